@@ -1,0 +1,29 @@
+//! The `corsmal-feat` command: parse arguments, run one command, turn its end into an exit code.
+
+mod commands;
+mod failure;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use commands::Command;
+
+/// Features of multi-channel recordings, classifiers, and the CORSMAL benchmark.
+#[derive(Parser)]
+#[command(name = "corsmal-feat", version, about, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match cli.command.run() {
+        Ok(code) => code,
+        Err(failure) => {
+            eprintln!("error: {failure}");
+            ExitCode::from(2)
+        }
+    }
+}

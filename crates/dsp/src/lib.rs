@@ -1,0 +1,13 @@
+//! Signal processing of corsmal-feat: arrays in, arrays out, librosa's definitions and names.
+//!
+//! Audio is `[channels, samples]`, spectrograms are `[channels, bins, frames]`; every channel is
+//! independent unless a function says that it takes a statistic over all of them. Functions are
+//! generic over [`Real`] (`f32` or `f64`) and keep the precision of their input.
+
+pub mod error;
+pub mod real;
+pub mod stft;
+pub mod window;
+
+pub use error::{DspError, Result};
+pub use real::Real;

@@ -1,0 +1,58 @@
+//! The two sample types, `f32` and `f64`.
+
+use num_traits::{Float, FromPrimitive, NumAssign};
+use rustfft::FftNum;
+
+use crate::error::{DspError, Result};
+
+/// A real sample type: `f32` or `f64`.
+///
+/// librosa keeps the precision of its input from end to end; functions of this crate are generic
+/// over `Real` for the same reason.
+pub trait Real: Float + FromPrimitive + NumAssign + FftNum + std::iter::Sum + Default {
+    /// Nearest value of this type.
+    fn of(x: f64) -> Self;
+    /// Exact widening.
+    fn wide(self) -> f64;
+    /// The slice as `f32` samples, where this is the `f32` type.
+    fn as_f32(slice: &[Self]) -> Option<&[f32]>;
+}
+
+impl Real for f32 {
+    #[inline(always)]
+    fn of(x: f64) -> Self {
+        x as f32
+    }
+    #[inline(always)]
+    fn wide(self) -> f64 {
+        f64::from(self)
+    }
+    fn as_f32(slice: &[Self]) -> Option<&[f32]> {
+        Some(slice)
+    }
+}
+
+impl Real for f64 {
+    #[inline(always)]
+    fn of(x: f64) -> Self {
+        x
+    }
+    #[inline(always)]
+    fn wide(self) -> f64 {
+        self
+    }
+    fn as_f32(_: &[Self]) -> Option<&[f32]> {
+        None
+    }
+}
+
+/// Refuses NaN and infinities, as librosa's `util.valid_audio` does.
+pub fn require_finite<'a, T: Real>(
+    name: &'static str,
+    values: impl IntoIterator<Item = &'a T>,
+) -> Result<()> {
+    match values.into_iter().position(|x| !x.is_finite()) {
+        None => Ok(()),
+        Some(index) => Err(DspError::NonFinite { name, index }),
+    }
+}

@@ -1,0 +1,25 @@
+//! The private extension module `corsmal_feat._core`.
+//!
+//! Functions take contiguous `[channels, samples]` or `[channels, rows, frames]` arrays; the typed
+//! Python front end (`python/corsmal_feat/`) checks, reshapes and gives librosa's signatures. One
+//! file per family, each with a `register`. The GIL is released while we compute.
+
+mod arrays;
+mod spectrum;
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+pyo3::create_exception!(_core, ParameterError, PyValueError, "A parameter or array was refused.");
+
+/// Any of our refusals as `ParameterError` (a `ValueError`).
+pub(crate) fn value_error(error: impl std::fmt::Display) -> PyErr {
+    ParameterError::new_err(error.to_string())
+}
+
+#[pymodule]
+fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    m.add("ParameterError", m.py().get_type::<ParameterError>())?;
+    spectrum::register(m)
+}

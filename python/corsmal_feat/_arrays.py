@@ -1,0 +1,50 @@
+"""Checks and shapes shared by all front-end functions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ._core import ParameterError
+
+Floats = npt.NDArray[np.float32] | npt.NDArray[np.float64]
+
+
+def floats(name: str, value: Any, min_ndim: int = 1) -> Floats:
+    """A finite float32 or float64 array; integers are refused with a hint, as librosa does."""
+    array = np.asarray(value)
+    if array.dtype not in (np.float32, np.float64):
+        hint = ""
+        if array.dtype.kind in "iu":
+            bits = 8 * array.dtype.itemsize - 1
+            hint = f"; divide {array.dtype} samples by 2**{bits} and cast to float32 first"
+        elif array.dtype == np.float16:
+            return floats(name, array.astype(np.float32), min_ndim)
+        raise ParameterError(
+            f"{name} has dtype {array.dtype}, expected float32 or float64{hint}"
+        )
+    if array.ndim < min_ndim:
+        raise ParameterError(
+            f"{name} has {array.ndim} dimensions, expected at least {min_ndim}"
+        )
+    return array
+
+
+def audio(y: Any) -> Floats:
+    """`y` [shape=(..., n)], finite."""
+    array = floats("y", y)
+    if not np.isfinite(array).all():
+        raise ParameterError("y holds NaN or infinite values")
+    return array
+
+
+def rows(array: Floats, keep: int) -> Floats:
+    """Leading axes flattened to one and the last `keep` axes kept, contiguous."""
+    return np.ascontiguousarray(array.reshape((-1, *array.shape[array.ndim - keep :])))
+
+
+def unrows(result: Any, like: Floats, keep: int) -> Any:
+    """`result` with the leading axes of `like` (whose last `keep` axes were data) put back."""
+    return result.reshape((*like.shape[: like.ndim - keep], *result.shape[1:]))
