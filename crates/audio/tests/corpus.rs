@@ -22,9 +22,7 @@ fn shared(what: &str) -> Option<PathBuf> {
 /// FNV-1a over the bits of the samples (little-endian), 64 bits.
 fn checksum(samples: &[f32]) -> u64 {
     let bytes = samples.iter().flat_map(|s| s.to_bits().to_le_bytes());
-    bytes.fold(0xcbf2_9ce4_8422_2325, |h, b| {
-        (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
+    bytes.fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3))
 }
 
 /// One line of the table: what the reader makes of the file.

@@ -31,17 +31,21 @@ pub(crate) struct Header {
     pub(crate) repairs: Vec<Repair>,
 }
 
-/// Whether a file that starts with these 12 bytes is for this reader.
+/// Whether a file that starts with these (up to 12) bytes is for this reader: a WAV, or cut off
+/// before it can be anything else.
 pub(crate) fn is_wav(start: &[u8]) -> bool {
-    let form = start.get(..4);
-    matches!(form, Some(b"RIFF" | b"RIFX" | b"RF64" | b"BW64")) && start.get(8..12) == Some(b"WAVE")
+    let form = matches!(start.get(..4), Some(b"RIFF" | b"RIFX" | b"RF64" | b"BW64"));
+    form && start.get(8..).is_none_or(|kind| b"WAVE".starts_with(kind) || kind.starts_with(b"WAVE"))
 }
 
 impl Header {
     /// Reads up to the first sample.
     pub(crate) fn read(input: &mut Input) -> Result<Self, AudioError> {
-        let mut form = [0; 4];
-        form.copy_from_slice(&input.peek(12)?[..4]);
+        let Some(&[f0, f1, f2, f3, ..]) = input.peek(12)?.first_chunk::<12>() else {
+            let actual = "the file ends inside the RIFF header";
+            return Err(AudioError::corrupt(0, actual, "12 bytes: id, size, WAVE"));
+        };
+        let form = [f0, f1, f2, f3];
         input.consume(12);
         let endian = if &form == b"RIFX" { Endian::Big } else { Endian::Little };
         let mut format = None;
@@ -66,17 +70,17 @@ impl Header {
                 };
                 return Self::finish(input, form, endian, format, size, long_size, repairs);
             }
-            let body = input.peek((size as usize).min(40))?;
-            let body = &body[..body.len().min(size as usize)];
+            let mut body = [0; 40];
+            let shown = input.peek((size as usize).min(body.len()))?;
+            let n = shown.len().min(body.len()).min(size as usize);
+            body[..n].copy_from_slice(&shown[..n]);
+            let body = &body[..n];
+            skip_chunk(input, at, id, size, &mut repairs)?;
             match &id {
-                b"fmt " => {
-                    let parsed = Format::parse(body, endian, at + 8)?;
-                    format = Some(parsed);
-                }
+                b"fmt " => format = Some(Format::parse(body, endian, at + 8)?),
                 b"ds64" => long_size = body.get(8..16).and_then(|b| b.try_into().ok()),
                 _ => {}
             }
-            skip_chunk(input, at, id, size, &mut repairs)?;
         }
         let at = input.position();
         Err(AudioError::corrupt(at, format!("{MAX_CHUNKS} chunks and no data"), "a data chunk"))
