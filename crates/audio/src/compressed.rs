@@ -5,12 +5,14 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
+use symphonia::core::codecs::audio::well_known::CODEC_ID_VORBIS;
 use symphonia::core::codecs::audio::{AudioCodecParameters, AudioDecoder, AudioDecoderOptions};
 use symphonia::core::errors::Error;
 use symphonia::core::formats::probe::Hint;
 use symphonia::core::formats::{FormatOptions, FormatReader, TrackType};
 use symphonia::core::io::{MediaSource, MediaSourceStream};
 use symphonia::core::meta::MetadataOptions;
+use symphonia::core::units::Timestamp;
 
 use crate::error::AudioError;
 use crate::input::{Input, Medium};
@@ -18,7 +20,7 @@ use crate::report::{ReadReport, Repair};
 use crate::source::{AudioSpec, BlockSource};
 use crate::wav::{MAX_CHANNELS, MAX_SAMPLE_RATE};
 
-const CODECS: &str = "FLAC, Vorbis or MP3, 1 to 64 channels, 1 to 768000 Hz";
+const CODECS: &str = "FLAC, MP3, Vorbis of 1 or 2 channels; 1 to 768000 Hz";
 
 /// Whether the first bytes are those of FLAC, Ogg, an ID3 tag or an MPEG audio frame.
 pub(crate) fn is_known(start: &[u8]) -> bool {
@@ -79,11 +81,17 @@ impl MediaSource for Bytes {
     }
 }
 
+/// Most channels of Vorbis: symphonia 0.6.1 undoes the coupling of channels in the wrong order
+/// (Vorbis I specification, 4.3.5: last step first), so that more than one pair comes out mixed up.
+const MAX_VORBIS_CHANNELS: u16 = 2;
+
 /// Demultiplexer and decoder of the first audio track.
 struct Track {
     format: Box<dyn FormatReader>,
     decoder: Box<dyn AudioDecoder>,
     id: u32,
+    /// Time stamp that the next packet should have, in frames.
+    expected: Option<Timestamp>,
 }
 
 /// Streams the samples of one compressed recording.
@@ -95,7 +103,10 @@ pub(crate) struct CompressedSource {
     block: Vec<f32>,
     start: usize,
     position: Arc<AtomicU64>,
-    skipped: u64,
+    /// Damaged or missing frames so far.
+    lost: u64,
+    /// An Ogg stream stopped without its last page.
+    unfinished: bool,
     report: ReadReport,
 }
 
@@ -109,19 +120,18 @@ impl CompressedSource {
             let medium = Mutex::new(medium);
             Bytes { prefix: Cursor::new(prefix), medium, len, position: position.clone() }
         };
-        guarded(|| open_track(bytes))
-            .and_then(|(track, spec)| {
-                Ok(Self {
-                    track: Some(track),
-                    spec: checked(spec)?,
-                    block: Vec::new(),
-                    start: 0,
-                    position: position.clone(),
-                    skipped: 0,
-                    report: ReadReport::default(),
-                })
-            })
-            .map_err(|failure| failure.at(position.load(Ordering::Relaxed)))
+        let (track, spec) = guarded(|| open_track(bytes))
+            .map_err(|failure| failure.at(position.load(Ordering::Relaxed)))?;
+        Ok(Self {
+            track: Some(track),
+            spec,
+            block: Vec::new(),
+            start: 0,
+            position,
+            lost: 0,
+            unfinished: false,
+            report: ReadReport::default(),
+        })
     }
 
     /// Decodes the next packet into `block`; false at the end.
@@ -131,49 +141,57 @@ impl CompressedSource {
         let Some(track) = self.track.as_mut() else {
             return Ok(false);
         };
-        let channels = usize::from(self.spec.channels);
         loop {
             let packet = match track.format.next_packet() {
                 Ok(Some(packet)) => packet,
                 Ok(None) => return Ok(false),
                 Err(Error::IoError(e)) if e.kind() == io::ErrorKind::UnexpectedEof => {
+                    self.unfinished = true;
                     return Ok(false);
+                }
+                Err(Error::ResetRequired) => {
+                    // Another link of a chained Ogg file.
+                    track.restart()?;
+                    continue;
                 }
                 Err(e) => return Err(e.into()),
             };
             if packet.track_id != track.id {
                 continue;
             }
-            match track.decoder.decode(&packet) {
-                Ok(audio) => {
-                    let (rate, planes) = (audio.spec().rate(), audio.num_planes());
-                    if audio.is_empty() {
-                        continue;
-                    }
-                    if rate != self.spec.sample_rate || planes != channels {
-                        let actual = format!("change to {planes} channels at {rate} Hz");
-                        return Err(Failure::Unsupported(actual));
-                    }
-                    audio.copy_to_vec_interleaved(&mut self.block);
-                    return Ok(true);
-                }
-                Err(Error::DecodeError(_)) => self.skipped += 1,
-                Err(e) => return Err(e.into()),
+            if let Some(gap) = track.expected.and_then(|t| packet.pts.duration_from(t)) {
+                self.lost += gap.get();
             }
+            track.expected = packet.pts.checked_add(packet.block_dur());
+            let audio = match track.decoder.decode(&packet) {
+                Ok(audio) if audio.is_empty() => continue,
+                Ok(audio) => audio,
+                Err(Error::DecodeError(_)) => {
+                    self.lost += packet.dur.get();
+                    continue;
+                }
+                Err(e) => return Err(e.into()),
+            };
+            let (rate, planes) = (audio.spec().rate(), audio.num_planes());
+            if rate != self.spec.sample_rate || planes != usize::from(self.spec.channels) {
+                let actual = format!("change to {planes} channels at {rate} Hz");
+                return Err(Failure::Unsupported(actual));
+            }
+            audio.copy_to_vec_interleaved(&mut self.block);
+            return Ok(true);
         }
     }
 
     /// Notes what is only known at the end.
     fn end(&mut self) {
         self.track = None;
-        let actual = self.report.decoded_frames;
-        if self.spec.declared_frames.is_some_and(|declared| actual < declared) {
-            self.report.truncated = true;
-            let declared = self.spec.declared_frames.unwrap_or_default();
-            self.report.repairs.push(Repair::Truncated { declared, actual });
+        if self.lost > 0 {
+            self.report.repairs.push(Repair::LostFrames { count: self.lost });
         }
-        if self.skipped > 0 {
-            self.report.repairs.push(Repair::SkippedPackets { count: self.skipped });
+        let (declared, actual) = (self.spec.declared_frames, self.report.decoded_frames);
+        if self.unfinished || declared.is_some_and(|n| actual.saturating_add(self.lost) < n) {
+            self.report.truncated = true;
+            self.report.repairs.push(Repair::Truncated { declared, actual });
         }
     }
 }
@@ -275,33 +293,45 @@ fn open_track(bytes: Bytes) -> Result<(Track, AudioSpec), Failure> {
         MetadataOptions::default(),
     )?;
     let container = format.format_info().short_name;
-    let track = format
-        .default_track(TrackType::Audio)
-        .ok_or_else(|| Failure::Unsupported("no audio track".into()))?;
-    let id = track.id;
-    let params = track.codec_params.as_ref().and_then(|p| p.audio());
-    let params: &AudioCodecParameters =
-        params.ok_or_else(|| Failure::Unsupported("an unknown codec".into()))?;
-    let decoder = symphonia::default::get_codecs()
-        .make_audio_decoder(params, &AudioDecoderOptions::default())?;
+    let (id, decoder, params) = first_audio(format.as_ref())?;
     let codec = decoder.codec_info().short_name;
-    let format_name =
-        if container == codec { codec.to_owned() } else { format!("{container} {codec}") };
     let channels = params.channels.as_ref().map_or(0, |c| c.count());
     let spec = AudioSpec {
         sample_rate: params.sample_rate.unwrap_or(0),
         channels: u16::try_from(channels).unwrap_or(u16::MAX),
-        format: format_name,
-        declared_frames: track.num_frames,
+        format: if container == codec { codec.into() } else { format!("{container} {codec}") },
+        declared_frames: format.default_track(TrackType::Audio).and_then(|t| t.num_frames),
     };
-    Ok((Track { format, decoder, id }, spec))
+    let fits = (1..=MAX_SAMPLE_RATE).contains(&spec.sample_rate)
+        && (1..=MAX_CHANNELS).contains(&spec.channels)
+        && (params.codec != CODEC_ID_VORBIS || spec.channels <= MAX_VORBIS_CHANNELS);
+    if !fits {
+        let AudioSpec { sample_rate, channels, format, .. } = spec;
+        let actual = format!("{format} of {channels} channels at {sample_rate} Hz");
+        return Err(Failure::Unsupported(actual));
+    }
+    Ok((Track { format, decoder, id, expected: None }, spec))
 }
 
-fn checked(spec: AudioSpec) -> Result<AudioSpec, Failure> {
-    let rate_fits = (1..=MAX_SAMPLE_RATE).contains(&spec.sample_rate);
-    if rate_fits && (1..=MAX_CHANNELS).contains(&spec.channels) {
-        return Ok(spec);
+impl Track {
+    /// Goes on with the track that the demultiplexer has now.
+    fn restart(&mut self) -> Result<(), Failure> {
+        (self.id, self.decoder, _) = first_audio(self.format.as_ref())?;
+        self.expected = None;
+        Ok(())
     }
-    let actual = format!("{} channels at {} Hz", spec.channels, spec.sample_rate);
-    Err(Failure::Unsupported(actual))
+}
+
+/// The first audio track with a decoder for it.
+fn first_audio(
+    format: &dyn FormatReader,
+) -> Result<(u32, Box<dyn AudioDecoder>, AudioCodecParameters), Failure> {
+    let track = format
+        .default_track(TrackType::Audio)
+        .ok_or_else(|| Failure::Unsupported("no audio track".into()))?;
+    let params = track.codec_params.as_ref().and_then(|p| p.audio());
+    let params = params.ok_or_else(|| Failure::Unsupported("an unknown codec".into()))?;
+    let decoder = symphonia::default::get_codecs()
+        .make_audio_decoder(params, &AudioDecoderOptions::default())?;
+    Ok((track.id, decoder, params.clone()))
 }

@@ -23,8 +23,8 @@ pub enum Repair {
     },
     /// The file ends before its data: the whole frames that are there were read.
     Truncated {
-        /// Frames that the header states.
-        declared: u64,
+        /// Frames that the header states; `None` where an Ogg stream just stops.
+        declared: Option<u64>,
         /// Whole frames that are there.
         actual: u64,
     },
@@ -45,9 +45,9 @@ pub enum Repair {
         /// Where the padding byte should be.
         offset: u64,
     },
-    /// Packets of a compressed stream that could not be decoded were left out.
-    SkippedPackets {
-        /// How many.
+    /// Frames inside a compressed stream that are damaged or missing were left out.
+    LostFrames {
+        /// How many, according to the time stamps.
         count: u64,
     },
 }
@@ -63,7 +63,7 @@ impl Repair {
             Self::PartialFrame { .. } => "partial_frame",
             Self::BlockAlign { .. } => "block_align",
             Self::MissingPadding { .. } => "missing_padding",
-            Self::SkippedPackets { .. } => "skipped_packets",
+            Self::LostFrames { .. } => "lost_frames",
         }
     }
 }
@@ -76,8 +76,11 @@ impl fmt::Display for Repair {
             Self::DataSizeWrapped { declared, used } => {
                 write!(f, "32-bit data size {declared} wrapped around, used {used}")
             }
-            Self::Truncated { declared, actual } => {
+            Self::Truncated { declared: Some(declared), actual } => {
                 write!(f, "the file ends after {actual} of {declared} frames")
+            }
+            Self::Truncated { declared: None, actual } => {
+                write!(f, "the stream stops after {actual} frames without its end mark")
             }
             Self::PartialFrame { bytes } => {
                 write!(f, "{bytes} bytes of an incomplete last frame left out")
@@ -88,7 +91,7 @@ impl fmt::Display for Repair {
             Self::MissingPadding { offset } => {
                 write!(f, "odd-sized chunk without padding at byte {offset}")
             }
-            Self::SkippedPackets { count } => write!(f, "{count} undecodable packets left out"),
+            Self::LostFrames { count } => write!(f, "{count} damaged or missing frames left out"),
         }
     }
 }

@@ -125,7 +125,7 @@ impl Header {
         let data_len = match (declared_len, available) {
             (Some(declared), Some(there)) if declared > there => {
                 let frame = format.frame_bytes();
-                let (declared, actual) = (declared / frame, there / frame);
+                let (declared, actual) = (Some(declared / frame), there / frame);
                 repairs.push(Repair::Truncated { declared, actual });
                 Some(there)
             }

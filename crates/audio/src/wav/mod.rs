@@ -82,7 +82,8 @@ impl WavSource {
             && !self.report.truncated
         {
             let frame = self.frame_bytes as u64;
-            self.note(Repair::Truncated { declared: declared / frame, actual: self.done / frame });
+            let (declared, actual) = (Some(declared / frame), self.done / frame);
+            self.note(Repair::Truncated { declared, actual });
             self.report.truncated = true;
         }
         if rest > 0 {
