@@ -7,6 +7,7 @@
 pub mod decibel;
 pub mod delta;
 pub mod error;
+pub mod lanes;
 pub mod mel;
 pub mod mfcc;
 pub mod real;
