@@ -4,8 +4,15 @@
 //! independent unless a function says that it takes a statistic over all of them. Functions are
 //! generic over [`Real`] (`f32` or `f64`) and keep the precision of their input.
 
+pub mod columns;
 pub mod error;
+pub mod frequency;
+mod lanes;
+pub mod mono;
+pub mod normalize;
+pub mod pitch;
 pub mod real;
+pub mod spectral;
 pub mod stft;
 pub mod window;
 
