@@ -5,15 +5,21 @@
 //! generic over [`Real`] (`f32` or `f64`) and keep the precision of their input.
 
 pub mod columns;
+pub mod decibel;
+pub mod delta;
 pub mod error;
 pub mod frequency;
-mod lanes;
+pub mod lanes;
+pub mod mel;
+pub mod mfcc;
 pub mod mono;
 pub mod normalize;
 pub mod pitch;
 pub mod real;
 pub mod spectral;
 pub mod stft;
+mod sums;
+pub mod time_domain;
 pub mod window;
 
 pub use error::{DspError, Result};

@@ -1,8 +1,8 @@
 //! Normalisation of vectors to unit length (librosa 0.11 `util.normalize`).
 
 use crate::error::{DspError, Result};
-use crate::lanes;
 use crate::real::Real;
+use crate::sums;
 
 /// How the length of a vector is measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,9 +44,9 @@ impl Norm {
             Self::Max => values.iter().fold(0.0, |m, x| magnitude(*x).max(m)),
             Self::Min => values.iter().fold(f64::INFINITY, |m, x| magnitude(*x).min(m)),
             Self::Count => values.iter().filter(|x| **x != T::zero()).count() as f64,
-            Self::P(1.0) => lanes::sum(values, magnitude),
-            Self::P(2.0) => lanes::sum(values, |x| x.wide() * x.wide()).sqrt(),
-            Self::P(p) => lanes::sum(values, |x| magnitude(x).powf(p)).powf(1.0 / p),
+            Self::P(1.0) => sums::sum(values, magnitude),
+            Self::P(2.0) => sums::sum(values, |x| x.wide() * x.wide()).sqrt(),
+            Self::P(p) => sums::sum(values, |x| magnitude(x).powf(p)).powf(1.0 / p),
         }
     }
 

@@ -330,7 +330,8 @@ mod tests {
     #[test]
     fn streaming_equals_the_whole() {
         let params = PitchParams::new(22050.0, 64);
-        let s = Array3::from_shape_fn((2, 33, 50), |(c, k, t)| ((c + 7 * k * k + 3 * t) % 29) as f32);
+        let s =
+            Array3::from_shape_fn((2, 33, 50), |(c, k, t)| ((c + 7 * k * k + 3 * t) % 29) as f32);
         let mut merged = TuningEstimator::new(params).unwrap();
         for channel in s.outer_iter() {
             let mut one = TuningEstimator::new(params).unwrap();

@@ -5,9 +5,9 @@ use ndarray::{Array3, ArrayView2, ArrayView3};
 use super::{Frequencies, centroid, require_magnitudes, require_non_negative};
 use crate::columns::map_columns;
 use crate::error::{DspError, Result};
-use crate::lanes;
 use crate::normalize::Norm;
 use crate::real::Real;
+use crate::sums;
 
 /// Parameters of the bandwidth.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,10 +40,10 @@ impl Bandwidth {
         let weight = |s: T| T::of(s.wide() / total).wide();
         if self.p == 2.0 {
             let square = |x: f64| x * x;
-            lanes::sum_pairs(magnitude, freqs, |s, f| weight(s) * square(f - centroid)).sqrt()
+            sums::sum_pairs(magnitude, freqs, |s, f| weight(s) * square(f - centroid)).sqrt()
         } else {
             let power = |x: f64| x.abs().powf(self.p);
-            lanes::sum_pairs(magnitude, freqs, |s, f| weight(s) * power(f - centroid))
+            sums::sum_pairs(magnitude, freqs, |s, f| weight(s) * power(f - centroid))
                 .powf(1.0 / self.p)
         }
     }

@@ -5,16 +5,16 @@ use ndarray::{Array3, ArrayView3};
 use super::{Frequencies, require_magnitudes};
 use crate::columns::map_columns;
 use crate::error::Result;
-use crate::lanes;
 use crate::normalize::Norm;
 use crate::real::Real;
+use crate::sums;
 
 /// Mean frequency in Hz of one spectrum, weighted by its magnitudes; 0 for silence.
 ///
 /// The weights are rounded to `T` after normalisation, as librosa stores them.
 pub fn centroid<T: Real>(magnitude: &[T], freqs: &[f64]) -> f64 {
     let total = Norm::P(1.0).divisor(magnitude);
-    lanes::sum_pairs(magnitude, freqs, |s, f| T::of(s.wide() / total).wide() * f)
+    sums::sum_pairs(magnitude, freqs, |s, f| T::of(s.wide() / total).wide() * f)
 }
 
 /// Centroid in Hz of every frame, `[channels, 1, frames]`.

@@ -5,8 +5,8 @@ use ndarray::{Array3, ArrayView3};
 use super::require_non_negative;
 use crate::columns::map_columns;
 use crate::error::{DspError, Result};
-use crate::lanes;
 use crate::real::Real;
+use crate::sums;
 
 /// Parameters of the flatness.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,7 +60,7 @@ impl Flatness {
                 group.iter().map(|s| floored(*s).ln()).sum()
             };
         }
-        T::of((logs / n).exp() / (lanes::sum(magnitude, floored) / n))
+        T::of((logs / n).exp() / (sums::sum(magnitude, floored) / n))
     }
 }
 

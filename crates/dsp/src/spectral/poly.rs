@@ -5,8 +5,8 @@ use ndarray::{Array3, ArrayView3};
 use super::Frequencies;
 use crate::columns::map_columns;
 use crate::error::{DspError, Result};
-use crate::lanes;
 use crate::real::{Real, require_finite};
+use crate::sums;
 
 const MAX_ORDER: usize = 256;
 
@@ -76,13 +76,13 @@ impl Poly {
     /// Coefficients of one spectrum, highest degree first, into `out` of [`rows`](Self::rows).
     pub fn fit<T: Real>(&self, magnitude: &[T], out: &mut [f64]) {
         for (slot, row) in out.iter_mut().zip(&self.inverse) {
-            *slot = lanes::sum_pairs(magnitude, row, |s, w| s.wide() * w);
+            *slot = sums::sum_pairs(magnitude, row, |s, w| s.wide() * w);
         }
     }
 }
 
 fn norm(column: &[f64]) -> f64 {
-    lanes::sum(column, |x| x * x).sqrt()
+    sums::sum(column, |x| x * x).sqrt()
 }
 
 /// One-sided Jacobi: rotates columns until they are orthogonal and returns the rotations `V`, by
@@ -96,7 +96,7 @@ fn orthogonalise(columns: &mut [Vec<f64>]) -> Vec<Vec<f64>> {
         let mut rotated = false;
         for i in 0..m {
             for j in i + 1..m {
-                let dot = lanes::sum_pairs(&columns[i], &columns[j], |a, b| a * b);
+                let dot = sums::sum_pairs(&columns[i], &columns[j], |a, b| a * b);
                 let (a, b) = (norm(&columns[i]), norm(&columns[j]));
                 if dot.abs() <= f64::EPSILON * a * b {
                     continue;
