@@ -11,6 +11,7 @@ pub mod delta;
 pub mod error;
 pub mod frequency;
 pub mod lanes;
+mod log2;
 pub mod mel;
 pub mod mfcc;
 pub mod mono;
