@@ -5,6 +5,8 @@
 //! generic over [`Real`] (`f32` or `f64`) and keep the precision of their input.
 
 pub mod error;
+pub mod lanes;
+pub mod median;
 pub mod real;
 pub mod stft;
 pub mod window;
