@@ -5,10 +5,13 @@
 //! generic over [`Real`] (`f32` or `f64`) and keep the precision of their input.
 
 pub mod error;
-pub mod lanes;
+pub mod hpss;
+pub mod istft;
 pub mod median;
 pub mod real;
 pub mod stft;
+pub mod transform;
+pub mod vector;
 pub mod window;
 
 pub use error::{DspError, Result};

@@ -9,8 +9,8 @@ use ndarray::{ArrayView2, ArrayViewMut2};
 use pulp::bytemuck::{cast_slice, cast_slice_mut};
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::lanes::Lane;
 use crate::stft::PadMode;
+use crate::vector::Lane;
 
 /// Window length of the sorting network, librosa's default for both HPSS filters.
 const NETWORK: usize = 31;
