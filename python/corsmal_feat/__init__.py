@@ -1,7 +1,15 @@
 """Acoustic features in librosa's vocabulary, computed in Rust; classifiers; the CORSMAL benchmark."""
 
-from . import filters
+from . import feature, filters
 from ._core import ParameterError, __version__
-from .spectrum import stft
+from .spectrum import amplitude_to_db, power_to_db, stft
 
-__all__ = ["ParameterError", "__version__", "filters", "stft"]
+__all__ = [
+    "ParameterError",
+    "__version__",
+    "amplitude_to_db",
+    "feature",
+    "filters",
+    "power_to_db",
+    "stft",
+]
