@@ -1,9 +1,11 @@
 //! Mel scale and filter bank (librosa 0.11 `filters.mel`, `feature.melspectrogram`).
 
 use ndarray::{Array2, Array3, ArrayView3, Axis};
+use pulp::Arch;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{DspError, Result};
+use crate::lanes::{LANES, Row};
 use crate::real::Real;
 
 /// Normalisation of each mel filter.
@@ -192,6 +194,24 @@ impl SparseBank {
     /// For each band its first bin and weights.
     pub fn bands(&self) -> &[(usize, Vec<f32>)] {
         &self.bands
+    }
+
+    /// `bank @ power` for the rows of one lane block, `[bins] -> [bands]`.
+    pub fn apply_rows(&self, arch: Arch, power: &[Row], out: &mut [Row]) {
+        arch.dispatch(
+            #[inline(always)]
+            || {
+                for ((first, weights), out) in self.bands.iter().zip(out) {
+                    let mut sum = [0.0; LANES];
+                    for (w, row) in weights.iter().zip(&power[*first..]) {
+                        for (sum, x) in sum.iter_mut().zip(&row.0) {
+                            *sum += w * x;
+                        }
+                    }
+                    out.0 = sum;
+                }
+            },
+        );
     }
 
     /// `bank @ spectrum` for `spectrum [channels, bins, frames]`.
