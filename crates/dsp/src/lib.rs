@@ -6,6 +6,7 @@
 
 pub mod chroma;
 pub mod columns;
+pub mod cqt;
 pub mod decibel;
 pub mod delta;
 pub mod error;
@@ -25,6 +26,7 @@ pub mod spectral;
 pub mod stft;
 mod sums;
 pub mod time_domain;
+pub mod tonnetz;
 pub mod transform;
 pub mod vector;
 pub mod window;

@@ -19,6 +19,8 @@ pub trait Lane: Real + Pod {
     fn store<S: Simd>(simd: S, to: &mut [Self], v: Self::V<S>);
     /// The same value in every lane.
     fn splat<S: Simd>(simd: S, value: Self) -> Self::V<S>;
+    /// `a * b + c`, with one rounding where that is faster.
+    fn multiply_add<S: Simd>(simd: S, a: Self::V<S>, b: Self::V<S>, c: Self::V<S>) -> Self::V<S>;
     /// Smaller value per lane.
     fn lower<S: Simd>(simd: S, a: Self::V<S>, b: Self::V<S>) -> Self::V<S>;
     /// Larger value per lane.
@@ -34,7 +36,7 @@ pub trait Lane: Real + Pod {
 }
 
 macro_rules! lane {
-    ($t:ident, $v:ident, $lanes:ident, $load:ident, $store:ident, $splat:ident, $min:ident, $max:ident, $less:ident, $select:ident) => {
+    ($t:ident, $v:ident, $lanes:ident, $load:ident, $store:ident, $splat:ident, $mul_add:ident, $min:ident, $max:ident, $less:ident, $select:ident) => {
         impl Lane for $t {
             type V<S: Simd> = S::$v;
             #[inline(always)]
@@ -49,6 +51,10 @@ macro_rules! lane {
             #[inline(always)]
             fn splat<S: Simd>(simd: S, value: Self) -> S::$v {
                 simd.$splat(value)
+            }
+            #[inline(always)]
+            fn multiply_add<S: Simd>(simd: S, a: S::$v, b: S::$v, c: S::$v) -> S::$v {
+                simd.$mul_add(a, b, c)
             }
             #[inline(always)]
             fn lower<S: Simd>(simd: S, a: S::$v, b: S::$v) -> S::$v {
@@ -73,6 +79,7 @@ lane!(
     partial_load_f32s,
     partial_store_f32s,
     splat_f32s,
+    mul_add_e_f32s,
     min_f32s,
     max_f32s,
     less_than_f32s,
@@ -85,6 +92,7 @@ lane!(
     partial_load_f64s,
     partial_store_f64s,
     splat_f64s,
+    mul_add_e_f64s,
     min_f64s,
     max_f64s,
     less_than_f64s,
