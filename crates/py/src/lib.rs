@@ -5,7 +5,10 @@
 //! file per family, each with a `register`. The GIL is released while we compute.
 
 mod arrays;
+mod chroma;
 mod mel;
+mod onset;
+mod spectral;
 mod spectrum;
 mod time_domain;
 
@@ -25,5 +28,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("ParameterError", m.py().get_type::<ParameterError>())?;
     spectrum::register(m)?;
     mel::register(m)?;
-    time_domain::register(m)
+    time_domain::register(m)?;
+    spectral::register(m)?;
+    chroma::register(m)?;
+    onset::register(m)
 }
