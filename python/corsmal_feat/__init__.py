@@ -2,6 +2,7 @@
 
 from . import filters
 from ._core import ParameterError, __version__
+from ._resample import resample
 from .spectrum import stft
 
-__all__ = ["ParameterError", "__version__", "filters", "stft"]
+__all__ = ["ParameterError", "__version__", "filters", "resample", "stft"]

@@ -6,6 +6,7 @@
 
 pub mod error;
 pub mod real;
+pub mod resample;
 pub mod stft;
 pub mod window;
 
