@@ -125,16 +125,15 @@ impl ResamplePlan {
         start: u64,
     ) -> Result<Vec<f32>> {
         check_interleaved(channels, input)?;
-        let mut needed = vec![out.start as i64..out.end as i64];
+        let mut range = out.start as i64..out.end as i64;
+        let mut steps = Vec::with_capacity(self.stages.len());
         for stage in self.stages.iter().rev() {
-            let inner = needed.last().map(clip).unwrap_or(0..0);
-            needed.push(stage.input_range(&inner));
+            let from = stage.input_range(&clip(&range));
+            steps.push((stage, std::mem::replace(&mut range, from.clone()), from));
         }
-        needed.reverse();
-        let mut data = covering(channels, &needed[0], input, start as i64);
-        for (stage, pair) in self.stages.iter().zip(needed.windows(2)) {
-            let [from, to] = pair else { continue };
-            let out = clip(to);
+        let mut data = covering(channels, &range, input, start as i64);
+        for (stage, to, from) in steps.into_iter().rev() {
+            let out = clip(&to);
             let mut next = vec![0.0; (out.start as i64 - to.start) as usize * channels];
             if !out.is_empty() {
                 let input = Frames { data: &data, start: from.start };
@@ -192,7 +191,7 @@ pub fn resample<T: Real>(
     scale: bool,
 ) -> Result<Array2<T>> {
     check_rates(orig_sr, target_sr)?;
-    require_finite("y", &y)?;
+    require_finite("y", y)?;
     if orig_sr == target_sr {
         return Ok(y.to_owned());
     }
