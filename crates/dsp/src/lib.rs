@@ -5,8 +5,11 @@
 //! generic over [`Real`] (`f32` or `f64`) and keep the precision of their input.
 
 pub mod error;
+pub mod paa;
+pub mod pca;
 pub mod real;
 pub mod resample;
+pub mod resize;
 pub mod stft;
 pub mod window;
 
