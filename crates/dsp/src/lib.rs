@@ -4,13 +4,19 @@
 //! independent unless a function says that it takes a statistic over all of them. Functions are
 //! generic over [`Real`] (`f32` or `f64`) and keep the precision of their input.
 
+pub mod decibel;
+pub mod delta;
 pub mod error;
 pub mod paa;
 pub mod pca;
+pub mod lanes;
+pub mod mel;
+pub mod mfcc;
 pub mod real;
 pub mod resample;
 pub mod resize;
 pub mod stft;
+pub mod time_domain;
 pub mod window;
 
 pub use error::{DspError, Result};

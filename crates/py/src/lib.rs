@@ -5,8 +5,11 @@
 //! file per family, each with a `register`. The GIL is released while we compute.
 
 mod arrays;
+mod compound;
+mod mel;
 mod resample;
 mod spectrum;
+mod time_domain;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -22,6 +25,9 @@ pub(crate) fn value_error(error: impl std::fmt::Display) -> PyErr {
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add("ParameterError", m.py().get_type::<ParameterError>())?;
+    spectrum::register(m)?;
+    mel::register(m)?;
+    time_domain::register(m)?;
     resample::register(m)?;
-    spectrum::register(m)
+    compound::register(m)
 }
