@@ -5,9 +5,12 @@
 //! file per family, each with a `register`. The GIL is released while we compute.
 
 mod arrays;
+mod chroma;
 mod compound;
 mod mel;
+mod onset;
 mod resample;
+mod spectral;
 mod spectrum;
 mod time_domain;
 
@@ -29,5 +32,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     mel::register(m)?;
     time_domain::register(m)?;
     resample::register(m)?;
-    compound::register(m)
+    compound::register(m)?;
+    spectral::register(m)?;
+    chroma::register(m)?;
+    onset::register(m)
 }
