@@ -4,6 +4,7 @@ from . import corsmal, feature, filters, onset
 from ._core import ParameterError, __version__
 from ._mono import to_mono
 from ._pitch import estimate_tuning, piptrack, pitch_tuning
+from ._resample import resample
 from .spectrum import amplitude_to_db, power_to_db, stft
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "piptrack",
     "pitch_tuning",
     "power_to_db",
+    "resample",
     "stft",
     "to_mono",
 ]

@@ -6,8 +6,10 @@
 
 mod arrays;
 mod chroma;
+mod compound;
 mod mel;
 mod onset;
+mod resample;
 mod spectral;
 mod spectrum;
 mod time_domain;
@@ -29,6 +31,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     spectrum::register(m)?;
     mel::register(m)?;
     time_domain::register(m)?;
+    resample::register(m)?;
+    compound::register(m)?;
     spectral::register(m)?;
     chroma::register(m)?;
     onset::register(m)
