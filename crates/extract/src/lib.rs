@@ -1,1 +1,6 @@
 //! placeholder
+
+pub mod identity;
+pub mod npy;
+pub mod npz;
+pub mod outcome;
