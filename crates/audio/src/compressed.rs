@@ -1,0 +1,307 @@
+//! FLAC, Ogg Vorbis and MP3, demultiplexed and decoded by symphonia.
+
+use std::io::{self, Cursor, Read, Seek, SeekFrom};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+
+use symphonia::core::codecs::audio::{AudioCodecParameters, AudioDecoder, AudioDecoderOptions};
+use symphonia::core::errors::Error;
+use symphonia::core::formats::probe::Hint;
+use symphonia::core::formats::{FormatOptions, FormatReader, TrackType};
+use symphonia::core::io::{MediaSource, MediaSourceStream};
+use symphonia::core::meta::MetadataOptions;
+
+use crate::error::AudioError;
+use crate::input::{Input, Medium};
+use crate::report::{ReadReport, Repair};
+use crate::source::{AudioSpec, BlockSource};
+use crate::wav::{MAX_CHANNELS, MAX_SAMPLE_RATE};
+
+const CODECS: &str = "FLAC, Vorbis or MP3, 1 to 64 channels, 1 to 768000 Hz";
+
+/// Whether the first bytes are those of FLAC, Ogg, an ID3 tag or an MPEG audio frame.
+pub(crate) fn is_known(start: &[u8]) -> bool {
+    let mpeg = |b: &[u8]| match *b {
+        // Sync word, then neither the reserved version nor the reserved layer.
+        [0xff, b, ..] => b & 0xe0 == 0xe0 && b & 0x18 != 0x08 && b & 0x06 != 0,
+        _ => false,
+    };
+    start.starts_with(b"fLaC")
+        || start.starts_with(b"OggS")
+        || start.starts_with(b"ID3")
+        || mpeg(start)
+}
+
+/// The input as symphonia wants it: seekable where it is, and shareable between threads, which
+/// the mutex (never contended) provides.
+struct Bytes {
+    /// What was read of a pipe before it came here.
+    prefix: Cursor<Vec<u8>>,
+    medium: Mutex<Box<dyn Medium>>,
+    len: Option<u64>,
+    position: Arc<AtomicU64>,
+}
+
+impl Read for Bytes {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let mut n = self.prefix.read(out)?;
+        if n == 0 {
+            n = self.medium.get_mut().map_err(|_| io::ErrorKind::Other)?.read(out)?;
+        }
+        self.position.fetch_add(n as u64, Ordering::Relaxed);
+        Ok(n)
+    }
+}
+
+impl Seek for Bytes {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let len = self.len.ok_or(io::ErrorKind::Unsupported)?;
+        let target = match to {
+            SeekFrom::Start(n) => Some(n),
+            SeekFrom::End(d) => len.checked_add_signed(d),
+            SeekFrom::Current(d) => self.position.load(Ordering::Relaxed).checked_add_signed(d),
+        };
+        let target = target.ok_or(io::ErrorKind::InvalidInput)?;
+        self.medium.get_mut().map_err(|_| io::ErrorKind::Other)?.jump(target)?;
+        self.position.store(target, Ordering::Relaxed);
+        Ok(target)
+    }
+}
+
+impl MediaSource for Bytes {
+    fn is_seekable(&self) -> bool {
+        self.len.is_some()
+    }
+
+    fn byte_len(&self) -> Option<u64> {
+        self.len
+    }
+}
+
+/// Demultiplexer and decoder of the first audio track.
+struct Track {
+    format: Box<dyn FormatReader>,
+    decoder: Box<dyn AudioDecoder>,
+    id: u32,
+}
+
+/// Streams the samples of one compressed recording.
+pub(crate) struct CompressedSource {
+    /// `None` once the end or an error was met.
+    track: Option<Track>,
+    spec: AudioSpec,
+    /// Decoded samples, interleaved; those from `start` on are not handed out yet.
+    block: Vec<f32>,
+    start: usize,
+    position: Arc<AtomicU64>,
+    skipped: u64,
+    report: ReadReport,
+}
+
+impl CompressedSource {
+    /// Reads headers from the start of `input`, of which nothing was consumed.
+    pub(crate) fn new(input: Input) -> Result<Self, AudioError> {
+        let position = Arc::new(AtomicU64::new(0));
+        let bytes = {
+            let len = input.len();
+            let (prefix, medium) = input.into_unread()?;
+            let medium = Mutex::new(medium);
+            Bytes { prefix: Cursor::new(prefix), medium, len, position: position.clone() }
+        };
+        guarded(|| open_track(bytes))
+            .and_then(|(track, spec)| {
+                Ok(Self {
+                    track: Some(track),
+                    spec: checked(spec)?,
+                    block: Vec::new(),
+                    start: 0,
+                    position: position.clone(),
+                    skipped: 0,
+                    report: ReadReport::default(),
+                })
+            })
+            .map_err(|failure| failure.at(position.load(Ordering::Relaxed)))
+    }
+
+    /// Decodes the next packet into `block`; false at the end.
+    fn refill(&mut self) -> Result<bool, Failure> {
+        self.block.clear();
+        self.start = 0;
+        let Some(track) = self.track.as_mut() else {
+            return Ok(false);
+        };
+        let channels = usize::from(self.spec.channels);
+        loop {
+            let packet = match track.format.next_packet() {
+                Ok(Some(packet)) => packet,
+                Ok(None) => return Ok(false),
+                Err(Error::IoError(e)) if e.kind() == io::ErrorKind::UnexpectedEof => {
+                    return Ok(false);
+                }
+                Err(e) => return Err(e.into()),
+            };
+            if packet.track_id != track.id {
+                continue;
+            }
+            match track.decoder.decode(&packet) {
+                Ok(audio) => {
+                    let (rate, planes) = (audio.spec().rate(), audio.num_planes());
+                    if audio.is_empty() {
+                        continue;
+                    }
+                    if rate != self.spec.sample_rate || planes != channels {
+                        let actual = format!("change to {planes} channels at {rate} Hz");
+                        return Err(Failure::Unsupported(actual));
+                    }
+                    audio.copy_to_vec_interleaved(&mut self.block);
+                    return Ok(true);
+                }
+                Err(Error::DecodeError(_)) => self.skipped += 1,
+                Err(e) => return Err(e.into()),
+            }
+        }
+    }
+
+    /// Notes what is only known at the end.
+    fn end(&mut self) {
+        self.track = None;
+        let actual = self.report.decoded_frames;
+        if self.spec.declared_frames.is_some_and(|declared| actual < declared) {
+            self.report.truncated = true;
+            let declared = self.spec.declared_frames.unwrap_or_default();
+            self.report.repairs.push(Repair::Truncated { declared, actual });
+        }
+        if self.skipped > 0 {
+            self.report.repairs.push(Repair::SkippedPackets { count: self.skipped });
+        }
+    }
+}
+
+impl BlockSource for CompressedSource {
+    fn spec(&self) -> &AudioSpec {
+        &self.spec
+    }
+
+    fn read(&mut self, out: &mut [f32]) -> Result<usize, AudioError> {
+        let channels = usize::from(self.spec.channels);
+        let wanted = out.len() / channels * channels;
+        let mut done = 0;
+        while done < wanted {
+            if self.start == self.block.len() {
+                if self.track.is_none() {
+                    break;
+                }
+                match guarded(|| self.refill()) {
+                    Ok(true) => {}
+                    Ok(false) => {
+                        self.report.decoded_frames += (done / channels) as u64;
+                        self.end();
+                        return Ok(done / channels);
+                    }
+                    Err(failure) => {
+                        self.track = None;
+                        return Err(failure.at(self.position.load(Ordering::Relaxed)));
+                    }
+                }
+            }
+            let n = (self.block.len() - self.start).min(wanted - done);
+            out[done..done + n].copy_from_slice(&self.block[self.start..self.start + n]);
+            self.start += n;
+            done += n;
+        }
+        self.report.decoded_frames += (done / channels) as u64;
+        Ok(done / channels)
+    }
+
+    fn seekable(&self) -> bool {
+        false
+    }
+
+    fn seek(&mut self, _: u64) -> Result<(), AudioError> {
+        Err(AudioError::NotSeekable)
+    }
+
+    fn health(&self) -> &ReadReport {
+        &self.report
+    }
+}
+
+/// An error that does not know its byte yet.
+enum Failure {
+    Io(io::Error),
+    Unsupported(String),
+    Corrupt(String),
+}
+
+impl Failure {
+    /// The byte up to which symphonia has read; the cause lies at or shortly before it.
+    fn at(self, offset: u64) -> AudioError {
+        match self {
+            Self::Io(source) => AudioError::Io { offset, source },
+            Self::Unsupported(actual) => AudioError::unsupported(offset, actual, CODECS),
+            Self::Corrupt(actual) => AudioError::corrupt(offset, actual, "a decodable stream"),
+        }
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::IoError(e) if e.kind() == io::ErrorKind::UnexpectedEof => {
+                Self::Corrupt("the file ends too early".into())
+            }
+            // The stream reports its own inconsistencies in this way, too.
+            Error::IoError(e) if e.kind() == io::ErrorKind::Other => Self::Corrupt(e.to_string()),
+            Error::IoError(e) => Self::Io(e),
+            Error::Unsupported(what) => Self::Unsupported(what.into()),
+            other => Self::Corrupt(other.to_string()),
+        }
+    }
+}
+
+/// Runs foreign code; a panic in it is a corrupt file to us.
+fn guarded<T>(f: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
+    catch_unwind(AssertUnwindSafe(f))
+        .unwrap_or_else(|_| Err(Failure::Corrupt("the decoder gave up (panicked)".into())))
+}
+
+fn open_track(bytes: Bytes) -> Result<(Track, AudioSpec), Failure> {
+    let stream = MediaSourceStream::new(Box::new(bytes), Default::default());
+    let format = symphonia::default::get_probe().probe(
+        &Hint::new(),
+        stream,
+        FormatOptions::default(),
+        MetadataOptions::default(),
+    )?;
+    let container = format.format_info().short_name;
+    let track = format
+        .default_track(TrackType::Audio)
+        .ok_or_else(|| Failure::Unsupported("no audio track".into()))?;
+    let id = track.id;
+    let params = track.codec_params.as_ref().and_then(|p| p.audio());
+    let params: &AudioCodecParameters =
+        params.ok_or_else(|| Failure::Unsupported("an unknown codec".into()))?;
+    let decoder = symphonia::default::get_codecs()
+        .make_audio_decoder(params, &AudioDecoderOptions::default())?;
+    let codec = decoder.codec_info().short_name;
+    let format_name =
+        if container == codec { codec.to_owned() } else { format!("{container} {codec}") };
+    let channels = params.channels.as_ref().map_or(0, |c| c.count());
+    let spec = AudioSpec {
+        sample_rate: params.sample_rate.unwrap_or(0),
+        channels: u16::try_from(channels).unwrap_or(u16::MAX),
+        format: format_name,
+        declared_frames: track.num_frames,
+    };
+    Ok((Track { format, decoder, id }, spec))
+}
+
+fn checked(spec: AudioSpec) -> Result<AudioSpec, Failure> {
+    let rate_fits = (1..=MAX_SAMPLE_RATE).contains(&spec.sample_rate);
+    if rate_fits && (1..=MAX_CHANNELS).contains(&spec.channels) {
+        return Ok(spec);
+    }
+    let actual = format!("{} channels at {} Hz", spec.channels, spec.sample_rate);
+    Err(Failure::Unsupported(actual))
+}
