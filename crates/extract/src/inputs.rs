@@ -70,7 +70,9 @@ pub enum InputError {
         reason: String,
     },
     /// Two inputs cannot be told apart.
-    #[error("{first} and {second} both have the id {id:?}; name each once, or give ids in a manifest")]
+    #[error(
+        "{first} and {second} both have the id {id:?}; name each once, or give ids in a manifest"
+    )]
     Duplicate {
         /// The id.
         id: String,
@@ -209,7 +211,8 @@ impl FromStr for Shard {
 
     /// Reads `i/n`, counted from 0.
     fn from_str(text: &str) -> Result<Self, InputError> {
-        let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        let parts =
+            text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
         match parts {
             Some((index, count)) if index < count => Ok(Self { index, count }),
             _ => Err(InputError::Shard { value: text.into() }),
@@ -283,8 +286,7 @@ fn find(name: &str, found: &mut Vec<Found>) -> Result<(), InputError> {
 
 fn find_manifest(path: &Path, found: &mut Vec<Found>) -> Result<(), InputError> {
     for entry in manifest::read(path)? {
-        let wrong =
-            |reason| InputError::Manifest { path: path.into(), line: entry.line, reason };
+        let wrong = |reason| InputError::Manifest { path: path.into(), line: entry.line, reason };
         match std::fs::metadata(&entry.path) {
             Ok(meta) if meta.is_dir() => {
                 return Err(wrong(format!("{} is a folder", entry.path.display())));
@@ -316,12 +318,14 @@ fn find_glob(pattern: &str, found: &mut Vec<Found>) -> Result<(), InputError> {
         .map_err(|e| InputError::Glob { pattern: pattern.into(), reason: e.to_string() })?;
     let mut files = Vec::new();
     for path in matches {
-        let path = path.map_err(|e| InputError::io(&e.path().to_path_buf(), e.into_error()))?;
+        let path = path.map_err(|e| {
+            let at = e.path().to_path_buf();
+            InputError::io(&at, e.into())
+        })?;
         walk(&path, &mut files)?;
     }
-    let is_literal = |part: &Component<'_>| {
-        !part.as_os_str().to_string_lossy().contains(['*', '?', '['])
-    };
+    let is_literal =
+        |part: &Component<'_>| !part.as_os_str().to_string_lossy().contains(['*', '?', '[']);
     let root: PathBuf = Path::new(pattern).components().take_while(is_literal).collect();
     push_sorted(pattern, &root, files, found)
 }

@@ -1,6 +1,12 @@
 //! placeholder
 
 pub mod identity;
+pub mod inputs;
+pub mod layout;
+pub mod ledger;
+pub mod manifest;
 pub mod npy;
 pub mod npz;
 pub mod outcome;
+pub mod provenance;
+pub mod table;

@@ -81,7 +81,11 @@ fn csv_rows(path: &Path) -> Result<Vec<Row>, InputError> {
     }
     for (index, name) in columns.iter().enumerate() {
         if name.is_empty() || columns[..index].contains(name) {
-            return Err(wrong(path, 1, format!("column {} ({name:?}) has no name of its own", index + 1)));
+            return Err(wrong(
+                path,
+                1,
+                format!("column {} ({name:?}) has no name of its own", index + 1),
+            ));
         }
     }
     let mut rows = Vec::new();
@@ -169,7 +173,9 @@ impl<'de> Deserialize<'de> for Object {
                 let mut fields: Vec<(String, Value)> = Vec::new();
                 while let Some((name, value)) = map.next_entry::<String, Value>()? {
                     if name.is_empty() || fields.iter().any(|(other, _)| *other == name) {
-                        return Err(A::Error::custom(format!("key {name:?} has no name of its own")));
+                        return Err(A::Error::custom(format!(
+                            "key {name:?} has no name of its own"
+                        )));
                     }
                     fields.push((name, value));
                 }

@@ -33,7 +33,9 @@ pub enum NpyError {
         actual: String,
     },
     /// The element type is not one that is read here.
-    #[error("element type {descr:?} is not read; expected one of b1, i1-i8, u1-u8, f4, f8, c8, c16, U")]
+    #[error(
+        "element type {descr:?} is not read; expected one of b1, i1-i8, u1-u8, f4, f8, c8, c16, U"
+    )]
     DType {
         /// The `descr` of the header.
         descr: String,
@@ -208,10 +210,8 @@ impl Header {
             several => format!("({})", several.join(", ")),
         };
         let order = if self.order == Order::Fortran { "True" } else { "False" };
-        let mut text = format!(
-            "{{'descr': '{}', 'fortran_order': {order}, 'shape': {shape}, }}",
-            self.dtype
-        );
+        let mut text =
+            format!("{{'descr': '{}', 'fortran_order': {order}, 'shape': {shape}, }}", self.dtype);
         // 64 axes of 20 digits stay far below the 65,535 bytes of version 1.0.
         let unpadded = MAGIC.len() + 4 + text.len() + 1;
         text.extend(std::iter::repeat_n(' ', unpadded.next_multiple_of(ALIGNMENT) - unpadded));
@@ -231,7 +231,11 @@ impl Header {
         let mut front = [0u8; 8];
         read_exact(reader, &mut front, 0)?;
         if &front[..6] != MAGIC {
-            return Err(malformed(0, "the magic bytes \\x93NUMPY", format!("{:02x?}", &front[..6])));
+            return Err(malformed(
+                0,
+                "the magic bytes \\x93NUMPY",
+                format!("{:02x?}", &front[..6]),
+            ));
         }
         let length_bytes = match front[6] {
             1 => 2,

@@ -54,7 +54,11 @@ pub(super) fn assign(found: &[Found]) -> Result<Vec<String>, InputError> {
             }
         }
         if !changed {
-            return Ok(forms.into_iter().zip(levels).map(|(mut f, level)| f.swap_remove(level)).collect());
+            return Ok(forms
+                .into_iter()
+                .zip(levels)
+                .map(|(mut f, level)| f.swap_remove(level))
+                .collect());
         }
     }
 }
@@ -71,7 +75,7 @@ fn forms(found: &Found) -> Vec<String> {
             }
             forms.retain(|id| !id.ends_with(NPY));
             if forms.is_empty() {
-                forms.push(id_of(&relative.with_extension("npy_")));
+                forms.push(format!("{}_", id_of(relative)));
             }
             forms
         }

@@ -11,7 +11,6 @@ mod sink;
 mod sound;
 pub mod writer;
 
-
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
@@ -75,7 +74,7 @@ pub enum NpzError {
 }
 
 impl NpzError {
-    fn io(path: &Path, source: std::io::Error) -> Self {
+    pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
         Self::Io { path: path.to_path_buf(), source }
     }
 
@@ -83,7 +82,7 @@ impl NpzError {
         Self::Npy { path: path.to_path_buf(), member: member.to_string(), source }
     }
 
-    fn member(
+    pub(crate) fn member(
         path: &Path,
         member: &str,
         expected: impl std::fmt::Display,

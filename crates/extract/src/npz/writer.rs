@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::NpzError;
-use super::sink::Sink;
 use super::headers::{self, Zip64};
+use super::sink::Sink;
 use crate::npy::{DType, Header};
 
 /// Bytes copied at a time from a stream.
