@@ -96,3 +96,6 @@ impl NpzError {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
