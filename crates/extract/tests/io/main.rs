@@ -1,0 +1,6 @@
+//! Black-box tests of what goes into a run and what comes out of it.
+
+mod inputs;
+mod outputs;
+mod resume;
+mod support;
