@@ -6,6 +6,7 @@
 
 mod decode;
 mod headers;
+mod packed;
 pub mod reader;
 mod sink;
 mod sound;
@@ -17,6 +18,7 @@ use thiserror::Error;
 
 use crate::npy::NpyError;
 
+pub use packed::Packed;
 pub use reader::NpzFile;
 pub use sound::sound_entries;
 pub use writer::{Compression, EntryRecord, NpzWriter};

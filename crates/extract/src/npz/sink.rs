@@ -1,6 +1,5 @@
-//! Counts, checks and, if asked, deflates the bytes of one entry on their way to the file.
+//! Counts, checks and, if asked, deflates the bytes of one entry on their way out.
 
-use std::fs::File;
 use std::io::{self, BufWriter, Write};
 
 use flate2::write::DeflateEncoder;
@@ -12,27 +11,28 @@ const LEVEL: u32 = 6;
 /// Small pieces are gathered to writes of this size.
 const BUFFER: usize = 1 << 20;
 
-pub(super) struct Sink<'a> {
-    body: Body<'a>,
+pub(super) struct Sink<W: Write> {
+    body: Body<W>,
     crc: crc32fast::Hasher,
     size: u64,
 }
 
-enum Body<'a> {
-    Stored(BufWriter<&'a File>),
-    Deflated(DeflateEncoder<BufWriter<&'a File>>),
+enum Body<W: Write> {
+    Stored(BufWriter<W>),
+    Deflated(DeflateEncoder<BufWriter<W>>),
 }
 
 /// What has gone through a [`Sink`].
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Totals {
     pub crc32: u32,
     pub size: u64,
     pub compressed: u64,
 }
 
-impl<'a> Sink<'a> {
-    pub fn new(file: &'a File, compression: Compression) -> Self {
-        let out = BufWriter::with_capacity(BUFFER, file);
+impl<W: Write> Sink<W> {
+    pub fn new(out: W, compression: Compression) -> Self {
+        let out = BufWriter::with_capacity(BUFFER, out);
         let body = match compression {
             Compression::Stored => Body::Stored(out),
             Compression::Deflated => {
@@ -59,7 +59,7 @@ impl<'a> Sink<'a> {
     }
 }
 
-impl Write for Sink<'_> {
+impl<W: Write> Write for Sink<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = match &mut self.body {
             Body::Stored(out) => out.write(bytes),

@@ -24,9 +24,10 @@ pub fn sound_entries(path: &Path, entries: &[EntryRecord]) -> io::Result<usize> 
         Err(error) => return Err(error),
     };
     let length = file.metadata()?.len();
+    let mut chunk = vec![0u8; CHUNK];
     let mut end = 0;
     for (index, entry) in entries.iter().enumerate() {
-        if entry.offset != end || entry.end > length || !is_sound(&mut file, entry)? {
+        if entry.offset != end || entry.end > length || !is_sound(&mut file, entry, &mut chunk)? {
             return Ok(index);
         }
         end = entry.end;
@@ -34,7 +35,7 @@ pub fn sound_entries(path: &Path, entries: &[EntryRecord]) -> io::Result<usize> 
     Ok(entries.len())
 }
 
-fn is_sound(file: &mut File, entry: &EntryRecord) -> io::Result<bool> {
+fn is_sound(file: &mut File, entry: &EntryRecord, chunk: &mut [u8]) -> io::Result<bool> {
     let expected = headers::local_header(entry, Zip64::default());
     let front = expected.len() as u64;
     if entry.offset.checked_add(front).and_then(|at| at.checked_add(entry.compressed))
@@ -50,19 +51,20 @@ fn is_sound(file: &mut File, entry: &EntryRecord) -> io::Result<bool> {
     }
     let body = file.take(entry.compressed);
     match entry.compression {
-        Compression::Stored => matches(body, entry),
+        Compression::Stored => matches(body, entry, chunk),
         // Damaged deflate data is an error of the decoder, not of the disk.
-        Compression::Deflated => Ok(matches(DeflateDecoder::new(body), entry).unwrap_or(false)),
+        Compression::Deflated => {
+            Ok(matches(DeflateDecoder::new(body), entry, chunk).unwrap_or(false))
+        }
     }
 }
 
-fn matches(body: impl Read, entry: &EntryRecord) -> io::Result<bool> {
+fn matches(body: impl Read, entry: &EntryRecord, chunk: &mut [u8]) -> io::Result<bool> {
     // One byte more than promised is enough to tell that it is too long.
     let mut body = body.take(entry.size.saturating_add(1));
-    let mut chunk = vec![0u8; CHUNK];
     let (mut crc, mut size) = (crc32fast::Hasher::new(), 0);
     loop {
-        match body.read(&mut chunk) {
+        match body.read(chunk) {
             Ok(0) => break,
             Ok(n) => {
                 crc.update(&chunk[..n]);

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::NpzError;
 use super::headers::{self, Zip64};
+use super::packed::Packed;
 use super::sink::Sink;
 use crate::npy::{DType, Header};
 
@@ -145,6 +146,24 @@ impl NpzWriter {
         Ok(self.push(entry))
     }
 
+    /// Appends an array that was deflated elsewhere, whatever the compression of the writer.
+    ///
+    /// # Errors
+    /// As [`NpzWriter::array`].
+    pub fn packed(&mut self, name: &str, packed: &Packed) -> Result<EntryRecord, NpzError> {
+        let totals = packed.totals;
+        let front = packed.header.encode().len() as u64;
+        self.check_length(name, &packed.header, totals.size - front)?;
+        let mut entry = self.begin(name, &packed.header)?;
+        entry.compression = Compression::Deflated;
+        entry.crc32 = totals.crc32;
+        entry.compressed = totals.compressed;
+        let local = headers::local_header(&entry, self.zip64);
+        entry.end = entry.offset + local.len() as u64 + totals.compressed;
+        self.write_at_end(&[&local, &packed.bytes])?;
+        Ok(self.push(entry))
+    }
+
     /// Appends an array whose elements come from a stream; none of it is held in memory.
     ///
     /// # Errors
@@ -156,7 +175,8 @@ impl NpzWriter {
         mut data: impl Read,
     ) -> Result<EntryRecord, NpzError> {
         self.array_with(name, header, |out| {
-            let mut chunk = vec![0u8; CHUNK];
+            let length = header.data_len().unwrap_or(0).clamp(1, CHUNK as u64);
+            let mut chunk = vec![0u8; length as usize];
             loop {
                 match data.read(&mut chunk) {
                     Ok(0) => return Ok(()),
