@@ -19,3 +19,8 @@ pub mod labels;
 pub mod metrics;
 pub mod splits;
 pub mod spread;
+pub mod comparison;
+pub mod cross_validation;
+pub mod fusion;
+pub mod grid;
+pub mod model_file;

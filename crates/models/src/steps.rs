@@ -1,5 +1,6 @@
 //! Steps before the classifier, fitted on training rows only.
 
+mod columns;
 mod pca;
 mod standardize;
 
@@ -7,6 +8,7 @@ use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+pub use self::columns::{Columns, ColumnsParams};
 pub use self::pca::{Components, Pca, PcaParams};
 pub use self::standardize::{ConstantRule, Standardize, StandardizeParams};
 use crate::error::{ModelError, Result};
@@ -23,11 +25,17 @@ pub enum StepSpec {
     /// principal components
     #[serde(rename = "pca")]
     Pca(PcaParams),
+    /// a choice of features
+    #[serde(rename = "columns")]
+    Columns(ColumnsParams),
 }
 
 /// Names and descriptions of all steps.
-pub const STEPS: &[(&str, &str)] =
-    &[("standardize", "zero mean and unit variance"), ("pca", "principal components")];
+pub const STEPS: &[(&str, &str)] = &[
+    ("standardize", "zero mean and unit variance"),
+    ("pca", "principal components"),
+    ("columns", "a choice of features"),
+];
 
 impl StepSpec {
     /// The step of this name, its parameters from a JSON object.
@@ -38,6 +46,7 @@ impl StepSpec {
         match name {
             "standardize" => StandardizeParams::from_json(parameters).map(Self::Standardize),
             "pca" => PcaParams::from_json(parameters).map(Self::Pca),
+            "columns" => ColumnsParams::from_json(parameters).map(Self::Columns),
             _ => Err(ModelError::UnknownName {
                 kind: "step",
                 name: name.into(),
@@ -51,6 +60,7 @@ impl StepSpec {
         match self {
             Self::Standardize(_) => StandardizeParams::OWNER,
             Self::Pca(_) => PcaParams::OWNER,
+            Self::Columns(_) => ColumnsParams::OWNER,
         }
     }
 
@@ -63,6 +73,7 @@ impl StepSpec {
         match self {
             Self::Standardize(params) => params.fit(x).map(Step::Standardize),
             Self::Pca(params) => params.fit(x).map(Step::Pca),
+            Self::Columns(params) => params.fit(x).map(Step::Columns),
         }
     }
 }
@@ -74,6 +85,8 @@ pub enum Step {
     Standardize(Standardize),
     /// principal components
     Pca(Pca),
+    /// a choice of features
+    Columns(Columns),
 }
 
 impl Step {
@@ -82,6 +95,7 @@ impl Step {
         match self {
             Self::Standardize(step) => step.n_features(),
             Self::Pca(step) => step.n_inputs(),
+            Self::Columns(step) => step.n_inputs(),
         }
     }
 
@@ -90,6 +104,7 @@ impl Step {
         match self {
             Self::Standardize(step) => step.n_features(),
             Self::Pca(step) => step.n_components(),
+            Self::Columns(step) => step.n_outputs(),
         }
     }
 
@@ -102,6 +117,7 @@ impl Step {
         Ok(match self {
             Self::Standardize(step) => step.transform(x),
             Self::Pca(step) => step.transform(x),
+            Self::Columns(step) => step.transform(x),
         })
     }
 
@@ -109,6 +125,7 @@ impl Step {
         let sound = match self {
             Self::Standardize(step) => step.is_sound(),
             Self::Pca(step) => step.is_sound(),
+            Self::Columns(step) => step.is_sound(),
         };
         if sound { Ok(()) } else { Err(ModelError::Inconsistent("step".into())) }
     }
