@@ -115,6 +115,9 @@ pub struct Record {
     /// Its row of the summary table, if it has one.
     #[serde(default, with = "row")]
     pub row: Option<Vec<f32>>,
+    /// Names of the columns of the table, in the first record that has a row.
+    #[serde(default)]
+    pub names: Option<Vec<String>>,
 }
 
 /// The open ledger of a run.

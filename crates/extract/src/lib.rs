@@ -7,6 +7,7 @@
 pub mod config;
 pub mod engine;
 pub mod features;
+pub mod frontend;
 pub mod identity;
 pub mod inputs;
 pub mod layout;
@@ -18,5 +19,6 @@ pub mod npz;
 pub mod outcome;
 pub mod parquet;
 pub mod provenance;
+pub mod run;
 pub mod summary;
 pub mod table;

@@ -133,6 +133,31 @@ impl Plan {
         Ok(Self { sample_rate, channels, features, streams, config: config.clone() })
     }
 
+    /// Samples between the frames of a feature.
+    pub fn hop(&self, name: &str) -> usize {
+        let Some(mut index) = self.features.iter().position(|f| f.name == name) else { return 0 };
+        while let Some(source) = self.features[index].source {
+            index = source;
+        }
+        let hop = |s: &StreamPlan| {
+            let member = match &s.kind {
+                StreamKind::Wave { member } => *member == index,
+                StreamKind::Spectrum { members, .. } => members.iter().any(|(m, _)| *m == index),
+            };
+            member.then_some(s.framing.hop)
+        };
+        self.streams.iter().find_map(hop).unwrap_or(0)
+    }
+
+    /// The longest transform, where there is one.
+    pub fn longest_transform(&self) -> Option<usize> {
+        let n_fft = |s: &StreamPlan| match &s.kind {
+            StreamKind::Spectrum { params, .. } => Some(params.n_fft),
+            StreamKind::Wave { .. } => None,
+        };
+        self.streams.iter().filter_map(n_fft).max()
+    }
+
     /// Names of the statistics of a recording: `feature[coefficient].statistic`, with `chN/` before
     /// where channels stay apart.
     pub fn summary_names(&self) -> Vec<String> {

@@ -87,6 +87,15 @@ impl Store {
         Ok(())
     }
 
+    /// All values, where they are one chunk in memory.
+    pub fn single(&self) -> Option<&[f32]> {
+        match self.chunks.as_slice() {
+            [] if self.spilled.is_none() => Some(&[]),
+            [chunk] if self.spilled.is_none() => Some(chunk),
+            _ => None,
+        }
+    }
+
     /// All values in memory.
     ///
     /// # Errors

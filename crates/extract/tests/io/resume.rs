@@ -36,7 +36,7 @@ fn work(out: &Path, compression: Compression, stop: usize) -> usize {
         let id = format!("rec/{index}");
         let record = if index == 2 {
             let outcome = Outcome::new(id, "x.wav", Status::Empty, "no samples");
-            Record { outcome, entries: Vec::new(), row: None }
+            Record { outcome, entries: Vec::new(), row: None, names: None }
         } else {
             let values: Vec<f32> = (0..40 * index).map(|i| (i * index) as f32).collect();
             let frames = writer.floats(&layout::frames_name(&id, None), &[4, 10 * index], &values);
@@ -117,7 +117,9 @@ fn rows_come_back_bit_for_bit() {
     let row = vec![f32::from_bits(0x7fc0_1234), -0.0, f32::MIN_POSITIVE / 3.0, 1e-7, f32::INFINITY];
     let outcome = Outcome::new("a", "a.wav", Status::Ok, "");
     let mut ledger = Ledger::create(&out, &header()).unwrap();
-    ledger.append(&Record { outcome, entries: vec![], row: Some(row.clone()) }).unwrap();
+    ledger
+        .append(&Record { outcome, entries: vec![], row: Some(row.clone()), names: None })
+        .unwrap();
     drop(ledger);
     let (_, records) = Ledger::resume(&out, &header()).unwrap();
     let bits = |row: &[f32]| row.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
