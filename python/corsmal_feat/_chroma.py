@@ -13,6 +13,7 @@ from ._pitch import estimate_tuning
 from .filters import chroma_params
 from .spectrum import spectrogram
 
+
 def chroma_stft(
     *,
     y: Any = None,

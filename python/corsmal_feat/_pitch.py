@@ -37,13 +37,12 @@ def _tracked(
         raise ParameterError("n_fft = None is not possible: a number is needed with y")
     if np.iscomplexobj(S):
         S = np.abs(S)
-    s, n_fft = spectrogram(
-        y, S, n_fft or 0, hop_length, win_length, window, center, pad_mode, 1.0
-    )
+    s, n_fft = spectrogram(y, S, n_fft or 0, hop_length, win_length, window, center, pad_mode, 1.0)
     params = (float(sr), n_fft, float(fmin), float(fmax), float(threshold))
     if ref is None or ref is np.max:
         return s, None, params
     shape = (*s.shape[:-2], s.shape[-1])
+    levels: Any
     if callable(ref):
         levels = threshold * np.asarray(ref(np.abs(s), axis=-2))
         if levels.shape != shape:

@@ -6,17 +6,14 @@ import warnings
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from . import _core
 from ._arrays import Floats, rows, unrows
 from ._core import ParameterError
 from .spectrum import spectrogram
 
-Doubles = npt.NDArray[np.float64]
 
-
-def _frequencies(freq: Any, sr: float, n_fft: int, s: Floats) -> Doubles:
+def _frequencies(freq: Any, sr: float, n_fft: int, s: Floats) -> Any:
     """Frequencies [bins] of the rows of `s`, or [channels, bins, frames] where they vary."""
     if freq is None:
         return _core.fft_frequencies(float(sr), n_fft)
@@ -41,7 +38,7 @@ def spectral_centroid(
     window: Any = "hann",
     center: bool = True,
     pad_mode: str = "constant",
-) -> Doubles:
+) -> Any:
     """Magnitude-weighted mean frequency in Hz [shape=(..., 1, t)]; 0 in silence
     (librosa.feature.spectral_centroid)."""
     s, n_fft = spectrogram(y, S, n_fft, hop_length, win_length, window, center, pad_mode, 1.0)
@@ -64,7 +61,7 @@ def spectral_bandwidth(
     centroid: Any = None,
     norm: bool = True,
     p: float = 2,
-) -> Doubles:
+) -> Any:
     """Width of the spectrum around its centroid in Hz [shape=(..., 1, t)]: the p-norm of the
     deviations (librosa.feature.spectral_bandwidth)."""
     s, n_fft = spectrogram(y, S, n_fft, hop_length, win_length, window, center, pad_mode, 1.0)
@@ -75,9 +72,7 @@ def spectral_bandwidth(
         try:
             centroid = rows(np.broadcast_to(centroid, shape), 2)[:, 0]
         except ValueError:
-            raise ParameterError(
-                f"centroid has shape {centroid.shape}, expected {shape}"
-            ) from None
+            raise ParameterError(f"centroid has shape {centroid.shape}, expected {shape}") from None
     result = _core.spectral_bandwidth(rows(s, 2), freq, centroid, bool(norm), float(p))
     return unrows(result, s, 2)
 
@@ -95,7 +90,7 @@ def spectral_rolloff(
     pad_mode: str = "constant",
     freq: Any = None,
     roll_percent: float = 0.85,
-) -> Doubles:
+) -> Any:
     """Lowest frequency in Hz that has the fraction `roll_percent` of the magnitudes at or below it
     [shape=(..., 1, t)] (librosa.feature.spectral_rolloff)."""
     s, n_fft = spectrogram(y, S, n_fft, hop_length, win_length, window, center, pad_mode, 1.0)
@@ -138,7 +133,7 @@ def spectral_contrast(
     n_bands: int = 6,
     quantile: float = 0.02,
     linear: bool = False,
-) -> Doubles:
+) -> Any:
     """Peaks over valleys of octave bands in dB [shape=(..., n_bands + 1, t)], both clamped 80 dB
     below their maximum over the whole array (librosa.feature.spectral_contrast)."""
     s, n_fft = spectrogram(y, S, n_fft, hop_length, win_length, window, center, pad_mode, 1.0)
@@ -173,7 +168,7 @@ def poly_features(
     pad_mode: str = "constant",
     order: int = 1,
     freq: Any = None,
-) -> Doubles:
+) -> Any:
     """Coefficients of the polynomial over frequency fitted to each frame, highest degree first
     [shape=(..., order + 1, t)] (librosa.feature.poly_features)."""
     s, n_fft = spectrogram(y, S, n_fft, hop_length, win_length, window, center, pad_mode, 1.0)

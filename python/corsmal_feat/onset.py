@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, floats, rows, unrows
+from ._arrays import floats, rows, unrows
 from ._core import ParameterError
 from ._mel import melspectrogram
 from .spectrum import power_to_db
@@ -51,7 +51,7 @@ def onset_strength(
             kwargs.setdefault("fmax", 0.5 * sr)
         mel = feature(y=y, sr=sr, n_fft=n_fft, hop_length=hop_length, **kwargs)
         S = power_to_db(np.abs(mel))
-    s: Floats = np.atleast_2d(floats("S", S))
+    s: Any = np.atleast_2d(floats("S", S))
     if ref is not None:
         ref = np.asarray(ref)
         if ref.shape != s.shape:
@@ -65,9 +65,7 @@ def onset_strength(
         envelope = np.pad(flux, padding)
         envelope = envelope[..., : s.shape[-1]] if center else envelope
     else:
-        envelope = unrows(
-            _core.onset_strength(rows(s, 2), ref, lag, max_size, delay), s, 2
-        )
+        envelope = unrows(_core.onset_strength(rows(s, 2), ref, lag, max_size, delay), s, 2)
     if detrend:
         envelope = unrows(_core.detrend(rows(envelope, 1)), envelope, 1)
     return envelope
@@ -149,9 +147,9 @@ def onset_backtrack(events: Any, energy: Any) -> npt.NDArray[np.int64]:
     events = np.asarray(events)
     if events.dtype.kind not in "iu" and events.size:
         raise ParameterError(f"events has dtype {events.dtype}, expected integers")
-    array = np.ascontiguousarray(floats("energy", energy))
+    array: Any = np.ascontiguousarray(floats("energy", energy))
     if array.ndim != 1:
         raise ParameterError(f"energy has {array.ndim} dimensions, expected 1")
-    if events.size and not (0 <= events.min() and events.max() < array.size):
+    if events.size and (events.min() < 0 or events.max() >= array.size):
         raise ParameterError(f"events reach beyond the {array.size} frames of energy")
     return np.asarray(_core.onset_backtrack(events.tolist(), array), dtype=np.int64)

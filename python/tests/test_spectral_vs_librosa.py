@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import warnings
+from pathlib import Path
 from typing import Any
 
+import corsmal_feat
 import numpy as np
 import pytest
-
-import corsmal_feat
 
 librosa = pytest.importorskip("librosa", reason="librosa is absent", exc_type=ImportError)
 
@@ -70,9 +71,7 @@ def both(name: str, *args: Any, **kwargs: Any) -> tuple[Any, Any]:
     return ours, theirs
 
 
-def agree(
-    ours: Any, theirs: Any, scale: float, flips: float = 0.0, least: float = 1e-30
-) -> None:
+def agree(ours: Any, theirs: Any, scale: float, flips: float = 0.0, least: float = 1e-30) -> None:
     """Same shape and dtype, and values within `scale` of the largest (which counts as `least` at
     least), but for a share of `flips`."""
     ours, theirs = np.asarray(ours), np.asarray(theirs)
@@ -261,3 +260,15 @@ def test_mono(shape: tuple[int, ...], dtype: Any) -> None:
     ours, theirs = both("to_mono", y)
     assert ours.dtype == theirs.dtype
     agree(ours, theirs, 2e-7)
+
+
+def test_onsets_of_a_recording() -> None:
+    shared = Path(os.environ.get("CORSMAL_SHARED", "../shared"))
+    reference = shared / "data/ccm/method_input_reference.npz"
+    if not reference.is_file():
+        pytest.skip(f"skipped: {reference} absent")
+    with np.load(reference) as data:
+        y, want = data["m6_wav_22k_kaiser_fast"], data["m6_onsets"]
+    ours, theirs = both("onset.onset_detect", y=y, sr=22050, units="samples")
+    assert np.array_equal(ours, theirs)
+    assert np.array_equal(ours, want)

@@ -1,10 +1,12 @@
 //! Binary logarithm in single precision, rounded as numpy's vector code rounds it.
 
+use std::f32::consts::LOG2_E;
+
 /// For each sixteenth of the mantissa in [1, 2) the cubic, highest degree first, that
 /// approximates `log2(1 + r) / r` best in the maximum norm (found by the Remez exchange); mantissas
 /// from 1.5 on are halved, so that `r` lies in [-0.25, 0.5).
 const CUBICS: [[f32; 4]; 16] = [
-    [-0.32713538, 0.47962224, -0.72133183, 1.442695],
+    [-0.32713538, 0.47962224, -0.72133183, LOG2_E],
     [-0.27086058, 0.46928123, -0.72067106, 1.4426804],
     [-0.22655562, 0.45282358, -0.7186117, 1.4425936],
     [-0.19122967, 0.43307126, -0.7149131, 1.4423616],
@@ -19,7 +21,7 @@ const CUBICS: [[f32; 4]; 16] = [
     [-0.5222953, 0.45234758, -0.7234966, 1.4426355],
     [-0.46788168, 0.46771082, -0.72204405, 1.4426814],
     [-0.42062804, 0.4766208, -0.7214783, 1.4426936],
-    [-0.3794061, 0.48052752, -0.72134984, 1.442695],
+    [-0.3794061, 0.48052752, -0.72134984, LOG2_E],
 ];
 
 /// `log2(x)` of a positive number.
