@@ -1,6 +1,7 @@
 //! One file per command: its arguments (`Args`) and what it does (`run`).
 
 mod completions;
+mod inspect;
 
 use std::process::ExitCode;
 
@@ -11,6 +12,8 @@ use crate::failure::Failure;
 /// Registration: a command is its file, a variant here and a line in `run`.
 #[derive(Subcommand)]
 pub enum Command {
+    /// Show format and health of a recording, with a picture on request.
+    Inspect(inspect::Args),
     /// Print shell completions or the man page.
     Completions(completions::Args),
 }
@@ -19,6 +22,7 @@ impl Command {
     /// Runs the command to its exit code.
     pub fn run(self) -> Result<ExitCode, Failure> {
         match self {
+            Self::Inspect(args) => inspect::run(args),
             Self::Completions(args) => completions::run(args),
         }
     }
