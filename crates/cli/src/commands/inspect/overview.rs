@@ -26,13 +26,14 @@ struct Column {
     power: Array2<f32>,
 }
 
-/// Collects columns. Each holds the extremes of all its samples and the power of one window at its
-/// end (or, after merging, the mean of several), so that long recordings cost few transforms.
+/// Collects columns. Each holds the extremes of all its samples and the power of one window around
+/// its end (or, after merging, the mean of several), so that long recordings cost few transforms.
 pub struct Overview {
     sample_rate: u32,
     stft: StftParams,
     bank: SparseBank,
-    /// The latest `n_fft` frames, `[channels, n_fft]`, zeros before the start.
+    /// The latest `n_fft` frames, `[channels, n_fft]`, zeros before the start. Columns take their
+    /// extremes from its middle, where the window of the transform is centred.
     recent: Array2<f32>,
     /// Frames per column.
     length: usize,
@@ -40,7 +41,8 @@ pub struct Overview {
     /// Extremes of the column being filled, and its frames so far.
     envelope: Vec<(f32, f32)>,
     filled: usize,
-    frames: u64,
+    /// Frames that entered `recent`.
+    entered: u64,
 }
 
 const NOTHING: (f32, f32) = (f32::INFINITY, f32::NEG_INFINITY);
@@ -56,30 +58,41 @@ impl Overview {
             stft: StftParams { center: false, ..StftParams::new(n_fft, n_fft) },
             bank: SparseBank::new(&mel_filter(&mel)?),
             recent: Array2::zeros((channels, n_fft)),
-            length: n_fft / 2,
+            length: n_fft / 8,
             columns: Vec::new(),
             envelope: vec![NOTHING; channels],
             filled: 0,
-            frames: 0,
+            entered: 0,
         })
     }
 
-    /// Adds interleaved samples.
+    /// Frames between entering `recent` and its middle.
+    fn delay(&self) -> usize {
+        self.stft.n_fft / 2
+    }
+
+    /// Adds interleaved samples; non-finite ones count as zero.
     pub fn push(&mut self, interleaved: &[f32]) -> Result<(), DspError> {
         let channels = self.envelope.len();
+        let delay = self.delay();
         let mut rest = interleaved;
         while !rest.is_empty() {
-            let take = (self.length - self.filled).min(rest.len() / channels);
+            let missing = (delay as u64).saturating_sub(self.entered) as usize;
+            let step = if missing > 0 { missing } else { delay.min(self.length - self.filled) };
+            let take = step.min(rest.len() / channels);
             let (now, later) = rest.split_at(take * channels);
             rest = later;
             self.remember(now, take);
-            for (c, (low, high)) in self.envelope.iter_mut().enumerate() {
-                for &x in now[c..].iter().step_by(channels).filter(|x| x.is_finite()) {
+            self.entered += take as u64;
+            if missing > 0 {
+                continue;
+            }
+            for (row, (low, high)) in self.recent.rows().into_iter().zip(&mut self.envelope) {
+                for &x in row.slice(s![delay - take..delay]) {
                     (*low, *high) = (low.min(x), high.max(x));
                 }
             }
             self.filled += take;
-            self.frames += take as u64;
             if self.filled == self.length {
                 self.finish_column()?;
             }
@@ -87,16 +100,14 @@ impl Overview {
         Ok(())
     }
 
-    /// Shifts the latest frames into `recent`.
+    /// Shifts `frames` (at most `n_fft`) frames into `recent`.
     fn remember(&mut self, block: &[f32], frames: usize) {
         let (channels, n) = self.recent.dim();
-        let keep = frames.min(n);
         for (c, mut row) in self.recent.rows_mut().into_iter().enumerate() {
             if let Some(row) = row.as_slice_mut() {
-                row.copy_within(keep.., 0);
-                let latest = block[(frames - keep) * channels..][c..].iter().step_by(channels);
-                for (to, &x) in row[n - keep..].iter_mut().zip(latest) {
-                    *to = if x.is_finite() { x } else { 0.0 };
+                row.copy_within(frames.., 0);
+                for (to, x) in row[n - frames..].iter_mut().zip(block.chunks_exact(channels)) {
+                    *to = if x[c].is_finite() { x[c] } else { 0.0 };
                 }
             }
         }
@@ -117,6 +128,8 @@ impl Overview {
 
     /// The picture of everything that was pushed.
     pub fn finish(mut self, title: String, subtitle: String) -> Result<RecordingPicture, DspError> {
+        let frames = self.entered;
+        self.push(&vec![0.0; self.delay() * self.envelope.len()])?;
         if self.filled > 0 {
             self.finish_column()?;
         }
@@ -125,13 +138,9 @@ impl Overview {
         let decibels = |power: f32| 10.0 * (power / loudest).max(1e-12).log10();
         let channel = |c: usize| {
             let level = |(b, t): (usize, usize)| decibels(self.columns[t].power[[c, b]]);
-            let extremes = |column: &Column| {
-                let (low, high) = column.envelope[c];
-                if low <= high { (low, high) } else { (0.0, 0.0) }
-            };
             ChannelPicture {
                 label: format!("ch {c}"),
-                envelope: self.columns.iter().map(extremes).collect(),
+                envelope: self.columns.iter().map(|column| column.envelope[c]).collect(),
                 levels: Array2::from_shape_fn((BANDS, self.columns.len()), level),
             }
         };
@@ -141,7 +150,7 @@ impl Overview {
         Ok(RecordingPicture {
             title,
             subtitle,
-            seconds: self.frames as f64 / f64::from(self.sample_rate),
+            seconds: frames as f64 / f64::from(self.sample_rate),
             frequencies: labelled.map(|&hz| (hz, place(hz))).collect(),
             level_range: (-RANGE_DB, 0.0),
             level_label: "dB below the loudest band".into(),
@@ -187,12 +196,14 @@ mod tests {
         let (_, place) = picture.frequencies.iter().find(|(hz, _)| *hz == 1000.0).unwrap();
         let second = &picture.channels[1];
         assert_eq!(second.levels.nrows(), BANDS);
-        for column in second.levels.columns().into_iter().skip(2) {
+        assert_eq!(second.levels.ncols(), 250);
+        for column in second.levels.columns().into_iter().skip(5).take(240) {
             let best = (0..BANDS).max_by(|a, b| column[*a].total_cmp(&column[*b])).unwrap();
             assert!((best as f64 + 0.5 - place * BANDS as f64).abs() < 1.5, "band {best}");
             // Half the amplitude of the louder channel.
             assert!((column[best] + 6.02).abs() < 0.2, "{}", column[best]);
         }
+        // A column of 64 samples holds four periods.
         assert!(second.envelope.iter().all(|(low, high)| (high - low - 0.5).abs() < 0.01));
     }
 
@@ -203,9 +214,8 @@ mod tests {
         let whole = picture(&samples, 1, 800_000);
         let columns = whole.channels[0].envelope.len();
         assert!((MAX_COLUMNS / 2 - 1..=MAX_COLUMNS).contains(&columns), "{columns}");
-        let at = 777_777 * columns / 800_000;
-        let peak = whole.channels[0].envelope[at - 1..=at + 1].iter().map(|e| e.1);
-        assert_eq!(peak.fold(0.0, f32::max), 0.9);
+        let length = 800_000usize.div_ceil(columns).next_power_of_two();
+        assert_eq!(whole.channels[0].envelope[777_777 / length].1, 0.9);
         let split = picture(&samples, 1, 12_345);
         assert_eq!(split.channels[0].envelope, whole.channels[0].envelope);
         assert_eq!(split.channels[0].levels, whole.channels[0].levels);
