@@ -11,7 +11,7 @@ import numpy.typing as npt
 from . import _core
 from ._core import ParameterError
 
-__all__ = ["get_window", "mel"]
+__all__ = ["chroma", "get_window", "mel"]
 
 
 def window_name(window: Any) -> str:
@@ -72,3 +72,46 @@ def warn_empty() -> None:
         "Empty filters detected in the mel bank: fewer n_mels or a longer n_fft avoid them",
         stacklevel=3,
     )
+
+
+ChromaParams = tuple[float, int, int, float, float, float | None, float | None, bool]
+
+
+def chroma_params(
+    sr: float,
+    n_fft: int,
+    n_chroma: int,
+    tuning: float,
+    ctroct: float,
+    octwidth: float | None,
+    norm: float | None,
+    base_c: bool,
+) -> ChromaParams:
+    """Filter bank parameters as the Rust side takes them."""
+    if n_fft < 1 or n_chroma < 1:
+        raise ParameterError(
+            f"n_fft = {n_fft}, n_chroma = {n_chroma} are not possible: at least 1"
+        )
+    width = None if octwidth is None else float(octwidth)
+    power = None if norm is None else float(norm)
+    return (
+        float(sr), int(n_fft), int(n_chroma), float(tuning), float(ctroct), width, power,
+        bool(base_c),
+    )  # fmt: skip
+
+
+def chroma(
+    *,
+    sr: float,
+    n_fft: int,
+    n_chroma: int = 12,
+    tuning: float = 0.0,
+    ctroct: float = 5.0,
+    octwidth: float | None = 2,
+    norm: float | None = 2,
+    base_c: bool = True,
+    dtype: npt.DTypeLike = np.float32,
+) -> npt.NDArray[Any]:
+    """Chroma filter bank [shape=(n_chroma, 1 + n_fft/2)] (librosa.filters.chroma)."""
+    params = chroma_params(sr, n_fft, n_chroma, tuning, ctroct, octwidth, norm, base_c)
+    return _core.chroma_filter(params).astype(dtype, copy=False)

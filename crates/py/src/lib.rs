@@ -5,7 +5,12 @@
 //! file per family, each with a `register`. The GIL is released while we compute.
 
 mod arrays;
+mod chroma;
+mod compound;
 mod mel;
+mod onset;
+mod resample;
+mod spectral;
 mod spectrum;
 mod time_domain;
 
@@ -25,5 +30,10 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("ParameterError", m.py().get_type::<ParameterError>())?;
     spectrum::register(m)?;
     mel::register(m)?;
-    time_domain::register(m)
+    time_domain::register(m)?;
+    resample::register(m)?;
+    compound::register(m)?;
+    spectral::register(m)?;
+    chroma::register(m)?;
+    onset::register(m)
 }
