@@ -58,7 +58,15 @@ struct Extreme {
 }
 
 impl Extreme {
-    /// `x` is not negative: the sample or its opposite.
+    /// Adds samples (or their opposites) of which `highest` is the largest.
+    fn push_block(&mut self, highest: f32, samples: impl Iterator<Item = f32>) {
+        if highest < self.value || highest <= 0.0 {
+            self.run = 0;
+        } else {
+            samples.for_each(|x| self.push(x));
+        }
+    }
+
     fn push(&mut self, x: f32) {
         if x > self.value {
             *self = Self { value: x, run: 1, ..Self::default() };
@@ -145,14 +153,13 @@ impl HealthMeter {
             if !started {
                 channel.first = channel.block[0];
             }
-            let mut peak = 0.0f32;
-            for &x in &channel.block {
-                channel.high.push(x.max(0.0));
-                channel.low.push((-x).max(0.0));
-                channel.varies |= x != channel.first;
-                channel.sum += f64::from(x);
-                peak = peak.max(x.abs());
-            }
+            let totals = Totals::of(&channel.block);
+            // Most blocks stay below the extremes so far, which then only end a run.
+            channel.high.push_block(totals.high, channel.block.iter().copied());
+            channel.low.push_block(-totals.low, channel.block.iter().map(|x| -x));
+            channel.varies |= totals.high != channel.first || totals.low != channel.first;
+            channel.sum += totals.sum;
+            let peak = totals.high.max(-totals.low);
             channel.silent_blocks += u64::from(peak < SILENCE);
         }
         let mut pair = 0;
@@ -224,6 +231,34 @@ impl Channel {
             silence: self.silent_blocks as f64 / blocks.max(1) as f64,
             dead,
             non_finite: self.non_finite,
+        }
+    }
+}
+
+/// Extremes and sum of a block that is not empty, in eight lanes that the compiler can vectorise.
+struct Totals {
+    high: f32,
+    low: f32,
+    sum: f64,
+}
+
+impl Totals {
+    fn of(block: &[f32]) -> Self {
+        let first = block.first().copied().unwrap_or(0.0);
+        let (mut high, mut low, mut sum) = ([first; 8], [first; 8], [0.0f64; 8]);
+        let (chunks, rest) = block.as_chunks::<8>();
+        for chunk in chunks {
+            for k in 0..8 {
+                high[k] = if chunk[k] > high[k] { chunk[k] } else { high[k] };
+                low[k] = if chunk[k] < low[k] { chunk[k] } else { low[k] };
+                sum[k] += f64::from(chunk[k]);
+            }
+        }
+        let rest_sum: f64 = rest.iter().copied().map(f64::from).sum();
+        Self {
+            high: high.iter().chain(rest).copied().fold(first, f32::max),
+            low: low.iter().chain(rest).copied().fold(first, f32::min),
+            sum: sum.iter().sum::<f64>() + rest_sum,
         }
     }
 }

@@ -106,7 +106,7 @@ impl RecordingPicture {
             }
         }
         let name = TextStyle { color: INK, ..style(11.0, Anchor::Start) };
-        on.text(14.0, (wave.y + mel.bottom()) / 2.0 + 4.0, &channel.label, name);
+        on.text(14.0, middle + 4.0, &channel.label, name);
         Ok(())
     }
 

@@ -115,7 +115,7 @@ impl Header {
             repairs.push(Repair::DataSizeWrapped { declared, used });
             declared = used;
         }
-        let empty = declared == 0 && is_really_empty(input)?;
+        let empty = declared == 0 && is_really_empty(input, endian)?;
         let to_end = unknown || (declared == 0 && !empty);
         if to_end {
             let repair = if unknown { Repair::DataSizeUnknown } else { Repair::DataSizeZero };
@@ -172,7 +172,7 @@ fn is_unpadded(next: &[u8; 5]) -> bool {
 
 /// A data size of 0 is meant if nothing follows, or (where the input can be looked through) if
 /// chunks follow that end exactly with the file. Otherwise it was never filled in.
-fn is_really_empty(input: &mut Input) -> Result<bool, AudioError> {
+fn is_really_empty(input: &mut Input, endian: Endian) -> Result<bool, AudioError> {
     if input.peek(1)?.is_empty() {
         return Ok(true);
     }
@@ -185,7 +185,7 @@ fn is_really_empty(input: &mut Input) -> Result<bool, AudioError> {
         let Some(&[i0, i1, i2, i3, s0, s1, s2, s3]) = input.peek(8)?.first_chunk::<8>() else {
             break at;
         };
-        let size = u64::from(u32::from_le_bytes([s0, s1, s2, s3]));
+        let size = u64::from(endian.u32([s0, s1, s2, s3]));
         let named = [i0, i1, i2, i3].iter().all(|b| (0x20..0x7f).contains(b));
         let next = at + 8 + size + size % 2;
         chunks += 1;

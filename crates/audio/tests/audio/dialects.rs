@@ -94,8 +94,12 @@ fn no_samples_are_no_samples() {
     assert_eq!((got.samples.len(), got.declared_frames), (0, Some(0)));
     assert!(got.report.repairs.is_empty());
     // Chunks after an empty data chunk are not samples where that can be seen.
-    let got = read_file(Wav { after: b"LIST\x05\0\0\0abcde\0".to_vec(), ..empty }.bytes()).unwrap();
-    assert_eq!((got.samples.len(), got.repairs()), (0, vec![]));
+    let little = Wav { after: b"LIST\x05\0\0\0abcde\0".to_vec(), ..empty.clone() };
+    let big = Wav { form: b"RIFX", after: b"LIST\0\0\0\x05abcde\0".to_vec(), ..empty };
+    for wav in [little, big] {
+        let got = read_file(wav.bytes()).unwrap();
+        assert_eq!((got.samples.len(), got.repairs()), (0, vec![]));
+    }
 }
 
 #[test]

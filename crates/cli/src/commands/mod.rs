@@ -5,6 +5,7 @@ mod extract;
 mod features;
 mod merge;
 mod presets;
+mod inspect;
 
 use std::process::ExitCode;
 
@@ -23,6 +24,8 @@ pub enum Command {
     Presets(presets::Args),
     /// List the features that a configuration can name.
     Features(features::Args),
+    /// Show format and health of a recording, with a picture on request.
+    Inspect(inspect::Args),
     /// Print shell completions or the man page.
     Completions(completions::Args),
 }
@@ -35,6 +38,7 @@ impl Command {
             Self::Merge(args) => merge::run(args),
             Self::Presets(args) => presets::run(args),
             Self::Features(args) => features::run(args),
+            Self::Inspect(args) => inspect::run(args),
             Self::Completions(args) => completions::run(args),
         }
     }

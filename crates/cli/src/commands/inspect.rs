@@ -1,0 +1,88 @@
+//! `corsmal-feat inspect`: what a file holds and whether it is healthy.
+
+mod overview;
+mod recording;
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use crate::failure::Failure;
+
+/// Arguments of `inspect`.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  corsmal-feat inspect recording.wav --picture recording.png\n\nClipping: at least three successive samples at the channel's own peak. Silence: share of 20 ms blocks\nbelow -60 dBFS. Exit code 1: the file is no readable recording."
+)]
+pub struct Args {
+    /// The file; its content decides what it is, not its name.
+    file: PathBuf,
+    /// Also draw waveform and log-mel spectrogram of each channel, as .png or .svg.
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
+    /// Print JSON instead of text, with the correlation of all channels.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Format of a picture, by its file name.
+#[derive(Clone, Copy)]
+enum PictureFormat {
+    Png,
+    Svg,
+}
+
+/// A picture to be written.
+struct Picture {
+    path: PathBuf,
+    format: PictureFormat,
+}
+
+impl Picture {
+    /// Refuses names and folders that cannot work before anything is read.
+    fn check(path: PathBuf) -> Result<Self, Failure> {
+        let extension = path.extension().map(|e| e.to_ascii_lowercase());
+        let format = match extension.as_deref().and_then(|e| e.to_str()) {
+            Some("png") => PictureFormat::Png,
+            Some("svg") => PictureFormat::Svg,
+            _ => {
+                let name = path.display();
+                return Err(Failure::new(format!("--picture {name}: must end in .png or .svg")));
+            }
+        };
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+        if folder.is_some_and(|folder| !folder.is_dir()) {
+            let name = path.display();
+            return Err(Failure::new(format!("--picture {name}: its folder does not exist")));
+        }
+        Ok(Self { path, format })
+    }
+}
+
+/// Kinds of files, by their first bytes.
+enum Kind {
+    /// A zip archive, as `.npz` files are.
+    Archive,
+    /// Anything else is left to the audio readers, which say what is wrong with it.
+    Recording,
+}
+
+fn kind(path: &Path) -> Result<Kind, Failure> {
+    let unreadable = |e| Failure::new(format!("{}: {e}", path.display()));
+    let mut start = Vec::new();
+    File::open(path).and_then(|f| f.take(4).read_to_end(&mut start)).map_err(unreadable)?;
+    Ok(if start == b"PK\x03\x04" { Kind::Archive } else { Kind::Recording })
+}
+
+/// Prints what the file is.
+pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    let picture = args.picture.map(Picture::check).transpose()?;
+    match kind(&args.file)? {
+        Kind::Recording => recording::inspect(&args.file, picture.as_ref(), args.json),
+        Kind::Archive => {
+            let name = args.file.display();
+            Err(Failure::new(format!("{name}: an archive, expected a recording")))
+        }
+    }
+}
