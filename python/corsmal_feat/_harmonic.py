@@ -284,18 +284,18 @@ def chroma_cqt(
     n_chroma = _positive("n_chroma", n_chroma)
     bins_per_octave = n_chroma if bins_per_octave is None else bins_per_octave
     bins_per_octave = _positive("bins_per_octave", bins_per_octave)
-    weights = None if window is None else [float(w) for w in np.ravel(window)]
+    weights = None if window is None else np.ravel(window)
     chroma = (
         bins_per_octave,
         n_chroma,
         C1 if fmin is None else float(fmin),
-        weights,
+        None if weights is None else [float(w) for w in weights],
         None if threshold is None else float(threshold),
         None if norm is None else float(norm),
     )
     if C is not None:
         c = floats("C", C, 2)
-        return unrows(_core.chroma_of_cqt(rows(c, 2), chroma), c, 2)
+        return _promoted(unrows(_core.chroma_of_cqt(rows(c, 2), chroma), c, 2), weights)
     if y is None:
         raise ParameterError("y or C is needed")
     y = audio(y)
@@ -303,7 +303,14 @@ def chroma_cqt(
         tuning = estimate_tuning(y=y, sr=sr, bins_per_octave=bins_per_octave)
     n_bins = _positive("n_octaves", n_octaves) * bins_per_octave
     params = _cqt_params(sr, hop_length, fmin, n_bins, bins_per_octave, tuning)
-    return unrows(_core.chroma_cqt(rows(y, 1), params, chroma), y, 1)
+    return _promoted(unrows(_core.chroma_cqt(rows(y, 1), params, chroma), y, 1), weights)
+
+
+def _promoted(chroma: Any, weights: Any) -> Any:
+    """A double-precision window makes librosa's folding matrix double, and with it the result."""
+    if weights is None:
+        return chroma
+    return chroma.astype(np.result_type(chroma, weights.dtype), copy=False)
 
 
 def tonnetz(*, y: Any = None, sr: float = 22050, chroma: Any = None, **kwargs: Any) -> Any:

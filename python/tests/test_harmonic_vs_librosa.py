@@ -18,10 +18,22 @@ def pour(n, seed, sr=22050):
 
 
 def close(got, want, relative=2e-6):
+    """Equal shape and type, and values within `relative` of the largest."""
     got, want = np.asarray(got), np.asarray(want)
     assert got.shape == want.shape
     assert got.dtype == want.dtype
-    assert np.abs(got - want).max(initial=0) <= relative * max(np.abs(want).max(initial=0), 1e-30)
+    error = np.abs(got.astype(complex) - want).max(initial=0)
+    assert error <= relative * max(np.abs(want).max(initial=0), 1e-30)
+
+
+def agree(ours, theirs, y, relative=2e-6):
+    """`close` for an array and its double-precision copy. Where librosa's own single-precision
+    result deviates (a division by hardly any window, say), four times that is granted."""
+    double = theirs(y.astype(np.result_type(y, np.float64)))
+    close(ours(y.astype(np.result_type(y, np.float64))), double, relative)
+    want = theirs(y)
+    scale = max(np.abs(want).max(initial=0), 1e-30)
+    close(ours(y), want, relative + 4 * np.abs(want - double).max(initial=0) / scale)
 
 
 SPECTROGRAMS = [
@@ -86,15 +98,15 @@ SIGNALS = [
 ]
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize(("shape", "params"), SIGNALS)
-def test_separation_of_signals(shape, params, dtype):
-    y = pour(int(np.prod(shape)), 3).reshape(shape).astype(dtype)
-    want = librosa.effects.hpss(y, **params)
-    for got, expected in zip(cf.effects.hpss(y, **params), want, strict=True):
-        close(got, expected, 3e-6)
-    close(cf.effects.harmonic(y, **params), want[0], 3e-6)
-    close(cf.effects.percussive(y, **params), want[1], 3e-6)
+def test_separation_of_signals(shape, params):
+    y = pour(int(np.prod(shape)), 3).reshape(shape)
+    for name in ("harmonic", "percussive"):
+        ours, theirs = getattr(cf.effects, name), getattr(librosa.effects, name)
+        agree(lambda y, f=ours: f(y, **params), lambda y, f=theirs: f(y, **params), y)
+    both = cf.effects.hpss(y, **params)
+    np.testing.assert_array_equal(both[0], cf.effects.harmonic(y, **params))
+    np.testing.assert_array_equal(both[1], cf.effects.percussive(y, **params))
 
 
 @pytest.mark.parametrize(
@@ -110,12 +122,12 @@ def test_separation_of_signals(shape, params, dtype):
     ],
 )
 def test_istft(n, analysis, synthesis):
-    for dtype in (np.float32, np.float64):
-        d = librosa.stft(np.stack([pour(n, 4), pour(n, 5)]).astype(dtype), **analysis)
-        want = librosa.istft(d, **synthesis)
-        close(cf.istft(d, **synthesis), want)
-        out = np.empty_like(want)
-        assert cf.istft(d, out=out, **synthesis) is out
+    d = librosa.stft(np.stack([pour(n, 4), pour(n, 5)]), **analysis)
+    agree(lambda d: cf.istft(d, **synthesis), lambda d: librosa.istft(d, **synthesis), d)
+    want = cf.istft(d, **synthesis)
+    out = np.empty_like(want)
+    assert cf.istft(d, out=out, **synthesis) is out
+    np.testing.assert_array_equal(out, want)
 
 
 TRANSFORMS = [
