@@ -36,17 +36,22 @@ pub trait Lane: Real + Pod {
 }
 
 macro_rules! lane {
-    ($t:ident, $v:ident, $lanes:ident, $load:ident, $store:ident, $splat:ident, $mul_add:ident, $min:ident, $max:ident, $less:ident, $select:ident) => {
+    ($t:ident, $v:ident, $view:ident, $view_mut:ident, $load:ident, $store:ident, $splat:ident, $mul_add:ident, $min:ident, $max:ident, $less:ident, $select:ident) => {
         impl Lane for $t {
             type V<S: Simd> = S::$v;
             #[inline(always)]
             fn load<S: Simd>(simd: S, from: &[Self]) -> S::$v {
-                simd.$load(&from[..from.len().min(S::$lanes)])
+                match S::$view(from).0.first() {
+                    Some(v) => *v,
+                    None => simd.$load(from),
+                }
             }
             #[inline(always)]
             fn store<S: Simd>(simd: S, to: &mut [Self], v: S::$v) {
-                let n = to.len().min(S::$lanes);
-                simd.$store(&mut to[..n], v);
+                match S::$view_mut(to) {
+                    ([first, ..], _) => *first = v,
+                    (_, rest) => simd.$store(rest, v),
+                }
             }
             #[inline(always)]
             fn splat<S: Simd>(simd: S, value: Self) -> S::$v {
@@ -75,7 +80,8 @@ macro_rules! lane {
 lane!(
     f32,
     f32s,
-    F32_LANES,
+    as_simd_f32s,
+    as_mut_simd_f32s,
     partial_load_f32s,
     partial_store_f32s,
     splat_f32s,
@@ -88,7 +94,8 @@ lane!(
 lane!(
     f64,
     f64s,
-    F64_LANES,
+    as_simd_f64s,
+    as_mut_simd_f64s,
     partial_load_f64s,
     partial_store_f64s,
     splat_f64s,

@@ -15,7 +15,7 @@ use num_complex::Complex;
 use pulp::Arch;
 
 pub use chroma::{ChromaCqt, ChromaCqtParams, chroma_cqt, cq_to_chroma};
-pub use tuning::{SignalTuning, signal_tuning};
+pub use tuning::SignalTuning;
 
 use crate::error::{DspError, Result};
 use crate::frequency::require_rate;
@@ -27,7 +27,7 @@ use crate::transform::Forward;
 use crate::vector::Lane;
 use crate::window::Window;
 use basis::{Basis, Wavelets};
-use decimate::decimate;
+use decimate::Decimator;
 
 /// Lowest frequency by default: C1 in Hz.
 pub const C1: f64 = 32.703_195_662_574_83;
@@ -127,6 +127,10 @@ pub struct CqtPlan {
     params: CqtParams,
     /// Halvings of the rate before the first octave.
     early: u32,
+    /// These halvings but the last, and the last of them.
+    early_decimators: [Decimator; 2],
+    /// Halving between octaves.
+    decimator: Decimator,
     /// Octaves from the highest down.
     octaves: Vec<Octave>,
 }
@@ -185,7 +189,9 @@ impl CqtPlan {
             }
             end = first;
         }
-        Ok(Self { params: *p, early, octaves })
+        let early_decimators = [Decimator::early(early), Decimator::last(early.max(1))];
+        let decimator = Decimator::last(1);
+        Ok(Self { params: *p, early, early_decimators, decimator, octaves })
     }
 
     /// The parameters of the transform.
@@ -221,7 +227,7 @@ impl CqtPlan {
                 None => self.respond(octave, &signal, part)?,
             }
             if octave.halve && i + 1 < self.octaves.len() {
-                signal = decimate(&signal, signal.len().div_ceil(2), std::f64::consts::SQRT_2);
+                signal = self.decimator.halve(&signal, signal.len().div_ceil(2));
             }
         }
         Ok(out)
@@ -236,13 +242,13 @@ impl CqtPlan {
         // soxr rounds the number of samples half up, librosa pads to the next larger with a zero.
         let n = (y.len() + factor / 2) / factor;
         let mut signal = y.to_vec();
-        for level in 1..=self.early {
-            let remaining = 1usize << (self.early - level);
-            // The response after the end counts in the next stage.
-            let tail = if remaining > 1 { decimate::REACH } else { 0 };
-            let m = n * remaining + tail;
-            signal = decimate(&signal, m, std::f64::consts::SQRT_2);
+        let [early, last] = &self.early_decimators;
+        for level in 1..self.early {
+            // The response after the end counts in the later stages.
+            let after = n << (self.early - level);
+            signal = early.halve(&signal, after + last.reach());
         }
+        signal = last.halve(&signal, n);
         signal.resize(y.len().div_ceil(factor), T::zero());
         signal
     }
