@@ -1,6 +1,27 @@
 """Compound inputs of the benchmark's systems: re-exported from one private module per family."""
 
+from ._compound import (
+    a34_short,
+    a34f136,
+    a34f136_mean,
+    paa_fbank,
+    pca_fit,
+    pca_fit_transform,
+    pca_project,
+    sk_resize,
+)
 from ._mono import to_mono
 from ._pitch import piptrack_both
 
-__all__ = ["piptrack_both", "to_mono"]
+__all__ = [
+    "a34_short",
+    "a34f136",
+    "a34f136_mean",
+    "paa_fbank",
+    "pca_fit",
+    "pca_fit_transform",
+    "pca_project",
+    "piptrack_both",
+    "sk_resize",
+    "to_mono",
+]

@@ -98,11 +98,7 @@ fn gaussian(sigma: f64) -> Vec<f64> {
     half.iter().map(|w| w / total).collect()
 }
 
-fn along<T: Real>(
-    image: &mut Array2<T>,
-    axis: usize,
-    filter: impl Fn(ArrayView1<T>) -> Array1<T>,
-) {
+fn along<T: Real>(image: &mut Array2<T>, axis: usize, filter: impl Fn(ArrayView1<T>) -> Array1<T>) {
     for mut line in image.lanes_mut(Axis(axis)) {
         let filtered = filter(line.view());
         line.assign(&filtered);
