@@ -10,6 +10,17 @@ from ._compound import (
     pca_project,
     sk_resize,
 )
+from ._frontends import (
+    m1_stft,
+    m2_mfcc,
+    m3_spectrogram,
+    m4_logmel,
+    m4_windows,
+    m5_a34f136,
+    m5_vggish_patches,
+    m6_spectrogram,
+    spec9216,
+)
 from ._mono import to_mono
 from ._pitch import piptrack_both
 
@@ -17,11 +28,20 @@ __all__ = [
     "a34_short",
     "a34f136",
     "a34f136_mean",
+    "m1_stft",
+    "m2_mfcc",
+    "m3_spectrogram",
+    "m4_logmel",
+    "m4_windows",
+    "m5_a34f136",
+    "m5_vggish_patches",
+    "m6_spectrogram",
     "paa_fbank",
     "pca_fit",
     "pca_fit_transform",
     "pca_project",
     "piptrack_both",
     "sk_resize",
+    "spec9216",
     "to_mono",
 ]

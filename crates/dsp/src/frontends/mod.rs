@@ -72,12 +72,7 @@ impl LibrosaVersion {
 }
 
 /// Mean over the channels at `target_sr` (librosa `load` with `mono=True`).
-fn mono_at(
-    y: ArrayView2<f32>,
-    sr: f64,
-    target_sr: f64,
-    res_type: ResType,
-) -> Result<Array1<f32>> {
+fn mono_at(y: ArrayView2<f32>, sr: f64, target_sr: f64, res_type: ResType) -> Result<Array1<f32>> {
     let mono = to_mono(y)?.insert_axis(Axis(0));
     Ok(resample(mono.view(), sr, target_sr, res_type, true, false)?.remove_axis(Axis(0)))
 }
