@@ -6,12 +6,17 @@
 
 pub mod chroma;
 pub mod columns;
+pub mod cqt;
 pub mod decibel;
 pub mod delta;
 pub mod error;
 pub mod frequency;
 pub mod frontends;
+pub mod hpss;
+pub mod istft;
 pub mod lanes;
+mod log2;
+pub mod median;
 pub mod mel;
 pub mod mfcc;
 pub mod mono;
@@ -27,6 +32,9 @@ pub mod spectral;
 pub mod stft;
 mod sums;
 pub mod time_domain;
+pub mod tonnetz;
+pub mod transform;
+pub mod vector;
 pub mod window;
 
 pub use error::{DspError, Result};

@@ -6,6 +6,7 @@ use ndarray::{Array3, ArrayView2, ArrayView3};
 use crate::columns::for_each_column;
 use crate::error::{DspError, Result};
 use crate::frequency::fft_frequencies;
+use crate::log2::log2;
 use crate::real::Real;
 
 /// Parameters of the tracker, in librosa's names.
@@ -265,8 +266,7 @@ pub fn pitch_tuning<T: Real>(
     for f in frequencies.iter().filter(|f| **f > T::zero() && f.is_finite()) {
         any = true;
         // Each step rounds to T, as in numpy.
-        let octaves = T::of((*f / T::of(27.5)).wide().log2());
-        let bins = per_octave * octaves;
+        let bins = per_octave * octaves(*f / T::of(27.5));
         let mut residual = bins - bins.floor();
         if residual >= T::of(0.5) {
             residual -= T::one();
@@ -284,6 +284,14 @@ pub fn pitch_tuning<T: Real>(
     let fullest = counts.iter().copied().max().unwrap_or(0);
     let first = counts.iter().position(|n| *n == fullest).unwrap_or(0);
     Ok(any.then(|| edge(first)))
+}
+
+/// Binary logarithm of `ratio`, rounded to `T` as numpy does.
+fn octaves<T: Real>(ratio: T) -> T {
+    match T::as_f32(&[ratio]) {
+        Some(single) => T::of(f64::from(log2(single[0]))),
+        None => ratio.log2(),
+    }
 }
 
 #[cfg(test)]

@@ -9,10 +9,12 @@
 mod decibel;
 mod fft;
 mod gather;
+mod spectrum;
 
 pub use decibel::{max_per_slot, power_to_decibel};
 pub use fft::LaneFft;
 pub use gather::{Slots, gather};
+pub use spectrum::Spectrum;
 
 use pulp::Simd;
 
