@@ -1,6 +1,27 @@
 """Compound inputs of the benchmark's systems: re-exported from one private module per family."""
 
 from ._harmonic import abs_cqt, af193, hpss_audio, hpss_mags, hpss_masks
+from ._compound import (
+    a34_short,
+    a34f136,
+    a34f136_mean,
+    paa_fbank,
+    pca_fit,
+    pca_fit_transform,
+    pca_project,
+    sk_resize,
+)
+from ._frontends import (
+    m1_stft,
+    m2_mfcc,
+    m3_spectrogram,
+    m4_logmel,
+    m4_windows,
+    m5_a34f136,
+    m5_vggish_patches,
+    m6_spectrogram,
+    spec9216,
+)
 from ._mono import to_mono
 from ._pitch import piptrack_both
 
@@ -11,5 +32,23 @@ __all__ = [
     "hpss_mags",
     "hpss_masks",
     "piptrack_both",
+    "a34_short",
+    "a34f136",
+    "a34f136_mean",
+    "m1_stft",
+    "m2_mfcc",
+    "m3_spectrogram",
+    "m4_logmel",
+    "m4_windows",
+    "m5_a34f136",
+    "m5_vggish_patches",
+    "m6_spectrogram",
+    "paa_fbank",
+    "pca_fit",
+    "pca_fit_transform",
+    "pca_project",
+    "piptrack_both",
+    "sk_resize",
+    "spec9216",
     "to_mono",
 ]

@@ -12,6 +12,7 @@ pub mod decibel;
 pub mod delta;
 pub mod error;
 pub mod frequency;
+pub mod frontends;
 pub mod hpss;
 pub mod istft;
 pub mod lanes;

@@ -8,6 +8,7 @@ mod arrays;
 mod chroma;
 mod compound;
 mod harmonic;
+mod frontends;
 mod mel;
 mod onset;
 mod resample;
@@ -35,6 +36,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     time_domain::register(m)?;
     resample::register(m)?;
     compound::register(m)?;
+    frontends::register(m)?;
     spectral::register(m)?;
     chroma::register(m)?;
     onset::register(m)

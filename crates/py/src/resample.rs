@@ -6,6 +6,18 @@ use pyo3::prelude::*;
 use crate::arrays::{Floats, Matrix, view2};
 use crate::value_error;
 
+/// The converter of librosa's name.
+pub(crate) fn res_type(name: &str) -> PyResult<ResType> {
+    match name {
+        "soxr_hq" => Ok(ResType::SoxrHq),
+        "kaiser_best" => Ok(ResType::KaiserBest),
+        "kaiser_fast" => Ok(ResType::KaiserFast),
+        other => Err(value_error(format!(
+            "res_type = {other} is not possible: soxr_hq, kaiser_best or kaiser_fast"
+        ))),
+    }
+}
+
 #[pyfunction]
 fn resample<'py>(
     py: Python<'py>,
@@ -15,16 +27,7 @@ fn resample<'py>(
     fix: bool,
     scale: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let res_type = match res_type {
-        "soxr_hq" => ResType::SoxrHq,
-        "kaiser_best" => ResType::KaiserBest,
-        "kaiser_fast" => ResType::KaiserFast,
-        other => {
-            return Err(value_error(format!(
-                "res_type = {other} is not possible: soxr_hq, kaiser_best or kaiser_fast"
-            )));
-        }
-    };
+    let res_type = self::res_type(res_type)?;
     let (from, to) = rates;
     let result = match y {
         Floats::F32(y) => {

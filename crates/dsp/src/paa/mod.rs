@@ -15,7 +15,9 @@ use num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
 use crate::error::{DspError, Result};
+use crate::frequency::require_rate;
 use crate::real::{Real, require_finite};
+use crate::sums::{sum, sum_pairs};
 use tables::{ChromaBin, Filter, N_CHROMA, N_MFCC};
 
 pub use midterm::{MidTerm, file_vector};
@@ -46,13 +48,6 @@ pub fn short_names() -> Vec<String> {
     names
 }
 
-fn check_rate(sr: f64) -> Result<()> {
-    if sr.is_finite() && sr > 0.0 {
-        return Ok(());
-    }
-    Err(DspError::parameter("sr", sr, "a positive number of hertz"))
-}
-
 /// Tables for one sample rate, window and step (in samples).
 #[derive(Clone)]
 pub struct PaaPlan {
@@ -60,6 +55,8 @@ pub struct PaaPlan {
     window: usize,
     step: usize,
     fft: Arc<dyn Fft<f64>>,
+    /// Of the bins in hertz, one bin high as pyAudioAnalysis has them.
+    frequencies: Vec<f64>,
     filters: Vec<Filter>,
     dct: Array2<f64>,
     chroma: Vec<ChromaBin>,
@@ -79,7 +76,7 @@ impl PaaPlan {
     /// A step of 0, or a rate or window for which pyAudioAnalysis itself fails: its filters need
     /// about 6.9 kHz, its chroma code more bins than semitones.
     pub fn new(sr: f64, window: usize, step: usize) -> Result<Self> {
-        check_rate(sr)?;
+        require_rate(sr)?;
         if step == 0 {
             return Err(DspError::parameter("step", step, "at least 1"));
         }
@@ -92,6 +89,7 @@ impl PaaPlan {
             window,
             step,
             fft: FftPlanner::new().plan_fft_forward(window),
+            frequencies: (1..=num_fft).map(|k| k as f64 * (sr / (2.0 * num_fft as f64))).collect(),
             filters: tables::filters(sr, num_fft)?,
             dct: tables::dct(),
             chroma: tables::chroma_bins(sr, num_fft)?,
@@ -209,14 +207,14 @@ impl Frame {
             *m = z.norm_sqr().sqrt() / bins;
             *p = *m * *m;
         }
-        self.total = sum(self.magnitude.iter().map(|m| m + EPS));
+        self.total = sum(&self.magnitude, |m| m + EPS);
 
-        let energy = sum(x.iter().map(|v| v * v));
-        let spectral_energy = sum(self.power.iter().copied());
+        let energy = sum(x, |v| v * v);
+        let spectral_energy = sum(&self.power, |p| p);
         self.features[0] = zero_crossing_rate(x);
         self.features[1] = energy / x.len() as f64;
         self.features[2] = block_entropy(x, energy);
-        (self.features[3], self.features[4]) = self.centroid_and_spread(plan.sr);
+        (self.features[3], self.features[4]) = self.centroid_and_spread(plan);
         self.features[5] = block_entropy(&self.magnitude, spectral_energy);
         self.features[6] = if first { 0.0 } else { self.flux() };
         self.features[7] = self.rolloff(spectral_energy);
@@ -224,24 +222,22 @@ impl Frame {
         self.chroma(plan, spectral_energy);
     }
 
-    /// Of the magnitudes relative to the largest; frequencies are one bin high.
-    fn centroid_and_spread(&self, sr: f64) -> (f64, f64) {
-        let n = self.magnitude.len();
-        let width = sr / (2.0 * n as f64);
+    /// Of the magnitudes relative to the largest.
+    fn centroid_and_spread(&self, plan: &PaaPlan) -> (f64, f64) {
         let max = self.magnitude.iter().copied().fold(0.0, f64::max);
         let scale = if max == 0.0 { EPS } else { max };
-        let frequency = |k: usize| (k + 1) as f64 * width;
-        let weights = || self.magnitude.iter().map(|m| m / scale).enumerate();
-        let total = sum(weights().map(|(_, w)| w)) + EPS;
-        let centroid = sum(weights().map(|(k, w)| frequency(k) * w)) / total;
-        let spread =
-            (sum(weights().map(|(k, w)| (frequency(k) - centroid).powi(2) * w)) / total).sqrt();
-        (centroid / (sr / 2.0), spread / (sr / 2.0))
+        let magnitude = &self.magnitude;
+        let total = sum(magnitude, |m| m / scale) + EPS;
+        let centroid = sum_pairs(magnitude, &plan.frequencies, |m, f| f * (m / scale)) / total;
+        let offset = |m: f64, f: f64| (f - centroid).powi(2) * (m / scale);
+        let spread = (sum_pairs(magnitude, &plan.frequencies, offset) / total).sqrt();
+        let nyquist = plan.sr / 2.0;
+        (centroid / nyquist, spread / nyquist)
     }
 
     fn flux(&self) -> f64 {
-        let pairs = self.magnitude.iter().zip(&self.previous);
-        sum(pairs.map(|(m, p)| (m / self.total - p / self.previous_total).powi(2)))
+        let rise = |m: f64, p: f64| (m / self.total - p / self.previous_total).powi(2);
+        sum_pairs(&self.magnitude, &self.previous, rise)
     }
 
     fn rolloff(&self, energy: f64) -> f64 {
@@ -260,7 +256,7 @@ impl Frame {
             .iter()
             .map(|f| {
                 let bins = &self.magnitude[f.first..f.first + f.weights.len()];
-                (sum(f.weights.iter().zip(bins).map(|(w, m)| w * m)) + EPS).log10()
+                (sum_pairs(bins, &f.weights, |m, w| w * m) + EPS).log10()
             })
             .collect();
         for (slot, row) in self.features[8..8 + N_MFCC].iter_mut().zip(plan.dct.outer_iter()) {
@@ -284,15 +280,6 @@ impl Frame {
     }
 }
 
-/// A sum in eight interleaved parts: quick, and closer than one after another.
-fn sum(values: impl Iterator<Item = f64>) -> f64 {
-    let mut parts = [0.0; 8];
-    for (i, v) in values.enumerate() {
-        parts[i % 8] += v;
-    }
-    parts.iter().sum()
-}
-
 /// A zero sample counts as half a crossing on each side.
 fn zero_crossing_rate(x: &[f64]) -> f64 {
     let sign = |v: f64| i32::from(v > 0.0) - i32::from(v < 0.0);
@@ -305,7 +292,7 @@ fn zero_crossing_rate(x: &[f64]) -> f64 {
 fn block_entropy(x: &[f64], energy: f64) -> f64 {
     let len = x.len() / BLOCKS;
     let terms = (0..BLOCKS).map(|b| {
-        let share = sum(x[b * len..(b + 1) * len].iter().map(|v| v * v)) / (energy + EPS);
+        let share = sum(&x[b * len..(b + 1) * len], |v| v * v) / (energy + EPS);
         share * (share + EPS).log2()
     });
     -terms.sum::<f64>()

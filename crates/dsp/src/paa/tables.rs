@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use ndarray::Array2;
 
 use crate::error::{DspError, Result};
+use crate::frequency::require_rate;
 
 /// Filters of the talkbox bank: 13 linearly and 27 logarithmically spaced.
 const LINEAR: usize = 13;
@@ -53,7 +54,7 @@ pub fn paa_fbank(sr: f64, num_fft: usize) -> Result<Array2<f64>> {
     if num_fft == 0 {
         return Err(DspError::parameter("num_fft", num_fft, "at least 1"));
     }
-    super::check_rate(sr)?;
+    require_rate(sr)?;
     let mut bank = Array2::zeros((FILTERS, num_fft));
     for (mut row, filter) in bank.outer_iter_mut().zip(filters(sr, num_fft)?) {
         for (slot, w) in row.iter_mut().skip(filter.first).zip(filter.weights) {

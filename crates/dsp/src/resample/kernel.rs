@@ -13,14 +13,21 @@ pub(super) struct Plane<'a> {
 }
 
 /// `out[i] = sum over planes, taps k of taps[k] * samples[i + k * stride]`.
+///
+/// Taps are taken in the order 0, 16, 32, ..., 1, 17, ...: neighbours in that order read samples a
+/// whole number of vectors apart, so that a block of outputs loads each vector only once.
 pub(super) struct Correlate<'a> {
     pub planes: &'a [Plane<'a>],
     pub stride: usize,
     pub out: &'a mut [f32],
 }
 
+/// Distance of successive taps.
+const COMB: usize = 16;
 /// Vectors of outputs that are summed together.
 const UNROLL: usize = 8;
+/// Successive taps that share loads.
+const GROUP: usize = 4;
 
 impl WithSimd for Correlate<'_> {
     type Output = ();
@@ -29,12 +36,11 @@ impl WithSimd for Correlate<'_> {
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { planes, stride, out } = self;
         let lanes = S::F32_LANES;
-        let block = UNROLL * lanes;
         let len = out.len();
         let mut at = 0;
-        while at + block <= len {
+        while at + UNROLL * lanes <= len {
             vectors::<S, UNROLL>(simd, planes, stride, at, out);
-            at += block;
+            at += UNROLL * lanes;
         }
         while at + lanes <= len {
             vectors::<S, 1>(simd, planes, stride, at, out);
@@ -47,8 +53,10 @@ impl WithSimd for Correlate<'_> {
             for (i, slot) in out.iter_mut().enumerate().skip(at) {
                 let mut sum = 0.0f32;
                 for plane in planes {
-                    for (k, &tap) in plane.taps.iter().enumerate() {
-                        sum = tap.mul_add(plane.samples[i + k * stride], sum);
+                    for first in 0..COMB {
+                        for k in (first..plane.taps.len()).step_by(COMB) {
+                            sum = plane.taps[k].mul_add(plane.samples[i + k * stride], sum);
+                        }
                     }
                 }
                 *slot = sum;
@@ -65,20 +73,39 @@ fn vectors<S: Simd, const N: usize>(
     at: usize,
     out: &mut [f32],
 ) {
-    let width = N * S::F32_LANES;
+    let lanes = S::F32_LANES;
     let mut sums = [simd.splat_f32s(0.0); N];
     for plane in planes {
-        let mut from = at;
-        for &tap in plane.taps {
-            let tap = simd.splat_f32s(tap);
-            let (samples, _) = S::as_simd_f32s(&plane.samples[from..from + width]);
-            for (sum, &x) in sums.iter_mut().zip(samples) {
-                *sum = simd.mul_add_f32s(tap, x, *sum);
+        let count = plane.taps.len();
+        for first in 0..COMB {
+            let mut k = first;
+            if stride == 1 && COMB.is_multiple_of(lanes) {
+                let apart = COMB / lanes;
+                while k + (GROUP - 1) * COMB < count {
+                    let taps: [S::f32s; GROUP] =
+                        std::array::from_fn(|g| simd.splat_f32s(plane.taps[k + g * COMB]));
+                    let width = (N + (GROUP - 1) * apart) * lanes;
+                    let (samples, _) = S::as_simd_f32s(&plane.samples[at + k..at + k + width]);
+                    for (g, tap) in taps.into_iter().enumerate() {
+                        for (sum, &x) in sums.iter_mut().zip(&samples[g * apart..g * apart + N]) {
+                            *sum = simd.mul_add_f32s(tap, x, *sum);
+                        }
+                    }
+                    k += GROUP * COMB;
+                }
             }
-            from += stride;
+            while k < count {
+                let tap = simd.splat_f32s(plane.taps[k]);
+                let from = at + k * stride;
+                let (samples, _) = S::as_simd_f32s(&plane.samples[from..from + N * lanes]);
+                for (sum, &x) in sums.iter_mut().zip(samples) {
+                    *sum = simd.mul_add_f32s(tap, x, *sum);
+                }
+                k += COMB;
+            }
         }
     }
-    let (slots, _) = S::as_mut_simd_f32s(&mut out[at..at + width]);
+    let (slots, _) = S::as_mut_simd_f32s(&mut out[at..at + N * lanes]);
     slots.copy_from_slice(&sums);
 }
 

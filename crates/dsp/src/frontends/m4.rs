@@ -1,0 +1,116 @@
+//! M4 (HVRL, Keio): a log-mel spectrogram of every channel.
+
+use ndarray::{Array3, Array4, ArrayView2, ArrayView3, s};
+use num_complex::Complex;
+use realfft::RealFftPlanner;
+
+use super::Variant;
+use crate::error::{DspError, Result};
+use crate::frequency::require_rate;
+use crate::mel::{hz_to_mel, mel_to_hz};
+use crate::real::require_finite;
+use crate::window::{Window, get_window};
+
+const BANDS: usize = 64;
+const PRE_EMPHASIS: f64 = 0.97;
+const WINDOW_FRAMES: usize = 64;
+const WINDOW_STEP: usize = 16;
+
+/// 64 mel bands in dB of 25 ms frames every 10 ms, all channels, on 16-bit counts.
+///
+/// The code transforms each frame (1102 samples at 44.1 kHz) with 512 points, which drops all but
+/// the first 512 samples, and takes 20 log10 of a power: [`Variant::Code`]. [`Variant::Paper`]
+/// transforms whole frames (the next power of two) and takes 10 log10.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct M4LogMel {
+    /// Paper or code.
+    pub variant: Variant,
+}
+
+impl M4LogMel {
+    /// `[frames, 64, channels]` of `y [channels, samples]`, the layout of the published features.
+    ///
+    /// # Errors
+    /// No or non-finite samples, a rate below 100 Hz.
+    pub fn run(&self, y: ArrayView2<f32>, sr: f64) -> Result<Array3<f32>> {
+        require_rate(sr)?;
+        require_finite("y", y)?;
+        let length = (0.025 * sr).round_ties_even() as usize;
+        let step = (0.01 * sr).round_ties_even() as usize;
+        if step == 0 {
+            return Err(DspError::parameter("sr", sr, "at least 100 Hz"));
+        }
+        let (channels, n) = y.dim();
+        if n == 0 {
+            return Err(DspError::TooShort { name: "y", actual: 0, needed: 1 });
+        }
+        let (n_fft, decibels) = match self.variant {
+            Variant::Code => (512, 20.0),
+            Variant::Paper => (length.next_power_of_two(), 10.0),
+        };
+        let frames = n.abs_diff(length).div_ceil(step);
+        let used = length.min(n_fft);
+        let window = get_window(Window::Hamming, length, false);
+        let bank = triangles(sr, n_fft);
+        let fft = RealFftPlanner::<f64>::new().plan_fft_forward(n_fft);
+        let (mut frame, mut spectrum) = (fft.make_input_vec(), fft.make_output_vec());
+        let mut scratch = fft.make_scratch_vec();
+        let mut out = Array3::zeros((frames, BANDS, channels));
+        for (c, signal) in y.outer_iter().enumerate() {
+            let count = |i: usize| signal.get(i).map_or(0.0, |&v| f64::from(v) * 32768.0);
+            for t in 0..frames {
+                frame.fill(0.0);
+                for (k, slot) in frame.iter_mut().enumerate().take(used) {
+                    let i = t * step + k;
+                    // The padding after the last sample is not pre-emphasised.
+                    let before = if i == 0 || i >= n { 0.0 } else { count(i - 1) };
+                    *slot = (count(i) - PRE_EMPHASIS * before) * window[k];
+                }
+                fft.process_with_scratch(&mut frame, &mut spectrum, &mut scratch)
+                    .expect("buffers made by the plan itself");
+                let power = |z: &Complex<f64>| z.norm_sqr() / n_fft as f64;
+                for (b, (first, weights)) in bank.iter().enumerate() {
+                    let bins = weights.iter().zip(spectrum.iter().skip(*first));
+                    let energy: f64 = bins.map(|(w, z)| w * power(z)).sum();
+                    let floored = if energy == 0.0 { f64::EPSILON } else { energy };
+                    out[[t, b, c]] = (decibels * floored.log10()) as f32;
+                }
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// First bin and weights of each filter, its corners rounded down to bins.
+fn triangles(sr: f64, n_fft: usize) -> Vec<(usize, Vec<f64>)> {
+    let top = hz_to_mel(sr / 2.0, true);
+    let corner = |i: usize| {
+        let hz = mel_to_hz(top * i as f64 / (BANDS + 1) as f64, true);
+        ((n_fft + 1) as f64 * hz / sr).floor() as usize
+    };
+    (0..BANDS)
+        .map(|b| {
+            let [low, centre, high] = [corner(b), corner(b + 1), corner(b + 2)];
+            let rising = (low..centre).map(|k| (k - low) as f64 / (centre - low) as f64);
+            let falling = (centre..high).map(|k| (high - k) as f64 / (high - centre) as f64);
+            (low, rising.chain(falling).collect())
+        })
+        .collect()
+}
+
+/// Windows of 64 frames every 16, `[windows, channels, 64 frames, 64 bands]`, of features `[frames, 64,
+/// channels]`; `ceil(|frames - 64| / 16)` of them, the last filled up with the floor of the code's
+/// dB scale where frames are missing.
+pub fn m4_windows(features: ArrayView3<f32>) -> Array4<f32> {
+    let (frames, bands, channels) = features.dim();
+    let count = frames.abs_diff(WINDOW_FRAMES).div_ceil(WINDOW_STEP);
+    let floor = (20.0 * f64::EPSILON.log10()) as f32;
+    let mut out = Array4::from_elem((count, channels, WINDOW_FRAMES, bands), floor);
+    for w in 0..count {
+        let start = (w * WINDOW_STEP).min(frames);
+        let part = features.slice(s![start..(start + WINDOW_FRAMES).min(frames), .., ..]);
+        let kept = part.dim().0;
+        out.slice_mut(s![w, .., ..kept, ..]).assign(&part.permuted_axes([2, 0, 1]));
+    }
+    out
+}

@@ -1,0 +1,95 @@
+//! The inputs of the systems compared in the CORSMAL benchmark, M1 to M6, and the baselines' 9216
+//! values. One plan structure per system; `run` takes `[channels, samples]` in -1..1 at any rate.
+//!
+//! Where a paper and its code differ the plan has a `Variant`; what neither says is a choice
+//! of ours that the plan's documentation names as such.
+
+mod m1;
+mod m2;
+mod m3;
+mod m4;
+mod m5;
+mod m6;
+mod spec9216;
+
+pub use m1::M1Stft;
+pub use m2::M2Mfcc;
+pub use m3::M3Spectrogram;
+pub use m4::{M4LogMel, m4_windows};
+pub use m5::{M5A34f136, M5VggishPatches, downmix_71, downmix_71_weights};
+pub use m6::{M6Crop, M6Spectrogram};
+pub use spec9216::Spec9216;
+
+use ndarray::{Array1, Array2, ArrayView2, Axis};
+use serde::{Deserialize, Serialize};
+
+use crate::decibel::Decibel;
+use crate::error::Result;
+use crate::mono::to_mono;
+use crate::real::Real;
+use crate::resample::{ResType, resample};
+use crate::stft::{PadMode, StftParams, spectrogram};
+
+/// What a system's paper says or what its published code does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Variant {
+    /// The published code, defects included.
+    #[default]
+    Code,
+    /// The paper's words.
+    Paper,
+}
+
+/// The librosa whose conventions a system was built on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum LibrosaVersion {
+    /// 0.8: reflect padding, resampy's windowed sinc.
+    #[default]
+    #[serde(rename = "0.8")]
+    V08,
+    /// 0.11: zero padding, libsoxr.
+    #[serde(rename = "0.11")]
+    V011,
+}
+
+impl LibrosaVersion {
+    /// Padding of centred frames.
+    pub fn pad_mode(self) -> PadMode {
+        match self {
+            Self::V08 => PadMode::Reflect,
+            Self::V011 => PadMode::Constant,
+        }
+    }
+
+    /// Converter where a system asked for resampy's `kaiser_fast`.
+    pub fn fast_res_type(self) -> ResType {
+        match self {
+            Self::V08 => ResType::KaiserFast,
+            Self::V011 => ResType::SoxrHq,
+        }
+    }
+}
+
+/// Mean over the channels at `target_sr` (librosa `load` with `mono=True`).
+fn mono_at(y: ArrayView2<f32>, sr: f64, target_sr: f64, res_type: ResType) -> Result<Array1<f32>> {
+    let mono = to_mono(y)?.insert_axis(Axis(0));
+    Ok(resample(mono.view(), sr, target_sr, res_type, true, false)?.remove_axis(Axis(0)))
+}
+
+/// The first `len` samples, or all and zeros up to `len`.
+fn cut_or_pad(y: Array1<f32>, len: usize) -> Array1<f32> {
+    let mut samples = y.to_vec();
+    samples.resize(len, 0.0);
+    Array1::from_vec(samples)
+}
+
+/// `amplitude_to_db(|stft|)` `[bins, frames]` of one channel, 80 dB deep.
+fn amplitude_db<T: Real>(y: ArrayView2<T>, params: &StftParams) -> Result<Array2<T>> {
+    let mut power = spectrogram(y, params, 2.0)?;
+    Decibel::default().power(power.as_slice_mut().expect("made in C order"))?;
+    Ok(power.index_axis_move(Axis(0), 0))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,67 @@
+use ndarray::Array2;
+
+use super::*;
+
+/// Eight channels of a decaying tone with clicks.
+fn recording(n: usize) -> Array2<f32> {
+    Array2::from_shape_fn((8, n), |(c, i)| {
+        let click = if i % 9000 < 40 { 0.3 } else { 0.0 };
+        let t = i as f32 / 44_100.0;
+        (0.2 * (t * 1500.0 * (1.0 + 0.1 * c as f32)).sin() + click) * (-t).exp()
+    })
+}
+
+#[test]
+fn shapes() {
+    let (y, sr) = (recording(60_000), 44_100.0);
+    assert_eq!(M1Stft::default().run(y.view()).unwrap().dim(), (1025, 118));
+    assert_eq!(M2Mfcc::default().run(y.view(), sr).unwrap().dim(), (1501, 40));
+    assert_eq!(M3Spectrogram::default().run(y.view(), sr).unwrap().dim(), (257, 124));
+    let logmel = M4LogMel::default().run(y.view(), sr).unwrap();
+    assert_eq!(logmel.dim(), (134, 64, 8));
+    assert_eq!(m4_windows(logmel.view()).dim(), (5, 8, 64, 64));
+    assert_eq!(M5A34f136::new(sr).unwrap().run(y.view()).unwrap().len(), 136);
+    let patches = M5VggishPatches::default().run(y.view(), sr).unwrap();
+    assert_eq!(patches.dim(), (1, 96, 64));
+    assert_eq!(M6Spectrogram::default().run(y.view(), sr).unwrap().dim(), (96, 96));
+    assert_eq!(Spec9216::default().run(y.row(0)).unwrap().dim(), (96, 96));
+}
+
+#[test]
+fn silence_and_single_samples_are_finite_or_refused() {
+    for n in [1, 2, 600, 5000] {
+        let y = Array2::<f32>::zeros((8, n));
+        let finite = |a: Array2<f32>| assert!(a.iter().all(|v| v.is_finite()), "{n}");
+        finite(M2Mfcc::default().run(y.view(), 44_100.0).unwrap());
+        finite(M3Spectrogram::default().run(y.view(), 44_100.0).unwrap());
+        finite(M6Spectrogram::default().run(y.view(), 44_100.0).unwrap());
+        let logmel = M4LogMel::default().run(y.view(), 44_100.0).unwrap();
+        assert!(logmel.iter().all(|v| v.is_finite()));
+        assert!(m4_windows(logmel.view()).iter().all(|v| v.is_finite()));
+        assert!(M5VggishPatches::default().run(y.view(), 44_100.0).unwrap().is_empty());
+        assert!(Spec9216::default().run(y.row(0)).is_err());
+    }
+    let none = Array2::<f32>::zeros((8, 0));
+    assert!(M2Mfcc::default().run(none.view(), 44_100.0).is_err());
+    assert!(M6Spectrogram::default().run(none.view(), 44_100.0).is_err());
+    assert!(M4LogMel::default().run(none.view(), 44_100.0).is_err());
+}
+
+#[test]
+fn the_low_frequency_channel_is_left_out() {
+    assert!((downmix_71_weights().iter().sum::<f64>() - 1.0).abs() < 1e-15);
+    let mut y = Array2::<f32>::zeros((8, 4));
+    y.row_mut(3).fill(0.5);
+    assert!(downmix_71(y.view()).unwrap().iter().all(|&v| v == 0.0));
+    assert!(downmix_71(Array2::zeros((5, 4)).view()).is_err());
+}
+
+#[test]
+fn m6_begins_at_the_given_time() {
+    let y = recording(88_200);
+    let from = |crop| {
+        let plan = M6Spectrogram { librosa: LibrosaVersion::V011, crop };
+        plan.run(y.view(), 44_100.0).unwrap()
+    };
+    assert_ne!(from(M6Crop::At(0.0)), from(M6Crop::At(1.0)));
+}
