@@ -5,6 +5,7 @@
 //! file per family, each with a `register`. The GIL is released while we compute.
 
 mod arrays;
+mod classifiers;
 mod spectrum;
 
 use pyo3::exceptions::PyValueError;
@@ -21,5 +22,6 @@ pub(crate) fn value_error(error: impl std::fmt::Display) -> PyErr {
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add("ParameterError", m.py().get_type::<ParameterError>())?;
+    classifiers::register(m)?;
     spectrum::register(m)
 }

@@ -185,7 +185,8 @@ impl Tree {
                 tree.close(at.node, &totals);
                 continue;
             };
-            let middle = at.start + partition(members, columns.column(split.feature), split.threshold, &mut spare);
+            let middle = at.start
+                + partition(members, columns.column(split.feature), split.threshold, &mut spare);
             let left = tree.nodes.len();
             tree.nodes.extend([PLACEHOLDER; 2]);
             tree.nodes[at.node] = Node {
@@ -344,7 +345,9 @@ impl Search<'_> {
         let keys = &mut scratch.keys;
         keys.clear();
         // Value (as an integer of the same order) above, row below: one plain integer sort.
-        keys.extend(self.rows.iter().map(|&r| u64::from(ordered(column[r as usize])) << 32 | u64::from(r)));
+        keys.extend(
+            self.rows.iter().map(|&r| u64::from(ordered(column[r as usize])) << 32 | u64::from(r)),
+        );
         let (mut low, mut high) = (u64::MAX, 0);
         for &key in keys.iter() {
             low = low.min(key);
@@ -354,7 +357,8 @@ impl Search<'_> {
             return None;
         }
         keys.sort_unstable();
-        let mut tally = Tally::new(self.growth.criterion, self.totals, &mut scratch.left, &mut scratch.right);
+        let mut tally =
+            Tally::new(self.growth.criterion, self.totals, &mut scratch.left, &mut scratch.right);
         let leaf = self.growth.min_samples_leaf;
         let mut best = Split { feature, threshold: 0.0, gain: f64::NEG_INFINITY };
         let mut best_at = 0;
@@ -399,7 +403,8 @@ impl Search<'_> {
         if threshold >= high || threshold < low {
             threshold = low;
         }
-        let mut tally = Tally::new(self.growth.criterion, self.totals, &mut scratch.left, &mut scratch.right);
+        let mut tally =
+            Tally::new(self.growth.criterion, self.totals, &mut scratch.left, &mut scratch.right);
         tally.left.fill(0.0);
         let mut count = 0;
         for &row in self.rows {
@@ -439,7 +444,12 @@ struct Tally<'a> {
 
 impl<'a> Tally<'a> {
     /// Everything on the right.
-    fn new(criterion: Criterion, totals: &[f64], left: &'a mut Vec<f64>, right: &'a mut Vec<f64>) -> Self {
+    fn new(
+        criterion: Criterion,
+        totals: &[f64],
+        left: &'a mut Vec<f64>,
+        right: &'a mut Vec<f64>,
+    ) -> Self {
         left.clear();
         left.resize(totals.len(), 0.0);
         right.clear();

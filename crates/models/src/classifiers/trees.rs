@@ -58,8 +58,11 @@ impl Trees {
                 if plan.bootstrap {
                     (0..y.len()).for_each(|_| times[rng.gen_range(0..y.len())] += 1);
                 }
-                let weights: Vec<f32> =
-                    times.iter().zip(y).map(|(&n, &c)| (f64::from(n) * per_class[c]) as f32).collect();
+                let weights: Vec<f32> = times
+                    .iter()
+                    .zip(y)
+                    .map(|(&n, &c)| (f64::from(n) * per_class[c]) as f32)
+                    .collect();
                 let sample = Sample { y: &labels, weights: &weights, n_classes };
                 Tree::grow(&columns, &sample, &plan.growth, rng.next_u64())
             })
