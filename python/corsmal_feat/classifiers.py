@@ -120,7 +120,8 @@ def _warn_column(labels: npt.NDArray[Any]) -> None:
     if exceptions:
         category = exceptions.DataConversionWarning
     warnings.warn(
-        f"A column-vector y of shape {labels.shape} was passed when a 1d array was expected.",
+        "A column-vector y was passed when a 1d array was expected: its shape is "
+        f"{labels.shape}.",
         category,
         stacklevel=5,
     )
@@ -533,8 +534,8 @@ class LogisticRegression(_Estimator):
         *,
         C: float = 1.0,
         class_weight: Any = None,
-        tol: float = 1e-5,
-        max_iter: int = 1000,
+        tol: float = 1e-8,
+        max_iter: int = 10_000,
     ) -> None:
         self.C = C
         self.class_weight = class_weight

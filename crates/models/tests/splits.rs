@@ -18,7 +18,7 @@ fn published() -> Option<Vec<Vec<String>>> {
     };
     let mut rows: Vec<Vec<String>> =
         text.lines().skip(1).map(|l| l.split(',').map(String::from).collect()).collect();
-    rows.sort_by_key(|row| row[0].parse::<usize>().unwrap());
+    rows.sort_by_key(|row| row[0].parse::<usize>().expect("row number"));
     Some(rows)
 }
 
