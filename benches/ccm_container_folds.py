@@ -38,7 +38,12 @@ def weighted_f1(truth: Labels, predicted: Labels) -> float:
     total = 0.0
     for label in np.unique(truth):
         hits = np.sum((truth == label) & (predicted == label))
-        total += 2 * hits / (np.sum(truth == label) + np.sum(predicted == label)) * np.sum(truth == label)
+        total += (
+            2
+            * hits
+            / (np.sum(truth == label) + np.sum(predicted == label))
+            * np.sum(truth == label)
+        )
     return float(total / len(truth))
 
 
@@ -190,10 +195,13 @@ def main() -> None:
         else:
             vggish = v["X"].astype(np.float64)
             sets = {
-                f"A34F + VGGish {n}": np.hstack([x, pooled(vggish, v["offsets"], n)]) for n in (3, 4, 5)
+                f"A34F + VGGish {n}": np.hstack([x, pooled(vggish, v["offsets"], n)])
+                for n in (3, 4, 5)
             }
             report = nested(sets, data)
-        print(name, json.dumps(report, indent=1), f"{time.perf_counter() - start:.0f} s", flush=True)
+        print(
+            name, json.dumps(report, indent=1), f"{time.perf_counter() - start:.0f} s", flush=True
+        )
 
 
 if __name__ == "__main__":

@@ -60,7 +60,9 @@ def _names_of(X: Any) -> npt.NDArray[np.object_] | None:
 def _features(X: Any, owner: str) -> Matrix:
     """`X` [shape=(rows, features)] as finite, contiguous float64."""
     if hasattr(X, "toarray") and hasattr(X, "tocsr"):
-        raise TypeError(f"{owner}: sparse data was passed, but dense data is required; use .toarray()")
+        raise TypeError(
+            f"{owner}: sparse data was passed, but dense data is required; use .toarray()"
+        )
     array = np.asarray(X)
     if array.dtype.kind == "c":
         raise ParameterError(f"Complex data not supported by {owner}")
@@ -98,7 +100,9 @@ def _labels(y: Any, rows: int, owner: str) -> tuple[npt.NDArray[Any], npt.NDArra
         _warn_column(labels)
         labels = labels.ravel()
     if labels.ndim != 1:
-        raise ParameterError(f"y should be a 1d array, got an array of shape {labels.shape} instead.")
+        raise ParameterError(
+            f"y should be a 1d array, got an array of shape {labels.shape} instead."
+        )
     if len(labels) != rows:
         raise ParameterError(f"X has {rows} rows and y has {len(labels)} labels")
     if labels.dtype.kind == "f":
@@ -120,8 +124,7 @@ def _warn_column(labels: npt.NDArray[Any]) -> None:
     if exceptions:
         category = exceptions.DataConversionWarning
     warnings.warn(
-        "A column-vector y was passed when a 1d array was expected: its shape is "
-        f"{labels.shape}.",
+        f"A column-vector y was passed when a 1d array was expected: its shape is {labels.shape}.",
         category,
         stacklevel=5,
     )
@@ -171,7 +174,12 @@ class _Estimator:
         return hasattr(self, "_model")
 
     def __sklearn_tags__(self) -> Any:
-        from sklearn.utils import ClassifierTags, InputTags, Tags, TargetTags
+        from sklearn.utils import (  # type: ignore[import-untyped]
+            ClassifierTags,
+            InputTags,
+            Tags,
+            TargetTags,
+        )
 
         return Tags(
             estimator_type="classifier",
@@ -208,7 +216,9 @@ class _Estimator:
         try:
             spec = _core.classifier_parameters(self._name, json.dumps(self._parameters(classes)))
         except TypeError as error:
-            raise ParameterError(f"{owner}: a parameter is of an impossible type: {error}") from error
+            raise ParameterError(
+                f"{owner}: a parameter is of an impossible type: {error}"
+            ) from error
         pipeline = {"classifier": {"name": self._name, "parameters": json.loads(spec)}}
         counts = np.bincount(positions).tolist()
         if len(classes) < 2 and self._name in ("svm", "logistic"):
@@ -222,7 +232,9 @@ class _Estimator:
             [str(c) for c in classes.tolist()],
             "y",
             [] if names is None else names.tolist(),
-            json.dumps({"rows": len(x), "rows_per_class": counts, "label_kind": classes.dtype.kind}),
+            json.dumps(
+                {"rows": len(x), "rows_per_class": counts, "label_kind": classes.dtype.kind}
+            ),
         )
         self.classes_ = classes
         self.n_features_in_ = x.shape[1]
@@ -317,7 +329,7 @@ def _classes(header: dict[str, Any]) -> npt.NDArray[Any]:
     provenance = header["provenance"]
     kind = provenance.get("label_kind", "") if isinstance(provenance, dict) else ""
     if kind == "b":
-        return names == "True"
+        return np.asarray(names == "True")
     if kind in ("i", "u"):
         return names.astype(np.int64)
     if kind == "f":

@@ -44,7 +44,11 @@ def test_fit_predict_save_load_pickle(estimator, classes, tmp_path: Path):
     np.testing.assert_allclose(proba.sum(axis=1), 1)
     path = tmp_path / "model"
     model.save(path)
-    for back in (type(model).load(path), classifiers.load_model(path), pickle.loads(pickle.dumps(model))):
+    for back in (
+        type(model).load(path),
+        classifiers.load_model(path),
+        pickle.loads(pickle.dumps(model)),
+    ):
         np.testing.assert_array_equal(back.predict(x), model.predict(x))
         np.testing.assert_array_equal(back.predict_proba(x), proba)
         assert back.classes_.dtype.kind == model.classes_.dtype.kind

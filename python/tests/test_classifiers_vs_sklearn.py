@@ -51,7 +51,11 @@ def test_neighbours_are_identical(table, target, weights, metric):
     y = table[target]
     for train, test in container_folds(table):
         for k in (1, 5, 8):
-            settings = {"weights": weights, "metric": metric, "p": 3 if metric == "minkowski" else 2}
+            settings = {
+                "weights": weights,
+                "metric": metric,
+                "p": 3 if metric == "minkowski" else 2,
+            }
             ours = KNN(k, **settings).fit(table["X"][train], y[train])
             theirs = neighbors.KNeighborsClassifier(k, **settings).fit(table["X"][train], y[train])
             query = table["X"][test]
@@ -155,7 +159,9 @@ def test_inside_pipelines_and_searches(table):
     pipeline = make_pipeline(StandardScaler(), SVC(C=10))
     scores = cross_val_score(pipeline, x, y, groups=groups, cv=GroupKFold(3))
     theirs = make_pipeline(StandardScaler(), svm.SVC(C=10))
-    np.testing.assert_allclose(scores, cross_val_score(theirs, x, y, groups=groups, cv=GroupKFold(3)))
+    np.testing.assert_allclose(
+        scores, cross_val_score(theirs, x, y, groups=groups, cv=GroupKFold(3))
+    )
     search = GridSearchCV(KNN(), {"n_neighbors": [1, 5]}, cv=3).fit(x, y)
     assert search.best_params_["n_neighbors"] in (1, 5)
     assert clone(SVC(C=3)).get_params()["C"] == 3

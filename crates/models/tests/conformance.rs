@@ -1,5 +1,7 @@
 //! What holds for every classifier in the table.
 
+#![allow(clippy::unwrap_used, reason = "tests")]
+
 mod common;
 
 use common::clouds;

@@ -1,5 +1,7 @@
 //! Model files: whole, damaged and hostile.
 
+#![allow(clippy::unwrap_used, reason = "tests")]
+
 mod common;
 
 use common::clouds;

@@ -1,5 +1,7 @@
 //! Splits against scikit-learn and against the published ones.
 
+#![allow(clippy::unwrap_used, reason = "tests")]
+
 use corsmal_models::ModelError;
 use corsmal_models::splits::{
     fold_column, group_k_fold, group_lists, leave_one_group_out, stratified_k_fold,
@@ -18,7 +20,7 @@ fn published() -> Option<Vec<Vec<String>>> {
     };
     let mut rows: Vec<Vec<String>> =
         text.lines().skip(1).map(|l| l.split(',').map(String::from).collect()).collect();
-    rows.sort_by_key(|row| row[0].parse::<usize>().expect("row number"));
+    rows.sort_by_key(|row| row[0].parse::<usize>().unwrap());
     Some(rows)
 }
 

@@ -21,7 +21,8 @@ struct PyModel(Model);
 #[pyfunction]
 fn classifier_parameters(name: &str, parameters: &str) -> PyResult<String> {
     let object = serde_json::from_str(parameters).map_err(value_error)?;
-    let spec = corsmal_models::classifiers::ClassifierSpec::new(name, &object).map_err(value_error)?;
+    let spec =
+        corsmal_models::classifiers::ClassifierSpec::new(name, &object).map_err(value_error)?;
     serde_json::to_string(&spec.parameters()).map_err(value_error)
 }
 
