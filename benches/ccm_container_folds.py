@@ -15,6 +15,7 @@ seven joint classes; the probabilities of type and level are sums over them. Fix
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import pathlib
 import time
@@ -50,11 +51,11 @@ def weighted_f1(truth: Labels, predicted: Labels) -> float:
 def pooled(v: Matrix, offsets: Labels, segments: int) -> Matrix:
     """Means over `segments` equal parts of each recording, the maximum, and the log length."""
     rows = []
-    for start, end in zip(offsets[:-1], offsets[1:], strict=True):
+    for start, end in itertools.pairwise(offsets):
         own = v[start:end]
         edges = np.linspace(0, len(own), segments + 1)
         parts = []
-        for low, high in zip(edges[:-1], edges[1:], strict=True):
+        for low, high in itertools.pairwise(edges):
             first = int(low)
             parts.append(own[first : max(int(np.ceil(high)), first + 1)].mean(axis=0))
         rows.append(np.concatenate([*parts, own.max(axis=0), [np.log(len(own))]]))
@@ -112,7 +113,7 @@ def merged(proba: Matrix, classes: Labels) -> Matrix:
 
 
 def log_loss(proba: Matrix, truth: Labels) -> float:
-    """Mean −log of the probability given to the truth, at least 0.001."""
+    """Mean -log of the probability given to the truth, at least 0.001."""
     return float(-np.log(np.maximum(proba[np.arange(len(truth)), truth], 1e-3)).mean())
 
 

@@ -156,7 +156,8 @@ class _Estimator:
         for name, value in params.items():
             if name not in known:
                 raise ParameterError(
-                    f"Invalid parameter {name!r} for estimator {self!r}. Valid parameters are: {known}."
+                    f"Invalid parameter {name!r} for estimator {self!r}. "
+                    f"Valid parameters are: {known}."
                 )
             setattr(self, name, value)
         return self
