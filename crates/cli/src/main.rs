@@ -2,6 +2,8 @@
 
 mod commands;
 mod failure;
+mod interrupt;
+mod progress;
 
 use std::process::ExitCode;
 

@@ -1,0 +1,152 @@
+//! `corsmal-feat extract`: recordings in, feature tensors or tables out.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use corsmal_extract::config::Config;
+use corsmal_extract::inputs::{self, Shard};
+use corsmal_extract::npz::Compression;
+use corsmal_extract::run::{self, Options, Quiet, RunError};
+
+use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
+use crate::progress::{LogFormat, Meter};
+
+/// Arguments of `extract`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  corsmal-feat extract --in audio/ --out feats.npz
+  corsmal-feat extract --in audio/ --out feats.parquet --preset mfcc-zcr --jobs 8
+  corsmal-feat extract --in list.csv --out feats.npz --config my.toml --set mfcc.n_mels=64
+  sox in.flac -t wav - | corsmal-feat extract --in - --out feats.npz --preset esc26
+
+Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 interrupted.")]
+pub struct Args {
+    /// Recordings: files, folders (searched through), globs, manifests (.csv, .jsonl), or - for a
+    /// WAV stream on standard input.
+    #[arg(long = "in", value_name = "PATH", num_args = 1.., required = true)]
+    inputs: Vec<String>,
+    /// Output: .npz, or .parquet for summary tables.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    #[command(flatten)]
+    config: ConfigArgs,
+    /// Worker threads; by default one for each core.
+    #[arg(long, value_name = "N", env = "CORSMAL_FEAT_JOBS")]
+    jobs: Option<usize>,
+    /// Only the i-th of n parts of the inputs, counted from 0; `merge` joins the outputs.
+    #[arg(long, value_name = "I/N", default_value = "0/1")]
+    shard: Shard,
+    /// Continue an interrupted run.
+    #[arg(long)]
+    resume: bool,
+    /// Replace an existing output, forget an interrupted run.
+    #[arg(long)]
+    overwrite: bool,
+    /// Deflate the arrays of an .npz (smaller, much slower).
+    #[arg(long)]
+    compress: bool,
+    /// Stop at the first bad file.
+    #[arg(long, conflicts_with = "max_errors")]
+    strict: bool,
+    /// Stop after more than N bad files.
+    #[arg(long, value_name = "N")]
+    max_errors: Option<usize>,
+    /// Check everything and list the inputs, but read and write nothing.
+    #[arg(long)]
+    dry_run: bool,
+    /// Only errors on standard error.
+    #[arg(long, short)]
+    quiet: bool,
+    /// Form of messages on standard error.
+    #[arg(long, value_enum, default_value = "text")]
+    log_format: LogFormat,
+}
+
+/// Where a configuration comes from.
+#[derive(clap::Args)]
+pub struct ConfigArgs {
+    /// A configuration that comes with the tool (see `corsmal-feat presets`).
+    #[arg(long, value_name = "NAME", conflicts_with = "config")]
+    pub preset: Option<String>,
+    /// A configuration file (TOML).
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Change one key, such as mfcc.n_mels=64 or signal.sample_rate=16000.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub overrides: Vec<String>,
+}
+
+impl ConfigArgs {
+    /// The effective configuration; `logmel` by default.
+    pub fn load(&self) -> Result<Config, Failure> {
+        match &self.config {
+            Some(path) => Ok(Config::load(path, &self.overrides)?),
+            None => {
+                let name = self.preset.as_deref().unwrap_or("logmel");
+                let preset = corsmal_extract::config::Preset::find(name)?;
+                Ok(Config::with_overrides(preset.toml, name, &self.overrides)?)
+            }
+        }
+    }
+}
+
+/// Runs the extraction.
+pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    let config = Arc::new(args.config.load()?);
+    let jobs = match args.jobs {
+        Some(0) => return Err(Failure::new("--jobs 0 is not possible: at least 1")),
+        Some(jobs) => jobs,
+        None => std::thread::available_parallelism().map_or(1, usize::from),
+    };
+    let found = inputs::collect(&args.inputs)?;
+    if found.is_empty() {
+        let names = args.inputs.join(" ");
+        return Err(Failure::new(format!("--in {names}: no recordings found")));
+    }
+    if args.dry_run {
+        for input in args.shard.of(&found) {
+            println!("{}\t{}", input.id, input.source);
+        }
+        eprintln!(
+            "{} recordings, configuration {}, nothing was read or written",
+            args.shard.of(&found).len(),
+            &config.hash()[..12]
+        );
+        return Ok(ExitCode::SUCCESS);
+    }
+    let options = Options {
+        out: args.out,
+        compression: if args.compress { Compression::Deflated } else { Compression::Stored },
+        jobs,
+        shard: args.shard,
+        resume: args.resume,
+        overwrite: args.overwrite,
+        max_errors: if args.strict { Some(0) } else { args.max_errors },
+    };
+    let stop = crate::interrupt::flag();
+    let meter = Meter::new(args.log_format, &config);
+    let result = if args.quiet {
+        run::run(&found, &config, &options, &Quiet, stop)
+    } else {
+        run::run(&found, &config, &options, &meter, stop)
+    };
+    match result {
+        Ok(report) => {
+            if !args.quiet {
+                meter.finish(&report, &options.out);
+            }
+            Ok(if report.failed() > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
+        }
+        Err(error @ RunError::Interrupted) => {
+            eprintln!("{error}");
+            Ok(ExitCode::from(INTERRUPTED))
+        }
+        Err(error @ RunError::TooManyErrors { .. }) => {
+            eprintln!("error: {error}; --resume continues the run");
+            Ok(ExitCode::from(FAILED_FILES))
+        }
+        Err(error) => Err(error.into()),
+    }
+}

@@ -1,0 +1,30 @@
+//! `corsmal-feat merge`: the outputs of all shards of a run into one.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use crate::failure::Failure;
+
+/// Arguments of `merge`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Example:
+  corsmal-feat extract --in audio/ --out part0.npz --shard 0/2
+  corsmal-feat extract --in audio/ --out part1.npz --shard 1/2
+  corsmal-feat merge part0.npz part1.npz --out feats.npz
+
+The result has the same bytes as one run over all inputs.")]
+pub struct Args {
+    /// The outputs of all shards, in any order.
+    #[arg(required = true)]
+    shards: Vec<PathBuf>,
+    /// The merged output.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+/// Merges shards.
+pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    corsmal_extract::merge::merge(&args.shards, &args.out)?;
+    Ok(ExitCode::SUCCESS)
+}

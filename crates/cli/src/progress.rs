@@ -1,0 +1,156 @@
+//! What a run tells on standard error: a bar on a terminal, lines for failures, a summary.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use clap::ValueEnum;
+use corsmal_extract::config::Config;
+use corsmal_extract::outcome::Outcome;
+use corsmal_extract::run::{Progress, Report};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde_json::json;
+
+/// Form of messages.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LogFormat {
+    /// For people.
+    Text,
+    /// One JSON object a line.
+    Json,
+}
+
+/// Progress of a run on standard error.
+pub struct Meter {
+    format: LogFormat,
+    bar: ProgressBar,
+    started: Instant,
+    /// Seconds of audio written.
+    seconds: Mutex<f64>,
+    rate: f64,
+}
+
+impl Meter {
+    /// Draws a bar only on a terminal.
+    pub fn new(format: LogFormat, config: &Config) -> Self {
+        let target = match format {
+            LogFormat::Text => ProgressDrawTarget::stderr_with_hz(8),
+            LogFormat::Json => ProgressDrawTarget::hidden(),
+        };
+        let bar = ProgressBar::with_draw_target(None, target);
+        let template = "{bar:30} {pos}/{len} files, {per_sec}, {msg}, ETA {eta}";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        let rate = config.signal.sample_rate;
+        Self { format, bar, started: Instant::now(), seconds: Mutex::new(0.0), rate }
+    }
+
+    fn line(&self, text: &str) {
+        self.bar.suspend(|| eprintln!("{text}"));
+    }
+
+    /// The last lines of a run.
+    pub fn finish(&self, report: &Report, out: &Path) {
+        self.bar.finish_and_clear();
+        let elapsed = self.started.elapsed();
+        let seconds = *self.seconds.lock().unwrap_or_else(|e| e.into_inner());
+        let mut statuses: BTreeMap<&str, usize> = BTreeMap::new();
+        for outcome in &report.outcomes {
+            *statuses.entry(outcome.status.name()).or_default() += 1;
+        }
+        if self.format == LogFormat::Json {
+            let line = json!({
+                "event": "finished", "out": out.display().to_string(), "statuses": statuses,
+                "resumed": report.resumed, "up_to_date": report.up_to_date,
+                "elapsed_s": elapsed.as_secs_f64(), "audio_s": seconds,
+            });
+            eprintln!("{line}");
+            return;
+        }
+        if report.up_to_date {
+            eprintln!("{}: up to date, nothing to do", out.display());
+            return;
+        }
+        let counts: Vec<String> = statuses.iter().map(|(s, n)| format!("{n} {s}")).collect();
+        eprintln!(
+            "{}: {} in {} ({:.0} s of audio, {:.0} x real time){}",
+            out.display(),
+            counts.join(", "),
+            human(elapsed),
+            seconds,
+            seconds / elapsed.as_secs_f64().max(1e-9),
+            if report.resumed > 0 {
+                format!(", {} resumed", report.resumed)
+            } else {
+                String::new()
+            },
+        );
+    }
+}
+
+impl Progress for Meter {
+    fn start(&self, inputs: usize, done: usize) {
+        self.bar.set_length(inputs as u64);
+        self.bar.set_position(done as u64);
+        if self.format == LogFormat::Json {
+            eprintln!("{}", json!({"event": "started", "inputs": inputs, "resumed": done}));
+        }
+    }
+
+    fn done(&self, outcome: &Outcome) {
+        let rate = match outcome.sample_rate {
+            _ if self.rate > 0.0 => self.rate,
+            Some(rate) => f64::from(rate),
+            None => f64::INFINITY,
+        };
+        let total = {
+            let mut seconds = self.seconds.lock().unwrap_or_else(|e| e.into_inner());
+            *seconds += outcome.decoded_frames as f64 / rate;
+            *seconds
+        };
+        self.bar.inc(1);
+        let speed = total / self.started.elapsed().as_secs_f64().max(1e-9);
+        self.bar.set_message(format!("{speed:.0} x real time"));
+        match self.format {
+            LogFormat::Json => {
+                let value = serde_json::to_value(outcome).unwrap_or_default();
+                self.line(&json!({"event": "file", "outcome": value}).to_string());
+            }
+            LogFormat::Text if !outcome.status.has_features() => {
+                let place = outcome
+                    .byte_offset
+                    .filter(|_| !outcome.reason.contains("byte"))
+                    .map_or(String::new(), |b| format!(" (byte {b})"));
+                let reason = outcome.reason.strip_prefix(&format!("{}: ", outcome.path));
+                let reason = reason.unwrap_or(&outcome.reason);
+                self.line(&format!("{}: {}: {reason}{place}", outcome.path, outcome.status));
+            }
+            LogFormat::Text => {}
+        }
+    }
+
+    fn warning(&self, message: &str) {
+        match self.format {
+            LogFormat::Text => self.line(&format!("warning: {message}")),
+            LogFormat::Json => {
+                self.line(&json!({"event": "warning", "message": message}).to_string())
+            }
+        }
+    }
+}
+
+fn human(elapsed: Duration) -> String {
+    let seconds = elapsed.as_secs_f64();
+    if seconds < 60.0 {
+        format!("{seconds:.2} s")
+    } else {
+        format!(
+            "{}:{:02}:{:02}",
+            seconds as u64 / 3600,
+            seconds as u64 / 60 % 60,
+            seconds as u64 % 60
+        )
+    }
+}

@@ -1,0 +1,208 @@
+//! The front end: decoded blocks to the signal that features see, in the order of
+//! [`SignalConfig`](crate::config::SignalConfig).
+
+use std::sync::Arc;
+
+use corsmal_dsp::resample::{ResamplePlan, ResampleStream};
+
+use crate::config::{Channels, SignalConfig};
+
+/// The 7.1 rule of ffmpeg's `-ac 1`: weights of FL, FR, FC, LFE, BL, BR, SL, SR, divided by their
+/// sum.
+const DOWNMIX_71: [f32; 8] = {
+    let h = std::f32::consts::FRAC_1_SQRT_2;
+    let sum = 2.0 * h + 1.0 + 4.0 * 0.5;
+    [h / sum, h / sum, 1.0 / sum, 0.0, 0.5 / sum, 0.5 / sum, 0.5 / sum, 0.5 / sum]
+};
+
+/// Channels that features see of a recording with `channels` channels.
+///
+/// # Errors
+/// A sentence, where the rule does not fit the recording.
+pub fn channels_out(rule: &Channels, channels: usize) -> Result<usize, String> {
+    match rule {
+        Channels::All => Ok(channels),
+        Channels::Mean => Ok(1),
+        Channels::Downmix71 if channels == 8 => Ok(1),
+        Channels::Downmix71 => {
+            Err(format!("signal.channels = downmix-7.1 needs 8 channels, there are {channels}"))
+        }
+        Channels::List(list) => match list.iter().find(|c| **c >= channels) {
+            None => Ok(list.len()),
+            Some(c) => Err(format!(
+                "signal.channels asks for channel {c}, there are {channels} (counted from 0)"
+            )),
+        },
+    }
+}
+
+/// Channels, resampling, pre-emphasis and length, block by block.
+pub struct FrontEnd {
+    rule: Channels,
+    channels_in: usize,
+    channels: usize,
+    resample: Option<ResampleStream>,
+    preemphasis: f32,
+    /// The frame before, for pre-emphasis; empty before the first.
+    before: Vec<f32>,
+    /// Frames still to be given, where a length is configured.
+    remaining: Option<u64>,
+    mixed: Vec<f32>,
+}
+
+impl FrontEnd {
+    /// The front end for recordings of `channels_in` channels whose features run at `sample_rate`.
+    ///
+    /// # Errors
+    /// A sentence, where the configuration does not fit the recording.
+    pub fn new(
+        config: &SignalConfig,
+        channels_in: usize,
+        resample: Option<Arc<ResamplePlan>>,
+        sample_rate: f64,
+    ) -> Result<Self, String> {
+        let channels = channels_out(&config.channels, channels_in)?;
+        let resample = resample
+            .map(|plan| ResampleStream::new(plan, channels))
+            .transpose()
+            .map_err(|e| e.to_string())?;
+        Ok(Self {
+            rule: config.channels.clone(),
+            channels_in,
+            channels,
+            resample,
+            preemphasis: config.preemphasis as f32,
+            before: Vec::new(),
+            remaining: (config.length > 0.0).then(|| (config.length * sample_rate).round() as u64),
+            mixed: Vec::new(),
+        })
+    }
+
+    /// Whether blocks pass unchanged.
+    pub fn is_identity(&self) -> bool {
+        self.rule == Channels::All
+            && self.resample.is_none()
+            && self.preemphasis == 0.0
+            && self.remaining.is_none()
+    }
+
+    /// Whether every output frame depends on one input frame only, at the same position.
+    pub fn is_pointwise(config: &SignalConfig, resampled: bool) -> bool {
+        !resampled && config.preemphasis == 0.0 && config.length == 0.0
+    }
+
+    /// Takes interleaved input frames, appends interleaved output frames.
+    pub fn push(&mut self, input: &[f32], out: &mut Vec<f32>) {
+        let from = out.len();
+        match self.resample.take() {
+            None => mix(&self.rule, self.channels_in, input, out),
+            Some(mut stream) => {
+                self.mixed.clear();
+                mix(&self.rule, self.channels_in, input, &mut self.mixed);
+                stream.push(&self.mixed, out).expect("whole frames");
+                self.resample = Some(stream);
+            }
+        }
+        self.rest(out, from);
+    }
+
+    /// What remains at the end of the recording.
+    pub fn finish(mut self, out: &mut Vec<f32>) {
+        let from = out.len();
+        if let Some(stream) = self.resample.take() {
+            stream.finish(out);
+        }
+        self.rest(out, from);
+        if let Some(frames) = self.remaining {
+            out.resize(out.len() + frames as usize * self.channels, 0.0);
+        }
+    }
+
+    /// Pre-emphasis and cut of the frames behind `from`.
+    fn rest(&mut self, out: &mut Vec<f32>, from: usize) {
+        if self.preemphasis != 0.0 {
+            for frame in out[from..].chunks_exact_mut(self.channels) {
+                if self.before.is_empty() {
+                    self.before.extend_from_slice(frame);
+                    continue;
+                }
+                for (x, before) in frame.iter_mut().zip(&mut self.before) {
+                    let current = *x;
+                    *x -= self.preemphasis * *before;
+                    *before = current;
+                }
+            }
+        }
+        if let Some(remaining) = &mut self.remaining {
+            let given = ((out.len() - from) / self.channels) as u64;
+            let kept = given.min(*remaining);
+            out.truncate(from + kept as usize * self.channels);
+            *remaining -= kept;
+        }
+    }
+}
+
+/// Applies a channel rule to interleaved frames.
+fn mix(rule: &Channels, channels: usize, input: &[f32], out: &mut Vec<f32>) {
+    match rule {
+        Channels::All => out.extend_from_slice(input),
+        Channels::Mean if channels == 1 => out.extend_from_slice(input),
+        // Summed channel by channel in single precision, as numpy's mean over axis 0.
+        Channels::Mean if channels == 8 => {
+            out.extend(input.as_chunks::<8>().0.iter().map(|x| x.iter().sum::<f32>() / 8.0));
+        }
+        Channels::Mean => out
+            .extend(input.chunks_exact(channels).map(|x| x.iter().sum::<f32>() / channels as f32)),
+        Channels::Downmix71 => out.extend(
+            input
+                .chunks_exact(channels)
+                .map(|x| x.iter().zip(&DOWNMIX_71).map(|(x, w)| x * w).sum::<f32>()),
+        ),
+        Channels::List(list) => {
+            for frame in input.chunks_exact(channels) {
+                out.extend(list.iter().map(|c| frame[*c]));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(config: &SignalConfig, channels: usize, input: &[f32], block: usize) -> Vec<f32> {
+        let plan = (config.sample_rate > 0.0)
+            .then(|| Arc::new(ResamplePlan::new(44100.0, config.sample_rate).unwrap()));
+        let mut front = FrontEnd::new(config, channels, plan, 100.0).unwrap();
+        let mut out = Vec::new();
+        input.chunks(block * channels).for_each(|b| front.push(b, &mut out));
+        front.finish(&mut out);
+        out
+    }
+
+    #[test]
+    fn channel_rules() {
+        let frame: Vec<f32> = (1..=8).map(|i| i as f32).collect();
+        let with = |channels| SignalConfig { channels, ..SignalConfig::default() };
+        assert_eq!(run(&with(Channels::Mean), 8, &frame, 1), [4.5]);
+        assert_eq!(run(&with(Channels::List(vec![7, 0])), 8, &frame, 1), [8.0, 1.0]);
+        let h = std::f32::consts::FRAC_1_SQRT_2;
+        let want = (h + 2.0 * h + 3.0 + 0.5 * (5.0 + 6.0 + 7.0 + 8.0)) / (2.0 * h + 3.0);
+        assert!((run(&with(Channels::Downmix71), 8, &frame, 1)[0] - want).abs() < 1e-6);
+        assert!(channels_out(&Channels::Downmix71, 2).is_err());
+        assert!(channels_out(&Channels::List(vec![2]), 2).is_err());
+    }
+
+    #[test]
+    fn pre_emphasis_and_length_do_not_depend_on_blocks() {
+        let config = SignalConfig { preemphasis: 0.5, length: 0.12, ..SignalConfig::default() };
+        let input: Vec<f32> = (0..10).map(|i| (i * i) as f32).collect();
+        let whole = run(&config, 1, &input, 10);
+        assert_eq!(whole.len(), 12);
+        assert_eq!(whole[..3], [0.0, 1.0, 3.5]);
+        assert_eq!(whole[10..], [0.0, 0.0]);
+        for block in 1..10 {
+            assert_eq!(run(&config, 1, &input, block), whole);
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! One span of one recording: opened, read, pushed through front end and extractor.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use corsmal_audio::{AudioError, AudioSpec, BlockSource, Repair};
+
+use super::plans::Planned;
+use crate::config::{Normalize, SignalConfig};
+use crate::engine::{Extractor, Span};
+use crate::frontend::FrontEnd;
+use crate::inputs::{Input, InputSource};
+use crate::outcome::{Outcome, Status};
+
+/// Samples read at a time, all channels together.
+const BLOCK: usize = 1 << 16;
+/// Frames of a span; recordings of more than two are cut.
+const SPAN: u64 = 1 << 20;
+
+/// Why a recording has no features.
+pub struct Failed {
+    /// The verdict.
+    pub status: Status,
+    /// In words.
+    pub reason: String,
+    /// Byte in the file, where known.
+    pub byte_offset: Option<u64>,
+}
+
+impl Failed {
+    /// A failure without a place.
+    pub fn new(status: Status, reason: impl Into<String>) -> Self {
+        Self { status, reason: reason.into(), byte_offset: None }
+    }
+}
+
+impl From<AudioError> for Failed {
+    fn from(error: AudioError) -> Self {
+        let status = match error.status() {
+            "empty" => Status::Empty,
+            "corrupt" => Status::Corrupt,
+            "io" => Status::Io,
+            _ => Status::Unsupported,
+        };
+        Self { status, reason: error.to_string(), byte_offset: error.offset() }
+    }
+}
+
+/// Opens an input.
+pub fn open(input: &Input) -> Result<Box<dyn BlockSource>, Failed> {
+    Ok(match &input.source {
+        InputSource::File(path) => corsmal_audio::open(path)?,
+        InputSource::Stdin => corsmal_audio::from_reader(std::io::stdin())?,
+    })
+}
+
+/// Frames of the recording that are taken, by the configuration and the manifest.
+pub fn crop(signal: &SignalConfig, input: &Input, sample_rate: u32) -> Range<u64> {
+    let frame = |seconds: f64| (seconds * f64::from(sample_rate)) as u64;
+    let offset = input.start.unwrap_or(0.0);
+    let start = frame(offset + signal.start);
+    let mut end = u64::MAX;
+    if let Some(limit) = input.end {
+        end = end.min(frame(limit));
+    }
+    if signal.end > 0.0 {
+        end = end.min(frame(offset + signal.end));
+    }
+    start..end.max(start)
+}
+
+/// Spans of the signal that can be computed apart; one where it cannot be cut.
+pub fn spans(
+    source: &dyn BlockSource,
+    signal: &SignalConfig,
+    resampled: bool,
+    crop: &Range<u64>,
+) -> Vec<Range<u64>> {
+    let whole = 0..u64::MAX;
+    let separable = source.seekable()
+        && FrontEnd::is_pointwise(signal, resampled)
+        && signal.normalize == Normalize::None;
+    let Some(declared) = source.spec().declared_frames.filter(|_| separable) else {
+        return vec![whole];
+    };
+    let frames = declared.min(crop.end).saturating_sub(crop.start);
+    if frames <= 2 * SPAN {
+        return vec![whole];
+    }
+    let mut spans: Vec<Range<u64>> = (0..frames / SPAN).map(|i| i * SPAN..(i + 1) * SPAN).collect();
+    // The last span takes the rest, whatever the header said.
+    if let Some(last) = spans.last_mut() {
+        last.end = u64::MAX;
+    }
+    spans
+}
+
+/// Reads and computes one span. `None` when the run was stopped.
+pub fn compute(
+    source: &mut dyn BlockSource,
+    planned: &Planned,
+    crop: &Range<u64>,
+    span: &Range<u64>,
+    stop: &AtomicBool,
+) -> Result<Option<Span>, Failed> {
+    let plan = &planned.plan;
+    let config = &plan.config.signal;
+    let channels = usize::from(source.spec().channels);
+    let mut front = FrontEnd::new(config, channels, planned.resample.clone(), plan.sample_rate)
+        .map_err(|e| Failed::new(Status::Unsupported, e))?;
+    // Padding by reflection may reach back twice the padding of a frame.
+    let (before, after) = plan.context();
+    let first = span.start.saturating_sub(2 * before as u64 + 1);
+    let begin = crop.start.saturating_add(first);
+    let end = crop.end.min(crop.start.saturating_add(span.end.saturating_add(after as u64)));
+    skip_to(source, begin)?;
+    let checked = may_be_non_finite(source.spec());
+    let mut extractor = Extractor::new(plan.clone(), span.clone(), first);
+    let identity = front.is_identity() && config.normalize == Normalize::None;
+    let held = config.normalize != Normalize::None;
+    let (mut block, mut signal) = (Vec::new(), Vec::new());
+    let mut position = begin;
+    let mut ended = false;
+    while position < end {
+        if stop.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+        let wanted = ((BLOCK / channels).max(1) as u64).min(end - position) as usize;
+        let frames = if identity {
+            let room = extractor.room(wanted);
+            let frames = source.read(room)?;
+            if checked {
+                require_finite(&room[..frames * channels], position, channels)?;
+            }
+            extractor.commit(wanted, frames);
+            frames
+        } else {
+            block.resize(wanted * channels, 0.0);
+            let frames = source.read(&mut block)?;
+            let samples = &block[..frames * channels];
+            if checked {
+                require_finite(samples, position, channels)?;
+            }
+            front.push(samples, &mut signal);
+            if !held {
+                extractor.push(&signal);
+                signal.clear();
+            }
+            frames
+        };
+        if frames == 0 {
+            ended = true;
+            break;
+        }
+        position += frames as u64;
+    }
+    // The end of the crop is the end of the signal, too.
+    let at_end = ended || end == crop.end;
+    if !identity {
+        if at_end {
+            front.finish(&mut signal);
+        }
+        normalize(config.normalize, &mut signal);
+        extractor.push(&signal);
+    }
+    Ok(Some(extractor.finish(at_end)))
+}
+
+/// Goes to a frame, by reading where the source cannot seek.
+fn skip_to(source: &mut dyn BlockSource, frame: u64) -> Result<(), Failed> {
+    if frame == 0 {
+        return Ok(());
+    }
+    if source.seekable() {
+        return Ok(source.seek(frame)?);
+    }
+    let channels = usize::from(source.spec().channels);
+    let mut block = vec![0.0; BLOCK / channels * channels];
+    let mut left = frame;
+    while left > 0 {
+        let wanted = (left.min((BLOCK / channels) as u64)) as usize * channels;
+        match source.read(&mut block[..wanted])? {
+            0 => break,
+            frames => left -= frames as u64,
+        }
+    }
+    Ok(())
+}
+
+/// Integer encodings cannot hold NaN.
+fn may_be_non_finite(spec: &AudioSpec) -> bool {
+    !(spec.format.contains("pcm_s") || spec.format.contains("pcm_u"))
+}
+
+fn require_finite(samples: &[f32], position: u64, channels: usize) -> Result<(), Failed> {
+    if samples.iter().fold(true, |all, x| all & x.is_finite()) {
+        return Ok(());
+    }
+    let bad = samples.iter().filter(|x| !x.is_finite()).count();
+    let at = samples.iter().position(|x| !x.is_finite()).unwrap_or(0);
+    Err(Failed::new(
+        Status::NonFinite,
+        format!(
+            "NaN or infinite from frame {} on (channel {}; {bad} such samples in that block)",
+            position + (at / channels) as u64,
+            at % channels
+        ),
+    ))
+}
+
+/// Brings a whole signal to a common level; silence stays as it is.
+fn normalize(rule: Normalize, signal: &mut [f32]) {
+    let level = match rule {
+        Normalize::None => return,
+        Normalize::Peak => signal.iter().fold(0.0, |m: f32, x| m.max(x.abs())),
+        Normalize::Rms => {
+            let sum: f64 = signal.iter().map(|x| f64::from(*x) * f64::from(*x)).sum();
+            (sum / signal.len().max(1) as f64).sqrt() as f32
+        }
+    };
+    if level > 0.0 {
+        signal.iter_mut().for_each(|x| *x /= level);
+    }
+}
+
+/// Fills an outcome with what the reader knows.
+pub fn describe(outcome: &mut Outcome, source: &dyn BlockSource) {
+    let spec = source.spec();
+    outcome.declared_frames = spec.declared_frames;
+    outcome.sample_rate = Some(spec.sample_rate);
+    outcome.channels = Some(u32::from(spec.channels));
+    let report = source.health();
+    for repair in &report.repairs {
+        if !outcome.repairs.iter().any(|r| r == repair.name()) {
+            outcome.repairs.push(repair.name().to_string());
+        }
+        if matches!(repair, Repair::Truncated { .. } | Repair::LostFrames { .. })
+            && outcome.status == Status::Ok
+        {
+            outcome.status = Status::Truncated;
+            outcome.reason = repair.to_string();
+        }
+    }
+}
