@@ -6,9 +6,9 @@ m5      random forest of 500 trees on A34F, the settings of M5
 a34f    pipeline on A34F chosen by nested cross-validation
 fusion  pipeline on A34F and pooled VGGish chosen by nested cross-validation
 
-In the nested runs every outer fold ranks all candidates by their log loss on inner folds of its own
-six training containers (two held out at a time) and averages the probabilities of the best three,
-fitted on all six; the held-out containers are used once, for the score. Every pipeline learns the
+In the nested runs every outer fold ranks all candidates by their weighted F1 on inner folds of its
+own six training containers (two held out at a time) and averages the probabilities of the best
+three, fitted on all six; the held-out containers are used once, for the score. Every pipeline learns the
 seven joint classes; the probabilities of type and level are sums over them. Fixed seeds.
 """
 
@@ -112,11 +112,6 @@ def merged(proba: Matrix, classes: Labels) -> Matrix:
     return np.stack([proba[:, classes == c].sum(axis=1) for c in range(classes.max() + 1)], axis=1)
 
 
-def log_loss(proba: Matrix, truth: Labels) -> float:
-    """Mean -log of the probability given to the truth, at least 0.001."""
-    return float(-np.log(np.maximum(proba[np.arange(len(truth)), truth], 1e-3)).mean())
-
-
 def nested(sets: dict[str, Matrix], data: dict[str, Labels]) -> dict[str, object]:
     """Scores of the fused pipelines and which were chosen, for type and level."""
     joint, container = data["joint"], data["container"]
@@ -128,14 +123,15 @@ def nested(sets: dict[str, Matrix], data: dict[str, Labels]) -> dict[str, object
         test = np.isin(container, fold)
         inner = inner_folds(tuple(int(c) for c in np.unique(container[~test])))
         candidates = {(s, p): make for s in sets for p, make in pipelines().items()}
-        loss: dict[str, dict[tuple[str, str], float]] = {t: {} for t in targets}
+        inner_f1: dict[str, dict[tuple[str, str], float]] = {t: {} for t in targets}
         for (set_name, name), make in candidates.items():
             proba = held_out(make, sets[set_name][~test], joint[~test], container[~test], inner)
             for target, classes in targets.items():
                 truth = data[target][~test]
-                loss[target][set_name, name] = log_loss(merged(proba, classes), truth)
+                predicted = np.argmax(merged(proba, classes), axis=1)
+                inner_f1[target][set_name, name] = weighted_f1(truth, predicted)
         for target, classes in targets.items():
-            best = sorted(candidates, key=loss[target].__getitem__)[:FUSED]
+            best = sorted(candidates, key=inner_f1[target].__getitem__, reverse=True)[:FUSED]
             chosen[target].append([" / ".join(b) for b in best])
             total = np.zeros((test.sum(), classes.max() + 1))
             for key in best:
