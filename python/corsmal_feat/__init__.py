@@ -1,6 +1,6 @@
 """Acoustic features in librosa's vocabulary, computed in Rust; classifiers; the CORSMAL benchmark."""
 
-from . import corsmal, decompose, effects, feature, filters, onset
+from . import classifiers, corsmal, decompose, effects, feature, filters, onset
 from ._core import ParameterError, __version__
 from ._harmonic import cqt, istft
 from ._mono import to_mono
@@ -12,6 +12,7 @@ __all__ = [
     "ParameterError",
     "__version__",
     "amplitude_to_db",
+    "classifiers",
     "corsmal",
     "cqt",
     "decompose",

@@ -100,7 +100,9 @@ pub fn bootstrap<S: AsRef<str>>(
     }
     found.sort_by(f64::total_cmp);
     let at = |part: f64| found[((resamples - 1) as f64 * part).round() as usize];
-    let part = |holds: fn(&f64) -> bool| found.iter().filter(|d| holds(d)).count() as f64 / resamples as f64;
+    let part = |holds: fn(&f64) -> bool| {
+        found.iter().filter(|d| holds(d)).count() as f64 / resamples as f64
+    };
     let tail = part(|d| *d <= 0.0).min(part(|d| *d >= 0.0));
     let all: Vec<usize> = (0..truth.len()).collect();
     Ok(Bootstrap {
@@ -141,7 +143,8 @@ mod tests {
     #[test]
     fn bootstrap_sees_a_clear_difference_and_none_in_equals() {
         let truth: Vec<usize> = (0..200).map(|i| i % 2).collect();
-        let first: Vec<usize> = (0..200).map(|i| if i % 3 == 0 { 1 - i % 2 } else { i % 2 }).collect();
+        let first: Vec<usize> =
+            (0..200).map(|i| if i % 3 == 0 { 1 - i % 2 } else { i % 2 }).collect();
         let clear = bootstrap::<&str>(&truth, &first, &truth, None, 500, 1).unwrap();
         assert!(clear.low > 0.2 && clear.high < 0.5 && clear.p_value == 0.0, "{clear:?}");
         let none = bootstrap::<&str>(&truth, &first, &first, None, 500, 1).unwrap();

@@ -117,7 +117,8 @@ impl CrossValidation {
 
     fn of(folds: Vec<FoldOutcome>, data: &Data<'_>) -> Result<Self> {
         let rows: Vec<usize> = folds.iter().flat_map(|f| f.rows.iter().copied()).collect();
-        let predicted: Vec<usize> = folds.iter().flat_map(|f| f.predicted.iter().copied()).collect();
+        let predicted: Vec<usize> =
+            folds.iter().flat_map(|f| f.predicted.iter().copied()).collect();
         let spread = |score: fn(&Scores) -> f64| {
             Spread::of(&folds.iter().map(|f| score(&f.scores)).collect::<Vec<_>>())
         };
@@ -135,7 +136,11 @@ impl CrossValidation {
 ///
 /// # Errors
 /// Folds that overlap or leave a side empty, and whatever training refuses.
-pub fn cross_validate(data: &Data<'_>, folds: &[Fold], spec: &PipelineSpec) -> Result<CrossValidation> {
+pub fn cross_validate(
+    data: &Data<'_>,
+    folds: &[Fold],
+    spec: &PipelineSpec,
+) -> Result<CrossValidation> {
     data.check(folds)?;
     let outcomes = folds.iter().map(|fold| run_fold(data, fold, spec)).collect::<Result<_>>()?;
     CrossValidation::of(outcomes, data)

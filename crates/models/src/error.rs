@@ -63,7 +63,9 @@ pub enum ModelError {
         value: f64,
     },
     /// A column without any variation where that is refused.
-    #[error("feature {feature} has the same value in all {rows} rows ({count} features of {features} do)")]
+    #[error(
+        "feature {feature} has the same value in all {rows} rows ({count} features of {features} do)"
+    )]
     ConstantFeature {
         /// first column concerned
         feature: usize,

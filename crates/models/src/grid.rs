@@ -31,7 +31,8 @@ pub fn combinations(
             p.insert(key.clone(), value.clone());
             p
         };
-        parameters = parameters.iter().flat_map(|p| values.iter().map(move |v| with(p, v))).collect();
+        parameters =
+            parameters.iter().flat_map(|p| values.iter().map(move |v| with(p, v))).collect();
     }
     parameters.iter().map(|p| ClassifierSpec::new(base.name(), p)).collect()
 }

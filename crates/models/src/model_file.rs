@@ -190,7 +190,8 @@ impl Model {
     /// [`ModelFileError::TooLarge`].
     pub fn to_bytes(&self) -> std::result::Result<Vec<u8>, ModelFileError> {
         let content = |part, reason: String| ModelFileError::Content { part, reason };
-        let header = serde_json::to_vec(&self.header).map_err(|e| content("header", e.to_string()))?;
+        let header =
+            serde_json::to_vec(&self.header).map_err(|e| content("header", e.to_string()))?;
         let payload =
             postcard::to_stdvec(&self.pipeline).map_err(|e| content("payload", e.to_string()))?;
         limit("header", header.len() as u64, MAX_HEADER)?;

@@ -22,7 +22,10 @@ pub struct PipelineSpec {
 impl PipelineSpec {
     /// A classifier after standardisation.
     pub fn standardized(classifier: impl Into<ClassifierSpec>) -> Self {
-        Self { steps: vec![StepSpec::Standardize(Default::default())], classifier: classifier.into() }
+        Self {
+            steps: vec![StepSpec::Standardize(Default::default())],
+            classifier: classifier.into(),
+        }
     }
 
     /// A classifier alone.

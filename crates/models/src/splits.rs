@@ -199,7 +199,10 @@ pub fn train_test_split(
         }
     }
     if n_train.min(n_test) < members.len() {
-        return refuse(format!("{n_test} test and {n_train} training rows for {} classes", members.len()));
+        return refuse(format!(
+            "{n_test} test and {n_train} training rows for {} classes",
+            members.len()
+        ));
     }
     let counts: Vec<usize> = members.values().map(Vec::len).collect();
     let of_train = share(&counts, n_train, &mut rng);

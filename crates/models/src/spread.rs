@@ -70,9 +70,13 @@ mod tests {
     #[test]
     fn quantiles_are_those_of_the_tables() {
         // scipy.stats.t.ppf(0.975, df)
-        for (degrees, expected) in
-            [(1, 12.706_204_7), (2, 4.302_652_7), (3, 3.182_446_3), (4, 2.776_445_1), (9, 2.262_157_2)]
-        {
+        for (degrees, expected) in [
+            (1, 12.706_204_7),
+            (2, 4.302_652_7),
+            (3, 3.182_446_3),
+            (4, 2.776_445_1),
+            (9, 2.262_157_2),
+        ] {
             assert!((student_975(degrees) - expected).abs() < 1e-6, "{degrees}");
         }
         let spread = Spread::of(&[0.9, 0.8, 1.0]);

@@ -6,6 +6,7 @@
 
 mod arrays;
 mod chroma;
+mod classifiers;
 mod compound;
 mod harmonic;
 mod frontends;
@@ -30,6 +31,7 @@ pub(crate) fn value_error(error: impl std::fmt::Display) -> PyErr {
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add("ParameterError", m.py().get_type::<ParameterError>())?;
+    classifiers::register(m)?;
     spectrum::register(m)?;
     harmonic::register(m)?;
     mel::register(m)?;

@@ -131,9 +131,16 @@ pub(super) struct Tree {
 /// The labels and weights a tree grows on.
 pub(super) struct Sample<'a> {
     pub y: &'a [u32],
-    /// row weights; rows of weight zero are left out
-    pub weights: &'a [f32],
-    pub n_classes: usize,
+    /// how often each row counts; rows that count zero times are left out
+    pub times: &'a [u32],
+    /// how much a row of each class counts
+    pub class_weights: &'a [f64],
+}
+
+impl Sample<'_> {
+    fn weight(&self, row: usize) -> f64 {
+        f64::from(self.times[row]) * self.class_weights[self.y[row] as usize]
+    }
 }
 
 struct Split {
@@ -157,8 +164,10 @@ impl Tree {
     /// Grows a tree; the same seed gives the same tree.
     pub(super) fn grow(columns: &Columns, sample: &Sample<'_>, growth: &Growth, seed: u64) -> Self {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut rows: Vec<u32> =
-            (0..sample.y.len() as u32).filter(|&i| sample.weights[i as usize] > 0.0).collect();
+        let counts = |&row: &u32| sample.times[row as usize] > 0;
+        let mut rows: Vec<u32> = (0..sample.y.len() as u32).filter(counts).collect();
+        // Class after class, and so in every node: partitioning keeps the order.
+        rows.sort_by_key(|&row| sample.y[row as usize]);
         let n_features = columns.values.nrows();
         let mut features: Vec<u32> = (0..n_features as u32).collect();
         let mut spare = Vec::with_capacity(rows.len());
@@ -166,9 +175,15 @@ impl Tree {
         let mut open = vec![Open { node: 0, start: 0, end: rows.len(), depth: 0 }];
         while let Some(at) = open.pop() {
             let members = &mut rows[at.start..at.end];
-            let mut totals = vec![0.0; sample.n_classes];
-            for &row in members.iter() {
-                totals[sample.y[row as usize] as usize] += f64::from(sample.weights[row as usize]);
+            let mut totals = vec![0.0; sample.class_weights.len()];
+            let mut ends: Vec<(usize, usize)> = Vec::new();
+            for (at, &row) in members.iter().enumerate() {
+                let class = sample.y[row as usize] as usize;
+                totals[class] += sample.weight(row as usize);
+                match ends.last_mut() {
+                    Some(last) if last.0 == class => last.1 = at + 1,
+                    _ => ends.push((class, at + 1)),
+                }
             }
             let pure = totals.iter().filter(|&&t| t > 0.0).count() < 2;
             let stop = pure
@@ -178,14 +193,17 @@ impl Tree {
             let split = if stop {
                 None
             } else {
-                let search = Search { columns, sample, growth, rows: members, totals: &totals };
+                let times = members.iter().map(|&row| sample.times[row as usize]).collect();
+                let search =
+                    Search { columns, sample, growth, rows: members, times, ends, totals: &totals };
                 search.best(&mut features, &mut rng)
             };
             let Some(split) = split else {
                 tree.close(at.node, &totals);
                 continue;
             };
-            let middle = at.start + partition(members, columns.column(split.feature), split.threshold, &mut spare);
+            let middle = at.start
+                + partition(members, columns.column(split.feature), split.threshold, &mut spare);
             let left = tree.nodes.len();
             tree.nodes.extend([PLACEHOLDER; 2]);
             tree.nodes[at.node] = Node {
@@ -260,7 +278,12 @@ struct Search<'a> {
     columns: &'a Columns,
     sample: &'a Sample<'a>,
     growth: &'a Growth,
+    /// rows of the node, class after class
     rows: &'a [u32],
+    /// how often each counts
+    times: Vec<u32>,
+    /// each class there with the end of its rows
+    ends: Vec<(usize, usize)>,
     totals: &'a [f64],
 }
 
@@ -344,7 +367,9 @@ impl Search<'_> {
         let keys = &mut scratch.keys;
         keys.clear();
         // Value (as an integer of the same order) above, row below: one plain integer sort.
-        keys.extend(self.rows.iter().map(|&r| u64::from(ordered(column[r as usize])) << 32 | u64::from(r)));
+        keys.extend(
+            self.rows.iter().map(|&r| u64::from(ordered(column[r as usize])) << 32 | u64::from(r)),
+        );
         let (mut low, mut high) = (u64::MAX, 0);
         for &key in keys.iter() {
             low = low.min(key);
@@ -354,13 +379,14 @@ impl Search<'_> {
             return None;
         }
         keys.sort_unstable();
-        let mut tally = Tally::new(self.growth.criterion, self.totals, &mut scratch.left, &mut scratch.right);
+        let mut tally =
+            Tally::new(self.growth.criterion, self.totals, &mut scratch.left, &mut scratch.right);
         let leaf = self.growth.min_samples_leaf;
         let mut best = Split { feature, threshold: 0.0, gain: f64::NEG_INFINITY };
         let mut best_at = 0;
         for at in 1..keys.len() {
             let row = keys[at - 1] as u32 as usize;
-            tally.shift(self.sample.y[row] as usize, f64::from(self.sample.weights[row]));
+            tally.shift(self.sample.y[row] as usize, self.sample.weight(row));
             if keys[at] >> 32 == keys[at - 1] >> 32 || at < leaf || keys.len() - at < leaf {
                 continue;
             }
@@ -385,12 +411,11 @@ impl Search<'_> {
         scratch: &mut Scratch,
     ) -> Option<Split> {
         let column = self.columns.column(feature);
-        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-        for &row in self.rows {
-            let v = column[row as usize];
-            low = low.min(v);
-            high = high.max(v);
-        }
+        let values = &mut scratch.values;
+        values.clear();
+        values.extend(self.rows.iter().map(|&row| column[row as usize]));
+        let low = values.iter().fold(f32::INFINITY, |a, &b| if b < a { b } else { a });
+        let high = values.iter().fold(f32::NEG_INFINITY, |a, &b| if b > a { b } else { a });
         if low >= high {
             return None;
         }
@@ -399,15 +424,20 @@ impl Search<'_> {
         if threshold >= high || threshold < low {
             threshold = low;
         }
-        let mut tally = Tally::new(self.growth.criterion, self.totals, &mut scratch.left, &mut scratch.right);
-        tally.left.fill(0.0);
-        let mut count = 0;
-        for &row in self.rows {
-            let row = row as usize;
-            let goes_left = column[row] <= threshold;
-            count += usize::from(goes_left);
-            let weight = if goes_left { f64::from(self.sample.weights[row]) } else { 0.0 };
-            tally.left[self.sample.y[row] as usize] += weight;
+        let mut tally =
+            Tally::new(self.growth.criterion, self.totals, &mut scratch.left, &mut scratch.right);
+        let (mut start, mut count) = (0, 0);
+        for &(class, end) in &self.ends {
+            let pairs = values[start..end].iter().zip(&self.times[start..end]);
+            let (mut rows, mut times) = (0u32, 0u32);
+            for (&value, &n) in pairs {
+                let left = u32::from(value <= threshold);
+                rows += left;
+                times += left * n;
+            }
+            count += rows as usize;
+            tally.left[class] = f64::from(times) * self.sample.class_weights[class];
+            start = end;
         }
         tally.recount(self.totals);
         let leaf = self.growth.min_samples_leaf;
@@ -421,6 +451,7 @@ impl Search<'_> {
 #[derive(Default)]
 struct Scratch {
     keys: Vec<u64>,
+    values: Vec<f32>,
     left: Vec<f64>,
     right: Vec<f64>,
 }
@@ -439,7 +470,12 @@ struct Tally<'a> {
 
 impl<'a> Tally<'a> {
     /// Everything on the right.
-    fn new(criterion: Criterion, totals: &[f64], left: &'a mut Vec<f64>, right: &'a mut Vec<f64>) -> Self {
+    fn new(
+        criterion: Criterion,
+        totals: &[f64],
+        left: &'a mut Vec<f64>,
+        right: &'a mut Vec<f64>,
+    ) -> Self {
         left.clear();
         left.resize(totals.len(), 0.0);
         right.clear();

@@ -1,6 +1,7 @@
 //! k nearest neighbours by exhaustive search, in blocks.
 //!
-//! Euclidean distances come from one matrix product per block (‖a‖² + ‖b‖² − 2a·b), the others
+//! Euclidean and cosine distances (‖a‖² + ‖b‖² − 2a·b) are first estimated by a matrix product in single
+//! precision per block, with an error bound; only rows that may be near are computed exactly. Others come
 //! from plain loops. Equal distances are ordered as scikit-learn 1.9's brute-force search orders
 //! them (a binary max-heap filled in row order), equal votes go to the lowest class.
 
@@ -81,7 +82,10 @@ impl Train for KNearestParams {
                 allowed: format!("there are {} training rows", x.nrows()),
             });
         }
-        let x = if self.metric == Metric::Cosine { unit_rows(x) } else { x.to_owned() };
+        let x = match self.metric {
+            Metric::Cosine => unit_rows(x),
+            _ => x.as_standard_layout().into_owned(),
+        };
         let norms = squared_lengths(x.view());
         Ok(KNearest {
             k: self.k,
@@ -89,7 +93,7 @@ impl Train for KNearestParams {
             metric: self.metric,
             p: self.p,
             n_classes,
-            x: x.as_standard_layout().into_owned(),
+            x,
             y: y.to_vec(),
             norms,
         })
@@ -100,6 +104,8 @@ impl Train for KNearestParams {
 const QUERY_BLOCK: usize = 128;
 /// Training rows of one block.
 const TRAIN_BLOCK: usize = 512;
+/// Fewer query rows than this are not worth a copy of the training rows in single precision.
+const SCREEN_FROM: usize = 16;
 
 impl Classify for KNearest {
     fn n_features(&self) -> usize {
@@ -111,13 +117,16 @@ impl Classify for KNearest {
     }
 
     fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
+        let by_products = matches!(self.metric, Metric::Euclidean | Metric::Cosine);
+        let screen = (by_products && x.nrows() >= SCREEN_FROM)
+            .then(|| Screen::new(self.x.view(), self.metric == Metric::Euclidean));
         let mut proba = Array2::zeros((x.nrows(), self.n_classes));
         proba
             .axis_chunks_iter_mut(Axis(0), QUERY_BLOCK)
             .into_par_iter()
             .zip(x.axis_chunks_iter(Axis(0), QUERY_BLOCK))
             .for_each(|(mut votes, block)| {
-                let heaps = self.search(block);
+                let heaps = self.search(block, screen.as_ref());
                 for (mut row, heap) in votes.outer_iter_mut().zip(heaps) {
                     self.vote(&heap, row.as_slice_mut().expect("rows of a new array"));
                 }
@@ -139,35 +148,72 @@ impl Classify for KNearest {
     }
 }
 
+/// Training rows in single precision, for a first look that rules most of them out. Its errors are
+/// bounded, so what is ruled out could not have been among the nearest.
+struct Screen {
+    x: Array2<f32>,
+    /// subtracted before rounding: distances do not change, errors shrink
+    centre: Array1<f64>,
+    norms: Vec<f64>,
+}
+
+impl Screen {
+    fn new(x: ArrayView2<'_, f64>, centred: bool) -> Self {
+        let rows = x.nrows() as f64;
+        let centre = match centred {
+            true => x.sum_axis(Axis(0)) / rows,
+            false => Array1::zeros(x.ncols()),
+        };
+        let (x, norms) = Self::lower(x, &centre);
+        Self { x, centre, norms }
+    }
+
+    fn lower(x: ArrayView2<'_, f64>, centre: &Array1<f64>) -> (Array2<f32>, Vec<f64>) {
+        let shifted = &x - centre;
+        (shifted.mapv(|v| v as f32), squared_lengths(shifted.view()))
+    }
+}
+
 impl KNearest {
     /// The k nearest training rows of each query row; squared distances for the euclidean metric.
-    fn search(&self, block: ArrayView2<'_, f64>) -> Vec<Nearest> {
+    fn search(&self, block: ArrayView2<'_, f64>, screen: Option<&Screen>) -> Vec<Nearest> {
         let block = match self.metric {
             Metric::Cosine => unit_rows(block),
             _ => block.as_standard_layout().into_owned(),
         };
         let norms = squared_lengths(block.view());
         let mut heaps = vec![Nearest::new(self.k); block.nrows()];
+        let Some(screen) = screen else {
+            for ((heap, query), &norm) in heaps.iter_mut().zip(block.outer_iter()).zip(&norms) {
+                for row in 0..self.x.nrows() {
+                    heap.push(self.distance(query, norm, row), row);
+                }
+            }
+            return heaps;
+        };
+        let (low, low_norms) = Screen::lower(block.view(), &screen.centre);
+        // Rounding of both factors and of every sum: (n + 4)·u·‖a‖‖b‖ for a product, twice that for
+        // a squared distance; the double precision formula's own errors are far below.
+        let unit = 2.0 * (self.x.ncols() as f64 + 4.0) * f64::from(f32::EPSILON) / 2.0;
         let mut products = Array2::zeros((block.nrows(), TRAIN_BLOCK));
         for start in (0..self.x.nrows()).step_by(TRAIN_BLOCK) {
             let end = (start + TRAIN_BLOCK).min(self.x.nrows());
-            let rows = self.x.slice(s![start..end, ..]);
-            if matches!(self.metric, Metric::Euclidean | Metric::Cosine) {
-                let mut products = products.slice_mut(s![.., ..end - start]);
-                ndarray::linalg::general_mat_mul(1.0, &block, &rows.t(), 0.0, &mut products);
-                for ((heap, products), norm) in heaps.iter_mut().zip(products.outer_iter()).zip(&norms) {
-                    for (j, &dot) in products.iter().enumerate() {
-                        let distance = match self.metric {
-                            Metric::Cosine => (1.0 - dot).clamp(0.0, 2.0),
-                            _ => norm + self.norms[start + j] - 2.0 * dot,
-                        };
-                        heap.push(distance, start + j);
-                    }
-                }
-            } else {
-                for (heap, query) in heaps.iter_mut().zip(block.outer_iter()) {
-                    for (j, row) in rows.outer_iter().enumerate() {
-                        heap.push(self.distance(query, row), start + j);
+            let mut products = products.slice_mut(s![.., ..end - start]);
+            let rows = screen.x.slice(s![start..end, ..]);
+            ndarray::linalg::general_mat_mul(1.0, &low, &rows.t(), 0.0, &mut products);
+            for (q, heap) in heaps.iter_mut().enumerate() {
+                let length = low_norms[q].sqrt();
+                for ((j, &dot), &low_norm) in products.row(q).iter().enumerate().zip(&screen.norms[start..end]) {
+                    let dot = f64::from(dot);
+                    let about = match self.metric {
+                        Metric::Cosine => 1.0 - dot,
+                        _ => low_norms[q] + low_norm - 2.0 * dot,
+                    };
+                    let slack = unit * length * low_norm.sqrt() + 1e-12 * (norms[q] + self.norms[start + j]);
+                    // False for NaN: what overflowed is looked at.
+                    let ruled_out = about - slack >= heap.farthest();
+                    if !ruled_out {
+                        heap.push(self.distance(block.row(q), norms[q], start + j), start + j);
                     }
                 }
             }
@@ -175,12 +221,16 @@ impl KNearest {
         heaps
     }
 
-    fn distance(&self, a: ArrayView1<'_, f64>, b: ArrayView1<'_, f64>) -> f64 {
-        let (a, b) = (a.as_slice().unwrap_or(&[]), b.as_slice().unwrap_or(&[]));
+    /// Distance of a query row with squared length `norm` to training row `row`.
+    fn distance(&self, query: ArrayView1<'_, f64>, norm: f64, row: usize) -> f64 {
+        let other = self.x.row(row);
+        let (a, b) = (query.as_slice().unwrap_or(&[]), other.as_slice().unwrap_or(&[]));
         match self.metric {
+            Metric::Euclidean => norm + self.norms[row] - 2.0 * query.dot(&other),
+            Metric::Cosine => (1.0 - query.dot(&other)).clamp(0.0, 2.0),
             Metric::Manhattan => lanes(a, b, |sum, d| sum + d.abs(), |x, y| x + y),
             Metric::Chebyshev => lanes(a, b, |max, d| d.abs().max(max), f64::max),
-            _ => {
+            Metric::Minkowski => {
                 let p = self.p;
                 lanes(a, b, |sum, d| sum + d.abs().powf(p), |x, y| x + y).powf(1.0 / p)
             }
@@ -227,7 +277,7 @@ fn squared_lengths(x: ArrayView2<'_, f64>) -> Vec<f64> {
 fn unit_rows(x: ArrayView2<'_, f64>) -> Array2<f64> {
     let lengths: Array1<f64> = squared_lengths(x).into_iter().map(f64::sqrt).collect();
     let lengths = lengths.mapv(|l| if l == 0.0 { 1.0 } else { l });
-    (&x / &lengths.insert_axis(Axis(1))).as_standard_layout().into_owned()
+    x.as_standard_layout().into_owned() / &lengths.insert_axis(Axis(1))
 }
 
 /// The k smallest (distance, row) so far: a binary heap with the largest on top. Which of several
@@ -262,6 +312,11 @@ impl Nearest {
             at = child;
         }
         heap[at] = (distance, row);
+    }
+
+    /// The largest distance kept; infinite until there are k.
+    fn farthest(&self) -> f64 {
+        self.0[0].0
     }
 
     /// Nearest first.

@@ -16,8 +16,8 @@ parameters! {
         C: f64 = 1.0, "a positive number", "inverse of the penalty's strength";
         class_weight: ClassWeight = ClassWeight::Equal,
             "null, balanced, or one positive number per class in label order", "weight of each class";
-        tol: f64 = 1e-5, "a positive number", "largest slope of the mean loss at the end";
-        max_iter: usize = 1000, "a whole number of at least 1", "most steps";
+        tol: f64 = 1e-8, "a positive number", "largest slope of the mean loss at the end";
+        max_iter: usize = 10_000, "a whole number of at least 1", "most steps";
     }
     check(this) {
         Self::require(this.C.is_finite() && this.C > 0.0, "C", this.C)?;

@@ -84,7 +84,12 @@ impl PcaParams {
         let values = values.mapv(|v| v.max(0.0));
         let total = values.sum();
         if total <= 0.0 {
-            return Err(ModelError::ConstantFeature { feature: 0, rows, count: features, features });
+            return Err(ModelError::ConstantFeature {
+                feature: 0,
+                rows,
+                count: features,
+                features,
+            });
         }
         let kept = match self.n_components {
             None => most,
@@ -99,10 +104,12 @@ impl PcaParams {
             }
         };
         let kept_vectors = vectors.slice(s![.., ..kept]);
-        let mut components = if wide { kept_vectors.t().dot(&centred) } else { kept_vectors.t().to_owned() };
+        let mut components =
+            if wide { kept_vectors.t().dot(&centred) } else { kept_vectors.t().to_owned() };
         for mut component in components.outer_iter_mut() {
             let length = component.dot(&component).sqrt();
-            let largest = component.iter().fold(0.0f64, |a, &b| if b.abs() > a.abs() { b } else { a });
+            let largest =
+                component.iter().fold(0.0f64, |a, &b| if b.abs() > a.abs() { b } else { a });
             // A direction without any variance (rank below the count asked) stays zero.
             let factor = if length > 0.0 { largest.signum() / length } else { 0.0 };
             component *= factor;

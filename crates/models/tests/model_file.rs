@@ -1,0 +1,158 @@
+//! Model files: whole, damaged and hostile.
+
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod common;
+
+use common::clouds;
+use corsmal_models::classifiers::{CLASSIFIERS, ClassifierSpec};
+use corsmal_models::labels::Labels;
+use corsmal_models::model_file::{Model, ModelFileError, ModelHeader};
+use corsmal_models::params::key_values;
+use corsmal_models::pipeline::PipelineSpec;
+use corsmal_models::steps::{Components, PcaParams, StepSpec};
+use ndarray::Array2;
+use proptest::prelude::*;
+
+fn model(name: &str, texts: &[&str], rows: usize) -> (Model, Array2<f64>) {
+    let (x, y) = clouds(rows, 6, 3, 11);
+    let classifier = ClassifierSpec::new(name, &key_values(texts).unwrap()).unwrap();
+    let pca = PcaParams { n_components: Some(Components::Count(4)) };
+    let mut pipeline = PipelineSpec::standardized(classifier);
+    pipeline.steps.push(StepSpec::Pca(pca));
+    let fitted = pipeline.train(x.view(), &y, 3).unwrap();
+    let header = ModelHeader {
+        pipeline,
+        labels: Labels::new(vec!["none".into(), "pasta".into(), "rice".into()]).unwrap(),
+        target: "type".into(),
+        feature_names: (0..6).map(|i| format!("mfcc_{i}")).collect(),
+        feature_config: serde_json::json!({"sample_rate": 22050, "mfcc": {"n_mfcc": 6}}),
+        feature_config_hash: "00ff".into(),
+        provenance: serde_json::json!({"rows": rows}),
+        tool_version: "0.1.0".into(),
+    };
+    (Model::new(header, fitted).unwrap(), x)
+}
+
+fn small(name: &str) -> (Model, Array2<f64>) {
+    let trees: &[&str] = if ["rf", "et"].contains(&name) { &["trees=3"] } else { &[] };
+    model(name, trees, 45)
+}
+
+/// The same bytes with a checksum that fits them, as somebody hostile would make them.
+fn reseal(mut bytes: Vec<u8>) -> Vec<u8> {
+    let end = bytes.len() - 32;
+    let checksum = *blake3::hash(&bytes[..end]).as_bytes();
+    bytes[end..].copy_from_slice(&checksum);
+    bytes
+}
+
+#[test]
+fn every_classifier_survives_the_disk() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, _) in CLASSIFIERS {
+        let (model, x) = small(name);
+        let path = folder.path().join(name);
+        model.save(&path).unwrap();
+        let back = Model::load(&path).unwrap();
+        assert_eq!(back.header(), model.header());
+        assert_eq!(back.predict(x.view()).unwrap(), model.predict(x.view()).unwrap());
+        assert_eq!(back.predict_proba(x.view()).unwrap(), model.predict_proba(x.view()).unwrap());
+        assert_eq!(back.to_bytes().unwrap(), model.to_bytes().unwrap());
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), CLASSIFIERS.len());
+}
+
+#[test]
+fn every_truncation_and_every_flipped_byte_is_noticed() {
+    for (name, _) in CLASSIFIERS {
+        let bytes = small(name).0.to_bytes().unwrap();
+        for at in 0..bytes.len() {
+            assert!(Model::from_bytes(&bytes[..at]).is_err(), "{name}: cut at {at}");
+            // Every byte of the frame, every seventh inside.
+            if at < 64 || at % 7 == 0 {
+                let mut damaged = bytes.clone();
+                damaged[at] ^= 1 << (at % 8);
+                assert!(Model::from_bytes(&damaged).is_err(), "{name}: byte {at}");
+            }
+        }
+        let longer = [bytes.as_slice(), &[0]].concat();
+        assert!(matches!(Model::from_bytes(&longer), Err(ModelFileError::Length { .. })));
+    }
+}
+
+#[test]
+fn refusals_say_what_is_wrong() {
+    let bytes = small("knn").0.to_bytes().unwrap();
+    let mut other = bytes.clone();
+    other[8] = 9;
+    assert!(matches!(Model::from_bytes(&other), Err(ModelFileError::Version { found: 9 })));
+    assert!(matches!(Model::from_bytes(b"RIFFabcd"), Err(ModelFileError::NotAModel)));
+    assert!(matches!(Model::from_bytes(b""), Err(ModelFileError::NotAModel)));
+    let mut huge = bytes.clone();
+    huge[12..20].copy_from_slice(&u64::MAX.to_le_bytes());
+    assert!(matches!(
+        Model::from_bytes(&huge),
+        Err(ModelFileError::TooLarge { part: "header", .. })
+    ));
+    let mut huge = bytes.clone();
+    huge[20..28].copy_from_slice(&u64::MAX.to_le_bytes());
+    assert!(matches!(Model::from_bytes(&huge), Err(ModelFileError::TooLarge { part: "file", .. })));
+    let mut damaged = bytes.clone();
+    *damaged.last_mut().unwrap() ^= 1;
+    assert!(matches!(Model::from_bytes(&damaged), Err(ModelFileError::Checksum)));
+    let absent = Model::load(std::path::Path::new("/nowhere/model"));
+    assert!(absent.unwrap_err().to_string().starts_with("/nowhere/model: "));
+    let (model, _) = small("knn");
+    assert!(model.check_configuration("00ff").is_ok());
+    let text = model.check_configuration("abcd").unwrap_err().to_string();
+    assert!(text.contains("00ff") && text.contains("abcd"), "{text}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    // Damage under a checksum that fits: refused, or a model that can be used without panic.
+    #[test]
+    fn hostile_files_never_panic(
+        which in 0..CLASSIFIERS.len(),
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
+        cut in prop::option::of(any::<prop::sample::Index>()),
+    ) {
+        let (model, x) = hostile_base(which);
+        let mut bytes = model.clone();
+        // Behind the magic and the version, and mostly in the payload.
+        for (index, value) in changes {
+            let at = 12 + index.index(bytes.len() - 12);
+            bytes[at] = value;
+        }
+        if let Some(cut) = cut {
+            bytes.truncate(60 + cut.index(bytes.len() - 60));
+        }
+        if let Ok(model) = Model::from_bytes(&reseal(bytes)) {
+            if let Ok(proba) = model.predict_proba(x.view()) {
+                prop_assert_eq!(proba.nrows(), x.nrows());
+            }
+            let _ = model.predict(x.view());
+        }
+    }
+
+    #[test]
+    fn saved_models_predict_the_same(seed in any::<u32>(), rows in 9usize..40, k in 1usize..9) {
+        let (model, x) = model("knn", &[&format!("k={k}")], rows);
+        let (forest, _) = self::model("rf", &["trees=2", &format!("seed={seed}")], rows);
+        for model in [model, forest] {
+            let back = Model::from_bytes(&model.to_bytes().unwrap()).unwrap();
+            prop_assert_eq!(back.predict_proba(x.view()).unwrap(), model.predict_proba(x.view()).unwrap());
+        }
+    }
+}
+
+fn hostile_base(which: usize) -> &'static (Vec<u8>, Array2<f64>) {
+    static BASES: std::sync::OnceLock<Vec<(Vec<u8>, Array2<f64>)>> = std::sync::OnceLock::new();
+    let make = |(name, _): &(&str, &str)| {
+        let (model, x) = small(name);
+        (model.to_bytes().unwrap(), x)
+    };
+    &BASES.get_or_init(|| CLASSIFIERS.iter().map(make).collect())[which]
+}

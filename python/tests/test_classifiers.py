@@ -1,0 +1,118 @@
+"""The classifiers on their own: no scikit-learn needed."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from corsmal_feat import ParameterError, classifiers
+
+ALL = [
+    classifiers.KNN(),
+    classifiers.SVC(probability=True),
+    classifiers.DecisionTree(),
+    classifiers.RandomForest(20),
+    classifiers.ExtraTrees(20),
+    classifiers.LogisticRegression(),
+]
+
+
+def clouds(rows: int = 150, classes: tuple[object, ...] = ("full", "half", "empty")):
+    rng = np.random.default_rng(0)
+    which = np.arange(rows) % len(classes)
+    x = rng.normal(size=(len(classes), 6))[which] * 2 + rng.normal(size=(rows, 6))
+    return x, np.array(classes)[which]
+
+
+def fresh(estimator):
+    return type(estimator)(**estimator.get_params())
+
+
+@pytest.mark.parametrize("estimator", ALL, ids=lambda e: type(e).__name__)
+@pytest.mark.parametrize("classes", [("full", "half", "empty"), (3, -1, 7), (True, False)])
+def test_fit_predict_save_load_pickle(estimator, classes, tmp_path: Path):
+    x, y = clouds(classes=classes)
+    model = fresh(estimator).fit(x[:100], y[:100])
+    assert model.score(x[100:], y[100:]) > 0.8
+    np.testing.assert_array_equal(model.classes_, np.unique(y))
+    proba = model.predict_proba(x)
+    assert proba.shape == (len(x), len(classes))
+    np.testing.assert_allclose(proba.sum(axis=1), 1)
+    path = tmp_path / "model"
+    model.save(path)
+    for back in (
+        type(model).load(path),
+        classifiers.load_model(path),
+        pickle.loads(pickle.dumps(model)),
+    ):
+        np.testing.assert_array_equal(back.predict(x), model.predict(x))
+        np.testing.assert_array_equal(back.predict_proba(x), proba)
+        assert back.classes_.dtype.kind == model.classes_.dtype.kind
+    assert type(model).load(path).get_params().keys() == model.get_params().keys()
+
+
+def test_files_of_another_classifier_and_damaged_files_are_refused(tmp_path: Path):
+    x, y = clouds()
+    path = tmp_path / "model"
+    classifiers.KNN().fit(x, y).save(path)
+    with pytest.raises(ParameterError, match="holds knn, not rf"):
+        classifiers.RandomForest.load(path)
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(ParameterError, match="damaged"):
+        classifiers.load_model(path)
+
+
+@pytest.mark.parametrize("estimator", ALL, ids=lambda e: type(e).__name__)
+def test_bad_input_is_refused(estimator):
+    x, y = clouds()
+    model = fresh(estimator)
+    with pytest.raises(AttributeError, match="not fitted"):
+        model.predict(x)
+    model.fit(x, y)
+    with pytest.raises(ParameterError, match="X has 5 features, but"):
+        model.predict(x[:, :5])
+    for value, word in ((np.nan, "NaN"), (np.inf, "infinity")):
+        bad = x.copy()
+        bad[3, 2] = value
+        with pytest.raises(ParameterError, match=word):
+            model.fit(bad, y)
+        with pytest.raises(ParameterError, match=word):
+            model.predict(bad)
+    with pytest.raises(ParameterError, match="1D array"):
+        model.fit(x[0], y)
+    with pytest.raises(ParameterError, match="149 labels"):
+        model.fit(x, y[1:])
+    with pytest.raises(ParameterError, match="continuous"):
+        model.fit(x, x[:, 0])
+
+
+def test_parameters_are_refused_by_name():
+    x, y = clouds()
+    with pytest.raises(ParameterError, match="C = -1"):
+        classifiers.SVC(C=-1).fit(x, y)
+    with pytest.raises(ParameterError, match="metric"):
+        classifiers.KNN(metric="canberra").fit(x, y)
+    with pytest.raises(ParameterError, match="Invalid parameter 'k'"):
+        classifiers.KNN().set_params(k=3)
+
+
+def test_seeds_decide_and_class_weights_count():
+    x, y = clouds()
+    forest = classifiers.RandomForest(10, random_state=3)
+    first = forest.fit(x, y).predict_proba(x)
+    np.testing.assert_array_equal(first, fresh(forest).fit(x, y).predict_proba(x))
+    assert (first != forest.set_params(random_state=4).fit(x, y).predict_proba(x)).any()
+    weighted = classifiers.LogisticRegression(class_weight={"full": 50.0}).fit(x, y)
+    plain = classifiers.LogisticRegression().fit(x, y)
+    assert (weighted.predict(x) == "full").sum() > (plain.predict(x) == "full").sum()
+
+
+def test_no_scikit_learn_is_imported():
+    code = "import sys, corsmal_feat; sys.exit('sklearn' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
