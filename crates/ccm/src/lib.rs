@@ -1,1 +1,13 @@
-//! placeholder
+//! The CORSMAL Containers Manipulation (CCM) benchmark: data set, labels, splits, submissions,
+//! scores, synthetic recordings, the published results and the report.
+//!
+//! Facts about the data set and the official evaluators are documented where they are used;
+//! `docs/benchmark.md` gives the overview.
+
+pub mod dataset;
+pub mod error;
+pub mod scores;
+pub mod submission;
+mod table;
+
+pub use error::{CcmError, Result};
