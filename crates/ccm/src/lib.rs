@@ -6,8 +6,10 @@
 
 pub mod dataset;
 pub mod error;
+pub mod predictions;
 pub mod scores;
 pub mod submission;
+pub mod synth;
 mod table;
 
 pub use error::{CcmError, Result};

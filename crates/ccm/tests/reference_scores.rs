@@ -158,7 +158,8 @@ fn acc_lists() {
         let mut part = annotations.of_containers(&containers);
         if let Some(list) = list {
             let text = std::fs::read_to_string(ccm(list).unwrap()).unwrap();
-            let ids: Vec<usize> = text.split_whitespace().map(|t| t.parse().unwrap()).collect();
+            let ids: Vec<usize> =
+                text.split(|c: char| !c.is_ascii_digit()).filter_map(|t| t.parse().ok()).collect();
             let mut index = 0;
             part.rows.retain(|_| {
                 index += 1;

@@ -56,8 +56,9 @@ impl SequenceName {
     pub fn number(self, container: Container) -> Option<u16> {
         let fillings = container.fillings().count() as u16;
         let filling = container.fillings().position(|f| f == self.filling)? as u16;
-        let setting =
-            u16::from(self.scenario) * 4 + u16::from(self.background) * 2 + u16::from(self.illumination);
+        let setting = u16::from(self.scenario) * 4
+            + u16::from(self.background) * 2
+            + u16::from(self.illumination);
         Some(setting * fillings + filling)
     }
 }
@@ -92,7 +93,8 @@ mod tests {
 
     #[test]
     fn refuses_what_is_no_name() {
-        for text in ["", "0000_audio.wav", "s3_fi0_fu0_b0_l0", "s0_fi1_fu0_b0_l0", "s0_fi0_fu0_b0"] {
+        for text in ["", "0000_audio.wav", "s3_fi0_fu0_b0_l0", "s0_fi1_fu0_b0_l0", "s0_fi0_fu0_b0"]
+        {
             assert_eq!(SequenceName::parse(text), None, "{text}");
         }
         let water = SequenceName::parse("s0_fi3_fu1_b0_l0").unwrap();

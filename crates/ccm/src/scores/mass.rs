@@ -23,7 +23,8 @@ impl MassInput {
     /// Takes whole columns that are not addressed from the (aligned) baseline.
     pub(super) fn new(submission: &Submission, baseline: &Submission) -> Self {
         let mut addressed = 0;
-        let mut column = |own: &crate::submission::Estimates, other: &crate::submission::Estimates| {
+        let mut column = |own: &crate::submission::Estimates,
+                          other: &crate::submission::Estimates| {
             let use_own = own.addressed();
             addressed += usize::from(use_own);
             if use_own { own.values.clone() } else { other.values.clone() }

@@ -49,9 +49,7 @@ pub(super) fn delivery(distance: &[f64], angle: &[f64]) -> f64 {
     distance
         .iter()
         .zip(angle)
-        .filter(|&(&d, &a)| {
-            d > -1.0 && d < FARTHEST_DELIVERY_MM && a < std::f64::consts::FRAC_PI_4
-        })
+        .filter(|&(&d, &a)| d > -1.0 && d < FARTHEST_DELIVERY_MM && a < std::f64::consts::FRAC_PI_4)
         .map(|(d, _)| 1.0 - d / FARTHEST_DELIVERY_MM)
         .sum()
 }

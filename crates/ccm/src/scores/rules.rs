@@ -97,7 +97,8 @@ pub fn evaluate(
         RuleSet::Toolkit202111 | RuleSet::Toolkit => truth.toolkit(&aligned, &input, rules)?,
     };
     for (_, value) in &mut scores.values {
-        *value *= 100.0;
+        // Adding zero turns the -0 of an empty sum into 0.
+        *value = *value * 100.0 + 0.0;
     }
     if let Some(error) = (rules == RuleSet::Paper).then(|| truth.weight_error(&aligned, &input)) {
         scores.values.extend(error.map(|e| ("weight_error_N", e)));
@@ -300,8 +301,7 @@ impl<'a> Truth<'a> {
     /// What the evaluators add to the filling mass score so that the truth scores 100.
     fn offset(&self, rules: RuleSet) -> Result<f64> {
         let containers = self.annotations.rows.iter().map(|r| r.container);
-        let (first, last) =
-            containers.fold((u8::MAX, 0), |(a, b), c| (a.min(c), b.max(c)));
+        let (first, last) = containers.fold((u8::MAX, 0), |(a, b), c| (a.min(c), b.max(c)));
         match (first, last) {
             _ if rules == RuleSet::Toolkit202111 => Ok(0.047505),
             (1.., ..=9) => Ok(0.047505),

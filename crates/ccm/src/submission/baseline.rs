@@ -19,8 +19,7 @@ pub fn pseudo_random(keys: &[RowKey], seed: u64) -> Vec<Prediction> {
         .map(|&key| {
             let level = class_scores::<3>(&mut rng);
             let kind = class_scores::<4>(&mut rng);
-            let mut size =
-                |range: f64, from: f64| (range * rng.gen_range(0.0..1.0) + from).round();
+            let mut size = |range: f64, from: f64| (range * rng.gen_range(0.0..1.0) + from).round();
             let capacity = size(3950.0, 50.0);
             let mass = size(350.0, 1.0);
             let dimensions = Dimensions {

@@ -203,7 +203,8 @@ fn read_estimates(table: &Table, name: &str, labels: bool) -> Result<Estimates> 
                 ));
             }
         }
-        estimates.float |= !table.text(row, column).bytes().all(|b| b.is_ascii_digit() || b == b'-');
+        estimates.float |=
+            !table.text(row, column).bytes().all(|b| b.is_ascii_digit() || b == b'-');
         estimates.values.push(value);
     }
     Ok(estimates)
@@ -221,7 +222,8 @@ mod tests {
 
     #[test]
     fn reads_the_2020_format_in_any_column_order() {
-        let text = "Container ID,Sequence,Container Capacity,Filling level,Filling type\n1,0,-1,2,3\n";
+        let text =
+            "Container ID,Sequence,Container Capacity,Filling level,Filling type\n1,0,-1,2,3\n";
         let s = submission(text).unwrap();
         assert_eq!(s.format, Format::Y2020);
         assert_eq!((s.kind.values[0], s.level.values[0]), (3.0, 2.0));

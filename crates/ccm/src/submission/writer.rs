@@ -57,9 +57,12 @@ impl Prediction {
     }
 
     fn fault(&self) -> Option<String> {
-        for p in [self.kind_probabilities.map(|p| p.to_vec()), self.level_probabilities.map(|p| p.to_vec())]
-            .into_iter()
-            .flatten()
+        for p in [
+            self.kind_probabilities.map(|p| p.to_vec()),
+            self.level_probabilities.map(|p| p.to_vec()),
+        ]
+        .into_iter()
+        .flatten()
         {
             let sum: f64 = p.iter().sum();
             // Written this way round so that NaN is a fault too.

@@ -1,6 +1,8 @@
 //! One file per command: its arguments (`Args`) and what it does (`run`).
 
 mod completions;
+mod evaluate;
+mod synth;
 
 use std::process::ExitCode;
 
@@ -13,6 +15,10 @@ use crate::failure::Failure;
 pub enum Command {
     /// Print shell completions or the man page.
     Completions(completions::Args),
+    /// Score CORSMAL submissions by the paper's or the official evaluators' rules.
+    Evaluate(evaluate::Args),
+    /// Make synthetic recordings in the layout of the CCM data set (demonstration and tests only).
+    Synth(synth::Args),
 }
 
 impl Command {
@@ -20,6 +26,8 @@ impl Command {
     pub fn run(self) -> Result<ExitCode, Failure> {
         match self {
             Self::Completions(args) => completions::run(args),
+            Self::Evaluate(args) => evaluate::run(args),
+            Self::Synth(args) => synth::run(args),
         }
     }
 }
