@@ -1,1 +1,26 @@
-//! placeholder
+//! Classifiers for acoustic features: training, prediction, validation, model files.
+//!
+//! Features are `[rows, features]` in double precision, labels are class indices with a table of
+//! names ([`labels::Labels`]). [`classifiers::ClassifierSpec`] names a classifier with its
+//! parameters; it implements [`linfa::traits::Fit`], and the fitted
+//! [`classifiers::Classifier`] implements linfa's prediction traits.
+
+pub mod classifiers;
+pub mod error;
+mod lbfgs;
+pub mod params;
+mod table;
+
+pub use error::{ModelError, Result};
+pub mod mt19937;
+pub mod pipeline;
+pub mod steps;
+pub mod labels;
+pub mod metrics;
+pub mod splits;
+pub mod spread;
+pub mod comparison;
+pub mod cross_validation;
+pub mod fusion;
+pub mod grid;
+pub mod model_file;

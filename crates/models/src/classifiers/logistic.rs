@@ -1,0 +1,173 @@
+//! Logistic regression: the softmax (two classes: the logistic function) of linear scores, with an
+//! L2 penalty on the weights, the intercepts free. Same objective as scikit-learn 1.9.
+
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut1, Axis, s};
+use serde::{Deserialize, Serialize};
+
+use super::{Classify, Train};
+use crate::error::{ModelError, Result};
+use crate::lbfgs;
+use crate::params::{ClassWeight, Parameters, parameters};
+
+parameters! {
+    /// Parameters of logistic regression.
+    #[allow(non_snake_case, reason = "C is its name everywhere")]
+    LogisticParams, "logistic" {
+        C: f64 = 1.0, "a positive number", "inverse of the penalty's strength";
+        class_weight: ClassWeight = ClassWeight::Equal,
+            "null, balanced, or one positive number per class in label order", "weight of each class";
+        tol: f64 = 1e-5, "a positive number", "largest slope of the mean loss at the end";
+        max_iter: usize = 1000, "a whole number of at least 1", "most steps";
+    }
+    check(this) {
+        Self::require(this.C.is_finite() && this.C > 0.0, "C", this.C)?;
+        Self::require(this.class_weight.is_valid(), "class_weight", format!("{:?}", this.class_weight))?;
+        Self::require(this.tol.is_finite() && this.tol > 0.0, "tol", this.tol)?;
+        Self::require(this.max_iter >= 1, "max_iter", this.max_iter)
+    }
+}
+
+/// Fitted weights.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Logistic {
+    n_classes: usize,
+    /// `[classes, features]`; one row (of the second class) when there are two classes
+    weights: Array2<f64>,
+    intercepts: Array1<f64>,
+}
+
+impl Train for LogisticParams {
+    type Fitted = Logistic;
+    const FEWEST_CLASSES: usize = 2;
+
+    fn train(&self, x: ArrayView2<'_, f64>, y: &[usize], n_classes: usize) -> Result<Logistic> {
+        let outputs = if n_classes == 2 { 1 } else { n_classes };
+        let per_class = self.class_weight.per_class(y, n_classes)?;
+        let row_weights: Vec<f64> = y.iter().map(|&c| per_class[c]).collect();
+        let objective = Objective {
+            x,
+            y,
+            penalty: 1.0 / self.C / row_weights.iter().sum::<f64>(),
+            total: row_weights.iter().sum(),
+            row_weights,
+            outputs,
+        };
+        let start = Array1::zeros(outputs * (x.ncols() + 1));
+        let options = lbfgs::Options { tol: self.tol, max_iter: self.max_iter };
+        let found = lbfgs::minimise(start, &options, |at, gradient| objective.at(at, gradient));
+        if !found.iter().all(|v| v.is_finite()) {
+            return Err(ModelError::Numerical {
+                owner: Self::OWNER,
+                reason: "the weights overflowed: standardise the features first".into(),
+            });
+        }
+        let table = found
+            .into_shape_with_order((outputs, x.ncols() + 1))
+            .map_err(|e| ModelError::Inconsistent(e.to_string()))?;
+        Ok(Logistic {
+            n_classes,
+            weights: table.slice(s![.., ..x.ncols()]).to_owned(),
+            intercepts: table.column(x.ncols()).to_owned(),
+        })
+    }
+}
+
+/// Mean loss plus penalty, as a function of `[outputs, features + 1]` (intercept last).
+struct Objective<'a, 'y> {
+    x: ArrayView2<'a, f64>,
+    y: &'y [usize],
+    row_weights: Vec<f64>,
+    total: f64,
+    penalty: f64,
+    outputs: usize,
+}
+
+impl Objective<'_, '_> {
+    fn at(&self, at: ArrayView1<'_, f64>, mut gradient: ArrayViewMut1<'_, f64>) -> f64 {
+        let features = self.x.ncols();
+        let shape = (self.outputs, features + 1);
+        let table = at.to_shape(shape).expect("the shape minimised over");
+        let weights = table.slice(s![.., ..features]);
+        let mut scores = self.x.dot(&weights.t()) + table.column(features);
+        let mut loss = 0.0;
+        for ((mut row, &class), weight) in scores.outer_iter_mut().zip(self.y).zip(&self.row_weights) {
+            // The row of scores becomes the row of slopes.
+            loss += weight * slopes(row.view_mut(), class);
+            row *= weight / self.total;
+        }
+        let mut slope = Array2::zeros(shape);
+        slope.slice_mut(s![.., ..features]).assign(&scores.t().dot(&self.x));
+        slope.slice_mut(s![.., ..features]).scaled_add(self.penalty, &weights);
+        slope.column_mut(features).assign(&scores.sum_axis(Axis(0)));
+        gradient.iter_mut().zip(&slope).for_each(|(to, &from)| *to = from);
+        loss / self.total + 0.5 * self.penalty * weights.iter().map(|w| w * w).sum::<f64>()
+    }
+}
+
+/// Loss of one row; its scores are replaced by the loss's derivatives.
+fn slopes(mut scores: ArrayViewMut1<'_, f64>, class: usize) -> f64 {
+    if scores.len() == 1 {
+        let z = scores[0];
+        let target = class as f64;
+        scores[0] = logistic(z) - target;
+        let tail = (-z.abs()).exp().ln_1p();
+        return z.max(0.0) + tail - target * z;
+    }
+    let own = scores[class];
+    let (top, sum) = soften(scores.view_mut());
+    scores[class] -= 1.0;
+    top + sum.ln() - own
+}
+
+fn logistic(z: f64) -> f64 {
+    if z >= 0.0 { 1.0 / (1.0 + (-z).exp()) } else { z.exp() / (1.0 + z.exp()) }
+}
+
+/// Scores to softmax; gives the largest score and the sum of exponentials relative to it.
+fn soften(mut scores: ArrayViewMut1<'_, f64>) -> (f64, f64) {
+    let top = scores.iter().fold(f64::NEG_INFINITY, |a, &b| a.max(b));
+    scores.mapv_inplace(|v| (v - top).exp());
+    let sum = scores.sum();
+    scores /= sum;
+    (top, sum)
+}
+
+impl Classify for Logistic {
+    fn n_features(&self) -> usize {
+        self.weights.ncols()
+    }
+
+    fn n_classes(&self) -> usize {
+        self.n_classes
+    }
+
+    fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
+        let mut scores = x.dot(&self.weights.t()) + &self.intercepts;
+        if self.n_classes == 2 {
+            let second = scores.column(0).mapv(logistic);
+            let mut proba = Array2::zeros((x.nrows(), 2));
+            proba.column_mut(0).assign(&second.mapv(|p| 1.0 - p));
+            proba.column_mut(1).assign(&second);
+            return Ok(proba);
+        }
+        for row in scores.outer_iter_mut() {
+            soften(row);
+        }
+        match scores.iter().all(|v| v.is_finite()) {
+            true => Ok(scores),
+            false => Err(ModelError::Numerical {
+                owner: LogisticParams::OWNER,
+                reason: "the scores overflowed: features too large".into(),
+            }),
+        }
+    }
+
+    fn validate(&self) -> Result<()> {
+        let outputs = if self.n_classes == 2 { 1 } else { self.n_classes };
+        let sound = self.n_classes >= 2
+            && self.weights.nrows() == outputs
+            && self.intercepts.len() == outputs
+            && self.weights.iter().chain(&self.intercepts).all(|v| v.is_finite());
+        if sound { Ok(()) } else { Err(ModelError::Inconsistent("weights".into())) }
+    }
+}

@@ -1,0 +1,194 @@
+//! Kernel values: all at once when they fit the memory allowed, else row by row through a cache.
+
+use ndarray::{Array2, ArrayView2, Axis};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::error::{ModelError, Result};
+
+/// The kernel with its width settled.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(super) enum Function {
+    Rbf { gamma: f64 },
+    Linear,
+}
+
+impl Function {
+    fn finish(self, dot: f64, norm_a: f64, norm_b: f64) -> f64 {
+        match self {
+            Self::Linear => dot,
+            Self::Rbf { gamma } => (-gamma * (norm_a + norm_b - 2.0 * dot)).exp(),
+        }
+    }
+
+    pub(super) fn is_valid(self) -> bool {
+        match self {
+            Self::Linear => true,
+            Self::Rbf { gamma } => gamma.is_finite() && gamma > 0.0,
+        }
+    }
+
+    /// Kernel of every row of `a` with every row of `b` (whose squared lengths are given).
+    pub(super) fn matrix(
+        self,
+        a: ArrayView2<'_, f64>,
+        b: ArrayView2<'_, f64>,
+        b_norms: &[f64],
+    ) -> Array2<f64> {
+        let mut values = a.dot(&b.t());
+        for (mut row, norm) in values.outer_iter_mut().zip(squared_lengths(a)) {
+            row.iter_mut().zip(b_norms).for_each(|(v, bn)| *v = self.finish(*v, norm, *bn));
+        }
+        values
+    }
+}
+
+pub(super) fn squared_lengths(x: ArrayView2<'_, f64>) -> Vec<f64> {
+    x.outer_iter().map(|row| row.dot(&row)).collect()
+}
+
+/// Kernel values among the training rows.
+pub(super) struct Gram<'a> {
+    x: ArrayView2<'a, f64>,
+    norms: Vec<f64>,
+    function: Function,
+    /// all of them in single precision, if they fit
+    full: Option<Array2<f32>>,
+}
+
+/// Multiplications above which one row of kernel values is shared among threads.
+const PARALLEL_WORK: usize = 400_000;
+
+impl<'a> Gram<'a> {
+    /// `x` in standard layout.
+    pub(super) fn new(x: ArrayView2<'a, f64>, function: Function, budget: usize) -> Result<Self> {
+        let norms = squared_lengths(x);
+        let gram = Self { x, norms, function, full: None };
+        // Kernel values are kept in single precision: they must be finite there.
+        let largest = gram.norms.iter().fold(0.0f64, |a, &b| a.max(b));
+        if !largest.is_finite() || (matches!(function, Function::Linear) && largest > 1e37) {
+            return Err(ModelError::Numerical {
+                owner: "svm",
+                reason: "features are too large: standardise them first".into(),
+            });
+        }
+        let bytes = x.nrows().checked_mul(x.nrows()).and_then(|n| n.checked_mul(size_of::<f32>()));
+        let full = bytes.is_some_and(|b| b <= budget).then(|| gram.all());
+        Ok(Self { full, ..gram })
+    }
+
+    fn all(&self) -> Array2<f32> {
+        const BLOCK: usize = 128;
+        let n = self.x.nrows();
+        let mut all = Array2::zeros((n, n));
+        all.axis_chunks_iter_mut(Axis(0), BLOCK)
+            .into_par_iter()
+            .zip(self.x.axis_chunks_iter(Axis(0), BLOCK))
+            .for_each(|(mut out, block)| {
+                let values = self.function.matrix(block, self.x, &self.norms);
+                out.zip_mut_with(&values, |to, &from| *to = from as f32);
+            });
+        all
+    }
+
+    /// Kernel of training row `row` with each of `others`.
+    pub(super) fn fill(&self, row: u32, others: &[u32], out: &mut [f32]) {
+        let i = row as usize;
+        if let Some(full) = &self.full {
+            let values = full.row(i);
+            let values = values.to_slice().expect("standard layout");
+            out.iter_mut().zip(others).for_each(|(to, &j)| *to = values[j as usize]);
+            return;
+        }
+        let a = self.x.row(i);
+        let value = |j: u32| {
+            let j = j as usize;
+            self.function.finish(a.dot(&self.x.row(j)), self.norms[i], self.norms[j]) as f32
+        };
+        if others.len() * self.x.ncols() < PARALLEL_WORK {
+            out.iter_mut().zip(others).for_each(|(to, &j)| *to = value(j));
+        } else {
+            out.par_iter_mut().with_min_len(256).zip(others).for_each(|(to, &j)| *to = value(j));
+        }
+    }
+
+    /// The kernel matrix of some rows, for a solver.
+    pub(super) fn rows<'b>(&'b self, rows: &'b [u32], cache_bytes: usize) -> Rows<'b, 'a> {
+        let per_row = size_of::<f32>() * rows.len().max(1);
+        Rows {
+            gram: self,
+            rows,
+            // The solver holds two rows at a time.
+            capacity: (cache_bytes / per_row).clamp(2, rows.len().max(2)),
+            slots: Vec::new(),
+            slot_of: vec![u32::MAX; rows.len()],
+            clock: 0,
+        }
+    }
+}
+
+struct Slot {
+    row: usize,
+    used: u64,
+    values: Vec<f32>,
+}
+
+/// Rows of a kernel matrix with the least recently used ones forgotten when memory is used up.
+pub(super) struct Rows<'a, 'x> {
+    gram: &'a Gram<'x>,
+    rows: &'a [u32],
+    capacity: usize,
+    slots: Vec<Slot>,
+    slot_of: Vec<u32>,
+    clock: u64,
+}
+
+impl Rows<'_, '_> {
+    pub(super) fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// K(i, i).
+    pub(super) fn diagonal(&self, i: usize) -> f64 {
+        let norm = self.gram.norms[self.rows[i] as usize];
+        self.gram.function.finish(norm, norm, norm)
+    }
+
+    /// Row `i`.
+    pub(super) fn one(&mut self, i: usize) -> &[f32] {
+        let slot = self.load(i);
+        &self.slots[slot].values
+    }
+
+    /// Rows `i` and `j`.
+    pub(super) fn two(&mut self, i: usize, j: usize) -> (&[f32], &[f32]) {
+        // The first is now the most recently used: loading the second leaves it in place.
+        let first = self.load(i);
+        let second = self.load(j);
+        (&self.slots[first].values, &self.slots[second].values)
+    }
+
+    fn load(&mut self, i: usize) -> usize {
+        self.clock += 1;
+        let slot = self.slot_of[i] as usize;
+        if slot < self.slots.len() {
+            self.slots[slot].used = self.clock;
+            return slot;
+        }
+        let slot = if self.slots.len() < self.capacity {
+            self.slots.push(Slot { row: i, used: 0, values: vec![0.0; self.rows.len()] });
+            self.slots.len() - 1
+        } else {
+            let oldest = self.slots.iter().enumerate().min_by_key(|(_, s)| s.used);
+            let slot = oldest.map_or(0, |(at, _)| at);
+            self.slot_of[self.slots[slot].row] = u32::MAX;
+            slot
+        };
+        self.slot_of[i] = slot as u32;
+        let entry = &mut self.slots[slot];
+        entry.row = i;
+        entry.used = self.clock;
+        self.gram.fill(self.rows[i], self.rows, &mut entry.values);
+        slot
+    }
+}

@@ -1,0 +1,344 @@
+//! Support vector machine (C-SVC), one against one, labels by votes as LIBSVM and scikit-learn.
+//!
+//! Chang & Lin, "LIBSVM: a library for support vector machines" (2011). Probabilities: a sigmoid
+//! per pair fitted on five-fold held-out decision values, then pairwise coupling.
+
+mod kernel;
+mod probability;
+mod smo;
+
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
+use rand::seq::SliceRandom;
+use rand::{RngCore, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use self::kernel::{Function, Gram};
+use self::probability::Sigmoid;
+use super::{Classify, Train};
+use crate::error::{ModelError, Result};
+use crate::params::{ClassWeight, Parameters, parameters};
+use crate::table::argmax;
+
+/// How two rows are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kernel {
+    /// exp(−γ‖a − b‖²)
+    Rbf,
+    /// a·b
+    Linear,
+}
+
+/// Width of the RBF kernel.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Gamma {
+    /// by rule
+    Rule(GammaRule),
+    /// this value
+    Value(f64),
+}
+
+/// Rules for the width of the RBF kernel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum GammaRule {
+    /// 1 / (features · variance of all training values)
+    Scale,
+    /// 1 / features
+    Auto,
+}
+
+parameters! {
+    /// Parameters of the support vector machine.
+    #[allow(non_snake_case, reason = "C is its name everywhere")]
+    SvmParams, "svm" {
+        C: f64 = 1.0, "a positive number", "cost of a training row on the wrong side";
+        kernel: Kernel = Kernel::Rbf, "rbf or linear", "how rows are compared";
+        gamma: Gamma = Gamma::Rule(GammaRule::Scale), "scale, auto or a positive number",
+            "width of the rbf kernel";
+        class_weight: ClassWeight = ClassWeight::Equal,
+            "null, balanced, or one positive number per class in label order",
+            "factors of C by class";
+        probability: bool = true, "true or false",
+            "fit class probabilities as well (five more fits per pair)";
+        tol: f64 = 1e-3, "a positive number", "tolerance of the optimality conditions";
+        cache_mb: usize = 200, "a whole number of at least 1", "memory for kernel values, MiB";
+        seed: u64 = 0, "a whole number", "seed of the folds for the probabilities";
+    }
+    check(this) {
+        let positive = |v: f64| v.is_finite() && v > 0.0;
+        Self::require(positive(this.C), "C", this.C)?;
+        if let Gamma::Value(gamma) = this.gamma {
+            Self::require(positive(gamma), "gamma", gamma)?;
+        }
+        Self::require(this.class_weight.is_valid(), "class_weight", format!("{:?}", this.class_weight))?;
+        Self::require(positive(this.tol), "tol", this.tol)?;
+        Self::require(this.cache_mb >= 1, "cache_mb", this.cache_mb)
+    }
+}
+
+impl SvmParams {
+    fn function(&self, x: ArrayView2<'_, f64>) -> Function {
+        let features = x.ncols() as f64;
+        match (self.kernel, self.gamma) {
+            (Kernel::Linear, _) => Function::Linear,
+            (_, Gamma::Value(gamma)) => Function::Rbf { gamma },
+            (_, Gamma::Rule(GammaRule::Auto)) => Function::Rbf { gamma: 1.0 / features },
+            (_, Gamma::Rule(GammaRule::Scale)) => {
+                let variance = x.var(0.0);
+                let gamma = if variance > 0.0 { 1.0 / (features * variance) } else { 1.0 };
+                Function::Rbf { gamma }
+            }
+        }
+    }
+}
+
+/// One two-class machine: class `first` is on the positive side.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Pair {
+    first: usize,
+    second: usize,
+    /// rows of the support table
+    rows: Vec<u32>,
+    /// α·y of each
+    coefficients: Vec<f64>,
+    rho: f64,
+    sigmoid: Option<Sigmoid>,
+}
+
+/// A fitted support vector machine.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Svm {
+    n_classes: usize,
+    function: Function,
+    /// `[support vectors, features]`, each once however many pairs use it
+    support: Array2<f64>,
+    pairs: Vec<Pair>,
+}
+
+/// A two-class problem on rows of the training table.
+struct TwoClass<'a, 'x> {
+    gram: &'a Gram<'x>,
+    /// training rows
+    rows: Vec<u32>,
+    /// +1 or −1
+    signs: Vec<f64>,
+    /// largest α of each row
+    bounds: Vec<f64>,
+    tol: f64,
+    cache_bytes: usize,
+}
+
+impl TwoClass<'_, '_> {
+    fn solve(&self) -> Result<smo::Solution> {
+        let mut rows = self.gram.rows(&self.rows, self.cache_bytes);
+        smo::solve(&mut rows, &self.signs, &self.bounds, self.tol)
+    }
+
+    /// The problem restricted to some of its rows.
+    fn subset(&self, keep: &[usize]) -> Self {
+        Self {
+            gram: self.gram,
+            rows: keep.iter().map(|&i| self.rows[i]).collect(),
+            signs: keep.iter().map(|&i| self.signs[i]).collect(),
+            bounds: keep.iter().map(|&i| self.bounds[i]).collect(),
+            tol: self.tol,
+            cache_bytes: self.cache_bytes,
+        }
+    }
+
+    /// Decision values of all rows, each from a machine that has not seen it (five folds).
+    fn held_out_decisions(&self, seed: u64) -> Result<Vec<f64>> {
+        const FOLDS: usize = 5;
+        let n = self.rows.len();
+        let mut order: Vec<usize> = (0..n).collect();
+        order.shuffle(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
+        let mut decisions = vec![0.0; n];
+        for fold in 0..FOLDS {
+            let (start, end) = (fold * n / FOLDS, (fold + 1) * n / FOLDS);
+            let held = &order[start..end];
+            let kept: Vec<usize> = order[..start].iter().chain(&order[end..]).copied().collect();
+            let inner = self.subset(&kept);
+            let positive = inner.signs.iter().filter(|&&s| s > 0.0).count();
+            if positive == 0 || positive == kept.len() {
+                // As LIBSVM: one class alone wins everywhere.
+                let value = f64::from(i8::from(positive > 0) - i8::from(positive < kept.len()));
+                held.iter().for_each(|&i| decisions[i] = value);
+                continue;
+            }
+            let solution = inner.solve()?;
+            let mut values = vec![0.0f32; kept.len()];
+            for &i in held {
+                self.gram.fill(self.rows[i], &inner.rows, &mut values);
+                let sum: f64 = values
+                    .iter()
+                    .zip(&solution.alpha)
+                    .zip(&inner.signs)
+                    .map(|((&k, a), s)| f64::from(k) * a * s)
+                    .sum();
+                decisions[i] = sum - solution.rho;
+            }
+        }
+        Ok(decisions)
+    }
+}
+
+impl Train for SvmParams {
+    type Fitted = Svm;
+    const FEWEST_CLASSES: usize = 2;
+
+    fn train(&self, x: ArrayView2<'_, f64>, y: &[usize], n_classes: usize) -> Result<Svm> {
+        let weights = self.class_weight.per_class(y, n_classes)?;
+        let function = self.function(x);
+        let x = x.as_standard_layout();
+        let budget = self.cache_mb.saturating_mul(1 << 20);
+        let gram = Gram::new(x.view(), function, budget)?;
+        let mut members = vec![Vec::new(); n_classes];
+        y.iter().enumerate().for_each(|(row, &c)| members[c].push(row as u32));
+        let mut seeds = Xoshiro256PlusPlus::seed_from_u64(self.seed);
+        let jobs: Vec<(usize, usize, u64)> = (0..n_classes)
+            .flat_map(|a| (a + 1..n_classes).map(move |b| (a, b)))
+            .map(|(a, b)| (a, b, seeds.next_u64()))
+            .collect();
+        let cache_bytes = budget / rayon::current_num_threads().min(jobs.len()).max(1);
+        let mut pairs: Vec<Pair> = jobs
+            .into_par_iter()
+            .map(|(first, second, seed)| {
+                let sizes = [(first, members[first].len(), 1.0), (second, members[second].len(), -1.0)];
+                let repeat = |value: fn(&(usize, usize, f64)) -> (usize, f64)| {
+                    sizes.iter().flat_map(move |s| std::iter::repeat_n(value(s), s.1))
+                };
+                let problem = TwoClass {
+                    gram: &gram,
+                    rows: [members[first].as_slice(), &members[second]].concat(),
+                    signs: repeat(|s| (s.0, s.2)).map(|s| s.1).collect(),
+                    bounds: repeat(|s| (s.0, s.2)).map(|s| self.C * weights[s.0]).collect(),
+                    tol: self.tol,
+                    cache_bytes,
+                };
+                let solution = problem.solve()?;
+                let sigmoid = if self.probability {
+                    let decisions = problem.held_out_decisions(seed)?;
+                    Some(Sigmoid::fit(&decisions, &problem.signs))
+                } else {
+                    None
+                };
+                let (mut rows, mut coefficients) = (Vec::new(), Vec::new());
+                for ((&row, &alpha), sign) in problem.rows.iter().zip(&solution.alpha).zip(&problem.signs) {
+                    if alpha > 0.0 {
+                        rows.push(row);
+                        coefficients.push(alpha * sign);
+                    }
+                }
+                Ok(Pair { first, second, rows, coefficients, rho: solution.rho, sigmoid })
+            })
+            .collect::<Result<_>>()?;
+        let support = compact(&mut pairs, x.view());
+        Ok(Svm { n_classes, function, support, pairs })
+    }
+}
+
+/// Keeps each training row that any pair needs once, and renumbers the pairs' rows.
+fn compact(pairs: &mut [Pair], x: ArrayView2<'_, f64>) -> Array2<f64> {
+    let mut used: Vec<u32> = pairs.iter().flat_map(|p| p.rows.iter().copied()).collect();
+    used.sort_unstable();
+    used.dedup();
+    let mut number = vec![0; x.nrows()];
+    used.iter().enumerate().for_each(|(i, &row)| number[row as usize] = i as u32);
+    pairs.iter_mut().for_each(|p| p.rows.iter_mut().for_each(|r| *r = number[*r as usize]));
+    let rows: Vec<usize> = used.iter().map(|&r| r as usize).collect();
+    x.select(Axis(0), &rows)
+}
+
+impl Svm {
+    /// Calls `finish` with every row's number and its decision values, one per pair.
+    fn decide<T: Send>(
+        &self,
+        x: ArrayView2<'_, f64>,
+        finish: impl Fn(ArrayView1<'_, f64>) -> T + Sync,
+    ) -> Vec<T> {
+        const BLOCK: usize = 128;
+        let norms = kernel::squared_lengths(self.support.view());
+        let blocks: Vec<_> = x.axis_chunks_iter(Axis(0), BLOCK).collect();
+        blocks
+            .into_par_iter()
+            .flat_map_iter(|block| {
+                let values = self.function.matrix(block, self.support.view(), &norms);
+                let decide = |row: ArrayView1<'_, f64>| {
+                    let decisions: Array1<f64> = self
+                        .pairs
+                        .iter()
+                        .map(|pair| {
+                            let terms = pair.rows.iter().zip(&pair.coefficients);
+                            terms.map(|(&i, c)| row[i as usize] * c).sum::<f64>() - pair.rho
+                        })
+                        .collect();
+                    finish(decisions.view())
+                };
+                values.outer_iter().map(decide).collect::<Vec<_>>()
+            })
+            .collect()
+    }
+}
+
+impl Classify for Svm {
+    fn n_features(&self) -> usize {
+        self.support.ncols()
+    }
+
+    fn n_classes(&self) -> usize {
+        self.n_classes
+    }
+
+    fn predict(&self, x: ArrayView2<'_, f64>) -> Result<Vec<usize>> {
+        Ok(self.decide(x, |decisions| {
+            let mut votes = vec![0.0; self.n_classes];
+            for (pair, &d) in self.pairs.iter().zip(decisions) {
+                votes[if d > 0.0 { pair.first } else { pair.second }] += 1.0;
+            }
+            argmax(&votes)
+        }))
+    }
+
+    fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
+        let sigmoids: Option<Vec<Sigmoid>> = self.pairs.iter().map(|p| p.sigmoid).collect();
+        let sigmoids = sigmoids.ok_or(ModelError::NoProbability { owner: SvmParams::OWNER })?;
+        let rows = self.decide(x, |decisions| {
+            let mut pairwise = Array2::zeros((self.n_classes, self.n_classes));
+            for ((pair, sigmoid), &d) in self.pairs.iter().zip(&sigmoids).zip(decisions) {
+                let p = sigmoid.at(d).clamp(1e-7, 1.0 - 1e-7);
+                pairwise[[pair.first, pair.second]] = p;
+                pairwise[[pair.second, pair.first]] = 1.0 - p;
+            }
+            probability::couple(pairwise.view())
+        });
+        let mut proba = Array2::zeros((x.nrows(), self.n_classes));
+        for (mut to, from) in proba.outer_iter_mut().zip(rows) {
+            to.assign(&from);
+        }
+        Ok(proba)
+    }
+
+    fn validate(&self) -> Result<()> {
+        let k = self.n_classes;
+        let mut expected = (0..k).flat_map(|a| (a + 1..k).map(move |b| (a, b)));
+        let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
+        let pairs_sound = self.pairs.iter().all(|p| {
+            expected.next() == Some((p.first, p.second))
+                && p.rows.len() == p.coefficients.len()
+                && p.rows.iter().all(|&r| (r as usize) < self.support.nrows())
+                && finite(&p.coefficients)
+                && p.rho.is_finite()
+                && p.sigmoid.is_none_or(|s| s.is_finite())
+        });
+        let sound = pairs_sound
+            && expected.next().is_none()
+            && k >= 2
+            && self.function.is_valid()
+            && self.support.iter().all(|v| v.is_finite());
+        if sound { Ok(()) } else { Err(ModelError::Inconsistent("support vectors".into())) }
+    }
+}

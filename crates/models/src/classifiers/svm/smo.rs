@@ -1,0 +1,136 @@
+//! Sequential minimal optimisation with second-order working set selection (Fan, Chen & Lin 2005)
+//! for min ½αᵀQα − Σα, 0 ≤ αᵢ ≤ Cᵢ, yᵀα = 0, with Qᵢⱼ = yᵢyⱼK(i, j).
+
+use super::kernel::Rows;
+use crate::error::{ModelError, Result};
+
+/// The optimum: f(x) = Σ yᵢαᵢK(i, x) − ρ.
+pub(super) struct Solution {
+    pub alpha: Vec<f64>,
+    pub rho: f64,
+}
+
+/// Smallest curvature used, where the kernel matrix is not positive definite.
+const TAU: f64 = 1e-12;
+
+pub(super) fn solve(kernel: &mut Rows<'_, '_>, y: &[f64], bound: &[f64], tol: f64) -> Result<Solution> {
+    let n = kernel.len();
+    let diagonal: Vec<f64> = (0..n).map(|i| kernel.diagonal(i)).collect();
+    let mut alpha = vec![0.0; n];
+    // y·gradient, so that no sign has to be looked up in the loops.
+    let mut slope: Vec<f64> = y.iter().map(|y| -y).collect();
+    let limit = (100 * n).max(10_000_000);
+    for _ in 0..limit {
+        let state = State { alpha: &alpha, y, bound };
+        let Some((i, steepest)) = state.up(&slope) else { break };
+        let row = kernel.one(i);
+        let Some(j) = state.down(&slope, i, steepest, row, &diagonal, tol) else { break };
+        let (row_i, row_j) = kernel.two(i, j);
+        let curvature = (diagonal[i] + diagonal[j] - 2.0 * f64::from(row_i[j])).max(TAU);
+        let (old_i, old_j) = (alpha[i], alpha[j]);
+        // Along the line that keeps yᵀα: αᵢ += yᵢ·step, αⱼ −= yⱼ·step.
+        let step = (slope[j] - slope[i]) / curvature;
+        let room = |a: f64, y: f64, c: f64, forth: bool| if (y > 0.0) == forth { c - a } else { a };
+        let room_i = room(old_i, y[i], bound[i], true);
+        let room_j = room(old_j, y[j], bound[j], false);
+        let step = step.min(room_i).min(room_j);
+        // A bound that is reached is met exactly.
+        alpha[i] = snap(old_i + y[i] * step, step == room_i, y[i] > 0.0, bound[i]);
+        alpha[j] = snap(old_j - y[j] * step, step == room_j, y[j] < 0.0, bound[j]);
+        let (change_i, change_j) = (y[i] * (alpha[i] - old_i), y[j] * (alpha[j] - old_j));
+        for ((s, &ki), &kj) in slope.iter_mut().zip(row_i).zip(row_j) {
+            *s += change_i * f64::from(ki) + change_j * f64::from(kj);
+        }
+    }
+    let rho = State { alpha: &alpha, y, bound }.rho(&slope);
+    if !rho.is_finite() {
+        return Err(ModelError::Numerical {
+            owner: "svm",
+            reason: "the optimisation overflowed: standardise the features first".into(),
+        });
+    }
+    Ok(Solution { alpha, rho })
+}
+
+fn snap(value: f64, reached: bool, rising: bool, bound: f64) -> f64 {
+    match (reached, rising) {
+        (true, true) => bound,
+        (true, false) => 0.0,
+        _ => value,
+    }
+}
+
+struct State<'a> {
+    alpha: &'a [f64],
+    y: &'a [f64],
+    bound: &'a [f64],
+}
+
+impl State<'_> {
+    /// Whether y·α of a row can still grow.
+    fn can_rise(&self, t: usize) -> bool {
+        if self.y[t] > 0.0 { self.alpha[t] < self.bound[t] } else { self.alpha[t] > 0.0 }
+    }
+
+    /// Whether y·α of a row can still shrink.
+    fn can_fall(&self, t: usize) -> bool {
+        if self.y[t] > 0.0 { self.alpha[t] > 0.0 } else { self.alpha[t] < self.bound[t] }
+    }
+
+    /// The row whose rise lowers the objective fastest, with −slope there.
+    fn up(&self, slope: &[f64]) -> Option<(usize, f64)> {
+        let mut best: Option<(usize, f64)> = None;
+        for (t, &s) in slope.iter().enumerate() {
+            if self.can_rise(t) && best.is_none_or(|(_, b)| -s >= b) {
+                best = Some((t, -s));
+            }
+        }
+        best
+    }
+
+    /// The partner that gains most to second order; `None` when the conditions hold within `tol`.
+    fn down(
+        &self,
+        slope: &[f64],
+        i: usize,
+        steepest: f64,
+        row: &[f32],
+        diagonal: &[f64],
+        tol: f64,
+    ) -> Option<usize> {
+        let mut lowest = f64::NEG_INFINITY;
+        let mut best: Option<(usize, f64)> = None;
+        for (t, &s) in slope.iter().enumerate() {
+            if !self.can_fall(t) {
+                continue;
+            }
+            lowest = lowest.max(s);
+            let difference = steepest + s;
+            if difference > 0.0 {
+                let curvature = (diagonal[i] + diagonal[t] - 2.0 * f64::from(row[t])).max(TAU);
+                let gain = difference * difference / curvature;
+                if best.is_none_or(|(_, b)| gain >= b) {
+                    best = Some((t, gain));
+                }
+            }
+        }
+        best.filter(|_| steepest + lowest >= tol).map(|(t, _)| t)
+    }
+
+    /// Offset from the free rows, or midway between its bounds when there are none.
+    fn rho(&self, slope: &[f64]) -> f64 {
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        let (mut sum, mut free) = (0.0, 0usize);
+        for (t, &s) in slope.iter().enumerate() {
+            match (self.can_rise(t), self.can_fall(t)) {
+                (true, true) => {
+                    sum += s;
+                    free += 1;
+                }
+                (true, false) => high = high.min(s),
+                (false, _) => low = low.max(s),
+            }
+        }
+        if free > 0 { sum / free as f64 } else { (low + high) / 2.0 }
+    }
+}

@@ -1,0 +1,153 @@
+//! Whether two classifiers differ on the same rows.
+
+use std::collections::BTreeMap;
+
+use rand::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::Serialize;
+
+use crate::error::{ModelError, Result};
+use crate::metrics::Scores;
+
+/// McNemar's exact test.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct McNemar {
+    /// rows only the first got right
+    pub only_first: usize,
+    /// rows only the second got right
+    pub only_second: usize,
+    /// two-sided probability of a split at least this uneven if both are equally good
+    pub p_value: f64,
+}
+
+/// McNemar's exact test on two predictions of the same rows.
+///
+/// # Errors
+/// Different lengths.
+pub fn mcnemar(truth: &[usize], first: &[usize], second: &[usize]) -> Result<McNemar> {
+    same_length(truth, first, second)?;
+    let right = |p: &[usize], row: usize| p[row] == truth[row];
+    let count = |a: &[usize], b: &[usize]| {
+        (0..truth.len()).filter(|&row| right(a, row) && !right(b, row)).count()
+    };
+    let (only_first, only_second) = (count(first, second), count(second, first));
+    let n = only_first + only_second;
+    // Binomial tail, each term from the one before, in logarithms against underflow.
+    let mut log_term = -(n as f64) * std::f64::consts::LN_2;
+    let mut tail = 0.0;
+    for k in 0..=only_first.min(only_second) {
+        tail += log_term.exp();
+        log_term += ((n - k) as f64 / (k + 1) as f64).ln();
+    }
+    Ok(McNemar { only_first, only_second, p_value: (2.0 * tail).min(1.0) })
+}
+
+/// Bootstrap interval of the difference of weighted F1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Bootstrap {
+    /// weighted F1 of the second minus that of the first
+    pub difference: f64,
+    /// lower end of the 95 % percentile interval
+    pub low: f64,
+    /// its upper end
+    pub high: f64,
+    /// part of resamples in which the second is not better, doubled for both sides, at most 1
+    pub p_value: f64,
+}
+
+/// Resamples rows, or whole groups when given, with replacement.
+///
+/// # Errors
+/// Different lengths, no rows, or no resamples.
+pub fn bootstrap<S: AsRef<str>>(
+    truth: &[usize],
+    first: &[usize],
+    second: &[usize],
+    groups: Option<&[S]>,
+    resamples: usize,
+    seed: u64,
+) -> Result<Bootstrap> {
+    same_length(truth, first, second)?;
+    if let Some(groups) = groups.filter(|g| g.len() != truth.len()) {
+        let (what, expected) = ("groups", truth.len());
+        return Err(ModelError::Length { what, expected, actual: groups.len() });
+    }
+    if truth.is_empty() || resamples == 0 {
+        let what = "rows and resamples";
+        return Err(ModelError::Length { what, expected: 1, actual: 0 });
+    }
+    let mut units: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    let units: Vec<Vec<usize>> = match groups {
+        None => (0..truth.len()).map(|row| vec![row]).collect(),
+        Some(groups) => {
+            let rows = groups.iter().enumerate();
+            rows.for_each(|(row, g)| units.entry(g.as_ref()).or_default().push(row));
+            units.into_values().collect()
+        }
+    };
+    let n_classes = truth.iter().chain(first).chain(second).max().map_or(0, |c| c + 1);
+    let difference = |rows: &[usize]| -> Result<f64> {
+        let of = |p: &[usize]| rows.iter().map(|&row| p[row]).collect::<Vec<_>>();
+        let t = of(truth);
+        let f1 = |p| Scores::new(&t, &of(p), n_classes).map(|s| s.weighted_f1);
+        Ok(f1(second)? - f1(first)?)
+    };
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut found = Vec::with_capacity(resamples.min(1 << 20));
+    for _ in 0..resamples {
+        let drawn = (0..units.len()).flat_map(|_| units[rng.gen_range(0..units.len())].iter());
+        found.push(difference(&drawn.copied().collect::<Vec<_>>())?);
+    }
+    found.sort_by(f64::total_cmp);
+    let at = |part: f64| found[((resamples - 1) as f64 * part).round() as usize];
+    let part = |holds: fn(&f64) -> bool| found.iter().filter(|d| holds(d)).count() as f64 / resamples as f64;
+    let tail = part(|d| *d <= 0.0).min(part(|d| *d >= 0.0));
+    let all: Vec<usize> = (0..truth.len()).collect();
+    Ok(Bootstrap {
+        difference: difference(&all)?,
+        low: at(0.025),
+        high: at(0.975),
+        p_value: (2.0 * tail).min(1.0),
+    })
+}
+
+fn same_length(truth: &[usize], first: &[usize], second: &[usize]) -> Result<()> {
+    match [first, second].into_iter().find(|p| p.len() != truth.len()) {
+        Some(p) => {
+            let (what, expected) = ("predictions", truth.len());
+            Err(ModelError::Length { what, expected, actual: p.len() })
+        }
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mcnemar_is_the_binomial_test() {
+        // 2 against 8: scipy.stats.binomtest(2, 10).pvalue = 0.109375
+        let truth = vec![0; 20];
+        let first: Vec<usize> = (0..20).map(|i| usize::from(i >= 2)).collect();
+        let second: Vec<usize> = (0..20).map(|i| usize::from(!(2..10).contains(&i))).collect();
+        let test = mcnemar(&truth, &first, &second).unwrap();
+        assert_eq!((test.only_first, test.only_second), (2, 8));
+        assert!((test.p_value - 0.109_375).abs() < 1e-12);
+        assert_eq!(mcnemar(&truth, &first, &first).unwrap().p_value, 1.0);
+        assert!(mcnemar(&truth, &first, &second[1..]).is_err());
+    }
+
+    #[test]
+    fn bootstrap_sees_a_clear_difference_and_none_in_equals() {
+        let truth: Vec<usize> = (0..200).map(|i| i % 2).collect();
+        let first: Vec<usize> = (0..200).map(|i| if i % 3 == 0 { 1 - i % 2 } else { i % 2 }).collect();
+        let clear = bootstrap::<&str>(&truth, &first, &truth, None, 500, 1).unwrap();
+        assert!(clear.low > 0.2 && clear.high < 0.5 && clear.p_value == 0.0, "{clear:?}");
+        let none = bootstrap::<&str>(&truth, &first, &first, None, 500, 1).unwrap();
+        assert_eq!((none.difference, none.low, none.high, none.p_value), (0.0, 0.0, 0.0, 1.0));
+        let groups: Vec<String> = (0..200).map(|i| (i / 20).to_string()).collect();
+        let grouped = bootstrap(&truth, &first, &truth, Some(&groups), 500, 1).unwrap();
+        assert!(grouped.difference == clear.difference && grouped.low > 0.2);
+    }
+}

@@ -1,0 +1,211 @@
+//! Predictions of rows that were not trained on, with or without a choice of pipeline inside.
+
+use ndarray::{Array2, ArrayView2, Axis};
+use serde::Serialize;
+
+use crate::error::{ModelError, Result};
+use crate::fusion::merge_classes;
+use crate::metrics::Scores;
+use crate::pipeline::PipelineSpec;
+use crate::splits::Fold;
+use crate::spread::Spread;
+use crate::table::argmax;
+
+/// Labelled rows.
+#[derive(Clone, Copy, Debug)]
+pub struct Data<'a> {
+    /// `[rows, features]`
+    pub x: ArrayView2<'a, f64>,
+    /// class indices trained on
+    pub y: &'a [usize],
+    /// classes trained on
+    pub n_classes: usize,
+    /// the class scored for each class trained on, e.g. the level of each joint class: their
+    /// probabilities are added up
+    pub merge: Option<&'a [usize]>,
+}
+
+impl Data<'_> {
+    fn scored_classes(&self) -> usize {
+        self.merge.map_or(self.n_classes, |m| m.iter().max().map_or(0, |c| c + 1))
+    }
+
+    fn scored(&self, rows: &[usize]) -> Vec<usize> {
+        let class = |&row: &usize| self.merge.map_or(self.y[row], |m| m[self.y[row]]);
+        rows.iter().map(class).collect()
+    }
+
+    fn check(&self, folds: &[Fold]) -> Result<()> {
+        crate::table::check_features(self.x)?;
+        crate::table::check_labels(self.x.nrows(), self.y, self.n_classes)?;
+        if let Some(merge) = self.merge
+            && merge.len() != self.n_classes
+        {
+            let what = "merged classes";
+            return Err(ModelError::Length { what, expected: self.n_classes, actual: merge.len() });
+        }
+        let mut tested = vec![false; self.x.nrows()];
+        for fold in folds {
+            let refuse = |reason: &str| {
+                Err(ModelError::Folds { reason: format!("fold {}: {reason}", fold.name) })
+            };
+            if fold.train.is_empty() || fold.test.is_empty() {
+                return refuse("no training rows or no test rows");
+            }
+            if fold.train.iter().chain(&fold.test).any(|&row| row >= tested.len()) {
+                return refuse("a row beyond the table");
+            }
+            let mut trained = vec![false; tested.len()];
+            fold.train.iter().for_each(|&row| trained[row] = true);
+            if fold.test.iter().any(|&row| trained[row]) {
+                return refuse("a row is both trained on and tested");
+            }
+            for &row in &fold.test {
+                if std::mem::replace(&mut tested[row], true) {
+                    return refuse("a row is tested twice");
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Outcome of one fold.
+#[derive(Clone, Debug, Serialize)]
+pub struct FoldOutcome {
+    /// what was held out
+    pub name: String,
+    /// rows tested
+    pub rows: Vec<usize>,
+    /// class predicted for each
+    pub predicted: Vec<usize>,
+    /// probabilities `[rows, classes]`; absent for an SVM without them
+    #[serde(skip)]
+    pub proba: Option<Array2<f64>>,
+    /// scores of this fold
+    pub scores: Scores,
+    /// the pipeline used: its position among the candidates
+    pub chosen: usize,
+    /// mean weighted F1 of every candidate over the inner folds; empty without a choice
+    pub inner: Vec<f64>,
+}
+
+/// Outcome of a cross-validation.
+#[derive(Clone, Debug, Serialize)]
+pub struct CrossValidation {
+    /// fold by fold
+    pub folds: Vec<FoldOutcome>,
+    /// scores of all tested rows together
+    pub pooled: Scores,
+    /// accuracy over folds
+    pub accuracy: Spread,
+    /// weighted F1 over folds
+    pub weighted_f1: Spread,
+    /// macro F1 over folds
+    pub macro_f1: Spread,
+}
+
+impl CrossValidation {
+    /// Out-of-fold class of every row; `None` for rows that were in no test fold.
+    pub fn predicted(&self, rows: usize) -> Vec<Option<usize>> {
+        let mut all = vec![None; rows];
+        for fold in &self.folds {
+            fold.rows.iter().zip(&fold.predicted).for_each(|(&row, &class)| all[row] = Some(class));
+        }
+        all
+    }
+
+    fn of(folds: Vec<FoldOutcome>, data: &Data<'_>) -> Result<Self> {
+        let rows: Vec<usize> = folds.iter().flat_map(|f| f.rows.iter().copied()).collect();
+        let predicted: Vec<usize> = folds.iter().flat_map(|f| f.predicted.iter().copied()).collect();
+        let spread = |score: fn(&Scores) -> f64| {
+            Spread::of(&folds.iter().map(|f| score(&f.scores)).collect::<Vec<_>>())
+        };
+        Ok(Self {
+            pooled: Scores::new(&data.scored(&rows), &predicted, data.scored_classes())?,
+            accuracy: spread(|s| s.accuracy),
+            weighted_f1: spread(|s| s.weighted_f1),
+            macro_f1: spread(|s| s.macro_f1),
+            folds,
+        })
+    }
+}
+
+/// Trains on each fold's training rows and predicts its test rows.
+///
+/// # Errors
+/// Folds that overlap or leave a side empty, and whatever training refuses.
+pub fn cross_validate(data: &Data<'_>, folds: &[Fold], spec: &PipelineSpec) -> Result<CrossValidation> {
+    data.check(folds)?;
+    let outcomes = folds.iter().map(|fold| run_fold(data, fold, spec)).collect::<Result<_>>()?;
+    CrossValidation::of(outcomes, data)
+}
+
+fn run_fold(data: &Data<'_>, fold: &Fold, spec: &PipelineSpec) -> Result<FoldOutcome> {
+    let train_y: Vec<usize> = fold.train.iter().map(|&row| data.y[row]).collect();
+    let train_x = data.x.select(Axis(0), &fold.train);
+    let model = spec.train(train_x.view(), &train_y, data.n_classes)?;
+    let test_x = data.x.select(Axis(0), &fold.test);
+    let proba = match model.predict_proba(test_x.view()) {
+        Ok(proba) => Some(proba),
+        Err(ModelError::NoProbability { .. }) if data.merge.is_none() => None,
+        Err(e) => return Err(e),
+    };
+    let (predicted, proba) = match data.merge {
+        None => (model.predict(test_x.view())?, proba),
+        Some(merge) => {
+            let merged = proba.map(|p| merge_classes(p.view(), merge, data.scored_classes()));
+            let merged = merged.transpose()?;
+            let rows = merged.iter().flat_map(|m| m.outer_iter());
+            (rows.map(|row| argmax(row.iter())).collect(), merged)
+        }
+    };
+    let scores = Scores::new(&data.scored(&fold.test), &predicted, data.scored_classes())?;
+    let (name, rows) = (fold.name.clone(), fold.test.clone());
+    Ok(FoldOutcome { name, rows, predicted, proba, scores, chosen: 0, inner: Vec::new() })
+}
+
+/// Nested cross-validation: in every fold the pipeline is chosen on the training rows alone, by
+/// the mean weighted F1 over inner folds (the first among equals), then fitted on all of them.
+/// `inner` makes the inner folds from the outer training rows; its row numbers are positions in
+/// that list.
+///
+/// # Errors
+/// No candidate, or as [`cross_validate`].
+pub fn nested_cross_validate(
+    data: &Data<'_>,
+    folds: &[Fold],
+    candidates: &[PipelineSpec],
+    inner: impl Fn(&[usize]) -> Result<Vec<Fold>>,
+) -> Result<CrossValidation> {
+    data.check(folds)?;
+    let mut outcomes = Vec::with_capacity(folds.len());
+    for fold in folds {
+        let (chosen, scores) = choose(data, &fold.train, candidates, &inner)?;
+        let outcome = run_fold(data, fold, &candidates[chosen])?;
+        outcomes.push(FoldOutcome { chosen, inner: scores, ..outcome });
+    }
+    CrossValidation::of(outcomes, data)
+}
+
+/// The candidate with the best mean weighted F1 over inner folds of `rows`, and all the means.
+///
+/// # Errors
+/// No candidate, or as [`cross_validate`].
+pub fn choose(
+    data: &Data<'_>,
+    rows: &[usize],
+    candidates: &[PipelineSpec],
+    inner: impl Fn(&[usize]) -> Result<Vec<Fold>>,
+) -> Result<(usize, Vec<f64>)> {
+    if candidates.is_empty() {
+        return Err(ModelError::Folds { reason: "no pipeline to choose from".into() });
+    }
+    let x = data.x.select(Axis(0), rows);
+    let y: Vec<usize> = rows.iter().map(|&row| data.y[row]).collect();
+    let inside = Data { x: x.view(), y: &y, ..*data };
+    let inner_folds = inner(rows)?;
+    let score = |spec| cross_validate(&inside, &inner_folds, spec).map(|cv| cv.weighted_f1.mean);
+    let scores: Vec<f64> = candidates.iter().map(score).collect::<Result<_>>()?;
+    Ok((argmax(&scores), scores))
+}

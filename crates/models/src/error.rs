@@ -1,0 +1,156 @@
+//! What this crate refuses, and why.
+
+use thiserror::Error;
+
+/// A refusal. Texts name the place, what was found and what would be accepted.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// A parameter of a classifier or step that does not exist.
+    #[error("{owner} has no parameter {key}: {allowed}")]
+    UnknownParameter {
+        /// classifier or step
+        owner: &'static str,
+        /// the key given
+        key: String,
+        /// the keys it has
+        allowed: String,
+    },
+    /// A parameter value of the wrong type or outside its range.
+    #[error("{owner}: {key} = {value} is not possible: {allowed}")]
+    ParameterValue {
+        /// classifier or step
+        owner: &'static str,
+        /// the key
+        key: String,
+        /// the value given
+        value: String,
+        /// what it may be
+        allowed: String,
+    },
+    /// A name outside a table (classifier, step, metric).
+    #[error("there is no {kind} {name}: {allowed}")]
+    UnknownName {
+        /// what the name should be
+        kind: &'static str,
+        /// the name given
+        name: String,
+        /// the names there are
+        allowed: String,
+    },
+    /// Text that is not a list of `key=value`.
+    #[error("{text:?} is not of the form key=value")]
+    NotKeyValue {
+        /// the text
+        text: String,
+    },
+    /// No rows, or no columns.
+    #[error("the feature table is empty: {rows} rows x {features} features")]
+    Empty {
+        /// rows
+        rows: usize,
+        /// columns
+        features: usize,
+    },
+    /// NaN or infinity among the features.
+    #[error("row {row}, feature {feature} is {value}: only finite features can be used")]
+    NonFinite {
+        /// first row concerned
+        row: usize,
+        /// its column
+        feature: usize,
+        /// the value
+        value: f64,
+    },
+    /// A column without any variation where that is refused.
+    #[error("feature {feature} has the same value in all {rows} rows ({count} features of {features} do)")]
+    ConstantFeature {
+        /// first column concerned
+        feature: usize,
+        /// rows looked at
+        rows: usize,
+        /// how many columns are constant
+        count: usize,
+        /// columns in all
+        features: usize,
+    },
+    /// Two things that must have as many entries have not.
+    #[error("{what}: {actual} where {expected} are needed")]
+    Length {
+        /// what is counted
+        what: &'static str,
+        /// count needed
+        expected: usize,
+        /// count found
+        actual: usize,
+    },
+    /// A class index outside the label table.
+    #[error("row {row} has class {class}, and there are {n_classes} classes")]
+    ClassOutOfRange {
+        /// row
+        row: usize,
+        /// its class
+        class: usize,
+        /// classes in the table
+        n_classes: usize,
+    },
+    /// Fewer different classes in the training rows than the method needs.
+    #[error("{owner} needs rows of at least 2 classes: these {rows} rows have {classes}")]
+    TooFewClasses {
+        /// classifier
+        owner: &'static str,
+        /// rows
+        rows: usize,
+        /// classes among them
+        classes: usize,
+    },
+    /// A class with fewer rows than asked for.
+    #[error("class {class} has {rows} rows, and {needed} are needed for {purpose}")]
+    TooFewRows {
+        /// class index
+        class: usize,
+        /// its rows
+        rows: usize,
+        /// rows needed
+        needed: usize,
+        /// what for
+        purpose: &'static str,
+    },
+    /// Fewer groups than folds.
+    #[error("{groups} groups cannot make {folds} folds")]
+    TooFewGroups {
+        /// different groups
+        groups: usize,
+        /// folds asked
+        folds: usize,
+    },
+    /// A cross-validation plan that cannot be carried out.
+    #[error("folds: {reason}")]
+    Folds {
+        /// why
+        reason: String,
+    },
+    /// Probabilities asked of a model trained without them.
+    #[error("this {owner} was trained without probabilities: train with probability=true")]
+    NoProbability {
+        /// classifier
+        owner: &'static str,
+    },
+    /// An iterative method that did not get there.
+    #[error("{owner}: {reason}")]
+    Numerical {
+        /// classifier or step
+        owner: &'static str,
+        /// what went wrong
+        reason: String,
+    },
+    /// A model whose parts contradict one another (only from damaged or hostile files).
+    #[error("inconsistent model: {0}")]
+    Inconsistent(String),
+    /// From linfa itself.
+    #[error(transparent)]
+    Linfa(#[from] linfa::Error),
+}
+
+/// `Result` with [`ModelError`].
+pub type Result<T> = std::result::Result<T, ModelError>;

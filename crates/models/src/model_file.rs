@@ -1,0 +1,286 @@
+//! Trained models on disk.
+//!
+//! One file: magic, format version, lengths, a JSON header for people and other programs, the
+//! fitted pipeline (postcard), and a BLAKE3 checksum of everything before it. Nothing in it is
+//! executed; every length is checked before memory is taken, and the parts are checked against one
+//! another before they are used.
+//!
+//! | bytes | content |
+//! |---|---|
+//! | 8 | `CORSMDL` and a zero byte |
+//! | 4 | format version, little endian |
+//! | 8 | header length |
+//! | 8 | payload length |
+//! | … | header, JSON |
+//! | … | payload, postcard |
+//! | 32 | BLAKE3 |
+
+use std::fs::File;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+
+use ndarray::{Array2, ArrayView2};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use thiserror::Error;
+
+use crate::error::{ModelError, Result};
+use crate::labels::Labels;
+use crate::pipeline::{Pipeline, PipelineSpec};
+
+const MAGIC: &[u8; 8] = b"CORSMDL\0";
+/// Version of the file format written.
+pub const FORMAT_VERSION: u32 = 1;
+/// Largest header accepted.
+pub const MAX_HEADER: u64 = 64 << 20;
+/// Largest file accepted.
+pub const MAX_FILE: u64 = 4 << 30;
+const PREFIX: usize = 28;
+const CHECKSUM: usize = 32;
+
+/// What a model file says about its model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelHeader {
+    /// steps and classifier with all parameters
+    pub pipeline: PipelineSpec,
+    /// label names in class order
+    pub labels: Labels,
+    /// what is predicted: type, level, joint, or a column's name
+    pub target: String,
+    /// name of each feature; empty when unknown
+    pub feature_names: Vec<String>,
+    /// full configuration the features were made with; null when they came from elsewhere
+    pub feature_config: Value,
+    /// hash of that configuration; empty when there is none
+    pub feature_config_hash: String,
+    /// where it was learned: rows, classes, files, folds, scores
+    pub provenance: Value,
+    /// version of the program that wrote it
+    pub tool_version: String,
+}
+
+/// A trained model with everything needed to use it.
+#[derive(Clone, Debug)]
+pub struct Model {
+    header: ModelHeader,
+    pipeline: Pipeline,
+}
+
+/// Why a model file was refused.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ModelFileError {
+    /// Reading or writing failed.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// the file
+        path: PathBuf,
+        /// why
+        source: std::io::Error,
+    },
+    /// The file does not begin as a model file does.
+    #[error("not a model file of corsmal-feat")]
+    NotAModel,
+    /// Written in a format this program does not know.
+    #[error("model format version {found}: this program reads version {FORMAT_VERSION}")]
+    Version {
+        /// version in the file
+        found: u32,
+    },
+    /// A length in the file is beyond what is accepted.
+    #[error("model {part} of {bytes} bytes: at most {limit} are accepted")]
+    TooLarge {
+        /// header or file
+        part: &'static str,
+        /// length claimed
+        bytes: u64,
+        /// most accepted
+        limit: u64,
+    },
+    /// The file is shorter or longer than it says.
+    #[error("model file of {found} bytes where its lengths say {expected}")]
+    Length {
+        /// bytes by its lengths
+        expected: u64,
+        /// bytes there
+        found: u64,
+    },
+    /// The content is not what was written.
+    #[error("the model file is damaged: its checksum does not match")]
+    Checksum,
+    /// The header or the payload cannot be understood.
+    #[error("model {part}: {reason}")]
+    Content {
+        /// header or payload
+        part: &'static str,
+        /// why
+        reason: String,
+    },
+    /// The features offered were made with another configuration.
+    #[error("the model was trained on features with configuration {model}, these have {features}")]
+    Configuration {
+        /// hash in the model
+        model: String,
+        /// hash of the features
+        features: String,
+    },
+}
+
+impl Model {
+    /// A model from its parts.
+    ///
+    /// # Errors
+    /// [`ModelError::Inconsistent`] when label or feature names do not fit the pipeline.
+    pub fn new(header: ModelHeader, pipeline: Pipeline) -> Result<Self> {
+        let refuse = |what: &str| Err(ModelError::Inconsistent(what.into()));
+        if header.labels.len() != pipeline.n_classes() {
+            return refuse("label names do not match the classes");
+        }
+        if !header.feature_names.is_empty() && header.feature_names.len() != pipeline.n_features() {
+            return refuse("feature names do not match the features");
+        }
+        if header.pipeline.steps.len() != pipeline.steps().len() {
+            return refuse("steps do not match the pipeline");
+        }
+        Ok(Self { header, pipeline })
+    }
+
+    /// What the file says about it.
+    pub fn header(&self) -> &ModelHeader {
+        &self.header
+    }
+
+    /// Features per row.
+    pub fn n_features(&self) -> usize {
+        self.pipeline.n_features()
+    }
+
+    /// Class indices of `[rows, features]`.
+    ///
+    /// # Errors
+    /// See [`Pipeline::predict`].
+    pub fn predict(&self, x: ArrayView2<'_, f64>) -> Result<Vec<usize>> {
+        self.pipeline.predict(x)
+    }
+
+    /// Probabilities `[rows, classes]`.
+    ///
+    /// # Errors
+    /// See [`Pipeline::predict_proba`].
+    pub fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
+        self.pipeline.predict_proba(x)
+    }
+
+    /// Refuses features made with another configuration.
+    ///
+    /// # Errors
+    /// [`ModelFileError::Configuration`].
+    pub fn check_configuration(&self, hash: &str) -> std::result::Result<(), ModelFileError> {
+        if hash == self.header.feature_config_hash {
+            return Ok(());
+        }
+        let (model, features) = (self.header.feature_config_hash.clone(), hash.to_string());
+        Err(ModelFileError::Configuration { model, features })
+    }
+
+    /// The file's bytes.
+    ///
+    /// # Errors
+    /// [`ModelFileError::TooLarge`].
+    pub fn to_bytes(&self) -> std::result::Result<Vec<u8>, ModelFileError> {
+        let content = |part, reason: String| ModelFileError::Content { part, reason };
+        let header = serde_json::to_vec(&self.header).map_err(|e| content("header", e.to_string()))?;
+        let payload =
+            postcard::to_stdvec(&self.pipeline).map_err(|e| content("payload", e.to_string()))?;
+        limit("header", header.len() as u64, MAX_HEADER)?;
+        limit("file", (PREFIX + header.len() + payload.len() + CHECKSUM) as u64, MAX_FILE)?;
+        let mut bytes = Vec::with_capacity(PREFIX + header.len() + payload.len() + CHECKSUM);
+        bytes.extend(MAGIC);
+        bytes.extend(FORMAT_VERSION.to_le_bytes());
+        bytes.extend((header.len() as u64).to_le_bytes());
+        bytes.extend((payload.len() as u64).to_le_bytes());
+        bytes.extend(header);
+        bytes.extend(payload);
+        let checksum = blake3::hash(&bytes);
+        bytes.extend(checksum.as_bytes());
+        Ok(bytes)
+    }
+
+    /// A model from a file's bytes, whoever wrote them.
+    ///
+    /// # Errors
+    /// One of [`ModelFileError`] for anything that is not a whole, undamaged, consistent model.
+    pub fn from_bytes(bytes: &[u8]) -> std::result::Result<Self, ModelFileError> {
+        let found = bytes.len() as u64;
+        limit("file", found, MAX_FILE)?;
+        if !bytes.starts_with(MAGIC) {
+            return Err(ModelFileError::NotAModel);
+        }
+        let short = || ModelFileError::Length { expected: (PREFIX + CHECKSUM) as u64, found };
+        let version = bytes.get(8..12).and_then(|b| b.try_into().ok()).ok_or_else(short)?;
+        let version = u32::from_le_bytes(version);
+        if version != FORMAT_VERSION {
+            return Err(ModelFileError::Version { found: version });
+        }
+        let length = |at: usize| -> std::result::Result<u64, ModelFileError> {
+            let raw = bytes.get(at..at + 8).and_then(|b| b.try_into().ok()).ok_or_else(short)?;
+            Ok(u64::from_le_bytes(raw))
+        };
+        let (header_length, payload_length) = (length(12)?, length(20)?);
+        limit("header", header_length, MAX_HEADER)?;
+        limit("file", payload_length, MAX_FILE)?;
+        let expected = PREFIX as u64 + header_length + payload_length + CHECKSUM as u64;
+        if expected != found {
+            return Err(ModelFileError::Length { expected, found });
+        }
+        let (content, checksum) = bytes.split_at(bytes.len() - CHECKSUM);
+        if blake3::hash(content).as_bytes() != checksum {
+            return Err(ModelFileError::Checksum);
+        }
+        let (header, payload) = content[PREFIX..].split_at(header_length as usize);
+        let refuse = |part, reason: String| ModelFileError::Content { part, reason };
+        let header: ModelHeader =
+            serde_json::from_slice(header).map_err(|e| refuse("header", e.to_string()))?;
+        let (pipeline, rest): (Pipeline, _) =
+            postcard::take_from_bytes(payload).map_err(|e| refuse("payload", e.to_string()))?;
+        if !rest.is_empty() {
+            return Err(refuse("payload", format!("{} bytes left over", rest.len())));
+        }
+        pipeline.validate().map_err(|e| refuse("payload", e.to_string()))?;
+        Self::new(header, pipeline).map_err(|e| refuse("header", e.to_string()))
+    }
+
+    /// Writes the file: under another name first, then renamed, so that no half-written model is
+    /// ever found under this one.
+    ///
+    /// # Errors
+    /// [`ModelFileError::Io`].
+    pub fn save(&self, path: &Path) -> std::result::Result<(), ModelFileError> {
+        let bytes = self.to_bytes()?;
+        let io = |source| ModelFileError::Io { path: path.into(), source };
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut file = tempfile::NamedTempFile::new_in(folder).map_err(io)?;
+        file.write_all(&bytes).map_err(io)?;
+        file.as_file().sync_all().map_err(io)?;
+        file.persist(path).map_err(|e| io(e.error))?;
+        Ok(())
+    }
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`ModelFileError`].
+    pub fn load(path: &Path) -> std::result::Result<Self, ModelFileError> {
+        let io = |source| ModelFileError::Io { path: path.into(), source };
+        let file = File::open(path).map_err(io)?;
+        limit("file", file.metadata().map_err(io)?.len(), MAX_FILE)?;
+        let mut bytes = Vec::new();
+        file.take(MAX_FILE + 1).read_to_end(&mut bytes).map_err(io)?;
+        Self::from_bytes(&bytes)
+    }
+}
+
+fn limit(part: &'static str, bytes: u64, limit: u64) -> std::result::Result<(), ModelFileError> {
+    if bytes <= limit { Ok(()) } else { Err(ModelFileError::TooLarge { part, bytes, limit }) }
+}

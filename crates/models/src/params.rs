@@ -1,0 +1,201 @@
+//! Parameter tables: one place per classifier or step says which keys it has, their defaults and
+//! what they may be. From it come the checked struct, the error texts and the listings.
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use crate::error::{ModelError, Result};
+
+/// One parameter as listed to people.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Parameter {
+    /// key
+    pub key: &'static str,
+    /// what it may be
+    pub allowed: &'static str,
+    /// what it does
+    pub help: &'static str,
+}
+
+/// A struct of parameters with a name, keys and ranges.
+pub trait Parameters: Default + Serialize + DeserializeOwned {
+    /// Name of the classifier or step.
+    const OWNER: &'static str;
+    /// Its parameters.
+    const TABLE: &'static [Parameter];
+
+    /// Refuses values outside their ranges.
+    ///
+    /// # Errors
+    /// [`ModelError::ParameterValue`] naming key, value and what is allowed.
+    fn check(&self) -> Result<()>;
+
+    /// From a JSON object; keys left out keep their defaults.
+    ///
+    /// # Errors
+    /// [`ModelError::UnknownParameter`] or [`ModelError::ParameterValue`].
+    fn from_json(object: &Map<String, Value>) -> Result<Self> {
+        for (key, value) in object {
+            let Some(parameter) = Self::TABLE.iter().find(|p| p.key == key) else {
+                let keys: Vec<_> = Self::TABLE.iter().map(|p| p.key).collect();
+                return Err(ModelError::UnknownParameter {
+                    owner: Self::OWNER,
+                    key: key.clone(),
+                    allowed: if keys.is_empty() {
+                        "it has none".into()
+                    } else {
+                        format!("it has {}", keys.join(", "))
+                    },
+                });
+            };
+            // One key at a time, so that the refusal can name it.
+            let single = Map::from_iter([(key.clone(), value.clone())]);
+            if serde_json::from_value::<Self>(Value::Object(single)).is_err() {
+                return Err(Self::refuse(parameter.key, value));
+            }
+        }
+        let params: Self = serde_json::from_value(Value::Object(object.clone()))
+            .map_err(|e| ModelError::Inconsistent(e.to_string()))?;
+        params.check()?;
+        Ok(params)
+    }
+
+    /// The refusal of `value` for `key`, with the allowed values of the table.
+    fn refuse(key: &'static str, value: impl std::fmt::Display) -> ModelError {
+        let allowed = Self::TABLE.iter().find(|p| p.key == key).map_or("", |p| p.allowed);
+        ModelError::ParameterValue {
+            owner: Self::OWNER,
+            key: key.into(),
+            value: value.to_string(),
+            allowed: allowed.into(),
+        }
+    }
+
+    /// `Ok` when `holds`, else the refusal of `value` for `key`.
+    fn require(holds: bool, key: &'static str, value: impl std::fmt::Display) -> Result<()> {
+        if holds { Ok(()) } else { Err(Self::refuse(key, value)) }
+    }
+}
+
+/// Declares a parameter struct with its table: `field: Type = default, "what it may be", "what it
+/// does";`. The ranges are given by a closure-like block over `self`.
+macro_rules! parameters {
+    (
+        $(#[$meta:meta])*
+        $name:ident, $owner:literal {
+            $($field:ident: $type:ty = $default:expr, $allowed:literal, $help:literal;)*
+        }
+        check($this:ident) $check:block
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields, default)]
+        pub struct $name {
+            $(#[doc = $help] pub $field: $type,)*
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: $default,)* }
+            }
+        }
+
+        impl $crate::params::Parameters for $name {
+            const OWNER: &'static str = $owner;
+            const TABLE: &'static [$crate::params::Parameter] = &[
+                $($crate::params::Parameter {
+                    key: stringify!($field), allowed: $allowed, help: $help,
+                },)*
+            ];
+
+            fn check(&self) -> $crate::error::Result<()> {
+                let $this = self;
+                $check
+            }
+        }
+    };
+}
+pub(crate) use parameters;
+
+/// Parses `key=value` texts into a JSON object: values that are JSON stay so, `a,b,c` becomes a
+/// list, anything else is text.
+///
+/// # Errors
+/// [`ModelError::NotKeyValue`].
+pub fn key_values<S: AsRef<str>>(texts: &[S]) -> Result<Map<String, Value>> {
+    let mut object = Map::new();
+    for text in texts.iter().map(AsRef::as_ref) {
+        let (key, value) = text
+            .split_once('=')
+            .filter(|(key, _)| !key.trim().is_empty())
+            .ok_or_else(|| ModelError::NotKeyValue { text: text.into() })?;
+        object.insert(key.trim().into(), scalar_or_list(value.trim()));
+    }
+    Ok(object)
+}
+
+fn scalar_or_list(text: &str) -> Value {
+    let scalar = |t: &str| serde_json::from_str(t).unwrap_or_else(|_| Value::String(t.into()));
+    match serde_json::from_str(text) {
+        Ok(value) => value,
+        Err(_) if text.contains(',') => text.split(',').map(|t| scalar(t.trim())).collect(),
+        Err(_) => Value::String(text.into()),
+    }
+}
+
+/// How rows of each class count.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum ClassWeight {
+    /// every row counts 1
+    #[default]
+    Equal,
+    /// by rule
+    Rule(WeightRule),
+    /// a weight per class, in the order of the label table
+    PerClass(Vec<f64>),
+}
+
+/// Weights computed from the class counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum WeightRule {
+    /// rows / (classes · rows of the class), as scikit-learn
+    Balanced,
+}
+
+impl ClassWeight {
+    /// Whether all weights given are finite and positive.
+    pub(crate) fn is_valid(&self) -> bool {
+        match self {
+            Self::PerClass(weights) => {
+                !weights.is_empty() && weights.iter().all(|w| w.is_finite() && *w > 0.0)
+            }
+            _ => true,
+        }
+    }
+
+    /// The weight of every class.
+    ///
+    /// # Errors
+    /// [`ModelError::Length`] when the list has not one weight per class.
+    pub(crate) fn per_class(&self, y: &[usize], n_classes: usize) -> Result<Vec<f64>> {
+        match self {
+            Self::Equal => Ok(vec![1.0; n_classes]),
+            Self::Rule(WeightRule::Balanced) => {
+                let mut counts = vec![0usize; n_classes];
+                y.iter().for_each(|&c| counts[c] += 1);
+                let present = counts.iter().filter(|&&c| c > 0).count();
+                let weight = |&c: &usize| y.len() as f64 / (present * c.max(1)) as f64;
+                Ok(counts.iter().map(weight).collect())
+            }
+            Self::PerClass(weights) if weights.len() == n_classes => Ok(weights.clone()),
+            Self::PerClass(weights) => Err(ModelError::Length {
+                what: "class_weight",
+                expected: n_classes,
+                actual: weights.len(),
+            }),
+        }
+    }
+}

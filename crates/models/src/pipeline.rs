@@ -1,0 +1,109 @@
+//! Steps followed by a classifier.
+
+use ndarray::{Array2, ArrayView2, CowArray, Ix2};
+use serde::{Deserialize, Serialize};
+
+use crate::classifiers::{Classifier, ClassifierSpec};
+use crate::error::{ModelError, Result};
+use crate::steps::{Step, StepSpec};
+use crate::table::{check_features, check_labels, check_query};
+
+/// What is trained: steps, then a classifier.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PipelineSpec {
+    /// steps in order
+    #[serde(default)]
+    pub steps: Vec<StepSpec>,
+    /// the classifier
+    pub classifier: ClassifierSpec,
+}
+
+impl PipelineSpec {
+    /// A classifier after standardisation.
+    pub fn standardized(classifier: impl Into<ClassifierSpec>) -> Self {
+        Self { steps: vec![StepSpec::Standardize(Default::default())], classifier: classifier.into() }
+    }
+
+    /// A classifier alone.
+    pub fn plain(classifier: impl Into<ClassifierSpec>) -> Self {
+        Self { steps: Vec::new(), classifier: classifier.into() }
+    }
+
+    /// Fits every step and the classifier on `[rows, features]` and class indices below `n_classes`.
+    ///
+    /// # Errors
+    /// Whatever a step or the classifier refuses.
+    pub fn train(&self, x: ArrayView2<'_, f64>, y: &[usize], n_classes: usize) -> Result<Pipeline> {
+        check_features(x)?;
+        check_labels(x.nrows(), y, n_classes)?;
+        let mut steps = Vec::with_capacity(self.steps.len());
+        let mut current = CowArray::from(x);
+        for spec in &self.steps {
+            let step = spec.fit(current.view())?;
+            current = step.transform(current.view())?.into();
+            steps.push(step);
+        }
+        let classifier = self.classifier.train(current.view(), y, n_classes)?;
+        Ok(Pipeline { steps, classifier })
+    }
+}
+
+/// Fitted steps and classifier.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Pipeline {
+    steps: Vec<Step>,
+    classifier: Classifier,
+}
+
+impl Pipeline {
+    /// Features per row.
+    pub fn n_features(&self) -> usize {
+        self.steps.first().map_or_else(|| self.classifier.n_features(), Step::n_inputs)
+    }
+
+    /// Classes in the label table.
+    pub fn n_classes(&self) -> usize {
+        self.classifier.n_classes()
+    }
+
+    /// Fitted steps in order.
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    /// `[rows, features]` through all steps.
+    fn through_steps<'a>(&self, x: ArrayView2<'a, f64>) -> Result<CowArray<'a, f64, Ix2>> {
+        check_query(x, self.n_features())?;
+        let mut current = CowArray::from(x);
+        for step in &self.steps {
+            current = step.transform(current.view())?.into();
+        }
+        Ok(current)
+    }
+
+    /// Class indices of `[rows, features]`.
+    ///
+    /// # Errors
+    /// Another number of features than in training, or features that are not finite.
+    pub fn predict(&self, x: ArrayView2<'_, f64>) -> Result<Vec<usize>> {
+        self.classifier.predict(self.through_steps(x)?.view())
+    }
+
+    /// Probabilities `[rows, classes]`.
+    ///
+    /// # Errors
+    /// As [`Pipeline::predict`]; [`ModelError::NoProbability`] for an SVM trained without.
+    pub fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
+        self.classifier.predict_proba(self.through_steps(x)?.view())
+    }
+
+    /// Whether the parts fit together, for models read from files.
+    pub(crate) fn validate(&self) -> Result<()> {
+        self.steps.iter().try_for_each(Step::validate)?;
+        self.classifier.validate()?;
+        let joined = self.steps.windows(2).all(|w| w[0].n_outputs() == w[1].n_inputs());
+        let last = self.steps.last().is_none_or(|s| s.n_outputs() == self.classifier.n_features());
+        if joined && last { Ok(()) } else { Err(ModelError::Inconsistent("pipeline".into())) }
+    }
+}

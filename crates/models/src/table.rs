@@ -1,0 +1,61 @@
+//! What every classifier and step asks of a feature table and its labels.
+
+use ndarray::ArrayView2;
+
+use crate::error::{ModelError, Result};
+
+/// Refuses an empty table and anything that is not finite.
+pub(crate) fn check_features(x: ArrayView2<'_, f64>) -> Result<()> {
+    if x.nrows() == 0 || x.ncols() == 0 {
+        return Err(ModelError::Empty { rows: x.nrows(), features: x.ncols() });
+    }
+    // The sum is finite unless something is not (or the sum itself overflows): a quick first look.
+    if x.sum().is_finite() {
+        return Ok(());
+    }
+    match x.indexed_iter().find(|(_, v)| !v.is_finite()) {
+        Some(((row, feature), &value)) => Err(ModelError::NonFinite { row, feature, value }),
+        None => Ok(()),
+    }
+}
+
+/// Refuses features that are not those the model was trained on, by number, and non-finite ones.
+pub(crate) fn check_query(x: ArrayView2<'_, f64>, n_features: usize) -> Result<()> {
+    if x.ncols() != n_features {
+        return Err(ModelError::Length {
+            what: "features per row",
+            expected: n_features,
+            actual: x.ncols(),
+        });
+    }
+    if x.nrows() == 0 { Ok(()) } else { check_features(x) }
+}
+
+/// Refuses labels that do not go with the rows or lie outside the label table.
+pub(crate) fn check_labels(rows: usize, y: &[usize], n_classes: usize) -> Result<()> {
+    if y.len() != rows {
+        return Err(ModelError::Length { what: "labels", expected: rows, actual: y.len() });
+    }
+    match y.iter().enumerate().find(|(_, c)| **c >= n_classes) {
+        Some((row, &class)) => Err(ModelError::ClassOutOfRange { row, class, n_classes }),
+        None => Ok(()),
+    }
+}
+
+/// Rows per class.
+pub(crate) fn class_counts(y: &[usize], n_classes: usize) -> Vec<usize> {
+    let mut counts = vec![0; n_classes];
+    y.iter().for_each(|&c| counts[c] += 1);
+    counts
+}
+
+/// Index of the largest value, the first one among equals.
+pub(crate) fn argmax<'a>(values: impl IntoIterator<Item = &'a f64>) -> usize {
+    let mut best = (0, f64::NEG_INFINITY);
+    for (i, &v) in values.into_iter().enumerate() {
+        if v > best.1 {
+            best = (i, v);
+        }
+    }
+    best.0
+}
