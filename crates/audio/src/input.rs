@@ -1,0 +1,166 @@
+//! Bytes of a file or a pipe: a buffer with an absolute position.
+
+use std::io::{self, Read, Seek, SeekFrom};
+
+use crate::error::AudioError;
+
+/// Large enough to make system calls rare, small enough to stay in the second-level cache.
+const BUFFER: usize = 128 << 10;
+
+/// Where bytes come from.
+pub(crate) trait Medium: Read + Send {
+    /// Total bytes; `None` for a pipe, which cannot be repositioned either.
+    fn byte_len(&self) -> Option<u64>;
+    /// Continues at the absolute byte `offset`.
+    fn jump(&mut self, offset: u64) -> io::Result<()>;
+}
+
+/// Anything that can seek, with its length.
+pub(crate) struct Seekable<R> {
+    inner: R,
+    len: u64,
+}
+
+impl<R: Read + Seek> Seekable<R> {
+    /// Measures the length and rewinds.
+    pub(crate) fn new(mut inner: R) -> io::Result<Self> {
+        let len = inner.seek(SeekFrom::End(0))?;
+        inner.seek(SeekFrom::Start(0))?;
+        Ok(Self { inner, len })
+    }
+}
+
+impl<R: Read> Read for Seekable<R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        self.inner.read(out)
+    }
+}
+
+impl<R: Read + Seek + Send> Medium for Seekable<R> {
+    fn byte_len(&self) -> Option<u64> {
+        Some(self.len)
+    }
+
+    fn jump(&mut self, offset: u64) -> io::Result<()> {
+        self.inner.seek(SeekFrom::Start(offset)).map(|_| ())
+    }
+}
+
+/// A pipe.
+pub(crate) struct Stream<R>(pub(crate) R);
+
+impl<R: Read> Read for Stream<R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        self.0.read(out)
+    }
+}
+
+impl<R: Read + Send> Medium for Stream<R> {
+    fn byte_len(&self) -> Option<u64> {
+        None
+    }
+
+    fn jump(&mut self, _: u64) -> io::Result<()> {
+        Err(io::ErrorKind::Unsupported.into())
+    }
+}
+
+/// Buffered bytes with the absolute position of the next one.
+pub(crate) struct Input {
+    medium: Box<dyn Medium>,
+    buffer: Box<[u8]>,
+    start: usize,
+    end: usize,
+    position: u64,
+}
+
+impl Input {
+    pub(crate) fn new(medium: Box<dyn Medium>) -> Self {
+        let buffer = vec![0; BUFFER].into_boxed_slice();
+        Self { medium, buffer, start: 0, end: 0, position: 0 }
+    }
+
+    /// Absolute offset of the next byte.
+    pub(crate) fn position(&self) -> u64 {
+        self.position
+    }
+
+    /// Total bytes, where known.
+    pub(crate) fn len(&self) -> Option<u64> {
+        self.medium.byte_len()
+    }
+
+    /// The buffered bytes, at least `least` of them (at most the buffer's size) unless the end
+    /// comes first.
+    pub(crate) fn peek(&mut self, least: usize) -> Result<&[u8], AudioError> {
+        if self.end - self.start < least {
+            self.buffer.copy_within(self.start..self.end, 0);
+            self.end -= self.start;
+            self.start = 0;
+            while self.end < least {
+                match self.medium.read(&mut self.buffer[self.end..]) {
+                    Ok(0) => break,
+                    Ok(n) => self.end += n,
+                    Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                    Err(source) => {
+                        let offset = self.position.saturating_add(self.end as u64);
+                        return Err(AudioError::Io { offset, source });
+                    }
+                }
+            }
+        }
+        Ok(&self.buffer[self.start..self.end])
+    }
+
+    /// Drops `n` bytes that `peek` has shown.
+    pub(crate) fn consume(&mut self, n: usize) {
+        debug_assert!(n <= self.end - self.start);
+        self.start += n;
+        self.position += n as u64;
+    }
+
+    /// Drops `n` bytes, seen or not; false where the input ends before.
+    pub(crate) fn skip(&mut self, n: u64) -> Result<bool, AudioError> {
+        let buffered = (self.end - self.start) as u64;
+        if n <= buffered {
+            self.consume(n as usize);
+            return Ok(true);
+        }
+        let target = self.position.saturating_add(n);
+        if let Some(len) = self.len() {
+            if target > len {
+                return Ok(false);
+            }
+            self.seek(target)?;
+            return Ok(true);
+        }
+        let mut left = n;
+        while left > 0 {
+            let seen = self.peek(1)?.len() as u64;
+            if seen == 0 {
+                return Ok(false);
+            }
+            let step = seen.min(left);
+            self.consume(step as usize);
+            left -= step;
+        }
+        Ok(true)
+    }
+
+    /// Continues at the absolute byte `offset`.
+    pub(crate) fn seek(&mut self, offset: u64) -> Result<(), AudioError> {
+        self.medium.jump(offset).map_err(|source| AudioError::Io { offset, source })?;
+        (self.start, self.end, self.position) = (0, 0, offset);
+        Ok(())
+    }
+
+    /// The bytes that were buffered but not consumed, and the medium that continues after them;
+    /// a seekable one is put back to the start instead, with nothing buffered.
+    #[cfg(feature = "symphonia")]
+    pub(crate) fn into_unread(mut self) -> Result<(Vec<u8>, Box<dyn Medium>), AudioError> {
+        if self.len().is_some() {
+            self.seek(0)?;
+        }
+        Ok((self.buffer[self.start..self.end].to_vec(), self.medium))
+    }
+}

@@ -1,0 +1,75 @@
+//! Chooses the reader by what the file holds.
+
+use std::fs::File;
+use std::io::{Read, Seek};
+use std::path::Path;
+
+use crate::error::AudioError;
+use crate::input::{Input, Medium, Seekable, Stream};
+use crate::source::BlockSource;
+use crate::wav::{WavSource, is_wav};
+
+/// File name extensions (lower case) that a walk through folders should pick up. Files are still
+/// opened by content, whatever they are called.
+#[cfg(feature = "symphonia")]
+pub const EXTENSIONS: [&str; 9] =
+    ["wav", "wave", "rf64", "bw64", "bwf", "flac", "ogg", "oga", "mp3"];
+/// File name extensions (lower case) that a walk through folders should pick up. Files are still
+/// opened by content, whatever they are called.
+#[cfg(not(feature = "symphonia"))]
+pub const EXTENSIONS: [&str; 5] = ["wav", "wave", "rf64", "bw64", "bwf"];
+
+#[cfg(feature = "symphonia")]
+const FORMATS: &str = "WAV (RIFF, RIFX, RF64, BW64), FLAC, Ogg Vorbis or MP3";
+#[cfg(not(feature = "symphonia"))]
+const FORMATS: &str = "WAV (RIFF, RIFX, RF64, BW64)";
+
+/// Opens a recording, by content.
+///
+/// # Errors
+/// The file cannot be opened or read, is empty, no audio, of an unsupported kind, or corrupt.
+pub fn open(path: &Path) -> Result<Box<dyn BlockSource>, AudioError> {
+    let failed = |source| AudioError::Open { path: path.to_owned(), source };
+    let file = File::open(path).map_err(failed)?;
+    let meta = file.metadata().map_err(failed)?;
+    if meta.is_dir() {
+        return Err(failed(std::io::ErrorKind::IsADirectory.into()));
+    }
+    if meta.is_file() { from_seekable(file) } else { from_reader(file) }
+}
+
+/// Reads a recording from a stream such as standard input, forward only.
+///
+/// # Errors
+/// As [`open`].
+pub fn from_reader(reader: impl Read + Send + 'static) -> Result<Box<dyn BlockSource>, AudioError> {
+    from_medium(Box::new(Stream(reader)))
+}
+
+/// Reads a recording from anything that can seek, such as bytes in a [`std::io::Cursor`].
+///
+/// # Errors
+/// As [`open`].
+pub fn from_seekable(
+    reader: impl Read + Seek + Send + 'static,
+) -> Result<Box<dyn BlockSource>, AudioError> {
+    let medium = Seekable::new(reader).map_err(|source| AudioError::Io { offset: 0, source })?;
+    from_medium(Box::new(medium))
+}
+
+fn from_medium(medium: Box<dyn Medium>) -> Result<Box<dyn BlockSource>, AudioError> {
+    let mut input = Input::new(medium);
+    let start = input.peek(12)?;
+    if start.is_empty() {
+        return Err(AudioError::Empty);
+    }
+    if is_wav(start) {
+        return Ok(Box::new(WavSource::new(input)?));
+    }
+    let found = format!("\"{}\"", start[..start.len().min(12)].escape_ascii());
+    #[cfg(feature = "symphonia")]
+    if crate::compressed::is_known(start) {
+        return Ok(Box::new(crate::compressed::CompressedSource::new(input)?));
+    }
+    Err(AudioError::NotAudio { found, expected: FORMATS })
+}

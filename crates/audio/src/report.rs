@@ -1,0 +1,108 @@
+//! What was odd about a recording that was read nevertheless.
+
+use std::fmt;
+
+use serde::Serialize;
+
+/// One deviation from the standard that the reader worked around; `docs/wav-policy.md` lists the
+/// rules. `name` is stable and meant for tables, `Display` is for people.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(tag = "name", rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Repair {
+    /// The data size was 0 although samples follow: read to the end.
+    DataSizeZero,
+    /// The data size was the placeholder of a stream (all bits set): read to the end.
+    DataSizeUnknown,
+    /// More than 4 GiB of data in a plain RIFF file, whose 32-bit size wrapped around.
+    DataSizeWrapped {
+        /// Bytes that the header states.
+        declared: u64,
+        /// Bytes of sample data that the file size implies.
+        used: u64,
+    },
+    /// The file ends before its data: the whole frames that are there were read.
+    Truncated {
+        /// Frames that the header states; `None` where an Ogg stream just stops.
+        declared: Option<u64>,
+        /// Whole frames that are there.
+        actual: u64,
+    },
+    /// The data end inside a frame, whose bytes were left out.
+    PartialFrame {
+        /// Bytes left out.
+        bytes: u64,
+    },
+    /// The block alignment contradicts channels and bits: the latter were used.
+    BlockAlign {
+        /// Bytes per frame that the header states.
+        declared: u64,
+        /// Bytes per frame that were used.
+        used: u64,
+    },
+    /// An odd-sized chunk without its padding byte.
+    MissingPadding {
+        /// Where the padding byte should be.
+        offset: u64,
+    },
+    /// Frames inside a compressed stream that are damaged or missing were left out.
+    LostFrames {
+        /// How many, according to the time stamps.
+        count: u64,
+    },
+}
+
+impl Repair {
+    /// Stable short code, the one that `docs/wav-policy.md` uses.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::DataSizeZero => "data_size_zero",
+            Self::DataSizeUnknown => "data_size_unknown",
+            Self::DataSizeWrapped { .. } => "data_size_wrapped",
+            Self::Truncated { .. } => "truncated",
+            Self::PartialFrame { .. } => "partial_frame",
+            Self::BlockAlign { .. } => "block_align",
+            Self::MissingPadding { .. } => "missing_padding",
+            Self::LostFrames { .. } => "lost_frames",
+        }
+    }
+}
+
+impl fmt::Display for Repair {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::DataSizeZero => write!(f, "data size 0 in the header, read to the end"),
+            Self::DataSizeUnknown => write!(f, "no data size in the header, read to the end"),
+            Self::DataSizeWrapped { declared, used } => {
+                write!(f, "32-bit data size {declared} wrapped around, used {used}")
+            }
+            Self::Truncated { declared: Some(declared), actual } => {
+                write!(f, "the file ends after {actual} of {declared} frames")
+            }
+            Self::Truncated { declared: None, actual } => {
+                write!(f, "the stream stops after {actual} frames without its end mark")
+            }
+            Self::PartialFrame { bytes } => {
+                write!(f, "{bytes} bytes of an incomplete last frame left out")
+            }
+            Self::BlockAlign { declared, used } => {
+                write!(f, "block alignment {declared} contradicts channels and bits, used {used}")
+            }
+            Self::MissingPadding { offset } => {
+                write!(f, "odd-sized chunk without padding at byte {offset}")
+            }
+            Self::LostFrames { count } => write!(f, "{count} damaged or missing frames left out"),
+        }
+    }
+}
+
+/// What reading found; complete once `read` has returned 0.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct ReadReport {
+    /// Frames handed out by `read` so far.
+    pub decoded_frames: u64,
+    /// The recording ended before what its header declares.
+    pub truncated: bool,
+    /// Deviations worked around, in the order met, each kind of cause once.
+    pub repairs: Vec<Repair>,
+}

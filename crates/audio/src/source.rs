@@ -1,0 +1,46 @@
+//! The interface of every reader.
+
+use serde::Serialize;
+
+use crate::error::AudioError;
+use crate::report::ReadReport;
+
+/// What a recording is, known before its samples are read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct AudioSpec {
+    /// Frames per second, 1 to 768 000 Hz.
+    pub sample_rate: u32,
+    /// Channels, 1 to 64.
+    pub channels: u16,
+    /// Container and encoding, such as `wav pcm_s16le` or `ogg vorbis`.
+    pub format: String,
+    /// Frames according to the header (after repair of a wrapped size), where it says so.
+    pub declared_frames: Option<u64>,
+}
+
+/// Samples of one recording, block by block.
+pub trait BlockSource: Send {
+    /// Format, rate, channels.
+    fn spec(&self) -> &AudioSpec;
+
+    /// Fills `out` with up to `out.len() / channels` frames of interleaved samples and returns how
+    /// many frames; 0 means the end (or an `out` shorter than one frame). Integer samples are
+    /// scaled to [-1, 1) as libsndfile does (16 bits: divided by 32768); float samples come
+    /// unchanged, NaN and infinities included.
+    ///
+    /// # Errors
+    /// Reading failed or the data are undecodable; later calls return the end.
+    fn read(&mut self, out: &mut [f32]) -> Result<usize, AudioError>;
+
+    /// Whether [`BlockSource::seek`] can be used.
+    fn seekable(&self) -> bool;
+
+    /// Continues at `frame`, counted from the start; beyond the end, `read` then returns 0.
+    ///
+    /// # Errors
+    /// The source cannot seek, or the system refuses.
+    fn seek(&mut self, frame: u64) -> Result<(), AudioError>;
+
+    /// Repairs, truncation and frames read so far; complete once `read` has returned 0.
+    fn health(&self) -> &ReadReport;
+}
