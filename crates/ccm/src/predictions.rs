@@ -6,6 +6,8 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use ndarray::{Array2, ArrayView1};
+
 use crate::dataset::{Container, SequenceName};
 use crate::error::{CcmError, Result};
 use crate::submission::RowKey;
@@ -85,49 +87,44 @@ impl ProbabilityTable {
     /// [`CcmError`] for no tables, weights that are not one positive number per table, other
     /// numbers of classes, and rows that one table has and another has not.
     pub fn average(tables: &[Self], weights: Option<&[f64]>) -> Result<Self> {
-        let Some((first, others)) = tables.split_first() else {
+        let Some(first) = tables.first() else {
             return Err(CcmError::Request("no prediction files to average".into()));
         };
+        let mut aligned = Vec::with_capacity(tables.len());
+        for table in tables {
+            aligned.push(table.aligned_to(first)?);
+        }
         let equal = vec![1.0; tables.len()];
-        let weights = weights.unwrap_or(&equal);
-        if weights.len() != tables.len() || !weights.iter().all(|w| w.is_finite() && *w > 0.0) {
-            return Err(CcmError::Request(format!(
-                "weights {weights:?}: one positive number for each of the {} prediction files is \
-                 needed",
-                tables.len()
-            )));
+        let views: Vec<_> = aligned.iter().map(|a| a.view()).collect();
+        let mean = corsmal_models::fusion::average(&views, weights.unwrap_or(&equal))
+            .map_err(|e| CcmError::Request(format!("fusion by averaging: {e}")))?;
+        let rows = mean.outer_iter().map(|r| r.to_vec()).collect();
+        Ok(Self { path: first.path.clone(), keys: first.keys.clone(), rows })
+    }
+
+    /// The rows in the order of another table, which must have the same ones.
+    fn aligned_to(&self, other: &Self) -> Result<Array2<f64>> {
+        let at: HashMap<_, _> = self.keys.iter().zip(&self.rows).collect();
+        let classes = other.rows.first().map_or(0, Vec::len);
+        let mut aligned = Array2::zeros((other.keys.len(), classes));
+        for (key, mut to) in other.keys.iter().zip(aligned.outer_iter_mut()) {
+            let row =
+                at.get(key).filter(|row| row.len() == classes && at.len() == other.keys.len());
+            let Some(row) = row else {
+                return Err(CcmError::Rows {
+                    path: self.path.clone(),
+                    problem: "rows or classes other than in the first file",
+                    rows: format!("{} rows, looking for {key}", at.len()),
+                    expected: format!(
+                        "the {} recordings of {} with {classes} classes",
+                        other.keys.len(),
+                        other.path.display()
+                    ),
+                });
+            };
+            to.assign(&ArrayView1::from(row.as_slice()));
         }
-        let total: f64 = weights.iter().sum();
-        let mut mean = first.clone();
-        for row in mean.rows.iter_mut().flatten() {
-            *row *= weights[0];
-        }
-        for (table, &weight) in others.iter().zip(&weights[1..]) {
-            let at: HashMap<_, _> = table.keys.iter().zip(&table.rows).collect();
-            for (key, row) in mean.keys.iter().zip(&mut mean.rows) {
-                let other = at.get(key).filter(|_| at.len() == first.keys.len());
-                let Some(other) = other.filter(|o| o.len() == row.len()) else {
-                    return Err(CcmError::Rows {
-                        path: table.path.clone(),
-                        problem: "rows or classes other than in the first file",
-                        rows: format!("{} rows, looking for {key}", at.len()),
-                        expected: format!(
-                            "the {} recordings of {} with {} classes",
-                            first.keys.len(),
-                            first.path.display(),
-                            row.len()
-                        ),
-                    });
-                };
-                for (sum, p) in row.iter_mut().zip(other.iter()) {
-                    *sum += weight * p;
-                }
-            }
-        }
-        for value in mean.rows.iter_mut().flatten() {
-            *value /= total;
-        }
-        Ok(mean)
+        Ok(aligned)
     }
 
     /// The most probable class of each recording, the lowest where several are equal.
