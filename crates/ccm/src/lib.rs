@@ -6,7 +6,9 @@
 
 pub mod dataset;
 pub mod error;
+pub mod paper;
 pub mod predictions;
+pub mod report;
 pub mod scores;
 pub mod submission;
 pub mod synth;

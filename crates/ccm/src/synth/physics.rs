@@ -88,7 +88,7 @@ impl Source {
         let active = if fraction > 0.0 {
             (0.25 + fraction * per_fill) * rng.gen_range(0.75..1.3)
         } else {
-            0.5
+            0.9
         };
         let total = ((lead + active + rng.gen_range(0.2..0.4)) * SAMPLE_RATE as f64) as usize;
         let span = (lead, lead + active);

@@ -1,6 +1,7 @@
 //! One file per command: its arguments (`Args`) and what it does (`run`).
 
 mod completions;
+mod dataset;
 mod evaluate;
 mod synth;
 
@@ -15,6 +16,8 @@ use crate::failure::Failure;
 pub enum Command {
     /// Print shell completions or the man page.
     Completions(completions::Args),
+    /// Look at a CORSMAL data set on disk.
+    Dataset(dataset::Args),
     /// Score CORSMAL submissions by the paper's or the official evaluators' rules.
     Evaluate(evaluate::Args),
     /// Make synthetic recordings in the layout of the CCM data set (demonstration and tests only).
@@ -26,6 +29,7 @@ impl Command {
     pub fn run(self) -> Result<ExitCode, Failure> {
         match self {
             Self::Completions(args) => completions::run(args),
+            Self::Dataset(args) => dataset::run(args),
             Self::Evaluate(args) => evaluate::run(args),
             Self::Synth(args) => synth::run(args),
         }
