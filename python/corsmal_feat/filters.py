@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy.typing as npt
 from . import _core
 from ._core import ParameterError
 
-__all__ = ["get_window"]
+__all__ = ["chroma", "get_window", "mel"]
 
 
 def window_name(window: Any) -> str:
@@ -25,3 +26,92 @@ def window_name(window: Any) -> str:
 def get_window(window: Any, Nx: int, *, fftbins: bool = True) -> npt.NDArray[np.float64]:
     """A window of `Nx` points, periodic unless `fftbins=False` (librosa.filters.get_window)."""
     return _core.get_window(window_name(window), int(Nx), bool(fftbins))
+
+
+MelParams = tuple[float, int, int, float, float | None, bool, str]
+
+
+def mel_params(
+    sr: float,
+    n_fft: int,
+    n_mels: int,
+    fmin: float,
+    fmax: float | None,
+    htk: bool,
+    norm: Any,
+) -> MelParams:
+    """Filter bank parameters as the Rust side takes them."""
+    if n_fft < 1 or n_mels < 1:
+        raise ParameterError(f"n_fft = {n_fft}, n_mels = {n_mels} are not possible: at least 1")
+    name = "none" if norm is None else norm if isinstance(norm, str) else repr(float(norm))
+    high = None if fmax is None else float(fmax)
+    return float(sr), int(n_fft), int(n_mels), float(fmin), high, bool(htk), name
+
+
+def mel(
+    *,
+    sr: float,
+    n_fft: int,
+    n_mels: int = 128,
+    fmin: float = 0.0,
+    fmax: float | None = None,
+    htk: bool = False,
+    norm: Any = "slaney",
+    dtype: npt.DTypeLike = np.float32,
+) -> npt.NDArray[Any]:
+    """Mel filter bank [shape=(n_mels, 1 + n_fft/2)], float32 (librosa.filters.mel)."""
+    bank, empty = _core.mel(mel_params(sr, n_fft, n_mels, fmin, fmax, htk, norm))
+    if empty:
+        warn_empty()
+    return bank.astype(dtype, copy=False)
+
+
+def warn_empty() -> None:
+    """What librosa warns of: bands too narrow to hold a bin."""
+    warnings.warn(
+        "Empty filters detected in the mel bank: fewer n_mels or a longer n_fft avoid them",
+        stacklevel=3,
+    )
+
+
+ChromaParams = tuple[float, int, int, float, float, float | None, float | None, bool]
+
+
+def chroma_params(
+    sr: float,
+    n_fft: int,
+    n_chroma: int,
+    tuning: float,
+    ctroct: float,
+    octwidth: float | None,
+    norm: float | None,
+    base_c: bool,
+) -> ChromaParams:
+    """Filter bank parameters as the Rust side takes them."""
+    if n_fft < 1 or n_chroma < 1:
+        raise ParameterError(
+            f"n_fft = {n_fft}, n_chroma = {n_chroma} are not possible: at least 1"
+        )
+    width = None if octwidth is None else float(octwidth)
+    power = None if norm is None else float(norm)
+    return (
+        float(sr), int(n_fft), int(n_chroma), float(tuning), float(ctroct), width, power,
+        bool(base_c),
+    )  # fmt: skip
+
+
+def chroma(
+    *,
+    sr: float,
+    n_fft: int,
+    n_chroma: int = 12,
+    tuning: float = 0.0,
+    ctroct: float = 5.0,
+    octwidth: float | None = 2,
+    norm: float | None = 2,
+    base_c: bool = True,
+    dtype: npt.DTypeLike = np.float32,
+) -> npt.NDArray[Any]:
+    """Chroma filter bank [shape=(n_chroma, 1 + n_fft/2)] (librosa.filters.chroma)."""
+    params = chroma_params(sr, n_fft, n_chroma, tuning, ctroct, octwidth, norm, base_c)
+    return _core.chroma_filter(params).astype(dtype, copy=False)

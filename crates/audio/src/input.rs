@@ -6,6 +6,8 @@ use crate::error::AudioError;
 
 /// Large enough to make system calls rare, small enough to stay in the second-level cache.
 const BUFFER: usize = 128 << 10;
+/// Holds the largest frame (64 channels of 8 bytes) and whatever a header peeks at.
+const MIN_BUFFER: usize = 1 << 10;
 
 /// Where bytes come from.
 pub(crate) trait Medium: Read + Send {
@@ -76,7 +78,9 @@ pub(crate) struct Input {
 
 impl Input {
     pub(crate) fn new(medium: Box<dyn Medium>) -> Self {
-        let buffer = vec![0; BUFFER].into_boxed_slice();
+        let whole = medium.byte_len().and_then(|len| usize::try_from(len).ok());
+        let size = whole.map_or(BUFFER, |len| len.clamp(MIN_BUFFER, BUFFER));
+        let buffer = vec![0; size].into_boxed_slice();
         Self { medium, buffer, start: 0, end: 0, position: 0 }
     }
 

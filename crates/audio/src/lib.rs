@@ -26,6 +26,7 @@
 #[cfg(feature = "symphonia")]
 mod compressed;
 mod error;
+mod health;
 mod input;
 mod open;
 mod report;
@@ -33,6 +34,7 @@ mod source;
 mod wav;
 
 pub use error::AudioError;
+pub use health::{ChannelHealth, Health, HealthMeter};
 pub use open::{EXTENSIONS, from_reader, from_seekable, open};
 pub use report::{ReadReport, Repair};
 pub use source::{AudioSpec, BlockSource};

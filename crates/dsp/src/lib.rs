@@ -4,9 +4,36 @@
 //! independent unless a function says that it takes a statistic over all of them. Functions are
 //! generic over [`Real`] (`f32` or `f64`) and keep the precision of their input.
 
+pub mod chroma;
+pub mod columns;
+pub mod cqt;
+pub mod decibel;
+pub mod delta;
 pub mod error;
+pub mod paa;
+pub mod pca;
+pub mod frequency;
+pub mod hpss;
+pub mod istft;
+pub mod lanes;
+mod log2;
+pub mod median;
+pub mod mel;
+pub mod mfcc;
+pub mod mono;
+pub mod normalize;
+pub mod onset;
+pub mod pitch;
 pub mod real;
+pub mod resample;
+pub mod resize;
+pub mod spectral;
 pub mod stft;
+mod sums;
+pub mod time_domain;
+pub mod tonnetz;
+pub mod transform;
+pub mod vector;
 pub mod window;
 
 pub use error::{DspError, Result};

@@ -77,3 +77,23 @@ macro_rules! into_either {
 }
 into_either!(Tensor);
 into_either!(Matrix);
+
+/// `each_precision!(py, view(array), result)`: `result` for the view of either precision of
+/// `array: Floats`, computed without the GIL and handed to numpy.
+macro_rules! each_precision {
+    ($py:ident, $view:ident($array:ident), $result:expr) => {
+        match $array {
+            $crate::arrays::Floats::F32($array) => {
+                let $array = $view(&$array)?;
+                let result = $py.detach(|| $result).map_err($crate::value_error)?;
+                $crate::arrays::into_numpy($py, result)
+            }
+            $crate::arrays::Floats::F64($array) => {
+                let $array = $view(&$array)?;
+                let result = $py.detach(|| $result).map_err($crate::value_error)?;
+                $crate::arrays::into_numpy($py, result)
+            }
+        }
+    };
+}
+pub(crate) use each_precision;

@@ -5,7 +5,14 @@
 //! file per family, each with a `register`. The GIL is released while we compute.
 
 mod arrays;
+mod chroma;
+mod compound;
+mod mel;
+mod onset;
+mod resample;
+mod spectral;
 mod spectrum;
+mod time_domain;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -21,5 +28,12 @@ pub(crate) fn value_error(error: impl std::fmt::Display) -> PyErr {
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add("ParameterError", m.py().get_type::<ParameterError>())?;
-    spectrum::register(m)
+    spectrum::register(m)?;
+    mel::register(m)?;
+    time_domain::register(m)?;
+    resample::register(m)?;
+    compound::register(m)?;
+    spectral::register(m)?;
+    chroma::register(m)?;
+    onset::register(m)
 }

@@ -11,10 +11,9 @@ use crate::value_error;
 /// center, pad_mode).
 type StftTuple = (usize, usize, usize, String, bool, String);
 
-/// The checked parameters behind a tuple from Python.
-pub(crate) fn stft_params(tuple: &StftTuple) -> PyResult<StftParams> {
-    let (n_fft, hop_length, win_length, window, center, pad_mode) = tuple;
-    let pad_mode = match pad_mode.as_str() {
+/// A padding mode by numpy's name.
+pub(crate) fn pad_mode(name: &str) -> PyResult<PadMode> {
+    Ok(match name {
         "constant" => PadMode::Constant,
         "edge" => PadMode::Edge,
         "reflect" => PadMode::Reflect,
@@ -24,7 +23,13 @@ pub(crate) fn stft_params(tuple: &StftTuple) -> PyResult<StftParams> {
                 "pad_mode = {other} is not possible: constant, edge, reflect or symmetric"
             )));
         }
-    };
+    })
+}
+
+/// The checked parameters behind a tuple from Python.
+pub(crate) fn stft_params(tuple: &StftTuple) -> PyResult<StftParams> {
+    let (n_fft, hop_length, win_length, window, center, pad_mode) = tuple;
+    let pad_mode = self::pad_mode(pad_mode)?;
     let params = StftParams {
         n_fft: *n_fft,
         hop_length: *hop_length,

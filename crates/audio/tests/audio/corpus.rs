@@ -1,23 +1,11 @@
 //! Every file of the odd and broken WAV corpus has the outcome that `corpus.csv` specifies.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use corsmal_audio::{AudioError, open};
 
-/// The shared material, where it is present.
-fn shared(what: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("CORSMAL_SHARED").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared")),
-        PathBuf::from,
-    );
-    let path = root.join(what);
-    if path.exists() {
-        return Some(path);
-    }
-    eprintln!("skipped: {} absent", path.display());
-    None
-}
+use crate::common::shared;
 
 /// FNV-1a over the bits of the samples (little-endian), 64 bits.
 fn checksum(samples: &[f32]) -> u64 {

@@ -1,0 +1,393 @@
+//! Constant-Q transform by octaves (librosa 0.11 `cqt`, after Schoerkhuber and Klapuri 2010).
+//!
+//! Each octave is a short transform times a sparse filter bank; between octaves the signal is
+//! decimated by two, so that the same filter lengths serve all of them.
+
+mod basis;
+mod chroma;
+mod decimate;
+mod tuning;
+
+use std::sync::Arc;
+
+use ndarray::{Array2, Array3, ArrayView2, ArrayViewMut2, Axis, s};
+use num_complex::Complex;
+use pulp::Arch;
+
+pub use chroma::{ChromaCqt, ChromaCqtParams, chroma_cqt, cq_to_chroma};
+pub use tuning::{SignalTuning, signal_tuning};
+
+use crate::error::{DspError, Result};
+use crate::frequency::require_rate;
+use crate::lanes::{LANES, LaneFft, Row, Slots, gather};
+use crate::normalize::Norm;
+use crate::real::require_finite;
+use crate::stft::{PadMode, StftParams};
+use crate::transform::Forward;
+use crate::vector::Lane;
+use crate::window::Window;
+use basis::{Basis, Wavelets};
+use decimate::decimate;
+
+/// Lowest frequency by default: C1 in Hz.
+pub const C1: f64 = 32.703_195_662_574_83;
+
+/// Parameters of the transform, in librosa's names.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CqtParams {
+    /// Sample rate in Hz.
+    pub sr: f64,
+    /// Samples between successive frames.
+    pub hop_length: usize,
+    /// Lowest centre frequency in Hz.
+    pub fmin: f64,
+    /// Number of bins.
+    pub n_bins: usize,
+    /// Bins per octave.
+    pub bins_per_octave: usize,
+    /// Deviation from A440 in fractions of a bin.
+    pub tuning: f64,
+    /// Factor on the length of all filters.
+    pub filter_scale: f64,
+    /// Normalisation of the filters.
+    pub norm: Option<Norm>,
+    /// Share of the magnitudes of each filter's spectrum that is left out, in [0, 1).
+    pub sparsity: f64,
+    /// Window of the filters.
+    pub window: Window,
+    /// Divide by the square root of the filter lengths.
+    pub scale: bool,
+    /// Padding of the signal's ends, in each octave.
+    pub pad_mode: PadMode,
+}
+
+/// More bins are refused.
+const MOST_BINS: usize = 1 << 16;
+
+impl CqtParams {
+    /// librosa's defaults: 84 semitones from C1.
+    pub fn new(sr: f64) -> Self {
+        Self {
+            sr,
+            hop_length: 512,
+            fmin: C1,
+            n_bins: 84,
+            bins_per_octave: 12,
+            tuning: 0.0,
+            filter_scale: 1.0,
+            norm: Some(Norm::P(1.0)),
+            sparsity: 0.01,
+            window: Window::Hann,
+            scale: true,
+            pad_mode: PadMode::Constant,
+        }
+    }
+
+    fn check(&self) -> Result<()> {
+        require_rate(self.sr)?;
+        if self.hop_length == 0 {
+            return Err(DspError::parameter("hop_length", 0, "at least 1"));
+        }
+        for (name, value) in [("n_bins", self.n_bins), ("bins_per_octave", self.bins_per_octave)] {
+            if !(1..=MOST_BINS).contains(&value) {
+                return Err(DspError::parameter(name, value, format!("1 to {MOST_BINS}")));
+            }
+        }
+        for (name, value) in [("fmin", self.fmin), ("filter_scale", self.filter_scale)] {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(DspError::parameter(name, value, "above 0"));
+            }
+        }
+        if !self.tuning.is_finite() {
+            return Err(DspError::parameter("tuning", self.tuning, "finite"));
+        }
+        if !(0.0..1.0).contains(&self.sparsity) {
+            return Err(DspError::parameter("sparsity", self.sparsity, "0 to below 1"));
+        }
+        Ok(())
+    }
+}
+
+/// One octave of filters and how its signal comes about.
+struct Octave {
+    basis: Arc<Basis>,
+    /// Lane transform, where there is one for this length.
+    lanes: Option<Arc<LaneFft>>,
+    /// First of its bins in the result.
+    first: usize,
+    /// Factor on its result, per bin.
+    gains: Vec<f32>,
+    hop: usize,
+    /// Whether the next octave works at half the rate.
+    halve: bool,
+}
+
+/// Filters and transforms for one set of parameters, shared between recordings and threads.
+pub struct CqtPlan {
+    params: CqtParams,
+    /// Halvings of the rate before the first octave.
+    early: u32,
+    /// Octaves from the highest down.
+    octaves: Vec<Octave>,
+}
+
+impl CqtPlan {
+    /// # Errors
+    /// Impossible parameters, or filters that reach above half the sample rate.
+    pub fn new(p: &CqtParams) -> Result<Self> {
+        p.check()?;
+        let wavelets = Wavelets::new(p);
+        let (cutoff, nyquist) = (wavelets.cutoff(p.window), p.sr / 2.0);
+        if !(cutoff <= nyquist && wavelets.frequencies[0] > 0.0) {
+            let allowed = format!(
+                "filters up to sr / 2 = {nyquist} Hz, but the highest reaches {cutoff:.1} Hz"
+            );
+            return Err(DspError::parameter("n_bins", p.n_bins, allowed));
+        }
+        let n_octaves = p.n_bins.div_ceil(p.bins_per_octave);
+        let early = early_halvings(nyquist, cutoff, p.hop_length, n_octaves);
+        let base = p.sr / f64::from(1u32 << early);
+        let (mut sr, mut hop) = (base, p.hop_length >> early);
+        let mut octaves: Vec<Octave> = Vec::with_capacity(n_octaves);
+        let mut end = p.n_bins;
+        while end > 0 {
+            let first = end.saturating_sub(p.bins_per_octave);
+            let (basis, lanes) = match octaves.last() {
+                Some(above) if same_lengths(&wavelets, first..end, sr, above, base) => {
+                    (above.basis.clone(), above.lanes.clone())
+                }
+                _ => {
+                    let basis = Basis::new(&wavelets, first..end, sr, p)?;
+                    let lanes = LaneFft::supports(basis.n_fft)
+                        .then(|| LaneFft::new(basis.n_fft).map(Arc::new))
+                        .transpose()?;
+                    (Arc::new(basis), lanes)
+                }
+            };
+            let gain = |k: usize| {
+                let scale = if p.scale { wavelets.length(k, base).sqrt() } else { 1.0 };
+                // Without the scale, early halving is made up for.
+                let early = if p.scale { 1.0 } else { f64::from(1u32 << early).sqrt() };
+                (early * (base / sr).sqrt() / scale) as f32
+            };
+            let halve = hop % 2 == 0;
+            octaves.push(Octave {
+                basis,
+                lanes,
+                first,
+                gains: (first..end).map(gain).collect(),
+                hop,
+                halve,
+            });
+            if halve {
+                hop /= 2;
+                sr /= 2.0;
+            }
+            end = first;
+        }
+        Ok(Self { params: *p, early, octaves })
+    }
+
+    /// The parameters of the transform.
+    pub fn params(&self) -> &CqtParams {
+        &self.params
+    }
+
+    /// Transform `[n_bins, frames]` of one channel.
+    ///
+    /// # Errors
+    /// A signal shorter than the early decimation needs, or without samples.
+    pub fn transform<T: Lane>(&self, y: &[T]) -> Result<Array2<Complex<T>>> {
+        let factor = 1usize << self.early;
+        if y.is_empty() || y.len() < factor {
+            return Err(DspError::TooShort { name: "y", actual: y.len(), needed: factor });
+        }
+        let mut signal = self.decimated_early(y);
+        let mut lengths = signal.len();
+        let mut frames = usize::MAX;
+        for octave in &self.octaves {
+            frames = frames.min(1 + lengths / octave.hop);
+            if octave.halve {
+                lengths = lengths.div_ceil(2);
+            }
+        }
+        let mut out = Array2::zeros((self.params.n_bins, frames));
+        for (i, octave) in self.octaves.iter().enumerate() {
+            let bins = octave.first..octave.first + octave.gains.len();
+            let part = out.slice_mut(s![bins, ..]);
+            let narrow = T::as_f32(&signal).zip(octave.lanes.as_deref());
+            match narrow {
+                Some((signal, fft)) => self.respond_in_lanes(octave, fft, signal, part),
+                None => self.respond(octave, &signal, part)?,
+            }
+            if octave.halve && i + 1 < self.octaves.len() {
+                signal = decimate(&signal, signal.len().div_ceil(2), std::f64::consts::SQRT_2);
+            }
+        }
+        Ok(out)
+    }
+
+    /// The signal of the first octave.
+    fn decimated_early<T: Lane>(&self, y: &[T]) -> Vec<T> {
+        if self.early == 0 {
+            return y.to_vec();
+        }
+        let factor = 1usize << self.early;
+        // soxr rounds the number of samples half up, librosa pads to the next larger with a zero.
+        let n = (y.len() + factor / 2) / factor;
+        let mut signal = y.to_vec();
+        for level in 1..=self.early {
+            let remaining = 1usize << (self.early - level);
+            // The response after the end counts in the next stage.
+            let tail = if remaining > 1 { decimate::REACH } else { 0 };
+            let m = n * remaining + tail;
+            signal = decimate(&signal, m, std::f64::consts::SQRT_2);
+        }
+        signal.resize(y.len().div_ceil(factor), T::zero());
+        signal
+    }
+
+    fn stft(&self, octave: &Octave) -> StftParams {
+        StftParams {
+            window: Window::Boxcar,
+            pad_mode: self.params.pad_mode,
+            ..StftParams::new(octave.basis.n_fft, octave.hop)
+        }
+    }
+
+    /// Filter responses of one octave into `out` `[bins, frames]`, frame by frame.
+    fn respond<T: Lane>(
+        &self,
+        octave: &Octave,
+        signal: &[T],
+        mut out: ArrayViewMut2<Complex<T>>,
+    ) -> Result<()> {
+        let forward = Forward::<T>::new(&self.stft(octave))?;
+        let mut scratch = forward.scratch();
+        for (t, mut column) in out.axis_iter_mut(Axis(1)).enumerate() {
+            let spectrum = forward.spectrum(signal, t, &mut scratch);
+            let filters = octave.basis.rows.iter().zip(&octave.gains);
+            for (((first, weights), gain), out) in filters.zip(&mut column) {
+                let mut sum = Complex::default();
+                for (w, x) in weights.iter().zip(&spectrum[*first..]) {
+                    sum += x * Complex::new(T::of(w.re.into()), T::of(w.im.into()));
+                }
+                *out = sum.scale(T::of(f64::from(*gain)));
+            }
+        }
+        Ok(())
+    }
+
+    /// As [`respond`](Self::respond), sixteen frames at a time.
+    fn respond_in_lanes<T: Lane>(
+        &self,
+        octave: &Octave,
+        fft: &LaneFft,
+        signal: &[f32],
+        mut out: ArrayViewMut2<Complex<T>>,
+    ) {
+        let arch = Arch::new();
+        let n_fft = octave.basis.n_fft;
+        let pad = n_fft / 2;
+        let mut padded = Vec::with_capacity(signal.len() + n_fft);
+        let outside =
+            |i: isize| self.params.pad_mode.index(i, signal.len()).map_or(0.0, |i| signal[i]);
+        padded.extend((0..pad as isize).map(|i| outside(i - pad as isize)));
+        padded.extend_from_slice(signal);
+        padded.extend((0..pad).map(|i| outside((signal.len() + i) as isize)));
+        let window = vec![1.0; n_fft];
+        let mut frames = vec![Row::ZERO; n_fft];
+        let mut spectrum = vec![Row::ZERO; 2 * fft.n_bins()];
+        let mut response = vec![[Row::ZERO; 2]; octave.basis.rows.len()];
+        for slots in Slots::blocks(out.ncols(), 1) {
+            gather(arch, &padded, octave.hop, &window, slots, &mut frames);
+            fft.complex(&mut frames, &mut spectrum);
+            project(arch, &octave.basis, &octave.gains, &spectrum, &mut response);
+            let columns = slots.first..slots.first + slots.len;
+            for (mut row, [re, im]) in
+                out.slice_mut(s![.., columns]).rows_mut().into_iter().zip(&response)
+            {
+                for ((z, re), im) in row.iter_mut().zip(re.0).zip(im.0) {
+                    *z = Complex::new(T::of(re.into()), T::of(im.into()));
+                }
+            }
+        }
+    }
+}
+
+/// Products of every filter with sixteen spectra (real and imaginary rows alternating).
+fn project(arch: Arch, basis: &Basis, gains: &[f32], spectrum: &[Row], response: &mut [[Row; 2]]) {
+    let bins = spectrum.as_chunks::<2>().0;
+    arch.dispatch(
+        #[inline(always)]
+        || {
+            let filters = basis.rows.iter().zip(gains);
+            for (((first, weights), gain), response) in filters.zip(response) {
+                let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
+                for (w, x) in weights.iter().zip(&bins[*first..]) {
+                    for l in 0..LANES {
+                        re[l] += w.re * x[0].0[l] - w.im * x[1].0[l];
+                        im[l] += w.re * x[1].0[l] + w.im * x[0].0[l];
+                    }
+                }
+                *response = [Row(re.map(|x| x * gain)), Row(im.map(|x| x * gain))];
+            }
+        },
+    );
+}
+
+/// Whether the filters `range` at `sr` have the lengths of the octave above, so that its basis
+/// serves them: frequencies and rate have both halved.
+fn same_lengths(
+    wavelets: &Wavelets,
+    range: std::ops::Range<usize>,
+    sr: f64,
+    above: &Octave,
+    base: f64,
+) -> bool {
+    above.halve
+        && above.gains.len() == range.len()
+        && range.len() > 0
+        && base > sr
+        && range.enumerate().all(|(i, k)| {
+            let length = wavelets.length(above.first + i, 2.0 * sr);
+            (wavelets.length(k, sr) - length).abs() <= 1e-9 * length
+        })
+}
+
+/// Halvings of the rate that the highest filter and the hop allow before the first octave.
+fn early_halvings(nyquist: f64, cutoff: f64, hop: usize, n_octaves: usize) -> u32 {
+    let by_rate = ((nyquist / cutoff).log2().ceil() - 2.0).max(0.0) as u32;
+    let by_hop = (hop.trailing_zeros() + 1).saturating_sub(n_octaves as u32);
+    by_rate.min(by_hop)
+}
+
+/// Constant-Q transform `[channels, n_bins, frames]` of `y [channels, samples]`. Channels are
+/// independent.
+///
+/// # Errors
+/// As [`CqtPlan::new`] and [`CqtPlan::transform`], or samples that are not finite.
+pub fn cqt<T: Lane>(y: ArrayView2<T>, p: &CqtParams) -> Result<Array3<Complex<T>>> {
+    let plan = CqtPlan::new(p)?;
+    per_channel(y, |y| plan.transform(y))
+}
+
+/// `each` channel's result, stacked.
+fn per_channel<T: Lane, R: Clone>(
+    y: ArrayView2<T>,
+    each: impl Fn(&[T]) -> Result<Array2<R>>,
+) -> Result<Array3<R>> {
+    require_finite("y", y.iter())?;
+    let y = y.as_standard_layout();
+    let channels = y
+        .rows()
+        .into_iter()
+        .map(|y| each(y.to_slice().expect("standard layout")))
+        .collect::<Result<Vec<_>>>()?;
+    let views: Vec<_> = channels.iter().map(Array2::view).collect();
+    ndarray::stack(Axis(0), &views).map_err(|_| DspError::Shape {
+        name: "y",
+        expected: "at least one channel".into(),
+        actual: y.shape().to_vec(),
+    })
+}

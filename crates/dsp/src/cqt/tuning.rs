@@ -1,0 +1,111 @@
+//! Tuning of a signal, as the constant-Q features estimate it.
+
+use ndarray::ArrayView2;
+use pulp::Arch;
+
+use crate::error::Result;
+use crate::lanes::{LANES, LaneFft, Row, Slots, gather};
+use crate::pitch::{PitchParams, TuningEstimator};
+use crate::real::{Real, require_finite};
+use crate::stft::StftParams;
+use crate::transform::Forward;
+use crate::window::get_window;
+
+/// Transform length of librosa's `estimate_tuning`.
+const N_FFT: usize = 2048;
+const HOP: usize = N_FFT / 4;
+/// Cells of the histogram, in bins.
+const RESOLUTION: f64 = 0.01;
+
+/// Collects the pitches of signals on their magnitude spectra (librosa 0.11 `estimate_tuning` with
+/// its defaults). Tables are made once.
+pub struct SignalTuning {
+    params: PitchParams,
+    window: Vec<f32>,
+    lanes: LaneFft,
+    precise: Forward<f64>,
+}
+
+impl SignalTuning {
+    /// # Errors
+    /// `sr` that is not positive.
+    pub fn new(sr: f64) -> Result<Self> {
+        let stft = StftParams::new(N_FFT, HOP);
+        let window = get_window(stft.window, N_FFT, true);
+        let params = PitchParams::new(sr, N_FFT);
+        TuningEstimator::<f32>::new(params)?;
+        Ok(Self {
+            params,
+            window: window.into_iter().map(|w| w as f32).collect(),
+            lanes: LaneFft::new(N_FFT)?,
+            precise: Forward::new(&stft)?,
+        })
+    }
+
+    /// Deviation from A440 in fractions of a bin, one for all `channels`, in [-0.5, 0.5) and in
+    /// steps of 0.01; `None` without any pitch.
+    ///
+    /// # Errors
+    /// `bins_per_octave = 0`.
+    pub fn estimate<'y, T: Real>(
+        &self,
+        channels: impl IntoIterator<Item = &'y [T]>,
+        bins_per_octave: usize,
+    ) -> Result<Option<f64>> {
+        let mut estimator = TuningEstimator::new(self.params)?;
+        for y in channels {
+            match T::as_f32(y) {
+                Some(narrow) => self.collect_in_lanes(narrow, &mut estimator),
+                None => self.collect(y, &mut estimator),
+            }
+        }
+        estimator.finish(RESOLUTION, bins_per_octave)
+    }
+
+    fn collect<T: Real>(&self, y: &[T], estimator: &mut TuningEstimator<T>) {
+        let mut scratch = self.precise.scratch();
+        for t in 0..self.precise.params().n_frames(y.len()) {
+            let spectrum = self.precise.spectrum(y, t, &mut scratch);
+            let magnitude: Vec<T> = spectrum.iter().map(|z| T::of(z.norm())).collect();
+            estimator.push(&magnitude, None);
+        }
+    }
+
+    fn collect_in_lanes<T: Real>(&self, y: &[f32], estimator: &mut TuningEstimator<T>) {
+        let arch = Arch::new();
+        let pad = N_FFT / 2;
+        let mut padded = vec![0.0; y.len() + N_FFT];
+        padded[pad..pad + y.len()].copy_from_slice(y);
+        let mut frames = vec![Row::ZERO; N_FFT];
+        let mut power = vec![Row::ZERO; self.lanes.n_bins()];
+        let mut magnitudes = vec![T::zero(); LANES * power.len()];
+        for slots in Slots::blocks(self.precise.params().n_frames(y.len()), 1) {
+            gather(arch, &padded, HOP, &self.window, slots, &mut frames);
+            self.lanes.power(&mut frames, &mut power);
+            for (s, magnitude) in
+                magnitudes.chunks_exact_mut(power.len()).take(slots.len).enumerate()
+            {
+                for (m, row) in magnitude.iter_mut().zip(&power) {
+                    *m = T::of(f64::from(row.0[s].sqrt()));
+                }
+                estimator.push(magnitude, None);
+            }
+        }
+    }
+}
+
+/// Tuning of `y [channels, samples]`, one for all channels (`estimate_tuning(y=y)`).
+///
+/// # Errors
+/// As [`SignalTuning`], or samples that are not finite.
+pub fn signal_tuning<T: Real>(
+    y: ArrayView2<T>,
+    sr: f64,
+    bins_per_octave: usize,
+) -> Result<Option<f64>> {
+    require_finite("y", y.iter())?;
+    let y = y.as_standard_layout();
+    let channels = y.rows();
+    let channels = channels.into_iter().map(|y| y.to_slice().expect("standard layout"));
+    SignalTuning::new(sr)?.estimate(channels, bins_per_octave)
+}

@@ -1,0 +1,289 @@
+//! Harmonic-percussive separation by median filtering (librosa 0.11 `decompose.hpss`,
+//! `effects.hpss`, after FitzGerald 2010 and Driedger et al. 2014).
+
+use ndarray::{Array2, Array3, ArrayView2, ArrayView3, s};
+use num_complex::Complex;
+use pulp::Arch;
+
+use crate::error::{DspError, Result};
+use crate::median;
+use crate::real::{Real, require_finite};
+use crate::stft::StftParams;
+use crate::transform::{Forward, Inverse};
+use crate::vector::Lane;
+
+/// Frames that are separated together: one pass of the median network.
+const BLOCK: usize = 16;
+
+/// Parameters of the separation, in librosa's names.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HpssParams {
+    /// Frames under the median filter along time, which keeps harmonic sound.
+    pub kernel_harmonic: usize,
+    /// Bins under the median filter along frequency, which keeps percussive sound.
+    pub kernel_percussive: usize,
+    /// Exponent of the soft masks; infinite for binary masks.
+    pub power: f64,
+    /// Factor by which the percussive estimate is raised in the harmonic mask.
+    pub margin_harmonic: f64,
+    /// Factor by which the harmonic estimate is raised in the percussive mask.
+    pub margin_percussive: f64,
+}
+
+impl Default for HpssParams {
+    fn default() -> Self {
+        Self {
+            kernel_harmonic: 31,
+            kernel_percussive: 31,
+            power: 2.0,
+            margin_harmonic: 1.0,
+            margin_percussive: 1.0,
+        }
+    }
+}
+
+/// Longest median filter; beyond it the window alone would fill memory.
+const LONGEST_KERNEL: usize = 1 << 20;
+
+impl HpssParams {
+    /// Refuses kernels of no or too many values, margins below 1 and powers that are not positive.
+    pub fn check(&self) -> Result<()> {
+        for kernel in [self.kernel_harmonic, self.kernel_percussive] {
+            if !(1..=LONGEST_KERNEL).contains(&kernel) {
+                let allowed = format!("1 to {LONGEST_KERNEL}");
+                return Err(DspError::parameter("kernel_size", kernel, allowed));
+            }
+        }
+        for margin in [self.margin_harmonic, self.margin_percussive] {
+            if margin.is_nan() || margin < 1.0 {
+                return Err(DspError::parameter("margin", margin, "at least 1"));
+            }
+        }
+        if self.power.is_nan() || self.power <= 0.0 {
+            return Err(DspError::parameter("power", self.power, "above 0"));
+        }
+        Ok(())
+    }
+
+    /// Mask value where both estimates vanish.
+    fn at_silence<T: Real>(&self) -> T {
+        let margins = [self.margin_harmonic, self.margin_percussive];
+        T::of(if margins == [1.0, 1.0] { 0.5 } else { 0.0 })
+    }
+
+    /// Turns the median-filtered magnitudes into the masks, in place.
+    fn masks_in_place<T: Real>(&self, harmonic: &mut [T], percussive: &mut [T]) {
+        let margins = (T::of(self.margin_harmonic), T::of(self.margin_percussive));
+        let (silence, power) = (self.at_silence::<T>(), T::of(self.power));
+        let each = |h: &mut T, p: &mut T, mask: &dyn Fn(T, T) -> T| {
+            (*h, *p) = (mask(*h, *p * margins.0), mask(*p, *h * margins.1));
+        };
+        let pairs = harmonic.iter_mut().zip(percussive);
+        if self.power == 2.0 {
+            Arch::new().dispatch(
+                #[inline(always)]
+                || {
+                    for (h, p) in pairs {
+                        let masks = (
+                            soft_mask(*h, *p * margins.0, silence, |x| x * x),
+                            soft_mask(*p, *h * margins.1, silence, |x| x * x),
+                        );
+                        (*h, *p) = masks;
+                    }
+                },
+            );
+        } else if self.power.is_infinite() {
+            let hard = |x, reference| if x > reference { T::one() } else { T::zero() };
+            pairs.for_each(|(h, p)| each(h, p, &hard));
+        } else {
+            let soft = |x, reference| soft_mask(x, reference, silence, |x| x.powf(power));
+            pairs.for_each(|(h, p)| each(h, p, &soft));
+        }
+    }
+}
+
+/// `x^p / (x^p + reference^p)`, scaled against overflow (librosa 0.11 `util.softmask`).
+#[inline(always)]
+fn soft_mask<T: Real>(x: T, reference: T, silence: T, power: impl Fn(T) -> T) -> T {
+    let larger = if x > reference { x } else { reference };
+    let vanish = larger < T::min_positive_value();
+    let scale = if vanish { T::one() } else { larger };
+    let (x, reference) = (power(x / scale), power(reference / scale));
+    if vanish { silence } else { x / (x + reference) }
+}
+
+/// Harmonic and percussive masks, shaped as the magnitudes `s [channels, bins, frames]`. Channels
+/// are independent.
+///
+/// # Errors
+/// Impossible parameters, or magnitudes that are negative or not finite.
+pub fn masks<T: Lane>(s: ArrayView3<T>, p: &HpssParams) -> Result<(Array3<T>, Array3<T>)> {
+    p.check()?;
+    let s = s.as_standard_layout();
+    require_finite("S", s.iter())?;
+    let (mut harmonic, mut percussive) = (Array3::zeros(s.dim()), Array3::zeros(s.dim()));
+    let bins = s.dim().1;
+    for ((s, mut h), mut q) in
+        s.outer_iter().zip(harmonic.outer_iter_mut()).zip(percussive.outer_iter_mut())
+    {
+        median::across(s, p.kernel_harmonic, h.view_mut());
+        median::down(s, p.kernel_percussive, 0..bins, q.view_mut());
+        if h.iter().chain(q.iter()).any(|m| *m < T::zero()) {
+            return Err(DspError::parameter("S", "negative", "magnitudes, 0 or more"));
+        }
+        p.masks_in_place(
+            h.as_slice_mut().expect("a new array"),
+            q.as_slice_mut().expect("a new array"),
+        );
+    }
+    Ok((harmonic, percussive))
+}
+
+/// A component of the separation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// What is steady along time.
+    Harmonic,
+    /// What is spread over frequency.
+    Percussive,
+}
+
+/// Separates recordings; made once for all of them.
+#[derive(Clone)]
+pub struct Separator<T: Real> {
+    forward: Forward<f64>,
+    inverse: Inverse<T>,
+    params: HpssParams,
+    /// Invert the masks instead of the masked spectrum.
+    mask: bool,
+}
+
+impl<T: Lane> Separator<T> {
+    /// `mask = true` inverts the masks alone, as librosa's `mask` argument does.
+    ///
+    /// # Errors
+    /// Impossible parameters.
+    pub fn new(stft: &StftParams, params: HpssParams, mask: bool) -> Result<Self> {
+        params.check()?;
+        Ok(Self { forward: Forward::new(stft)?, inverse: Inverse::new(stft)?, params, mask })
+    }
+
+    /// Writes `parts` of `y` to as many buffers of its length, calls `observe` with each magnitude
+    /// spectrum in turn, and returns them all as `[frames, bins]`.
+    ///
+    /// The complex spectra are kept for the frames under the median filter only.
+    ///
+    /// # Errors
+    /// A signal too short for one frame.
+    ///
+    /// # Panics
+    /// When a buffer has another length.
+    pub fn separate(
+        &self,
+        y: &[T],
+        parts: &mut [(Part, &mut [T])],
+        mut observe: impl FnMut(&[T]),
+    ) -> Result<Array2<T>> {
+        let stft = self.forward.params();
+        let (frames, bins) = (stft.n_frames(y.len()), stft.n_bins());
+        if frames == 0 {
+            let needed = if stft.center { 1 } else { stft.n_fft };
+            return Err(DspError::TooShort { name: "y", actual: y.len(), needed });
+        }
+        let inverted = self.inverse.frames_within(y.len(), frames);
+        for (_, out) in &mut *parts {
+            assert_eq!(out.len(), y.len(), "one output sample per input sample");
+            out.fill(T::zero());
+        }
+        let mut magnitude = Array2::zeros((frames, bins));
+        // Spectra wait for the frames that the filter along time looks ahead.
+        let kept = (BLOCK + self.params.kernel_harmonic).min(frames).next_multiple_of(BLOCK);
+        let mut waiting = Array2::zeros((kept, bins));
+        let (mut scratch, mut inverse) = (self.forward.scratch(), self.inverse.scratch());
+        let mut harmonic = Array2::zeros((BLOCK, bins));
+        let mut percussive = Array2::zeros((BLOCK, bins));
+        let mut analysed = 0;
+        for first in (0..frames).step_by(BLOCK) {
+            let end = frames.min(first + BLOCK);
+            while analysed < frames.min(end + self.params.kernel_harmonic / 2) {
+                let spectrum = self.forward.spectrum(y, analysed, &mut scratch);
+                let mut row = magnitude.row_mut(analysed);
+                let row = row.as_slice_mut().expect("a new array");
+                let mut kept = waiting.row_mut(analysed % kept);
+                round(spectrum, kept.as_slice_mut().expect("a new array"), row);
+                observe(row);
+                analysed += 1;
+            }
+            let n = end - first;
+            let (mut h, mut q) =
+                (harmonic.slice_mut(s![..n, ..]), percussive.slice_mut(s![..n, ..]));
+            median::down(magnitude.view(), self.params.kernel_harmonic, first..end, h.view_mut());
+            let rows = magnitude.slice(s![first..end, ..]);
+            median::across(rows, self.params.kernel_percussive, q.view_mut());
+            self.params.masks_in_place(
+                h.as_slice_mut().expect("whole rows"),
+                q.as_slice_mut().expect("whole rows"),
+            );
+            for t in first..end.min(inverted) {
+                let spectrum = waiting.row(t % kept);
+                for (part, out) in &mut *parts {
+                    let mask = match part {
+                        Part::Harmonic => h.row(t - first),
+                        Part::Percussive => q.row(t - first),
+                    };
+                    if self.mask {
+                        let spectrum = mask.iter().map(|m| Complex::new(*m, T::zero()));
+                        self.inverse.add(spectrum, t, out, &mut inverse);
+                    } else {
+                        let spectrum = spectrum.iter().zip(mask).map(|(z, m)| z.scale(*m));
+                        self.inverse.add(spectrum, t, out, &mut inverse);
+                    }
+                }
+            }
+        }
+        for (_, out) in parts {
+            self.inverse.normalize(inverted, out);
+        }
+        Ok(magnitude)
+    }
+}
+
+/// Rounds a spectrum to `T`, as librosa stores it, and takes the magnitudes of the rounded values.
+fn round<T: Real>(spectrum: &[Complex<f64>], rounded: &mut [Complex<T>], magnitude: &mut [T]) {
+    Arch::new().dispatch(
+        #[inline(always)]
+        || {
+            for ((z, rounded), m) in spectrum.iter().zip(rounded).zip(magnitude) {
+                *rounded = Complex::new(T::of(z.re), T::of(z.im));
+                let (re, im) = (rounded.re.wide(), rounded.im.wide());
+                *m = T::of((re * re + im * im).sqrt());
+            }
+        },
+    );
+}
+
+/// The asked parts of `y [channels, samples]`, each of its shape (librosa 0.11 `effects.hpss`,
+/// `effects.harmonic`, `effects.percussive`). Channels are independent.
+///
+/// # Errors
+/// Impossible parameters, a signal too short for one frame, or samples that are not finite.
+pub fn separate<T: Lane>(
+    y: ArrayView2<T>,
+    stft: &StftParams,
+    params: &HpssParams,
+    mask: bool,
+    parts: &[Part],
+) -> Result<Vec<Array2<T>>> {
+    let separator = Separator::new(stft, *params, mask)?;
+    require_finite("y", y.iter())?;
+    let y = y.as_standard_layout();
+    let mut separated = vec![Array2::zeros(y.dim()); parts.len()];
+    for (c, y) in y.rows().into_iter().enumerate() {
+        let y = y.to_slice().expect("standard layout");
+        let mut rows: Vec<_> = separated.iter_mut().map(|part| part.row_mut(c)).collect();
+        let outputs = rows.iter_mut().map(|row| row.as_slice_mut().expect("a new array"));
+        let mut parts: Vec<_> = parts.iter().copied().zip(outputs).collect();
+        separator.separate(y, &mut parts, |_| {})?;
+    }
+    Ok(separated)
+}

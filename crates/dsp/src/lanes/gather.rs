@@ -1,0 +1,120 @@
+//! Windowed frames of an interleaved signal into rows.
+
+use pulp::Arch;
+
+use super::{LANES, Row};
+
+/// Which (frame, channel) each lane of a block stands for: slot `s` is the `first + s`-th pair in
+/// the order frame by frame, channel by channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Slots {
+    /// Index of the first pair, `frame * channels + channel`.
+    pub first: usize,
+    /// Pairs in use, at most [`LANES`].
+    pub len: usize,
+    /// Channels of the signal.
+    pub channels: usize,
+}
+
+impl Slots {
+    /// The blocks that cover `frames` frames of `channels` channels.
+    pub fn blocks(frames: usize, channels: usize) -> impl Iterator<Item = Slots> {
+        let total = frames * channels;
+        (0..total).step_by(LANES).map(move |first| Slots {
+            first,
+            len: LANES.min(total - first),
+            channels,
+        })
+    }
+
+    /// Frame and channel of slot `s`.
+    #[inline(always)]
+    pub fn pair(&self, s: usize) -> (usize, usize) {
+        ((self.first + s) / self.channels, (self.first + s) % self.channels)
+    }
+}
+
+/// Writes `window[n] * signal[frame * hop + n]` of every slot into `rows[n]`; unused slots are zero.
+///
+/// `signal` is interleaved and starts at the first sample of frame 0.
+pub fn gather(
+    arch: Arch,
+    signal: &[f32],
+    hop: usize,
+    window: &[f32],
+    slots: Slots,
+    rows: &mut [Row],
+) {
+    debug_assert_eq!(window.len(), rows.len());
+    let aligned = slots.len == LANES && slots.first.is_multiple_of(slots.channels);
+    arch.dispatch(|| match slots.channels {
+        1 if aligned => groups::<1, 16>(signal, hop, window, slots, rows),
+        2 if aligned => groups::<2, 8>(signal, hop, window, slots, rows),
+        4 if aligned => groups::<4, 4>(signal, hop, window, slots, rows),
+        8 if aligned => groups::<8, 2>(signal, hop, window, slots, rows),
+        16 if aligned => groups::<16, 1>(signal, hop, window, slots, rows),
+        _ => strided(signal, hop, window, slots, rows),
+    });
+}
+
+/// `FRAMES` whole frames of `CHANNELS` channels fill the lanes.
+#[inline(always)]
+fn groups<const CHANNELS: usize, const FRAMES: usize>(
+    signal: &[f32],
+    hop: usize,
+    window: &[f32],
+    slots: Slots,
+    rows: &mut [Row],
+) {
+    let first = slots.first / CHANNELS;
+    let frames: [&[[f32; CHANNELS]]; FRAMES] = std::array::from_fn(|f| {
+        let start = (first + f) * hop * CHANNELS;
+        signal[start..start + window.len() * CHANNELS].as_chunks::<CHANNELS>().0
+    });
+    let rows = &mut rows[..window.len()];
+    for (n, (row, w)) in rows.iter_mut().zip(window).enumerate() {
+        let groups = row.0.as_chunks_mut::<CHANNELS>().0;
+        for (group, frame) in groups.iter_mut().zip(&frames) {
+            *group = frame[n].map(|x| x * w);
+        }
+    }
+}
+
+/// Any number of channels, and blocks that are not full.
+#[inline(always)]
+fn strided(signal: &[f32], hop: usize, window: &[f32], slots: Slots, rows: &mut [Row]) {
+    rows.fill(Row::ZERO);
+    for s in 0..slots.len {
+        let (frame, channel) = slots.pair(s);
+        let start = frame * hop * slots.channels + channel;
+        let samples = signal[start..].iter().step_by(slots.channels);
+        for ((row, w), x) in rows.iter_mut().zip(window).zip(samples) {
+            row.0[s] = x * w;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_layout_puts_the_same_samples_into_its_slots() {
+        let window: Vec<f32> = (0..32).map(|i| 1.0 + i as f32).collect();
+        for channels in [1, 2, 3, 4, 5, 8, 16, 20] {
+            let signal: Vec<f32> = (0..channels * (32 + 40 * 8)).map(|i| i as f32).collect();
+            for slots in Slots::blocks(37, channels) {
+                let mut rows = vec![Row([f32::NAN; LANES]); 32];
+                gather(Arch::new(), &signal, 8, &window, slots, &mut rows);
+                for s in 0..LANES {
+                    let (frame, channel) = slots.pair(s);
+                    for (n, row) in rows.iter().enumerate() {
+                        let x = signal.get((frame * 8 + n) * channels + channel);
+                        let want = if s < slots.len { x.unwrap() * window[n] } else { 0.0 };
+                        assert_eq!(row.0[s], want);
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,351 @@
+//! pyAudioAnalysis 0.3.14: 34 short-term features, their deltas, and mid-term statistics.
+//!
+//! Reproduced with every quirk, since published models were trained on them: a recording is divided
+//! by 32768 whatever its scale, centred and peak-normalised as a whole; frames are not windowed; the
+//! mel filters sit at half their frequency; most chroma bins are overwritten. All in double
+//! precision. Everything that depends on the rate and the window only is made once per [`PaaPlan`].
+
+mod midterm;
+mod tables;
+
+use std::sync::Arc;
+
+use ndarray::{Array2, ArrayView1};
+use num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
+
+use crate::error::{DspError, Result};
+use crate::real::{Real, require_finite};
+use tables::{ChromaBin, Filter, N_CHROMA, N_MFCC};
+
+pub use midterm::{MidTerm, file_vector};
+pub use tables::paa_fbank;
+
+/// Short-term features per frame.
+pub const N_SHORT: usize = 34;
+const EPS: f64 = f64::EPSILON;
+const BLOCKS: usize = 10;
+
+/// Names of the 34 features in order, as pyAudioAnalysis gives them.
+pub fn short_names() -> Vec<String> {
+    let mut names: Vec<String> = [
+        "zcr",
+        "energy",
+        "energy_entropy",
+        "spectral_centroid",
+        "spectral_spread",
+        "spectral_entropy",
+        "spectral_flux",
+        "spectral_rolloff",
+    ]
+    .map(String::from)
+    .to_vec();
+    names.extend((1..=N_MFCC).map(|i| format!("mfcc_{i}")));
+    names.extend((1..=N_CHROMA).map(|i| format!("chroma_{i}")));
+    names.push("chroma_std".into());
+    names
+}
+
+fn check_rate(sr: f64) -> Result<()> {
+    if sr.is_finite() && sr > 0.0 {
+        return Ok(());
+    }
+    Err(DspError::parameter("sr", sr, "a positive number of hertz"))
+}
+
+/// Tables for one sample rate, window and step (in samples).
+#[derive(Clone)]
+pub struct PaaPlan {
+    sr: f64,
+    window: usize,
+    step: usize,
+    fft: Arc<dyn Fft<f64>>,
+    filters: Vec<Filter>,
+    dct: Array2<f64>,
+    chroma: Vec<ChromaBin>,
+}
+
+impl std::fmt::Debug for PaaPlan {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { sr, window, step, .. } = self;
+        write!(f, "PaaPlan {{ sr: {sr}, window: {window}, step: {step} }}")
+    }
+}
+
+impl PaaPlan {
+    /// Makes the tables.
+    ///
+    /// # Errors
+    /// A step of 0, or a rate or window for which pyAudioAnalysis itself fails: its filters need
+    /// about 6.9 kHz, its chroma code more bins than semitones.
+    pub fn new(sr: f64, window: usize, step: usize) -> Result<Self> {
+        check_rate(sr)?;
+        if step == 0 {
+            return Err(DspError::parameter("step", step, "at least 1"));
+        }
+        let num_fft = window / 2;
+        if num_fft == 0 {
+            return Err(DspError::parameter("window", window, "at least 2 samples"));
+        }
+        Ok(Self {
+            sr,
+            window,
+            step,
+            fft: FftPlanner::new().plan_fft_forward(window),
+            filters: tables::filters(sr, num_fft)?,
+            dct: tables::dct(),
+            chroma: tables::chroma_bins(sr, num_fft)?,
+        })
+    }
+
+    /// Frames of a signal of `n` samples; no padding.
+    pub fn n_frames(&self, n: usize) -> usize {
+        if n < self.window { 0 } else { (n - self.window) / self.step + 1 }
+    }
+
+    /// Short-term features `[34, frames]` of a whole mono recording, or `[68, frames]` with
+    /// `deltas` (pyAudioAnalysis `feature_extraction`). 16-bit counts are what it expects; samples
+    /// in -1..1 work as well, nearly scale-free.
+    ///
+    /// # Errors
+    /// Non-finite samples, or fewer than one window of them.
+    pub fn short_term<T: Real>(&self, y: ArrayView1<T>, deltas: bool) -> Result<Array2<f64>> {
+        require_finite("y", y)?;
+        let frames = self.n_frames(y.len());
+        if frames == 0 {
+            return Err(DspError::TooShort { name: "y", actual: y.len(), needed: self.window });
+        }
+        let signal = normalized(y);
+        let rows = if deltas { 2 * N_SHORT } else { N_SHORT };
+        let mut out = Array2::zeros((rows, frames));
+        let mut frame = Frame::new(self);
+        for t in 0..frames {
+            let start = t * self.step;
+            frame.analyse(self, &signal[start..start + self.window], t == 0);
+            for (i, &v) in frame.features.iter().enumerate() {
+                out[[i, t]] = v;
+                if deltas && t > 0 {
+                    out[[N_SHORT + i, t]] = v - out[[i, t - 1]];
+                }
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// The signal over 32768, without its mean, over its peak.
+fn normalized<T: Real>(y: ArrayView1<T>) -> Vec<f64> {
+    let mut signal: Vec<f64> = y.iter().map(|v| v.wide() / 32768.0).collect();
+    let mean = pairwise_sum(&signal) / signal.len() as f64;
+    let mut peak = 0.0f64;
+    for v in &mut signal {
+        *v -= mean;
+        peak = peak.max(v.abs());
+    }
+    for v in &mut signal {
+        *v /= peak + 1e-10;
+    }
+    signal
+}
+
+/// numpy's summation order, which decides what a constant signal leaves after its mean is taken off.
+fn pairwise_sum(x: &[f64]) -> f64 {
+    if x.len() < 8 {
+        return x.iter().sum();
+    }
+    if x.len() > 128 {
+        let half = x.len() / 2 / 8 * 8;
+        return pairwise_sum(&x[..half]) + pairwise_sum(&x[half..]);
+    }
+    let mut r = [0.0; 8];
+    let blocks = x.chunks_exact(8);
+    let rest = blocks.remainder();
+    for block in blocks {
+        for (sum, v) in r.iter_mut().zip(block) {
+            *sum += v;
+        }
+    }
+    let sum = ((r[0] + r[1]) + (r[2] + r[3])) + ((r[4] + r[5]) + (r[6] + r[7]));
+    rest.iter().fold(sum, |sum, v| sum + v)
+}
+
+/// Working memory of one frame after another.
+struct Frame {
+    features: [f64; N_SHORT],
+    spectrum: Vec<Complex<f64>>,
+    scratch: Vec<Complex<f64>>,
+    /// Magnitudes of this frame and the sum of them; the same of the frame before.
+    magnitude: Vec<f64>,
+    total: f64,
+    previous: Vec<f64>,
+    previous_total: f64,
+    power: Vec<f64>,
+}
+
+impl Frame {
+    fn new(plan: &PaaPlan) -> Self {
+        let bins = plan.window / 2;
+        Self {
+            features: [0.0; N_SHORT],
+            spectrum: vec![Complex::default(); plan.window],
+            scratch: vec![Complex::default(); plan.fft.get_inplace_scratch_len()],
+            magnitude: vec![0.0; bins],
+            total: 0.0,
+            previous: vec![0.0; bins],
+            previous_total: 0.0,
+            power: vec![0.0; bins],
+        }
+    }
+
+    fn analyse(&mut self, plan: &PaaPlan, x: &[f64], first: bool) {
+        std::mem::swap(&mut self.magnitude, &mut self.previous);
+        self.previous_total = self.total;
+        for (z, &v) in self.spectrum.iter_mut().zip(x) {
+            *z = Complex::new(v, 0.0);
+        }
+        plan.fft.process_with_scratch(&mut self.spectrum, &mut self.scratch);
+        let bins = self.magnitude.len() as f64;
+        for ((m, p), z) in self.magnitude.iter_mut().zip(&mut self.power).zip(&self.spectrum) {
+            *m = z.norm_sqr().sqrt() / bins;
+            *p = *m * *m;
+        }
+        self.total = sum(self.magnitude.iter().map(|m| m + EPS));
+
+        let energy = sum(x.iter().map(|v| v * v));
+        let spectral_energy = sum(self.power.iter().copied());
+        self.features[0] = zero_crossing_rate(x);
+        self.features[1] = energy / x.len() as f64;
+        self.features[2] = block_entropy(x, energy);
+        (self.features[3], self.features[4]) = self.centroid_and_spread(plan.sr);
+        self.features[5] = block_entropy(&self.magnitude, spectral_energy);
+        self.features[6] = if first { 0.0 } else { self.flux() };
+        self.features[7] = self.rolloff(spectral_energy);
+        self.cepstrum(plan);
+        self.chroma(plan, spectral_energy);
+    }
+
+    /// Of the magnitudes relative to the largest; frequencies are one bin high.
+    fn centroid_and_spread(&self, sr: f64) -> (f64, f64) {
+        let n = self.magnitude.len();
+        let width = sr / (2.0 * n as f64);
+        let max = self.magnitude.iter().copied().fold(0.0, f64::max);
+        let scale = if max == 0.0 { EPS } else { max };
+        let frequency = |k: usize| (k + 1) as f64 * width;
+        let weights = || self.magnitude.iter().map(|m| m / scale).enumerate();
+        let total = sum(weights().map(|(_, w)| w)) + EPS;
+        let centroid = sum(weights().map(|(k, w)| frequency(k) * w)) / total;
+        let spread =
+            (sum(weights().map(|(k, w)| (frequency(k) - centroid).powi(2) * w)) / total).sqrt();
+        (centroid / (sr / 2.0), spread / (sr / 2.0))
+    }
+
+    fn flux(&self) -> f64 {
+        let pairs = self.magnitude.iter().zip(&self.previous);
+        sum(pairs.map(|(m, p)| (m / self.total - p / self.previous_total).powi(2)))
+    }
+
+    fn rolloff(&self, energy: f64) -> f64 {
+        let threshold = 0.90 * energy;
+        let mut running = 0.0;
+        let reached = self.power.iter().position(|p| {
+            running += p;
+            running + EPS > threshold
+        });
+        reached.map_or(0.0, |k| k as f64 / self.power.len() as f64)
+    }
+
+    fn cepstrum(&mut self, plan: &PaaPlan) {
+        let mel: Vec<f64> = plan
+            .filters
+            .iter()
+            .map(|f| {
+                let bins = &self.magnitude[f.first..f.first + f.weights.len()];
+                (sum(f.weights.iter().zip(bins).map(|(w, m)| w * m)) + EPS).log10()
+            })
+            .collect();
+        for (slot, row) in self.features[8..8 + N_MFCC].iter_mut().zip(plan.dct.outer_iter()) {
+            *slot = row.iter().zip(&mel).map(|(d, m)| d * m).sum();
+        }
+    }
+
+    fn chroma(&mut self, plan: &PaaPlan, energy: f64) {
+        let mut classes = [0.0; N_CHROMA];
+        for b in &plan.chroma {
+            classes[b.class] += self.power[b.bin] / b.divisor;
+        }
+        let scale = if energy == 0.0 { EPS } else { energy };
+        for c in &mut classes {
+            *c /= scale;
+        }
+        let mean = classes.iter().sum::<f64>() / N_CHROMA as f64;
+        let variance = classes.iter().map(|c| (c - mean).powi(2)).sum::<f64>() / N_CHROMA as f64;
+        self.features[21..21 + N_CHROMA].copy_from_slice(&classes);
+        self.features[33] = variance.sqrt();
+    }
+}
+
+/// A sum in eight interleaved parts: quick, and closer than one after another.
+fn sum(values: impl Iterator<Item = f64>) -> f64 {
+    let mut parts = [0.0; 8];
+    for (i, v) in values.enumerate() {
+        parts[i % 8] += v;
+    }
+    parts.iter().sum()
+}
+
+/// A zero sample counts as half a crossing on each side.
+fn zero_crossing_rate(x: &[f64]) -> f64 {
+    let sign = |v: f64| i32::from(v > 0.0) - i32::from(v < 0.0);
+    let changes: i32 = x.windows(2).map(|w| (sign(w[1]) - sign(w[0])).abs()).sum();
+    f64::from(changes) / 2.0 / (x.len() as f64 - 1.0)
+}
+
+/// Entropy of the energies of ten blocks relative to the energy of all (a tail that fills no block
+/// counts in the total only).
+fn block_entropy(x: &[f64], energy: f64) -> f64 {
+    let len = x.len() / BLOCKS;
+    let terms = (0..BLOCKS).map(|b| {
+        let share = sum(x[b * len..(b + 1) * len].iter().map(|v| v * v)) / (energy + EPS);
+        share * (share + EPS).log2()
+    });
+    -terms.sum::<f64>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array1;
+
+    #[test]
+    fn shapes_and_refusals() {
+        let plan = PaaPlan::new(44100.0, 2205, 2205).unwrap();
+        let y = Array1::from_shape_fn(10_000, |i| ((i * i % 977) as f64 - 488.0) / 500.0);
+        let f = plan.short_term(y.view(), true).unwrap();
+        assert_eq!(f.dim(), (68, 4));
+        assert!(f.column(0).iter().skip(N_SHORT).all(|&d| d == 0.0));
+        assert!((f[[34, 2]] - (f[[0, 2]] - f[[0, 1]])).abs() < 1e-15);
+        assert_eq!(short_names().len(), N_SHORT);
+        assert!(PaaPlan::new(44100.0, 200, 200).is_err());
+        assert!(PaaPlan::new(6000.0, 600, 600).is_err());
+        assert!(PaaPlan::new(44100.0, 2205, 0).is_err());
+        assert!(plan.short_term(y.slice(ndarray::s![..100]), true).is_err());
+    }
+
+    #[test]
+    fn silence_is_finite_and_a_tone_is_where_it_should_be() {
+        let plan = PaaPlan::new(16000.0, 800, 400).unwrap();
+        let silence = plan.short_term(Array1::<f32>::zeros(4000).view(), true).unwrap();
+        assert!(silence.iter().all(|v| v.is_finite()));
+        let tone = Array1::from_shape_fn(4000, |i| (i as f64 * 0.1).sin());
+        let f = plan.short_term(tone.view(), false).unwrap();
+        // 0.1 rad per sample is 0.0318 of the Nyquist frequency.
+        assert!((f[[7, 1]] - 0.0318).abs() < 0.003);
+        assert!((f[[0, 1]] - 0.0318).abs() < 0.003);
+    }
+
+    #[test]
+    fn pairwise_order() {
+        let x: Vec<f64> = (0..1000).map(|i| 1.0 / (i as f64 + 1.0)).collect();
+        assert!((pairwise_sum(&x) - 7.485470860550345).abs() < 1e-14);
+    }
+}

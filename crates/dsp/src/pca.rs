@@ -1,0 +1,170 @@
+//! Principal components (scikit-learn 1.9 `PCA(svd_solver="full")`).
+
+use linfa_linalg::eigh::{EigSort, Eigh};
+use ndarray::{Array1, Array2, ArrayView2, Axis};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{DspError, Result};
+use crate::real::require_finite;
+
+/// A fitted projection.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Pca {
+    /// Column means of the training data `[columns]`.
+    pub mean: Array1<f64>,
+    /// Orthonormal directions `[components, columns]`, largest variance first. The largest entry of
+    /// each is positive, which makes the signs deterministic.
+    pub components: Array2<f64>,
+    /// Variance along each (denominator rows - 1).
+    pub explained_variance: Array1<f64>,
+}
+
+impl Pca {
+    /// Fits `n_components` directions to `x [rows, columns]`.
+    ///
+    /// The eigenvectors come from the smaller of the two Gram matrices; directions without variance
+    /// (fewer rows than components need) are completed to an orthonormal set.
+    ///
+    /// # Errors
+    /// Fewer than two rows, `n_components` of 0 or above the smaller side, non-finite values.
+    pub fn fit(x: ArrayView2<f64>, n_components: usize) -> Result<Self> {
+        let (rows, columns) = x.dim();
+        if rows < 2 {
+            let expected = "at least two rows".into();
+            return Err(DspError::Shape { name: "X", expected, actual: x.shape().to_vec() });
+        }
+        let most = rows.min(columns);
+        if n_components == 0 || n_components > most {
+            let allowed = format!("1 to {most}, the smaller side of X");
+            return Err(DspError::parameter("n_components", n_components, allowed));
+        }
+        require_finite("X", x)?;
+        let mean = x.sum_axis(Axis(0)) / rows as f64;
+        let centred = &x - &mean;
+        let tall = rows > columns;
+        let gram = if tall { centred.t().dot(&centred) } else { centred.dot(&centred.t()) };
+        let (_, vectors) = gram
+            .eigh()
+            .map_err(|e| DspError::parameter("X", e, "data whose eigenvectors converge"))?
+            .sort_eig(EigSort::Desc);
+
+        let mut components = Array2::<f64>::zeros((n_components, columns));
+        let mut explained_variance = Array1::zeros(n_components);
+        let mut largest = 0.0f64;
+        for k in 0..n_components {
+            let vector = vectors.column(k);
+            let direction =
+                if tall { vector.to_owned() } else { centred.t().dot(&vector) };
+            let spread = if tall {
+                centred.dot(&vector).mapv(|v| v * v).sum().sqrt()
+            } else {
+                direction.dot(&direction).sqrt()
+            };
+            largest = largest.max(spread);
+            let empty = spread <= largest * rows.max(columns) as f64 * f64::EPSILON;
+            let unit = if empty { None } else { orthonormal(direction, &components, k) };
+            let mut unit = match unit {
+                Some(unit) => unit,
+                None => completed(&components, k),
+            };
+            let peak = unit.iter().fold(0.0f64, |m, &v| if v.abs() > m.abs() { v } else { m });
+            if peak < 0.0 {
+                unit.mapv_inplace(|v| -v);
+            }
+            components.row_mut(k).assign(&unit);
+            explained_variance[k] = spread * spread / (rows - 1) as f64;
+        }
+        Ok(Self { mean, components, explained_variance })
+    }
+
+    /// Coordinates `[rows, components]` of `x [rows, columns]`; `whiten` divides each by its
+    /// standard deviation.
+    ///
+    /// # Errors
+    /// Another number of columns than the fit had.
+    pub fn project(&self, x: ArrayView2<f64>, whiten: bool) -> Result<Array2<f64>> {
+        if x.ncols() != self.mean.len() || self.components.ncols() != self.mean.len() {
+            let expected = format!("{} columns", self.mean.len());
+            return Err(DspError::Shape { name: "X", expected, actual: x.shape().to_vec() });
+        }
+        let mut z = (&x - &self.mean).dot(&self.components.t());
+        if whiten {
+            z /= &self.explained_variance.mapv(f64::sqrt);
+        }
+        Ok(z)
+    }
+}
+
+/// `direction` made orthogonal to the first `k` components and of unit length; `None` if nothing is
+/// left of it.
+fn orthonormal(direction: Array1<f64>, components: &Array2<f64>, k: usize) -> Option<Array1<f64>> {
+    let before = direction.dot(&direction).sqrt();
+    let mut unit = direction;
+    for _ in 0..2 {
+        for row in components.outer_iter().take(k) {
+            let overlap = row.dot(&unit);
+            unit.scaled_add(-overlap, &row);
+        }
+    }
+    let norm = unit.dot(&unit).sqrt();
+    (norm > before * 1e-8 && norm > 0.0).then(|| unit / norm)
+}
+
+/// The first coordinate axis that the first `k` components leave room for, made orthonormal.
+fn completed(components: &Array2<f64>, k: usize) -> Array1<f64> {
+    let columns = components.ncols();
+    (0..columns)
+        .find_map(|axis| {
+            let mut direction = Array1::zeros(columns);
+            direction[axis] = 1.0;
+            orthonormal(direction, components, k).filter(|u| u[axis].abs() > 1e-6)
+        })
+        .expect("k is below the number of columns, so some axis is not spanned")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(rows: usize, columns: usize) -> Array2<f64> {
+        Array2::from_shape_fn((rows, columns), |(i, j)| {
+            ((i * 31 + j * 17 + i * j * 7) % 101) as f64 / 50.0 - 1.0 + (i * (j + 1)) as f64 * 0.01
+        })
+    }
+
+    #[test]
+    fn wide_and_tall_agree_with_the_covariance() {
+        for (rows, columns) in [(12, 30), (30, 12)] {
+            let x = sample(rows, columns);
+            let pca = Pca::fit(x.view(), 5).unwrap();
+            let eye = pca.components.dot(&pca.components.t());
+            for ((i, j), v) in eye.indexed_iter() {
+                assert!((v - f64::from(u8::from(i == j))).abs() < 1e-12);
+            }
+            let z = pca.project(x.view(), false).unwrap();
+            for k in 0..5 {
+                let variance = z.column(k).mapv(|v| v * v).sum() / (rows - 1) as f64;
+                assert!((variance / pca.explained_variance[k] - 1.0).abs() < 1e-10);
+            }
+            let white = pca.project(x.view(), true).unwrap();
+            assert!((white.column(0).mapv(|v| v * v).sum() / (rows - 1) as f64 - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn directions_without_variance_are_completed() {
+        let pca = Pca::fit(sample(4, 9).view(), 4).unwrap();
+        assert!(pca.explained_variance[3] < 1e-20);
+        let flat = Pca::fit(Array2::ones((3, 5)).view(), 3).unwrap();
+        let eye = flat.components.dot(&flat.components.t());
+        assert!((eye.diag().sum() - 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn refusals() {
+        assert!(Pca::fit(sample(1, 4).view(), 1).is_err());
+        assert!(Pca::fit(sample(5, 4).view(), 5).is_err());
+        let pca = Pca::fit(sample(5, 4).view(), 2).unwrap();
+        assert!(pca.project(sample(2, 3).view(), false).is_err());
+    }
+}

@@ -1,0 +1,234 @@
+//! Sample-rate conversion equal to librosa's default (`res_type="soxr_hq"`: libsoxr, 20 bits,
+//! linear phase), and resampy's `kaiser_best` and `kaiser_fast` of librosa up to 0.9.
+//!
+//! A [`ResamplePlan`] holds the filters of one pair of rates. It runs in three ways with the same
+//! bits: a whole array ([`resample`]), a stream in blocks of any size ([`ResampleStream`]), and any
+//! range of outputs of a long recording ([`ResamplePlan::segment`]).
+
+mod design;
+mod kernel;
+mod sinc;
+mod stage;
+mod stream;
+
+use std::ops::Range;
+
+use ndarray::{Array2, ArrayView2};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{DspError, Result};
+use crate::real::{Real, require_finite};
+use stage::{Frames, Stage};
+
+pub use sinc::resample_windowed_sinc;
+pub use stream::ResampleStream;
+
+/// The converter, by librosa's name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ResType {
+    /// libsoxr's high quality, librosa's default since 0.10.
+    #[default]
+    SoxrHq,
+    /// resampy's `kaiser_best`, librosa's default up to 0.9.
+    KaiserBest,
+    /// resampy's `kaiser_fast`.
+    KaiserFast,
+}
+
+/// The largest ratio of two rates in either direction.
+const MAX_RATIO: f64 = 65536.0;
+
+pub(crate) fn check_rates(orig_sr: f64, target_sr: f64) -> Result<()> {
+    for (name, value) in [("orig_sr", orig_sr), ("target_sr", target_sr)] {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(DspError::parameter(name, value, "a positive number of hertz"));
+        }
+    }
+    let ratio = target_sr / orig_sr;
+    if !(1.0 / MAX_RATIO..=MAX_RATIO).contains(&ratio) {
+        let allowed = format!("within a factor of {MAX_RATIO} of orig_sr ({orig_sr})");
+        return Err(DspError::parameter("target_sr", target_sr, allowed));
+    }
+    Ok(())
+}
+
+/// The filters that convert one rate to another.
+///
+/// Outputs are numbered from 0; output `o` lies at input time `o * orig_sr / target_sr`, and the
+/// signal is zero outside its samples.
+#[derive(Debug, Clone)]
+pub struct ResamplePlan {
+    orig_sr: f64,
+    target_sr: f64,
+    stages: Vec<Stage>,
+}
+
+impl ResamplePlan {
+    /// Designs the filters (milliseconds: make one plan per pair of rates). Equal rates pass the
+    /// signal through.
+    ///
+    /// # Errors
+    /// A rate that is not positive and finite, or rates more than a factor of 65536 apart.
+    pub fn new(orig_sr: f64, target_sr: f64) -> Result<Self> {
+        check_rates(orig_sr, target_sr)?;
+        let chain =
+            if orig_sr == target_sr { Vec::new() } else { design::chain(orig_sr / target_sr) };
+        Ok(Self { orig_sr, target_sr, stages: chain.iter().map(Stage::new).collect() })
+    }
+
+    /// Input rate in hertz.
+    pub fn orig_sr(&self) -> f64 {
+        self.orig_sr
+    }
+
+    /// Output rate in hertz.
+    pub fn target_sr(&self) -> f64 {
+        self.target_sr
+    }
+
+    /// Frames out of `n` frames in: `ceil(n * target_sr / orig_sr)`, librosa's rule (`fix=True`).
+    pub fn output_len(&self, n: u64) -> u64 {
+        (n as f64 * (self.target_sr / self.orig_sr)).ceil() as u64
+    }
+
+    /// Frames that the filters themselves give for `n` frames in: the nearest integer, so that the
+    /// last one of [`Self::output_len`] is sometimes an exact zero.
+    pub fn filtered_len(&self, n: u64) -> u64 {
+        if self.stages.is_empty() {
+            return n;
+        }
+        (n as f64 / (self.orig_sr / self.target_sr) + 0.5) as u64
+    }
+
+    /// Input frames that cover what outputs `out` depend on. It may begin before 0 and end after
+    /// the signal, where samples are zero.
+    pub fn input_range(&self, out: Range<u64>) -> Range<i64> {
+        let mut range = out.start as i64..out.end as i64;
+        for stage in self.stages.iter().rev() {
+            range = stage.input_range(&clip(&range));
+        }
+        range
+    }
+
+    /// Outputs `out` (interleaved) of a recording of `channels` channels, given the frames from
+    /// number `start` on that lie in [`Self::input_range`] and in the recording; the same bits as a
+    /// conversion of the whole.
+    ///
+    /// # Errors
+    /// `channels` is 0 or does not divide `input`.
+    pub fn segment(
+        &self,
+        channels: usize,
+        out: Range<u64>,
+        input: &[f32],
+        start: u64,
+    ) -> Result<Vec<f32>> {
+        check_interleaved(channels, input)?;
+        let mut range = out.start as i64..out.end as i64;
+        let mut steps = Vec::with_capacity(self.stages.len());
+        for stage in self.stages.iter().rev() {
+            let from = stage.input_range(&clip(&range));
+            steps.push((stage, std::mem::replace(&mut range, from.clone()), from));
+        }
+        let mut data = covering(channels, &range, input, start as i64);
+        for (stage, to, from) in steps.into_iter().rev() {
+            let out = clip(&to);
+            let mut next = vec![0.0; (out.start as i64 - to.start) as usize * channels];
+            if !out.is_empty() {
+                let input = Frames { data: &data, start: from.start };
+                stage.run(channels, out, input, &mut next);
+            }
+            data = next;
+        }
+        Ok(data)
+    }
+}
+
+/// The part of a range of positions that exists: a stage gives nothing before its output 0.
+fn clip(range: &Range<i64>) -> Range<u64> {
+    range.start.max(0) as u64..range.end.max(0) as u64
+}
+
+/// Frames `range` cut from `input`, which begins at frame `start`; zeros where it has none.
+fn covering(channels: usize, range: &Range<i64>, input: &[f32], start: i64) -> Vec<f32> {
+    let mut data = vec![0.0; (range.end - range.start).max(0) as usize * channels];
+    let end = start + (input.len() / channels) as i64;
+    let (from, to) = (range.start.max(start), range.end.min(end));
+    if from < to {
+        let source = &input[(from - start) as usize * channels..(to - start) as usize * channels];
+        let at = (from - range.start) as usize * channels;
+        data[at..at + source.len()].copy_from_slice(source);
+    }
+    data
+}
+
+fn check_interleaved(channels: usize, input: &[f32]) -> Result<()> {
+    if channels == 0 || !input.len().is_multiple_of(channels) {
+        return Err(DspError::Shape {
+            name: "input",
+            expected: format!("whole frames of {channels} channels"),
+            actual: vec![input.len()],
+        });
+    }
+    Ok(())
+}
+
+/// `y [channels, samples]` at another rate (librosa 0.11 `resample`). Equal rates copy `y`.
+///
+/// `fix` makes the length `ceil(samples * target_sr / orig_sr)`, by a final zero where the filters
+/// give one sample less; `scale` divides by the square root of the ratio. The filters run in single
+/// precision for `f64` input too, as libsoxr's do.
+///
+/// # Errors
+/// Impossible rates, or non-finite samples.
+pub fn resample<T: Real>(
+    y: ArrayView2<T>,
+    orig_sr: f64,
+    target_sr: f64,
+    res_type: ResType,
+    fix: bool,
+    scale: bool,
+) -> Result<Array2<T>> {
+    check_rates(orig_sr, target_sr)?;
+    require_finite("y", y)?;
+    if orig_sr == target_sr {
+        return Ok(y.to_owned());
+    }
+    let ratio = target_sr / orig_sr;
+    let mut out = match res_type {
+        ResType::SoxrHq => resample_hq(y, &ResamplePlan::new(orig_sr, target_sr)?),
+        ResType::KaiserBest | ResType::KaiserFast => {
+            resample_windowed_sinc(y, orig_sr, target_sr, res_type == ResType::KaiserFast)?
+        }
+    };
+    let n_out = (y.ncols() as f64 * ratio).ceil() as usize;
+    if fix && out.ncols() != n_out {
+        let mut fixed = Array2::zeros((out.nrows(), n_out));
+        let common = n_out.min(out.ncols());
+        fixed.slice_mut(ndarray::s![.., ..common]).assign(&out.slice(ndarray::s![.., ..common]));
+        out = fixed;
+    }
+    if scale {
+        out.mapv_inplace(|v| T::of(v.wide() / ratio.sqrt()));
+    }
+    Ok(out)
+}
+
+fn resample_hq<T: Real>(y: ArrayView2<T>, plan: &ResamplePlan) -> Array2<T> {
+    let (channels, n) = y.dim();
+    let count = plan.filtered_len(n as u64);
+    let mut out = Array2::zeros((channels, count as usize));
+    for (signal, mut row) in y.outer_iter().zip(out.outer_iter_mut()) {
+        let samples: Vec<f32> = signal.iter().map(|v| v.wide() as f32).collect();
+        let converted =
+            plan.segment(1, 0..count, &samples, 0).expect("one channel is whole frames");
+        for (slot, v) in row.iter_mut().zip(converted) {
+            *slot = T::of(f64::from(v));
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,291 @@
+//! One filter of the chain, ready to run at any output position.
+
+use std::ops::Range;
+
+use pulp::{Simd, WithSimd};
+
+use super::design::{Design, PolyDesign};
+use super::kernel::{Correlate, Plane, dispatch};
+
+/// A filter with single-precision coefficients. Outputs are numbered from 0 at input sample 0.
+#[derive(Debug, Clone)]
+pub(super) enum Stage {
+    /// Rational rate change.
+    Fir(Fir),
+    /// Tabulated interpolator.
+    Poly(Poly),
+}
+
+/// Interleaved frames with the absolute number of the first one.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Frames<'a> {
+    pub data: &'a [f32],
+    pub start: i64,
+}
+
+impl Stage {
+    pub fn new(design: &Design) -> Self {
+        match design {
+            Design::Fir { up, down, taps } => Self::Fir(Fir::new(*up, *down, taps)),
+            Design::Poly(design) => Self::Poly(Poly::new(design)),
+        }
+    }
+
+    /// Input frames that cover what outputs `out` depend on (may begin before 0).
+    pub fn input_range(&self, out: &Range<u64>) -> Range<i64> {
+        if out.is_empty() {
+            return 0..0;
+        }
+        let (first, last) = (self.end(out.start), self.end(out.end - 1));
+        first - self.reach() as i64..last
+    }
+
+    /// One past the last input frame of output `o`; never falls as `o` rises.
+    fn end(&self, o: u64) -> i64 {
+        match self {
+            Self::Fir(f) => f.end(o),
+            Self::Poly(p) => p.end(o),
+        }
+    }
+
+    /// Input frames of any one output, at most.
+    fn reach(&self) -> usize {
+        match self {
+            Self::Fir(f) => f.residues.iter().map(|r| r.len).max().unwrap_or(0),
+            Self::Poly(p) => p.taps,
+        }
+    }
+
+    /// Outputs that can be computed when inputs before `end` are known.
+    pub fn available(&self, end: i64) -> u64 {
+        // Outputs at `first + o * step` before `limit`, all in fractions of a frame.
+        let end = i128::from(end);
+        let (limit, first, step) = match self {
+            Self::Fir(f) => (end * f.up as i128, f.centre as i128, f.down as i128),
+            Self::Poly(p) => {
+                let limit = (end - (p.taps / 2) as i128) * i128::from(p.unit);
+                (limit, i128::from(p.first), i128::from(p.step))
+            }
+        };
+        ((limit - first + step - 1) / step).max(0) as u64
+    }
+
+    /// Appends outputs `out` (interleaved) computed from `input`, which covers
+    /// [`Self::input_range`].
+    pub fn run(&self, channels: usize, out: Range<u64>, input: Frames, to: &mut Vec<f32>) {
+        match self {
+            Self::Fir(f) => f.run(channels, out, input, to),
+            Self::Poly(p) => {
+                let base = to.len();
+                to.resize(base + (out.end - out.start) as usize * channels, 0.0);
+                dispatch(Interpolate {
+                    poly: p,
+                    channels,
+                    first: out.start,
+                    input,
+                    out: &mut to[base..],
+                });
+            }
+        }
+    }
+}
+
+/// Rational rate change `up / down`: output `q * up + r` is a plain filter
+/// of the residue's own.
+#[derive(Debug, Clone)]
+pub(super) struct Fir {
+    up: usize,
+    down: usize,
+    centre: usize,
+    residues: Vec<Residue>,
+}
+
+#[derive(Debug, Clone)]
+struct Residue {
+    len: usize,
+    /// Taps that meet frames `m + j * down` of the `len` frames under an output, for `m < down`.
+    phases: Vec<Vec<f32>>,
+}
+
+impl Fir {
+    fn new(up: usize, down: usize, taps: &[f64]) -> Self {
+        let centre = taps.len() / 2;
+        let residues = (0..up)
+            .map(|r| {
+                let first = (r * down + centre) % up;
+                let own: Vec<f32> =
+                    taps.iter().skip(first).step_by(up).rev().map(|&t| t as f32).collect();
+                let phases = (0..down)
+                    .map(|m| own.iter().skip(m).step_by(down).copied().collect())
+                    .collect();
+                Residue { len: own.len(), phases }
+            })
+            .collect();
+        Self { up, down, centre, residues }
+    }
+
+    fn end(&self, o: u64) -> i64 {
+        ((o * self.down as u64 + self.centre as u64) / self.up as u64) as i64 + 1
+    }
+
+    fn run(&self, channels: usize, out: Range<u64>, input: Frames, to: &mut Vec<f32>) {
+        let count = (out.end - out.start) as usize;
+        let base = to.len();
+        to.resize(base + count * channels, 0.0);
+        let to = &mut to[base..];
+        // Frames by phase, so that the samples under one tap lie side by side.
+        let planes = if self.down == 1 { Vec::new() } else { self.split(channels, input) };
+        let mut scratch = Vec::new();
+        for r in 0..self.up.min(count) {
+            let first = out.start + r as u64;
+            let residue = &self.residues[(first % self.up as u64) as usize];
+            let outputs = (count - r).div_ceil(self.up);
+            let skip = (self.end(first) - residue.len as i64 - input.start) as usize;
+            let parts: Vec<Plane> = residue
+                .phases
+                .iter()
+                .enumerate()
+                .map(|(m, taps)| {
+                    let at = skip + m;
+                    let samples = if self.down == 1 {
+                        &input.data[at * channels..]
+                    } else {
+                        &planes[at % self.down][at / self.down * channels..]
+                    };
+                    Plane { samples, taps }
+                })
+                .collect();
+            if self.up == 1 {
+                dispatch(Correlate { planes: &parts, stride: channels, out: to });
+            } else {
+                scratch.resize(outputs * channels, 0.0);
+                dispatch(Correlate { planes: &parts, stride: channels, out: &mut scratch });
+                let slots = to.chunks_exact_mut(channels).skip(r).step_by(self.up);
+                for (slot, frame) in slots.zip(scratch.chunks_exact(channels)) {
+                    slot.copy_from_slice(frame);
+                }
+            }
+        }
+    }
+
+    /// Plane `m` holds frames `m, m + down, ...` of `input`.
+    fn split(&self, channels: usize, input: Frames) -> Vec<Vec<f32>> {
+        let frames = input.data.len() / channels;
+        (0..self.down)
+            .map(|m| {
+                let mut plane = Vec::with_capacity(frames.div_ceil(self.down) * channels);
+                if channels == 1 {
+                    plane.extend(input.data.iter().skip(m).step_by(self.down));
+                } else {
+                    for frame in input.data.chunks_exact(channels).skip(m).step_by(self.down) {
+                        plane.extend_from_slice(frame);
+                    }
+                }
+                plane
+            })
+            .collect()
+    }
+}
+
+/// A tabulated interpolator.
+#[derive(Debug, Clone)]
+pub(super) struct Poly {
+    taps: usize,
+    order: usize,
+    first: u64,
+    step: u64,
+    /// Position units per input frame.
+    unit: u64,
+    /// Positions per tabulated phase.
+    grain: u64,
+    /// `[phase][order + 1][tap]`: coefficients of the polynomial in the rest of the position.
+    table: Vec<f32>,
+}
+
+impl Poly {
+    fn new(design: &PolyDesign) -> Self {
+        let PolyDesign { taps, phases, order, .. } = *design;
+        let unit = if order == 0 { phases as u64 } else { 1 << 32 };
+        let value = |i: usize| design.prototype.get(i).copied().unwrap_or(0.0);
+        let mut table = Vec::with_capacity(taps * phases * (order + 1));
+        for phase in 0..phases {
+            for k in 0..=order {
+                for tap in (0..taps).rev() {
+                    let at = tap * phases + phase;
+                    let (f0, f1, f2) = (value(at), value(at + 1), value(at + 2));
+                    let second = 0.5 * (f2 + f0) - f1;
+                    table.push(match (order, k) {
+                        (_, 0) => f0,
+                        (1, _) => f1 - f0,
+                        (_, 1) => f1 - f0 - second,
+                        _ => second,
+                    } as f32);
+                }
+            }
+        }
+        let (first, step) = (design.first, design.step);
+        Self { taps, order, first, step, unit, grain: unit / phases as u64, table }
+    }
+
+    /// Frame and rest of the position of output `o`.
+    fn position(&self, o: u64) -> (i64, u64) {
+        let at = u128::from(self.first) + u128::from(o) * u128::from(self.step);
+        ((at / u128::from(self.unit)) as i64, (at % u128::from(self.unit)) as u64)
+    }
+
+    fn end(&self, o: u64) -> i64 {
+        self.position(o).0 + (self.taps / 2) as i64 + 1
+    }
+}
+
+struct Interpolate<'a> {
+    poly: &'a Poly,
+    channels: usize,
+    first: u64,
+    input: Frames<'a>,
+    out: &'a mut [f32],
+}
+
+impl WithSimd for Interpolate<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        let Self { poly, channels, first, input, out } = self;
+        let Poly { taps, order, step, unit, grain, .. } = *poly;
+        let (mut frame, mut rest) = poly.position(first);
+        let reach = (taps / 2) as i64 + 1 - taps as i64;
+        let mut coefficients = vec![0.0f32; taps];
+        for slots in out.chunks_exact_mut(channels) {
+            let from = (frame + reach - input.start) as usize * channels;
+            let samples = &input.data[from..from + taps * channels];
+            let phase = (rest / grain) as usize;
+            let table = &poly.table[phase * taps * (order + 1)..(phase + 1) * taps * (order + 1)];
+            let taps = if order == 0 {
+                table
+            } else {
+                let x = (rest % grain) as f32 / grain as f32;
+                let (constant, higher) = table.split_at(taps);
+                for (i, c) in coefficients.iter_mut().enumerate() {
+                    let slope =
+                        if order == 1 { higher[i] } else { higher[taps + i].mul_add(x, higher[i]) };
+                    *c = slope.mul_add(x, constant[i]);
+                }
+                &coefficients[..]
+            };
+            if let [slot] = slots {
+                *slot = taps.iter().zip(samples).fold(0.0, |sum, (c, x)| c.mul_add(*x, sum));
+            } else {
+                slots.fill(0.0);
+                for (c, frame) in taps.iter().zip(samples.chunks_exact(channels)) {
+                    for (slot, x) in slots.iter_mut().zip(frame) {
+                        *slot = c.mul_add(*x, *slot);
+                    }
+                }
+            }
+            rest += step;
+            frame += (rest / unit) as i64;
+            rest %= unit;
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! Conversion of a stream, block by block.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::stage::Frames;
+use super::{ResamplePlan, check_interleaved};
+use crate::error::Result;
+
+/// Converts interleaved frames as they come; the outputs do not depend on how the input is cut into
+/// blocks. Output lags by the filters' reach (194 input frames at 2:1).
+#[derive(Debug, Clone)]
+pub struct ResampleStream {
+    plan: Arc<ResamplePlan>,
+    channels: usize,
+    buffers: Vec<Buffer>,
+    pushed: u64,
+    given: u64,
+}
+
+/// Input of one stage that is still needed.
+#[derive(Debug, Clone)]
+struct Buffer {
+    data: Vec<f32>,
+    /// Frame number of the first frame held.
+    start: i64,
+    /// Next output of the stage.
+    next: u64,
+}
+
+impl ResampleStream {
+    /// A stream of `channels` interleaved channels.
+    ///
+    /// # Errors
+    /// `channels` is 0.
+    pub fn new(plan: Arc<ResamplePlan>, channels: usize) -> Result<Self> {
+        check_interleaved(channels, &[])?;
+        let buffers = plan
+            .stages
+            .iter()
+            .map(|stage| {
+                let start = stage.input_range(&(0..1)).start.min(0);
+                Buffer { data: vec![0.0; -start as usize * channels], start, next: 0 }
+            })
+            .collect();
+        Ok(Self { plan, channels, buffers, pushed: 0, given: 0 })
+    }
+
+    /// Takes whole interleaved frames, appends the outputs that are complete to `out`.
+    ///
+    /// # Errors
+    /// `input` is not whole frames.
+    pub fn push(&mut self, input: &[f32], out: &mut Vec<f32>) -> Result<()> {
+        check_interleaved(self.channels, input)?;
+        self.pushed += (input.len() / self.channels) as u64;
+        self.run(input, out);
+        Ok(())
+    }
+
+    /// Ends the stream: the outputs that depend on the zeros after the last sample, in all
+    /// [`ResamplePlan::output_len`] frames (librosa's rule, with its final zero where it has one).
+    pub fn finish(mut self, out: &mut Vec<f32>) {
+        let filtered = self.plan.filtered_len(self.pushed);
+        let needed = self.plan.input_range(0..filtered).end - self.pushed as i64;
+        let from = out.len();
+        let before = self.given;
+        if needed > 0 {
+            self.run(&vec![0.0; needed as usize * self.channels], out);
+        }
+        // Outputs beyond the rounded length are dropped, and one that is missing is a zero.
+        let keep = filtered.saturating_sub(before) as usize * self.channels;
+        out.truncate(from + keep.min(out.len() - from));
+        let total = self.plan.output_len(self.pushed).saturating_sub(before) as usize;
+        out.resize(from + total * self.channels, 0.0);
+    }
+
+    fn run(&mut self, input: &[f32], out: &mut Vec<f32>) {
+        let channels = self.channels;
+        let mut block = None;
+        for (stage, buffer) in self.plan.stages.iter().zip(&mut self.buffers) {
+            buffer.data.extend_from_slice(block.as_deref().unwrap_or(input));
+            let end = buffer.start + (buffer.data.len() / channels) as i64;
+            let ready: Range<u64> = buffer.next..stage.available(end).max(buffer.next);
+            let mut made = Vec::new();
+            if !ready.is_empty() {
+                let frames = Frames { data: &buffer.data, start: buffer.start };
+                stage.run(channels, ready.clone(), frames, &mut made);
+                buffer.next = ready.end;
+                let first = stage.input_range(&(ready.end..ready.end + 1)).start;
+                let spent = (first - buffer.start).clamp(0, end - buffer.start) as usize;
+                buffer.data.drain(..spent * channels);
+                buffer.start += spent as i64;
+            }
+            block = Some(made);
+        }
+        let made = block.as_deref().unwrap_or(input);
+        self.given += (made.len() / channels) as u64;
+        out.extend_from_slice(made);
+    }
+}

@@ -1,0 +1,178 @@
+//! Features of the shape of a spectrum (librosa 0.11 `feature.spectral_*`, `poly_features`).
+//!
+//! Each file holds a kernel for one spectrum, which allocates nothing, and the function over a
+//! whole spectrogram `[channels, bins, frames]`. All of them expect magnitudes; librosa computes
+//! those with a transform in double precision, and on mostly empty spectra (silence, clicks, pure
+//! tones) bandwidth and contrast depend on that.
+
+mod bandwidth;
+mod centroid;
+mod contrast;
+mod flatness;
+mod poly;
+mod rolloff;
+
+use ndarray::{ArrayView3, s};
+
+use crate::error::{DspError, Result};
+use crate::real::{Real, require_finite};
+
+pub use bandwidth::{Bandwidth, spectral_bandwidth};
+pub use centroid::{centroid, spectral_centroid};
+pub use contrast::{Contrast, ContrastParams, contrast_from_extremes, spectral_contrast};
+pub use flatness::{Flatness, spectral_flatness};
+pub use poly::{Poly, poly_features};
+pub use rolloff::{rolloff, spectral_rolloff};
+
+/// Frequencies in Hz of the rows of a spectrogram.
+#[derive(Debug, Clone, Copy)]
+pub enum Frequencies<'a> {
+    /// One per bin, the same in all frames.
+    Bins(&'a [f64]),
+    /// One per bin and frame, shaped as the spectrogram (reassigned spectrograms).
+    Frames(ArrayView3<'a, f64>),
+}
+
+impl Frequencies<'_> {
+    /// Refuses frequencies that do not fit a spectrogram `[channels, bins, frames]`.
+    fn check(&self, (channels, bins, frames): (usize, usize, usize)) -> Result<()> {
+        let (actual, expected) = match self {
+            Self::Bins(f) => (vec![f.len()], vec![bins]),
+            Self::Frames(f) => (f.shape().to_vec(), vec![channels, bins, frames]),
+        };
+        if actual == expected {
+            return Ok(());
+        }
+        Err(DspError::Shape { name: "freq", expected: format!("{expected:?}"), actual })
+    }
+
+    /// The frequencies of one frame; `buffer` holds them where they have to be gathered.
+    fn column<'b>(&'b self, channel: usize, frame: usize, buffer: &'b mut Vec<f64>) -> &'b [f64] {
+        match self {
+            Self::Bins(f) => f,
+            Self::Frames(f) => {
+                buffer.clear();
+                buffer.extend(f.slice(s![channel, .., frame]));
+                buffer
+            }
+        }
+    }
+}
+
+/// Refuses negative magnitudes.
+fn require_non_negative<T: Real>(spectrogram: ArrayView3<T>) -> Result<()> {
+    match spectrogram.iter().find(|s| **s < T::zero()) {
+        None => Ok(()),
+        Some(s) => Err(DspError::parameter("S", s.wide(), "magnitudes, 0 or more")),
+    }
+}
+
+/// Refuses negative and non-finite magnitudes, as the features that normalise a spectrum do.
+fn require_magnitudes<T: Real>(spectrogram: ArrayView3<T>) -> Result<()> {
+    require_finite("S", spectrogram)?;
+    require_non_negative(spectrogram)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frequency::fft_frequencies;
+    use ndarray::{Array3, Axis};
+
+    const BINS: usize = 513;
+
+    fn noise() -> Array3<f32> {
+        let mut state = 1_u32;
+        Array3::from_shape_simple_fn((3, BINS, 21), || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 1e7
+        })
+    }
+
+    /// Every feature of a spectrogram, by name.
+    fn all(s: ArrayView3<f32>) -> Vec<(&'static str, Array3<f64>)> {
+        let freqs = fft_frequencies(22050.0, 1024).unwrap();
+        let f = Frequencies::Bins(&freqs);
+        let params = ContrastParams { linear: true, ..ContrastParams::default() };
+        vec![
+            ("centroid", spectral_centroid(s, f).unwrap()),
+            ("bandwidth", spectral_bandwidth(s, f, None, Bandwidth::default()).unwrap()),
+            ("rolloff", spectral_rolloff(s, f, 0.85).unwrap()),
+            ("flatness", spectral_flatness(s, Flatness::default()).unwrap().mapv(f64::from)),
+            ("contrast", spectral_contrast(s, &freqs, 22050.0, &params).unwrap()),
+            ("poly", poly_features(s, f, 2).unwrap().0),
+        ]
+    }
+
+    #[test]
+    fn channels_are_independent() {
+        let s = noise();
+        let together = all(s.view());
+        for c in 0..3 {
+            let alone = all(s.slice(s![c..c + 1, .., ..]));
+            for ((name, a), (_, b)) in together.iter().zip(&alone) {
+                assert_eq!(a.slice(s![c..c + 1, .., ..]), b, "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn frames_are_independent() {
+        let s = noise();
+        let together = all(s.view());
+        let alone = all(s.slice(s![.., .., 17..18]));
+        for ((name, a), (_, b)) in together.iter().zip(&alone) {
+            assert_eq!(a.slice(s![.., .., 17..18]), b, "{name}");
+        }
+    }
+
+    #[test]
+    fn silence_is_finite() {
+        for (name, a) in all(Array3::zeros((1, BINS, 2)).view()) {
+            let want = if name == "flatness" { 1.0 } else { 0.0 };
+            assert!(a.iter().all(|x| (x - want).abs() < 1e-6), "{name}: {a}");
+        }
+    }
+
+    #[test]
+    fn no_frames_give_no_values() {
+        for (name, a) in all(Array3::zeros((2, BINS, 0)).view()) {
+            assert_eq!(a.len_of(Axis(2)), 0, "{name}");
+        }
+    }
+
+    #[test]
+    fn negative_and_non_finite_magnitudes_are_refused() {
+        let freqs = fft_frequencies(22050.0, 1024).unwrap();
+        for bad in [-1.0, f32::NAN, f32::INFINITY] {
+            let mut s = noise();
+            s[[1, 2, 3]] = bad;
+            assert!(spectral_centroid(s.view(), Frequencies::Bins(&freqs)).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn frequencies_must_fit() {
+        let s = noise();
+        let error = spectral_centroid(s.view(), Frequencies::Bins(&[1.0, 2.0])).unwrap_err();
+        assert_eq!(error.to_string(), "freq has shape [2], expected [513]");
+        let per_frame = Array3::<f64>::ones((3, BINS, 20));
+        assert!(spectral_rolloff(s.view(), Frequencies::Frames(per_frame.view()), 0.85).is_err());
+    }
+
+    #[test]
+    fn frequencies_per_frame_are_those_of_the_frame() {
+        let s = noise();
+        let freqs = fft_frequencies(22050.0, 1024).unwrap();
+        let per_frame = Array3::from_shape_fn(s.raw_dim(), |(_, k, _)| freqs[k]);
+        let (bins, frames) = (Frequencies::Bins(&freqs), Frequencies::Frames(per_frame.view()));
+        assert_eq!(
+            spectral_centroid(s.view(), bins).unwrap(),
+            spectral_centroid(s.view(), frames).unwrap()
+        );
+        assert_eq!(
+            poly_features(s.view(), bins, 1).unwrap(),
+            poly_features(s.view(), frames, 1).unwrap()
+        );
+    }
+}

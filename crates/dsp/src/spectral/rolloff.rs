@@ -1,0 +1,64 @@
+//! Spectral roll-off (librosa 0.11 `feature.spectral_rolloff`).
+
+use std::cmp::Ordering;
+
+use ndarray::{Array3, ArrayView3};
+
+use super::{Frequencies, require_non_negative};
+use crate::columns::map_columns;
+use crate::error::{DspError, Result};
+use crate::real::Real;
+
+/// Lowest frequency in Hz at or below which `roll_percent` (a fraction) of the magnitudes lie.
+///
+/// The running sum is kept in `T` and in bin order, as librosa's `cumsum`: its rounding decides
+/// which of two neighbouring bins is found.
+pub fn rolloff<T: Real>(magnitude: &[T], freqs: &[f64], roll_percent: f64) -> f64 {
+    let total = magnitude.iter().fold(T::zero(), |sum, s| sum + *s);
+    let threshold = T::of(roll_percent) * total;
+    let mut sum = T::zero();
+    let reached = magnitude.iter().position(|s| {
+        sum += *s;
+        sum.partial_cmp(&threshold) != Some(Ordering::Less)
+    });
+    // The running sum never falls again, so all bins from here on qualify.
+    freqs[reached.unwrap_or(freqs.len())..].iter().fold(f64::NAN, |low, f| low.min(*f))
+}
+
+/// Roll-off frequency in Hz of every frame, `[channels, 1, frames]`.
+///
+/// # Errors
+/// A fraction outside (0, 1), negative magnitudes, or frequencies that do not fit.
+pub fn spectral_rolloff<T: Real>(
+    s: ArrayView3<T>,
+    freqs: Frequencies,
+    roll_percent: f64,
+) -> Result<Array3<f64>> {
+    if !(roll_percent > 0.0 && roll_percent < 1.0) {
+        return Err(DspError::parameter("roll_percent", roll_percent, "between 0 and 1"));
+    }
+    freqs.check(s.dim())?;
+    require_non_negative(s)?;
+    let mut buffer = Vec::new();
+    Ok(map_columns(s, 1, |c, t, magnitude, out| {
+        out[0] = rolloff(magnitude, freqs.column(c, t, &mut buffer), roll_percent);
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bins_below_the_fraction_are_passed() {
+        let freqs: Vec<f64> = (0..10).map(|k| 10.0 * f64::from(k)).collect();
+        assert_eq!(rolloff(&[1.0_f32; 10], &freqs, 0.5), 40.0);
+        assert_eq!(rolloff(&[1.0_f32; 10], &freqs, 0.99), 90.0);
+        assert_eq!(rolloff(&[0.0_f32; 10], &freqs, 0.85), 0.0);
+    }
+
+    #[test]
+    fn unsorted_frequencies_give_the_lowest_that_qualifies() {
+        assert_eq!(rolloff(&[1.0_f64, 1.0, 1.0, 1.0], &[0.0, 50.0, 30.0, 40.0], 0.5), 30.0);
+    }
+}

@@ -1,0 +1,220 @@
+//! Features of the waveform: zero-crossing rate and root-mean-square level (librosa 0.11
+//! `feature.zero_crossing_rate`, `feature.rms`).
+
+use ndarray::{Array3, ArrayView2, ArrayView3};
+
+use crate::error::{DspError, Result};
+use crate::real::Real;
+use crate::stft::PadMode;
+
+/// How a signal is cut into frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameParams {
+    /// Samples in a frame.
+    pub frame_length: usize,
+    /// Samples between frames.
+    pub hop_length: usize,
+    /// Frame `t` is centred on sample `t * hop_length`.
+    pub center: bool,
+}
+
+impl Default for FrameParams {
+    fn default() -> Self {
+        Self { frame_length: 2048, hop_length: 512, center: true }
+    }
+}
+
+impl FrameParams {
+    /// Refuses zero lengths.
+    pub fn check(&self) -> Result<()> {
+        if self.frame_length == 0 {
+            return Err(DspError::parameter("frame_length", 0, "at least 1"));
+        }
+        if self.hop_length == 0 {
+            return Err(DspError::parameter("hop_length", 0, "at least 1"));
+        }
+        Ok(())
+    }
+
+    /// Samples of padding on each side.
+    pub fn pad(&self) -> usize {
+        if self.center { self.frame_length / 2 } else { 0 }
+    }
+
+    /// Frames of `n` samples; 0 where they are too few for one.
+    pub fn n_frames(&self, n: usize) -> usize {
+        let padded = n + 2 * self.pad();
+        if n == 0 || padded < self.frame_length {
+            0
+        } else {
+            1 + (padded - self.frame_length) / self.hop_length
+        }
+    }
+
+    fn frames_of(&self, n: usize) -> Result<usize> {
+        self.check()?;
+        match self.n_frames(n) {
+            0 => {
+                let needed = if self.center { 1 } else { self.frame_length };
+                Err(DspError::TooShort { name: "y", actual: n, needed })
+            }
+            frames => Ok(frames),
+        }
+    }
+}
+
+/// What counts as a crossing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ZeroCrossingParams {
+    /// Values of at most this magnitude count as zero.
+    pub threshold: f64,
+    /// Zero is positive (true), or a sign of its own (false).
+    pub zero_pos: bool,
+    /// Whether the first sample of each frame counts as a crossing.
+    pub pad: bool,
+}
+
+impl Default for ZeroCrossingParams {
+    fn default() -> Self {
+        Self { threshold: 1e-10, zero_pos: true, pad: false }
+    }
+}
+
+impl ZeroCrossingParams {
+    /// Refuses a negative threshold.
+    pub fn check(&self) -> Result<()> {
+        if self.threshold.is_nan() || self.threshold < 0.0 {
+            return Err(DspError::parameter("threshold", self.threshold, "0 or more"));
+        }
+        Ok(())
+    }
+
+    /// Sign class of a sample; a crossing is where the class changes. The threshold is compared in
+    /// the precision of the signal, as librosa does.
+    #[inline(always)]
+    pub fn sign<T: Real>(&self, x: T, threshold: T) -> i8 {
+        let x = if x.abs() <= threshold { T::zero() } else { x };
+        if x < T::zero() {
+            -1
+        } else if self.zero_pos || x > T::zero() {
+            1
+        } else {
+            0
+        }
+    }
+}
+
+/// Share of samples in each frame at which the signal crosses zero, `[channels, 1, frames]`, edge
+/// values repeated by `center` (librosa 0.11 `feature.zero_crossing_rate`).
+///
+/// # Errors
+/// Impossible parameters, or a signal too short for one frame.
+pub fn zero_crossing_rate<T: Real>(
+    y: ArrayView2<T>,
+    frame: &FrameParams,
+    p: &ZeroCrossingParams,
+) -> Result<Array3<f64>> {
+    p.check()?;
+    let (channels, n) = y.dim();
+    let frames = frame.frames_of(n)?;
+    let (threshold, pad) = (T::of(p.threshold), frame.pad() as isize);
+    let first = usize::from(p.pad);
+    let mut out = Array3::zeros((channels, 1, frames));
+    // crossings[i]: changes of sign at samples 1..=i; outside the signal nothing changes.
+    let mut crossings = vec![0u32; n];
+    for c in 0..channels {
+        let signal = y.row(c);
+        let mut sign = p.sign(signal[0], threshold);
+        for i in 1..n {
+            let next = p.sign(signal[i], threshold);
+            crossings[i] = crossings[i - 1] + u32::from(next != sign);
+            sign = next;
+        }
+        let until = |i: isize| crossings[i.clamp(0, n as isize - 1) as usize];
+        for t in 0..frames {
+            let start = (t * frame.hop_length) as isize - pad;
+            let last = start + frame.frame_length as isize - 1;
+            let count = (until(last) - until(start)) as usize + first;
+            out[[c, 0, t]] = count as f64 / frame.frame_length as f64;
+        }
+    }
+    Ok(out)
+}
+
+/// Root of the mean square of each frame, `[channels, 1, frames]`, always `f32` (librosa 0.11
+/// `feature.rms` given `y`).
+///
+/// # Errors
+/// Impossible parameters, or a signal too short for one frame.
+pub fn rms<T: Real>(
+    y: ArrayView2<T>,
+    frame: &FrameParams,
+    pad_mode: PadMode,
+) -> Result<Array3<f32>> {
+    let (channels, n) = y.dim();
+    let frames = frame.frames_of(n)?;
+    let mut out = Array3::zeros((channels, 1, frames));
+    for c in 0..channels {
+        let signal = y.row(c);
+        for t in 0..frames {
+            let start = (t * frame.hop_length) as isize - frame.pad() as isize;
+            let sum: f64 = (start..start + frame.frame_length as isize)
+                .filter_map(|i| pad_mode.index(i, n))
+                .map(|i| signal[i].wide() * signal[i].wide())
+                .sum();
+            out[[c, 0, t]] = (sum / frame.frame_length as f64).sqrt() as f32;
+        }
+    }
+    Ok(out)
+}
+
+/// Root-mean-square level from a magnitude spectrogram `[channels, frame_length / 2 + 1, frames]`
+/// by Parseval's relation (librosa 0.11 `feature.rms` given `S`).
+///
+/// # Errors
+/// A spectrogram whose rows do not fit `frame_length`.
+pub fn rms_of_spectrogram<T: Real>(s: ArrayView3<T>, frame_length: usize) -> Result<Array3<f32>> {
+    let (channels, bins, frames) = s.dim();
+    if frame_length == 0 || bins != frame_length / 2 + 1 {
+        let expected = format!("{} bins for frame_length = {frame_length}", frame_length / 2 + 1);
+        return Err(DspError::Shape { name: "S", expected, actual: s.shape().to_vec() });
+    }
+    let length = frame_length as f64;
+    let halved = |k: usize| k == 0 || (frame_length.is_multiple_of(2) && k == bins - 1);
+    Ok(Array3::from_shape_fn((channels, 1, frames), |(c, _, t)| {
+        let sum: f64 = (0..bins)
+            .map(|k| {
+                let x = s[[c, k, t]].wide();
+                if halved(k) { x * x / 2.0 } else { x * x }
+            })
+            .sum();
+        (2.0 * sum / (length * length)).sqrt() as f32
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+
+    #[test]
+    fn alternating_signs_cross_at_every_sample() {
+        let y = Array2::from_shape_fn((1, 4096), |(_, i)| if i % 2 == 0 { 1.0_f32 } else { -1.0 });
+        let z = zero_crossing_rate(y.view(), &FrameParams::default(), &Default::default()).unwrap();
+        assert_eq!(z[[0, 0, 4]], 2047.0 / 2048.0);
+    }
+
+    #[test]
+    fn constant_level() {
+        let y = Array2::<f64>::from_elem((2, 8192), 0.5);
+        let r = rms(y.view(), &FrameParams::default(), PadMode::Constant).unwrap();
+        assert_eq!(r[[1, 0, 8]], 0.5);
+    }
+
+    #[test]
+    fn short_signals_are_refused_without_center() {
+        let y = Array2::<f32>::zeros((1, 100));
+        let frame = FrameParams { center: false, ..FrameParams::default() };
+        assert!(zero_crossing_rate(y.view(), &frame, &Default::default()).is_err());
+    }
+}

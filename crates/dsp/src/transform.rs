@@ -1,0 +1,180 @@
+//! Forward and inverse transforms of single frames, with everything that recordings share made
+//! once.
+
+use std::sync::Arc;
+
+use num_complex::Complex;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+
+use crate::error::Result;
+use crate::real::Real;
+use crate::stft::StftParams;
+use crate::window::{Window, padded_window};
+
+/// Windowed forward transform of frames in the precision `F`.
+#[derive(Clone)]
+pub struct Forward<F: Real> {
+    params: StftParams,
+    /// `None` for a rectangular window of the whole frame.
+    window: Option<Vec<F>>,
+    fft: Arc<dyn RealToComplex<F>>,
+}
+
+/// Working memory of a transform, for one thread.
+pub struct Scratch<F> {
+    frame: Vec<F>,
+    spectrum: Vec<Complex<F>>,
+    fft: Vec<Complex<F>>,
+}
+
+impl<F: Real> Forward<F> {
+    /// # Errors
+    /// Impossible parameters.
+    pub fn new(params: &StftParams) -> Result<Self> {
+        params.check()?;
+        let flat = params.window == Window::Boxcar && params.win_length == params.n_fft;
+        let window = if flat {
+            None
+        } else {
+            let window = padded_window(params.window, params.win_length, params.n_fft)?;
+            Some(window.into_iter().map(F::of).collect())
+        };
+        let fft = RealFftPlanner::new().plan_fft_forward(params.n_fft);
+        Ok(Self { params: *params, window, fft })
+    }
+
+    /// The parameters of the transform.
+    pub fn params(&self) -> &StftParams {
+        &self.params
+    }
+
+    /// Working memory for [`spectrum`](Self::spectrum).
+    pub fn scratch(&self) -> Scratch<F> {
+        Scratch {
+            frame: self.fft.make_input_vec(),
+            spectrum: self.fft.make_output_vec(),
+            fft: self.fft.make_scratch_vec(),
+        }
+    }
+
+    /// Spectrum of frame `t` of `y`, `n_fft / 2 + 1` values.
+    pub fn spectrum<'s, T: Real>(
+        &self,
+        y: &[T],
+        t: usize,
+        scratch: &'s mut Scratch<F>,
+    ) -> &'s [Complex<F>] {
+        let p = &self.params;
+        let start = (t * p.hop_length) as isize - p.pad() as isize;
+        let inside = usize::try_from(start).ok().and_then(|s| y.get(s..s + p.n_fft));
+        if let Some(samples) = inside {
+            for (slot, x) in scratch.frame.iter_mut().zip(samples) {
+                *slot = F::of(x.wide());
+            }
+        } else {
+            for (k, slot) in scratch.frame.iter_mut().enumerate() {
+                let index = p.pad_mode.index(start + k as isize, y.len());
+                *slot = index.map_or(F::zero(), |i| F::of(y[i].wide()));
+            }
+        }
+        if let Some(window) = &self.window {
+            for (x, &w) in scratch.frame.iter_mut().zip(window) {
+                *x *= w;
+            }
+        }
+        self.fft
+            .process_with_scratch(&mut scratch.frame, &mut scratch.spectrum, &mut scratch.fft)
+            .expect("buffers made by the plan itself");
+        &scratch.spectrum
+    }
+}
+
+/// Windowed inverse transform of frames and their overlap-add, in the precision `F`.
+#[derive(Clone)]
+pub struct Inverse<F: Real> {
+    params: StftParams,
+    window: Vec<F>,
+    squares: Vec<f64>,
+    fft: Arc<dyn ComplexToReal<F>>,
+}
+
+impl<F: Real> Inverse<F> {
+    /// # Errors
+    /// Impossible parameters.
+    pub fn new(params: &StftParams) -> Result<Self> {
+        params.check()?;
+        let window = padded_window(params.window, params.win_length, params.n_fft)?;
+        let squares = window.iter().map(|w| w * w).collect();
+        // The inverse transform is not normalised; its 1 / n_fft goes with the window.
+        let scale = 1.0 / params.n_fft as f64;
+        let window = window.into_iter().map(|w| F::of(w * scale)).collect();
+        let fft = RealFftPlanner::new().plan_fft_inverse(params.n_fft);
+        Ok(Self { params: *params, window, squares, fft })
+    }
+
+    /// Working memory for [`add`](Self::add).
+    pub fn scratch(&self) -> Scratch<F> {
+        Scratch {
+            frame: self.fft.make_output_vec(),
+            spectrum: self.fft.make_input_vec(),
+            fft: self.fft.make_scratch_vec(),
+        }
+    }
+
+    /// Frames that reach a signal of `length` samples, at most `frames`.
+    pub fn frames_within(&self, length: usize, frames: usize) -> usize {
+        frames.min((length + 2 * self.params.pad()).div_ceil(self.params.hop_length))
+    }
+
+    /// Adds frame `t` of the given spectrum (missing bins are zero, further ones are left out) to
+    /// the part of `y` that it reaches.
+    pub fn add(
+        &self,
+        spectrum: impl IntoIterator<Item = Complex<F>>,
+        t: usize,
+        y: &mut [F],
+        scratch: &mut Scratch<F>,
+    ) {
+        let Scratch { frame, spectrum: bins, fft } = scratch;
+        let mut given = spectrum.into_iter();
+        bins.fill_with(|| given.next().unwrap_or_default());
+        // A real signal has no imaginary part at zero and at half the sample rate.
+        bins[0].im = F::zero();
+        if self.params.n_fft % 2 == 0 {
+            bins[self.params.n_fft / 2].im = F::zero();
+        }
+        self.fft
+            .process_with_scratch(bins, frame, fft)
+            .expect("buffers made by the plan itself, real ends");
+        let (skip, y) = overlap(&self.params, t, y);
+        for ((y, x), w) in y.iter_mut().zip(&frame[skip..]).zip(&self.window[skip..]) {
+            *y += *x * *w;
+        }
+    }
+
+    /// Divides `y` by the sum of the squared windows of `frames` frames, where there is any.
+    pub fn normalize(&self, frames: usize, y: &mut [F]) {
+        let p = &self.params;
+        let mut weight = vec![0.0; y.len()];
+        for t in 0..frames {
+            let (skip, weight) = overlap(p, t, &mut weight);
+            for (sum, square) in weight.iter_mut().zip(&self.squares[skip..]) {
+                *sum += square;
+            }
+        }
+        for (y, weight) in y.iter_mut().zip(weight) {
+            if weight > F::min_positive_value().wide() {
+                *y /= F::of(weight);
+            }
+        }
+    }
+}
+
+/// The part of `y` from the start of frame `t` on, and how many of the frame's samples lie before
+/// `y`.
+fn overlap<'y, F>(p: &StftParams, t: usize, y: &'y mut [F]) -> (usize, &'y mut [F]) {
+    let start = t * p.hop_length;
+    let skip = p.pad().saturating_sub(start).min(p.n_fft);
+    let from = start.saturating_sub(p.pad()).min(y.len());
+    (skip, &mut y[from..])
+}

@@ -1,0 +1,236 @@
+//! Parameter groups that several features share, with librosa's names and defaults.
+
+use corsmal_dsp::decibel::Decibel;
+use corsmal_dsp::mel::{MelNorm, MelParams};
+use corsmal_dsp::stft::{PadMode, StftParams};
+use corsmal_dsp::time_domain::FrameParams;
+use corsmal_dsp::window::Window;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// Short-time transform. Features with equal groups share one transform.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct StftSpec {
+    /// Length of the transform in samples.
+    pub n_fft: usize,
+    /// Samples between frames.
+    pub hop_length: usize,
+    /// Length of the window; 0 is `n_fft`.
+    pub win_length: usize,
+    /// Window function.
+    pub window: Window,
+    /// Frames are centred on multiples of the hop.
+    pub center: bool,
+    /// Padding at the ends.
+    pub pad_mode: PadMode,
+}
+
+impl Default for StftSpec {
+    fn default() -> Self {
+        Self {
+            n_fft: 2048,
+            hop_length: 512,
+            win_length: 0,
+            window: Window::Hann,
+            center: true,
+            pad_mode: PadMode::Constant,
+        }
+    }
+}
+
+impl StftSpec {
+    /// The checked parameters.
+    pub fn params(&self) -> corsmal_dsp::Result<StftParams> {
+        let params = StftParams {
+            n_fft: self.n_fft,
+            hop_length: self.hop_length,
+            win_length: if self.win_length == 0 { self.n_fft } else { self.win_length },
+            window: self.window,
+            center: self.center,
+            pad_mode: self.pad_mode,
+        };
+        params.check()?;
+        Ok(params)
+    }
+}
+
+/// Mel filter bank, its norm apart (librosa calls that `norm` or `mel_norm`).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct MelSpec {
+    /// Number of bands.
+    pub n_mels: usize,
+    /// Lowest frequency in Hz.
+    pub fmin: f64,
+    /// Highest frequency in Hz; 0 is half the sample rate.
+    pub fmax: f64,
+    /// HTK's formula instead of Slaney's.
+    pub htk: bool,
+}
+
+impl Default for MelSpec {
+    fn default() -> Self {
+        Self { n_mels: 128, fmin: 0.0, fmax: 0.0, htk: false }
+    }
+}
+
+impl MelSpec {
+    /// Parameters for a sample rate and transform length.
+    pub fn params(&self, sr: f64, n_fft: usize, norm: MelNorm) -> MelParams {
+        let fmax = (self.fmax != 0.0).then_some(self.fmax);
+        MelParams { sr, n_fft, n_mels: self.n_mels, fmin: self.fmin, fmax, htk: self.htk, norm }
+    }
+}
+
+/// The reference of a conversion to decibels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DbRef {
+    /// This value becomes 0 dB.
+    Value(f64),
+    /// The maximum becomes 0 dB.
+    Max,
+}
+
+/// Range kept below the maximum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum TopDb {
+    /// In dB.
+    Range(f64),
+    /// Everything.
+    None,
+}
+
+/// A number or one word.
+fn number_or_word<'de, D: Deserializer<'de>>(d: D, word: &str) -> Result<Option<f64>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Raw {
+        Number(f64),
+        Word(String),
+    }
+    match Raw::deserialize(d) {
+        Ok(Raw::Number(n)) => Ok(Some(n)),
+        Ok(Raw::Word(w)) if w == word => Ok(None),
+        _ => Err(serde::de::Error::custom(format!("expected a number or \"{word}\""))),
+    }
+}
+
+impl Serialize for DbRef {
+    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Value(v) => s.serialize_f64(*v),
+            Self::Max => s.serialize_str("max"),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for DbRef {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        Ok(number_or_word(d, "max")?.map_or(Self::Max, Self::Value))
+    }
+}
+
+impl Serialize for TopDb {
+    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Range(v) => s.serialize_f64(*v),
+            Self::None => s.serialize_str("none"),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for TopDb {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        Ok(number_or_word(d, "none")?.map_or(Self::None, Self::Range))
+    }
+}
+
+/// Conversion to decibels.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct DbSpec {
+    /// Value (or `"max"`) that becomes 0 dB.
+    #[serde(rename = "ref")]
+    pub reference: DbRef,
+    /// Smallest power told apart from zero.
+    pub amin: f64,
+    /// Range kept below the maximum, in dB, or `"none"`.
+    pub top_db: TopDb,
+    /// The maximum is that of each channel (false) or of all channels, as librosa 0.11 takes it on
+    /// multi-channel arrays (true).
+    pub joint: bool,
+}
+
+impl Default for DbSpec {
+    fn default() -> Self {
+        Self { reference: DbRef::Value(1.0), amin: 1e-10, top_db: TopDb::Range(80.0), joint: false }
+    }
+}
+
+impl DbSpec {
+    /// The checked parameters; a reference of `"max"` is left at 1 here and applied by
+    /// [`DbSpec::level`].
+    pub fn decibel(&self) -> corsmal_dsp::Result<Decibel> {
+        let reference = match self.reference {
+            DbRef::Value(v) => v,
+            DbRef::Max => 1.0,
+        };
+        let top_db = match self.top_db {
+            TopDb::Range(v) => Some(v),
+            TopDb::None => None,
+        };
+        let decibel = Decibel { reference, amin: self.amin, top_db };
+        decibel.check()?;
+        if self.amin < f64::from(f32::MIN_POSITIVE) {
+            let allowed = "at least 1.2e-38 (features are single precision)";
+            return Err(corsmal_dsp::DspError::parameter("amin", self.amin, allowed));
+        }
+        Ok(decibel)
+    }
+
+    /// Whether values depend on the maximum of the recording.
+    pub fn needs_peak(&self) -> bool {
+        self.reference == DbRef::Max || self.top_db != TopDb::None
+    }
+
+    /// What is subtracted from every value, and the floor below the maximum, given that maximum.
+    pub fn level(&self, peak: f32) -> (f32, f32) {
+        let shift = if self.reference == DbRef::Max { peak } else { 0.0 };
+        let floor = match self.top_db {
+            TopDb::Range(range) => peak - range as f32,
+            TopDb::None => f32::NEG_INFINITY,
+        };
+        (shift, floor)
+    }
+}
+
+/// Frames of the waveform.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct FrameSpec {
+    /// Samples in a frame.
+    pub frame_length: usize,
+    /// Samples between frames.
+    pub hop_length: usize,
+    /// Frames are centred on multiples of the hop.
+    pub center: bool,
+}
+
+impl Default for FrameSpec {
+    fn default() -> Self {
+        Self { frame_length: 2048, hop_length: 512, center: true }
+    }
+}
+
+impl FrameSpec {
+    /// The checked parameters.
+    pub fn params(&self) -> corsmal_dsp::Result<FrameParams> {
+        let params = FrameParams {
+            frame_length: self.frame_length,
+            hop_length: self.hop_length,
+            center: self.center,
+        };
+        params.check()?;
+        Ok(params)
+    }
+}

@@ -1,0 +1,222 @@
+//! The one configuration: front end, features, summary. It travels through everything and is stored,
+//! with its hash, in every output.
+
+mod chain;
+mod groups;
+mod preset;
+mod set;
+
+pub use chain::{Channels, Normalize, ResType, SignalConfig};
+pub use groups::{DbRef, DbSpec, FrameSpec, MelSpec, StftSpec, TopDb};
+pub use preset::{PRESETS, Preset};
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use thiserror::Error;
+
+use crate::features::{self, FeatureConfig};
+use crate::summary::SummaryConfig;
+
+/// Version of the configuration's meaning; part of its hash.
+pub const SCHEMA: u32 = 1;
+
+/// Why a configuration was refused: names the key, the value, and what is allowed.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("configuration {path}: {source}")]
+    Read {
+        /// Path of the file.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The text is not TOML.
+    #[error("configuration {place}: {message}")]
+    Syntax {
+        /// Path or option.
+        place: String,
+        /// What the parser says.
+        message: String,
+    },
+    /// A key is unknown or its value impossible.
+    #[error("configuration key {key}: {message}")]
+    Key {
+        /// Dotted path of the key.
+        key: String,
+        /// The value and what is allowed.
+        message: String,
+    },
+    /// No preset has this name.
+    #[error("preset \"{name}\" is unknown: {known}")]
+    Preset {
+        /// The name that was given.
+        name: String,
+        /// The known names.
+        known: String,
+    },
+}
+
+impl ConfigError {
+    /// A refusal of `key`.
+    pub fn key(key: impl Into<String>, message: impl std::fmt::Display) -> Self {
+        Self::Key { key: key.into(), message: message.to_string() }
+    }
+}
+
+/// A checked configuration.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// Front end, in the order in which its steps run.
+    pub signal: SignalConfig,
+    /// Features in their order of output.
+    pub features: Vec<FeatureConfig>,
+    /// Statistics over frames; `None` writes frame-level features.
+    pub summary: Option<SummaryConfig>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Raw {
+    #[serde(default)]
+    description: String,
+    #[serde(default)]
+    signal: SignalConfig,
+    features: Map<String, Value>,
+    summary: Option<SummaryConfig>,
+}
+
+impl Config {
+    /// The configuration of a preset.
+    ///
+    /// # Errors
+    /// An unknown name.
+    pub fn preset(name: &str) -> Result<Self, ConfigError> {
+        Self::with_overrides(Preset::find(name)?.toml, name, &[])
+    }
+
+    /// A TOML file.
+    ///
+    /// # Errors
+    /// Unreadable, not TOML, an unknown key or an impossible value.
+    pub fn load(path: &Path, overrides: &[String]) -> Result<Self, ConfigError> {
+        let place = path.display().to_string();
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| ConfigError::Read { path: place.clone(), source })?;
+        Self::with_overrides(&text, &place, overrides)
+    }
+
+    /// TOML text with `key=value` overrides (`mfcc.n_mels=64`, `signal.sample_rate=16000`).
+    ///
+    /// # Errors
+    /// As [`Config::load`].
+    pub fn with_overrides(
+        toml: &str,
+        place: &str,
+        overrides: &[String],
+    ) -> Result<Self, ConfigError> {
+        let syntax = |e: toml::de::Error| ConfigError::Syntax {
+            place: place.to_string(),
+            message: e.to_string().trim_end().to_string(),
+        };
+        let mut value: Value = toml::from_str(toml).map_err(syntax)?;
+        for assignment in overrides {
+            set::apply(&mut value, assignment)?;
+        }
+        Self::from_value(value)
+    }
+
+    /// A configuration as stored in outputs.
+    ///
+    /// # Errors
+    /// An unknown key or an impossible value.
+    pub fn from_value(mut value: Value) -> Result<Self, ConfigError> {
+        if let Some(object) = value.as_object_mut() {
+            match object.remove("schema") {
+                None => {}
+                Some(v) if v == SCHEMA => {}
+                Some(v) => {
+                    return Err(ConfigError::key("schema", format!("{v}, expected {SCHEMA}")));
+                }
+            }
+            // Outputs say "frames" where no summary was asked for.
+            if object.get("summary").is_some_and(Value::is_null) {
+                object.remove("summary");
+            }
+        }
+        let raw: Raw = serde_json::from_value(value).map_err(|e| top_level(&e))?;
+        let _ = raw.description;
+        raw.signal.check()?;
+        if raw.features.is_empty() {
+            let message = format!("is empty, at least one of {}", features::kinds().join(", "));
+            return Err(ConfigError::key("features", message));
+        }
+        let features = raw
+            .features
+            .into_iter()
+            .map(|(name, value)| FeatureConfig::parse(&name, value))
+            .collect::<Result<Vec<_>, _>>()?;
+        FeatureConfig::check_references(&features)?;
+        if let Some(summary) = &raw.summary {
+            summary.check()?;
+        }
+        Ok(Self { signal: raw.signal, features, summary: raw.summary })
+    }
+
+    /// The effective configuration with every default filled in, keys in a fixed order.
+    pub fn to_value(&self) -> Value {
+        let features: Map<String, Value> =
+            self.features.iter().map(|f| (f.name().to_string(), f.to_value())).collect();
+        serde_json::json!({
+            "schema": SCHEMA,
+            "signal": self.signal,
+            "features": features,
+            "summary": self.summary,
+        })
+    }
+
+    /// BLAKE3 of the effective configuration, in hexadecimal.
+    pub fn hash(&self) -> String {
+        blake3::hash(self.to_value().to_string().as_bytes()).to_hex().to_string()
+    }
+}
+
+/// Serde's message about the outermost tables, with the key where it names one.
+fn top_level(error: &serde_json::Error) -> ConfigError {
+    let message = error.to_string();
+    let key = message.split('`').nth(1).unwrap_or("configuration").to_string();
+    ConfigError::key(key, message)
+}
+
+/// A table of plain values as its typed struct. Unknown keys are refused by comparison with the
+/// keys of the default value, since serde cannot do so across flattened groups.
+pub(crate) fn typed<T>(prefix: &str, table: &Map<String, Value>) -> Result<T, ConfigError>
+where
+    T: for<'de> Deserialize<'de> + Serialize + Default,
+{
+    let known = match serde_json::to_value(T::default()) {
+        Ok(Value::Object(map)) => map.keys().cloned().collect(),
+        _ => Vec::new(),
+    };
+    if let Some(key) = table.keys().find(|k| !known.contains(k)) {
+        let message = format!("is unknown here; known are {}", known.join(", "));
+        return Err(ConfigError::key(format!("{prefix}.{key}"), message));
+    }
+    let parse = |table: Map<String, Value>| serde_json::from_value::<T>(Value::Object(table));
+    parse(table.clone()).map_err(|error| {
+        // Serde does not name the key of a wrong value: find it by trying keys one at a time.
+        let wrong = table.iter().find_map(|(key, value)| {
+            let one = Map::from_iter([(key.clone(), value.clone())]);
+            parse(one).err().map(|e| (key, value, e))
+        });
+        match wrong {
+            Some((key, value, e)) => {
+                ConfigError::key(format!("{prefix}.{key}"), format!("= {value}: {e}"))
+            }
+            None => ConfigError::key(prefix, error),
+        }
+    })
+}

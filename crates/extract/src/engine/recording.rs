@@ -1,0 +1,305 @@
+//! A recording put together from its spans: values finished, statistics taken.
+
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+
+use corsmal_dsp::delta::{DeltaMode, DeltaParams, delta};
+use ndarray::ArrayView2;
+use rayon::prelude::*;
+
+use super::extractor::Span;
+use super::plan::{Plan, PlannedFeature};
+use super::store::Store;
+use crate::features::Kernel;
+use crate::summary::Accumulator;
+
+/// Finished frames of one feature.
+pub struct FeatureArray {
+    /// Name of the feature.
+    pub name: String,
+    /// Coefficients.
+    pub coefficients: usize,
+    /// Frames.
+    pub frames: usize,
+    /// Whether values are pairs of real and imaginary parts.
+    pub complex: bool,
+    /// `[frames][coefficients][channels]` (twice as many values where complex).
+    pub values: Store,
+}
+
+/// Everything that a recording gives.
+pub enum Features {
+    /// Frame-level features.
+    Frames(Vec<FeatureArray>),
+    /// Statistics, one value for each of [`Plan::summary_names`].
+    Summary(Vec<f32>),
+}
+
+/// Collects spans in order of time.
+pub struct Recording {
+    plan: Arc<Plan>,
+    raw: Vec<Store>,
+    /// For each feature the maxima `[peaks][channels]`.
+    peaks: Vec<Vec<f32>>,
+    total: Option<u64>,
+    folder: std::path::PathBuf,
+}
+
+impl Recording {
+    /// A recording without spans. Long ones put temporary files into `folder`.
+    pub fn new(plan: Arc<Plan>, folder: &Path) -> Self {
+        let raw = plan.features.iter().map(|_| Store::new(folder)).collect();
+        let peaks = plan
+            .features
+            .iter()
+            .map(|f| {
+                let peaks = f.feature.finish.as_ref().map_or(0, |finish| finish.peaks().len());
+                vec![f32::NEG_INFINITY; peaks * plan.channels]
+            })
+            .collect();
+        Self { plan, raw, peaks, total: None, folder: folder.to_path_buf() }
+    }
+
+    /// Adds the next span; spans behind the end of the signal are ignored.
+    ///
+    /// # Errors
+    /// The temporary file cannot be written.
+    pub fn add(&mut self, span: Span) -> io::Result<()> {
+        if self.total.is_some() {
+            return Ok(());
+        }
+        self.total = span.total;
+        for (i, values) in span.raw.into_iter().enumerate() {
+            let planned = &self.plan.features[i];
+            if let Some(finish) = &planned.feature.finish {
+                let width = planned.feature.raw_rows * self.plan.channels;
+                for (p, (rows, _)) in finish.peaks().into_iter().enumerate() {
+                    let channels = self.plan.channels;
+                    let peaks = &mut self.peaks[i][p * channels..(p + 1) * channels];
+                    let range = rows.start * channels..rows.end * channels;
+                    raise_peaks(&values, width, range, peaks);
+                }
+            }
+            self.raw[i].push(values)?;
+        }
+        Ok(())
+    }
+
+    /// Length of the signal in samples.
+    pub fn total(&self) -> u64 {
+        self.total.unwrap_or(0)
+    }
+
+    /// Frames of the feature with the fewest.
+    pub fn fewest_frames(&self) -> usize {
+        let frames = |(store, f): (&Store, &PlannedFeature)| {
+            let width = f.feature.raw_rows * self.plan.channels;
+            (width > 0).then(|| store.len() / width)
+        };
+        self.raw.iter().zip(&self.plan.features).filter_map(frames).min().unwrap_or(0)
+    }
+
+    /// Finishes every value.
+    ///
+    /// # Errors
+    /// A temporary file fails, or a derived feature has too few frames.
+    pub fn finish(mut self) -> Result<Features, FinishError> {
+        for (peaks, f) in self.peaks.iter_mut().zip(&self.plan.features) {
+            let Some(finish) = &f.feature.finish else { continue };
+            for (p, (_, joint)) in finish.peaks().into_iter().enumerate() {
+                let peaks = &mut peaks[p * self.plan.channels..(p + 1) * self.plan.channels];
+                if joint {
+                    let top = peaks.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+                    peaks.fill(top);
+                }
+            }
+        }
+        let mut arrays: Vec<FeatureArray> = Vec::new();
+        let raw = std::mem::take(&mut self.raw);
+        // Derived features need all coefficients of their source: what is kept is cut out last.
+        for (i, store) in raw.into_iter().enumerate() {
+            let planned = &self.plan.features[i];
+            let values = match (&planned.feature.kernel, planned.source) {
+                (Kernel::Derived(_, params), Some(source)) => {
+                    self.derive(&mut arrays[source], params)?
+                }
+                _ => self.finished(store, planned, &self.peaks[i])?,
+            };
+            let coefficients = planned.labels.len();
+            let per_frame =
+                coefficients * self.plan.channels * if planned.feature.complex { 2 } else { 1 };
+            arrays.push(FeatureArray {
+                name: planned.name.clone(),
+                coefficients,
+                frames: values.len() / per_frame.max(1),
+                complex: planned.feature.complex,
+                values,
+            });
+        }
+        match &self.plan.config.summary {
+            None => Ok(Features::Frames(arrays)),
+            Some(summary) => {
+                let mut row = Vec::new();
+                for mut array in arrays {
+                    let channels = self.plan.channels;
+                    let average = summary.average_channels && channels > 1;
+                    let width = array.coefficients * if average { 1 } else { channels };
+                    let mut statistics = Accumulator::new(&summary.stats, width);
+                    let mut means = Vec::new();
+                    array.values.batches(1, |chunks| {
+                        for chunk in chunks {
+                            if average {
+                                means.clear();
+                                means.extend(chunk.chunks_exact(channels).map(|values| {
+                                    let sum: f64 = values.iter().map(|x| f64::from(*x)).sum();
+                                    (sum / channels as f64) as f32
+                                }));
+                                statistics.push(&means);
+                            } else {
+                                statistics.push(chunk);
+                            }
+                        }
+                        io::Result::Ok(())
+                    })?;
+                    let series = if average { 1 } else { channels };
+                    // [stats][coefficients][channels] to [stats][channels][coefficients].
+                    for block in statistics.finish().chunks_exact(width) {
+                        for c in 0..series {
+                            row.extend(block.iter().skip(c).step_by(series));
+                        }
+                    }
+                }
+                Ok(Features::Summary(row))
+            }
+        }
+    }
+
+    /// Finished and kept coefficients of a feature.
+    fn finished(
+        &self,
+        mut store: Store,
+        planned: &PlannedFeature,
+        peaks: &[f32],
+    ) -> Result<Store, FinishError> {
+        let channels = self.plan.channels;
+        let rows = planned.feature.raw_rows;
+        let values_per = if planned.feature.complex { 2 * channels } else { channels };
+        let all = planned.feature.labels.len();
+        let [first, end] = planned.kept;
+        if planned.feature.finish.is_none() && end - first == all {
+            return Ok(store);
+        }
+        let finish_chunk = |raw: &Vec<f32>| {
+            let frames = raw.len() / (rows * channels);
+            let mut out = vec![0.0; frames * (end - first) * values_per];
+            let mut frame_out = vec![0.0; all * values_per];
+            let width = (end - first) * values_per;
+            for (raw, out) in raw.chunks_exact(rows * channels).zip(out.chunks_exact_mut(width)) {
+                match &planned.feature.finish {
+                    Some(finish) if end - first == all => finish.frame(raw, peaks, channels, out),
+                    Some(finish) => {
+                        finish.frame(raw, peaks, channels, &mut frame_out);
+                        out.copy_from_slice(&frame_out[first * values_per..end * values_per]);
+                    }
+                    None => out.copy_from_slice(&raw[first * values_per..end * values_per]),
+                }
+            }
+            out
+        };
+        let mut out = Store::new(&self.folder);
+        store.batches(2 * rayon::current_num_threads(), |chunks| {
+            let finished: Vec<Vec<f32>> = if chunks.len() > 1 {
+                chunks.par_iter().map(finish_chunk).collect()
+            } else {
+                chunks.iter().map(finish_chunk).collect()
+            };
+            finished.into_iter().try_for_each(|chunk| out.push(chunk))
+        })?;
+        Ok(out)
+    }
+
+    /// Local derivatives of another feature's frames.
+    fn derive(
+        &self,
+        source: &mut FeatureArray,
+        params: &DeltaParams,
+    ) -> Result<Store, FinishError> {
+        if params.mode == DeltaMode::Interp && source.frames < params.width {
+            return Err(FinishError::TooFewFrames {
+                feature: source.name.clone(),
+                frames: source.frames,
+                needed: params.width,
+            });
+        }
+        let series = source.coefficients * self.plan.channels;
+        let mut values = Vec::with_capacity(source.values.len());
+        source.values.batches(1, |chunks| {
+            chunks.iter().for_each(|c| values.extend_from_slice(c));
+            io::Result::Ok(())
+        })?;
+        let view = ArrayView2::from_shape((source.frames, series), &values)
+            .expect("frames of equal length");
+        let derived = delta(view.t(), params).map_err(|_| FinishError::TooFewFrames {
+            feature: source.name.clone(),
+            frames: source.frames,
+            needed: params.width,
+        })?;
+        let mut out = Store::new(&self.folder);
+        out.push(derived.t().as_standard_layout().into_owned().into_raw_vec_and_offset().0)?;
+        Ok(out)
+    }
+}
+
+/// Why stored values could not be finished.
+#[derive(Debug, thiserror::Error)]
+pub enum FinishError {
+    /// The temporary file failed.
+    #[error("temporary file: {0}")]
+    Temporary(#[from] io::Error),
+    /// A derivative needs more frames.
+    #[error("{feature} has {frames} frames, delta needs at least {needed}")]
+    TooFewFrames {
+        /// The source of the derivative.
+        feature: String,
+        /// Its frames.
+        frames: usize,
+        /// Frames needed.
+        needed: usize,
+    },
+}
+
+/// Raises `peaks [channels]` to the maxima of the values `range` of every frame of `width` values.
+fn raise_peaks(values: &[f32], width: usize, range: std::ops::Range<usize>, peaks: &mut [f32]) {
+    const LANES: usize = 16;
+    let channels = peaks.len();
+    pulp::Arch::new().dispatch(
+        #[inline(always)]
+        || {
+            let mut lanes = [f32::NEG_INFINITY; LANES];
+            for frame in values.chunks_exact(width) {
+                let frame = &frame[range.clone()];
+                if LANES.is_multiple_of(channels) {
+                    let (blocks, rest) = frame.as_chunks::<LANES>();
+                    for block in blocks {
+                        for (lane, x) in lanes.iter_mut().zip(block) {
+                            *lane = if *x > *lane { *x } else { *lane };
+                        }
+                    }
+                    for (i, x) in rest.iter().enumerate() {
+                        peaks[i % channels] = peaks[i % channels].max(*x);
+                    }
+                } else {
+                    for (i, x) in frame.iter().enumerate() {
+                        peaks[i % channels] = peaks[i % channels].max(*x);
+                    }
+                }
+            }
+            if LANES.is_multiple_of(channels) {
+                for (i, x) in lanes.iter().enumerate() {
+                    peaks[i % channels] = peaks[i % channels].max(*x);
+                }
+            }
+        },
+    );
+}

@@ -1,0 +1,106 @@
+//! What mel features share: the filter bank on rows, decibels, and the clamp below the maximum.
+
+use corsmal_dsp::decibel::Decibel;
+use corsmal_dsp::lanes::{Row, power_to_decibel};
+use corsmal_dsp::mel::{MelParams, SparseBank, mel_filter};
+use pulp::Arch;
+use serde::{Deserialize, Serialize};
+
+use super::{Finish, SpectrumKernel};
+use crate::config::DbSpec;
+
+/// Unit of the output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Scale {
+    /// As computed.
+    #[default]
+    Linear,
+    /// `10 log10` (librosa.power_to_db).
+    PowerToDb,
+    /// `20 log10` (librosa.amplitude_to_db): the value is squared first.
+    AmplitudeToDb,
+}
+
+/// Values to a unit, before any clamp.
+pub fn power_rows_to_scale(scale: Scale, db: &Decibel, rows: &mut [Row]) {
+    let (amin, offset) = (db.amin, db.offset());
+    match scale {
+        Scale::Linear => {}
+        Scale::PowerToDb => {
+            power_to_decibel(Arch::new(), rows, amin as f32, offset as f32);
+        }
+        Scale::AmplitudeToDb => {
+            for x in rows.iter_mut().flat_map(|row| &mut row.0) {
+                *x *= *x;
+            }
+            power_to_decibel(Arch::new(), rows, amin as f32, offset as f32);
+        }
+    }
+}
+
+/// `bank @ spectrum`, then a unit.
+pub struct MelKernel {
+    bank: SparseBank,
+    scale: Scale,
+    db: Decibel,
+}
+
+impl MelKernel {
+    /// The kernel for a filter bank.
+    pub fn new(params: &MelParams, scale: Scale, db: Decibel) -> corsmal_dsp::Result<Self> {
+        Ok(Self { bank: SparseBank::new(&mel_filter(params)?), scale, db })
+    }
+}
+
+impl SpectrumKernel for MelKernel {
+    fn rows(&self, spectrum: &[Row], out: &mut [Row]) {
+        self.bank.apply_rows(Arch::new(), spectrum, out);
+        power_rows_to_scale(self.scale, &self.db, out);
+    }
+}
+
+/// The reference of `"max"` and the `top_db` clamp.
+pub struct DecibelFinish {
+    db: DbSpec,
+    rows: usize,
+}
+
+impl DecibelFinish {
+    /// The finish, where this scale and these parameters need the maximum of the recording.
+    pub fn of(scale: Scale, db: &DbSpec, rows: usize) -> Option<Box<dyn Finish>> {
+        let needed = scale != Scale::Linear && db.needs_peak();
+        needed.then(|| Box::new(Self { db: *db, rows }) as Box<dyn Finish>)
+    }
+}
+
+impl Finish for DecibelFinish {
+    fn peaks(&self) -> Vec<(std::ops::Range<usize>, bool)> {
+        vec![(0..self.rows, self.db.joint)]
+    }
+
+    fn frame(&self, raw: &[f32], peaks: &[f32], channels: usize, out: &mut [f32]) {
+        clamp(&self.db, raw, peaks, channels, out);
+    }
+}
+
+/// `max(x, peak - top_db)`, less the peak where that is the reference.
+pub fn clamp(db: &DbSpec, raw: &[f32], peaks: &[f32], channels: usize, out: &mut [f32]) {
+    if let Ok(peaks) = <&[f32; 8]>::try_from(peaks) {
+        let levels = peaks.map(|p| db.level(p));
+        let (raw, out) = (raw.as_chunks::<8>().0, out.as_chunks_mut::<8>().0);
+        for (raw, out) in raw.iter().zip(out) {
+            for c in 0..8 {
+                out[c] = raw[c].max(levels[c].1) - levels[c].0;
+            }
+        }
+        return;
+    }
+    for (c, peak) in peaks.iter().enumerate() {
+        let (shift, floor) = db.level(*peak);
+        let raw = raw[c..].iter().step_by(channels);
+        for (x, out) in raw.zip(out[c..].iter_mut().step_by(channels)) {
+            *out = x.max(floor) - shift;
+        }
+    }
+}

@@ -1,0 +1,270 @@
+//! Features: one file each, with its parameters and one line in [`REGISTRY`].
+//!
+//! A feature declares what it reads (rows of a spectrum, frames of the waveform, or the whole
+//! recording), what it computes from that alone, and, where its values depend on the maximum of the
+//! recording (`top_db`), how stored values are finished once that is known.
+
+mod delta;
+mod mel_bands;
+mod melspectrogram;
+mod mfcc;
+mod rms;
+mod stft;
+mod zero_crossing_rate;
+
+use corsmal_dsp::lanes::Row;
+use corsmal_dsp::stft::StftParams;
+use corsmal_dsp::time_domain::FrameParams;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use crate::config::{ConfigError, typed};
+
+/// Every feature, in the order in which `corsmal-feat features` lists them.
+const REGISTRY: &[Entry] = &[
+    Entry::of::<stft::Stft>(),
+    Entry::of::<melspectrogram::Melspectrogram>(),
+    Entry::of::<mfcc::Mfcc>(),
+    Entry::of::<delta::Delta>(),
+    Entry::of::<zero_crossing_rate::ZeroCrossingRate>(),
+    Entry::of::<rms::Rms>(),
+];
+
+/// Parameters of a feature, and how to plan it.
+pub trait FeatureKind:
+    Serialize + for<'de> Deserialize<'de> + Default + Send + Sync + 'static
+{
+    /// Name in configurations, librosa's where it has one.
+    const KIND: &'static str;
+    /// What each number of the output is, in a sentence or two.
+    const ABOUT: &'static str;
+
+    /// Plans the feature for signals of `sr` Hz.
+    ///
+    /// # Errors
+    /// Impossible parameters.
+    fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature>;
+}
+
+/// What a spectrum feature reads of each frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// `|X|^2`, one row a bin.
+    Power,
+    /// `|X|`, one row a bin.
+    Magnitude,
+    /// Real and imaginary parts, two rows a bin.
+    Complex,
+}
+
+/// Computes from the spectra of sixteen (frame, channel) slots.
+pub trait SpectrumKernel: Send + Sync {
+    /// `spectrum` holds the quantity's rows, `out` the feature's.
+    fn rows(&self, spectrum: &[Row], out: &mut [Row]);
+}
+
+/// Computes from frames of the waveform.
+pub trait WaveKernel: Send + Sync {
+    /// `samples` is interleaved and starts at the first sample of the first of `frames` frames, edge
+    /// padding included; appends `[frames][rows][channels]` to `out`.
+    fn frames(&self, samples: &[f32], channels: usize, frames: usize, out: &mut Vec<f32>);
+}
+
+/// Finishes stored values once the maxima of the recording are known.
+pub trait Finish: Send + Sync {
+    /// Rows whose maximum is needed, and whether it is joint over channels.
+    fn peaks(&self) -> Vec<(std::ops::Range<usize>, bool)>;
+
+    /// One frame, `raw [rows][channels]` to `out [coefficients][channels]`; `peaks` is
+    /// `[peaks][channels]`.
+    fn frame(&self, raw: &[f32], peaks: &[f32], channels: usize, out: &mut [f32]);
+}
+
+/// What a feature computes from.
+pub enum Kernel {
+    /// Rows of the spectrum.
+    Spectrum(StftParams, Quantity, Box<dyn SpectrumKernel>),
+    /// Frames of the waveform; outside the signal its edge values count.
+    Wave(FrameParams, WavePad, Box<dyn WaveKernel>),
+    /// The finished frames of another feature, by name.
+    Derived(String, corsmal_dsp::delta::DeltaParams),
+}
+
+/// What waveform features see before the first and after the last sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WavePad {
+    /// Zeros.
+    Zero,
+    /// The first or last sample.
+    Edge,
+}
+
+/// A planned feature.
+pub struct Feature {
+    /// What it computes from.
+    pub kernel: Kernel,
+    /// Values stored per frame and channel before finishing.
+    pub raw_rows: usize,
+    /// Names of the output coefficients (empty for [`Kernel::Derived`], which takes its source's).
+    pub labels: Vec<String>,
+    /// Whether pairs of rows are real and imaginary parts.
+    pub complex: bool,
+    /// Finishing, where values depend on the whole recording.
+    pub finish: Option<Box<dyn Finish>>,
+}
+
+type Planner = Box<dyn Fn(f64) -> corsmal_dsp::Result<Feature> + Send + Sync>;
+
+/// A registered feature kind.
+pub struct Entry {
+    kind: &'static str,
+    about: &'static str,
+    parse: fn(&str, &Map<String, Value>) -> Result<(Value, Planner), ConfigError>,
+}
+
+impl Entry {
+    const fn of<K: FeatureKind>() -> Self {
+        fn parse<K: FeatureKind>(
+            prefix: &str,
+            table: &Map<String, Value>,
+        ) -> Result<(Value, Planner), ConfigError> {
+            let parameters: K = typed(prefix, table)?;
+            let value =
+                serde_json::to_value(&parameters).map_err(|e| ConfigError::key(prefix, e))?;
+            Ok((value, Box::new(move |sr| parameters.plan(sr))))
+        }
+        Self { kind: K::KIND, about: K::ABOUT, parse: parse::<K> }
+    }
+
+    /// Name in configurations.
+    pub fn kind(&self) -> &'static str {
+        self.kind
+    }
+
+    /// What each number of the output is.
+    pub fn about(&self) -> &'static str {
+        self.about
+    }
+
+    /// Default parameters.
+    pub fn defaults(&self) -> Value {
+        (self.parse)(self.kind, &Map::new()).map_or(Value::Null, |(value, _)| value)
+    }
+}
+
+/// Every registered feature.
+pub fn registry() -> &'static [Entry] {
+    REGISTRY
+}
+
+/// Names of every registered feature.
+pub fn kinds() -> Vec<&'static str> {
+    REGISTRY.iter().map(|e| e.kind).collect()
+}
+
+/// A feature of a configuration: name, kind, checked parameters.
+#[derive(Clone)]
+pub struct FeatureConfig {
+    name: String,
+    entry: &'static Entry,
+    parameters: Value,
+    coefficients: Option<[usize; 2]>,
+    planner: std::sync::Arc<Planner>,
+}
+
+impl std::fmt::Debug for FeatureConfig {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} = {}", self.name, self.to_value())
+    }
+}
+
+impl FeatureConfig {
+    /// Parses the table `features.NAME`. `kind` is the name unless given; `coefficients = [a, b]`
+    /// keeps coefficients `a` to `b - 1`; everything else are the kind's parameters.
+    pub(crate) fn parse(name: &str, value: Value) -> Result<Self, ConfigError> {
+        let prefix = format!("features.{name}");
+        if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c)) {
+            let message = "is not a possible name: letters, digits, _ and - only";
+            return Err(ConfigError::key(prefix, message));
+        }
+        let Value::Object(mut table) = value else {
+            return Err(ConfigError::key(prefix, format!("= {value}: expected a table")));
+        };
+        let kind = match table.remove("kind") {
+            None => name.to_string(),
+            Some(Value::String(kind)) => kind,
+            Some(other) => {
+                let message = format!("= {other}: expected one of {}", kinds().join(", "));
+                return Err(ConfigError::key(format!("{prefix}.kind"), message));
+            }
+        };
+        let Some(entry) = REGISTRY.iter().find(|e| e.kind == kind) else {
+            let message = format!("= \"{kind}\" is unknown: one of {}", kinds().join(", "));
+            return Err(ConfigError::key(format!("{prefix}.kind"), message));
+        };
+        let coefficients = match table.remove("coefficients") {
+            None => None,
+            Some(value) => match serde_json::from_value::<[usize; 2]>(value.clone()) {
+                Ok([a, b]) if a < b => Some([a, b]),
+                _ => {
+                    let message = format!("= {value}: expected [first, end) with first < end");
+                    return Err(ConfigError::key(format!("{prefix}.coefficients"), message));
+                }
+            },
+        };
+        let (parameters, planner) = (entry.parse)(&prefix, &table)?;
+        // Values that no sample rate makes possible are refused now, not at the first file.
+        planner(768_000.0).map_err(|e| ConfigError::key(&prefix, e))?;
+        let planner = std::sync::Arc::new(planner);
+        Ok(Self { name: name.to_string(), entry, parameters, coefficients, planner })
+    }
+
+    /// Refuses a derived feature whose source is missing or comes later.
+    pub(crate) fn check_references(all: &[Self]) -> Result<(), ConfigError> {
+        for (i, feature) in all.iter().enumerate() {
+            let Some(of) = feature.parameters.get("of").and_then(Value::as_str) else { continue };
+            let source = all[..i].iter().find(|f| f.name == of);
+            if source.is_none() {
+                let message = format!("= \"{of}\": expected the name of an earlier feature");
+                return Err(ConfigError::key(format!("features.{}.of", feature.name), message));
+            }
+        }
+        Ok(())
+    }
+
+    /// Name of the feature in outputs.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What each number of the output is.
+    pub fn about(&self) -> &'static str {
+        self.entry.about
+    }
+
+    /// Coefficients kept, `[first, end)`; `None` for all.
+    pub fn coefficients(&self) -> Option<[usize; 2]> {
+        self.coefficients
+    }
+
+    /// Kind and every parameter.
+    pub fn to_value(&self) -> Value {
+        let mut table = Map::new();
+        table.insert("kind".into(), self.entry.kind.into());
+        if let Some(range) = self.coefficients {
+            table.insert("coefficients".into(), Value::from(range.to_vec()));
+        }
+        if let Value::Object(parameters) = &self.parameters {
+            table.extend(parameters.clone());
+        }
+        Value::Object(table)
+    }
+
+    /// Plans the feature for signals of `sr` Hz.
+    ///
+    /// # Errors
+    /// Parameters that are impossible at this rate.
+    pub fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
+        (self.planner)(sr)
+    }
+}

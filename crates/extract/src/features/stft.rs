@@ -1,0 +1,89 @@
+//! `stft`: the short-time Fourier transform itself.
+
+use corsmal_dsp::lanes::Row;
+use serde::{Deserialize, Serialize};
+
+use super::mel_bands::{DecibelFinish, Scale, power_rows_to_scale};
+use super::{Feature, FeatureKind, Kernel, Quantity, SpectrumKernel};
+use crate::config::{DbSpec, StftSpec};
+
+/// What is kept of a complex bin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Output {
+    /// Complex numbers (complex64).
+    Complex,
+    /// `|X|`.
+    #[default]
+    Magnitude,
+    /// `|X|^2`.
+    Power,
+}
+
+/// Parameters of `stft`.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Stft {
+    #[serde(flatten)]
+    stft: StftSpec,
+    output: Output,
+    scale: Scale,
+    #[serde(flatten)]
+    db: DbSpec,
+}
+
+struct Copy;
+
+impl SpectrumKernel for Copy {
+    fn rows(&self, spectrum: &[Row], out: &mut [Row]) {
+        out.copy_from_slice(spectrum);
+    }
+}
+
+struct Scaled {
+    scale: Scale,
+    db: corsmal_dsp::decibel::Decibel,
+}
+
+impl SpectrumKernel for Scaled {
+    fn rows(&self, spectrum: &[Row], out: &mut [Row]) {
+        out.copy_from_slice(spectrum);
+        power_rows_to_scale(self.scale, &self.db, out);
+    }
+}
+
+impl FeatureKind for Stft {
+    const KIND: &'static str = "stft";
+    const ABOUT: &'static str = "Short-time Fourier transform (librosa.stft): one value per \
+        frequency bin k at k * sr / n_fft Hz. output = complex, magnitude or power; scale turns \
+        magnitude or power into decibels.";
+
+    fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
+        let stft = self.stft.params()?;
+        let decibel = self.db.decibel()?;
+        let bins = stft.n_bins();
+        let quantity = match self.output {
+            Output::Complex => Quantity::Complex,
+            Output::Magnitude => Quantity::Magnitude,
+            Output::Power => Quantity::Power,
+        };
+        let complex = self.output == Output::Complex;
+        if complex && self.scale != Scale::Linear {
+            let allowed = "linear for complex output";
+            return Err(corsmal_dsp::DspError::parameter("scale", "decibels", allowed));
+        }
+        let kernel: Box<dyn SpectrumKernel> = match self.scale {
+            Scale::Linear => Box::new(Copy),
+            scale => Box::new(Scaled { scale, db: decibel }),
+        };
+        let hz = |k: usize| format!("{:.1}Hz", k as f64 * sr / stft.n_fft as f64);
+        let finish = DecibelFinish::of(self.scale, &self.db, bins);
+        Ok(Feature {
+            kernel: Kernel::Spectrum(stft, quantity, kernel),
+            raw_rows: if complex { 2 * bins } else { bins },
+            labels: (0..bins).map(hz).collect(),
+            complex,
+            finish,
+        })
+    }
+}

@@ -1,0 +1,118 @@
+//! `zero_crossing_rate`: share of samples at which the signal changes sign.
+
+use corsmal_dsp::time_domain::{FrameParams, ZeroCrossingParams};
+use serde::{Deserialize, Serialize};
+
+use super::{Feature, FeatureKind, Kernel, WaveKernel, WavePad};
+use crate::config::FrameSpec;
+
+/// Parameters of `zero_crossing_rate`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ZeroCrossingRate {
+    #[serde(flatten)]
+    frame: FrameSpec,
+    threshold: f64,
+    zero_pos: bool,
+    pad: bool,
+}
+
+impl Default for ZeroCrossingRate {
+    fn default() -> Self {
+        let ZeroCrossingParams { threshold, zero_pos, pad } = ZeroCrossingParams::default();
+        Self { frame: FrameSpec::default(), threshold, zero_pos, pad }
+    }
+}
+
+struct Crossings {
+    frame: FrameParams,
+    params: ZeroCrossingParams,
+}
+
+impl WaveKernel for Crossings {
+    fn frames(&self, samples: &[f32], channels: usize, frames: usize, out: &mut Vec<f32>) {
+        let FrameParams { frame_length, hop_length, .. } = self.frame;
+        // Crossings between successive marks; a mark is where some frame starts or ends.
+        let mut marks: Vec<usize> =
+            (0..frames).flat_map(|t| [t * hop_length, t * hop_length + frame_length - 1]).collect();
+        marks.sort_unstable();
+        marks.dedup();
+        let mut until = vec![0u32; marks.len() * channels];
+        for m in 1..marks.len() {
+            let (before, after) = until.split_at_mut(m * channels);
+            let span = &samples[marks[m - 1] * channels..(marks[m] + 1) * channels];
+            let total = &mut after[..channels];
+            total.copy_from_slice(&before[(m - 1) * channels..]);
+            pulp::Arch::new().dispatch(
+                #[inline(always)]
+                || count(&self.params, span, channels, total),
+            );
+        }
+        let at = |sample: usize| marks.binary_search(&sample).unwrap_or(0) * channels;
+        let first = u32::from(self.params.pad);
+        for t in 0..frames {
+            let start = at(t * hop_length);
+            let end = at(t * hop_length + frame_length - 1);
+            out.extend(
+                (0..channels).map(|c| {
+                    (until[end + c] - until[start + c] + first) as f32 / frame_length as f32
+                }),
+            );
+        }
+    }
+}
+
+/// Adds the crossings of each channel between the first and the last frame of `span`.
+#[inline(always)]
+fn count(params: &ZeroCrossingParams, span: &[f32], channels: usize, total: &mut [u32]) {
+    const LANES: usize = 16;
+    let threshold = params.threshold as f32;
+    let pairs = span.len().saturating_sub(channels);
+    let (before, after) = (&span[..pairs], &span[span.len() - pairs..]);
+    if LANES.is_multiple_of(channels) {
+        let mut lanes = [0u32; LANES];
+        let (before, before_rest) = before.as_chunks::<LANES>();
+        let (after, after_rest) = after.as_chunks::<LANES>();
+        for (a, b) in before.iter().zip(after) {
+            for i in 0..LANES {
+                let crossed = params.sign(a[i], threshold) != params.sign(b[i], threshold);
+                lanes[i] += u32::from(crossed);
+            }
+        }
+        for (i, n) in lanes.iter().enumerate() {
+            total[i % channels] += n;
+        }
+        for (i, (a, b)) in before_rest.iter().zip(after_rest).enumerate() {
+            let crossed = params.sign(*a, threshold) != params.sign(*b, threshold);
+            total[i % channels] += u32::from(crossed);
+        }
+    } else {
+        for (i, (a, b)) in before.iter().zip(after).enumerate() {
+            let crossed = params.sign(*a, threshold) != params.sign(*b, threshold);
+            total[i % channels] += u32::from(crossed);
+        }
+    }
+}
+
+impl FeatureKind for ZeroCrossingRate {
+    const KIND: &'static str = "zero_crossing_rate";
+    const ABOUT: &'static str = "Share of the samples of a frame at which the signal changes sign \
+        (librosa.feature.zero_crossing_rate), between 0 and 1.";
+
+    fn plan(&self, _: f64) -> corsmal_dsp::Result<Feature> {
+        let frame = self.frame.params()?;
+        let params = ZeroCrossingParams {
+            threshold: self.threshold,
+            zero_pos: self.zero_pos,
+            pad: self.pad,
+        };
+        params.check()?;
+        Ok(Feature {
+            kernel: Kernel::Wave(frame, WavePad::Edge, Box::new(Crossings { frame, params })),
+            raw_rows: 1,
+            labels: vec![String::new()],
+            complex: false,
+            finish: None,
+        })
+    }
+}

@@ -1,0 +1,374 @@
+//! From what the user names to the list of recordings of a run.
+//!
+//! A name is, in this order of interpretation: `-` (a WAV stream on standard input), an existing
+//! file (a manifest if its extension is one of [`manifest::EXTENSIONS`], else a recording), an
+//! existing folder, or a glob. Folders and globs give files with an audio extension only, follow
+//! symbolic links, skip names that begin with a dot, and are sorted by the bytes of the path
+//! relative to their root; names keep the order in which they are given.
+//!
+//! **Ids.** A recording's id is its path relative to its root, without extension, with `/` between
+//! the parts. The root is the folder named, the part of a glob before its first wildcard, or the
+//! folder of a file named; paths in a manifest are taken as written. Where ids collide, all those
+//! that do keep their extension; where that does not help, they take the path as given on the
+//! command line. What still collides is refused. Ids from a manifest stand as they are. Ids that
+//! would begin with `__`, the prefix of an output's own arrays, get `./` in front.
+
+mod ids;
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Component, Path, PathBuf};
+use std::str::FromStr;
+
+use thiserror::Error;
+use walkdir::WalkDir;
+
+use crate::manifest;
+
+/// What can be wrong with the inputs of a run.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum InputError {
+    /// Nothing has this name.
+    #[error("{path}: no such file or folder")]
+    Missing {
+        /// The name given.
+        path: PathBuf,
+    },
+    /// The operating system refused.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// Its reason.
+        source: std::io::Error,
+    },
+    /// A folder or glob without recordings.
+    #[error("{path}: no file with an audio extension ({extensions})")]
+    NoAudio {
+        /// The folder or glob.
+        path: PathBuf,
+        /// The extensions looked for.
+        extensions: String,
+    },
+    /// A glob that cannot be understood.
+    #[error("{pattern}: not a glob: {reason}")]
+    Glob {
+        /// The glob.
+        pattern: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A row of a manifest that cannot be used.
+    #[error("{path}, line {line}: {reason}")]
+    Manifest {
+        /// The manifest.
+        path: PathBuf,
+        /// Line, from 1.
+        line: u64,
+        /// What is wrong, and what is allowed.
+        reason: String,
+    },
+    /// Two inputs cannot be told apart.
+    #[error(
+        "{first} and {second} both have the id {id:?}; name each once, or give ids in a manifest"
+    )]
+    Duplicate {
+        /// The id.
+        id: String,
+        /// One input.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// A shard that cannot be.
+    #[error("shard {value:?} is not possible: expected i/n with 0 <= i < n, as 0/4 to 3/4")]
+    Shard {
+        /// The text given.
+        value: String,
+    },
+}
+
+impl InputError {
+    pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
+        Self::Io { path: path.into(), source }
+    }
+}
+
+/// Where the bytes of a recording come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum InputSource {
+    /// A file.
+    File(PathBuf),
+    /// Standard input.
+    Stdin,
+}
+
+impl fmt::Display for InputSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(path) => path.display().fmt(f),
+            Self::Stdin => f.write_str("-"),
+        }
+    }
+}
+
+/// One recording, or a stretch of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Input {
+    /// Unique in the run.
+    pub id: String,
+    /// Where its bytes come from.
+    pub source: InputSource,
+    /// Start of the stretch in seconds.
+    pub start: Option<f64>,
+    /// End of the stretch in seconds.
+    pub end: Option<f64>,
+    /// Label columns as (name, value); every input of a run has the same names in the same order.
+    pub labels: Vec<(String, String)>,
+}
+
+/// Finds the recordings that `names` stand for, in a stable order, with unique ids.
+///
+/// # Errors
+/// [`InputError`] names the path, and in a manifest the line.
+pub fn collect(names: &[String]) -> Result<Vec<Input>, InputError> {
+    let mut found = Vec::new();
+    for name in names {
+        find(name, &mut found)?;
+    }
+    let ids = ids::assign(&found)?;
+    let mut columns: Vec<String> = Vec::new();
+    for (column, _) in found.iter().flat_map(|f| &f.labels) {
+        if !columns.contains(column) {
+            columns.push(column.clone());
+        }
+    }
+    let inputs = found.into_iter().zip(ids).map(|(found, id)| {
+        let mut values: BTreeMap<String, String> = found.labels.into_iter().collect();
+        let labels = columns.iter().map(|c| (c.clone(), values.remove(c).unwrap_or_default()));
+        Input {
+            id,
+            source: found.source,
+            start: found.start,
+            end: found.end,
+            labels: labels.collect(),
+        }
+    });
+    Ok(inputs.collect())
+}
+
+/// BLAKE3 (hex) over ids, paths, stretches and labels of all inputs: equal for equal lists only.
+pub fn list_hash(inputs: &[Input]) -> String {
+    let mut hasher = blake3::Hasher::new();
+    let mut put = |text: &str| {
+        hasher.update(&(text.len() as u64).to_le_bytes());
+        hasher.update(text.as_bytes());
+    };
+    for input in inputs {
+        put(&input.id);
+        put(&input.source.to_string());
+        for time in [input.start, input.end] {
+            put(&time.map(|t| t.to_string()).unwrap_or_default());
+        }
+        put(&input.labels.len().to_string());
+        for (column, value) in &input.labels {
+            put(column);
+            put(value);
+        }
+    }
+    hasher.finalize().to_hex().to_string()
+}
+
+/// Part `index` of `count` contiguous parts of an input list. The parts of a list, one after the
+/// other, are the list, so merged shards hold what a whole run holds, in the same order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    /// From 0.
+    pub index: usize,
+    /// At least 1.
+    pub count: usize,
+}
+
+impl Default for Shard {
+    /// The whole list.
+    fn default() -> Self {
+        Self { index: 0, count: 1 }
+    }
+}
+
+impl Shard {
+    /// This part of `list`; parts differ in length by at most one.
+    pub fn of<T>(self, list: &[T]) -> &[T] {
+        // In 128 bits, so that no product overflows.
+        let cut = |index: usize| (list.len() as u128 * index as u128 / self.count as u128) as usize;
+        &list[cut(self.index)..cut(self.index + 1)]
+    }
+}
+
+impl FromStr for Shard {
+    type Err = InputError;
+
+    /// Reads `i/n`, counted from 0.
+    fn from_str(text: &str) -> Result<Self, InputError> {
+        let parts =
+            text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        match parts {
+            Some((index, count)) if index < count => Ok(Self { index, count }),
+            _ => Err(InputError::Shard { value: text.into() }),
+        }
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+/// An input before it has its final id.
+struct Found {
+    source: InputSource,
+    /// What to make the id of, tried in this order.
+    naming: Naming,
+    start: Option<f64>,
+    end: Option<f64>,
+    labels: Vec<(String, String)>,
+}
+
+enum Naming {
+    Given(String),
+    /// Path relative to the root.
+    Derived(PathBuf),
+}
+
+impl Found {
+    fn file(path: PathBuf, relative: PathBuf) -> Self {
+        Self {
+            source: InputSource::File(path),
+            naming: Naming::Derived(relative),
+            start: None,
+            end: None,
+            labels: Vec::new(),
+        }
+    }
+}
+
+fn find(name: &str, found: &mut Vec<Found>) -> Result<(), InputError> {
+    if name == "-" {
+        let naming = Naming::Given("stdin".into());
+        let (start, end, labels) = (None, None, Vec::new());
+        found.push(Found { source: InputSource::Stdin, naming, start, end, labels });
+        return Ok(());
+    }
+    let path = Path::new(name);
+    match std::fs::metadata(path) {
+        Ok(meta) if meta.is_dir() => {
+            let mut files = Vec::new();
+            walk(path, &mut files)?;
+            push_sorted(name, path, files, found)
+        }
+        Ok(_) if has_extension(path, &manifest::EXTENSIONS) => find_manifest(path, found),
+        Ok(_) => {
+            let relative = path.file_name().map_or_else(|| path.into(), PathBuf::from);
+            found.push(Found::file(path.into(), relative));
+            Ok(())
+        }
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            if !name.contains(['*', '?', '[']) {
+                return Err(InputError::Missing { path: path.into() });
+            }
+            find_glob(name, found)
+        }
+        Err(error) => Err(InputError::io(path, error)),
+    }
+}
+
+fn find_manifest(path: &Path, found: &mut Vec<Found>) -> Result<(), InputError> {
+    for entry in manifest::read(path)? {
+        let wrong = |reason| InputError::Manifest { path: path.into(), line: entry.line, reason };
+        match std::fs::metadata(&entry.path) {
+            Ok(meta) if meta.is_dir() => {
+                return Err(wrong(format!("{} is a folder", entry.path.display())));
+            }
+            Ok(_) => {}
+            Err(error) => return Err(wrong(format!("{}: {error}", entry.path.display()))),
+        }
+        if let Some(reason) = entry.id.as_deref().and_then(ids::refusal) {
+            return Err(wrong(reason));
+        }
+        let naming = match entry.id {
+            Some(id) => Naming::Given(id),
+            None => Naming::Derived(entry.written.into()),
+        };
+        let source = InputSource::File(entry.path);
+        let (start, end, labels) = (entry.start, entry.end, entry.labels);
+        found.push(Found { source, naming, start, end, labels });
+    }
+    Ok(())
+}
+
+fn find_glob(pattern: &str, found: &mut Vec<Found>) -> Result<(), InputError> {
+    let options = glob::MatchOptions {
+        case_sensitive: true,
+        require_literal_separator: true,
+        require_literal_leading_dot: true,
+    };
+    let matches = glob::glob_with(pattern, options)
+        .map_err(|e| InputError::Glob { pattern: pattern.into(), reason: e.to_string() })?;
+    let mut files = Vec::new();
+    for path in matches {
+        let path = path.map_err(|e| {
+            let at = e.path().to_path_buf();
+            InputError::io(&at, e.into())
+        })?;
+        walk(&path, &mut files)?;
+    }
+    let is_literal =
+        |part: &Component<'_>| !part.as_os_str().to_string_lossy().contains(['*', '?', '[']);
+    let root: PathBuf = Path::new(pattern).components().take_while(is_literal).collect();
+    push_sorted(pattern, &root, files, found)
+}
+
+/// Appends the audio files at or below `path`.
+fn walk(path: &Path, files: &mut Vec<PathBuf>) -> Result<(), InputError> {
+    let visible = |entry: &walkdir::DirEntry| {
+        entry.depth() == 0 || !entry.file_name().as_encoded_bytes().starts_with(b".")
+    };
+    for entry in WalkDir::new(path).follow_links(true).into_iter().filter_entry(visible) {
+        let entry = entry.map_err(|error| {
+            let at = error.path().unwrap_or(path).to_path_buf();
+            InputError::io(&at, error.into())
+        })?;
+        if entry.file_type().is_file() && has_extension(entry.path(), &corsmal_audio::EXTENSIONS) {
+            files.push(entry.into_path());
+        }
+    }
+    Ok(())
+}
+
+fn push_sorted(
+    name: &str,
+    root: &Path,
+    mut files: Vec<PathBuf>,
+    found: &mut Vec<Found>,
+) -> Result<(), InputError> {
+    if files.is_empty() {
+        let extensions = corsmal_audio::EXTENSIONS.join(", ");
+        return Err(InputError::NoAudio { path: name.into(), extensions });
+    }
+    files.sort_unstable_by(|a, b| {
+        a.as_os_str().as_encoded_bytes().cmp(b.as_os_str().as_encoded_bytes())
+    });
+    // A glob with ** matches a folder and what is in it.
+    files.dedup();
+    for path in files {
+        let relative = path.strip_prefix(root).unwrap_or(&path).to_path_buf();
+        found.push(Found::file(path, relative));
+    }
+    Ok(())
+}
+
+fn has_extension(path: &Path, extensions: &[&str]) -> bool {
+    path.extension().is_some_and(|e| extensions.iter().any(|x| e.eq_ignore_ascii_case(x)))
+}

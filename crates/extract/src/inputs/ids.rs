@@ -1,0 +1,96 @@
+//! Unique ids for a list of inputs.
+
+use std::collections::BTreeMap;
+use std::path::{Component, Path};
+
+use super::{Found, InputError, InputSource, Naming};
+use crate::table::RESERVED;
+
+/// Longest id in bytes, far below what a zip archive can name.
+const LONGEST: usize = 4096;
+/// numpy cannot tell `x` in `x.npy` from `x.npy` in `x.npy.npy`.
+const NPY: &str = ".npy";
+
+/// Why an id that the user gave cannot be.
+pub(super) fn refusal(id: &str) -> Option<String> {
+    let reason = if id.starts_with(RESERVED) {
+        format!("must not begin with {RESERVED}")
+    } else if id.ends_with(NPY) {
+        format!("must not end in {NPY}")
+    } else if id.len() > LONGEST {
+        format!("must not be longer than {LONGEST} bytes")
+    } else if id.chars().any(char::is_control) {
+        "must not hold control characters".to_string()
+    } else {
+        return None;
+    };
+    Some(format!("id {id:?} {reason}"))
+}
+
+/// The id of each input: given ones as they are, others from the shortest form of their path that
+/// collides with none.
+pub(super) fn assign(found: &[Found]) -> Result<Vec<String>, InputError> {
+    let forms: Vec<Vec<String>> = found.iter().map(forms).collect();
+    let mut levels = vec![0; found.len()];
+    loop {
+        let mut holders: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+        for (index, forms) in forms.iter().enumerate() {
+            holders.entry(&forms[levels[index]]).or_default().push(index);
+        }
+        let mut changed = false;
+        for (id, group) in holders.into_iter().filter(|(_, group)| group.len() > 1) {
+            let advancing: Vec<usize> =
+                group.iter().copied().filter(|&i| levels[i] + 1 < forms[i].len()).collect();
+            if advancing.is_empty() {
+                return Err(InputError::Duplicate {
+                    id: id.into(),
+                    first: found[group[0]].source.to_string(),
+                    second: found[group[1]].source.to_string(),
+                });
+            }
+            for index in advancing {
+                levels[index] += 1;
+                changed = true;
+            }
+        }
+        if !changed {
+            return Ok(forms
+                .into_iter()
+                .zip(levels)
+                .map(|(mut f, level)| f.swap_remove(level))
+                .collect());
+        }
+    }
+}
+
+/// The ids that an input may have, best first.
+fn forms(found: &Found) -> Vec<String> {
+    match (&found.naming, &found.source) {
+        (Naming::Given(id), _) => vec![id.clone()],
+        (Naming::Derived(relative), InputSource::File(path)) => {
+            let mut forms = Vec::new();
+            for path in [relative, path] {
+                forms.push(id_of(&path.with_extension("")));
+                forms.push(id_of(path));
+            }
+            forms.retain(|id| !id.ends_with(NPY));
+            if forms.is_empty() {
+                forms.push(format!("{}_", id_of(relative)));
+            }
+            forms
+        }
+        (Naming::Derived(relative), InputSource::Stdin) => vec![id_of(relative)],
+    }
+}
+
+fn id_of(path: &Path) -> String {
+    let parts: Vec<String> = path
+        .components()
+        .filter_map(|part| match part {
+            Component::Normal(name) => Some(name.to_string_lossy().into_owned()),
+            _ => None,
+        })
+        .collect();
+    let id = parts.join("/").replace(char::is_control, "\u{fffd}");
+    if id.starts_with(RESERVED) { format!("./{id}") } else { id }
+}

@@ -1,0 +1,149 @@
+//! Puts the outputs of all shards of a run together into the file that one run would have written,
+//! byte for byte.
+
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use crate::inputs::Shard;
+use crate::layout::{self, LayoutError};
+use crate::ledger::part_path;
+use crate::npz::{NpzError, NpzFile, NpzWriter};
+use crate::parquet::{self, ParquetTableError};
+use crate::provenance::Provenance;
+use crate::table::{Table, TableError};
+
+/// What can go wrong with merging.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum MergeError {
+    /// A shard cannot be read.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+    /// An archive cannot be read or written.
+    #[error(transparent)]
+    Npz(#[from] NpzError),
+    /// A Parquet file cannot be read or written.
+    #[error(transparent)]
+    Parquet(#[from] ParquetTableError),
+    /// The result cannot be put in its place.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: std::io::Error,
+    },
+    /// The files are not the shards of one run.
+    #[error("{path}: expected {expected}, found {actual}")]
+    NotOneRun {
+        /// The file that does not fit.
+        path: PathBuf,
+        /// What would fit.
+        expected: String,
+        /// What it is.
+        actual: String,
+    },
+    /// The tables of two shards do not fit together.
+    #[error("{path}: {source}")]
+    Table {
+        /// The file that does not fit the ones before.
+        path: PathBuf,
+        /// Why.
+        source: TableError,
+    },
+}
+
+/// Merges all shards of a run, given in any order. The kind of output follows from the extension of
+/// `out`: `.parquet`, else `.npz`. `out` appears only when it is complete.
+///
+/// # Errors
+/// [`MergeError`] names the shard that does not fit.
+pub fn merge(shards: &[PathBuf], out: &Path) -> Result<(), MergeError> {
+    let part = part_path(out);
+    if out.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet")) {
+        merge_parquet(shards, out, &part)?;
+    } else {
+        merge_npz(shards, out, &part)?;
+    }
+    std::fs::rename(&part, out).map_err(|source| MergeError::Io { path: out.into(), source })
+}
+
+fn merge_parquet(shards: &[PathBuf], out: &Path, part: &Path) -> Result<(), MergeError> {
+    let mut read = Vec::new();
+    for path in shards {
+        let (table, provenance) = parquet::read(path)?;
+        read.push(Piece { path: path.clone(), table, provenance, file: () });
+    }
+    let (_, table, provenance) = join(read, out)?;
+    Ok(parquet::write(part, &table, &provenance)?)
+}
+
+fn merge_npz(shards: &[PathBuf], out: &Path, part: &Path) -> Result<(), MergeError> {
+    let mut read = Vec::new();
+    for path in shards {
+        let mut file = NpzFile::open(path)?;
+        let (table, provenance) = layout::read_table(&mut file)?;
+        read.push(Piece { path: path.clone(), table, provenance, file });
+    }
+    let (mut files, table, provenance) = join(read, out)?;
+    let (witness, _) = files[0].raw(layout::COMPRESSION_WITNESS)?;
+    let mut writer = NpzWriter::create(part, witness.compression)?;
+    for file in &mut files {
+        let names: Vec<String> =
+            file.names().iter().filter(|name| layout::is_frame_level(name)).cloned().collect();
+        for name in names {
+            let (entry, raw) = file.raw(&name)?;
+            writer.copy(&entry, raw)?;
+        }
+    }
+    layout::write_table(&mut writer, &table, &provenance)?;
+    Ok(writer.finish()?)
+}
+
+/// One shard.
+struct Piece<F> {
+    path: PathBuf,
+    table: Table,
+    provenance: Provenance,
+    file: F,
+}
+
+/// Orders the shards, checks that they are all of one run, and joins their tables.
+fn join<F>(
+    mut pieces: Vec<Piece<F>>,
+    out: &Path,
+) -> Result<(Vec<F>, Table, Provenance), MergeError> {
+    let not_one_run = |path: &Path, expected: String, actual: String| MergeError::NotOneRun {
+        path: path.into(),
+        expected,
+        actual,
+    };
+    pieces.sort_by_key(|piece| piece.provenance.shard.parse::<Shard>().map_or(0, |s| s.index));
+    let count = pieces.len();
+    let Some(first) = pieces.first().map(|piece| piece.provenance.clone()) else {
+        return Err(not_one_run(out, "at least one shard".into(), "none".into()));
+    };
+    let mut table: Option<Table> = None;
+    let mut files = Vec::new();
+    for (index, piece) in pieces.into_iter().enumerate() {
+        let shard = Shard { index, count }.to_string();
+        let expected = Provenance { shard: shard.clone(), ..first.clone() };
+        if piece.provenance.shard != shard {
+            return Err(not_one_run(&piece.path, format!("shard {shard}"), piece.provenance.shard));
+        }
+        if piece.provenance != expected {
+            let expected = "tool version, configuration and input list of the other shards";
+            return Err(not_one_run(&piece.path, expected.into(), "others".into()));
+        }
+        match &mut table {
+            None => table = Some(piece.table),
+            Some(table) => table
+                .extend(&piece.table)
+                .map_err(|source| MergeError::Table { path: piece.path, source })?,
+        }
+        files.push(piece.file);
+    }
+    let whole = Provenance { shard: Shard::default().to_string(), ..first };
+    Ok((files, table.unwrap_or_default(), whole))
+}

@@ -1,0 +1,310 @@
+use std::fs;
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::Path;
+
+use proptest::prelude::*;
+use tempfile::TempDir;
+
+use super::headers::Zip64;
+use super::*;
+use crate::npy::{DType, Header};
+
+const COMPRESSIONS: [Compression; 2] = [Compression::Stored, Compression::Deflated];
+
+fn ramp(count: usize) -> Vec<f32> {
+    (0..count).map(|i| i as f32 * 0.5 - 3.0).collect()
+}
+
+/// A few entries of different lengths and kinds.
+fn fill(writer: &mut NpzWriter, from: usize) -> Vec<EntryRecord> {
+    let mut records = Vec::new();
+    for index in from..5 {
+        let data = ramp(index * 100);
+        let name = format!("träning/{index}");
+        let header = Header::new(DType::F32, &[10, index * 10]).fortran();
+        let record = match index % 2 {
+            0 => writer.array(&name, &header, bytemuck::cast_slice(&data)),
+            _ => writer.array_from(&name, &header, bytemuck::cast_slice::<_, u8>(&data)),
+        };
+        records.push(record.unwrap());
+    }
+    records
+}
+
+fn write(path: &Path, compression: Compression) -> Vec<u8> {
+    let mut writer = NpzWriter::create(path, compression).unwrap();
+    fill(&mut writer, 0);
+    writer.finish().unwrap();
+    fs::read(path).unwrap()
+}
+
+#[test]
+fn what_is_written_is_read_back() {
+    let folder = TempDir::new().unwrap();
+    for compression in COMPRESSIONS {
+        let path = folder.path().join("a.npz");
+        write(&path, compression);
+        let mut npz = NpzFile::open(&path).unwrap();
+        assert_eq!(npz.names().len(), 5);
+        let array = npz.f32("träning/3").unwrap();
+        assert_eq!(array.shape(), [10, 30]);
+        let in_file_order: Vec<f32> = array.t().iter().copied().collect();
+        assert_eq!(in_file_order, ramp(300));
+        assert_eq!(npz.f64("träning/3").unwrap(), array.mapv(f64::from));
+        assert!(npz.f32("träning/0").unwrap().is_empty());
+        assert!(
+            matches!(npz.f32("other"), Err(NpzError::Missing { member, .. }) if member == "other")
+        );
+    }
+}
+
+#[test]
+fn text_is_read_back() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("a.npz");
+    for compression in COMPRESSIONS {
+        let strings = ["", "wasser", "水 ü 🜄"];
+        let mut writer = NpzWriter::create(&path, compression).unwrap();
+        writer.strings("words", &strings).unwrap();
+        writer.strings::<&str>("none", &[]).unwrap();
+        writer.text("json", "{\"a\": [1, 2]}").unwrap();
+        writer.finish().unwrap();
+        let mut npz = NpzFile::open(&path).unwrap();
+        assert_eq!(npz.strings("words").unwrap(), strings);
+        assert!(npz.strings("none").unwrap().is_empty());
+        assert_eq!(npz.json::<serde_json::Value>("json").unwrap()["a"][1], 2);
+        let error = npz.strings("json").unwrap_err().to_string();
+        assert!(error.contains("\"json\": expected a list of strings (U), found |u1"), "{error}");
+        assert!(npz.f32("words").unwrap_err().to_string().contains("real numbers"));
+    }
+}
+
+#[test]
+fn data_of_stored_members_is_aligned_and_members_are_what_numpy_saves() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("a.npz");
+    let bytes = write(&path, Compression::Stored);
+    let mut archive = ::zip::ZipArchive::new(io::Cursor::new(&bytes)).unwrap();
+    for index in 0..archive.len() {
+        let mut member = archive.by_index(index).unwrap();
+        let start = member.data_start().unwrap();
+        assert_eq!(start % 64, 0, "member {index}");
+        let mut content = Vec::new();
+        member.read_to_end(&mut content).unwrap();
+        let (header, length) = Header::read(&mut content.as_slice()).unwrap();
+        assert_eq!(length % 64, 0);
+        assert_eq!(content[..length as usize], header.encode());
+        assert_eq!(member.last_modified().unwrap().year(), 1980);
+    }
+}
+
+#[test]
+fn streamed_and_whole_arrays_give_the_same_bytes() {
+    let folder = TempDir::new().unwrap();
+    let data = ramp(5000);
+    let bytes: &[u8] = bytemuck::cast_slice(&data);
+    let header = Header::new(DType::F32, &[5000]);
+    for compression in COMPRESSIONS {
+        let mut files = Vec::new();
+        for piece in [usize::MAX, 7, 4096] {
+            let path = folder.path().join("a.npz");
+            let mut writer = NpzWriter::create(&path, compression).unwrap();
+            match piece {
+                usize::MAX => writer.array("x", &header, bytes).unwrap(),
+                _ => writer
+                    .array_with("x", &header, |out| {
+                        bytes.chunks(piece).try_for_each(|piece| out.write_all(piece))
+                    })
+                    .unwrap(),
+            };
+            writer.finish().unwrap();
+            files.push(fs::read(&path).unwrap());
+        }
+        if compression == Compression::Deflated {
+            let path = folder.path().join("a.npz");
+            let mut writer = NpzWriter::create(&path, compression).unwrap();
+            let short = Packed::deflate(&header, &bytes[1..]);
+            assert!(writer.packed("x", &short).is_err());
+            writer.packed("x", &Packed::deflate(&header, bytes)).unwrap();
+            writer.finish().unwrap();
+            files.push(fs::read(&path).unwrap());
+        }
+        assert!(files.iter().all(|file| *file == files[0]), "{compression:?}");
+    }
+}
+
+#[test]
+fn a_failed_entry_leaves_no_trace() {
+    let folder = TempDir::new().unwrap();
+    for compression in COMPRESSIONS {
+        let expected = write(&folder.path().join("a.npz"), compression);
+        let path = folder.path().join("b.npz");
+        let mut writer = NpzWriter::create(&path, compression).unwrap();
+        let header = Header::new(DType::F32, &[10]);
+        let failures: [NpzError; 3] = [
+            writer.array("x", &header, &[0; 39]).unwrap_err(),
+            writer.array_from("x", &header, &[0; 41][..]).unwrap_err(),
+            writer
+                .array_with("x", &header, |out| {
+                    out.write_all(&[1; 5000])?;
+                    Err(io::Error::other("source broke"))
+                })
+                .unwrap_err(),
+        ];
+        assert!(
+            failures[0].to_string().contains("expected 40 bytes of data for shape [10], found 39")
+        );
+        assert!(failures[1].to_string().contains("found 41"));
+        assert!(failures[2].to_string().contains("source broke"));
+        fill(&mut writer, 0);
+        writer.finish().unwrap();
+        assert!(fs::read(&path).unwrap() == expected, "{compression:?}");
+    }
+}
+
+#[test]
+fn a_partial_archive_is_continued_to_the_same_bytes_from_any_length() {
+    let folder = TempDir::new().unwrap();
+    for compression in COMPRESSIONS {
+        let whole = folder.path().join("whole.npz");
+        let mut writer = NpzWriter::create(&whole, compression).unwrap();
+        let records = fill(&mut writer, 0);
+        writer.finish().unwrap();
+        let expected = fs::read(&whole).unwrap();
+        let part = folder.path().join("part");
+        for length in (0..=expected.len()).step_by(61) {
+            fs::write(&part, &expected[..length]).unwrap();
+            let sound = sound_entries(&part, &records).unwrap();
+            let complete = records.iter().take_while(|r| r.end <= length as u64).count();
+            assert_eq!(sound, complete, "{compression:?} cut at {length}");
+            let kept = records[..sound].to_vec();
+            let mut writer = NpzWriter::resume(&part, compression, kept).unwrap();
+            fill(&mut writer, sound);
+            writer.finish().unwrap();
+            assert!(fs::read(&part).unwrap() == expected, "{compression:?} cut at {length}");
+        }
+    }
+}
+
+#[test]
+fn damage_inside_an_entry_is_seen() {
+    let folder = TempDir::new().unwrap();
+    for compression in COMPRESSIONS {
+        let path = folder.path().join("a.npz");
+        let mut writer = NpzWriter::create(&path, compression).unwrap();
+        let records = fill(&mut writer, 0);
+        drop(writer);
+        assert_eq!(sound_entries(&path, &records).unwrap(), 5);
+        let middle = (records[2].offset + records[2].end) / 2;
+        let mut file = fs::OpenOptions::new().write(true).open(&path).unwrap();
+        file.seek(SeekFrom::Start(middle)).unwrap();
+        file.write_all(&[0x5a; 16]).unwrap();
+        assert_eq!(sound_entries(&path, &records).unwrap(), 2, "{compression:?}");
+        let gap = records[1..].to_vec();
+        let error = NpzWriter::resume(&path, compression, gap).unwrap_err().to_string();
+        assert!(error.contains("expected an entry from byte 0"), "{error}");
+    }
+    let missing = folder.path().join("none");
+    assert_eq!(sound_entries(&missing, &[]).unwrap(), 0);
+}
+
+#[test]
+fn zip64_records_are_understood() {
+    let folder = TempDir::new().unwrap();
+    for compression in COMPRESSIONS {
+        for zip64 in [Zip64 { size: 200, entries: 3 }, Zip64 { size: 0, entries: u64::MAX }] {
+            let path = folder.path().join("a.npz");
+            let mut writer = NpzWriter::create(&path, compression).unwrap().with_zip64(zip64);
+            fill(&mut writer, 0);
+            writer.finish().unwrap();
+            let mut npz = NpzFile::open(&path).unwrap();
+            assert_eq!(npz.names().len(), 5);
+            assert_eq!(npz.f32("träning/4").unwrap().len(), 400);
+            python_opens(&path);
+        }
+    }
+}
+
+/// Lets Python's zip reader check every member, if there is a Python.
+fn python_opens(path: &Path) {
+    let program = std::env::var("CORSMAL_PYTHON").unwrap_or_else(|_| "python3".into());
+    let script = "import sys, zipfile; z = zipfile.ZipFile(sys.argv[1]); \
+                  assert z.testzip() is None and len(z.namelist()) == 5";
+    match std::process::Command::new(&program).arg("-c").arg(script).arg(path).status() {
+        Ok(status) => assert!(status.success()),
+        Err(_) => println!("skipped: {program} absent"),
+    }
+}
+
+/// More than 65,535 members, for which zip64 is a must.
+#[test]
+fn more_members_than_plain_zip_can_count() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("many.npz");
+    let mut writer = NpzWriter::create(&path, Compression::Stored).unwrap();
+    for index in 0..65_540 {
+        writer.floats(&index.to_string(), &[], &[index as f32]).unwrap();
+    }
+    writer.finish().unwrap();
+    let mut npz = NpzFile::open(&path).unwrap();
+    assert_eq!(npz.names().len(), 65_540);
+    assert_eq!(npz.f32("65539").unwrap()[[]], 65_539.0);
+}
+
+#[test]
+fn sizes_that_lie_are_refused_before_anything_is_allocated() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("a.npz");
+    let mut writer = NpzWriter::create(&path, Compression::Deflated).unwrap();
+    writer.floats("x", &[100], &ramp(100)).unwrap();
+    writer.finish().unwrap();
+    let mut bytes = fs::read(&path).unwrap();
+    let central = bytes.windows(4).position(|w| w == b"PK\x01\x02").unwrap();
+    // Uncompressed size in the central directory: 3 GiB out of some hundred bytes.
+    bytes[central + 24..central + 28].copy_from_slice(&(3u32 << 30).to_le_bytes());
+    fs::write(&path, &bytes).unwrap();
+    let error = NpzFile::open(&path).unwrap().f32("x").unwrap_err().to_string();
+    assert!(error.contains("at most 1073741824 bytes uncompressed"), "{error}");
+
+    let lies = Header::new(DType::F64, &[1 << 20]).encode();
+    let mut archive = ::zip::ZipWriter::new(fs::File::create(&path).unwrap());
+    archive.start_file("x.npy", ::zip::write::SimpleFileOptions::default()).unwrap();
+    archive.write_all(&lies).unwrap();
+    archive.write_all(&[0; 64]).unwrap();
+    archive.finish().unwrap();
+    let error = NpzFile::open(&path).unwrap().f32("x").unwrap_err().to_string();
+    assert!(
+        error.contains("expected 8388608 bytes of data for shape [1048576], found 64"),
+        "{error}"
+    );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    #[test]
+    fn any_damage_gives_an_answer(
+        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+        cut in any::<prop::sample::Index>(),
+        deflated in any::<bool>(),
+    ) {
+        let folder = TempDir::new().unwrap();
+        let path = folder.path().join("a.npz");
+        let mut writer = NpzWriter::create(&path, COMPRESSIONS[usize::from(deflated)]).unwrap();
+        writer.floats("x", &[3, 2], &ramp(6)).unwrap();
+        writer.strings("s", &["a", "bc"]).unwrap();
+        writer.finish().unwrap();
+        let mut bytes = fs::read(&path).unwrap();
+        for (at, byte) in edits {
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
+        }
+        bytes.truncate(bytes.len() - cut.index(bytes.len()) / 8);
+        fs::write(&path, &bytes).unwrap();
+        if let Ok(mut npz) = NpzFile::open(&path) {
+            for name in npz.names().to_vec() {
+                let _ = (npz.f32(&name), npz.strings(&name), npz.text(&name), npz.header(&name));
+            }
+        }
+    }
+}

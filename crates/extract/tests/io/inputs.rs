@@ -1,0 +1,202 @@
+//! From names to inputs.
+
+use std::fs;
+use std::path::Path;
+
+use crate::support::{folder, text};
+use corsmal_extract::inputs::{self, Input, InputSource, Shard};
+use proptest::prelude::*;
+
+fn ids(names: &[&str]) -> Result<Vec<String>, String> {
+    let names: Vec<String> = names.iter().map(|name| name.to_string()).collect();
+    match inputs::collect(&names) {
+        Ok(inputs) => Ok(inputs.into_iter().map(|input| input.id).collect()),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+fn in_folder(root: &Path, names: &[&str]) -> Result<Vec<String>, String> {
+    let names: Vec<String> = names.iter().map(|n| text(&root.join(n)).to_string()).collect();
+    ids(&names.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+#[test]
+fn a_folder_is_searched_in_byte_order() {
+    let dir = folder(&[
+        "b.wav",
+        "a/z.WAV",
+        "a/é.flac",
+        "a.ogg",
+        "B.mp3",
+        "notes.txt",
+        ".x.wav",
+        ".git/y.wav",
+    ]);
+    assert_eq!(ids(&[text(dir.path())]).unwrap(), ["B", "a", "a/z", "a/é", "b"]);
+}
+
+#[test]
+fn a_glob_is_named_from_its_fixed_part() {
+    let dir = folder(&["t/1/audio/x.wav", "t/2/audio/x.wav", "t/2/audio/x.txt", "u/x.wav"]);
+    let expected = ["1/audio/x", "2/audio/x"];
+    assert_eq!(in_folder(dir.path(), &["t/*/audio/*"]).unwrap(), expected);
+    assert_eq!(in_folder(dir.path(), &["t/*/audio"]).unwrap(), expected);
+    assert_eq!(in_folder(dir.path(), &["t/**"]).unwrap(), expected);
+    let error = in_folder(dir.path(), &["t/*/video/*"]).unwrap_err();
+    assert!(error.contains("t/*/video/*: no file with an audio extension (wav, "), "{error}");
+}
+
+#[test]
+fn colliding_ids_take_the_extension_then_the_path() {
+    let dir = folder(&["a/x.wav", "a/x.flac", "a/y.wav", "b/y.wav"]);
+    assert_eq!(in_folder(dir.path(), &["a"]).unwrap(), ["x.flac", "x.wav", "y"]);
+    let ids = in_folder(dir.path(), &["a/y.wav", "b/y.wav", "a/x.wav"]).unwrap();
+    let prefix = text(dir.path()).trim_start_matches('/').to_string();
+    assert_eq!(ids, [format!("{prefix}/a/y"), format!("{prefix}/b/y"), "x".to_string()]);
+    let error = in_folder(dir.path(), &["a/y.wav", "a/y.wav"]).unwrap_err();
+    assert!(error.contains("both have the id"), "{error}");
+}
+
+#[test]
+fn ids_never_look_like_arrays_of_the_output() {
+    let dir = folder(&["__ids__.wav", "x.npy.wav", "__MACOSX/x.wav"]);
+    assert_eq!(ids(&[text(dir.path())]).unwrap(), ["./__MACOSX/x", "./__ids__", "x.npy.wav"]);
+}
+
+#[test]
+fn what_is_not_there_is_named() {
+    assert_eq!(ids(&["nowhere/x.wav"]).unwrap_err(), "nowhere/x.wav: no such file or folder");
+    let dir = folder(&["notes.txt"]);
+    assert!(ids(&[text(dir.path())]).unwrap_err().contains("no file with an audio extension"));
+    assert!(in_folder(dir.path(), &["x[.wav"]).unwrap_err().contains("not a glob"));
+    // A file named outright is taken at its word; its outcome row will say what it is.
+    assert_eq!(in_folder(dir.path(), &["notes.txt"]).unwrap(), ["notes"]);
+    assert_eq!(ids(&["-"]).unwrap(), ["stdin"]);
+}
+
+#[test]
+fn manifests_bring_stretches_and_labels() {
+    let dir = folder(&["data/a.wav", "data/b.wav"]);
+    let csv = dir.path().join("list.csv");
+    fs::write(
+        &csv,
+        "\u{feff}level,path,id,start,end\n0,data/a.wav,,,\nhalf,data/a.wav,a-2,0.5,1.25\n\"a,b\",data/b.wav,,2,\n",
+    )
+    .unwrap();
+    let found = inputs::collect(&[text(&csv).into()]).unwrap();
+    let row = |id: &str, file: &str, start, end, level: &str| Input {
+        id: id.into(),
+        source: InputSource::File(dir.path().join(file)),
+        start,
+        end,
+        labels: vec![("level".into(), level.into())],
+    };
+    let expected = [
+        row("data/a", "data/a.wav", None, None, "0"),
+        row("a-2", "data/a.wav", Some(0.5), Some(1.25), "half"),
+        row("data/b", "data/b.wav", Some(2.0), None, "a,b"),
+    ];
+    assert_eq!(found, expected);
+
+    let json = dir.path().join("list.jsonl");
+    let lines = [
+        r#"{"path": "data/a.wav", "level": 0}"#,
+        "",
+        r#"{"level": "half", "end": 1.25, "path": "data/a.wav", "id": "a-2", "start": 0.5}"#,
+        r#"{"path": "data/b.wav", "id": null, "start": 2, "level": "a,b"}"#,
+    ];
+    fs::write(&json, lines.join("\n")).unwrap();
+    assert_eq!(inputs::collect(&[text(&json).into()]).unwrap(), expected);
+}
+
+#[test]
+fn labels_of_different_lists_are_joined() {
+    let dir = folder(&["a.wav", "b.wav", "c.wav"]);
+    fs::write(dir.path().join("1.jsonl"), "{\"path\": \"a.wav\", \"x\": true}\n").unwrap();
+    fs::write(dir.path().join("2.csv"), "path,y\nb.wav,2\n").unwrap();
+    let names = ["1.jsonl", "2.csv", "c.wav"].map(|n| text(&dir.path().join(n)).to_string());
+    let found = inputs::collect(&names).unwrap();
+    let labels: Vec<Vec<&str>> =
+        found.iter().map(|i| i.labels.iter().map(|(_, v)| v.as_str()).collect()).collect();
+    assert_eq!(labels, [["true", ""], ["", "2"], ["", ""]]);
+}
+
+#[test]
+fn manifest_errors_name_the_line() {
+    let dir = folder(&["a.wav"]);
+    let cases = [
+        ("m.csv", "file\na.wav\n", "line 1: the first line names no column `path`: file"),
+        ("m.csv", "path,x,x\na.wav,1,2\n", "line 1: column 3 (\"x\") has no name of its own"),
+        ("m.csv", "path,x\na.wav,1\na.wav\n", "line 3: "),
+        ("m.csv", "path\na.wav\nb.wav\n", "line 3: "),
+        ("m.csv", "path,start\na.wav,soon\n", "line 2: start = \"soon\" is not a time in seconds"),
+        ("m.csv", "path,start\na.wav,nan\n", "line 2: start = \"nan\""),
+        ("m.csv", "path,end\na.wav,-1\n", "line 2: end = \"-1\""),
+        ("m.csv", "path,start,end\na.wav,2,2\n", "line 2: end = 2 is not behind start = 2"),
+        ("m.csv", "path,id\n,x\n", "line 2: no path"),
+        ("m.csv", "path,id\na.wav,__x\n", "line 2: id \"__x\" must not begin with __"),
+        ("m.csv", "path,id\na.wav,x.npy\n", "line 2: id \"x.npy\" must not end in .npy"),
+        ("m.csv", "path\n.\n", "is a folder"),
+        ("m.jsonl", "{\"path\": \"a.wav\"}\n[1]\n", "line 2: "),
+        ("m.jsonl", "{\"path\": \"a.wav\", \"x\": [1]}\n", "line 1: \"x\" must be a string"),
+        ("m.jsonl", "{\"path\": \"a.wav\", \"path\": \"a.wav\"}\n", "line 1: key \"path\""),
+        ("m.jsonl", "{\"path\": \"a.wav\"\n", "line 1: "),
+    ];
+    for (name, content, message) in cases {
+        let path = dir.path().join(name);
+        fs::write(&path, content).unwrap();
+        let error = ids(&[text(&path)]).unwrap_err();
+        assert!(error.starts_with(text(&path)) && error.contains(message), "{content:?}: {error}");
+    }
+}
+
+#[test]
+fn the_list_hash_sees_every_field() {
+    let base = Input {
+        id: "a".into(),
+        source: InputSource::File("a.wav".into()),
+        start: None,
+        end: None,
+        labels: vec![("x".into(), "1".into())],
+    };
+    let mut variants = vec![vec![base.clone()], vec![], vec![base.clone(), base.clone()]];
+    variants.push(vec![Input { id: "b".into(), ..base.clone() }]);
+    variants.push(vec![Input { source: InputSource::Stdin, ..base.clone() }]);
+    variants.push(vec![Input { start: Some(1.0), ..base.clone() }]);
+    variants.push(vec![Input { end: Some(1.0), ..base.clone() }]);
+    variants.push(vec![Input { labels: vec![("x".into(), "2".into())], ..base.clone() }]);
+    variants.push(vec![Input { labels: vec![], ..base }]);
+    let hashes: std::collections::HashSet<_> =
+        variants.iter().map(|list| inputs::list_hash(list)).collect();
+    assert_eq!(hashes.len(), variants.len());
+}
+
+#[test]
+fn shards_are_read_as_written() {
+    assert_eq!("2/3".parse::<Shard>().unwrap(), Shard { index: 2, count: 3 });
+    assert_eq!("2/3".parse::<Shard>().unwrap().to_string(), "2/3");
+    for text in ["3/3", "0/0", "1", "-1/2", "a/b", "", "1/2/3"] {
+        let error = text.parse::<Shard>().unwrap_err().to_string();
+        assert!(error.contains("expected i/n with 0 <= i < n"), "{error}");
+    }
+}
+
+proptest! {
+    #[test]
+    fn shards_in_order_are_the_list(length in 0usize..200, count in 1usize..40) {
+        let list: Vec<usize> = (0..length).collect();
+        let parts: Vec<&[usize]> = (0..count).map(|index| Shard { index, count }.of(&list)).collect();
+        prop_assert_eq!(&parts.concat(), &list);
+        let longest = parts.iter().map(|p| p.len()).max().unwrap();
+        let shortest = parts.iter().map(|p| p.len()).min().unwrap();
+        prop_assert!(longest - shortest <= 1);
+    }
+
+    #[test]
+    fn any_manifest_gives_an_answer(content in "\\PC{0,80}", json in any::<bool>()) {
+        let dir = folder(&["a.wav"]);
+        let path = dir.path().join(if json { "m.jsonl" } else { "m.csv" });
+        fs::write(&path, content).unwrap();
+        let _ = ids(&[text(&path)]);
+    }
+}

@@ -1,0 +1,9 @@
+//! Black-box tests of what goes into a run and what comes out of it.
+
+// Helpers outside of test functions are not covered by `allow-unwrap-in-tests`.
+#![allow(clippy::unwrap_used)]
+
+mod inputs;
+mod outputs;
+mod resume;
+mod support;

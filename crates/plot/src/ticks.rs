@@ -1,0 +1,49 @@
+//! Round axis values and their labels.
+
+/// Round values inside `low..=high`, about `count` of them: steps of 1, 2 or 5 times a power of
+/// ten. Empty for an empty or non-finite range.
+pub(crate) fn ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
+    let span = high - low;
+    if !(span.is_finite() && span > 0.0) || count == 0 {
+        return Vec::new();
+    }
+    let rough = span / count as f64;
+    let power = 10f64.powf(rough.log10().floor());
+    let factor = [1.0, 2.0, 5.0, 10.0].into_iter().find(|f| f * power >= rough * 0.999);
+    let step = factor.unwrap_or(10.0) * power;
+    let first = (low / step - 1e-9).ceil();
+    let last = (high / step + 1e-9).floor();
+    // Adding 0 turns -0 into 0.
+    (0..=(last - first).max(-1.0) as usize).map(|i| (first + i as f64) * step + 0.0).collect()
+}
+
+/// Labels of `values` with as few decimals as tell them apart.
+pub(crate) fn labels(values: &[f64]) -> Vec<String> {
+    let step = values.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
+    let decimals = if step.is_finite() && step > 0.0 {
+        (-(step * 1.0001).log10().floor()).clamp(0.0, 9.0) as usize
+    } else {
+        1
+    };
+    values.iter().map(|v| format!("{v:.decimals$}")).collect()
+}
+
+/// A frequency in Hz, shortened from 1000 on: `50`, `1k`, `2.5k`.
+pub(crate) fn frequency(hz: f64) -> String {
+    if hz < 1000.0 { format!("{hz:.0}") } else { format!("{}k", hz / 1000.0) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn round_values_that_fill_the_range() {
+        assert_eq!(ticks(0.0, 1.25, 6), [0.0, 0.5, 1.0]);
+        assert_eq!(ticks(-80.0, 0.0, 4), [-80.0, -60.0, -40.0, -20.0, 0.0]);
+        assert_eq!(labels(&ticks(0.0, 0.3, 3)), ["0.0", "0.1", "0.2", "0.3"]);
+        assert_eq!(labels(&ticks(0.0, 100.0, 5)), ["0", "20", "40", "60", "80", "100"]);
+        assert!(ticks(1.0, 1.0, 5).is_empty() && ticks(0.0, f64::NAN, 5).is_empty());
+        assert_eq!([50.0, 1000.0, 2500.0].map(frequency), ["50", "1k", "2.5k"]);
+    }
+}

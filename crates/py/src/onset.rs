@@ -1,0 +1,133 @@
+//! Onset strength and onset detection.
+
+use corsmal_dsp::onset::{
+    OnsetParams, PeakPick, backtrack as dsp_backtrack, detrend as dsp_detrend,
+    onset_detect as dsp_onset_detect, onset_rises as dsp_onset_rises,
+    onset_strength as dsp_onset_strength,
+};
+use corsmal_dsp::{DspError, Real};
+use ndarray::{ArrayView1, ArrayView2};
+use numpy::{Element, PyReadonlyArrayDyn};
+use pyo3::prelude::*;
+
+use crate::arrays::{Floats, each_precision, into_numpy, view2, view3};
+use crate::value_error;
+
+/// Peak conditions from the front end: (pre_max, post_max, pre_avg, post_avg, delta, wait); the
+/// missing ones are librosa's for the sample rate and hop.
+type PeakTuple =
+    (Option<usize>, Option<usize>, Option<usize>, Option<usize>, Option<f64>, Option<usize>);
+
+/// A spectrogram in dB with an optional one of the same shape and precision to compare with.
+struct Compared<'py, T: Element> {
+    s: PyReadonlyArrayDyn<'py, T>,
+    reference: Option<PyReadonlyArrayDyn<'py, T>>,
+}
+
+impl<'py, T: Real + Element> Compared<'py, T> {
+    fn new(s: PyReadonlyArrayDyn<'py, T>, reference: Option<&Bound<'py, PyAny>>) -> PyResult<Self> {
+        Ok(Self { s, reference: reference.map(|array| array.extract()).transpose()? })
+    }
+
+    fn strength(&self, py: Python<'py>, params: &OnsetParams) -> PyResult<Bound<'py, PyAny>> {
+        let (s, reference) = (view3(&self.s)?, self.reference.as_ref().map(view3).transpose()?);
+        let envelope = py.detach(|| dsp_onset_strength(s, reference, params));
+        into_numpy(py, envelope.map_err(value_error)?)
+    }
+
+    fn rises(&self, py: Python<'py>, params: &OnsetParams) -> PyResult<Bound<'py, PyAny>> {
+        let (s, reference) = (view3(&self.s)?, self.reference.as_ref().map(view3).transpose()?);
+        let rises = py.detach(|| dsp_onset_rises(s, reference, params));
+        into_numpy(py, rises.map_err(value_error)?)
+    }
+}
+
+/// Envelope `[channels, frames]`; `center` is the delay in frames, None for a plain analysis.
+#[pyfunction]
+fn onset_strength<'py>(
+    py: Python<'py>,
+    s: Floats<'py>,
+    reference: Option<Bound<'py, PyAny>>,
+    lag: usize,
+    max_size: usize,
+    center: Option<usize>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (params, reference) = (OnsetParams { lag, max_size, center }, reference.as_ref());
+    match s {
+        Floats::F32(s) => Compared::new(s, reference)?.strength(py, &params),
+        Floats::F64(s) => Compared::new(s, reference)?.strength(py, &params),
+    }
+}
+
+/// Rises `[channels, bands, frames - lag]`, for aggregation by a Python function.
+#[pyfunction]
+fn onset_rises<'py>(
+    py: Python<'py>,
+    s: Floats<'py>,
+    reference: Option<Bound<'py, PyAny>>,
+    lag: usize,
+    max_size: usize,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (params, reference) = (OnsetParams { lag, max_size, center: None }, reference.as_ref());
+    match s {
+        Floats::F32(s) => Compared::new(s, reference)?.rises(py, &params),
+        Floats::F64(s) => Compared::new(s, reference)?.rises(py, &params),
+    }
+}
+
+#[pyfunction]
+fn detrend<'py>(py: Python<'py>, envelope: Floats<'py>) -> PyResult<Bound<'py, PyAny>> {
+    each_precision!(py, view2(envelope), Ok::<_, DspError>(dsp_detrend(envelope)))
+}
+
+/// Onset frames of each channel of an envelope `[channels, frames]`.
+#[pyfunction]
+fn onset_detect(
+    py: Python<'_>,
+    envelope: Floats<'_>,
+    rate: (f64, usize),
+    normalize: bool,
+    peaks: PeakTuple,
+) -> PyResult<Vec<Vec<usize>>> {
+    let (sr, hop_length) = rate;
+    let defaults = PeakPick::new(sr, hop_length).map_err(value_error)?;
+    let (pre_max, post_max, pre_avg, post_avg, delta, wait) = peaks;
+    let pick = PeakPick {
+        pre_max: pre_max.unwrap_or(defaults.pre_max),
+        post_max: post_max.unwrap_or(defaults.post_max),
+        pre_avg: pre_avg.unwrap_or(defaults.pre_avg),
+        post_avg: post_avg.unwrap_or(defaults.post_avg),
+        delta: delta.unwrap_or(defaults.delta),
+        wait: wait.unwrap_or(defaults.wait),
+    };
+    match envelope {
+        Floats::F32(e) => onsets(py, view2(&e)?, normalize, &pick),
+        Floats::F64(e) => onsets(py, view2(&e)?, normalize, &pick),
+    }
+}
+
+fn onsets<T: Real>(
+    py: Python<'_>,
+    envelope: ArrayView2<T>,
+    normalize: bool,
+    pick: &PeakPick,
+) -> PyResult<Vec<Vec<usize>>> {
+    let channel = |row: ArrayView1<T>| dsp_onset_detect(&row.to_vec(), normalize, pick);
+    py.detach(|| envelope.outer_iter().map(channel).collect::<Result<_, _>>()).map_err(value_error)
+}
+
+#[pyfunction]
+fn onset_backtrack(events: Vec<usize>, energy: Floats<'_>) -> PyResult<Vec<usize>> {
+    Ok(match energy {
+        Floats::F32(energy) => dsp_backtrack(&events, energy.as_slice()?),
+        Floats::F64(energy) => dsp_backtrack(&events, energy.as_slice()?),
+    })
+}
+
+pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_function(wrap_pyfunction!(onset_strength, m)?)?;
+    m.add_function(wrap_pyfunction!(onset_rises, m)?)?;
+    m.add_function(wrap_pyfunction!(detrend, m)?)?;
+    m.add_function(wrap_pyfunction!(onset_detect, m)?)?;
+    m.add_function(wrap_pyfunction!(onset_backtrack, m)?)
+}

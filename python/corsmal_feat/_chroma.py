@@ -1,0 +1,50 @@
+"""Chromagram (librosa.feature.chroma_stft)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._arrays import rows, unrows
+from ._pitch import estimate_tuning
+from .filters import chroma_params
+from .spectrum import spectrogram
+
+def chroma_stft(
+    *,
+    y: Any = None,
+    sr: float = 22050,
+    S: Any = None,
+    norm: float | None = np.inf,
+    n_fft: int = 2048,
+    hop_length: int = 512,
+    win_length: int | None = None,
+    window: Any = "hann",
+    center: bool = True,
+    pad_mode: str = "constant",
+    tuning: float | None = None,
+    n_chroma: int = 12,
+    ctroct: float = 5.0,
+    octwidth: float | None = 2,
+    base_c: bool = True,
+    dtype: npt.DTypeLike = np.float32,
+) -> Any:
+    """Chromagram [shape=(..., n_chroma, t)] of the power spectrogram, or of S whatever it is
+    (librosa.feature.chroma_stft).
+
+    Without `tuning` one is estimated on the same spectrogram over all channels and frames; it can
+    change abruptly with small changes of the input, so give `tuning=0` where frames are to be
+    compared between recordings. `dtype` is that of the filter bank.
+    """
+    s, n_fft = spectrogram(y, S, n_fft, hop_length, win_length, window, center, pad_mode, 2.0)
+    if tuning is None:
+        tuning = estimate_tuning(S=s, sr=sr, bins_per_octave=n_chroma)
+    params = chroma_params(sr, n_fft, n_chroma, tuning, ctroct, octwidth, 2.0, base_c)
+    double = np.dtype(dtype) == np.float64
+    if double:
+        s = s.astype(np.float64)
+    length = None if norm is None else float(norm)
+    return unrows(_core.chroma(rows(s, 2), params, length, double), s, 2)

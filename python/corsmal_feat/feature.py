@@ -1,0 +1,28 @@
+"""Features (librosa.feature): re-exported from one private module per family."""
+
+from ._chroma import chroma_stft
+from ._mel import delta, melspectrogram, mfcc
+from ._spectral import (
+    poly_features,
+    spectral_bandwidth,
+    spectral_centroid,
+    spectral_contrast,
+    spectral_flatness,
+    spectral_rolloff,
+)
+from ._time_domain import rms, zero_crossing_rate
+
+__all__ = [
+    "chroma_stft",
+    "delta",
+    "melspectrogram",
+    "mfcc",
+    "poly_features",
+    "rms",
+    "spectral_bandwidth",
+    "spectral_centroid",
+    "spectral_contrast",
+    "spectral_flatness",
+    "spectral_rolloff",
+    "zero_crossing_rate",
+]

@@ -1,0 +1,157 @@
+"""Onset strength and onset detection (librosa.onset)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._arrays import Floats, floats, rows, unrows
+from ._core import ParameterError
+from ._mel import melspectrogram
+from .spectrum import power_to_db
+
+__all__ = ["onset_backtrack", "onset_detect", "onset_strength"]
+
+
+def _count(name: str, value: Any) -> int:
+    if not isinstance(value, (int, np.integer)) or value < 1:
+        raise ParameterError(f"{name} = {value} is not possible: an integer, at least 1")
+    return int(value)
+
+
+def onset_strength(
+    *,
+    y: Any = None,
+    sr: float = 22050,
+    S: Any = None,
+    lag: int = 1,
+    max_size: int = 1,
+    ref: Any = None,
+    detrend: bool = False,
+    center: bool = True,
+    feature: Callable[..., Any] | None = None,
+    aggregate: Callable[..., Any] | bool | None = None,
+    n_fft: int = 2048,
+    hop_length: int = 512,
+    **kwargs: Any,
+) -> Any:
+    """Spectral flux envelope [shape=(..., t)] of the mel spectrogram in dB, or of S in dB
+    (librosa.onset.onset_strength). Further keyword arguments go to `feature`."""
+    if aggregate is False:
+        raise ParameterError("aggregate = False is not possible: a function or None")
+    lag, max_size = _count("lag", lag), _count("max_size", max_size)
+    n_fft, hop_length = _count("n_fft", n_fft), _count("hop_length", hop_length)
+    if S is None:
+        if feature is None:
+            feature = melspectrogram
+            kwargs.setdefault("fmax", 0.5 * sr)
+        mel = feature(y=y, sr=sr, n_fft=n_fft, hop_length=hop_length, **kwargs)
+        S = power_to_db(np.abs(mel))
+    s: Floats = np.atleast_2d(floats("S", S))
+    if ref is not None:
+        ref = np.asarray(ref)
+        if ref.shape != s.shape:
+            raise ParameterError(f"ref has shape {ref.shape}, expected {s.shape}")
+        ref = rows(ref.astype(s.dtype), 2)
+    delay = n_fft // (2 * hop_length) if center else None
+    if callable(aggregate) and aggregate is not np.mean:
+        rises = unrows(_core.onset_rises(rows(s, 2), ref, lag, max_size), s, 2)
+        flux = np.asarray(aggregate(rises, axis=-2), dtype=s.dtype)
+        padding = [(0, 0)] * (flux.ndim - 1) + [(lag + (delay or 0), 0)]
+        envelope = np.pad(flux, padding)
+        envelope = envelope[..., : s.shape[-1]] if center else envelope
+    else:
+        envelope = unrows(
+            _core.onset_strength(rows(s, 2), ref, lag, max_size, delay), s, 2
+        )
+    if detrend:
+        envelope = unrows(_core.detrend(rows(envelope, 1)), envelope, 1)
+    return envelope
+
+
+def onset_detect(
+    *,
+    y: Any = None,
+    sr: float = 22050,
+    onset_envelope: Any = None,
+    hop_length: int = 512,
+    backtrack: bool = False,
+    energy: Any = None,
+    units: str = "frames",
+    normalize: bool = True,
+    sparse: bool = True,
+    pre_max: float | None = None,
+    post_max: float | None = None,
+    pre_avg: float | None = None,
+    post_avg: float | None = None,
+    delta: float | None = None,
+    wait: float | None = None,
+) -> npt.NDArray[Any]:
+    """Onsets as frames, samples or times [shape=(n_onsets,)], or with `sparse=False` as a mask
+    shaped as the envelope (librosa.onset.onset_detect)."""
+    if units not in ("frames", "samples", "time"):
+        raise ParameterError(f"units = {units!r} is not possible: 'frames', 'samples' or 'time'")
+    hop_length = _count("hop_length", hop_length)
+    if onset_envelope is None:
+        if y is None:
+            raise ParameterError("y or onset_envelope must be given")
+        onset_envelope = onset_strength(y=y, sr=sr, hop_length=hop_length)
+    envelope = floats("onset_envelope", onset_envelope)
+    if envelope.shape[-1] == 0:
+        raise ParameterError("onset_envelope is empty")
+    if sparse and envelope.ndim != 1:
+        raise ParameterError(
+            f"onset_envelope has {envelope.ndim} dimensions: sparse=True allows only one"
+        )
+    if backtrack and not sparse:
+        raise ParameterError("backtrack = True is not possible with sparse=False")
+    peaks = (
+        _frames("pre_max", pre_max),
+        _frames("post_max", post_max),
+        _frames("pre_avg", pre_avg),
+        _frames("post_avg", post_avg),
+        None if delta is None else float(delta),
+        _frames("wait", wait),
+    )
+    rate = (float(sr), hop_length)
+    found: list[list[int]] = [[] for _ in range(envelope[..., 0].size)]
+    if np.isfinite(envelope).all():
+        found = _core.onset_detect(rows(envelope, 1), rate, bool(normalize), peaks)
+    if not sparse:
+        mask = np.zeros((len(found), envelope.shape[-1]), dtype=bool)
+        for row, frames in zip(mask, found, strict=True):
+            row[frames] = True
+        return mask.reshape(envelope.shape)
+    onsets = np.asarray(found[0], dtype=np.int64)
+    if backtrack:
+        onsets = onset_backtrack(onsets, envelope if energy is None else energy)
+    if units == "frames":
+        return onsets
+    samples = onsets * hop_length
+    return samples if units == "samples" else samples / sr
+
+
+def _frames(name: str, value: float | None) -> int | None:
+    if value is None:
+        return None
+    if not value >= 0:
+        raise ParameterError(f"{name} = {value} is not possible: 0 or more")
+    return int(np.ceil(value))
+
+
+def onset_backtrack(events: Any, energy: Any) -> npt.NDArray[np.int64]:
+    """The local minimum of `energy` [shape=(m,)] at or before each event, in frames
+    (librosa.onset.onset_backtrack)."""
+    events = np.asarray(events)
+    if events.dtype.kind not in "iu" and events.size:
+        raise ParameterError(f"events has dtype {events.dtype}, expected integers")
+    array = np.ascontiguousarray(floats("energy", energy))
+    if array.ndim != 1:
+        raise ParameterError(f"energy has {array.ndim} dimensions, expected 1")
+    if events.size and not (0 <= events.min() and events.max() < array.size):
+        raise ParameterError(f"events reach beyond the {array.size} frames of energy")
+    return np.asarray(_core.onset_backtrack(events.tolist(), array), dtype=np.int64)
