@@ -4,6 +4,7 @@
 //! Facts about the data set and the official evaluators are documented where they are used;
 //! `docs/benchmark.md` gives the overview.
 
+pub mod benchmark;
 pub mod dataset;
 pub mod error;
 pub mod paper;

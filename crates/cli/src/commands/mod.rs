@@ -1,5 +1,6 @@
 //! One file per command: its arguments (`Args`) and what it does (`run`).
 
+mod benchmark;
 mod completions;
 mod dataset;
 mod evaluate;
@@ -14,6 +15,8 @@ use crate::failure::Failure;
 /// Registration: a command is its file, a variant here and a line in `run`.
 #[derive(Subcommand)]
 pub enum Command {
+    /// Run the paper's audio baselines on a CCM data set and write the report.
+    Benchmark(benchmark::Args),
     /// Print shell completions or the man page.
     Completions(completions::Args),
     /// Look at a CORSMAL data set on disk.
@@ -28,6 +31,7 @@ impl Command {
     /// Runs the command to its exit code.
     pub fn run(self) -> Result<ExitCode, Failure> {
         match self {
+            Self::Benchmark(args) => benchmark::run(args),
             Self::Completions(args) => completions::run(args),
             Self::Dataset(args) => dataset::run(args),
             Self::Evaluate(args) => evaluate::run(args),
