@@ -1,6 +1,6 @@
 //! Principal components (scikit-learn 1.9 `PCA(svd_solver="full")`).
 
-use linfa_linalg::eigh::{EigSort, Eigh};
+use linfa_linalg::eigh::{EigSort, EighInto};
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
@@ -43,18 +43,18 @@ impl Pca {
         let centred = &x - &mean;
         let tall = rows > columns;
         let gram = if tall { centred.t().dot(&centred) } else { centred.dot(&centred.t()) };
+        require_finite("X, squared", &gram)?;
         let (_, vectors) = gram
-            .eigh()
+            .eigh_into()
             .map_err(|e| DspError::parameter("X", e, "data whose eigenvectors converge"))?
-            .sort_eig(EigSort::Desc);
+            .sort_eig_desc();
 
         let mut components = Array2::<f64>::zeros((n_components, columns));
         let mut explained_variance = Array1::zeros(n_components);
         let mut largest = 0.0f64;
         for k in 0..n_components {
             let vector = vectors.column(k);
-            let direction =
-                if tall { vector.to_owned() } else { centred.t().dot(&vector) };
+            let direction = if tall { vector.to_owned() } else { centred.t().dot(&vector) };
             let spread = if tall {
                 centred.dot(&vector).mapv(|v| v * v).sum().sqrt()
             } else {

@@ -229,13 +229,13 @@ impl fmt::Display for Shard {
 /// An input before it has its final id.
 struct Found {
     source: InputSource,
-    /// What to make the id of, tried in this order.
     naming: Naming,
     start: Option<f64>,
     end: Option<f64>,
     labels: Vec<(String, String)>,
 }
 
+/// What the id is made of.
 enum Naming {
     Given(String),
     /// Path relative to the root.
@@ -332,16 +332,28 @@ fn find_glob(pattern: &str, found: &mut Vec<Found>) -> Result<(), InputError> {
 
 /// Appends the audio files at or below `path`.
 fn walk(path: &Path, files: &mut Vec<PathBuf>) -> Result<(), InputError> {
+    let is_audio = |path: &Path| has_extension(path, &corsmal_audio::EXTENSIONS);
     let visible = |entry: &walkdir::DirEntry| {
         entry.depth() == 0 || !entry.file_name().as_encoded_bytes().starts_with(b".")
     };
     for entry in WalkDir::new(path).follow_links(true).into_iter().filter_entry(visible) {
-        let entry = entry.map_err(|error| {
-            let at = error.path().unwrap_or(path).to_path_buf();
-            InputError::io(&at, error.into())
-        })?;
-        if entry.file_type().is_file() && has_extension(entry.path(), &corsmal_audio::EXTENSIONS) {
-            files.push(entry.into_path());
+        match entry {
+            Ok(entry) if entry.file_type().is_file() && is_audio(entry.path()) => {
+                files.push(entry.into_path());
+            }
+            Ok(_) => {}
+            // A link back to a folder that is being searched shows nothing new.
+            Err(error) if error.loop_ancestor().is_some() => {}
+            Err(error) => {
+                let at = error.path().unwrap_or(path).to_path_buf();
+                match std::io::Error::from(error) {
+                    // A dangling link: a recording that will fail on its own, or none of ours.
+                    e if e.kind() == std::io::ErrorKind::NotFound => {
+                        files.extend(is_audio(&at).then_some(at));
+                    }
+                    e => return Err(InputError::io(&at, e)),
+                }
+            }
         }
     }
     Ok(())

@@ -230,6 +230,8 @@ impl Ledger {
                 .map_err(|source| LedgerError::Io { path: path.clone(), source })?;
             match file.try_lock() {
                 Ok(()) => {}
+                // Some file systems of clusters know no locks; work goes on without.
+                Err(TryLockError::Error(e)) if e.kind() == io::ErrorKind::Unsupported => {}
                 Err(TryLockError::WouldBlock) => return Err(LedgerError::Locked { path }),
                 Err(TryLockError::Error(source)) => return Err(LedgerError::Io { path, source }),
             }

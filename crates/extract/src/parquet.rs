@@ -3,6 +3,7 @@
 
 use std::fs::File;
 use std::io::BufWriter;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -153,6 +154,10 @@ fn schema(table: &Table) -> Result<TypePtr, ParquetError> {
 /// # Errors
 /// [`ParquetTableError`]; Parquet files of other tools are refused.
 pub fn read(path: &Path) -> Result<(Table, Provenance), ParquetTableError> {
+    shielded(path, || read_table(path))
+}
+
+fn read_table(path: &Path) -> Result<(Table, Provenance), ParquetTableError> {
     let (reader, provenance) = open(path)?;
     let outcomes = parse_outcomes(metadata(&reader, path, OUTCOMES)?)
         .map_err(|e| layout(path, "outcomes as JSON lines", e))?;
@@ -195,7 +200,17 @@ pub fn read(path: &Path) -> Result<(Table, Provenance), ParquetTableError> {
 /// # Errors
 /// As [`read`].
 pub fn read_provenance(path: &Path) -> Result<Provenance, ParquetTableError> {
-    open(path).map(|(_, provenance)| provenance)
+    shielded(path, || open(path).map(|(_, provenance)| provenance))
+}
+
+/// The decoders of the parquet crate (60.1) assert what damaged pages do not keep, so their panics
+/// end here as errors.
+fn shielded<T>(
+    path: &Path,
+    read: impl FnOnce() -> Result<T, ParquetTableError>,
+) -> Result<T, ParquetTableError> {
+    catch_unwind(AssertUnwindSafe(read))
+        .unwrap_or_else(|_| Err(layout(path, "sound Parquet pages", "damaged ones")))
 }
 
 fn open(path: &Path) -> Result<(SerializedFileReader<File>, Provenance), ParquetTableError> {

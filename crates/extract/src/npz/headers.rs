@@ -46,7 +46,7 @@ impl Zip64 {
     /// Whether the local header of an entry carries 64-bit sizes. It must not depend on the
     /// compressed size, which is not known when the header is laid out.
     fn local(self, size: u64) -> bool {
-        size + deflate_margin(size) >= self.size
+        size.saturating_add(deflate_margin(size)) >= self.size
     }
 }
 

@@ -56,7 +56,7 @@ impl NpzFile {
             .map_err(|e| refused(e.to_string()))?;
         let names = names
             .into_iter()
-            .map(|name| name.strip_suffix(EXTENSION).map_or(name.clone(), str::to_owned))
+            .filter_map(|name| name.strip_suffix(EXTENSION).map(str::to_owned))
             .collect();
         Ok(Self { path: path.into(), archive, length, names })
     }
@@ -66,7 +66,7 @@ impl NpzFile {
         &self.path
     }
 
-    /// Names of the members in archive order, without `.npy`.
+    /// Names of the `.npy` members in archive order, without that extension.
     pub fn names(&self) -> &[String] {
         &self.names
     }
@@ -111,6 +111,12 @@ impl NpzFile {
                 return Err(wrong.kind("a list of strings (U)", header));
             };
             let width = header.dtype.itemsize;
+            // Only with bytes behind them are width and count more than a header's word.
+            match (count, width) {
+                (0, _) => return Ok(Vec::new()),
+                (_, 0) => return Err(wrong.kind("text of at least one character", header)),
+                _ => {}
+            }
             let mut item = vec![0u8; width];
             let mut strings = Vec::new();
             for _ in 0..count {

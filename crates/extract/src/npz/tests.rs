@@ -266,17 +266,36 @@ fn sizes_that_lie_are_refused_before_anything_is_allocated() {
     let error = NpzFile::open(&path).unwrap().f32("x").unwrap_err().to_string();
     assert!(error.contains("at most 1073741824 bytes uncompressed"), "{error}");
 
-    let lies = Header::new(DType::F64, &[1 << 20]).encode();
-    let mut archive = ::zip::ZipWriter::new(fs::File::create(&path).unwrap());
-    archive.start_file("x.npy", ::zip::write::SimpleFileOptions::default()).unwrap();
-    archive.write_all(&lies).unwrap();
-    archive.write_all(&[0; 64]).unwrap();
-    archive.finish().unwrap();
+    foreign(&path, &Header::new(DType::F64, &[1 << 20]), &[0; 64]);
     let error = NpzFile::open(&path).unwrap().f32("x").unwrap_err().to_string();
     assert!(
         error.contains("expected 8388608 bytes of data for shape [1048576], found 64"),
         "{error}"
     );
+}
+
+/// An archive by another writer, with a header that need not be true and a member that is no array.
+fn foreign(path: &Path, header: &Header, data: &[u8]) {
+    let mut archive = ::zip::ZipWriter::new(fs::File::create(path).unwrap());
+    let options = ::zip::write::SimpleFileOptions::default();
+    archive.start_file("README", options).unwrap();
+    archive.start_file("x.npy", options).unwrap();
+    archive.write_all(&header.encode()).unwrap();
+    archive.write_all(data).unwrap();
+    archive.finish().unwrap();
+}
+
+#[test]
+fn text_without_bytes_costs_nothing() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("a.npz");
+    foreign(&path, &Header::new(DType::text(0), &[1 << 40]), &[]);
+    let error = NpzFile::open(&path).unwrap().strings("x").unwrap_err().to_string();
+    assert!(error.contains("expected text of at least one character, found <U0"), "{error}");
+    foreign(&path, &Header::new(DType::text(1 << 26), &[0]), &[]);
+    let mut npz = NpzFile::open(&path).unwrap();
+    assert_eq!(npz.names(), ["x"]);
+    assert!(npz.strings("x").unwrap().is_empty());
 }
 
 proptest! {

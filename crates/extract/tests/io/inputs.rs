@@ -74,6 +74,19 @@ fn what_is_not_there_is_named() {
     assert_eq!(ids(&["-"]).unwrap(), ["stdin"]);
 }
 
+#[cfg(unix)]
+#[test]
+fn links_are_followed_but_not_in_circles() {
+    use std::os::unix::fs::symlink;
+    let dir = folder(&["a/x.wav", "b/y.wav"]);
+    let at = |name: &str| dir.path().join(name);
+    symlink(at("b"), at("a/more")).unwrap();
+    symlink(at("a"), at("b/circle")).unwrap();
+    symlink(at("gone"), at("a/README")).unwrap();
+    symlink(at("gone.wav"), at("a/z.wav")).unwrap();
+    assert_eq!(in_folder(dir.path(), &["a"]).unwrap(), ["more/y", "x", "z"]);
+}
+
 #[test]
 fn manifests_bring_stretches_and_labels() {
     let dir = folder(&["data/a.wav", "data/b.wav"]);

@@ -13,6 +13,7 @@ use corsmal_extract::outcome::{Outcome, Status};
 use corsmal_extract::parquet;
 use corsmal_extract::provenance::Provenance;
 use corsmal_extract::table::{Table, TableError};
+use proptest::prelude::*;
 use tempfile::TempDir;
 
 const NAMES: [&str; 2] = ["mfcc.mean", "zcr.std"];
@@ -264,4 +265,23 @@ assert json.loads(m[b"corsmal.config"]) == {"n_fft": 512}
 assert len(m[b"corsmal.outcomes"].splitlines()) == 7
 "#;
     python(&["pandas", "pyarrow"], script, &[text(&path)]);
+}
+
+proptest! {
+    #[test]
+    fn any_damage_to_a_parquet_file_gives_an_answer(
+        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+    ) {
+        let folder = TempDir::new().unwrap();
+        let path = folder.path().join("a.parquet");
+        let whole = Shard::default();
+        parquet::write(&path, &table(whole), &provenance(whole)).unwrap();
+        let mut bytes = fs::read(&path).unwrap();
+        for (at, byte) in edits {
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
+        }
+        fs::write(&path, &bytes).unwrap();
+        let _ = parquet::read(&path);
+    }
 }
