@@ -1,7 +1,8 @@
 """Acoustic features in librosa's vocabulary, computed in Rust; classifiers; the CORSMAL benchmark."""
 
-from . import corsmal, feature, filters, onset
+from . import corsmal, decompose, effects, feature, filters, onset
 from ._core import ParameterError, __version__
+from ._harmonic import cqt, istft
 from ._mono import to_mono
 from ._pitch import estimate_tuning, piptrack, pitch_tuning
 from ._resample import resample
@@ -12,9 +13,13 @@ __all__ = [
     "__version__",
     "amplitude_to_db",
     "corsmal",
+    "cqt",
+    "decompose",
+    "effects",
     "estimate_tuning",
     "feature",
     "filters",
+    "istft",
     "onset",
     "piptrack",
     "pitch_tuning",

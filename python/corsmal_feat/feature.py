@@ -1,6 +1,7 @@
 """Features (librosa.feature): re-exported from one private module per family."""
 
 from ._chroma import chroma_stft
+from ._harmonic import chroma_cqt, tonnetz
 from ._mel import delta, melspectrogram, mfcc
 from ._spectral import (
     poly_features,
@@ -13,6 +14,7 @@ from ._spectral import (
 from ._time_domain import rms, zero_crossing_rate
 
 __all__ = [
+    "chroma_cqt",
     "chroma_stft",
     "delta",
     "melspectrogram",
@@ -24,5 +26,6 @@ __all__ = [
     "spectral_contrast",
     "spectral_flatness",
     "spectral_rolloff",
+    "tonnetz",
     "zero_crossing_rate",
 ]

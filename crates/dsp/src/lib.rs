@@ -4,6 +4,7 @@
 //! independent unless a function says that it takes a statistic over all of them. Functions are
 //! generic over [`Real`] (`f32` or `f64`) and keep the precision of their input.
 
+pub mod af193;
 pub mod chroma;
 pub mod columns;
 pub mod cqt;

@@ -25,7 +25,8 @@ fn pitch_params((sr, n_fft, fmin, fmax, threshold): PitchTuple) -> PitchParams {
 /// base_c), `norm` being librosa's number.
 type ChromaTuple = (f64, usize, usize, f64, f64, Option<f64>, Option<f64>, bool);
 
-fn norm_of(number: Option<f64>) -> PyResult<Option<Norm>> {
+/// The norm that librosa's number stands for.
+pub(crate) fn norm_of(number: Option<f64>) -> PyResult<Option<Norm>> {
     number.map(Norm::try_from).transpose().map_err(value_error)
 }
 

@@ -7,6 +7,7 @@
 mod arrays;
 mod chroma;
 mod compound;
+mod harmonic;
 mod mel;
 mod onset;
 mod resample;
@@ -29,6 +30,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add("ParameterError", m.py().get_type::<ParameterError>())?;
     spectrum::register(m)?;
+    harmonic::register(m)?;
     mel::register(m)?;
     time_domain::register(m)?;
     resample::register(m)?;

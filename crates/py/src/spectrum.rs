@@ -9,7 +9,7 @@ use crate::value_error;
 
 /// Transform parameters, all resolved by the front end: (n_fft, hop_length, win_length, window,
 /// center, pad_mode).
-type StftTuple = (usize, usize, usize, String, bool, String);
+pub(crate) type StftTuple = (usize, usize, usize, String, bool, String);
 
 /// A padding mode by numpy's name.
 pub(crate) fn pad_mode(name: &str) -> PyResult<PadMode> {

@@ -15,7 +15,7 @@ use num_complex::Complex;
 use pulp::Arch;
 
 pub use chroma::{ChromaCqt, ChromaCqtParams, chroma_cqt, cq_to_chroma};
-pub use tuning::{SignalTuning, signal_tuning};
+pub use tuning::SignalTuning;
 
 use crate::error::{DspError, Result};
 use crate::frequency::require_rate;

@@ -1,12 +1,11 @@
 //! Tuning of a signal, as the constant-Q features estimate it.
 
-use ndarray::ArrayView2;
 use pulp::Arch;
 
 use crate::error::Result;
 use crate::lanes::{LANES, LaneFft, Row, Slots, gather};
 use crate::pitch::{PitchParams, TuningEstimator};
-use crate::real::{Real, require_finite};
+use crate::real::Real;
 use crate::stft::StftParams;
 use crate::transform::Forward;
 use crate::window::get_window;
@@ -92,20 +91,4 @@ impl SignalTuning {
             }
         }
     }
-}
-
-/// Tuning of `y [channels, samples]`, one for all channels (`estimate_tuning(y=y)`).
-///
-/// # Errors
-/// As [`SignalTuning`], or samples that are not finite.
-pub fn signal_tuning<T: Real>(
-    y: ArrayView2<T>,
-    sr: f64,
-    bins_per_octave: usize,
-) -> Result<Option<f64>> {
-    require_finite("y", y.iter())?;
-    let y = y.as_standard_layout();
-    let channels = y.rows();
-    let channels = channels.into_iter().map(|y| y.to_slice().expect("standard layout"));
-    SignalTuning::new(sr)?.estimate(channels, bins_per_octave)
 }

@@ -1,0 +1,288 @@
+//! AF193: the feature vector of the CORSMAL audio baseline, means over time of 40 MFCC, 12 chroma,
+//! 128 mel, 7 spectral contrast and 6 tonnetz rows at librosa 0.11's defaults.
+//!
+//! All parts but the last share one transform; tonnetz comes from the harmonic part of the signal.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use ndarray::{Array2, ArrayView2, Axis};
+use pulp::Arch;
+
+use crate::chroma::{Chroma, ChromaParams, chroma_filter};
+use crate::cqt::{ChromaCqt, ChromaCqtParams, CqtParams, CqtPlan, SignalTuning};
+use crate::decibel::Decibel;
+use crate::error::Result;
+use crate::frequency::fft_frequencies;
+use crate::hpss::{HpssParams, Part, Separator};
+use crate::lanes::{LANES, Row, power_to_decibel};
+use crate::mel::{MelParams, SparseBank, mel_filter};
+use crate::mfcc::{MfccParams, mfcc_matrix};
+use crate::normalize::Norm;
+use crate::pitch::{PitchParams, TuningEstimator};
+use crate::real::require_finite;
+use crate::spectral::{Contrast, ContrastParams, contrast_from_extremes};
+use crate::stft::StftParams;
+use crate::sums;
+use crate::tonnetz::tonnetz;
+
+const N_FFT: usize = 2048;
+const HOP: usize = 512;
+const N_MFCC: usize = 40;
+const N_CHROMA: usize = 12;
+const N_MELS: usize = 128;
+const N_CONTRAST: usize = 7;
+const N_TONNETZ: usize = crate::tonnetz::DIMENSIONS;
+/// Bins per octave of the constant-Q transform.
+const CQT_BINS: usize = 36;
+const CQT_OCTAVES: usize = 7;
+/// Cells of the tuning histogram, in bins.
+const RESOLUTION: f64 = 0.01;
+
+/// Values of the vector.
+pub const LENGTH: usize = N_MFCC + N_CHROMA + N_MELS + N_CONTRAST + N_TONNETZ;
+
+/// Names of the values: `mfcc_0`, ..., `tonnetz_5`.
+pub fn names() -> Vec<String> {
+    let parts = [
+        ("mfcc", N_MFCC),
+        ("chroma", N_CHROMA),
+        ("mel", N_MELS),
+        ("contrast", N_CONTRAST),
+        ("tonnetz", N_TONNETZ),
+    ];
+    parts.iter().flat_map(|(part, n)| (0..*n).map(move |i| format!("{part}_{i}"))).collect()
+}
+
+/// Tables by tuning in hundredths of a bin.
+type ByTuning<P> = Mutex<HashMap<i32, Arc<P>>>;
+
+/// Everything that recordings of one sample rate share; threads may use it together.
+pub struct Af193 {
+    sr: f64,
+    separator: Separator<f32>,
+    mel: SparseBank,
+    mfcc: Array2<f64>,
+    contrast: Contrast,
+    tuning: SignalTuning,
+    chroma: ByTuning<Chroma<f32>>,
+    cqt: ByTuning<CqtPlan>,
+    fold: ChromaCqt,
+}
+
+impl Af193 {
+    /// # Errors
+    /// A sample rate at which a part does not exist: spectral contrast needs more than 12.8 kHz.
+    pub fn new(sr: f64) -> Result<Self> {
+        let freqs = fft_frequencies(sr, N_FFT)?;
+        let stft = StftParams::new(N_FFT, HOP);
+        let plan = Self {
+            sr,
+            separator: Separator::new(&stft, HpssParams::default(), false)?,
+            mel: SparseBank::new(&mel_filter(&MelParams::new(sr, N_FFT))?),
+            mfcc: mfcc_matrix(N_MELS, &MfccParams { n_mfcc: N_MFCC, ..MfccParams::default() })?,
+            contrast: Contrast::new(&freqs, sr, &ContrastParams::default())?,
+            tuning: SignalTuning::new(sr)?,
+            chroma: Mutex::default(),
+            cqt: Mutex::default(),
+            fold: ChromaCqt::new(CQT_BINS * CQT_OCTAVES, &ChromaCqtParams::default())?,
+        };
+        plan.cqt(0.0)?;
+        Ok(plan)
+    }
+
+    /// The vector of one channel.
+    ///
+    /// # Errors
+    /// No samples, or samples that are not finite.
+    pub fn compute(&self, y: &[f32]) -> Result<[f32; LENGTH]> {
+        require_finite("y", y)?;
+        let mut harmonic = vec![0.0; y.len()];
+        let mut spectra = Spectra::new(self)?;
+        let magnitude =
+            self.separator
+                .separate(y, &mut [(Part::Harmonic, &mut harmonic)], |m| spectra.push(m))?;
+        let mut vector = [0.0; LENGTH];
+        let (mfcc, rest) = vector.split_at_mut(N_MFCC);
+        let (chroma, rest) = rest.split_at_mut(N_CHROMA);
+        let (mel, rest) = rest.split_at_mut(N_MELS);
+        let (contrast, tonnetz) = rest.split_at_mut(N_CONTRAST);
+        let tuning = spectra.finish(mfcc, mel, contrast)?;
+        self.chroma_mean(magnitude.view(), tuning, chroma)?;
+        self.tonnetz_mean(&harmonic, tonnetz)?;
+        Ok(vector)
+    }
+
+    fn chroma_mean(&self, magnitude: ArrayView2<f32>, tuning: f64, out: &mut [f32]) -> Result<()> {
+        let chroma = cached(&self.chroma, tuning, || {
+            let params = ChromaParams { tuning, ..ChromaParams::new(self.sr, N_FFT) };
+            Ok(Chroma::new(chroma_filter(&params)?.view(), Some(Norm::Max)))
+        })?;
+        let mut frame = [0.0; N_CHROMA];
+        let mut sum = [0.0; N_CHROMA];
+        for spectrum in magnitude.rows() {
+            chroma.frame(spectrum.to_slice().expect("standard layout"), &mut frame);
+            sum.iter_mut().zip(frame).for_each(|(sum, x)| *sum += f64::from(x));
+        }
+        store_means(&sum, magnitude.nrows(), out);
+        Ok(())
+    }
+
+    fn cqt(&self, tuning: f64) -> Result<Arc<CqtPlan>> {
+        cached(&self.cqt, tuning, || {
+            CqtPlan::new(&CqtParams {
+                hop_length: HOP,
+                n_bins: CQT_BINS * CQT_OCTAVES,
+                bins_per_octave: CQT_BINS,
+                tuning,
+                ..CqtParams::new(self.sr)
+            })
+        })
+    }
+
+    fn tonnetz_mean(&self, harmonic: &[f32], out: &mut [f32]) -> Result<()> {
+        let tuning = self.tuning.estimate([harmonic], CQT_BINS)?.unwrap_or(0.0);
+        let transform = self.cqt(tuning)?.transform(harmonic)?;
+        let chroma = self.fold.of_transform(transform.view());
+        let centroids = tonnetz(chroma.view().insert_axis(Axis(0)))?;
+        let sum: Vec<f64> = centroids.index_axis(Axis(0), 0).sum_axis(Axis(1)).to_vec();
+        store_means(&sum, chroma.ncols(), out);
+        Ok(())
+    }
+}
+
+/// The table for `tuning`, made if it is the first of its kind.
+fn cached<P>(
+    tables: &ByTuning<P>,
+    tuning: f64,
+    make: impl FnOnce() -> Result<P>,
+) -> Result<Arc<P>> {
+    let key = (tuning * 100.0).round() as i32;
+    let lock = || tables.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(table) = lock().get(&key) {
+        return Ok(table.clone());
+    }
+    // Made outside the lock: two threads may make the same table, and one of them is kept.
+    let table = Arc::new(make()?);
+    Ok(lock().entry(key).or_insert(table).clone())
+}
+
+fn store_means(sums: &[f64], frames: usize, out: &mut [f32]) {
+    for (out, sum) in out.iter_mut().zip(sums) {
+        *out = (sum / frames as f64) as f32;
+    }
+}
+
+/// What is collected frame by frame from the magnitude spectra.
+struct Spectra<'p> {
+    plan: &'p Af193,
+    frames: usize,
+    power: Vec<f32>,
+    /// Mel powers of all frames, [`N_MELS`] each.
+    mel: Vec<Row>,
+    mel_sum: [f64; N_MELS],
+    contrast_scratch: Vec<f32>,
+    peaks: Vec<f64>,
+    valleys: Vec<f64>,
+    pitches: TuningEstimator<f32>,
+}
+
+impl<'p> Spectra<'p> {
+    fn new(plan: &'p Af193) -> Result<Self> {
+        Ok(Self {
+            plan,
+            frames: 0,
+            power: vec![0.0; N_FFT / 2 + 1],
+            mel: Vec::new(),
+            mel_sum: [0.0; N_MELS],
+            contrast_scratch: vec![0.0; plan.contrast.scratch_len()],
+            peaks: Vec::new(),
+            valleys: Vec::new(),
+            pitches: TuningEstimator::new(PitchParams::new(plan.sr, N_FFT))?,
+        })
+    }
+
+    fn push(&mut self, magnitude: &[f32]) {
+        self.frames += 1;
+        self.power.iter_mut().zip(magnitude).for_each(|(p, m)| *p = m * m);
+        let first = self.mel.len();
+        self.mel.resize(first + N_MELS / LANES, Row::ZERO);
+        let slots = self.mel[first..].iter_mut().flat_map(|row| &mut row.0);
+        for (((start, weights), slot), sum) in
+            self.plan.mel.bands().iter().zip(slots).zip(&mut self.mel_sum)
+        {
+            *slot = sums::sum_pairs(weights, &self.power[*start..], |w, p| w * p);
+            *sum += f64::from(*slot);
+        }
+        let at = self.peaks.len();
+        self.peaks.resize(at + N_CONTRAST, 0.0);
+        self.valleys.resize(at + N_CONTRAST, 0.0);
+        self.plan.contrast.peaks_valleys(
+            magnitude,
+            &mut self.contrast_scratch,
+            &mut self.peaks[at..],
+            &mut self.valleys[at..],
+        );
+        self.pitches.push(magnitude, None);
+    }
+
+    /// Writes the means and returns the tuning.
+    fn finish(mut self, mfcc: &mut [f32], mel: &mut [f32], contrast: &mut [f32]) -> Result<f64> {
+        store_means(&self.mel_sum, self.frames, mel);
+
+        let decibel = Decibel::default();
+        power_to_decibel(Arch::new(), &mut self.mel, decibel.amin as f32, decibel.offset() as f32);
+        let values = || self.mel.iter().flat_map(|row| row.0);
+        let peak = values().fold(f32::NEG_INFINITY, f32::max);
+        let floor = decibel.top_db.map_or(f32::NEG_INFINITY, |top_db| peak - top_db as f32);
+        let mut log_mel = [0.0; N_MELS];
+        for (i, x) in values().enumerate() {
+            log_mel[i % N_MELS] += f64::from(x.max(floor));
+        }
+        // The cosine transform is linear: that of the mean is the mean of all.
+        let cepstrum = self.plan.mfcc.dot(&ndarray::aview1(&log_mel));
+        store_means(cepstrum.as_slice().expect("a new array"), self.frames, mfcc);
+
+        contrast_from_extremes(&mut self.peaks, &mut self.valleys, false)?;
+        let mut sum = [0.0; N_CONTRAST];
+        for frame in self.peaks.chunks_exact(N_CONTRAST) {
+            sum.iter_mut().zip(frame).for_each(|(sum, x)| *sum += x);
+        }
+        store_means(&sum, self.frames, contrast);
+        Ok(self.pitches.finish(RESOLUTION, N_CHROMA)?.unwrap_or(0.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_value_has_its_name() {
+        let names = names();
+        assert_eq!(names.len(), LENGTH);
+        assert_eq!([&names[0], &names[40], &names[192]], ["mfcc_0", "chroma_0", "tonnetz_5"]);
+    }
+
+    #[test]
+    fn short_and_silent_signals_are_finite() {
+        let plan = Af193::new(22050.0).unwrap();
+        for y in [vec![0.5_f32], vec![0.0; 5000], vec![1.0; 3000]] {
+            assert!(plan.compute(&y).unwrap().iter().all(|x| x.is_finite()));
+        }
+        assert!(plan.compute(&[]).is_err());
+        assert!(plan.compute(&[f32::NAN]).is_err());
+    }
+
+    #[test]
+    fn a_plan_gives_the_same_bits_again() {
+        let plan = Af193::new(16000.0).unwrap();
+        let y: Vec<f32> = (0..20000).map(|i| ((i * i) as f32 * 1e-4).sin()).collect();
+        assert_eq!(plan.compute(&y).unwrap(), plan.compute(&y).unwrap());
+    }
+
+    #[test]
+    fn a_rate_without_all_octaves_is_refused() {
+        assert!(Af193::new(8000.0).is_err());
+    }
+}

@@ -1,0 +1,5 @@
+"""Decomposition of spectrograms (librosa.decompose)."""
+
+from ._harmonic import hpss
+
+__all__ = ["hpss"]
