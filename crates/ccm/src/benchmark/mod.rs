@@ -53,9 +53,9 @@ pub fn run(
         .iter()
         .map(|(name, path)| Added::read(name, path))
         .collect::<Result<Vec<_>>>()?;
-    files::prepare(&options.out)?;
     let set = DataSet::open(&options.data)?;
     let rows = results::Rows::of(&set)?;
+    files::prepare(&options.out)?;
     let mut outcomes = Vec::new();
     for feature_set in FeatureSet::ALL {
         let wanted: Vec<_> =

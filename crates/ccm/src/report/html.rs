@@ -93,14 +93,17 @@ fn write_table(out: &mut String, table: &Table) {
         );
     }
     out.push_str("</tr></thead>\n<tbody>\n");
+    // Whose figures they are is marked only where that differs.
+    let mixed = table.rows.iter().any(|r| r.source != table.rows[0].source);
     for row in &table.rows {
-        write_row(out, row);
+        write_row(out, row, mixed);
     }
     out.push_str("</tbody></table></div>\n");
 }
 
-fn write_row(out: &mut String, row: &Row) {
+fn write_row(out: &mut String, row: &Row, mixed: bool) {
     let (class, badge) = match row.source {
+        _ if !mixed => ("plain", ""),
         Source::Ours => ("ours", "<span class=\"badge\">here</span>"),
         Source::Added => ("added", "<span class=\"badge\">added</span>"),
         Source::Paper => ("paper", ""),
