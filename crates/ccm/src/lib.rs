@@ -1,1 +1,18 @@
-//! placeholder
+//! The CORSMAL Containers Manipulation (CCM) benchmark: data set, labels, splits, submissions,
+//! scores, synthetic recordings, the published results and the report.
+//!
+//! Facts about the data set and the official evaluators are documented where they are used;
+//! `docs/benchmark.md` gives the overview.
+
+pub mod benchmark;
+pub mod dataset;
+pub mod error;
+pub mod paper;
+pub mod predictions;
+pub mod report;
+pub mod scores;
+pub mod submission;
+pub mod synth;
+mod table;
+
+pub use error::{CcmError, Result};

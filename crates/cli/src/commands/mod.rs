@@ -1,11 +1,15 @@
 //! One file per command: its arguments (`Args`) and what it does (`run`).
 
+mod benchmark;
 mod completions;
+mod dataset;
+mod evaluate;
 mod extract;
 mod features;
+mod inspect;
 mod merge;
 mod presets;
-mod inspect;
+mod synth;
 
 use std::process::ExitCode;
 
@@ -26,8 +30,16 @@ pub enum Command {
     Features(features::Args),
     /// Show format and health of a recording, with a picture on request.
     Inspect(inspect::Args),
+    /// Run the paper's audio baselines on a CCM data set and write the report.
+    Benchmark(benchmark::Args),
     /// Print shell completions or the man page.
     Completions(completions::Args),
+    /// Look at a CORSMAL data set on disk.
+    Dataset(dataset::Args),
+    /// Score CORSMAL submissions by the paper's or the official evaluators' rules.
+    Evaluate(evaluate::Args),
+    /// Make synthetic recordings in the layout of the CCM data set (demonstration and tests only).
+    Synth(synth::Args),
 }
 
 impl Command {
@@ -39,7 +51,11 @@ impl Command {
             Self::Presets(args) => presets::run(args),
             Self::Features(args) => features::run(args),
             Self::Inspect(args) => inspect::run(args),
+            Self::Benchmark(args) => benchmark::run(args),
             Self::Completions(args) => completions::run(args),
+            Self::Dataset(args) => dataset::run(args),
+            Self::Evaluate(args) => evaluate::run(args),
+            Self::Synth(args) => synth::run(args),
         }
     }
 }

@@ -1,0 +1,96 @@
+//! Submissions, models and pictures beside the report.
+
+use std::path::Path;
+
+use corsmal_models::labels::Labels;
+use corsmal_models::model_file::{Model, ModelHeader};
+use corsmal_plot::{BarChart, ConfusionMatrix as MatrixPicture, Series, to_svg};
+use ndarray::Array2;
+
+use super::baselines::Outcome;
+use super::features::FeatureSource;
+use super::results::{Estimate, Rows};
+use crate::dataset::Filling;
+use crate::error::{CcmError, Result};
+use crate::scores::ConfusionMatrix;
+use crate::submission::{Format, Submission};
+
+/// Makes the folders, so that a wrong path fails before the work.
+pub(super) fn prepare(out: &Path) -> Result<()> {
+    for folder in ["features", "submissions", "models", "figures"] {
+        let path = out.join(folder);
+        std::fs::create_dir_all(&path).map_err(|e| CcmError::io(&path, e))?;
+    }
+    Ok(())
+}
+
+/// Writes the submissions of a baseline and, corrected, its model.
+pub(super) fn write_outcome(
+    out: &Path,
+    outcome: &Outcome,
+    rows: &Rows,
+    source: &dyn FeatureSource,
+) -> Result<()> {
+    let name = format!("{}-{}", outcome.baseline.slug(), outcome.variant.name());
+    let write = |part: &str, estimates: &mut dyn Iterator<Item = &Estimate>| {
+        let predictions: Vec<_> = estimates.map(Estimate::prediction).collect();
+        let keys: Vec<_> = predictions.iter().map(|p| p.key).collect();
+        let path = out.join("submissions").join(format!("{name}-{part}.csv"));
+        Submission::write(&path, Format::Y2020, &predictions, &keys)
+    };
+    write("held-out", &mut outcome.held_out.iter().map(|(_, e)| e))?;
+    for (part, estimates) in rows.tests.iter().zip(&outcome.tests) {
+        write(&part.subset.name().replace(' ', "-"), &mut estimates.iter())?;
+    }
+    let fault = |e: &dyn std::fmt::Display| CcmError::Request(format!("model {name}: {e}"));
+    let labels = Labels::new(Filling::all().map(Filling::name).collect()).map_err(|e| fault(&e))?;
+    let header = ModelHeader {
+        pipeline: outcome.spec.clone(),
+        labels,
+        target: "joint".into(),
+        feature_names: Vec::new(),
+        feature_config: source.identity(outcome.baseline.features).into(),
+        feature_config_hash: outcome.configuration.clone(),
+        provenance: serde_json::json!({
+            "baseline": outcome.baseline.name(),
+            "variant": outcome.variant.name(),
+            "training_recordings": rows.training.len(),
+        }),
+        tool_version: env!("CARGO_PKG_VERSION").into(),
+    };
+    let model = Model::new(header, outcome.model.clone()).map_err(|e| fault(&e))?;
+    model.save(&out.join("models").join(format!("{name}.model"))).map_err(|e| fault(&e))
+}
+
+/// Writes a confusion matrix and its per-class bars as SVG files.
+pub(super) fn write_pictures(
+    out: &Path,
+    name: &str,
+    title: &str,
+    labels: &[String],
+    matrix: &ConfusionMatrix,
+) -> Result<()> {
+    let put = |file: String, svg: std::result::Result<String, corsmal_plot::PlotError>| {
+        let path = out.join("figures").join(file);
+        let svg = svg.map_err(|e| CcmError::Request(format!("{}: {e}", path.display())))?;
+        std::fs::write(&path, svg).map_err(|e| CcmError::io(&path, e))
+    };
+    let n = labels.len();
+    let picture = MatrixPicture {
+        title: title.to_string(),
+        labels: labels.to_vec(),
+        counts: Array2::from_shape_fn((n, n), |(t, e)| matrix.counts[t][e]),
+    };
+    put(format!("{name}-confusion.svg"), to_svg(&picture))?;
+    let bars = BarChart {
+        title: title.to_string(),
+        value_label: "F1 / %".into(),
+        groups: labels.to_vec(),
+        series: vec![Series {
+            name: "F1".into(),
+            values: matrix.classes().iter().map(|c| 100.0 * c.f1).collect(),
+            errors: Vec::new(),
+        }],
+    };
+    put(format!("{name}-classes.svg"), to_svg(&bars))
+}

@@ -1,0 +1,81 @@
+//! The benchmark: the twelve audio baselines of the paper on a CCM data set, as their published
+//! code runs them and corrected, scored and put beside the paper's figures.
+
+mod added;
+mod baselines;
+mod features;
+mod files;
+mod matrix;
+mod results;
+mod tables;
+
+use std::path::PathBuf;
+
+pub use added::Added;
+pub use baselines::{Baseline, Learner, Variant};
+pub use features::{BaselineFeatures, FeatureSet, FeatureSource};
+
+use crate::dataset::DataSet;
+use crate::error::Result;
+use crate::report::Report;
+
+/// What to run.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Folder of the data set.
+    pub data: PathBuf,
+    /// Folder for everything that is written.
+    pub out: PathBuf,
+    /// The baselines to run.
+    pub baselines: Vec<Baseline>,
+    /// Prediction files of other methods that join the tables, by name.
+    pub added: Vec<(String, PathBuf)>,
+    /// Seed of the forests and of the pseudo-random estimates.
+    pub seed: u64,
+}
+
+/// Runs the benchmark and writes `report.html`, `report.json`, `tables/`, `figures/`,
+/// `submissions/`, `models/` and `features/` below the output folder.
+///
+/// `progress` is told each step. Features already in `features/` are reused when their
+/// configuration and the recordings are the same.
+///
+/// # Errors
+/// [`crate::CcmError`] when the data set has no labelled training recordings, when a file to add is
+/// unusable, when a recording cannot be read, and when something cannot be written.
+pub fn run(
+    options: &Options,
+    source: &dyn FeatureSource,
+    progress: &dyn Fn(&str),
+) -> Result<Report> {
+    let added = options
+        .added
+        .iter()
+        .map(|(name, path)| Added::read(name, path))
+        .collect::<Result<Vec<_>>>()?;
+    let set = DataSet::open(&options.data)?;
+    let rows = results::Rows::of(&set)?;
+    files::prepare(&options.out)?;
+    let mut outcomes = Vec::new();
+    for feature_set in FeatureSet::ALL {
+        let wanted: Vec<_> =
+            options.baselines.iter().filter(|b| b.features == feature_set).copied().collect();
+        if wanted.is_empty() {
+            continue;
+        }
+        progress(&format!("features: {}", feature_set.name()));
+        let matrices = matrix::load(&set, &rows, feature_set, source, &options.out)?;
+        for baseline in wanted {
+            for variant in Variant::ALL {
+                progress(&format!("{}, {}", baseline.name(), variant.name()));
+                let outcome = baseline.run(variant, &rows, &matrices, options.seed)?;
+                files::write_outcome(&options.out, &outcome, &rows, source)?;
+                outcomes.push(outcome);
+            }
+        }
+    }
+    let report = tables::report(&set, &rows, &outcomes, &added, options.seed)?;
+    tables::write_pictures(&options.out, &rows, &outcomes, options.seed)?;
+    report.write(&options.out)?;
+    Ok(report)
+}

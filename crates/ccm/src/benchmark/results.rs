@@ -1,0 +1,184 @@
+//! What is predicted for which recordings.
+
+use crate::dataset::{
+    Annotation, Annotations, DataSet, Filling, FillingLevel, FillingType, Recording, Subset,
+};
+use crate::error::{CcmError, Result};
+use crate::scores::{self, ConfusionMatrix, RuleSet};
+use crate::submission::{Format, Prediction, RowKey, Submission, pseudo_random};
+
+/// A recording to train on or to predict.
+pub(super) struct Target {
+    pub(super) recording: Recording,
+    /// How submissions name it.
+    pub(super) key: RowKey,
+    /// Type and level, where known.
+    pub(super) filling: Option<Filling>,
+    /// All that is annotated.
+    pub(super) annotation: Option<Annotation>,
+}
+
+/// A test part.
+pub(super) struct TestPart {
+    pub(super) subset: Subset,
+    pub(super) rows: Vec<Target>,
+}
+
+/// The recordings of a data set by what they are used for.
+pub(super) struct Rows {
+    /// Labelled recordings of containers 1 to 9, in the order of the 2020 scripts.
+    pub(super) training: Vec<Target>,
+    /// Test parts that have recordings.
+    pub(super) tests: Vec<TestPart>,
+}
+
+impl Rows {
+    pub(super) fn of(set: &DataSet) -> Result<Self> {
+        let (mut training, mut public, mut private) = (Vec::new(), Vec::new(), Vec::new());
+        for recording in &set.recordings {
+            let Some((container, sequence)) = recording.container.zip(recording.sequence) else {
+                continue;
+            };
+            let target = Target {
+                recording: recording.clone(),
+                key: RowKey::Sequence(container.number(), sequence),
+                filling: recording.filling(),
+                annotation: set.annotation(recording).cloned(),
+            };
+            match container.subset() {
+                Subset::Training if target.filling.is_some() => training.push(target),
+                Subset::Training => {}
+                Subset::Public => public.push(target),
+                Subset::Private => private.push(target),
+            }
+        }
+        if training.is_empty() {
+            return Err(CcmError::Request(format!(
+                "{}: no labelled training recording (containers 1 to 9); see `corsmal-feat \
+                 dataset check`",
+                set.root.display()
+            )));
+        }
+        let tests = [(Subset::Public, public), (Subset::Private, private)]
+            .into_iter()
+            .filter(|(_, rows)| !rows.is_empty())
+            .map(|(subset, rows)| TestPart { subset, rows })
+            .collect();
+        Ok(Self { training, tests })
+    }
+
+    /// Joint classes of the training recordings.
+    pub(super) fn joint(&self) -> Vec<usize> {
+        self.training.iter().filter_map(|t| t.filling.map(Filling::joint)).collect()
+    }
+}
+
+/// Estimates for a list of recordings, as class numbers.
+#[derive(Clone)]
+pub(super) struct Estimate {
+    pub(super) key: RowKey,
+    pub(super) kind: Option<usize>,
+    pub(super) level: Option<usize>,
+    pub(super) kind_probabilities: Option<[f64; 4]>,
+    pub(super) level_probabilities: Option<[f64; 3]>,
+    pub(super) capacity_ml: Option<f64>,
+}
+
+impl Estimate {
+    /// From a joint class and, where the classifier has them, its probabilities.
+    pub(super) fn joint(key: RowKey, class: usize, probabilities: Option<&[f64]>) -> Self {
+        let filling = Filling::from_joint(class);
+        let mut kinds = [0.0; 4];
+        let mut levels = [0.0; 3];
+        for (p, f) in probabilities.into_iter().flatten().zip(Filling::all()) {
+            kinds[f.kind() as usize] += p;
+            levels[f.level() as usize] += p;
+        }
+        Self {
+            key,
+            kind: filling.map(|f| f.kind() as usize),
+            level: filling.map(|f| f.level() as usize),
+            kind_probabilities: probabilities.map(|_| kinds),
+            level_probabilities: probabilities.map(|_| levels),
+            capacity_ml: None,
+        }
+    }
+
+    pub(super) fn prediction(&self) -> Prediction {
+        Prediction {
+            kind: self.kind.and_then(|k| FillingType::from_number(k as i64)),
+            level: self.level.and_then(|l| FillingLevel::from_number(l as i64)),
+            kind_probabilities: self.kind_probabilities,
+            level_probabilities: self.level_probabilities,
+            capacity_ml: self.capacity_ml,
+            ..Prediction::empty(self.key)
+        }
+    }
+}
+
+/// Scores in percent over a list of recordings; a task without any estimate has none.
+#[derive(Clone, Debug)]
+pub(super) struct PartScores {
+    pub(super) level: Option<f64>,
+    pub(super) kind: Option<f64>,
+    pub(super) joint: Option<f64>,
+    pub(super) capacity: Option<f64>,
+    pub(super) mass: Option<f64>,
+    pub(super) level_matrix: ConfusionMatrix,
+    pub(super) kind_matrix: ConfusionMatrix,
+    pub(super) joint_matrix: ConfusionMatrix,
+}
+
+/// Scores estimates by the paper's rules; `None` unless every target is labelled and estimated.
+pub(super) fn score(targets: &[&Target], estimates: &[Estimate], seed: u64) -> Option<PartScores> {
+    if targets.is_empty() || targets.len() != estimates.len() {
+        return None;
+    }
+    let fillings: Vec<Filling> = targets.iter().map(|t| t.filling).collect::<Option<_>>()?;
+    let pairs = || fillings.iter().zip(estimates);
+    let level_matrix = ConfusionMatrix::new(
+        FillingLevel::ALL.len(),
+        pairs().map(|(f, e)| (f.level() as usize, e.level)),
+    );
+    let kind_matrix = ConfusionMatrix::new(
+        FillingType::ALL.len(),
+        pairs().map(|(f, e)| (f.kind() as usize, e.kind)),
+    );
+    let joint_matrix = ConfusionMatrix::new(
+        Filling::COUNT,
+        pairs().map(|(f, e)| {
+            let kind = e.kind.and_then(|k| FillingType::from_number(k as i64));
+            let level = e.level.and_then(|l| FillingLevel::from_number(l as i64));
+            let both = kind.zip(level).and_then(|(k, l)| Filling::new(k, l));
+            (f.joint(), both.map(Filling::joint))
+        }),
+    );
+    let has_level = estimates.iter().any(|e| e.level.is_some());
+    let has_kind = estimates.iter().any(|e| e.kind.is_some());
+    let has_capacity = estimates.iter().any(|e| e.capacity_ml.is_some());
+    let official = by_paper(targets, estimates, seed);
+    let of = |name: &str| official.as_ref().and_then(|s| s.get(name));
+    Some(PartScores {
+        level: has_level.then(|| 100.0 * level_matrix.weighted_f1()),
+        kind: has_kind.then(|| 100.0 * kind_matrix.weighted_f1()),
+        joint: (has_level && has_kind).then(|| 100.0 * joint_matrix.weighted_f1()),
+        capacity: of("T3").filter(|_| has_capacity),
+        mass: of("mass"),
+        level_matrix,
+        kind_matrix,
+        joint_matrix,
+    })
+}
+
+/// Capacity and mass need annotated capacities, which names do not tell.
+fn by_paper(targets: &[&Target], estimates: &[Estimate], seed: u64) -> Option<scores::Scores> {
+    let rows: Vec<Annotation> =
+        targets.iter().map(|t| t.annotation.clone()).collect::<Option<_>>()?;
+    let keys: Vec<_> = targets.iter().map(|t| t.key).collect();
+    let annotations = Annotations { path: "annotations".into(), rows, levels_in_percent: false };
+    let predictions: Vec<_> = estimates.iter().map(Estimate::prediction).collect();
+    let submission = Submission::from_predictions("estimates", Format::Y2020, &predictions);
+    let random = pseudo_random(&keys, seed);
+    let baseline = Submission::from_predictions("random", Format::Y2020, &random);
+    scores::evaluate(&submission, &annotations, &baseline, RuleSet::Paper, None).ok()
+}

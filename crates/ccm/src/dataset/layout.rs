@@ -1,0 +1,254 @@
+//! Finding the recordings of a data set on disk.
+//!
+//! Two layouts are known. The tree of 2020: `train/<container>/audio/s0_fi1_fu2_b0_l1_audio.wav`
+//! and, for tests, `test/<container>/audio/0000_audio.wav`; folders may be nested otherwise as long
+//! as one of them is the container's number. The flat release of 2021: `train/audio/000000.wav`,
+//! where the annotation file tells what a number is.
+
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+
+use super::annotation::{Annotation, Annotations};
+use super::container::Container;
+use super::filling::Filling;
+use super::name::SequenceName;
+use crate::error::{CcmError, Result};
+
+/// Folders deeper than this are not searched.
+const MAX_DEPTH: usize = 6;
+
+/// One recording on disk.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// The file.
+    pub path: PathBuf,
+    /// Container; `None` for a flat file that no annotation explains.
+    pub container: Option<Container>,
+    /// Flat number (2021 release).
+    pub id: Option<u32>,
+    /// Sequence number within the container (2020 order), or the file number of a test recording.
+    pub sequence: Option<u16>,
+    /// Settings and filling, where known.
+    pub name: Option<SequenceName>,
+}
+
+impl Recording {
+    /// Type and level, where known.
+    pub fn filling(&self) -> Option<Filling> {
+        self.name.map(|n| n.filling)
+    }
+}
+
+/// Something that is not as it should be.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Oddity {
+    /// The file.
+    pub path: PathBuf,
+    /// What is odd about it.
+    pub what: String,
+}
+
+/// A data set on disk.
+#[derive(Debug)]
+pub struct DataSet {
+    /// Its folder.
+    pub root: PathBuf,
+    /// The recordings, by container and sequence number, unexplained ones last.
+    pub recordings: Vec<Recording>,
+    /// The annotation files that were found.
+    pub annotations: Vec<Annotations>,
+    /// File with the manual action annotations.
+    pub actions: Option<PathBuf>,
+    /// Made by `corsmal-feat synth`.
+    pub synthetic: bool,
+    /// Files that could not be placed.
+    pub odd: Vec<Oddity>,
+}
+
+impl DataSet {
+    /// Finds recordings and annotations below `root`.
+    ///
+    /// # Errors
+    /// [`CcmError`] when a folder cannot be read or there is no recording at all.
+    pub fn open(root: &Path) -> Result<Self> {
+        let mut wavs = Vec::new();
+        let mut tables = Vec::new();
+        walk(root, 0, &mut wavs, &mut tables)?;
+        let mut set = Self {
+            root: root.to_path_buf(),
+            recordings: Vec::new(),
+            annotations: Vec::new(),
+            actions: None,
+            synthetic: root.join(crate::synth::NOTICE).exists(),
+            odd: Vec::new(),
+        };
+        for path in tables {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+            if name.starts_with("man_annotation") {
+                set.actions = Some(path);
+            } else if name.contains("annotation") {
+                match Annotations::read(&path) {
+                    Ok(annotations) => set.annotations.push(annotations),
+                    Err(e) => set.odd.push(Oddity { path, what: e.to_string() }),
+                }
+            }
+        }
+        let index = Index::new(&set.annotations);
+        let mut seen = HashSet::new();
+        for path in wavs {
+            match place(root, &path, &index) {
+                Ok(recording) => {
+                    let key = (recording.container, recording.sequence, recording.id);
+                    if !seen.insert(key) {
+                        let what = "the same recording is there twice".into();
+                        set.odd.push(Oddity { path, what });
+                        continue;
+                    }
+                    set.recordings.push(recording);
+                }
+                Err(what) => set.odd.push(Oddity { path, what }),
+            }
+        }
+        if set.recordings.is_empty() {
+            return Err(CcmError::Request(format!(
+                "{}: no recording of the data set in here; expected files such as \
+                 train/1/audio/s0_fi0_fu0_b0_l0_audio.wav or train/audio/000000.wav",
+                root.display()
+            )));
+        }
+        set.recordings.sort_by_key(|r| (r.container.is_none(), r.container, r.sequence, r.id));
+        Ok(set)
+    }
+
+    /// The manual action annotations, none where there is no such file.
+    ///
+    /// # Errors
+    /// [`CcmError`] when the file is there but unusable.
+    pub fn actions(&self) -> Result<super::Actions> {
+        self.actions.as_deref().map_or_else(|| Ok(super::Actions::new()), super::read_actions)
+    }
+
+    /// Ground truth of a recording, from whichever annotation file has it.
+    pub fn annotation(&self, recording: &Recording) -> Option<&Annotation> {
+        Index::new(&self.annotations).find(recording)
+    }
+}
+
+/// Annotated rows by id and by container and sequence.
+struct Index<'a> {
+    by_id: HashMap<u32, &'a Annotation>,
+    by_sequence: HashMap<(u8, u16), &'a Annotation>,
+}
+
+impl<'a> Index<'a> {
+    fn new(files: &'a [Annotations]) -> Self {
+        let rows = || files.iter().flat_map(|f| &f.rows);
+        Self {
+            by_id: rows().filter_map(|r| Some((r.id?, r))).collect(),
+            by_sequence: rows().filter_map(|r| Some(((r.container, r.sequence?), r))).collect(),
+        }
+    }
+
+    fn find(&self, recording: &Recording) -> Option<&'a Annotation> {
+        let by_sequence = recording
+            .container
+            .zip(recording.sequence)
+            .and_then(|(c, s)| self.by_sequence.get(&(c.number(), s)));
+        by_sequence.or_else(|| self.by_id.get(&recording.id?)).copied()
+    }
+}
+
+/// What a file is, from its path and the annotations.
+fn place(root: &Path, path: &Path, index: &Index<'_>) -> std::result::Result<Recording, String> {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let folders: Vec<_> = path
+        .strip_prefix(root)
+        .unwrap_or(path)
+        .ancestors()
+        .skip(1)
+        .filter_map(|p| p.file_name().map(|n| n.to_string_lossy().into_owned()))
+        .collect();
+    let container =
+        folders.iter().find_map(|f| f.parse().ok()).map(|n: u8| Container::new(n).ok_or(n));
+    let digits = stem.strip_suffix("_audio").unwrap_or(&stem);
+    let number: Option<u32> =
+        digits.parse().ok().filter(|_| digits.bytes().all(|b| b.is_ascii_digit()));
+    let blank =
+        Recording { path: path.into(), container: None, id: None, sequence: None, name: None };
+    match (container, SequenceName::parse(&stem), number) {
+        (Some(Err(n)), ..) => Err(format!("the data set has no container {n}")),
+        (Some(Ok(container)), Some(name), _) => {
+            let sequence = name.number(container).ok_or_else(|| {
+                format!(
+                    "container {} is never filled with {}",
+                    container.number(),
+                    name.filling.name()
+                )
+            })?;
+            let recording = Recording {
+                container: Some(container),
+                sequence: Some(sequence),
+                name: Some(name),
+                ..blank
+            };
+            let annotated = index.find(&recording);
+            if let Some(other) = annotated.and_then(|a| a.filling).filter(|f| *f != name.filling) {
+                return Err(format!(
+                    "its name says {}, its annotation {}",
+                    name.filling.name(),
+                    other.name()
+                ));
+            }
+            Ok(Recording { id: annotated.and_then(|a| a.id), ..recording })
+        }
+        (Some(Ok(container)), None, Some(number)) => {
+            let sequence = u16::try_from(number).map_err(|_| "its number is too large")?;
+            let recording =
+                Recording { container: Some(container), sequence: Some(sequence), ..blank };
+            let name = index.find(&recording).and_then(Annotation::name);
+            Ok(Recording { name, ..recording })
+        }
+        (None, None, Some(id)) => {
+            // The numbers of test files start again at 0, so only training files use the ids of
+            // the training annotations.
+            let test = folders.iter().any(|f| f.to_lowercase().contains("test"));
+            let annotated = index.by_id.get(&id).filter(|_| !test);
+            Ok(Recording {
+                id: Some(id),
+                container: annotated.and_then(|a| Container::new(a.container)),
+                sequence: annotated.and_then(|a| a.sequence),
+                name: annotated.and_then(|a| a.name()),
+                ..blank
+            })
+        }
+        (None, Some(_), _) => Err("no folder above it is a container number".into()),
+        _ => Err("its name is none of the data set's".into()),
+    }
+}
+
+fn walk(
+    dir: &Path,
+    depth: usize,
+    wavs: &mut Vec<PathBuf>,
+    tables: &mut Vec<PathBuf>,
+) -> Result<()> {
+    let entries = std::fs::read_dir(dir).map_err(|e| CcmError::io(dir, e))?;
+    let mut paths = Vec::new();
+    for entry in entries {
+        paths.push(entry.map_err(|e| CcmError::io(dir, e))?.path());
+    }
+    paths.sort();
+    for path in paths {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        if path.is_dir() {
+            if depth < MAX_DEPTH {
+                walk(&path, depth + 1, wavs, tables)?;
+            }
+        } else if extension.as_deref() == Some("wav") {
+            wavs.push(path);
+        } else if extension.as_deref() == Some("csv") && depth <= 1 {
+            tables.push(path);
+        }
+    }
+    Ok(())
+}

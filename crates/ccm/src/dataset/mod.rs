@@ -1,0 +1,19 @@
+//! The CCM data set: containers, fillings, names, annotations, folders and splits.
+
+mod actions;
+mod annotation;
+mod check;
+mod container;
+mod filling;
+mod layout;
+mod name;
+mod splits;
+
+pub use actions::{Actions, read_actions};
+pub use annotation::{Annotation, Annotations, Dimensions};
+pub use check::{ContainerFindings, Findings, check};
+pub use container::{CONTAINER_FOLDS, Category, Container, Subset};
+pub use filling::{Filling, FillingLevel, FillingType};
+pub use layout::{DataSet, Oddity, Recording};
+pub use name::SequenceName;
+pub use splits::{PublishedSplit, training_order};

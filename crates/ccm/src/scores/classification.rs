@@ -1,0 +1,99 @@
+//! Confusion matrices and the weighted F1 score.
+
+use serde::Serialize;
+
+/// Counts of estimated against true classes; the last column counts what is not estimated.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ConfusionMatrix {
+    /// `[true class][estimated class, or the number of classes where there is none]`.
+    pub counts: Vec<Vec<u64>>,
+}
+
+/// Scores of one class, 0 to 1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ClassScores {
+    /// Share of the estimates of this class that are right.
+    pub precision: f64,
+    /// Share of the recordings of this class that are found.
+    pub recall: f64,
+    /// Harmonic mean of both.
+    pub f1: f64,
+    /// Number of recordings of this class.
+    pub support: u64,
+}
+
+impl ConfusionMatrix {
+    /// Counts pairs of true class and estimate, both below `classes`; larger estimates count as
+    /// not estimated.
+    pub fn new(classes: usize, pairs: impl IntoIterator<Item = (usize, Option<usize>)>) -> Self {
+        let mut counts = vec![vec![0; classes + 1]; classes];
+        for (truth, estimate) in pairs {
+            if let Some(row) = counts.get_mut(truth) {
+                row[estimate.unwrap_or(classes).min(classes)] += 1;
+            }
+        }
+        Self { counts }
+    }
+
+    /// Number of recordings counted.
+    pub fn total(&self) -> u64 {
+        self.counts.iter().flatten().sum()
+    }
+
+    /// Share of recordings with the right class; 0 where there are none.
+    pub fn accuracy(&self) -> f64 {
+        let right: u64 = (0..self.counts.len()).map(|c| self.counts[c][c]).sum();
+        ratio(right, self.total())
+    }
+
+    /// Scores of each class; 0 where a division by zero would be (as scikit-learn's default).
+    pub fn classes(&self) -> Vec<ClassScores> {
+        (0..self.counts.len())
+            .map(|c| {
+                let right = self.counts[c][c];
+                let support = self.counts[c].iter().sum();
+                let estimated = self.counts.iter().map(|row| row[c]).sum();
+                ClassScores {
+                    precision: ratio(right, estimated),
+                    recall: ratio(right, support),
+                    f1: ratio(2 * right, support + estimated),
+                    support,
+                }
+            })
+            .collect()
+    }
+
+    /// Mean of the classes' F1 scores weighted by their support (scikit-learn
+    /// `f1_score(average="weighted")`); what is not estimated is one more class without support.
+    pub fn weighted_f1(&self) -> f64 {
+        let sum: f64 = self.classes().iter().map(|c| c.f1 * c.support as f64).sum();
+        let total = self.total();
+        if total == 0 { 0.0 } else { sum / total as f64 }
+    }
+}
+
+fn ratio(part: u64, whole: u64) -> f64 {
+    if whole == 0 { 0.0 } else { part as f64 / whole as f64 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Figures from scikit-learn 1.9 `f1_score([0,0,1,1,2,2], [0,-1,1,1,0,1], average=…)`.
+    #[test]
+    fn agrees_with_scikit_learn() {
+        let estimates = [Some(0), None, Some(1), Some(1), Some(0), Some(1)];
+        let matrix = ConfusionMatrix::new(3, [0, 0, 1, 1, 2, 2].into_iter().zip(estimates));
+        assert!((matrix.weighted_f1() - 13.0 / 30.0).abs() < 1e-12);
+        let f1: Vec<_> = matrix.classes().iter().map(|c| c.f1).collect();
+        assert_eq!(f1, [0.5, 0.8, 0.0]);
+        assert_eq!(matrix.accuracy(), 0.5);
+    }
+
+    #[test]
+    fn nothing_counted_scores_zero() {
+        let matrix = ConfusionMatrix::new(2, []);
+        assert_eq!((matrix.weighted_f1(), matrix.accuracy()), (0.0, 0.0));
+    }
+}

@@ -1,0 +1,131 @@
+//! Data sets on disk, and the published splits and actions.
+
+mod shared_data;
+
+use corsmal_ccm::dataset::{
+    Annotations, Container, DataSet, PublishedSplit, SequenceName, check, read_actions,
+    training_order,
+};
+use corsmal_ccm::synth::{self, Size};
+use shared_data::ccm;
+
+#[test]
+fn published_splits_are_met_exactly() {
+    let Some(path) = ccm("splits.csv") else { return };
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    let header = reader.headers().unwrap().clone();
+    let rows: Vec<_> = reader.records().map(|r| r.unwrap()).collect();
+    let column = |name: &str| header.iter().position(|h| h == name).unwrap();
+    for ((container, name), row) in training_order().zip(&rows) {
+        assert_eq!(row[column("container")], container.number().to_string());
+        assert_eq!(row[column("sequence")], name.to_string());
+        assert_eq!(row[column("joint")], name.filling.joint().to_string());
+        let fold = corsmal_ccm::dataset::CONTAINER_FOLDS[container.fold().unwrap()];
+        assert_eq!(row[column("fold3")], fold.map(|c| c.to_string()).join("_"));
+    }
+    for (split, name) in [
+        (PublishedSplit::Baselines, "ml_baselines_split"),
+        (PublishedSplit::M6Stratified, "m6_split_val_ids"),
+        (PublishedSplit::M6Plain, "m6_split_filename_list"),
+    ] {
+        let column = column(name);
+        let mut held: Vec<_> = split.rows().unwrap().test;
+        held.sort_unstable();
+        let expected: Vec<_> = (0..rows.len()).filter(|&i| &rows[i][column] != "train").collect();
+        assert_eq!(held, expected, "{split:?}");
+    }
+}
+
+#[test]
+fn actions_are_missing_exactly_for_empty_containers() {
+    let Some(path) = ccm("man_annotations.csv") else { return };
+    let actions = read_actions(&path).unwrap();
+    assert_eq!(actions.len(), 684);
+    for (key, action) in training_order().map(|k| (k, actions[&k])) {
+        assert_eq!(action.is_none(), key.1.filling.joint() == 0, "{key:?}");
+    }
+}
+
+#[test]
+fn official_annotations_name_every_training_recording_once() {
+    for file in ["ccm_train_annotation.csv", "ccm_train_annotation_2020-08.csv"] {
+        let Some(path) = ccm(file) else { return };
+        let annotations = Annotations::read(&path).unwrap();
+        let mut keys: Vec<_> =
+            annotations.rows.iter().map(|r| (r.container, r.sequence.unwrap())).collect();
+        keys.sort_unstable();
+        let expected: Vec<_> =
+            training_order().map(|(c, n)| (c.number(), n.number(c).unwrap())).collect();
+        assert_eq!(keys, expected, "{file}");
+    }
+}
+
+#[test]
+fn a_synthetic_set_is_found_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    synth::generate(dir.path(), Size::Reduced, 2).unwrap();
+    let set = DataSet::open(dir.path()).unwrap();
+    assert!(set.synthetic);
+    assert_eq!(set.recordings.len(), 133);
+    assert!(set.recordings.iter().all(|r| r.name.is_some()));
+    let training = set.recordings.iter().filter(|r| r.container.unwrap().number() <= 9);
+    assert!(training.clone().all(|r| set.annotation(r).unwrap().id == r.id && r.id.is_some()));
+    let actions = set.actions().unwrap();
+    assert_eq!(actions.len(), training.count());
+    let findings = check(&set);
+    assert!(findings.sound(), "{:?}", findings.odd);
+    assert_eq!(findings.absent.len(), 3);
+    assert!(findings.formats.keys().all(|f| f.starts_with("8 channels, 44100 Hz")));
+}
+
+#[test]
+fn the_flat_release_is_explained_by_its_annotations() {
+    let dir = tempfile::tempdir().unwrap();
+    synth::generate(dir.path(), Size::Small, 2).unwrap();
+    let tree = DataSet::open(dir.path()).unwrap();
+    let flat = tempfile::tempdir().unwrap();
+    let audio = flat.path().join("train/audio");
+    std::fs::create_dir_all(&audio).unwrap();
+    for recording in &tree.recordings {
+        let name = format!("{:06}.wav", recording.id.unwrap());
+        std::fs::rename(&recording.path, audio.join(name)).unwrap();
+    }
+    let annotation = "ccm_train_annotation.csv";
+    std::fs::copy(dir.path().join(annotation), flat.path().join(annotation)).unwrap();
+    let set = DataSet::open(flat.path()).unwrap();
+    let names = |set: &DataSet| -> Vec<(Option<Container>, Option<SequenceName>)> {
+        set.recordings.iter().map(|r| (r.container, r.name)).collect()
+    };
+    assert_eq!(names(&set), names(&tree));
+}
+
+#[test]
+fn what_is_wrong_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let put = |name: &str, bytes: &[u8]| {
+        let path = dir.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, bytes).unwrap();
+    };
+    let error = DataSet::open(dir.path()).unwrap_err().to_string();
+    assert!(error.contains("no recording"), "{error}");
+    put("train/1/audio/s0_fi0_fu0_b0_l0_audio.wav", b"");
+    put("train/7/audio/s0_fi3_fu1_b0_l0_audio.wav", b"");
+    put("train/1/audio/hello.wav", b"");
+    put("train/22/audio/s0_fi0_fu0_b0_l0_audio.wav", b"");
+    put("train/audio/s0_fi0_fu0_b0_l0_audio.wav", b"");
+    put("train/1/again/s0_fi0_fu0_b0_l0_audio.wav", b"");
+    let findings = check(&DataSet::open(dir.path()).unwrap());
+    assert!(!findings.sound());
+    let all: String = findings.odd.iter().map(|o| format!("{}\n", o.what)).collect();
+    for expected in [
+        "never filled with water half",
+        "none of the data set's",
+        "no container 22",
+        "no folder above it",
+        "there twice",
+    ] {
+        assert!(all.contains(expected), "{expected}: {all}");
+    }
+    assert_eq!(findings.containers[0].missing.len(), 83);
+}

@@ -1,0 +1,33 @@
+//! M5's stored predictions, fused by averaging, are its submission.
+
+mod shared_data;
+
+use corsmal_ccm::predictions::ProbabilityTable;
+use corsmal_ccm::submission::Submission;
+use shared_data::ccm;
+
+#[test]
+fn averages_of_m5_are_its_submission() {
+    let Some(path) = ccm("m5_predictions/submission_public_test.csv") else { return };
+    let submission = Submission::read(&path).unwrap();
+    let fuse = |files: &[&str]| {
+        let tables: Vec<_> = files
+            .iter()
+            .map(|f| {
+                let path = ccm(&format!("m5_predictions/publictest_{f}.csv")).unwrap();
+                ProbabilityTable::read(&path).unwrap()
+            })
+            .collect();
+        ProbabilityTable::average(&tables, None).unwrap()
+    };
+    let kind = fuse(&["type_rf", "type_vggish_agg"]);
+    let level = fuse(&["level_rf", "level_vggish_agg", "level_r21d_agg"]);
+    for (fused, estimates) in [(kind, &submission.kind), (level, &submission.level)] {
+        let top = fused.top();
+        let equal = submission.keys.iter().zip(&estimates.values).filter(|(key, value)| {
+            let row = fused.keys.iter().position(|k| k == *key).unwrap();
+            top[row] as f64 == **value
+        });
+        assert_eq!(equal.count(), 228);
+    }
+}

@@ -1,0 +1,99 @@
+//! `corsmal-feat dataset`: the CCM data set on disk.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Subcommand;
+use corsmal_ccm::dataset::{DataSet, Findings, check};
+
+use crate::failure::{FAILED_FILES, Failure};
+
+/// Names listed per container before the rest is counted.
+const LISTED: usize = 6;
+
+/// Arguments of `dataset`.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    /// Say what is there, what is missing and what is odd.
+    ///
+    /// Known are the folder tree of 2020 (train/1/audio/s0_fi0_fu0_b0_l0_audio.wav) and the flat
+    /// release of 2021 (train/audio/000000.wav with its annotation file). Exit code 1 when
+    /// something is odd or a container is incomplete.
+    #[command(after_help = "Example:\n  corsmal-feat dataset check ~/CCM")]
+    Check {
+        /// Folder of the data set.
+        dir: PathBuf,
+        /// Print the findings as JSON.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// Prints the findings.
+pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    let Action::Check { dir, json } = args.action;
+    let findings = check(&DataSet::open(&dir)?);
+    if json {
+        println!("{}", serde_json::to_string_pretty(&findings)?);
+    } else {
+        print(&findings);
+    }
+    Ok(if findings.sound() { ExitCode::SUCCESS } else { ExitCode::from(FAILED_FILES) })
+}
+
+fn print(findings: &Findings) {
+    println!("{}", findings.root.display());
+    if findings.synthetic {
+        println!("SYNTHETIC recordings: their scores mean nothing about the real data set");
+    }
+    println!(
+        "{} recordings, {} with a known filling, {:.1} min",
+        findings.recordings,
+        findings.labelled,
+        findings.seconds / 60.0
+    );
+    for (format, count) in &findings.formats {
+        println!("{count:6} files: {format}");
+    }
+    for path in &findings.annotations {
+        println!("annotations: {}", path.display());
+    }
+    match &findings.actions {
+        Some(path) => println!("actions:     {}", path.display()),
+        None => println!("actions:     none (man_annotations.csv crops the training spectrograms)"),
+    }
+    println!("\n{:>9}  {:8} {:12} {:>9}", "container", "category", "part", "found");
+    for c in &findings.containers {
+        print!(
+            "{:>9}  {:8} {:12} {:>4}/{:<4}",
+            c.container.number(),
+            c.category,
+            c.subset,
+            c.found,
+            c.expected
+        );
+        match (c.missing.len(), findings.synthetic) {
+            (0, _) | (_, true) => println!(),
+            (n, _) if n <= LISTED => println!(" missing {}", c.missing.join(" ")),
+            (n, _) => {
+                println!(" missing {} and {} more", c.missing[..LISTED].join(" "), n - LISTED);
+            }
+        }
+    }
+    if !findings.absent.is_empty() {
+        let list: Vec<_> = findings.absent.iter().map(|c| c.number().to_string()).collect();
+        println!("not there: containers {}", list.join(", "));
+    }
+    if findings.unplaced > 0 {
+        println!("{} numbered files belong to no known container", findings.unplaced);
+    }
+    for odd in &findings.odd {
+        println!("odd: {}: {}", odd.path.display(), odd.what);
+    }
+}

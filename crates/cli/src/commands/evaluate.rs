@@ -1,0 +1,168 @@
+//! `corsmal-feat evaluate`: scores of a CORSMAL submission.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::ValueEnum;
+use corsmal_ccm::dataset::Annotations;
+use corsmal_ccm::scores::{self, RuleSet, Scores};
+use corsmal_ccm::submission::{Submission, pseudo_random};
+use serde::ser::{Serialize, SerializeMap, Serializer};
+
+use crate::failure::Failure;
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Rules {
+    /// The equations of the paper (T1, T2, T3, filling mass).
+    Paper,
+    /// The official evaluator of October 2020.
+    #[value(name = "toolkit-2020-10")]
+    Toolkit202010,
+    /// The official evaluator of November 2021, which the toolkit's README table belongs to.
+    #[value(name = "toolkit-2021-11")]
+    Toolkit202111,
+    /// The current official evaluator (s1 to s10, overall, JFLT, CMD).
+    Toolkit,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Format {
+    Json,
+    Csv,
+    Table,
+}
+
+/// Arguments of `evaluate`.
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  corsmal-feat evaluate --submission team.csv --annotations \
+                        ccm_train_annotation.csv --rules toolkit --baseline random1.csv\n\n\
+                        Quirks of each rule set are described in docs/benchmark.md.")]
+pub struct Args {
+    /// Submissions in the official 2020 or 2022 format.
+    #[arg(long, required = true, num_args = 1.., value_name = "CSV")]
+    submission: Vec<PathBuf>,
+    /// Official annotation file.
+    #[arg(long, value_name = "CSV")]
+    annotations: PathBuf,
+    /// Rules to score by.
+    #[arg(long, value_enum, default_value = "toolkit")]
+    rules: Rules,
+    /// Submission that stands in for tasks that are not addressed, in the filling mass only (the
+    /// official random1.csv or random123.csv). Default: pseudo-random estimates of --seed.
+    #[arg(long, value_name = "CSV")]
+    baseline: Option<PathBuf>,
+    /// Seed of the pseudo-random estimates.
+    #[arg(long, default_value_t = 1, conflicts_with = "baseline")]
+    seed: u64,
+    /// Score only the recordings of these containers, such as 1-9 or 3,6,9.
+    #[arg(long, value_name = "LIST", value_parser = containers)]
+    containers: Option<Containers>,
+    /// How to print the scores.
+    #[arg(long, value_enum, default_value = "table")]
+    format: Format,
+}
+
+/// Container numbers; a type of its own so that clap does not take it for a repeated option.
+#[derive(Clone)]
+struct Containers(Vec<u8>);
+
+fn containers(text: &str) -> Result<Containers, String> {
+    let fault = || format!("'{text}': expected numbers and ranges such as 1-9 or 3,6,9");
+    let mut list = Vec::new();
+    for part in text.split(',') {
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        let first: u8 = first.trim().parse().map_err(|_| fault())?;
+        let last: u8 = last.trim().parse().map_err(|_| fault())?;
+        list.extend(first..=last);
+    }
+    if list.is_empty() { Err(fault()) } else { Ok(Containers(list)) }
+}
+
+/// Prints the scores; notes go to standard error except in JSON, which holds them.
+pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    let rules = match args.rules {
+        Rules::Paper => RuleSet::Paper,
+        Rules::Toolkit202010 => RuleSet::Toolkit202010,
+        Rules::Toolkit202111 => RuleSet::Toolkit202111,
+        Rules::Toolkit => RuleSet::Toolkit,
+    };
+    let annotations = Annotations::read(&args.annotations)?;
+    let read_baseline = args.baseline.as_deref().map(Submission::read).transpose()?;
+    let mut results = Vec::new();
+    for path in &args.submission {
+        let submission = Submission::read(path)?;
+        let baseline = read_baseline.clone().unwrap_or_else(|| {
+            let estimates = pseudo_random(&submission.keys, args.seed);
+            let name = format!("pseudo-random estimates, seed {}", args.seed);
+            Submission::from_predictions(&name, submission.format, &estimates)
+        });
+        let list = args.containers.as_ref().map(|c| c.0.as_slice());
+        let scores = scores::evaluate(&submission, &annotations, &baseline, rules, list)?;
+        results.push((submission.name(), scores));
+    }
+    print(&results, args.format)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn print(results: &[(String, Scores)], format: Format) -> Result<(), Failure> {
+    if !matches!(format, Format::Json) {
+        for (name, scores) in results {
+            for note in &scores.notes {
+                eprintln!("note: {name}: {note}");
+            }
+        }
+    }
+    match format {
+        Format::Json => {
+            let objects: Vec<_> = results.iter().map(|(name, s)| Flat(name, s)).collect();
+            let text = match objects.as_slice() {
+                [one] => serde_json::to_string_pretty(one)?,
+                many => serde_json::to_string_pretty(many)?,
+            };
+            println!("{text}");
+        }
+        Format::Csv => {
+            for (i, (name, scores)) in results.iter().enumerate() {
+                if i == 0 {
+                    let names: Vec<_> = scores.values.iter().map(|(n, _)| *n).collect();
+                    println!("submission,{}", names.join(","));
+                }
+                let values: Vec<_> = scores.values.iter().map(|(_, v)| format!("{v:.2}")).collect();
+                println!("{name},{}", values.join(","));
+            }
+        }
+        Format::Table => {
+            let width = results.iter().map(|(n, _)| n.chars().count()).max().unwrap_or(0).max(10);
+            for (i, (name, scores)) in results.iter().enumerate() {
+                if i == 0 {
+                    println!("rules {}, {} recordings, percent", scores.rules.name(), scores.rows);
+                    print!("{:width$}", "submission");
+                    scores.values.iter().for_each(|(n, _)| print!(" {n:>7}"));
+                    println!();
+                }
+                print!("{name:width$}");
+                scores.values.iter().for_each(|(n, v)| print!(" {v:>w$.2}", w = n.len().max(7)));
+                println!();
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A result as one flat object, keys in the order of the scores.
+struct Flat<'a>(&'a str, &'a Scores);
+
+impl Serialize for Flat<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self(name, scores) = self;
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("submission", name)?;
+        map.serialize_entry("rules", scores.rules.name())?;
+        map.serialize_entry("recordings", &scores.rows)?;
+        for (name, value) in &scores.values {
+            map.serialize_entry(name, value)?;
+        }
+        map.serialize_entry("notes", &scores.notes)?;
+        map.end()
+    }
+}

@@ -1,0 +1,57 @@
+//! `corsmal-feat synth`: synthetic recordings in the layout of the CCM data set.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use corsmal_ccm::synth::{self, SAMPLE_RATE, Size};
+
+use crate::failure::Failure;
+
+/// Arguments of `synth`.
+#[derive(clap::Args)]
+#[command(
+    long_about = "Make synthetic recordings in the layout and naming of the CORSMAL Containers \
+                  Manipulation data set: pouring and shaking of water, rice and pasta, heard by \
+                  eight microphones, with annotation files.\n\nThey are for demonstration and \
+                  tests. Scores on them mean nothing about the real data set.",
+    after_help = "Example:\n  corsmal-feat synth --out synthetic --seed 7\n\n\
+                  The same seed and size give the same bytes on any number of cores."
+)]
+pub struct Args {
+    /// Folder to write to: new, empty, or of an earlier run.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Only the training containers in one setting (57 recordings instead of 133).
+    #[arg(long, conflicts_with = "full")]
+    small: bool,
+    /// All containers, scenarios, backgrounds and illuminations (1,140 recordings, about 1.4 GB).
+    #[arg(long)]
+    full: bool,
+    /// Print nothing.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Writes the data set and says what it is.
+pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    let size = match (args.small, args.full) {
+        (true, _) => Size::Small,
+        (_, true) => Size::Full,
+        _ => Size::Reduced,
+    };
+    let summary = synth::generate(&args.out, size, args.seed)?;
+    if !args.quiet {
+        println!(
+            "{}: {} synthetic recordings, {:.0} s, 8 channels, {SAMPLE_RATE} Hz (seed {})",
+            args.out.display(),
+            summary.recordings,
+            summary.frames as f64 / f64::from(SAMPLE_RATE),
+            args.seed
+        );
+        println!("They are synthetic: scores on them mean nothing about the real data set.");
+    }
+    Ok(ExitCode::SUCCESS)
+}
