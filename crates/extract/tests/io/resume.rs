@@ -43,7 +43,7 @@ fn work(out: &Path, compression: Compression, stop: usize) -> usize {
             let times = writer.floats(&layout::times_name(&id, None), &[1], &[index as f32]);
             let row = Some(vec![index as f32 / 3.0, f32::NAN, f32::NEG_INFINITY]);
             let entries = vec![frames.unwrap(), times.unwrap()];
-            Record { outcome: Outcome::new(id, "x.wav", Status::Ok, ""), entries, row }
+            Record { outcome: Outcome::new(id, "x.wav", Status::Ok, ""), entries, row, names: None }
         };
         ledger.append(&record).unwrap();
         records.push(record);
