@@ -115,8 +115,7 @@ fn separate<'py>(
 
 /// Transform parameters from the front end: (sr, hop_length, fmin, n_bins, bins_per_octave, tuning,
 /// filter_scale, norm, sparsity, window, scale, pad_mode).
-type CqtTuple =
-    (f64, usize, f64, usize, usize, f64, f64, Option<f64>, f64, String, bool, String);
+type CqtTuple = (f64, usize, f64, usize, usize, f64, f64, Option<f64>, f64, String, bool, String);
 
 fn cqt_params(tuple: CqtTuple) -> PyResult<CqtParams> {
     let (sr, hop_length, fmin, n_bins, bins_per_octave, tuning, ..) = tuple;
