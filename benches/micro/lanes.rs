@@ -3,7 +3,6 @@
 use corsmal_dsp::lanes::{LaneFft, Row, Slots, gather, power_to_decibel};
 use corsmal_dsp::mel::{MelParams, SparseBank, mel_filter};
 use divan::{Bencher, counter::ItemsCount};
-use pulp::Arch;
 use realfft::RealFftPlanner;
 
 fn main() {
@@ -50,7 +49,7 @@ fn gather_2048(bencher: Bencher, channels: usize) {
     let slots = Slots { first: 0, len: 16, channels };
     bencher
         .counter(ItemsCount::new(16usize))
-        .bench_local(|| gather(Arch::new(), &signal, 512, &window, slots, &mut out));
+        .bench_local(|| gather(&signal, 512, &window, slots, &mut out));
 }
 
 #[divan::bench]
@@ -59,7 +58,7 @@ fn decibel_128(bencher: Bencher) {
     let mut work = source.clone();
     bencher.counter(ItemsCount::new(16usize)).bench_local(|| {
         work.copy_from_slice(&source);
-        power_to_decibel(Arch::new(), &mut work, 1e-10, 0.0);
+        power_to_decibel(&mut work, 1e-10, 0.0);
     });
 }
 
@@ -68,7 +67,5 @@ fn mel_128(bencher: Bencher) {
     let bank = SparseBank::new(&mel_filter(&MelParams::new(44100.0, 2048)).unwrap());
     let power = rows(1025);
     let mut mel = vec![Row::ZERO; 128];
-    bencher
-        .counter(ItemsCount::new(16usize))
-        .bench_local(|| bank.apply_rows(Arch::new(), &power, &mut mel));
+    bencher.counter(ItemsCount::new(16usize)).bench_local(|| bank.apply_rows(&power, &mut mel));
 }

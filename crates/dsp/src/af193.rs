@@ -7,7 +7,6 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ndarray::{Array2, ArrayView2, Axis};
-use pulp::Arch;
 
 use crate::chroma::{Chroma, ChromaParams, chroma_filter};
 use crate::cqt::{ChromaCqt, ChromaCqtParams, CqtParams, CqtPlan, SignalTuning};
@@ -231,7 +230,7 @@ impl<'p> Spectra<'p> {
         store_means(&self.mel_sum, self.frames, mel);
 
         let decibel = Decibel::default();
-        power_to_decibel(Arch::new(), &mut self.mel, decibel.amin as f32, decibel.offset() as f32);
+        power_to_decibel(&mut self.mel, decibel.amin as f32, decibel.offset() as f32);
         let values = || self.mel.iter().flat_map(|row| row.0);
         let peak = values().fold(f32::NEG_INFINITY, f32::max);
         let floor = decibel.top_db.map_or(f32::NEG_INFINITY, |top_db| peak - top_db as f32);

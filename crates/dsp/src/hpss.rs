@@ -3,7 +3,6 @@
 
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3, s};
 use num_complex::Complex;
-use pulp::Arch;
 
 use crate::error::{DspError, Result};
 use crate::median;
@@ -81,7 +80,7 @@ impl HpssParams {
         let values = mask.iter_mut().zip(x.iter().zip(reference));
         let values = values.map(|(mask, (x, reference))| (mask, *x, *reference * margin));
         if self.power == 2.0 {
-            Arch::new().dispatch(
+            crate::simd::vectorized(
                 #[inline(always)]
                 || {
                     values.for_each(|(mask, x, reference)| {
@@ -249,7 +248,7 @@ impl<T: Lane> Separator<T> {
 
 /// Rounds a spectrum to `T`, as librosa stores it, and takes the magnitudes of the rounded values.
 fn round<T: Real>(spectrum: &[Complex<f64>], rounded: &mut [Complex<T>], magnitude: &mut [T]) {
-    Arch::new().dispatch(
+    crate::simd::vectorized(
         #[inline(always)]
         || {
             for ((z, rounded), m) in spectrum.iter().zip(rounded).zip(magnitude) {
@@ -263,7 +262,7 @@ fn round<T: Real>(spectrum: &[Complex<f64>], rounded: &mut [Complex<T>], magnitu
 
 /// `spectrum * mask`.
 fn masked<T: Real>(spectrum: &[Complex<T>], mask: &[T], out: &mut [Complex<T>]) {
-    Arch::new().dispatch(
+    crate::simd::vectorized(
         #[inline(always)]
         || {
             for ((out, z), m) in out.iter_mut().zip(spectrum).zip(mask) {

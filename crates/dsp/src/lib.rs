@@ -29,6 +29,7 @@ pub mod pitch;
 pub mod real;
 pub mod resample;
 pub mod resize;
+pub mod simd;
 pub mod spectral;
 pub mod stft;
 mod sums;

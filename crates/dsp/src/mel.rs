@@ -1,12 +1,12 @@
 //! Mel scale and filter bank (librosa 0.11 `filters.mel`, `feature.melspectrogram`).
 
 use ndarray::{Array2, Array3, ArrayView3, Axis};
-use pulp::Arch;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{DspError, Result};
 use crate::lanes::{LANES, Row};
 use crate::real::Real;
+use crate::simd::vectorized;
 
 /// Normalisation of each mel filter.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -197,8 +197,8 @@ impl SparseBank {
     }
 
     /// `bank @ power` for the rows of one lane block, `[bins] -> [bands]`.
-    pub fn apply_rows(&self, arch: Arch, power: &[Row], out: &mut [Row]) {
-        arch.dispatch(
+    pub fn apply_rows(&self, power: &[Row], out: &mut [Row]) {
+        vectorized(
             #[inline(always)]
             || {
                 for ((first, weights), out) in self.bands.iter().zip(out) {

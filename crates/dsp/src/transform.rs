@@ -4,7 +4,6 @@
 use std::sync::Arc;
 
 use num_complex::Complex;
-use pulp::Arch;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 use crate::error::Result;
@@ -146,7 +145,7 @@ impl<F: Real> Inverse<F> {
             .process_with_scratch(bins, frame, fft)
             .expect("buffers made by the plan itself, real ends");
         let (skip, y) = overlap(&self.params, t, y);
-        Arch::new().dispatch(
+        crate::simd::vectorized(
             #[inline(always)]
             || {
                 for ((y, x), w) in y.iter_mut().zip(&frame[skip..]).zip(&self.window[skip..]) {

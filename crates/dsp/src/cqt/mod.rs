@@ -12,7 +12,6 @@ use std::sync::Arc;
 
 use ndarray::{Array2, Array3, ArrayView2, ArrayViewMut2, Axis, s};
 use num_complex::Complex;
-use pulp::Arch;
 
 pub use chroma::{ChromaCqt, ChromaCqtParams, chroma_cqt, cq_to_chroma};
 pub use tuning::SignalTuning;
@@ -292,7 +291,6 @@ impl CqtPlan {
         signal: &[f32],
         mut out: ArrayViewMut2<Complex<T>>,
     ) {
-        let arch = Arch::new();
         let n_fft = octave.basis.n_fft;
         let pad = n_fft / 2;
         let mut padded = Vec::with_capacity(signal.len() + n_fft);
@@ -306,9 +304,9 @@ impl CqtPlan {
         let mut spectrum = vec![Row::ZERO; 2 * fft.n_bins()];
         let mut response = vec![[Row::ZERO; 2]; octave.basis.rows.len()];
         for slots in Slots::blocks(out.ncols(), 1) {
-            gather(arch, &padded, octave.hop, &window, slots, &mut frames);
+            gather(&padded, octave.hop, &window, slots, &mut frames);
             fft.complex(&mut frames, &mut spectrum);
-            project(arch, &octave.basis, &octave.gains, &spectrum, &mut response);
+            project(&octave.basis, &octave.gains, &spectrum, &mut response);
             let columns = slots.first..slots.first + slots.len;
             for (mut row, [re, im]) in
                 out.slice_mut(s![.., columns]).rows_mut().into_iter().zip(&response)
@@ -322,9 +320,9 @@ impl CqtPlan {
 }
 
 /// Products of every filter with sixteen spectra (real and imaginary rows alternating).
-fn project(arch: Arch, basis: &Basis, gains: &[f32], spectrum: &[Row], response: &mut [[Row; 2]]) {
+fn project(basis: &Basis, gains: &[f32], spectrum: &[Row], response: &mut [[Row; 2]]) {
     let bins = spectrum.as_chunks::<2>().0;
-    arch.dispatch(
+    crate::simd::vectorized(
         #[inline(always)]
         || {
             let filters = basis.rows.iter().zip(gains);

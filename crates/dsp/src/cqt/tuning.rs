@@ -1,7 +1,5 @@
 //! Tuning of a signal, as the constant-Q features estimate it.
 
-use pulp::Arch;
-
 use crate::error::Result;
 use crate::lanes::{LANES, LaneFft, Row, Slots, gather};
 use crate::pitch::{PitchParams, TuningEstimator};
@@ -71,7 +69,6 @@ impl SignalTuning {
     }
 
     fn collect_in_lanes<T: Real>(&self, y: &[f32], estimator: &mut TuningEstimator<T>) {
-        let arch = Arch::new();
         let pad = N_FFT / 2;
         let mut padded = vec![0.0; y.len() + N_FFT];
         padded[pad..pad + y.len()].copy_from_slice(y);
@@ -79,7 +76,7 @@ impl SignalTuning {
         let mut power = vec![Row::ZERO; self.lanes.n_bins()];
         let mut magnitudes = vec![T::zero(); LANES * power.len()];
         for slots in Slots::blocks(self.precise.params().n_frames(y.len()), 1) {
-            gather(arch, &padded, HOP, &self.window, slots, &mut frames);
+            gather(&padded, HOP, &self.window, slots, &mut frames);
             self.lanes.power(&mut frames, &mut power);
             for (s, magnitude) in
                 magnitudes.chunks_exact_mut(power.len()).take(slots.len).enumerate()

@@ -1,31 +1,16 @@
 //! Decibels of rows.
 
-use pulp::Arch;
-
-use super::{LANES, Row};
+use super::Row;
+use crate::simd::vectorized;
 
 /// `10 log10(max(amin, x)) - offset` of every value (`power` in, decibels out).
-pub fn power_to_decibel(arch: Arch, rows: &mut [Row], amin: f32, offset: f32) {
-    arch.dispatch(
+pub fn power_to_decibel(rows: &mut [Row], amin: f32, offset: f32) {
+    vectorized(
         #[inline(always)]
         || {
             for row in rows {
                 for x in &mut row.0 {
                     *x = decibel(x.max(amin)) - offset;
-                }
-            }
-        },
-    );
-}
-
-/// Raises `peak` to the largest value of each slot over all rows.
-pub fn max_per_slot(arch: Arch, rows: &[Row], peak: &mut [f32; LANES]) {
-    arch.dispatch(
-        #[inline(always)]
-        || {
-            for row in rows {
-                for (peak, x) in peak.iter_mut().zip(&row.0) {
-                    *peak = if *x > *peak { *x } else { *peak };
                 }
             }
         },
@@ -38,7 +23,7 @@ pub fn max_per_slot(arch: Arch, rows: &[Row], peak: &mut [f32; LANES]) {
 #[inline(always)]
 fn decibel(x: f32) -> f32 {
     // 10 log10(2) split so that the product of the first part with an exponent is exact.
-    const OCTAVE_HIGH: f32 = 3.010_253_9;
+    const OCTAVE_HIGH: f32 = 6165.0 / 2048.0;
     const OCTAVE_LOW: f32 = 4.605_039e-5;
     const NEPER: f32 = 4.342_944_8;
     const P: [f32; 9] = [

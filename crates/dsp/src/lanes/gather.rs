@@ -1,8 +1,7 @@
 //! Windowed frames of an interleaved signal into rows.
 
-use pulp::Arch;
-
 use super::{LANES, Row};
+use crate::simd::vectorized;
 
 /// Which (frame, channel) each lane of a block stands for: slot `s` is the `first + s`-th pair in
 /// the order frame by frame, channel by channel.
@@ -37,24 +36,20 @@ impl Slots {
 /// Writes `window[n] * signal[frame * hop + n]` of every slot into `rows[n]`; unused slots are zero.
 ///
 /// `signal` is interleaved and starts at the first sample of frame 0.
-pub fn gather(
-    arch: Arch,
-    signal: &[f32],
-    hop: usize,
-    window: &[f32],
-    slots: Slots,
-    rows: &mut [Row],
-) {
+pub fn gather(signal: &[f32], hop: usize, window: &[f32], slots: Slots, rows: &mut [Row]) {
     debug_assert_eq!(window.len(), rows.len());
     let aligned = slots.len == LANES && slots.first.is_multiple_of(slots.channels);
-    arch.dispatch(|| match slots.channels {
-        1 if aligned => groups::<1, 16>(signal, hop, window, slots, rows),
-        2 if aligned => groups::<2, 8>(signal, hop, window, slots, rows),
-        4 if aligned => groups::<4, 4>(signal, hop, window, slots, rows),
-        8 if aligned => groups::<8, 2>(signal, hop, window, slots, rows),
-        16 if aligned => groups::<16, 1>(signal, hop, window, slots, rows),
-        _ => strided(signal, hop, window, slots, rows),
-    });
+    vectorized(
+        #[inline(always)]
+        || match slots.channels {
+            1 if aligned => groups::<1, 16>(signal, hop, window, slots, rows),
+            2 if aligned => groups::<2, 8>(signal, hop, window, slots, rows),
+            4 if aligned => groups::<4, 4>(signal, hop, window, slots, rows),
+            8 if aligned => groups::<8, 2>(signal, hop, window, slots, rows),
+            16 if aligned => groups::<16, 1>(signal, hop, window, slots, rows),
+            _ => strided(signal, hop, window, slots, rows),
+        },
+    );
 }
 
 /// `FRAMES` whole frames of `CHANNELS` channels fill the lanes.
@@ -80,17 +75,22 @@ fn groups<const CHANNELS: usize, const FRAMES: usize>(
     }
 }
 
-/// Any number of channels, and blocks that are not full.
+/// Any number of channels, and blocks that are not full: runs of neighbouring channels of a frame.
 #[inline(always)]
 fn strided(signal: &[f32], hop: usize, window: &[f32], slots: Slots, rows: &mut [Row]) {
     rows.fill(Row::ZERO);
-    for s in 0..slots.len {
+    let channels = slots.channels;
+    let mut s = 0;
+    while s < slots.len {
         let (frame, channel) = slots.pair(s);
-        let start = frame * hop * slots.channels + channel;
-        let samples = signal[start..].iter().step_by(slots.channels);
+        let run = (channels - channel).min(slots.len - s);
+        let samples = signal[frame * hop * channels + channel..].chunks(channels);
         for ((row, w), x) in rows.iter_mut().zip(window).zip(samples) {
-            row.0[s] = x * w;
+            for (slot, x) in row.0[s..s + run].iter_mut().zip(x) {
+                *slot = x * w;
+            }
         }
+        s += run;
     }
 }
 
@@ -105,7 +105,7 @@ mod tests {
             let signal: Vec<f32> = (0..channels * (32 + 40 * 8)).map(|i| i as f32).collect();
             for slots in Slots::blocks(37, channels) {
                 let mut rows = vec![Row([f32::NAN; LANES]); 32];
-                gather(Arch::new(), &signal, 8, &window, slots, &mut rows);
+                gather(&signal, 8, &window, slots, &mut rows);
                 for s in 0..LANES {
                     let (frame, channel) = slots.pair(s);
                     for (n, row) in rows.iter().enumerate() {

@@ -11,7 +11,7 @@ mod fft;
 mod gather;
 mod spectrum;
 
-pub use decibel::{max_per_slot, power_to_decibel};
+pub use decibel::power_to_decibel;
 pub use fft::LaneFft;
 pub use gather::{Slots, gather};
 pub use spectrum::Spectrum;

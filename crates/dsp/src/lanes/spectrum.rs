@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use num_complex::Complex;
-use pulp::Arch;
 use realfft::{RealFftPlanner, RealToComplex};
 
 use super::{LANES, LaneFft, Row};
@@ -68,7 +67,7 @@ impl Spectrum {
     /// Magnitude spectrum (`n_bins` rows). `frames` is overwritten.
     pub fn magnitude(&self, frames: &mut [Row], out: &mut [Row]) {
         self.power(frames, out);
-        Arch::new().dispatch(
+        crate::simd::vectorized(
             #[inline(always)]
             || {
                 for row in out.iter_mut() {

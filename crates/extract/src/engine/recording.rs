@@ -273,7 +273,7 @@ pub enum FinishError {
 fn raise_peaks(values: &[f32], width: usize, range: std::ops::Range<usize>, peaks: &mut [f32]) {
     const LANES: usize = 16;
     let channels = peaks.len();
-    pulp::Arch::new().dispatch(
+    corsmal_dsp::simd::vectorized(
         #[inline(always)]
         || {
             let mut lanes = [f32::NEG_INFINITY; LANES];

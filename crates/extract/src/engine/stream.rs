@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use corsmal_dsp::lanes::{LANES, Row, Slots, gather};
-use pulp::Arch;
 
 use super::plan::{Framing, Plan, Scratch, StreamKind};
 use crate::features::{Kernel, Quantity};
@@ -159,7 +158,7 @@ fn run(
                 for ((m, quantity), start) in members.iter().zip(&starts) {
                     if current != Some(*quantity) {
                         let (time, out) = (&mut scratch.frames, &mut scratch.spectrum);
-                        gather(Arch::new(), samples, params.hop_length, window, slots, time);
+                        gather(samples, params.hop_length, window, slots, time);
                         match quantity {
                             Quantity::Power => spectrum.power(time, &mut out[..bins]),
                             Quantity::Magnitude => spectrum.magnitude(time, &mut out[..bins]),

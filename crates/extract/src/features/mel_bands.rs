@@ -3,7 +3,6 @@
 use corsmal_dsp::decibel::Decibel;
 use corsmal_dsp::lanes::{Row, power_to_decibel};
 use corsmal_dsp::mel::{MelParams, SparseBank, mel_filter};
-use pulp::Arch;
 use serde::{Deserialize, Serialize};
 
 use super::{Finish, SpectrumKernel};
@@ -28,13 +27,13 @@ pub fn power_rows_to_scale(scale: Scale, db: &Decibel, rows: &mut [Row]) {
     match scale {
         Scale::Linear => {}
         Scale::PowerToDb => {
-            power_to_decibel(Arch::new(), rows, amin as f32, offset as f32);
+            power_to_decibel(rows, amin as f32, offset as f32);
         }
         Scale::AmplitudeToDb => {
             for x in rows.iter_mut().flat_map(|row| &mut row.0) {
                 *x *= *x;
             }
-            power_to_decibel(Arch::new(), rows, amin as f32, offset as f32);
+            power_to_decibel(rows, amin as f32, offset as f32);
         }
     }
 }
@@ -55,7 +54,7 @@ impl MelKernel {
 
 impl SpectrumKernel for MelKernel {
     fn rows(&self, spectrum: &[Row], out: &mut [Row]) {
-        self.bank.apply_rows(Arch::new(), spectrum, out);
+        self.bank.apply_rows(spectrum, out);
         power_rows_to_scale(self.scale, &self.db, out);
     }
 }

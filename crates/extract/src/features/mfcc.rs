@@ -68,7 +68,7 @@ impl Finish for Cepstrum {
             }
         };
         clamp(&self.db, raw, peaks, channels, log_mel);
-        pulp::Arch::new().dispatch(
+        corsmal_dsp::simd::vectorized(
             #[inline(always)]
             || match channels {
                 8 => transform::<8>(&self.matrix, self.n_mels, log_mel, out),

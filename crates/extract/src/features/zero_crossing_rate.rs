@@ -43,7 +43,7 @@ impl WaveKernel for Crossings {
             let span = &samples[marks[m - 1] * channels..(marks[m] + 1) * channels];
             let total = &mut after[..channels];
             total.copy_from_slice(&before[(m - 1) * channels..]);
-            pulp::Arch::new().dispatch(
+            corsmal_dsp::simd::vectorized(
                 #[inline(always)]
                 || count(&self.params, span, channels, total),
             );
@@ -66,31 +66,27 @@ impl WaveKernel for Crossings {
 #[inline(always)]
 fn count(params: &ZeroCrossingParams, span: &[f32], channels: usize, total: &mut [u32]) {
     const LANES: usize = 16;
-    let threshold = params.threshold as f32;
+    let (high, low) = (params.threshold as f32, -(params.threshold as f32));
+    let zero_is_a_sign = !params.zero_pos;
+    let crossed = |a: f32, b: f32| {
+        let negative = (a < low) != (b < low);
+        u32::from(negative | (zero_is_a_sign & ((a > high) != (b > high))))
+    };
     let pairs = span.len().saturating_sub(channels);
     let (before, after) = (&span[..pairs], &span[span.len() - pairs..]);
-    if LANES.is_multiple_of(channels) {
-        let mut lanes = [0u32; LANES];
-        let (before, before_rest) = before.as_chunks::<LANES>();
-        let (after, after_rest) = after.as_chunks::<LANES>();
-        for (a, b) in before.iter().zip(after) {
-            for i in 0..LANES {
-                let crossed = params.sign(a[i], threshold) != params.sign(b[i], threshold);
-                lanes[i] += u32::from(crossed);
-            }
+    let whole = if LANES.is_multiple_of(channels) { pairs / LANES * LANES } else { 0 };
+    let mut lanes = [0u32; LANES];
+    let blocks = before[..whole].as_chunks::<LANES>().0.iter();
+    for (a, b) in blocks.zip(after[..whole].as_chunks::<LANES>().0) {
+        for i in 0..LANES {
+            lanes[i] += crossed(a[i], b[i]);
         }
-        for (i, n) in lanes.iter().enumerate() {
-            total[i % channels] += n;
-        }
-        for (i, (a, b)) in before_rest.iter().zip(after_rest).enumerate() {
-            let crossed = params.sign(*a, threshold) != params.sign(*b, threshold);
-            total[i % channels] += u32::from(crossed);
-        }
-    } else {
-        for (i, (a, b)) in before.iter().zip(after).enumerate() {
-            let crossed = params.sign(*a, threshold) != params.sign(*b, threshold);
-            total[i % channels] += u32::from(crossed);
-        }
+    }
+    if whole > 0 {
+        lanes.iter().enumerate().for_each(|(i, n)| total[i % channels] += n);
+    }
+    for (i, (a, b)) in before[whole..].iter().zip(&after[whole..]).enumerate() {
+        total[i % channels] += crossed(*a, *b);
     }
 }
 
