@@ -3,6 +3,7 @@
 mod benchmark;
 mod completions;
 mod dataset;
+mod demo;
 mod evaluate;
 mod extract;
 mod features;
@@ -30,6 +31,8 @@ pub enum Command {
     Features(features::Args),
     /// Show format and health of a recording, with a picture on request.
     Inspect(inspect::Args),
+    /// Show the main job end to end on synthetic recordings.
+    Demo(demo::Args),
     /// Run the paper's audio baselines on a CCM data set and write the report.
     Benchmark(benchmark::Args),
     /// Print shell completions or the man page.
@@ -51,6 +54,7 @@ impl Command {
             Self::Presets(args) => presets::run(args),
             Self::Features(args) => features::run(args),
             Self::Inspect(args) => inspect::run(args),
+            Self::Demo(args) => demo::run(args),
             Self::Benchmark(args) => benchmark::run(args),
             Self::Completions(args) => completions::run(args),
             Self::Dataset(args) => dataset::run(args),

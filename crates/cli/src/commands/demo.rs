@@ -1,0 +1,76 @@
+//! `corsmal-feat demo`: the main job end to end on synthetic recordings.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Parser;
+
+use crate::Cli;
+use crate::failure::Failure;
+
+/// Arguments of `demo`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Example:
+  corsmal-feat demo --out demo
+
+Everything that it shows is computed from synthetic recordings: scores on them say nothing about real
+data.")]
+pub struct Args {
+    /// Folder for everything that is made; it may be from an earlier demo.
+    #[arg(long, value_name = "DIR", default_value = "corsmal-feat-demo")]
+    out: PathBuf,
+}
+
+/// Runs the commands, showing each before it runs.
+pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    let started = Instant::now();
+    std::fs::create_dir_all(&args.out).map_err(|e| {
+        Failure::new(format!("--out {}: cannot be created: {e}", args.out.display()))
+    })?;
+    let path = |name: &str| args.out.join(name).display().to_string();
+    let (data, report) = (path("ccm"), path("report"));
+    let recording = path("ccm/train/1/audio/s0_fi3_fu2_b0_l0_audio.wav");
+    let (logmel, table) = (path("logmel.npz"), path("mfcc-zcr.npz"));
+    let (picture, models) = (path("recording.png"), "zcr-mfcc-knn,zcr-mfcc-svm,zcr-mfcc-rf");
+    let steps: &[(&str, Vec<&str>)] = &[
+        (
+            "Synthetic recordings, 8 channels, in the layout of the CCM data set",
+            vec!["synth", "--out", &data, "--small"],
+        ),
+        (
+            "Log-mel tensors of every recording",
+            vec!["extract", "--in", &data, "--out", &logmel, "--overwrite"],
+        ),
+        (
+            "One row of statistics for each recording",
+            vec!["extract", "--in", &data, "--out", &table, "--preset", "mfcc-zcr", "--overwrite"],
+        ),
+        (
+            "A recording: format, health and picture",
+            vec!["inspect", &recording, "--picture", &picture],
+        ),
+        (
+            "The audio baselines with this representation, scored (synthetic data!)",
+            vec!["benchmark", "--data", &data, "--out", &report, "--baselines", models, "--quiet"],
+        ),
+    ];
+    for (about, words) in steps {
+        println!("\n# {about}\n$ corsmal-feat {}", words.join(" "));
+        let words = std::iter::once("corsmal-feat").chain(words.iter().copied());
+        let cli = Cli::try_parse_from(words).map_err(|e| Failure::new(e.to_string()))?;
+        let code = cli.command.run()?;
+        if code != ExitCode::SUCCESS {
+            return Ok(code);
+        }
+    }
+    println!(
+        "\nDone in {:.1} s. Look at {picture} and {report}/index.html; in Python:\n\
+         \n  import numpy as np\n  feats = np.load(\"{logmel}\")\n  print(list(feats)[0], feats[list(feats)[0]].shape)  # [channels, mel bands, frames]\n\
+         \nThe same on your own recordings:\n\
+         \n  corsmal-feat extract --in YOUR_FOLDER --out feats.npz",
+        started.elapsed().as_secs_f64(),
+    );
+    Ok(ExitCode::SUCCESS)
+}
