@@ -31,7 +31,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     })?;
     let path = |name: &str| args.out.join(name).display().to_string();
     let (data, report) = (path("ccm"), path("report"));
-    let recording = path("ccm/train/1/audio/s0_fi3_fu2_b0_l0_audio.wav");
+    let recording = path("ccm/train/1/audio/s0_fi3_fu2_b1_l0_audio.wav");
     let (logmel, table) = (path("logmel.npz"), path("mfcc-zcr.npz"));
     let (picture, models) = (path("recording.png"), "zcr-mfcc-knn,zcr-mfcc-svm,zcr-mfcc-rf");
     let steps: &[(&str, Vec<&str>)] = &[
@@ -66,7 +66,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         }
     }
     println!(
-        "\nDone in {:.1} s. Look at {picture} and {report}/index.html; in Python:\n\
+        "\nDone in {:.1} s. Look at {picture} and {report}/report.html; in Python:\n\
          \n  import numpy as np\n  feats = np.load(\"{logmel}\")\n  print(list(feats)[0], feats[list(feats)[0]].shape)  # [channels, mel bands, frames]\n\
          \nThe same on your own recordings:\n\
          \n  corsmal-feat extract --in YOUR_FOLDER --out feats.npz",
