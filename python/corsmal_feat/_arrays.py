@@ -22,13 +22,9 @@ def floats(name: str, value: Any, min_ndim: int = 1) -> Floats:
             hint = f"; divide {array.dtype} samples by 2**{bits} and cast to float32 first"
         elif array.dtype == np.float16:
             return floats(name, array.astype(np.float32), min_ndim)
-        raise ParameterError(
-            f"{name} has dtype {array.dtype}, expected float32 or float64{hint}"
-        )
+        raise ParameterError(f"{name} has dtype {array.dtype}, expected float32 or float64{hint}")
     if array.ndim < min_ndim:
-        raise ParameterError(
-            f"{name} has {array.ndim} dimensions, expected at least {min_ndim}"
-        )
+        raise ParameterError(f"{name} has {array.ndim} dimensions, expected at least {min_ndim}")
     return array
 
 

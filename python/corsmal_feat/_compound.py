@@ -51,9 +51,7 @@ def a34_short(y: Any, sr: float, window: int, step: int, deltas: bool = True) ->
     return unrows(_core.a34_short(rows(y, 1), float(sr), frame, bool(deltas)), y, 1)
 
 
-def a34f136(
-    y: Any, sr: float, mid_window: int, mid_step: int, window: int, step: int
-) -> Doubles:
+def a34f136(y: Any, sr: float, mid_window: int, mid_step: int, window: int, step: int) -> Doubles:
     """Means, then standard deviations of the 68 short-term features over mid-term windows
     [shape=(..., 136, windows)] (pyAudioAnalysis `mid_feature_extraction`). All in samples."""
     y = _doubles("y", y, 1)
@@ -107,8 +105,8 @@ def pca_fit_transform(X: Any, n_components: int) -> Doubles:
 def pca_project(
     X: Any, components: Any, mean: Any, variance: Any = None, whiten: bool = False
 ) -> Doubles:
-    """`X` [shape=(rows, columns)] on fitted components [shape=(k, columns)], each coordinate divided
-    by its standard deviation if `whiten`."""
+    """`X` [shape=(rows, columns)] on fitted components [shape=(k, columns)], each coordinate
+    divided by its standard deviation if `whiten`."""
     if whiten and variance is None:
         raise ParameterError("variance = None is not possible with whiten=True")
     x = np.ascontiguousarray(_doubles("X", X, 2))

@@ -13,8 +13,12 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import audio, floats, rows
 from ._core import ParameterError
+from ._mel import mfcc
+from ._mono import to_mono
+from ._time_domain import zero_crossing_rate
 
 __all__ = [
+    "esc26",
     "m1_stft",
     "m2_mfcc",
     "m3_spectrogram",
@@ -38,14 +42,24 @@ def _recording(y: Any) -> Singles:
 
 def spec9216(y: Any, sr: float, fixed_len: int | None = None, *, librosa: str = "0.11") -> Any:
     """9216 values of one channel `y`: divided by its RMS, |STFT| (512, hop 128) in dB, resized to
-    96 x 96. `fixed_len` cuts or zero-pads first; padding makes the result float64, as it does in the
-    baselines. `sr` is not used; `librosa="0.8"` pads frames as the published baselines did."""
+    96 x 96. `fixed_len` cuts or zero-pads first; padding makes the result float64, as it does in
+    the baselines. `sr` is not used; `librosa="0.8"` pads frames as the published baselines did."""
     y = audio(y)
     if y.ndim != 1:
         raise ParameterError(f"y has {y.ndim} dimensions, expected one channel")
     image = _core.spec9216(rows(y, 1), fixed_len or None, librosa).ravel()
     padded = bool(fixed_len) and fixed_len > len(y)
     return image if padded else image.astype(y.dtype, copy=False)
+
+
+def esc26(y: Any, sr: float) -> npt.NDArray[np.float64]:
+    """26 values of the mean channel of `y`: means, then standard deviations over frames of MFCC 1
+    to 12, then mean and standard deviation of the zero-crossing rate."""
+    y = to_mono(y)
+    cepstra = mfcc(y=y, sr=sr)[1:13]
+    crossings = zero_crossing_rate(y)
+    parts = (part(rows, axis=1) for rows in (cepstra, crossings) for part in (np.mean, np.std))
+    return np.concatenate(list(parts)).astype(np.float64)
 
 
 def m1_stft(y: Any, *, n_fft: int = 2048, hop_length: int = 512) -> Singles:

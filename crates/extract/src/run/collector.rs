@@ -171,7 +171,7 @@ impl<'a> Collector<'a> {
             Err(e) => return self.fail(index, outcome, Failed::new(Status::Unsupported, e)),
         };
         let signal = &planned.plan.config.signal;
-        let crop = reader::crop(signal, input, source.spec().sample_rate);
+        let crop = reader::crop(signal, (input.start, input.end), source.spec().sample_rate);
         let spans = reader::spans(source.as_ref(), signal, planned.resample.is_some(), &crop);
         if let [span] = spans.as_slice() {
             let computed = reader::compute(source.as_mut(), &planned, &crop, span, self.stop);
@@ -206,7 +206,7 @@ impl<'a> Collector<'a> {
         let mut last = None;
         let computed = reader::open(input).and_then(|mut source| {
             let signal = &job.planned.plan.config.signal;
-            let crop = reader::crop(signal, input, source.spec().sample_rate);
+            let crop = reader::crop(signal, (input.start, input.end), source.spec().sample_rate);
             let span = reader::compute(source.as_mut(), &job.planned, &crop, &job.span, self.stop);
             last = Some(source);
             span
@@ -250,16 +250,7 @@ impl<'a> Collector<'a> {
                 recording.add(span?).map_err(temporary)?;
             }
             let total = recording.total();
-            if total == 0 {
-                return Err(Failed::new(Status::Empty, "no samples"));
-            }
-            if recording.fewest_frames() == 0 {
-                let needed = plan.shortest();
-                let reason = format!("{total} samples, at least {needed} make one frame");
-                return Err(Failed::new(Status::TooShort, reason));
-            }
-            let features =
-                recording.finish().map_err(|e| Failed::new(Status::TooShort, e.to_string()))?;
+            let features = super::signal::finish(recording, plan)?;
             Ok(match features {
                 Features::Summary(row) => (Vec::new(), Some(row), total),
                 Features::Frames(arrays) => {
