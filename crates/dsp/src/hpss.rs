@@ -71,33 +71,32 @@ impl HpssParams {
         T::of(if margins == [1.0, 1.0] { 0.5 } else { 0.0 })
     }
 
-    /// Turns the median-filtered magnitudes into the masks, in place.
-    fn masks_in_place<T: Real>(&self, harmonic: &mut [T], percussive: &mut [T]) {
-        let margins = (T::of(self.margin_harmonic), T::of(self.margin_percussive));
-        let (silence, power) = (self.at_silence::<T>(), T::of(self.power));
-        let each = |h: &mut T, p: &mut T, mask: &dyn Fn(T, T) -> T| {
-            (*h, *p) = (mask(*h, *p * margins.0), mask(*p, *h * margins.1));
+    /// The mask of `part` from the median-filtered magnitudes of both, into `mask`.
+    fn mask<T: Real>(&self, part: Part, harmonic: &[T], percussive: &[T], mask: &mut [T]) {
+        let (x, reference, margin) = match part {
+            Part::Harmonic => (harmonic, percussive, self.margin_harmonic),
+            Part::Percussive => (percussive, harmonic, self.margin_percussive),
         };
-        let pairs = harmonic.iter_mut().zip(percussive);
+        let (margin, silence, power) = (T::of(margin), self.at_silence(), T::of(self.power));
+        let values = mask.iter_mut().zip(x.iter().zip(reference));
+        let values = values.map(|(mask, (x, reference))| (mask, *x, *reference * margin));
         if self.power == 2.0 {
             Arch::new().dispatch(
                 #[inline(always)]
                 || {
-                    for (h, p) in pairs {
-                        let masks = (
-                            soft_mask(*h, *p * margins.0, silence, |x| x * x),
-                            soft_mask(*p, *h * margins.1, silence, |x| x * x),
-                        );
-                        (*h, *p) = masks;
-                    }
+                    values.for_each(|(mask, x, reference)| {
+                        *mask = soft_mask(x, reference, silence, |x| x * x);
+                    });
                 },
             );
         } else if self.power.is_infinite() {
-            let hard = |x, reference| if x > reference { T::one() } else { T::zero() };
-            pairs.for_each(|(h, p)| each(h, p, &hard));
+            values.for_each(|(mask, x, reference)| {
+                *mask = if x > reference { T::one() } else { T::zero() };
+            });
         } else {
-            let soft = |x, reference| soft_mask(x, reference, silence, |x| x.powf(power));
-            pairs.for_each(|(h, p)| each(h, p, &soft));
+            values.for_each(|(mask, x, reference)| {
+                *mask = soft_mask(x, reference, silence, |x| x.powf(power));
+            });
         }
     }
 }
@@ -122,7 +121,8 @@ pub fn masks<T: Lane>(s: ArrayView3<T>, p: &HpssParams) -> Result<(Array3<T>, Ar
     let s = s.as_standard_layout();
     require_finite("S", s.iter())?;
     let (mut harmonic, mut percussive) = (Array3::zeros(s.dim()), Array3::zeros(s.dim()));
-    let bins = s.dim().1;
+    let (_, bins, frames) = s.dim();
+    let mut mask = vec![T::zero(); bins * frames];
     for ((s, mut h), mut q) in
         s.outer_iter().zip(harmonic.outer_iter_mut()).zip(percussive.outer_iter_mut())
     {
@@ -131,10 +131,13 @@ pub fn masks<T: Lane>(s: ArrayView3<T>, p: &HpssParams) -> Result<(Array3<T>, Ar
         if h.iter().chain(q.iter()).any(|m| *m < T::zero()) {
             return Err(DspError::parameter("S", "negative", "magnitudes, 0 or more"));
         }
-        p.masks_in_place(
-            h.as_slice_mut().expect("a new array"),
-            q.as_slice_mut().expect("a new array"),
-        );
+        let (h, q) =
+            (h.as_slice_mut().expect("a new array"), q.as_slice_mut().expect("a new array"));
+        p.mask(Part::Harmonic, h, q, &mut mask);
+        let filtered = h.to_vec();
+        h.copy_from_slice(&mask);
+        p.mask(Part::Percussive, &filtered, q, &mut mask);
+        q.copy_from_slice(&mask);
     }
     Ok((harmonic, percussive))
 }
@@ -202,6 +205,7 @@ impl<T: Lane> Separator<T> {
         let (mut scratch, mut inverse) = (self.forward.scratch(), self.inverse.scratch());
         let mut harmonic = Array2::zeros((BLOCK, bins));
         let mut percussive = Array2::zeros((BLOCK, bins));
+        let mut mask = vec![T::zero(); BLOCK * bins];
         let mut analysed = 0;
         for first in (0..frames).step_by(BLOCK) {
             let end = frames.min(first + BLOCK);
@@ -220,24 +224,19 @@ impl<T: Lane> Separator<T> {
             median::down(magnitude.view(), self.params.kernel_harmonic, first..end, h.view_mut());
             let rows = magnitude.slice(s![first..end, ..]);
             median::across(rows, self.params.kernel_percussive, q.view_mut());
-            self.params.masks_in_place(
-                h.as_slice_mut().expect("whole rows"),
-                q.as_slice_mut().expect("whole rows"),
-            );
-            for t in first..end.min(inverted) {
-                let spectrum = waiting.row(t % kept);
-                for (part, out) in &mut *parts {
-                    let mask = match part {
-                        Part::Harmonic => h.row(t - first),
-                        Part::Percussive => q.row(t - first),
-                    };
+            let (h, q) = (h.as_slice().expect("whole rows"), q.as_slice().expect("whole rows"));
+            for (part, out) in &mut *parts {
+                let mask = &mut mask[..n * bins];
+                self.params.mask(*part, h, q, mask);
+                for (t, mask) in (first..end.min(inverted)).zip(mask.chunks_exact(bins)) {
                     if self.mask {
-                        let spectrum = mask.iter().map(|m| Complex::new(*m, T::zero()));
-                        self.inverse.add(spectrum, t, out, &mut inverse);
+                        let values = inverse.bins().iter_mut().zip(mask);
+                        values.for_each(|(z, m)| *z = Complex::new(*m, T::zero()));
                     } else {
-                        let spectrum = spectrum.iter().zip(mask).map(|(z, m)| z.scale(*m));
-                        self.inverse.add(spectrum, t, out, &mut inverse);
+                        let spectrum = waiting.row(t % kept);
+                        masked(spectrum.to_slice().expect("a new array"), mask, inverse.bins());
                     }
+                    self.inverse.add(t, out, &mut inverse);
                 }
             }
         }
@@ -257,6 +256,18 @@ fn round<T: Real>(spectrum: &[Complex<f64>], rounded: &mut [Complex<T>], magnitu
                 *rounded = Complex::new(T::of(z.re), T::of(z.im));
                 let (re, im) = (rounded.re.wide(), rounded.im.wide());
                 *m = T::of((re * re + im * im).sqrt());
+            }
+        },
+    );
+}
+
+/// `spectrum * mask`.
+fn masked<T: Real>(spectrum: &[Complex<T>], mask: &[T], out: &mut [Complex<T>]) {
+    Arch::new().dispatch(
+        #[inline(always)]
+        || {
+            for ((out, z), m) in out.iter_mut().zip(spectrum).zip(mask) {
+                *out = Complex::new(z.re * *m, z.im * *m);
             }
         },
     );

@@ -40,7 +40,9 @@ pub fn istft<T: Real>(
     for (spectra, mut y) in spectrogram.axis_iter(Axis(0)).zip(y.rows_mut()) {
         let y = y.as_slice_mut().expect("a new array");
         for t in 0..frames {
-            inverse.add(spectra.column(t).iter().copied(), t, y, &mut scratch);
+            let mut given = spectra.column(t).into_iter().copied();
+            scratch.bins().fill_with(|| given.next().unwrap_or_default());
+            inverse.add(t, y, &mut scratch);
         }
         inverse.normalize(frames, y);
     }

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use num_complex::Complex;
+use pulp::Arch;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 use crate::error::Result;
@@ -25,6 +26,13 @@ pub struct Scratch<F> {
     frame: Vec<F>,
     spectrum: Vec<Complex<F>>,
     fft: Vec<Complex<F>>,
+}
+
+impl<F> Scratch<F> {
+    /// The `n_fft / 2 + 1` bins of the frame at hand.
+    pub fn bins(&mut self) -> &mut [Complex<F>] {
+        &mut self.spectrum
+    }
 }
 
 impl<F: Real> Forward<F> {
@@ -126,30 +134,26 @@ impl<F: Real> Inverse<F> {
         frames.min((length + 2 * self.params.pad()).div_ceil(self.params.hop_length))
     }
 
-    /// Adds frame `t` of the given spectrum (missing bins are zero, further ones are left out) to
-    /// the part of `y` that it reaches.
-    pub fn add(
-        &self,
-        spectrum: impl IntoIterator<Item = Complex<F>>,
-        t: usize,
-        y: &mut [F],
-        scratch: &mut Scratch<F>,
-    ) {
+    /// Adds frame `t`, whose spectrum is in `scratch`, to the part of `y` that it reaches.
+    pub fn add(&self, t: usize, y: &mut [F], scratch: &mut Scratch<F>) {
         let Scratch { frame, spectrum: bins, fft } = scratch;
-        let mut given = spectrum.into_iter();
-        bins.fill_with(|| given.next().unwrap_or_default());
         // A real signal has no imaginary part at zero and at half the sample rate.
         bins[0].im = F::zero();
-        if self.params.n_fft % 2 == 0 {
+        if self.params.n_fft.is_multiple_of(2) {
             bins[self.params.n_fft / 2].im = F::zero();
         }
         self.fft
             .process_with_scratch(bins, frame, fft)
             .expect("buffers made by the plan itself, real ends");
         let (skip, y) = overlap(&self.params, t, y);
-        for ((y, x), w) in y.iter_mut().zip(&frame[skip..]).zip(&self.window[skip..]) {
-            *y += *x * *w;
-        }
+        Arch::new().dispatch(
+            #[inline(always)]
+            || {
+                for ((y, x), w) in y.iter_mut().zip(&frame[skip..]).zip(&self.window[skip..]) {
+                    *y += *x * *w;
+                }
+            },
+        );
     }
 
     /// Divides `y` by the sum of the squared windows of `frames` frames, where there is any.

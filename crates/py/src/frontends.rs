@@ -4,7 +4,6 @@ use corsmal_dsp::frontends::{
     LibrosaVersion, M1Stft, M2Mfcc, M3Spectrogram, M4LogMel, M5A34f136, M5VggishPatches, M6Crop,
     M6Spectrogram, Spec9216, Variant, m4_windows as dsp_m4_windows,
 };
-use corsmal_dsp::stft::PadMode;
 use numpy::PyReadonlyArrayDyn;
 use pyo3::prelude::*;
 

@@ -52,7 +52,7 @@ pub fn cq_to_chroma(n_input: usize, p: &ChromaCqtParams) -> Result<Array2<f32>> 
     if p.n_chroma == 0 {
         return Err(DspError::parameter("n_chroma", 0, "at least 1"));
     }
-    if p.bins_per_octave == 0 || p.bins_per_octave % p.n_chroma != 0 {
+    if p.bins_per_octave == 0 || !p.bins_per_octave.is_multiple_of(p.n_chroma) {
         let allowed = format!("a multiple of n_chroma = {}", p.n_chroma);
         return Err(DspError::parameter("bins_per_octave", p.bins_per_octave, allowed));
     }

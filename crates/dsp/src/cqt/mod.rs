@@ -353,7 +353,7 @@ fn same_lengths(
 ) -> bool {
     above.halve
         && above.gains.len() == range.len()
-        && range.len() > 0
+        && !range.is_empty()
         && base > sr
         && range.enumerate().all(|(i, k)| {
             let length = wavelets.length(above.first + i, 2.0 * sr);

@@ -5,20 +5,19 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-/// One plane of interleaved samples and the taps that meet it.
+/// Samples of one channel and the taps that meet them.
 pub(super) struct Plane<'a> {
-    /// Sample `i + k * stride` meets tap `k` for output `i`.
+    /// Sample `i + k` meets tap `k` for output `i`.
     pub samples: &'a [f32],
     pub taps: &'a [f32],
 }
 
-/// `out[i] = sum over planes, taps k of taps[k] * samples[i + k * stride]`.
+/// `out[i] = sum over planes, taps k of taps[k] * samples[i + k]`.
 ///
 /// Taps are taken in the order 0, 16, 32, ..., 1, 17, ...: neighbours in that order read samples a
 /// whole number of vectors apart, so that a block of outputs loads each vector only once.
 pub(super) struct Correlate<'a> {
     pub planes: &'a [Plane<'a>],
-    pub stride: usize,
     pub out: &'a mut [f32],
 }
 
@@ -34,28 +33,28 @@ impl WithSimd for Correlate<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { planes, stride, out } = self;
+        let Self { planes, out } = self;
         let lanes = S::F32_LANES;
         let len = out.len();
         let mut at = 0;
         while at + UNROLL * lanes <= len {
-            vectors::<S, UNROLL>(simd, planes, stride, at, out);
+            vectors::<S, UNROLL>(simd, planes, at, out);
             at += UNROLL * lanes;
         }
         while at + lanes <= len {
-            vectors::<S, 1>(simd, planes, stride, at, out);
+            vectors::<S, 1>(simd, planes, at, out);
             at += lanes;
         }
         if at < len && len >= lanes {
             // The last vector overlaps the one before: the same sums again.
-            vectors::<S, 1>(simd, planes, stride, len - lanes, out);
+            vectors::<S, 1>(simd, planes, len - lanes, out);
         } else {
             for (i, slot) in out.iter_mut().enumerate().skip(at) {
                 let mut sum = 0.0f32;
                 for plane in planes {
                     for first in 0..COMB {
                         for k in (first..plane.taps.len()).step_by(COMB) {
-                            sum = plane.taps[k].mul_add(plane.samples[i + k * stride], sum);
+                            sum = plane.taps[k].mul_add(plane.samples[i + k], sum);
                         }
                     }
                 }
@@ -66,20 +65,14 @@ impl WithSimd for Correlate<'_> {
 }
 
 #[inline(always)]
-fn vectors<S: Simd, const N: usize>(
-    simd: S,
-    planes: &[Plane],
-    stride: usize,
-    at: usize,
-    out: &mut [f32],
-) {
+fn vectors<S: Simd, const N: usize>(simd: S, planes: &[Plane], at: usize, out: &mut [f32]) {
     let lanes = S::F32_LANES;
     let mut sums = [simd.splat_f32s(0.0); N];
     for plane in planes {
         let count = plane.taps.len();
         for first in 0..COMB {
             let mut k = first;
-            if stride == 1 && COMB.is_multiple_of(lanes) {
+            if COMB.is_multiple_of(lanes) {
                 let apart = COMB / lanes;
                 while k + (GROUP - 1) * COMB < count {
                     let taps: [S::f32s; GROUP] =
@@ -96,7 +89,7 @@ fn vectors<S: Simd, const N: usize>(
             }
             while k < count {
                 let tap = simd.splat_f32s(plane.taps[k]);
-                let from = at + k * stride;
+                let from = at + k;
                 let (samples, _) = S::as_simd_f32s(&plane.samples[from..from + N * lanes]);
                 for (sum, &x) in sums.iter_mut().zip(samples) {
                     *sum = simd.mul_add_f32s(tap, x, *sum);

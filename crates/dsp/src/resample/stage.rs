@@ -1,5 +1,6 @@
 //! One filter of the chain, ready to run at any output position.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
@@ -133,57 +134,47 @@ impl Fir {
         let base = to.len();
         to.resize(base + count * channels, 0.0);
         let to = &mut to[base..];
-        // Frames by phase, so that the samples under one tap lie side by side.
-        let planes = if self.down == 1 { Vec::new() } else { self.split(channels, input) };
         let mut scratch = Vec::new();
-        for r in 0..self.up.min(count) {
-            let first = out.start + r as u64;
-            let residue = &self.residues[(first % self.up as u64) as usize];
-            let outputs = (count - r).div_ceil(self.up);
-            let skip = (self.end(first) - residue.len as i64 - input.start) as usize;
-            let parts: Vec<Plane> = residue
-                .phases
-                .iter()
-                .enumerate()
-                .map(|(m, taps)| {
-                    let at = skip + m;
-                    let samples = if self.down == 1 {
-                        &input.data[at * channels..]
-                    } else {
-                        &planes[at % self.down][at / self.down * channels..]
-                    };
-                    Plane { samples, taps }
-                })
-                .collect();
-            if self.up == 1 {
-                dispatch(Correlate { planes: &parts, stride: channels, out: to });
-            } else {
-                scratch.resize(outputs * channels, 0.0);
-                dispatch(Correlate { planes: &parts, stride: channels, out: &mut scratch });
-                let slots = to.chunks_exact_mut(channels).skip(r).step_by(self.up);
-                for (slot, frame) in slots.zip(scratch.chunks_exact(channels)) {
-                    slot.copy_from_slice(frame);
+        for c in 0..channels {
+            // One channel's frames by phase: the samples under one tap lie side by side.
+            let planes = self.split(channels, c, input.data);
+            for r in 0..self.up.min(count) {
+                let first = out.start + r as u64;
+                let residue = &self.residues[(first % self.up as u64) as usize];
+                let skip = (self.end(first) - residue.len as i64 - input.start) as usize;
+                let parts: Vec<Plane> = residue
+                    .phases
+                    .iter()
+                    .enumerate()
+                    .map(|(m, taps)| {
+                        let at = skip + m;
+                        Plane { samples: &planes[at % self.down][at / self.down..], taps }
+                    })
+                    .collect();
+                if channels == 1 && self.up == 1 {
+                    dispatch(Correlate { planes: &parts, out: to });
+                    continue;
+                }
+                scratch.resize((count - r).div_ceil(self.up), 0.0);
+                dispatch(Correlate { planes: &parts, out: &mut scratch });
+                let slots = to.iter_mut().skip(r * channels + c).step_by(self.up * channels);
+                for (slot, v) in slots.zip(&scratch) {
+                    *slot = *v;
                 }
             }
         }
     }
 
-    /// Plane `m` holds frames `m, m + down, ...` of `input`.
-    fn split(&self, channels: usize, input: Frames) -> Vec<Vec<f32>> {
-        let frames = input.data.len() / channels;
-        (0..self.down)
-            .map(|m| {
-                let mut plane = Vec::with_capacity(frames.div_ceil(self.down) * channels);
-                if channels == 1 {
-                    plane.extend(input.data.iter().skip(m).step_by(self.down));
-                } else {
-                    for frame in input.data.chunks_exact(channels).skip(m).step_by(self.down) {
-                        plane.extend_from_slice(frame);
-                    }
-                }
-                plane
-            })
-            .collect()
+    /// Plane `m` holds frames `m, m + down, ...` of channel `c`.
+    fn split<'a>(&self, channels: usize, c: usize, data: &'a [f32]) -> Vec<Cow<'a, [f32]>> {
+        if channels == 1 && self.down == 1 {
+            return vec![Cow::Borrowed(data)];
+        }
+        let plane = |m: usize| {
+            let samples = data.iter().skip(m * channels + c).step_by(self.down * channels);
+            Cow::Owned(samples.copied().collect())
+        };
+        (0..self.down).map(plane).collect()
     }
 }
 
