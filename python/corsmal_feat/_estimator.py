@@ -56,7 +56,12 @@ class FeatureExtractor(Parametrised):
     _names: list[str]
 
     def __sklearn_tags__(self) -> Any:
-        from sklearn.utils import InputTags, Tags, TargetTags, TransformerTags
+        from sklearn.utils import (  # type: ignore[import-untyped]
+            InputTags,
+            Tags,
+            TargetTags,
+            TransformerTags,
+        )
 
         return Tags(
             estimator_type=None,
@@ -126,7 +131,7 @@ class FeatureExtractor(Parametrised):
         if len(found.outcomes) != len(different):
             raise ParameterError("X holds folders, globs or manifests: name each recording")
         rows = iter(found.summary if found.summary is not None else ())
-        row_of = {}
+        row_of: dict[str, Matrix] = {}
         for name, outcome in zip(different, found.outcomes, strict=True):
             if outcome["status"] not in ("ok", "truncated"):
                 raise RunError(f"{name}: {outcome['status']}: {outcome['reason']}")

@@ -355,7 +355,7 @@ def af193(y: Any, sr: float) -> Any:
     y = audio(y)
     channels = rows(y, 1)
     if y.dtype == np.float32:
-        return unrows(_core.af193(channels, float(sr)), y, 1)
+        return unrows(_core.af193(channels.astype(np.float32), float(sr)), y, 1)
     return unrows(np.stack([_af193_composed(channel, sr) for channel in channels]), y, 1)
 
 
