@@ -14,7 +14,7 @@ import numpy.typing as npt
 from . import _core
 from ._core import ParameterError, RunError
 from ._extract import Config, configuration, extract, interleaved, whole_rate
-from ._parameters import Parametrised
+from ._parameters import Parametrised, not_fitted
 
 __all__ = ["FeatureExtractor"]
 
@@ -53,7 +53,7 @@ class FeatureExtractor(Parametrised):
         self.sr = sr
         self.jobs = jobs
 
-    _names: list[str]
+    _names: list[str] | None = None
 
     def __sklearn_tags__(self) -> Any:
         from sklearn.utils import (  # type: ignore[import-untyped]
@@ -67,7 +67,7 @@ class FeatureExtractor(Parametrised):
             estimator_type=None,
             target_tags=TargetTags(required=False),
             transformer_tags=TransformerTags(preserves_dtype=[]),
-            input_tags=InputTags(one_d_array=True, three_d_array=True, string=True),
+            input_tags=InputTags(three_d_array=True, string=True),
             requires_fit=False,
         )
 
@@ -75,13 +75,18 @@ class FeatureExtractor(Parametrised):
         return True
 
     def fit(self, X: Any, y: Any = None) -> Self:
-        """Checks the configuration; nothing is learnt from `X`."""
-        self._configuration()
+        """Learns the names of the columns from the first of `X`: the channels are part of them."""
+        recordings = _recordings(X)
+        for position, recording in enumerate(recordings):
+            if not _is_path(recording):
+                _signal(recording, position)
+        self._names, _ = self._compute(recordings[:1])
         return self
 
     def fit_transform(self, X: Any, y: Any = None) -> Matrix:
         """`fit(X).transform(X)`."""
-        return self.fit(X).transform(X)
+        self._names, matrix = self._compute(_recordings(X))
+        return matrix
 
     def transform(self, X: Any) -> Matrix:
         """Features [shape=(recordings, values)] of the recordings `X`.
@@ -90,25 +95,18 @@ class FeatureExtractor(Parametrised):
         ------
         RunError : a recording that has no features, since a row cannot be left out here
         """
-        config, overrides = self._configuration()
-        recordings = [X] if isinstance(X, str | os.PathLike) else list(X)
-        if not recordings:
-            raise ParameterError("X is empty: at least one recording is needed")
-        of_files = [isinstance(x, str | os.PathLike) for x in recordings]
-        if all(of_files):
-            names, matrix = self._of_files(recordings)
-        elif any(of_files):
-            raise ParameterError("X mixes paths and arrays: either of them")
-        else:
-            names, matrix = self._of_signals(recordings, _core.Signals(config, overrides))
-        self._names = names
+        names, matrix = self._compute(_recordings(X))
+        if self._names is not None and names != self._names:
+            raise ParameterError(
+                f"X gives {len(names)} values for each recording, fit has seen "
+                f"{len(self._names)}: another number of channels or configuration"
+            )
         return matrix
 
     def get_feature_names_out(self, input_features: Any = None) -> npt.NDArray[np.object_]:
-        """Names of the columns, known once something was transformed: the number of channels is
-        part of them. `input_features` is scikit-learn's and has no effect."""
-        if not hasattr(self, "_names"):
-            raise ParameterError("the names are known after transform: they depend on the channels")
+        """Names of the columns, known after `fit`. `input_features` has no effect."""
+        if self._names is None:
+            raise not_fitted(self)
         return np.asarray(self._names, dtype=object)
 
     def _configuration(self) -> tuple[tuple[str, str], list[str]]:
@@ -121,6 +119,16 @@ class FeatureExtractor(Parametrised):
                 'needs it; set={"summary.stats": ["mean", "std"]} adds one'
             )
         return config, overrides
+
+    def _compute(self, recordings: list[Any]) -> tuple[list[str], Matrix]:
+        """Names of the columns, and rows."""
+        config, overrides = self._configuration()
+        of_files = [_is_path(recording) for recording in recordings]
+        if all(of_files):
+            return self._of_files(recordings)
+        if any(of_files):
+            raise ParameterError("X mixes paths and arrays: either of them")
+        return self._of_signals(recordings, _core.Signals(config, overrides))
 
     def _of_files(self, paths: list[Any]) -> tuple[list[str], Matrix]:
         names = [os.fspath(path) for path in paths]
@@ -142,8 +150,8 @@ class FeatureExtractor(Parametrised):
         rate = whole_rate(self.sr)
 
         def row(position: int) -> tuple[list[str], Any]:
+            samples = _signal(signals[position], position)
             try:
-                samples = interleaved(signals[position])
                 signal = by.start(rate, samples.shape[1])
                 names = signal.summary_names()
                 signal.push(samples)
@@ -161,3 +169,38 @@ class FeatureExtractor(Parametrised):
                     f"{len(names)}: another number of channels"
                 )
         return names, np.stack([values for _, values in computed])
+
+
+def _recordings(X: Any) -> list[Any]:
+    if hasattr(X, "toarray") and hasattr(X, "tocsr"):
+        raise TypeError("sparse data was passed, but dense data is required; use .toarray()")
+    recordings = [X] if _is_path(X) else list(X if hasattr(X, "__iter__") else np.asarray(X))
+    if not recordings:
+        raise ParameterError("Found array with 0 sample(s): at least one recording is needed")
+    return recordings
+
+
+def _is_path(recording: Any) -> bool:
+    return isinstance(recording, str | os.PathLike)
+
+
+def _signal(y: Any, position: int) -> Matrix:
+    """A signal in memory [shape=(n, channels)]."""
+    if np.iscomplexobj(y):
+        raise ParameterError(f"Complex data not supported: recording {position}")
+    if not np.ndim(y):
+        raise ParameterError(
+            f"recording {position} is a single value. Reshape your data to (recordings, n), or put "
+            "a single recording into a list"
+        )
+    try:
+        samples = interleaved(y)
+    except ParameterError as error:
+        raise ParameterError(f"recording {position}: {error}") from error
+    if not len(samples):
+        shape = np.atleast_2d(y).shape
+        raise ParameterError(
+            f"recording {position}: 0 feature(s) (shape={shape}) while a minimum of 1 is required: "
+            "no samples"
+        )
+    return samples

@@ -1,11 +1,27 @@
-"""Parameters of estimators, as scikit-learn handles them."""
+"""Parameters and state of estimators, as scikit-learn handles them."""
 
 from __future__ import annotations
 
 import inspect
+import sys
 from typing import Any, Self
 
 from ._core import ParameterError
+
+
+class NotFittedError(ValueError, AttributeError):
+    """`predict` was called before `fit`."""
+
+
+def not_fitted(estimator: object) -> Exception:
+    """The error of an estimator that needs `fit` first."""
+    message = (
+        f"This {type(estimator).__name__} instance is not fitted yet. Call 'fit' with appropriate "
+        "arguments before using this estimator."
+    )
+    # scikit-learn's own class where it is in use: callers there catch that one.
+    exceptions = sys.modules.get("sklearn.exceptions")
+    return exceptions.NotFittedError(message) if exceptions else NotFittedError(message)
 
 
 class Parametrised:

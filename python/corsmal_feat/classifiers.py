@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._core import ParameterError
-from ._parameters import Parametrised
+from ._parameters import NotFittedError, Parametrised, not_fitted
 
 __all__ = [
     "KNN",
@@ -32,20 +32,6 @@ __all__ = [
 ]
 
 Matrix = npt.NDArray[np.float64]
-
-
-class NotFittedError(ValueError, AttributeError):
-    """`predict` was called before `fit`."""
-
-
-def _not_fitted(estimator: object) -> Exception:
-    message = (
-        f"This {type(estimator).__name__} instance is not fitted yet. Call 'fit' with appropriate "
-        "arguments before using this estimator."
-    )
-    # scikit-learn's own class where it is in use: callers there catch that one.
-    exceptions = sys.modules.get("sklearn.exceptions")
-    return exceptions.NotFittedError(message) if exceptions else NotFittedError(message)
 
 
 def _names_of(X: Any) -> npt.NDArray[np.object_] | None:
@@ -218,7 +204,7 @@ class _Estimator(Parametrised):
 
     def _query(self, X: Any) -> Matrix:
         if not hasattr(self, "_model"):
-            raise _not_fitted(self)
+            raise not_fitted(self)
         names = _names_of(X)
         known = getattr(self, "feature_names_in_", None)
         if names is not None and known is not None and names.tolist() != known.tolist():
@@ -251,7 +237,7 @@ class _Estimator(Parametrised):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the model file, whole or not at all."""
         if not hasattr(self, "_model"):
-            raise _not_fitted(self)
+            raise not_fitted(self)
         self._model.save(os.fspath(path))
 
     @classmethod
