@@ -57,6 +57,9 @@ struct SpanJob {
     planned: Planned,
 }
 
+/// What a recording gives: arrays, or a row of the table; and its samples.
+type Parts = (Vec<Member>, Option<Vec<f32>>, u64);
+
 /// A recording of which not all spans are there.
 struct Partial {
     outcome: Outcome,
@@ -244,7 +247,7 @@ impl<'a> Collector<'a> {
         let temporary = |e: std::io::Error| {
             Failed::new(Status::Io, format!("temporary file in {}: {e}", self.folder.display()))
         };
-        let finish = || -> Result<(Vec<Member>, Option<Vec<f32>>, u64), Failed> {
+        let finish = || -> Result<Parts, Failed> {
             let mut recording = Recording::new(plan.clone(), &self.folder);
             for span in spans {
                 recording.add(span?).map_err(temporary)?;

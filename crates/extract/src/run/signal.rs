@@ -149,3 +149,50 @@ pub fn finish(recording: Recording, plan: &Plan) -> Result<Features, Failed> {
     }
     recording.finish().map_err(|e| Failed::new(Status::TooShort, e.to_string()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(features: Features) -> Vec<f32> {
+        match features {
+            Features::Summary(row) => row,
+            Features::Frames(_) => panic!("a summary was configured"),
+        }
+    }
+
+    #[test]
+    fn blocks_do_not_matter() {
+        for overrides in
+            [&[][..], &["signal.normalize=rms", "signal.start=0.01", "signal.end=0.09"]]
+        {
+            let overrides: Vec<String> = overrides.iter().map(|s| s.to_string()).collect();
+            let toml = crate::config::Preset::find("esc26").unwrap().toml;
+            let config = Config::with_overrides(toml, "esc26", &overrides).unwrap();
+            let signals = Signals::new(Arc::new(config));
+            let samples: Vec<f32> =
+                (0..2 * 6000_u32).map(|i| (i * i % 997) as f32 / 997.0).collect();
+            let mut whole = signals.start(44_100, 2).unwrap();
+            whole.push(&samples).unwrap();
+            let whole = rows(whole.finish().unwrap());
+            assert_eq!(whole.len(), 26);
+            for block in [2, 34, 3000] {
+                let mut signal = signals.start(44_100, 2).unwrap();
+                samples.chunks(block).for_each(|block| signal.push(block).unwrap());
+                assert_eq!(rows(signal.finish().unwrap()), whole);
+            }
+        }
+    }
+
+    #[test]
+    fn refusals_say_what_a_file_would() {
+        let signals = Signals::new(Arc::new(Config::preset("esc26").unwrap()));
+        let status = |samples: &[f32]| {
+            let mut signal = signals.start(22_050, 1).unwrap();
+            signal.push(samples).and_then(|()| signal.finish().map(|_| ())).unwrap_err().status
+        };
+        assert_eq!(status(&[]), Status::Empty);
+        assert_eq!(status(&[0.0, f32::NAN]), Status::NonFinite);
+        assert!(signals.start(22_050, 0).is_err());
+    }
+}
