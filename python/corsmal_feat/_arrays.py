@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from ._core import ParameterError
 
-Floats = npt.NDArray[np.float32] | npt.NDArray[np.float64]
+Singles = npt.NDArray[np.float32]
+Doubles = npt.NDArray[np.float64]
+Floats = Singles | Doubles
+#: an array of either precision, and the same one again
+Same = TypeVar("Same", Singles, Doubles, Floats)
 
 
 def floats(name: str, value: Any, min_ndim: int = 1) -> Floats:
@@ -22,13 +26,9 @@ def floats(name: str, value: Any, min_ndim: int = 1) -> Floats:
             hint = f"; divide {array.dtype} samples by 2**{bits} and cast to float32 first"
         elif array.dtype == np.float16:
             return floats(name, array.astype(np.float32), min_ndim)
-        raise ParameterError(
-            f"{name} has dtype {array.dtype}, expected float32 or float64{hint}"
-        )
+        raise ParameterError(f"{name} has dtype {array.dtype}, expected float32 or float64{hint}")
     if array.ndim < min_ndim:
-        raise ParameterError(
-            f"{name} has {array.ndim} dimensions, expected at least {min_ndim}"
-        )
+        raise ParameterError(f"{name} has {array.ndim} dimensions, expected at least {min_ndim}")
     return array
 
 
@@ -40,11 +40,11 @@ def audio(y: Any) -> Floats:
     return array
 
 
-def rows(array: Floats, keep: int) -> Floats:
+def rows(array: Same, keep: int) -> Same:
     """Leading axes flattened to one and the last `keep` axes kept, contiguous."""
     return np.ascontiguousarray(array.reshape((-1, *array.shape[array.ndim - keep :])))
 
 
-def unrows(result: Any, like: Floats, keep: int) -> Any:
+def unrows(result: Same, like: Floats, keep: int) -> Same:
     """`result` with the leading axes of `like` (whose last `keep` axes were data) put back."""
     return result.reshape((*like.shape[: like.ndim - keep], *result.shape[1:]))

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from . import _core
-from ._arrays import floats, rows, unrows
+from ._arrays import Doubles, floats, rows, unrows
 from ._core import ParameterError
 
 __all__ = [
@@ -21,8 +20,6 @@ __all__ = [
     "pca_project",
     "sk_resize",
 ]
-
-Doubles = npt.NDArray[np.float64]
 
 
 def _doubles(name: str, value: Any, ndim: int) -> Doubles:
@@ -51,9 +48,7 @@ def a34_short(y: Any, sr: float, window: int, step: int, deltas: bool = True) ->
     return unrows(_core.a34_short(rows(y, 1), float(sr), frame, bool(deltas)), y, 1)
 
 
-def a34f136(
-    y: Any, sr: float, mid_window: int, mid_step: int, window: int, step: int
-) -> Doubles:
+def a34f136(y: Any, sr: float, mid_window: int, mid_step: int, window: int, step: int) -> Doubles:
     """Means, then standard deviations of the 68 short-term features over mid-term windows
     [shape=(..., 136, windows)] (pyAudioAnalysis `mid_feature_extraction`). All in samples."""
     y = _doubles("y", y, 1)
@@ -65,7 +60,7 @@ def a34f136_mean(
     y: Any, sr: float, mid_window: int, mid_step: int, window: int, step: int
 ) -> Doubles:
     """The vector of a recording [shape=(..., 136)]: the mean of `a34f136` over its windows."""
-    return a34f136(y, sr, mid_window, mid_step, window, step).mean(axis=-1)
+    return np.asarray(a34f136(y, sr, mid_window, mid_step, window, step).mean(axis=-1))
 
 
 def sk_resize(
@@ -81,7 +76,7 @@ def sk_resize(
     if s.ndim != 2 or len(shape) != 2:
         raise ParameterError(f"S has {s.ndim} dimensions and shape {len(shape)}, expected 2 and 2")
     size = (int(shape[0]), int(shape[1]))
-    return _core.sk_resize(np.ascontiguousarray(s), size, mode, anti_aliasing)
+    return _core.sk_resize(rows(s, 1), size, mode, anti_aliasing)
 
 
 def pca_fit(X: Any, n_components: int) -> Doubles:
@@ -107,8 +102,8 @@ def pca_fit_transform(X: Any, n_components: int) -> Doubles:
 def pca_project(
     X: Any, components: Any, mean: Any, variance: Any = None, whiten: bool = False
 ) -> Doubles:
-    """`X` [shape=(rows, columns)] on fitted components [shape=(k, columns)], each coordinate divided
-    by its standard deviation if `whiten`."""
+    """`X` [shape=(rows, columns)] on fitted components [shape=(k, columns)], each coordinate
+    divided by its standard deviation if `whiten`."""
     if whiten and variance is None:
         raise ParameterError("variance = None is not possible with whiten=True")
     x = np.ascontiguousarray(_doubles("X", X, 2))

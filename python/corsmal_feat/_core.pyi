@@ -1,14 +1,82 @@
 """The extension module; private: use the functions of `corsmal_feat`."""
 
-from typing import Any
+import os
+from typing import Any, final
 
 import numpy as np
 import numpy.typing as npt
 
 from ._arrays import Floats
+from ._harmonic import CqtChromaParams, CqtParams, HpssParams
 from .filters import ChromaParams, MelParams
 from .spectrum import StftParams
 
+__all__ = [
+    "ParameterError",
+    "RunError",
+    "Signal",
+    "Signals",
+    "TrainedModel",
+    "__version__",
+    "a34_short",
+    "a34f136",
+    "af193",
+    "apply_mel",
+    "chroma",
+    "chroma_cqt",
+    "chroma_filter",
+    "chroma_of_cqt",
+    "classifier_parameters",
+    "cqt",
+    "delta",
+    "detrend",
+    "effective_config",
+    "estimate_tuning",
+    "extract",
+    "fft_frequencies",
+    "get_window",
+    "hpss_masks",
+    "istft",
+    "m1_stft",
+    "m2_mfcc",
+    "m3_spectrogram",
+    "m4_logmel",
+    "m4_windows",
+    "m5_a34f136",
+    "m5_vggish_patches",
+    "m6_spectrogram",
+    "mel",
+    "mfcc",
+    "onset_backtrack",
+    "onset_detect",
+    "onset_rises",
+    "onset_strength",
+    "paa_fbank",
+    "pca_fit",
+    "pca_project",
+    "piptrack",
+    "pitch_tuning",
+    "poly_features",
+    "power_to_db",
+    "resample",
+    "rms",
+    "rms_of_spectrogram",
+    "separate",
+    "sk_resize",
+    "spec9216",
+    "spectral_bandwidth",
+    "spectral_centroid",
+    "spectral_contrast",
+    "spectral_flatness",
+    "spectral_rolloff",
+    "spectrogram",
+    "stft",
+    "to_mono",
+    "tonnetz",
+    "zero_crossing_rate",
+]
+
+_Singles = npt.NDArray[np.float32]
 _Doubles = npt.NDArray[np.float64]
 _PitchParams = tuple[float, int, float, float, float]
 _PeakParams = tuple[int | None, int | None, int | None, int | None, float | None, int | None]
@@ -16,6 +84,7 @@ _PeakParams = tuple[int | None, int | None, int | None, int | None, float | None
 __version__: str
 
 class ParameterError(ValueError): ...
+class RunError(RuntimeError): ...
 
 def get_window(window: str, nx: int, fftbins: bool) -> _Doubles: ...
 def stft(y: Floats, params: StftParams) -> npt.NDArray[Any]: ...
@@ -69,6 +138,67 @@ def onset_detect(
     envelope: Floats, rate: tuple[float, int], normalize: bool, peaks: _PeakParams
 ) -> list[list[int]]: ...
 def onset_backtrack(events: list[int], energy: Floats) -> list[int]: ...
+def istft(
+    spectrogram: npt.NDArray[np.complex64] | npt.NDArray[np.complex128],
+    params: StftParams,
+    length: int | None,
+) -> Floats: ...
+def hpss_masks(s: Floats, params: HpssParams) -> tuple[Floats, Floats]: ...
+def separate(
+    y: Floats,
+    stft: StftParams,
+    params: HpssParams,
+    mask: bool,
+    harmonic: bool,
+    percussive: bool,
+) -> list[Floats]: ...
+def cqt(y: Floats, params: CqtParams) -> npt.NDArray[Any]: ...
+def chroma_cqt(y: Floats, cqt: CqtParams, chroma: CqtChromaParams) -> Floats: ...
+def chroma_of_cqt(c: Floats, chroma: CqtChromaParams) -> Floats: ...
+def tonnetz(chroma: Floats) -> Floats: ...
+def af193(y: _Singles, sr: float) -> _Singles: ...
+def paa_fbank(sr: float, num_fft: int) -> _Doubles: ...
+def a34_short(y: _Doubles, sr: float, frame: tuple[int, int], deltas: bool) -> _Doubles: ...
+def a34f136(y: _Doubles, sr: float, mid: tuple[int, int], frame: tuple[int, int]) -> _Doubles: ...
+def sk_resize(
+    image: Floats, shape: tuple[int, int], mode: str, anti_aliasing: bool | None
+) -> Floats: ...
+def pca_fit(x: _Doubles, n_components: int) -> list[_Doubles]: ...
+def pca_project(
+    x: _Doubles, components: _Doubles, mean: list[float], variance: list[float] | None
+) -> _Doubles: ...
+def spec9216(y: Floats, fixed_len: int | None, librosa: str) -> Floats: ...
+def m1_stft(y: _Singles, n_fft: int, hop_length: int) -> _Singles: ...
+def m2_mfcc(y: _Singles, sr: float, padded: bool, librosa: str) -> _Singles: ...
+def m3_spectrogram(y: _Singles, sr: float, n_fft: int, hop_length: int) -> _Singles: ...
+def m4_logmel(y: _Singles, sr: float, variant: str) -> _Singles: ...
+def m4_windows(features: _Singles) -> _Singles: ...
+def m5_a34f136(y: _Singles, sr: float) -> _Doubles: ...
+def m5_vggish_patches(y: _Singles, sr: float, converter: str) -> _Singles: ...
+def m6_spectrogram(y: _Singles, sr: float, start: float | None, librosa: str) -> _Singles: ...
+def effective_config(config: tuple[str, str], overrides: list[str]) -> tuple[str, str]: ...
+def extract(
+    paths: list[str],
+    config: tuple[str, str],
+    overrides: list[str],
+    out: str | os.PathLike[str],
+    jobs: int | None,
+    resume: bool,
+    overwrite: bool,
+) -> list[str]: ...
+
+@final
+class Signals:
+    def __new__(cls, config: tuple[str, str], overrides: list[str]) -> Signals: ...
+    def start(self, sample_rate: int, channels: int) -> Signal: ...
+
+@final
+class Signal:
+    def push(self, block: _Singles) -> None: ...
+    def summary_names(self) -> list[str]: ...
+    def finish(self) -> tuple[_Singles | None, list[tuple[str, bool, _Singles]]]: ...
+
+@final
 class TrainedModel:
     @staticmethod
     def fit(
@@ -87,8 +217,8 @@ class TrainedModel:
     def to_bytes(self) -> bytes: ...
     @staticmethod
     def from_bytes(bytes: bytes) -> TrainedModel: ...
-    def save(self, path: str) -> None: ...
+    def save(self, path: str | os.PathLike[str]) -> None: ...
     @staticmethod
-    def load(path: str) -> TrainedModel: ...
+    def load(path: str | os.PathLike[str]) -> TrainedModel: ...
 
 def classifier_parameters(name: str, parameters: str) -> str: ...

@@ -8,13 +8,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from . import _core
-from ._arrays import audio, floats, rows
+from ._arrays import Doubles, Singles, audio, floats, rows
 from ._core import ParameterError
+from ._mel import mfcc
+from ._mono import to_mono
+from ._time_domain import zero_crossing_rate
 
 __all__ = [
+    "esc26",
     "m1_stft",
     "m2_mfcc",
     "m3_spectrogram",
@@ -26,26 +29,34 @@ __all__ = [
     "spec9216",
 ]
 
-Singles = npt.NDArray[np.float32]
-
 
 def _recording(y: Any) -> Singles:
     y = audio(y)
     if y.ndim > 2:
         raise ParameterError(f"y has {y.ndim} dimensions, expected (n,) or (channels, n)")
-    return rows(np.atleast_2d(y).astype(np.float32, copy=False), 1)
+    return np.ascontiguousarray(np.atleast_2d(y), dtype=np.float32)
 
 
 def spec9216(y: Any, sr: float, fixed_len: int | None = None, *, librosa: str = "0.11") -> Any:
     """9216 values of one channel `y`: divided by its RMS, |STFT| (512, hop 128) in dB, resized to
-    96 x 96. `fixed_len` cuts or zero-pads first; padding makes the result float64, as it does in the
-    baselines. `sr` is not used; `librosa="0.8"` pads frames as the published baselines did."""
+    96 x 96. `fixed_len` cuts or zero-pads first; padding makes the result float64, as it does in
+    the baselines. `sr` is not used; `librosa="0.8"` pads frames as the published baselines did."""
     y = audio(y)
     if y.ndim != 1:
         raise ParameterError(f"y has {y.ndim} dimensions, expected one channel")
     image = _core.spec9216(rows(y, 1), fixed_len or None, librosa).ravel()
-    padded = bool(fixed_len) and fixed_len > len(y)
+    padded = (fixed_len or 0) > len(y)
     return image if padded else image.astype(y.dtype, copy=False)
+
+
+def esc26(y: Any, sr: float) -> Doubles:
+    """26 values of the mean channel of `y`: means, then standard deviations over frames of MFCC 1
+    to 12, then mean and standard deviation of the zero-crossing rate."""
+    y = to_mono(y)
+    cepstra = mfcc(y=y, sr=sr)[1:13]
+    crossings = zero_crossing_rate(y)
+    parts = (part(rows, axis=1) for rows in (cepstra, crossings) for part in (np.mean, np.std))
+    return np.concatenate(list(parts)).astype(np.float64)
 
 
 def m1_stft(y: Any, *, n_fft: int = 2048, hop_length: int = 512) -> Singles:
@@ -81,7 +92,7 @@ def m4_windows(features: Any) -> Singles:
     return _core.m4_windows(np.ascontiguousarray(features, dtype=np.float32))
 
 
-def m5_a34f136(y: Any, sr: float) -> npt.NDArray[np.float64]:
+def m5_a34f136(y: Any, sr: float) -> Doubles:
     """M5: 136 pyAudioAnalysis values of a recording of 8 channels (mixed as 7.1), 2 or 1."""
     return _core.m5_a34f136(_recording(y), float(sr))
 

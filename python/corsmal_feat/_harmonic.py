@@ -22,6 +22,8 @@ from .spectrum import stft, stft_params, warn_short
 C1 = 440.0 * 2.0 ** ((24.0 - 69.0) / 12.0)
 
 HpssParams = tuple[int, int, float, float, float]
+CqtParams = tuple[float, int, float, int, int, float, float, float | None, float, str, bool, str]
+CqtChromaParams = tuple[int, int, float, list[float] | None, float | None, float | None]
 
 
 def _pair(value: Any) -> tuple[Any, Any]:
@@ -206,7 +208,7 @@ def _cqt_params(
     window: Any = "hann",
     scale: bool = True,
     pad_mode: str = "constant",
-) -> tuple[Any, ...]:
+) -> CqtParams:
     return (
         float(sr),
         _positive("hop_length", hop_length),
@@ -314,8 +316,8 @@ def _promoted(chroma: Any, weights: Any) -> Any:
 
 
 def tonnetz(*, y: Any = None, sr: float = 22050, chroma: Any = None, **kwargs: Any) -> Any:
-    """Tonal centroids [shape=(..., 6, t)] of a chromagram, by default of `chroma_cqt(y=y, **kwargs)`
-    (librosa.feature.tonnetz)."""
+    """Tonal centroids [shape=(..., 6, t)] of a chromagram, by default of
+    `chroma_cqt(y=y, **kwargs)` (librosa.feature.tonnetz)."""
     if chroma is None:
         if y is None:
             raise ParameterError("y or chroma is needed")
@@ -353,7 +355,7 @@ def af193(y: Any, sr: float) -> Any:
     y = audio(y)
     channels = rows(y, 1)
     if y.dtype == np.float32:
-        return unrows(_core.af193(channels, float(sr)), y, 1)
+        return unrows(_core.af193(channels.astype(np.float32), float(sr)), y, 1)
     return unrows(np.stack([_af193_composed(channel, sr) for channel in channels]), y, 1)
 
 

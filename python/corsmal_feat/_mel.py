@@ -32,9 +32,7 @@ def melspectrogram(
     norm: Any = "slaney",
 ) -> Any:
     """Mel spectrogram [shape=(..., n_mels, t)] (librosa.feature.melspectrogram)."""
-    s, n_fft = spectrogram(
-        y, S, n_fft, hop_length, win_length, window, center, pad_mode, power
-    )
+    s, n_fft = spectrogram(y, S, n_fft, hop_length, win_length, window, center, pad_mode, power)
     params = mel_params(sr, n_fft, n_mels, fmin, fmax, htk, norm)
     result, empty = _core.apply_mel(rows(s, 2), params)
     if empty:

@@ -7,7 +7,6 @@ They work without scikit-learn; with it installed they are estimators like any o
 
 from __future__ import annotations
 
-import inspect
 import json
 import os
 import sys
@@ -18,6 +17,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._core import ParameterError
+from ._parameters import NotFittedError, Parametrised, not_fitted
 
 __all__ = [
     "KNN",
@@ -32,20 +32,6 @@ __all__ = [
 ]
 
 Matrix = npt.NDArray[np.float64]
-
-
-class NotFittedError(ValueError, AttributeError):
-    """`predict` was called before `fit`."""
-
-
-def _not_fitted(estimator: object) -> Exception:
-    message = (
-        f"This {type(estimator).__name__} instance is not fitted yet. Call 'fit' with appropriate "
-        "arguments before using this estimator."
-    )
-    # scikit-learn's own class where it is in use: callers there catch that one.
-    exceptions = sys.modules.get("sklearn.exceptions")
-    return exceptions.NotFittedError(message) if exceptions else NotFittedError(message)
 
 
 def _names_of(X: Any) -> npt.NDArray[np.object_] | None:
@@ -130,7 +116,7 @@ def _warn_column(labels: npt.NDArray[Any]) -> None:
     )
 
 
-class _Estimator:
+class _Estimator(Parametrised):
     """What all classifiers share. Parameters are those of the subclass's `__init__`."""
 
     _name: str
@@ -141,35 +127,6 @@ class _Estimator:
     classes_: npt.NDArray[Any]
     n_features_in_: int
     feature_names_in_: npt.NDArray[np.object_]
-
-    @classmethod
-    def _keywords(cls) -> list[str]:
-        return [name for name in inspect.signature(cls.__init__).parameters if name != "self"]
-
-    def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """The parameters by name; `deep` is scikit-learn's and has no effect."""
-        return {name: getattr(self, name) for name in self._keywords()}
-
-    def set_params(self, **params: Any) -> Self:
-        """Changes parameters by name; they count from the next `fit` on."""
-        known = self._keywords()
-        for name, value in params.items():
-            if name not in known:
-                raise ParameterError(
-                    f"Invalid parameter {name!r} for estimator {self!r}. "
-                    f"Valid parameters are: {known}."
-                )
-            setattr(self, name, value)
-        return self
-
-    def __repr__(self) -> str:
-        defaults = inspect.signature(type(self).__init__).parameters
-        changed = (
-            f"{name}={value!r}"
-            for name, value in self.get_params().items()
-            if value is not defaults[name].default and value != defaults[name].default
-        )
-        return f"{type(self).__name__}({', '.join(changed)})"
 
     def __sklearn_is_fitted__(self) -> bool:
         return hasattr(self, "_model")
@@ -247,7 +204,7 @@ class _Estimator:
 
     def _query(self, X: Any) -> Matrix:
         if not hasattr(self, "_model"):
-            raise _not_fitted(self)
+            raise not_fitted(self)
         names = _names_of(X)
         known = getattr(self, "feature_names_in_", None)
         if names is not None and known is not None and names.tolist() != known.tolist():
@@ -280,7 +237,7 @@ class _Estimator:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the model file, whole or not at all."""
         if not hasattr(self, "_model"):
-            raise _not_fitted(self)
+            raise not_fitted(self)
         self._model.save(os.fspath(path))
 
     @classmethod

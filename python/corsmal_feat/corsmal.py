@@ -1,6 +1,5 @@
 """Compound inputs of the benchmark's systems: re-exported from one private module per family."""
 
-from ._harmonic import abs_cqt, af193, hpss_audio, hpss_mags, hpss_masks
 from ._compound import (
     a34_short,
     a34f136,
@@ -12,6 +11,7 @@ from ._compound import (
     sk_resize,
 )
 from ._frontends import (
+    esc26,
     m1_stft,
     m2_mfcc,
     m3_spectrogram,
@@ -22,19 +22,20 @@ from ._frontends import (
     m6_spectrogram,
     spec9216,
 )
+from ._harmonic import abs_cqt, af193, hpss_audio, hpss_mags, hpss_masks
 from ._mono import to_mono
 from ._pitch import piptrack_both
 
 __all__ = [
-    "abs_cqt",
-    "af193",
-    "hpss_audio",
-    "hpss_mags",
-    "hpss_masks",
-    "piptrack_both",
     "a34_short",
     "a34f136",
     "a34f136_mean",
+    "abs_cqt",
+    "af193",
+    "esc26",
+    "hpss_audio",
+    "hpss_mags",
+    "hpss_masks",
     "m1_stft",
     "m2_mfcc",
     "m3_spectrogram",

@@ -89,9 +89,7 @@ def chroma_params(
 ) -> ChromaParams:
     """Filter bank parameters as the Rust side takes them."""
     if n_fft < 1 or n_chroma < 1:
-        raise ParameterError(
-            f"n_fft = {n_fft}, n_chroma = {n_chroma} are not possible: at least 1"
-        )
+        raise ParameterError(f"n_fft = {n_fft}, n_chroma = {n_chroma} are not possible: at least 1")
     width = None if octwidth is None else float(octwidth)
     power = None if norm is None else float(norm)
     return (

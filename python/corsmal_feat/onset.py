@@ -58,8 +58,9 @@ def onset_strength(
             raise ParameterError(f"ref has shape {ref.shape}, expected {s.shape}")
         ref = rows(ref.astype(s.dtype), 2)
     delay = n_fft // (2 * hop_length) if center else None
+    envelope: Any
     if callable(aggregate) and aggregate is not np.mean:
-        rises = unrows(_core.onset_rises(rows(s, 2), ref, lag, max_size), s, 2)
+        rises: Any = unrows(_core.onset_rises(rows(s, 2), ref, lag, max_size), s, 2)
         flux = np.asarray(aggregate(rises, axis=-2), dtype=s.dtype)
         padding = [(0, 0)] * (flux.ndim - 1) + [(lag + (delay or 0), 0)]
         envelope = np.pad(flux, padding)

@@ -100,9 +100,7 @@ def power_to_db(
     """Power to decibels; the top_db clamp is joint over the whole array (librosa.power_to_db)."""
     S = np.asarray(S)
     if np.iscomplexobj(S):
-        warnings.warn(
-            "power_to_db was called on complex input: phase is discarded", stacklevel=2
-        )
+        warnings.warn("power_to_db was called on complex input: phase is discarded", stacklevel=2)
         S = np.abs(S)
     scalar = S.ndim == 0
     S = floats("S", S.astype(np.float64) if S.dtype.kind in "iu" else S, 0)

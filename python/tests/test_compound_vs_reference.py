@@ -1,11 +1,10 @@
-"""Compound inputs against pyAudioAnalysis, scikit-image, scikit-learn and the published features."""
+"""Compound inputs against pyAudioAnalysis, scikit-image, scikit-learn, published features."""
 
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
-
 from corsmal_feat import ParameterError, corsmal, resample, to_mono
 
 REPOSITORY = Path(__file__).resolve().parents[2]

@@ -1,9 +1,8 @@
-"""Separation, constant-Q features and AF193 against librosa, on inputs that no golden file holds."""
-
-import numpy as np
-import pytest
+"""Separation, constant-Q features and AF193 against librosa, on inputs beyond the golden ones."""
 
 import corsmal_feat as cf
+import numpy as np
+import pytest
 
 librosa = pytest.importorskip("librosa")
 pytestmark = pytest.mark.filterwarnings("ignore")

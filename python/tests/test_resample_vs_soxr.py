@@ -1,9 +1,8 @@
 """resample against librosa with soxr: other rates, lengths and signals than the golden cases."""
 
+import corsmal_feat
 import numpy as np
 import pytest
-
-import corsmal_feat
 
 librosa = pytest.importorskip("librosa", reason="skipped: librosa absent")
 pytest.importorskip("soxr", reason="skipped: soxr absent")

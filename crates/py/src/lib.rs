@@ -8,6 +8,7 @@ mod arrays;
 mod chroma;
 mod classifiers;
 mod compound;
+mod extract;
 mod frontends;
 mod harmonic;
 mod mel;
@@ -17,10 +18,11 @@ mod spectral;
 mod spectrum;
 mod time_domain;
 
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 pyo3::create_exception!(_core, ParameterError, PyValueError, "A parameter or array was refused.");
+pyo3::create_exception!(_core, RunError, PyRuntimeError, "A run could not start or go on.");
 
 /// Any of our refusals as `ParameterError` (a `ValueError`).
 pub(crate) fn value_error(error: impl std::fmt::Display) -> PyErr {
@@ -31,6 +33,7 @@ pub(crate) fn value_error(error: impl std::fmt::Display) -> PyErr {
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add("ParameterError", m.py().get_type::<ParameterError>())?;
+    m.add("RunError", m.py().get_type::<RunError>())?;
     classifiers::register(m)?;
     spectrum::register(m)?;
     harmonic::register(m)?;
@@ -38,6 +41,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     time_domain::register(m)?;
     resample::register(m)?;
     compound::register(m)?;
+    extract::register(m)?;
     frontends::register(m)?;
     spectral::register(m)?;
     chroma::register(m)?;

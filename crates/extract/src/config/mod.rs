@@ -122,11 +122,18 @@ impl Config {
             place: place.to_string(),
             message: e.to_string().trim_end().to_string(),
         };
-        let mut value: Value = toml::from_str(toml).map_err(syntax)?;
+        Self::from_tree(toml::from_str(toml).map_err(syntax)?, overrides)
+    }
+
+    /// A tree of tables with `key=value` overrides.
+    ///
+    /// # Errors
+    /// An unknown key or an impossible value.
+    pub fn from_tree(mut tree: Value, overrides: &[String]) -> Result<Self, ConfigError> {
         for assignment in overrides {
-            set::apply(&mut value, assignment)?;
+            set::apply(&mut tree, assignment)?;
         }
-        Self::from_value(value)
+        Self::from_value(tree)
     }
 
     /// A configuration as stored in outputs.

@@ -57,6 +57,9 @@ struct SpanJob {
     planned: Planned,
 }
 
+/// What a recording gives: arrays, or a row of the table; and its samples.
+type Parts = (Vec<Member>, Option<Vec<f32>>, u64);
+
 /// A recording of which not all spans are there.
 struct Partial {
     outcome: Outcome,
@@ -171,7 +174,7 @@ impl<'a> Collector<'a> {
             Err(e) => return self.fail(index, outcome, Failed::new(Status::Unsupported, e)),
         };
         let signal = &planned.plan.config.signal;
-        let crop = reader::crop(signal, input, source.spec().sample_rate);
+        let crop = reader::crop(signal, (input.start, input.end), source.spec().sample_rate);
         let spans = reader::spans(source.as_ref(), signal, planned.resample.is_some(), &crop);
         if let [span] = spans.as_slice() {
             let computed = reader::compute(source.as_mut(), &planned, &crop, span, self.stop);
@@ -206,7 +209,7 @@ impl<'a> Collector<'a> {
         let mut last = None;
         let computed = reader::open(input).and_then(|mut source| {
             let signal = &job.planned.plan.config.signal;
-            let crop = reader::crop(signal, input, source.spec().sample_rate);
+            let crop = reader::crop(signal, (input.start, input.end), source.spec().sample_rate);
             let span = reader::compute(source.as_mut(), &job.planned, &crop, &job.span, self.stop);
             last = Some(source);
             span
@@ -244,22 +247,13 @@ impl<'a> Collector<'a> {
         let temporary = |e: std::io::Error| {
             Failed::new(Status::Io, format!("temporary file in {}: {e}", self.folder.display()))
         };
-        let finish = || -> Result<(Vec<Member>, Option<Vec<f32>>, u64), Failed> {
+        let finish = || -> Result<Parts, Failed> {
             let mut recording = Recording::new(plan.clone(), &self.folder);
             for span in spans {
                 recording.add(span?).map_err(temporary)?;
             }
             let total = recording.total();
-            if total == 0 {
-                return Err(Failed::new(Status::Empty, "no samples"));
-            }
-            if recording.fewest_frames() == 0 {
-                let needed = plan.shortest();
-                let reason = format!("{total} samples, at least {needed} make one frame");
-                return Err(Failed::new(Status::TooShort, reason));
-            }
-            let features =
-                recording.finish().map_err(|e| Failed::new(Status::TooShort, e.to_string()))?;
+            let features = super::signal::finish(recording, plan)?;
             Ok(match features {
                 Features::Summary(row) => (Vec::new(), Some(row), total),
                 Features::Frames(arrays) => {

@@ -3,6 +3,7 @@
 mod collector;
 mod plans;
 mod reader;
+mod signal;
 mod sink;
 
 use std::path::{Path, PathBuf};
@@ -24,6 +25,8 @@ use crate::table::TableError;
 
 use collector::Collector;
 use sink::Sink;
+
+pub use signal::{Signal, SignalError, Signals};
 
 /// Why a run could not start or go on. Bad recordings are not among these: they are outcomes.
 #[derive(Debug, Error)]

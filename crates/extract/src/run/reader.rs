@@ -54,19 +54,20 @@ pub fn open(input: &Input) -> Result<Box<dyn BlockSource>, Failed> {
     })
 }
 
-/// Frames of the recording that are taken, by the configuration and the manifest.
-pub fn crop(signal: &SignalConfig, input: &Input, sample_rate: u32) -> Range<u64> {
+/// Frames of the recording that are taken, by the configuration and the manifest's start and end.
+pub fn crop(
+    signal: &SignalConfig,
+    (start, end): (Option<f64>, Option<f64>),
+    sample_rate: u32,
+) -> Range<u64> {
     let frame = |seconds: f64| (seconds * f64::from(sample_rate)) as u64;
-    let offset = input.start.unwrap_or(0.0);
-    let start = frame(offset + signal.start);
-    let mut end = u64::MAX;
-    if let Some(limit) = input.end {
-        end = end.min(frame(limit));
-    }
+    let offset = start.unwrap_or(0.0);
+    let first = frame(offset + signal.start);
+    let mut last = end.map_or(u64::MAX, frame);
     if signal.end > 0.0 {
-        end = end.min(frame(offset + signal.end));
+        last = last.min(frame(offset + signal.end));
     }
-    start..end.max(start)
+    first..last.max(first)
 }
 
 /// Spans of the signal that can be computed apart; one where it cannot be cut.
@@ -192,7 +193,8 @@ fn may_be_non_finite(spec: &AudioSpec) -> bool {
     !(spec.format.contains("pcm_s") || spec.format.contains("pcm_u"))
 }
 
-fn require_finite(samples: &[f32], position: u64, channels: usize) -> Result<(), Failed> {
+/// Refuses samples that features cannot be computed of; `position` is that of the first frame.
+pub fn require_finite(samples: &[f32], position: u64, channels: usize) -> Result<(), Failed> {
     if samples.iter().fold(true, |all, x| all & x.is_finite()) {
         return Ok(());
     }
@@ -209,7 +211,7 @@ fn require_finite(samples: &[f32], position: u64, channels: usize) -> Result<(),
 }
 
 /// Brings a whole signal to a common level; silence stays as it is.
-fn normalize(rule: Normalize, signal: &mut [f32]) {
+pub fn normalize(rule: Normalize, signal: &mut [f32]) {
     let level = match rule {
         Normalize::None => return,
         Normalize::Peak => signal.iter().fold(0.0, |m: f32, x| m.max(x.abs())),

@@ -1,0 +1,198 @@
+//! A signal from memory instead of a file: pushed block by block, computed as a recording of a run.
+
+use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use corsmal_audio::AudioSpec;
+use thiserror::Error;
+
+use super::plans::{Planned, Plans};
+use super::reader::{self, Failed};
+use crate::config::{Config, Normalize};
+use crate::engine::{Extractor, Features, Plan, Recording};
+use crate::frontend::FrontEnd;
+use crate::outcome::Status;
+
+/// Frames that go through the front end at a time.
+const BLOCK: usize = 1 << 14;
+
+/// Why a signal has no features.
+#[derive(Debug, Error)]
+#[error("{status}: {reason}")]
+pub struct SignalError {
+    /// The verdict, as the outcome of a file would have it.
+    pub status: Status,
+    /// In words.
+    pub reason: String,
+}
+
+impl From<Failed> for SignalError {
+    fn from(failed: Failed) -> Self {
+        Self { status: failed.status, reason: failed.reason }
+    }
+}
+
+/// Computes signals by one configuration; filters and transforms are made once per sample rate and
+/// number of channels.
+pub struct Signals {
+    plans: Plans,
+    folder: PathBuf,
+}
+
+impl Signals {
+    /// Signals by `config`. What does not fit in memory goes to the system's temporary folder.
+    pub fn new(config: Arc<Config>) -> Self {
+        Self { plans: Plans::new(config), folder: std::env::temp_dir() }
+    }
+
+    /// Begins a signal of `sample_rate` Hz and `channels` channels.
+    ///
+    /// # Errors
+    /// The configuration does not fit such signals.
+    pub fn start(&self, sample_rate: u32, channels: u16) -> Result<Signal, SignalError> {
+        let refuse = |reason: String| Failed::new(Status::Unsupported, reason);
+        if sample_rate == 0 || !(1..=64).contains(&channels) {
+            let reason = format!("{channels} channels at {sample_rate} Hz: 1 to 64, above 0 Hz");
+            return Err(refuse(reason).into());
+        }
+        let format = "memory".into();
+        let spec = AudioSpec { sample_rate, channels, format, declared_frames: None };
+        let Planned { plan, resample } = self.plans.of(&spec).map_err(refuse)?;
+        let config = &plan.config.signal;
+        let front = FrontEnd::new(config, usize::from(channels), resample, plan.sample_rate)
+            .map_err(refuse)?;
+        Ok(Signal {
+            front,
+            extractor: Extractor::new(plan.clone(), 0..u64::MAX, 0),
+            crop: reader::crop(config, (None, None), sample_rate),
+            channels: usize::from(channels),
+            position: 0,
+            held: Vec::new(),
+            folder: self.folder.clone(),
+            plan,
+        })
+    }
+}
+
+/// One signal. Any split into blocks gives the same bits.
+pub struct Signal {
+    plan: Arc<Plan>,
+    front: FrontEnd,
+    extractor: Extractor,
+    /// Input frames that count.
+    crop: Range<u64>,
+    channels: usize,
+    /// Input frames pushed.
+    position: u64,
+    /// Behind the front end; the whole signal where its level is to be normalised.
+    held: Vec<f32>,
+    folder: PathBuf,
+}
+
+impl Signal {
+    /// What is computed.
+    pub fn plan(&self) -> &Arc<Plan> {
+        &self.plan
+    }
+
+    /// Takes interleaved samples; a frame that is not whole is left out.
+    ///
+    /// # Errors
+    /// NaN or infinite samples.
+    pub fn push(&mut self, samples: &[f32]) -> Result<(), SignalError> {
+        let whole = samples.len() / self.channels * self.channels;
+        for block in samples[..whole].chunks(BLOCK * self.channels) {
+            let frames = (block.len() / self.channels) as u64;
+            let begin = self.position;
+            self.position += frames;
+            let inside = |frame: u64| frame.clamp(begin, self.position) - begin;
+            let (from, to) = (inside(self.crop.start), inside(self.crop.end));
+            let block = &block[from as usize * self.channels..to as usize * self.channels];
+            reader::require_finite(block, begin + from, self.channels)?;
+            self.front.push(block, &mut self.held);
+            if self.plan.config.signal.normalize == Normalize::None {
+                self.extractor.push(&self.held);
+                self.held.clear();
+            }
+        }
+        Ok(())
+    }
+
+    /// The features of the signal, which ends here.
+    ///
+    /// # Errors
+    /// No samples, too few for one frame, or a temporary file that fails.
+    pub fn finish(self) -> Result<Features, SignalError> {
+        let Self { plan, front, mut extractor, mut held, folder, .. } = self;
+        front.finish(&mut held);
+        reader::normalize(plan.config.signal.normalize, &mut held);
+        extractor.push(&held);
+        drop(held);
+        let mut recording = Recording::new(plan.clone(), &folder);
+        let span = extractor.finish(true);
+        recording.add(span).map_err(|e| Failed::new(Status::Io, format!("temporary file: {e}")))?;
+        Ok(finish(recording, &plan)?)
+    }
+}
+
+/// Finishes a recording of which every span is there.
+pub fn finish(recording: Recording, plan: &Plan) -> Result<Features, Failed> {
+    let total = recording.total();
+    if total == 0 {
+        return Err(Failed::new(Status::Empty, "no samples"));
+    }
+    if recording.fewest_frames() == 0 {
+        let needed = plan.shortest();
+        let reason = format!("{total} samples, at least {needed} make one frame");
+        return Err(Failed::new(Status::TooShort, reason));
+    }
+    recording.finish().map_err(|e| Failed::new(Status::TooShort, e.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(features: Features) -> Vec<f32> {
+        match features {
+            Features::Summary(row) => row,
+            Features::Frames(_) => panic!("a summary was configured"),
+        }
+    }
+
+    #[test]
+    fn blocks_do_not_matter() {
+        for overrides in
+            [&[][..], &["signal.normalize=rms", "signal.start=0.01", "signal.end=0.09"]]
+        {
+            let overrides: Vec<String> = overrides.iter().map(|s| s.to_string()).collect();
+            let toml = crate::config::Preset::find("esc26").unwrap().toml;
+            let config = Config::with_overrides(toml, "esc26", &overrides).unwrap();
+            let signals = Signals::new(Arc::new(config));
+            let samples: Vec<f32> =
+                (0..2 * 6000_u32).map(|i| (i * i % 997) as f32 / 997.0).collect();
+            let mut whole = signals.start(44_100, 2).unwrap();
+            whole.push(&samples).unwrap();
+            let whole = rows(whole.finish().unwrap());
+            assert_eq!(whole.len(), 26);
+            for block in [2, 34, 3000] {
+                let mut signal = signals.start(44_100, 2).unwrap();
+                samples.chunks(block).for_each(|block| signal.push(block).unwrap());
+                assert_eq!(rows(signal.finish().unwrap()), whole);
+            }
+        }
+    }
+
+    #[test]
+    fn refusals_say_what_a_file_would() {
+        let signals = Signals::new(Arc::new(Config::preset("esc26").unwrap()));
+        let status = |samples: &[f32]| {
+            let mut signal = signals.start(22_050, 1).unwrap();
+            signal.push(samples).and_then(|()| signal.finish().map(|_| ())).unwrap_err().status
+        };
+        assert_eq!(status(&[]), Status::Empty);
+        assert_eq!(status(&[0.0, f32::NAN]), Status::NonFinite);
+        assert!(signals.start(22_050, 0).is_err());
+    }
+}

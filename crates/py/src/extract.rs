@@ -1,0 +1,200 @@
+//! Runs over files, and features of signals in memory.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use corsmal_extract::config::{Config, Preset};
+use corsmal_extract::engine::{FeatureArray, Features};
+use corsmal_extract::inputs::{self, Shard};
+use corsmal_extract::npz::Compression;
+use corsmal_extract::outcome::Outcome;
+use corsmal_extract::run::{self, Options, Progress, Signals};
+use ndarray::{Array1, Array3};
+use numpy::PyReadonlyArrayDyn;
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+
+use crate::arrays::{into_numpy, view2};
+use crate::{RunError, value_error};
+
+/// How often a run asks whether Python has a signal for us.
+const POLL: Duration = Duration::from_millis(50);
+
+const FINISHED: &str = "the signal is finished: start another one";
+
+/// The configuration from `(kind, text)`, `kind` being "preset", "path", "toml" or "json".
+fn config_of((kind, text): (&str, &str), overrides: &[String]) -> PyResult<Arc<Config>> {
+    let config = match kind {
+        "preset" => Preset::find(text)
+            .and_then(|preset| Config::with_overrides(preset.toml, text, overrides)),
+        "path" => Config::load(Path::new(text), overrides),
+        "toml" => Config::with_overrides(text, "text", overrides),
+        "json" => Config::from_tree(serde_json::from_str(text).map_err(value_error)?, overrides),
+        other => return Err(value_error(format!("kind = {other} of a configuration is unknown"))),
+    };
+    config.map(Arc::new).map_err(value_error)
+}
+
+/// The effective configuration as JSON, and its hash.
+#[pyfunction]
+fn effective_config(
+    config: (String, String),
+    overrides: Vec<String>,
+) -> PyResult<(String, String)> {
+    let config = config_of((&config.0, &config.1), &overrides)?;
+    Ok((config.to_value().to_string(), config.hash()))
+}
+
+/// Keeps warnings for Python.
+#[derive(Default)]
+struct Warnings(Mutex<Vec<String>>);
+
+impl Progress for Warnings {
+    fn start(&self, _: usize, _: usize) {}
+
+    fn done(&self, _: &Outcome) {}
+
+    fn warning(&self, message: &str) {
+        self.0.lock().unwrap_or_else(|e| e.into_inner()).push(message.to_string());
+    }
+}
+
+/// Extracts the features of `paths` into the file `out` and gives what is to be warned of. An
+/// interrupt stops the run, its ledger intact.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "one private caller, by name")]
+fn extract(
+    py: Python<'_>,
+    paths: Vec<String>,
+    config: (String, String),
+    overrides: Vec<String>,
+    out: PathBuf,
+    jobs: Option<usize>,
+    resume: bool,
+    overwrite: bool,
+) -> PyResult<Vec<String>> {
+    let config = config_of((&config.0, &config.1), &overrides)?;
+    let jobs = match jobs {
+        Some(0) => return Err(value_error("jobs = 0 is not possible: at least 1")),
+        Some(jobs) => jobs,
+        None => std::thread::available_parallelism().map_or(1, usize::from),
+    };
+    let compression = Compression::Stored;
+    let shard = "0/1".parse::<Shard>().map_err(value_error)?;
+    let options = Options { out, compression, jobs, shard, resume, overwrite, max_errors: None };
+    let warnings = Warnings::default();
+    let work = |stop: &AtomicBool| {
+        let found = inputs::collect(&paths).map_err(|e| RunError::new_err(e.to_string()))?;
+        run::run(&found, &config, &options, &warnings, stop).map_err(|error| match error {
+            run::RunError::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
+            other => RunError::new_err(other.to_string()),
+        })
+    };
+    py.detach(|| interruptible(work))?;
+    Ok(warnings.0.into_inner().unwrap_or_else(|e| e.into_inner()))
+}
+
+/// Does `work` in another thread and raises its flag when Python has an exception for this one.
+fn interruptible<T: Send>(work: impl FnOnce(&AtomicBool) -> PyResult<T> + Send) -> PyResult<T> {
+    let stop = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let (done, finished) = channel::<()>();
+        let stop = &stop;
+        let worker = scope.spawn(move || {
+            // Dropped at the end, however that comes.
+            let _done = done;
+            work(stop)
+        });
+        let mut raised = None;
+        while finished.recv_timeout(POLL) == Err(RecvTimeoutError::Timeout) {
+            if raised.is_none() {
+                raised = Python::attach(|py| py.check_signals()).err();
+                stop.store(raised.is_some(), Ordering::Relaxed);
+            }
+        }
+        let result = worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        match raised {
+            Some(error) => Err(error),
+            None => result,
+        }
+    })
+}
+
+/// Features of signals in memory, by one configuration.
+#[pyclass(frozen, name = "Signals", module = "corsmal_feat._core")]
+struct PySignals(Signals);
+
+#[pymethods]
+impl PySignals {
+    #[new]
+    fn new(config: (String, String), overrides: Vec<String>) -> PyResult<Self> {
+        config_of((&config.0, &config.1), &overrides).map(|config| Self(Signals::new(config)))
+    }
+
+    /// Begins a signal.
+    fn start(&self, py: Python<'_>, sample_rate: u32, channels: u16) -> PyResult<PySignal> {
+        let signal = py.detach(|| self.0.start(sample_rate, channels)).map_err(value_error)?;
+        Ok(PySignal(Some(signal)))
+    }
+}
+
+/// One signal, pushed block by block.
+#[pyclass(name = "Signal", module = "corsmal_feat._core")]
+struct PySignal(Option<run::Signal>);
+
+impl PySignal {
+    fn open(&mut self) -> PyResult<&mut run::Signal> {
+        self.0.as_mut().ok_or_else(|| value_error(FINISHED))
+    }
+}
+
+#[pymethods]
+impl PySignal {
+    /// Takes samples [frames, channels].
+    fn push(&mut self, py: Python<'_>, block: PyReadonlyArrayDyn<'_, f32>) -> PyResult<()> {
+        let view = view2(&block)?;
+        let samples = view.as_slice().ok_or_else(|| value_error("block is not contiguous"))?;
+        let signal = self.open()?;
+        py.detach(|| signal.push(samples)).map_err(value_error)
+    }
+
+    /// Names of the summary's values; empty without a summary.
+    fn summary_names(&mut self) -> PyResult<Vec<String>> {
+        Ok(self.open()?.plan().summary_names())
+    }
+
+    /// The summary [values] if there is one, and frame-level features: name, whether values are
+    /// pairs of real and imaginary parts, values [frames, coefficients, channels].
+    fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<Finished<'py>> {
+        let Some(signal) = self.0.take() else { return Err(value_error(FINISHED)) };
+        let channels = signal.plan().channels;
+        match py.detach(|| signal.finish()).map_err(value_error)? {
+            Features::Summary(row) => {
+                Ok((Some(into_numpy(py, Array1::from_vec(row))?), Vec::new()))
+            }
+            Features::Frames(features) => {
+                let numpy = |feature: FeatureArray| {
+                    let per_channel = if feature.complex { 2 } else { 1 };
+                    let shape = (feature.frames, feature.coefficients, per_channel * channels);
+                    let values = feature.values.into_vec()?;
+                    let array = Array3::from_shape_vec(shape, values).map_err(value_error)?;
+                    Ok((feature.name, feature.complex, into_numpy(py, array)?))
+                };
+                Ok((None, features.into_iter().map(numpy).collect::<PyResult<_>>()?))
+            }
+        }
+    }
+}
+
+type Finished<'py> = (Option<Bound<'py, PyAny>>, Vec<(String, bool, Bound<'py, PyAny>)>);
+
+/// Adds this family to the module.
+pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_class::<PySignals>()?;
+    m.add_class::<PySignal>()?;
+    m.add_function(wrap_pyfunction!(effective_config, m)?)?;
+    m.add_function(wrap_pyfunction!(extract, m)?)
+}

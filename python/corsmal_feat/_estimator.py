@@ -1,0 +1,206 @@
+"""Features as a scikit-learn transformer."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._core import ParameterError, RunError
+from ._extract import Config, configuration, extract, interleaved, whole_rate
+from ._parameters import Parametrised, not_fitted
+
+__all__ = ["FeatureExtractor"]
+
+Matrix = npt.NDArray[np.float32]
+
+
+class FeatureExtractor(Parametrised):
+    """Recordings in, one row of features for each out: the first step of a scikit-learn `Pipeline`.
+
+    The rows are the summary of the configuration, so it needs one (`preset="esc26"`, "esc28",
+    "mfcc-zcr", or a [summary] of its own). scikit-learn is not needed to use it; with it, it is a
+    transformer like any other (`clone`, `cross_val_score`, `GridSearchCV`).
+
+    Parameters
+    ----------
+    preset, config, set : see `corsmal_feat.extract`; preset is "esc26" where no config is given
+    sr : sample rate in Hz of signals in memory; not used for files
+    jobs : worker threads; by default one for each core
+
+    Rows to transform are paths, or signals in memory: a list of float arrays, each [shape=(n,) or
+    (channels, n)], or one array [shape=(recordings, n) or (recordings, channels, n)].
+    """
+
+    def __init__(
+        self,
+        preset: str | None = None,
+        *,
+        config: Config | None = None,
+        set: Mapping[str, Any] | None = None,
+        sr: float | None = None,
+        jobs: int | None = None,
+    ) -> None:
+        self.preset = preset
+        self.config = config
+        self.set = set
+        self.sr = sr
+        self.jobs = jobs
+
+    _names: list[str] | None = None
+
+    def __sklearn_tags__(self) -> Any:
+        from sklearn.utils import (  # type: ignore[import-untyped]
+            InputTags,
+            Tags,
+            TargetTags,
+            TransformerTags,
+        )
+
+        return Tags(
+            estimator_type=None,
+            target_tags=TargetTags(required=False),
+            transformer_tags=TransformerTags(preserves_dtype=[]),
+            input_tags=InputTags(three_d_array=True, string=True),
+            requires_fit=False,
+        )
+
+    def __sklearn_is_fitted__(self) -> bool:
+        return True
+
+    def fit(self, X: Any, y: Any = None) -> Self:
+        """Learns the names of the columns from the first of `X`: the channels are part of them."""
+        recordings = _recordings(X)
+        for position, recording in enumerate(recordings):
+            if not _is_path(recording):
+                _signal(recording, position)
+        self._names, _ = self._compute(recordings[:1])
+        return self
+
+    def fit_transform(self, X: Any, y: Any = None) -> Matrix:
+        """`fit(X).transform(X)`."""
+        self._names, matrix = self._compute(_recordings(X))
+        return matrix
+
+    def transform(self, X: Any) -> Matrix:
+        """Features [shape=(recordings, values)] of the recordings `X`.
+
+        Raises
+        ------
+        RunError : a recording that has no features, since a row cannot be left out here
+        """
+        names, matrix = self._compute(_recordings(X))
+        if self._names is not None and names != self._names:
+            raise ParameterError(
+                f"X gives {len(names)} values for each recording, fit has seen "
+                f"{len(self._names)}: another number of channels or configuration"
+            )
+        return matrix
+
+    def get_feature_names_out(self, input_features: Any = None) -> npt.NDArray[np.object_]:
+        """Names of the columns, known after `fit`. `input_features` has no effect."""
+        if self._names is None:
+            raise not_fitted(self)
+        return np.asarray(self._names, dtype=object)
+
+    def _configuration(self) -> tuple[tuple[str, str], list[str]]:
+        preset = "esc26" if self.preset is None and self.config is None else self.preset
+        config, overrides = configuration(preset, self.config, self.set)
+        effective, _ = _core.effective_config(config, overrides)
+        if json.loads(effective)["summary"] is None:
+            raise ParameterError(
+                "summary = None is not possible for FeatureExtractor: one row for each recording "
+                'needs it; set={"summary.stats": ["mean", "std"]} adds one'
+            )
+        return config, overrides
+
+    def _compute(self, recordings: list[Any]) -> tuple[list[str], Matrix]:
+        """Names of the columns, and rows."""
+        config, overrides = self._configuration()
+        of_files = [_is_path(recording) for recording in recordings]
+        if all(of_files):
+            return self._of_files(recordings)
+        if any(of_files):
+            raise ParameterError("X mixes paths and arrays: either of them")
+        return self._of_signals(recordings, _core.Signals(config, overrides))
+
+    def _of_files(self, paths: list[Any]) -> tuple[list[str], Matrix]:
+        names = [os.fspath(path) for path in paths]
+        # The same file may be in X twice, as in a bootstrap.
+        different = list(dict.fromkeys(names))
+        preset = "esc26" if self.preset is None and self.config is None else self.preset
+        found = extract(different, preset=preset, config=self.config, set=self.set, jobs=self.jobs)
+        if len(found.outcomes) != len(different):
+            raise ParameterError("X holds folders, globs or manifests: name each recording")
+        rows = iter(found.summary if found.summary is not None else ())
+        row_of: dict[str, Matrix] = {}
+        for name, outcome in zip(different, found.outcomes, strict=True):
+            if outcome["status"] not in ("ok", "truncated"):
+                raise RunError(f"{name}: {outcome['status']}: {outcome['reason']}")
+            row_of[name] = next(rows)
+        return found.names, np.stack([row_of[name] for name in names])
+
+    def _of_signals(self, signals: list[Any], by: _core.Signals) -> tuple[list[str], Matrix]:
+        rate = whole_rate(self.sr)
+
+        def row(position: int) -> tuple[list[str], Any]:
+            samples = _signal(signals[position], position)
+            try:
+                signal = by.start(rate, samples.shape[1])
+                names = signal.summary_names()
+                signal.push(samples)
+                return names, signal.finish()[0]
+            except ParameterError as error:
+                raise ParameterError(f"recording {position}: {error}") from error
+
+        with ThreadPoolExecutor(self.jobs or os.cpu_count()) as pool:
+            computed = list(pool.map(row, range(len(signals))))
+        names = computed[0][0]
+        for position, (others, _) in enumerate(computed):
+            if others != names:
+                raise ParameterError(
+                    f"recording {position} gives {len(others)} values where the first one gives "
+                    f"{len(names)}: another number of channels"
+                )
+        return names, np.stack([values for _, values in computed])
+
+
+def _recordings(X: Any) -> list[Any]:
+    if hasattr(X, "toarray") and hasattr(X, "tocsr"):
+        raise TypeError("sparse data was passed, but dense data is required; use .toarray()")
+    recordings = [X] if _is_path(X) else list(X if hasattr(X, "__iter__") else np.asarray(X))
+    if not recordings:
+        raise ParameterError("Found array with 0 sample(s): at least one recording is needed")
+    return recordings
+
+
+def _is_path(recording: Any) -> bool:
+    return isinstance(recording, str | os.PathLike)
+
+
+def _signal(y: Any, position: int) -> Matrix:
+    """A signal in memory [shape=(n, channels)]."""
+    if np.iscomplexobj(y):
+        raise ParameterError(f"Complex data not supported: recording {position}")
+    if not np.ndim(y):
+        raise ParameterError(
+            f"recording {position} is a single value. Reshape your data to (recordings, n), or put "
+            "a single recording into a list"
+        )
+    try:
+        samples = interleaved(y)
+    except ParameterError as error:
+        raise ParameterError(f"recording {position}: {error}") from error
+    if not len(samples):
+        shape = np.atleast_2d(y).shape
+        raise ParameterError(
+            f"recording {position}: 0 feature(s) (shape={shape}) while a minimum of 1 is required: "
+            "no samples"
+        )
+    return samples
