@@ -1,9 +1,14 @@
 //! The `corsmal-feat` command: parse arguments, run one command, turn its end into an exit code.
 
 mod commands;
+mod dataset_table;
 mod failure;
+mod folds;
 mod interrupt;
+mod label_file;
+mod pipeline;
 mod progress;
+mod publish;
 
 use std::process::ExitCode;
 

@@ -1,7 +1,9 @@
 //! One file per command: its arguments (`Args`) and what it does (`run`).
 
 mod benchmark;
+mod classify;
 mod completions;
+mod cross_validate;
 mod dataset;
 mod demo;
 mod evaluate;
@@ -11,6 +13,7 @@ mod inspect;
 mod merge;
 mod presets;
 mod synth;
+mod train;
 
 use std::process::ExitCode;
 
@@ -33,6 +36,12 @@ pub enum Command {
     Inspect(inspect::Args),
     /// Show the main job end to end on synthetic recordings.
     Demo(demo::Args),
+    /// Learn a classifier from features with labels and write it to a model file.
+    Train(train::Args),
+    /// Predict the classes of recordings, or of features, with a trained model.
+    Classify(classify::Args),
+    /// Score a classifier on rows that it was not trained on.
+    CrossValidate(cross_validate::Args),
     /// Run the paper's audio baselines on a CCM data set and write the report.
     Benchmark(benchmark::Args),
     /// Print shell completions or the man page.
@@ -55,6 +64,9 @@ impl Command {
             Self::Features(args) => features::run(args),
             Self::Inspect(args) => inspect::run(args),
             Self::Demo(args) => demo::run(args),
+            Self::Train(args) => train::run(args),
+            Self::Classify(args) => classify::run(args),
+            Self::CrossValidate(args) => cross_validate::run(args),
             Self::Benchmark(args) => benchmark::run(args),
             Self::Completions(args) => completions::run(args),
             Self::Dataset(args) => dataset::run(args),

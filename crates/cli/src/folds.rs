@@ -1,0 +1,163 @@
+//! Which rows are held out together, from `--cv`.
+
+use std::fmt;
+use std::str::FromStr;
+
+use corsmal_models::labels::Labels;
+use corsmal_models::splits::{self, Fold};
+
+use crate::dataset_table::DatasetTable;
+use crate::failure::Failure;
+
+/// Inner folds of a choice, and folds without groups, unless there are fewer groups.
+const FOLDS: usize = 5;
+
+/// A plan as written by the user.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum CvPlan {
+    /// `group=COLUMN`: each group once
+    Group(String),
+    /// `k=N`: this many folds, of whole groups where there are groups, else stratified
+    K(usize),
+    /// `lists=1,4,7/2,5,8`: these groups together
+    Lists(Vec<Vec<String>>),
+    /// `fold=COLUMN`: the column says the fold
+    Fold(String),
+}
+
+impl FromStr for CvPlan {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || {
+            format!("{text:?}: expected group=COLUMN, k=N, lists=1,4,7/2,5,8/3,6,9 or fold=COLUMN")
+        };
+        let (kind, value) = text.split_once('=').ok_or_else(expected)?;
+        if value.is_empty() {
+            return Err(expected());
+        }
+        match kind {
+            "group" => Ok(Self::Group(value.into())),
+            "k" => value.parse().map(Self::K).map_err(|_| expected()),
+            "lists" => {
+                let list = |l: &str| l.split(',').map(|g| g.trim().to_string()).collect();
+                Ok(Self::Lists(value.split('/').map(list).collect()))
+            }
+            "fold" => Ok(Self::Fold(value.into())),
+            _ => Err(expected()),
+        }
+    }
+}
+
+impl fmt::Display for CvPlan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Group(column) => write!(f, "one group of {column} held out"),
+            Self::K(k) => write!(f, "{k} folds"),
+            Self::Lists(lists) => write!(f, "{} lists of groups", lists.len()),
+            Self::Fold(column) => write!(f, "the folds of column {column}"),
+        }
+    }
+}
+
+/// Outer folds and what inner folds are made of.
+pub struct Folds {
+    /// in words
+    pub description: String,
+    /// the folds scored
+    pub outer: Vec<Fold>,
+    /// what is never split, one name per row
+    groups: Option<Vec<String>>,
+    seed: u32,
+}
+
+impl Folds {
+    /// Carries out a plan; without one, each group once where there are groups, else stratified
+    /// folds.
+    pub fn new(
+        plan: Option<&CvPlan>,
+        table: &DatasetTable,
+        groups: Option<&str>,
+        (labels, y): (&Labels, &[usize]),
+        seed: u32,
+    ) -> Result<Self, Failure> {
+        let default = groups.map_or(CvPlan::K(FOLDS), |column| CvPlan::Group(column.into()));
+        let plan = plan.unwrap_or(&default);
+        let column = match plan {
+            CvPlan::Group(column) | CvPlan::Fold(column) => Some(column.as_str()),
+            CvPlan::K(_) | CvPlan::Lists(_) => groups,
+        };
+        let groups = column.map(|c| table.column(c)).transpose()?;
+        let outer = match (plan, &groups) {
+            (CvPlan::Group(_) | CvPlan::Fold(_), Some(g)) => splits::leave_one_group_out(g)?,
+            (CvPlan::K(k), Some(g)) => splits::group_k_fold(g, *k)?,
+            (CvPlan::Lists(lists), Some(g)) => splits::group_lists(g, lists)?,
+            (CvPlan::K(k), None) => stratified(labels, y, *k, seed)?,
+            _ => return Err(Failure::new("--cv lists=…: which column is listed? give --groups")),
+        };
+        let description = match (plan, column) {
+            (CvPlan::K(_), None) => format!("{plan}, stratified, seed {seed}"),
+            (CvPlan::K(_) | CvPlan::Lists(_), Some(column)) => format!("{plan} ({column})"),
+            _ => plan.to_string(),
+        };
+        Ok(Self { description, outer, groups, seed })
+    }
+
+    /// Folds inside these rows, of whole groups where there are groups. Row numbers are positions
+    /// in `rows`.
+    pub fn inner(
+        &self,
+        rows: &[usize],
+        y: &[usize],
+    ) -> Result<Vec<Fold>, corsmal_models::ModelError> {
+        let Some(groups) = &self.groups else {
+            let inside: Vec<usize> = rows.iter().map(|&row| y[row]).collect();
+            return splits::stratified_k_fold(&inside, FOLDS, Some(self.seed));
+        };
+        let inside: Vec<&str> = rows.iter().map(|&row| groups[row].as_str()).collect();
+        let different = Labels::of(&inside).0.len();
+        splits::group_k_fold(&inside, different.clamp(2, FOLDS))
+    }
+
+    /// Classes that some fold tests without having trained on them, each with the fold.
+    pub fn untrained(&self, y: &[usize]) -> Vec<(usize, &str)> {
+        let mut found = Vec::new();
+        for fold in &self.outer {
+            let trained: Vec<usize> = fold.train.iter().map(|&row| y[row]).collect();
+            let mut tested: Vec<usize> = fold.test.iter().map(|&row| y[row]).collect();
+            tested.sort_unstable();
+            tested.dedup();
+            tested.retain(|class| !trained.contains(class));
+            found.extend(tested.into_iter().map(|class| (class, fold.name.as_str())));
+        }
+        found
+    }
+}
+
+fn stratified(labels: &Labels, y: &[usize], k: usize, seed: u32) -> Result<Vec<Fold>, Failure> {
+    for (class, name) in labels.names().iter().enumerate() {
+        let rows = y.iter().filter(|&&c| c == class).count();
+        if rows < k {
+            let text = format!("class {name} has {rows} rows, too few for {k} stratified folds");
+            return Err(Failure::new(text));
+        }
+    }
+    Ok(splits::stratified_k_fold(y, k, Some(seed))?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plans_are_read_as_written() {
+        let lists = vec![vec!["1".into(), "4".into()], vec!["2".into()]];
+        assert_eq!("lists=1, 4/2".parse(), Ok(CvPlan::Lists(lists)));
+        assert_eq!("k=3".parse(), Ok(CvPlan::K(3)));
+        assert_eq!("group=container".parse(), Ok(CvPlan::Group("container".into())));
+        assert_eq!("fold=fold".parse(), Ok(CvPlan::Fold("fold".into())));
+        for wrong in ["k=", "k=x", "3", "leave=1", ""] {
+            assert!(wrong.parse::<CvPlan>().is_err(), "{wrong}");
+        }
+    }
+}
