@@ -6,6 +6,7 @@ use std::sync::Arc;
 use corsmal_dsp::lanes::{Row, Spectrum};
 use corsmal_dsp::stft::{PadMode, StftParams};
 use corsmal_dsp::time_domain::FrameParams;
+use corsmal_dsp::transform::Forward;
 
 use crate::config::Config;
 use crate::features::{Feature, Kernel, Quantity, WavePad};
@@ -70,6 +71,15 @@ pub enum StreamKind {
         /// Features and what they read.
         members: Vec<(usize, Quantity)>,
     },
+    /// Magnitudes of a transform in double precision, shared by the features that read them.
+    Exact {
+        /// Transform parameters.
+        params: StftParams,
+        /// The transform of a frame that starts with its first sample.
+        forward: Forward<f64>,
+        /// Features.
+        members: Vec<usize>,
+    },
     /// A waveform feature.
     Wave {
         /// Index of the feature.
@@ -112,6 +122,7 @@ impl Plan {
                 Kernel::Spectrum(params, quantity, _) => {
                     join_spectrum(&mut streams, params, (index, *quantity))?;
                 }
+                Kernel::Exact(params, _) => join_exact(&mut streams, params, index)?,
                 Kernel::Wave(frame, pad, _) => streams.push(wave(frame, *pad, index)),
                 Kernel::Derived(of, _) => {
                     source = features.iter().position(|f| f.name == *of);
@@ -142,6 +153,7 @@ impl Plan {
         let hop = |s: &StreamPlan| {
             let member = match &s.kind {
                 StreamKind::Wave { member } => *member == index,
+                StreamKind::Exact { members, .. } => members.contains(&index),
                 StreamKind::Spectrum { members, .. } => members.iter().any(|(m, _)| *m == index),
             };
             member.then_some(s.framing.hop)
@@ -152,7 +164,9 @@ impl Plan {
     /// The longest transform, where there is one.
     pub fn longest_transform(&self) -> Option<usize> {
         let n_fft = |s: &StreamPlan| match &s.kind {
-            StreamKind::Spectrum { params, .. } => Some(params.n_fft),
+            StreamKind::Spectrum { params, .. } | StreamKind::Exact { params, .. } => {
+                Some(params.n_fft)
+            }
             StreamKind::Wave { .. } => None,
         };
         self.streams.iter().filter_map(n_fft).max()
@@ -213,12 +227,7 @@ fn join_spectrum(
     let window =
         corsmal_dsp::window::padded_window(wanted.window, wanted.win_length, wanted.n_fft)?;
     streams.push(StreamPlan {
-        framing: Framing {
-            length: wanted.n_fft,
-            hop: wanted.hop_length,
-            pad: wanted.pad(),
-            mode: wanted.pad_mode,
-        },
+        framing: transform_framing(wanted),
         kind: StreamKind::Spectrum {
             params: *wanted,
             spectrum: Spectrum::new(wanted.n_fft)?,
@@ -227,6 +236,38 @@ fn join_spectrum(
         },
     });
     Ok(())
+}
+
+/// Adds a feature to the exact transform with these parameters, made where there is none.
+fn join_exact(
+    streams: &mut Vec<StreamPlan>,
+    wanted: &StftParams,
+    member: usize,
+) -> corsmal_dsp::Result<()> {
+    for stream in streams.iter_mut() {
+        if let StreamKind::Exact { params, members, .. } = &mut stream.kind
+            && params == wanted
+        {
+            members.push(member);
+            return Ok(());
+        }
+    }
+    // Padding is the stream's: the transform sees whole frames.
+    let forward = Forward::new(&StftParams { center: false, ..*wanted })?;
+    streams.push(StreamPlan {
+        framing: transform_framing(wanted),
+        kind: StreamKind::Exact { params: *wanted, forward, members: vec![member] },
+    });
+    Ok(())
+}
+
+fn transform_framing(params: &StftParams) -> Framing {
+    Framing {
+        length: params.n_fft,
+        hop: params.hop_length,
+        pad: params.pad(),
+        mode: params.pad_mode,
+    }
 }
 
 fn wave(frame: &FrameParams, pad: WavePad, member: usize) -> StreamPlan {

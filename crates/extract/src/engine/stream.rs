@@ -3,6 +3,11 @@
 use std::ops::Range;
 
 use corsmal_dsp::lanes::{LANES, Row, Slots, gather};
+<<<<<<< HEAD
+=======
+use corsmal_dsp::transform::Forward;
+use pulp::Arch;
+>>>>>>> x-features
 
 use super::plan::{Framing, Plan, Scratch, StreamKind};
 use crate::features::{Kernel, Quantity};
@@ -135,6 +140,9 @@ fn run(
 ) {
     let stream = &plan.streams[stream];
     match &stream.kind {
+        StreamKind::Exact { forward, members, .. } => {
+            exact(plan, forward, members, samples, frames, raw);
+        }
         StreamKind::Wave { member } => {
             if let Kernel::Wave(_, _, kernel) = &plan.features[*member].feature.kernel {
                 kernel.frames(samples, plan.channels, frames, &mut raw[*member]);
@@ -182,6 +190,46 @@ fn run(
                         }
                     }
                 }
+            }
+        }
+    }
+}
+
+/// Computes features of exact magnitudes, one (frame, channel) after the other.
+fn exact(
+    plan: &Plan,
+    forward: &Forward<f64>,
+    members: &[usize],
+    samples: &[f32],
+    frames: usize,
+    raw: &mut [Vec<f32>],
+) {
+    let (params, channels) = (forward.params(), plan.channels);
+    let mut transform = forward.scratch();
+    let mut signal = vec![0.0_f32; params.n_fft];
+    let mut magnitude = vec![0.0_f32; params.n_bins()];
+    let mut workers = Vec::with_capacity(members.len());
+    for m in members {
+        let feature = &plan.features[*m].feature;
+        let Kernel::Exact(_, kernel) = &feature.kernel else { continue };
+        let (start, rows) = (raw[*m].len(), feature.raw_rows);
+        raw[*m].resize(start + frames * rows * channels, 0.0);
+        workers.push((*m, start, kernel.worker(), vec![0.0_f64; rows]));
+    }
+    for t in 0..frames {
+        let frame = &samples[t * params.hop_length * channels..];
+        for c in 0..channels {
+            let source = frame[c..].iter().step_by(channels);
+            signal.iter_mut().zip(source).for_each(|(slot, x)| *slot = *x);
+            let spectrum = forward.spectrum(&signal, 0, &mut transform);
+            for (slot, z) in magnitude.iter_mut().zip(spectrum) {
+                *slot = (z.re as f32).hypot(z.im as f32);
+            }
+            for (m, start, worker, values) in &mut workers {
+                worker(&magnitude, values);
+                let at = *start + t * values.len() * channels + c;
+                let out = raw[*m][at..].iter_mut().step_by(channels);
+                out.zip(&*values).for_each(|(slot, v)| *slot = *v as f32);
             }
         }
     }

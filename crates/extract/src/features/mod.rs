@@ -8,7 +8,13 @@ mod delta;
 mod mel_bands;
 mod melspectrogram;
 mod mfcc;
+mod poly_features;
 mod rms;
+mod spectral_bandwidth;
+mod spectral_centroid;
+mod spectral_contrast;
+mod spectral_flatness;
+mod spectral_rolloff;
 mod stft;
 mod zero_crossing_rate;
 
@@ -28,6 +34,12 @@ const REGISTRY: &[Entry] = &[
     Entry::of::<delta::Delta>(),
     Entry::of::<zero_crossing_rate::ZeroCrossingRate>(),
     Entry::of::<rms::Rms>(),
+    Entry::of::<spectral_centroid::SpectralCentroid>(),
+    Entry::of::<spectral_bandwidth::SpectralBandwidth>(),
+    Entry::of::<spectral_rolloff::SpectralRolloff>(),
+    Entry::of::<spectral_flatness::SpectralFlatness>(),
+    Entry::of::<spectral_contrast::SpectralContrast>(),
+    Entry::of::<poly_features::PolyFeatures>(),
 ];
 
 /// Parameters of a feature, and how to plan it.
@@ -44,6 +56,14 @@ pub trait FeatureKind:
     /// # Errors
     /// Impossible parameters.
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature>;
+
+    /// Refuses parameters that no sample rate makes possible, before the first file is opened.
+    ///
+    /// # Errors
+    /// Impossible parameters.
+    fn check(&self) -> corsmal_dsp::Result<()> {
+        self.plan(768_000.0).map(drop)
+    }
 }
 
 /// What a spectrum feature reads of each frame.
@@ -70,6 +90,15 @@ pub trait WaveKernel: Send + Sync {
     fn frames(&self, samples: &[f32], channels: usize, frames: usize, out: &mut Vec<f32>);
 }
 
+/// Computes from one magnitude spectrum of `n_fft / 2 + 1` bins the rows of one (frame, channel).
+pub type SlotFn<'k> = Box<dyn FnMut(&[f32], &mut [f64]) + 'k>;
+
+/// Computes from exact magnitude spectra, one (frame, channel) at a time.
+pub trait SlotKernel: Send + Sync {
+    /// The function with its working memory, made once per block of frames.
+    fn worker(&self) -> SlotFn<'_>;
+}
+
 /// Finishes stored values once the maxima of the recording are known.
 pub trait Finish: Send + Sync {
     /// Rows whose maximum is needed, and whether it is joint over channels.
@@ -84,6 +113,9 @@ pub trait Finish: Send + Sync {
 pub enum Kernel {
     /// Rows of the spectrum.
     Spectrum(StftParams, Quantity, Box<dyn SpectrumKernel>),
+    /// Magnitudes of a transform in double precision, rounded to single precision as librosa
+    /// stores them.
+    Exact(StftParams, Box<dyn SlotKernel>),
     /// Frames of the waveform; outside the signal its edge values count.
     Wave(FrameParams, WavePad, Box<dyn WaveKernel>),
     /// The finished frames of another feature, by name.
@@ -113,6 +145,15 @@ pub struct Feature {
     pub finish: Option<Box<dyn Finish>>,
 }
 
+impl Feature {
+    /// A feature of exact magnitudes whose values are final as computed, one row a label.
+    fn exact(stft: StftParams, kernel: Box<dyn SlotKernel>, labels: Vec<String>) -> Self {
+        let raw_rows = labels.len();
+        let kernel = Kernel::Exact(stft, kernel);
+        Self { kernel, raw_rows, labels, complex: false, finish: None }
+    }
+}
+
 type Planner = Box<dyn Fn(f64) -> corsmal_dsp::Result<Feature> + Send + Sync>;
 
 /// A registered feature kind.
@@ -131,6 +172,7 @@ impl Entry {
             let parameters: K = typed(prefix, table)?;
             let value =
                 serde_json::to_value(&parameters).map_err(|e| ConfigError::key(prefix, e))?;
+            parameters.check().map_err(|e| ConfigError::key(prefix, e))?;
             Ok((value, Box::new(move |sr| parameters.plan(sr))))
         }
         Self { kind: K::KIND, about: K::ABOUT, parse: parse::<K> }
@@ -213,8 +255,6 @@ impl FeatureConfig {
             },
         };
         let (parameters, planner) = (entry.parse)(&prefix, &table)?;
-        // Values that no sample rate makes possible are refused now, not at the first file.
-        planner(768_000.0).map_err(|e| ConfigError::key(&prefix, e))?;
         let planner = std::sync::Arc::new(planner);
         Ok(Self { name: name.to_string(), entry, parameters, coefficients, planner })
     }

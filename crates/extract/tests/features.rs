@@ -1,0 +1,130 @@
+//! Features by way of the engine against the array functions of `corsmal_dsp`.
+
+use std::sync::Arc;
+
+use corsmal_dsp::frequency::fft_frequencies;
+use corsmal_dsp::spectral::{
+    Bandwidth, ContrastParams, Flatness, Frequencies, poly_features, spectral_bandwidth,
+    spectral_centroid, spectral_contrast, spectral_flatness, spectral_rolloff,
+};
+use corsmal_dsp::stft::{StftParams, spectrogram};
+use corsmal_extract::config::Config;
+use corsmal_extract::engine::{Extractor, Features, Plan, Recording};
+use ndarray::{Array2, Array3, ArrayView2, Axis, concatenate, s};
+
+const SR: f64 = 22_050.0;
+
+/// Two tones over noise, another mixture in every channel, `[channels, n]`.
+fn signal(channels: usize, n: usize) -> Array2<f32> {
+    let mut state = 7_u32;
+    let mut noise = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / (1 << 23) as f32 - 1.0
+    };
+    Array2::from_shape_fn((channels, n), |(c, i)| {
+        let tone = |hz: f64| (std::f64::consts::TAU * hz * i as f64 / SR).sin() as f32;
+        let level = 0.3 / (c + 1) as f32;
+        level * tone(440.0 * (c + 1) as f64) + 0.1 * tone(1760.0) + 0.02 * noise()
+    })
+}
+
+fn features(config: &Arc<Config>, y: ArrayView2<f32>, sr: f64, block: usize) -> Features {
+    let plan = Arc::new(Plan::new(config, sr, y.nrows()).unwrap());
+    let interleaved: Vec<f32> = y.t().iter().copied().collect();
+    let mut extractor = Extractor::new(plan.clone(), 0..u64::MAX, 0);
+    interleaved.chunks(block * y.nrows()).for_each(|b| extractor.push(b));
+    let folder = std::env::temp_dir();
+    let mut recording = Recording::new(plan, &folder);
+    recording.add(extractor.finish(true)).unwrap();
+    recording.finish().unwrap()
+}
+
+/// Frames of the only feature of a configuration, `[channels, coefficients, frames]`.
+fn frames(toml: &str, y: ArrayView2<f32>, block: usize) -> Array3<f32> {
+    let config = Arc::new(Config::with_overrides(toml, "test", &[]).unwrap());
+    let Features::Frames(mut arrays) = features(&config, y, SR, block) else {
+        panic!("no summary was asked for")
+    };
+    let array = arrays.remove(0);
+    let shape = (array.frames, array.coefficients, y.nrows());
+    let values = Array3::from_shape_vec(shape, array.values.into_vec().unwrap()).unwrap();
+    values.reversed_axes()
+}
+
+fn close(name: &str, got: &Array3<f32>, want: &Array3<f64>, tolerance: f64) {
+    assert_eq!(got.dim(), want.dim(), "{name}");
+    let largest = want.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let off = got.iter().zip(want).fold(0.0, |m: f64, (g, w)| m.max((f64::from(*g) - w).abs()));
+    assert!(off <= tolerance * largest.max(1e-12), "{name}: {off} of {largest}");
+}
+
+/// librosa's contrast of each channel by itself.
+fn contrast(s: &Array3<f32>, params: &ContrastParams) -> Array3<f64> {
+    let freqs = fft_frequencies(SR, 2048).unwrap();
+    let parts: Vec<_> = (0..s.dim().0)
+        .map(|c| spectral_contrast(s.slice(s![c..c + 1, .., ..]), &freqs, SR, params).unwrap())
+        .collect();
+    concatenate(Axis(0), &parts.iter().map(Array3::view).collect::<Vec<_>>()).unwrap()
+}
+
+#[test]
+fn spectral_features_are_those_of_arrays_whatever_the_blocks() {
+    for (channels, n) in [(1, 30_000), (3, 9_001), (2, 700), (1, 1)] {
+        let y = signal(channels, n);
+        let s = spectrogram(y.view(), &StftParams::new(2048, 512), 1.0).unwrap();
+        let freqs = fft_frequencies(SR, 2048).unwrap();
+        let f = Frequencies::Bins(&freqs);
+        let default = ContrastParams::default();
+        let linear = ContrastParams { linear: true, n_bands: 4, ..default };
+        let cubic = Bandwidth { p: 3.0, norm: true };
+        let cases = [
+            ("spectral_centroid", "", spectral_centroid(s.view(), f).unwrap()),
+            (
+                "spectral_bandwidth",
+                "p = 3.0",
+                spectral_bandwidth(s.view(), f, None, cubic).unwrap(),
+            ),
+            ("spectral_rolloff", "roll_percent = 0.5", spectral_rolloff(s.view(), f, 0.5).unwrap()),
+            (
+                "spectral_flatness",
+                "",
+                spectral_flatness(s.view(), Flatness::default()).unwrap().mapv(f64::from),
+            ),
+            ("spectral_contrast", "", contrast(&s, &default)),
+            ("spectral_contrast", "linear = true\nn_bands = 4", contrast(&s, &linear)),
+            ("poly_features", "order = 2", poly_features(s.view(), f, 2).unwrap().0),
+        ];
+        for (kind, parameters, want) in &cases {
+            let toml = format!("[features.{kind}]\n{parameters}");
+            let got = frames(&toml, y.view(), n);
+            close(kind, &got, want, 1e-6);
+            for block in [1, 977] {
+                assert_eq!(frames(&toml, y.view(), block), got, "{kind} in blocks of {block}");
+            }
+        }
+    }
+}
+
+#[test]
+fn silence_is_finite() {
+    let y = Array2::zeros((2, 5000));
+    for kind in corsmal_extract::features::kinds() {
+        if kind == "delta" {
+            continue;
+        }
+        let got = frames(&format!("[features.{kind}]"), y.view(), 5000);
+        assert!(got.iter().all(|x| x.is_finite()), "{kind}");
+    }
+}
+
+#[test]
+fn impossible_bands_are_refused_with_the_key() {
+    let refused = |text: &str| Config::with_overrides(text, "test", &[]).unwrap_err().to_string();
+    assert!(refused("[features.spectral_contrast]\nfmin = -1.0").contains("fmin"));
+    assert!(refused("[features.spectral_rolloff]\nroll_percent = 1.0").contains("roll_percent"));
+    // Possible at some rate, not at this one.
+    let text = "[features.spectral_contrast]\nn_fft = 512";
+    let config = Arc::new(Config::with_overrides(text, "test", &[]).unwrap());
+    assert!(Plan::new(&config, 8_000.0, 1).is_err());
+    assert!(Plan::new(&config, 44_100.0, 1).is_ok());
+}
