@@ -3,11 +3,7 @@
 use std::ops::Range;
 
 use corsmal_dsp::lanes::{LANES, Row, Slots, gather};
-<<<<<<< HEAD
-=======
 use corsmal_dsp::transform::Forward;
-use pulp::Arch;
->>>>>>> x-features
 
 use super::plan::{Framing, Plan, Scratch, StreamKind};
 use crate::features::{Kernel, Quantity};
