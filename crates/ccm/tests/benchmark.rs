@@ -47,8 +47,8 @@ impl FeatureSource for Counting {
     ) -> Result<Vec<f32>, String> {
         self.0.fetch_add(1, Ordering::Relaxed);
         let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
-        let step = bytes.len() / set.len();
-        Ok((0..set.len()).map(|i| f32::from(bytes[i * step])).collect())
+        let step = bytes.len() / set.width();
+        Ok((0..set.width()).map(|i| f32::from(bytes[i * step])).collect())
     }
 }
 

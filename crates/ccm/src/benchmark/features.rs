@@ -53,7 +53,7 @@ impl FeatureSet {
     }
 
     /// Values per recording.
-    pub fn len(self) -> usize {
+    pub fn width(self) -> usize {
         match self {
             Self::ZcrMfcc => 26,
             Self::Af193 => 193,

@@ -56,7 +56,7 @@ fn part(
     source: &dyn FeatureSource,
     out: &Path,
 ) -> Result<Array2<f64>> {
-    let shape = (jobs.len(), features.len());
+    let shape = (jobs.len(), features.width());
     let path = cache_path(&jobs, features, source, out)?;
     let values = match read(&path, shape) {
         Some(values) => values,

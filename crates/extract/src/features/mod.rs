@@ -156,11 +156,14 @@ impl Feature {
 
 type Planner = Box<dyn Fn(f64) -> corsmal_dsp::Result<Feature> + Send + Sync>;
 
+/// Checks a table of parameters: every parameter with its value, and the planner.
+type Parse = fn(&str, &Map<String, Value>) -> Result<(Value, Planner), ConfigError>;
+
 /// A registered feature kind.
 pub struct Entry {
     kind: &'static str,
     about: &'static str,
-    parse: fn(&str, &Map<String, Value>) -> Result<(Value, Planner), ConfigError>,
+    parse: Parse,
 }
 
 impl Entry {
