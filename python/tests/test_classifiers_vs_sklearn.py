@@ -48,20 +48,15 @@ def container_folds(table):
 @pytest.mark.parametrize("metric", ["euclidean", "manhattan", "cosine", "chebyshev", "minkowski"])
 def test_neighbours_are_identical(table, weights, metric):
     y = table["joint"]
-    for train, test in container_folds(table):
-        for k in (1, 5, 8):
-            settings = {
-                "weights": weights,
-                "metric": metric,
-                "p": 3 if metric == "minkowski" else 2,
-            }
-            ours = KNN(k, **settings).fit(table["X"][train], y[train])
-            theirs = neighbors.KNeighborsClassifier(k, **settings).fit(table["X"][train], y[train])
-            query = table["X"][test]
-            np.testing.assert_array_equal(ours.predict(query), theirs.predict(query))
-            np.testing.assert_allclose(
-                ours.predict_proba(query), theirs.predict_proba(query), rtol=0, atol=1e-9
-            )
+    for k, (train, test) in zip((1, 5, 8), container_folds(table), strict=True):
+        settings = {"weights": weights, "metric": metric, "p": 3 if metric == "minkowski" else 2}
+        ours = KNN(k, **settings).fit(table["X"][train], y[train])
+        theirs = neighbors.KNeighborsClassifier(k, **settings).fit(table["X"][train], y[train])
+        query = table["X"][test]
+        np.testing.assert_array_equal(ours.predict(query), theirs.predict(query))
+        np.testing.assert_allclose(
+            ours.predict_proba(query), theirs.predict_proba(query), rtol=0, atol=1e-9
+        )
 
 
 @pytest.mark.parametrize(("target", "scaled"), [("type", True), ("joint", False)])
