@@ -67,6 +67,9 @@ impl ConfigError {
     }
 }
 
+/// Highest sample rate that is read, in Hz.
+const HIGHEST_RATE: f64 = 768_000.0;
+
 /// A checked configuration.
 #[derive(Debug, Clone)]
 pub struct Config {
@@ -159,7 +162,9 @@ impl Config {
             .into_iter()
             .map(|(name, value)| FeatureConfig::parse(&name, value))
             .collect::<Result<Vec<_>, _>>()?;
-        FeatureConfig::check_references(&features)?;
+        // Values that no sample rate makes possible are refused now, not at the first file.
+        let rate = raw.signal.sample_rate;
+        FeatureConfig::check(&features, if rate > 0.0 { rate } else { HIGHEST_RATE })?;
         if let Some(summary) = &raw.summary {
             summary.check()?;
         }
