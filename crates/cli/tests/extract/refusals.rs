@@ -9,7 +9,7 @@ use crate::support::{ended, extract, extraction, names, tool, wav};
 fn refused(input: &Path, out: &Path, more: &[&str], words: &[&str]) {
     let run = extract(input, out, more).with(2);
     assert!(run.stderr.starts_with("error: "), "{}", run.stderr);
-    assert_eq!(run.stderr.matches("error").count(), 1, "{}", run.stderr);
+    assert_eq!(run.stderr.matches("error: ").count(), 1, "{}", run.stderr);
     assert!(run.stdout.is_empty());
     for word in words {
         assert!(run.stderr.contains(word), "{word:?} is not in: {}", run.stderr);
@@ -155,7 +155,7 @@ fn no_space_is_an_error_and_the_run_can_go_on() {
     shell.args(["-c", "trap '' XFSZ; ulimit -f 256; exec \"$0\" \"$@\""]);
     shell.arg(limited.get_program()).args(limited.get_args());
     let run = ended(&mut shell).with(2);
-    assert_eq!(run.stderr.matches("error").count(), 1, "{}", run.stderr);
+    assert_eq!(run.stderr.matches("error: ").count(), 1, "{}", run.stderr);
     assert!(run.stderr.contains("feats.npz"), "{}", run.stderr);
     assert!(!out.exists());
     extract(&input, &out, &["--resume"]).with(0);

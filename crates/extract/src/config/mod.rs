@@ -87,9 +87,9 @@ struct Raw {
     #[serde(default)]
     description: String,
     #[serde(default)]
-    signal: SignalConfig,
+    signal: Map<String, Value>,
     features: Map<String, Value>,
-    summary: Option<SummaryConfig>,
+    summary: Option<Value>,
 }
 
 impl Config {
@@ -152,7 +152,8 @@ impl Config {
         }
         let raw: Raw = serde_json::from_value(value).map_err(|e| top_level(&e))?;
         let _ = raw.description;
-        raw.signal.check()?;
+        let signal: SignalConfig = typed("signal", &raw.signal)?;
+        signal.check()?;
         if raw.features.is_empty() {
             let message = format!("is empty, at least one of {}", features::kinds().join(", "));
             return Err(ConfigError::key("features", message));
@@ -163,12 +164,19 @@ impl Config {
             .map(|(name, value)| FeatureConfig::parse(&name, value))
             .collect::<Result<Vec<_>, _>>()?;
         // Values that no sample rate makes possible are refused now, not at the first file.
-        let rate = raw.signal.sample_rate;
+        let rate = signal.sample_rate;
         FeatureConfig::check(&features, if rate > 0.0 { rate } else { HIGHEST_RATE })?;
-        if let Some(summary) = &raw.summary {
-            summary.check()?;
-        }
-        Ok(Self { signal: raw.signal, features, summary: raw.summary })
+        let summary = match raw.summary {
+            None => None,
+            Some(value) => {
+                let wrong = |e| ConfigError::key("summary", format!("= {value}: {e}"));
+                let summary: SummaryConfig =
+                    serde_json::from_value(value.clone()).map_err(wrong)?;
+                summary.check()?;
+                Some(summary)
+            }
+        };
+        Ok(Self { signal, features, summary })
     }
 
     /// The effective configuration with every default filled in, keys in a fixed order.
