@@ -56,10 +56,7 @@ impl Meter {
         self.bar.finish_and_clear();
         let elapsed = self.started.elapsed();
         let seconds = *self.seconds.lock().unwrap_or_else(|e| e.into_inner());
-        let mut statuses: BTreeMap<&str, usize> = BTreeMap::new();
-        for outcome in &report.outcomes {
-            *statuses.entry(outcome.status.name()).or_default() += 1;
-        }
+        let statuses = counts(&report.outcomes);
         if self.format == LogFormat::Json {
             let line = json!({
                 "event": "finished", "out": out.display().to_string(), "statuses": statuses,
@@ -119,13 +116,7 @@ impl Progress for Meter {
                 self.line(&json!({"event": "file", "outcome": value}).to_string());
             }
             LogFormat::Text if !outcome.status.has_features() => {
-                let place = outcome
-                    .byte_offset
-                    .filter(|_| !outcome.reason.contains("byte"))
-                    .map_or(String::new(), |b| format!(" (byte {b})"));
-                let reason = outcome.reason.strip_prefix(&format!("{}: ", outcome.path));
-                let reason = reason.unwrap_or(&outcome.reason);
-                self.line(&format!("{}: {}: {reason}{place}", outcome.path, outcome.status));
+                self.line(&failure_line(outcome));
             }
             LogFormat::Text => {}
         }
@@ -139,6 +130,30 @@ impl Progress for Meter {
             }
         }
     }
+}
+
+/// Path, status and reason of a recording without features.
+pub fn failure_line(outcome: &Outcome) -> String {
+    let place = outcome
+        .byte_offset
+        .filter(|_| !outcome.reason.contains("byte"))
+        .map_or(String::new(), |b| format!(" (byte {b})"));
+    let reason = outcome.reason.strip_prefix(&format!("{}: ", outcome.path));
+    let reason = reason.unwrap_or(&outcome.reason);
+    let status = match outcome.status.name() {
+        said if reason.starts_with(said) => String::new(),
+        unsaid => format!("{unsaid}: "),
+    };
+    format!("{}: {status}{reason}{place}", outcome.path)
+}
+
+/// Number of inputs by status.
+pub fn counts(outcomes: &[Outcome]) -> BTreeMap<&'static str, usize> {
+    let mut counts = BTreeMap::new();
+    for outcome in outcomes {
+        *counts.entry(outcome.status.name()).or_default() += 1;
+    }
+    counts
 }
 
 fn human(elapsed: Duration) -> String {

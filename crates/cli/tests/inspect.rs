@@ -101,3 +101,88 @@ fn what_is_no_recording_is_refused() {
     assert_eq!(missing.status.code(), Some(2));
     assert!(text(&missing.stderr).contains("missing.wav"));
 }
+
+/// An output with one good and one bad recording.
+fn output(folder: &Path, name: &str) -> PathBuf {
+    let audio = folder.join("audio");
+    std::fs::create_dir_all(&audio).unwrap();
+    recording(&audio);
+    std::fs::write(audio.join("bad.wav"), b"RIFF").unwrap();
+    let out = folder.join(name);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_corsmal-feat"));
+    command.arg("extract").arg("--in").arg(audio).arg("--out").arg(&out);
+    let run = command.args(["--preset", "mfcc-zcr"]).output().unwrap();
+    assert_eq!(run.status.code(), Some(1), "{}", text(&run.stderr));
+    out
+}
+
+#[test]
+fn outputs_show_contents_configuration_and_outcomes() {
+    let folder = tempfile::tempdir().unwrap();
+    // 4 channels of (20 + 1) features, mean and standard deviation.
+    for (name, format, first, shape) in [
+        ("feats.npz", "npz", "__ids__", serde_json::json!([1])),
+        ("feats.parquet", "parquet", "id", serde_json::json!([1])),
+    ] {
+        let out = output(folder.path(), name);
+        let shown = inspect(&[&out]);
+        assert!(shown.status.success(), "{}", text(&shown.stderr));
+        let report = text(&shown.stdout);
+        for words in [
+            "2 inputs: 1 corrupt, 1 ok",
+            "features.mfcc.n_mfcc = 20",
+            "audio/bad.wav: corrupt at byte 0",
+        ] {
+            assert!(report.contains(words), "{words:?} is not in: {report}");
+        }
+        let shown = inspect(&[&out, "--json".as_ref()]);
+        let report: serde_json::Value = serde_json::from_slice(&shown.stdout).unwrap();
+        assert_eq!(report["format"], format);
+        assert_eq!(
+            (&report["members"][0]["name"], &report["members"][0]["shape"]),
+            (&first.into(), &shape)
+        );
+        assert_eq!(report["config"]["features"]["mfcc"]["n_mfcc"], 20);
+        assert_eq!(report["meta"]["shard"], "0/1");
+        assert_eq!(report["statuses"], serde_json::json!({"corrupt": 1, "ok": 1}));
+        assert_eq!(report["failed"][0]["id"], "bad");
+        let picture = inspect(&[&out, "--picture".as_ref(), &folder.path().join("p.png")]);
+        assert_eq!(picture.status.code(), Some(2));
+    }
+    let members = text(&inspect(&[&folder.path().join("feats.npz")]).stdout);
+    assert!(members.contains("__summary__") && members.contains("1 × 168"), "{members}");
+}
+
+#[test]
+fn of_other_archives_only_the_members() {
+    use corsmal_extract::npz::{Compression, NpzWriter};
+    let folder = tempfile::tempdir().unwrap();
+    let foreign = folder.path().join("foreign.npz");
+    let mut writer = NpzWriter::create(&foreign, Compression::Deflated).unwrap();
+    writer.floats("x", &[2, 3], &[0.0; 6]).unwrap();
+    writer.strings("names", &["one", "three"]).unwrap();
+    writer.finish().unwrap();
+    let shown = inspect(&[&foreign]);
+    let report = text(&shown.stdout);
+    assert!(shown.status.success() && report.contains("npz · 2 members"), "{report}");
+    let rows: Vec<Vec<&str>> = report.lines().map(|l| l.split_whitespace().collect()).collect();
+    assert!(rows.contains(&vec!["x", "<f4", "2", "×", "3"]), "{report}");
+    assert!(rows.contains(&vec!["names", "<U5", "2"]), "{report}");
+    assert!(!report.contains("configuration"));
+
+    // Torn archives, and a table of someone else.
+    let bytes = std::fs::read(&foreign).unwrap();
+    for (name, content) in
+        [("torn.npz", &bytes[..bytes.len() / 2]), ("torn.parquet", b"PAR1 and no more".as_slice())]
+    {
+        let path = folder.path().join(name);
+        std::fs::write(&path, content).unwrap();
+        let out = inspect(&[&path]);
+        assert_eq!(out.status.code(), Some(1));
+        let message = text(&out.stderr);
+        assert!(message.contains(name) && !message.contains("panicked"), "{message}");
+        let out = inspect(&[&path, "--json".as_ref()]);
+        let report: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        assert!(report["reason"].as_str().is_some_and(|r| !r.is_empty()));
+    }
+}

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use corsmal_dsp::resample::{ResamplePlan, ResampleStream};
 
-use crate::config::{Channels, SignalConfig};
+use crate::config::{Channels, Normalize, SignalConfig};
 
 /// The 7.1 rule of ffmpeg's `-ac 1`: weights of FL, FR, FC, LFE, BL, BR, SL, SR, divided by their
 /// sum.
@@ -45,6 +45,8 @@ pub struct FrontEnd {
     preemphasis: f32,
     /// The frame before, for pre-emphasis; empty before the first.
     before: Vec<f32>,
+    /// The signal so far, where it is to be brought to a common level.
+    held: Option<(Normalize, Vec<f32>)>,
     /// Frames still to be given, where a length is configured.
     remaining: Option<u64>,
     mixed: Vec<f32>,
@@ -73,6 +75,7 @@ impl FrontEnd {
             resample,
             preemphasis: config.preemphasis as f32,
             before: Vec::new(),
+            held: (config.normalize != Normalize::None).then(|| (config.normalize, Vec::new())),
             remaining: (config.length > 0.0).then(|| (config.length * sample_rate).round() as u64),
             mixed: Vec::new(),
         })
@@ -83,12 +86,14 @@ impl FrontEnd {
         self.rule == Channels::All
             && self.resample.is_none()
             && self.preemphasis == 0.0
+            && self.held.is_none()
             && self.remaining.is_none()
     }
 
     /// Whether every output frame depends on one input frame only, at the same position.
     pub fn is_pointwise(config: &SignalConfig, resampled: bool) -> bool {
-        !resampled && config.preemphasis == 0.0 && config.length == 0.0
+        let SignalConfig { preemphasis, normalize, length, .. } = config;
+        !resampled && *preemphasis == 0.0 && *normalize == Normalize::None && *length == 0.0
     }
 
     /// Takes interleaved input frames, appends interleaved output frames.
@@ -103,23 +108,32 @@ impl FrontEnd {
                 self.resample = Some(stream);
             }
         }
-        self.rest(out, from);
+        self.emphasize(out, from);
+        match &mut self.held {
+            Some((_, held)) => held.extend(out.drain(from..)),
+            None => self.cut(out, from),
+        }
     }
 
-    /// What remains at the end of the recording.
-    pub fn finish(mut self, out: &mut Vec<f32>) {
+    /// What remains at the end of the recording. Returns the number of frames of silence that are
+    /// to follow, where a longer signal is configured.
+    pub fn finish(mut self, out: &mut Vec<f32>) -> u64 {
         let from = out.len();
         if let Some(stream) = self.resample.take() {
             stream.finish(out);
         }
-        self.rest(out, from);
-        if let Some(frames) = self.remaining {
-            out.resize(out.len() + frames as usize * self.channels, 0.0);
+        self.emphasize(out, from);
+        if let Some((rule, mut held)) = self.held.take() {
+            held.extend(out.drain(from..));
+            normalize(rule, &mut held);
+            out.append(&mut held);
         }
+        self.cut(out, from);
+        self.remaining.unwrap_or(0)
     }
 
-    /// Pre-emphasis and cut of the frames behind `from`.
-    fn rest(&mut self, out: &mut Vec<f32>, from: usize) {
+    /// Pre-emphasis of the frames behind `from`.
+    fn emphasize(&mut self, out: &mut Vec<f32>, from: usize) {
         if self.preemphasis != 0.0 {
             for frame in out[from..].chunks_exact_mut(self.channels) {
                 if self.before.is_empty() {
@@ -133,12 +147,31 @@ impl FrontEnd {
                 }
             }
         }
+    }
+
+    /// Cuts the frames behind `from` to the configured length.
+    fn cut(&mut self, out: &mut Vec<f32>, from: usize) {
         if let Some(remaining) = &mut self.remaining {
             let given = ((out.len() - from) / self.channels) as u64;
             let kept = given.min(*remaining);
             out.truncate(from + kept as usize * self.channels);
             *remaining -= kept;
         }
+    }
+}
+
+/// Brings a whole signal to a common level; silence stays as it is.
+fn normalize(rule: Normalize, signal: &mut [f32]) {
+    let level = match rule {
+        Normalize::None => return,
+        Normalize::Peak => signal.iter().fold(0.0, |m: f32, x| m.max(x.abs())),
+        Normalize::Rms => {
+            let sum: f64 = signal.iter().map(|x| f64::from(*x) * f64::from(*x)).sum();
+            (sum / signal.len().max(1) as f64).sqrt() as f32
+        }
+    };
+    if level > 0.0 {
+        signal.iter_mut().for_each(|x| *x /= level);
     }
 }
 
@@ -176,7 +209,8 @@ mod tests {
         let mut front = FrontEnd::new(config, channels, plan, 100.0).unwrap();
         let mut out = Vec::new();
         input.chunks(block * channels).for_each(|b| front.push(b, &mut out));
-        front.finish(&mut out);
+        let silence = front.finish(&mut out) as usize;
+        out.resize(out.len() + silence * channels, 0.0);
         out
     }
 
@@ -191,6 +225,17 @@ mod tests {
         assert!((run(&with(Channels::Downmix71), 8, &frame, 1)[0] - want).abs() < 1e-6);
         assert!(channels_out(&Channels::Downmix71, 2).is_err());
         assert!(channels_out(&Channels::List(vec![2]), 2).is_err());
+    }
+
+    #[test]
+    fn the_level_is_set_before_the_length() {
+        let with = |normalize| SignalConfig { normalize, length: 0.04, ..SignalConfig::default() };
+        for block in 1..3 {
+            assert_eq!(run(&with(Normalize::Rms), 1, &[3.0, -3.0], block), [1.0, -1.0, 0.0, 0.0]);
+            let cut = run(&with(Normalize::Peak), 1, &[1.0, 2.0, 0.0, 1.0, 4.0], block);
+            assert_eq!(cut, [0.25, 0.5, 0.0, 0.25]);
+        }
+        assert_eq!(run(&with(Normalize::Peak), 1, &[0.0; 5], 2), [0.0; 4]);
     }
 
     #[test]

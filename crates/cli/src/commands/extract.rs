@@ -106,6 +106,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         return Err(Failure::new(format!("--in {names}: no recordings found")));
     }
     if args.dry_run {
+        run::is_parquet(&args.out, &config)?;
         for input in args.shard.of(&found) {
             println!("{}\t{}", input.id, input.source);
         }

@@ -1,19 +1,22 @@
 //! `corsmal-feat inspect`: what a file holds and whether it is healthy.
 
+mod output;
 mod overview;
 mod recording;
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use crate::failure::Failure;
+use serde::Serialize;
+
+use crate::failure::{FAILED_FILES, Failure};
 
 /// Arguments of `inspect`.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  corsmal-feat inspect recording.wav --picture recording.png\n\nClipping: at least three successive samples at the channel's own peak. Silence: share of 20 ms blocks\nbelow -60 dBFS. Exit code 1: the file is no readable recording."
+    after_help = "Examples:\n  corsmal-feat inspect recording.wav --picture recording.png\n  corsmal-feat inspect feats.npz --json\n\nOf a recording: format, health, picture. Of an output of `extract`: contents, configuration, outcomes;\nof any other .npz: its members.\n\nClipping: at least three successive samples at the channel's own peak. Silence: share of 20 ms blocks\nbelow -60 dBFS. Exit code 1: the file cannot be read."
 )]
 pub struct Args {
     /// The file; its content decides what it is, not its name.
@@ -21,7 +24,7 @@ pub struct Args {
     /// Also draw waveform and log-mel spectrogram of each channel, as .png or .svg.
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Print JSON instead of text, with the correlation of all channels.
+    /// Print JSON instead of text, with the correlation of all channels or all members.
     #[arg(long)]
     json: bool,
 }
@@ -63,7 +66,9 @@ impl Picture {
 /// Kinds of files, by their first bytes.
 enum Kind {
     /// A zip archive, as `.npz` files are.
-    Archive,
+    Npz,
+    /// A Parquet table.
+    Parquet,
     /// Anything else is left to the audio readers, which say what is wrong with it.
     Recording,
 }
@@ -72,17 +77,54 @@ fn kind(path: &Path) -> Result<Kind, Failure> {
     let unreadable = |e| Failure::new(format!("{}: {e}", path.display()));
     let mut start = Vec::new();
     File::open(path).and_then(|f| f.take(4).read_to_end(&mut start)).map_err(unreadable)?;
-    Ok(if start == b"PK\x03\x04" { Kind::Archive } else { Kind::Recording })
+    Ok(match start.as_slice() {
+        b"PK\x03\x04" | b"PK\x05\x06" => Kind::Npz,
+        b"PAR1" => Kind::Parquet,
+        _ => Kind::Recording,
+    })
+}
+
+/// The JSON form of a refusal.
+#[derive(Serialize)]
+struct Refusal<'a> {
+    path: &'a str,
+    status: &'static str,
+    byte: Option<u64>,
+    reason: &'a str,
+}
+
+impl Refusal<'_> {
+    /// Says why a file cannot be shown.
+    fn print(&self, json: bool) -> Result<ExitCode, Failure> {
+        if json {
+            print(&to_json(self)?)?;
+        } else {
+            let reason = self.reason.strip_prefix(&format!("{}: ", self.path));
+            eprintln!("{}: {}", self.path, reason.unwrap_or(self.reason));
+        }
+        Ok(ExitCode::from(FAILED_FILES))
+    }
+}
+
+fn to_json(value: &impl Serialize) -> Result<String, Failure> {
+    Ok(serde_json::to_string_pretty(value)? + "\n")
+}
+
+fn print(text: &str) -> Result<(), Failure> {
+    Ok(std::io::stdout().write_all(text.as_bytes())?)
 }
 
 /// Prints what the file is.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let picture = args.picture.map(Picture::check).transpose()?;
-    match kind(&args.file)? {
-        Kind::Recording => recording::inspect(&args.file, picture.as_ref(), args.json),
-        Kind::Archive => {
-            let name = args.file.display();
-            Err(Failure::new(format!("{name}: an archive, expected a recording")))
-        }
+    let output = match kind(&args.file)? {
+        Kind::Recording => return recording::inspect(&args.file, picture.as_ref(), args.json),
+        Kind::Npz => output::npz,
+        Kind::Parquet => output::parquet,
+    };
+    if picture.is_some() {
+        let name = args.file.display();
+        return Err(Failure::new(format!("--picture: {name} is no recording")));
     }
+    output::inspect(&args.file, output, args.json)
 }

@@ -50,8 +50,21 @@ impl StftSpec {
             pad_mode: self.pad_mode,
         };
         params.check()?;
+        at_most("n_fft", self.n_fft, MAX_N_FFT)?;
         Ok(params)
     }
+}
+
+/// Longest transform; bounds the memory of windows and filter banks.
+const MAX_N_FFT: usize = 1 << 18;
+/// Longest frame of the waveform.
+const MAX_FRAME: usize = 1 << 24;
+
+fn at_most(name: &'static str, value: usize, limit: usize) -> corsmal_dsp::Result<()> {
+    if value <= limit {
+        return Ok(());
+    }
+    Err(corsmal_dsp::DspError::parameter(name, value, format!("at most {limit}")))
 }
 
 /// Mel filter bank, its norm apart (librosa calls that `norm` or `mel_norm`).
@@ -231,6 +244,7 @@ impl FrameSpec {
             center: self.center,
         };
         params.check()?;
+        at_most("frame_length", self.frame_length, MAX_FRAME)?;
         Ok(params)
     }
 }

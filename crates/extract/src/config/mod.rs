@@ -67,6 +67,9 @@ impl ConfigError {
     }
 }
 
+/// Highest sample rate that is read, in Hz.
+const HIGHEST_RATE: f64 = 768_000.0;
+
 /// A checked configuration.
 #[derive(Debug, Clone)]
 pub struct Config {
@@ -84,9 +87,9 @@ struct Raw {
     #[serde(default)]
     description: String,
     #[serde(default)]
-    signal: SignalConfig,
+    signal: Map<String, Value>,
     features: Map<String, Value>,
-    summary: Option<SummaryConfig>,
+    summary: Option<Value>,
 }
 
 impl Config {
@@ -156,7 +159,8 @@ impl Config {
         }
         let raw: Raw = serde_json::from_value(value).map_err(|e| top_level(&e))?;
         let _ = raw.description;
-        raw.signal.check()?;
+        let signal: SignalConfig = typed("signal", &raw.signal)?;
+        signal.check()?;
         if raw.features.is_empty() {
             let message = format!("is empty, at least one of {}", features::kinds().join(", "));
             return Err(ConfigError::key("features", message));
@@ -166,11 +170,20 @@ impl Config {
             .into_iter()
             .map(|(name, value)| FeatureConfig::parse(&name, value))
             .collect::<Result<Vec<_>, _>>()?;
-        FeatureConfig::check_references(&features)?;
-        if let Some(summary) = &raw.summary {
-            summary.check()?;
-        }
-        Ok(Self { signal: raw.signal, features, summary: raw.summary })
+        // Values that no sample rate makes possible are refused now, not at the first file.
+        let rate = signal.sample_rate;
+        FeatureConfig::check(&features, if rate > 0.0 { rate } else { HIGHEST_RATE })?;
+        let summary = match raw.summary {
+            None => None,
+            Some(value) => {
+                let wrong = |e| ConfigError::key("summary", format!("= {value}: {e}"));
+                let summary: SummaryConfig =
+                    serde_json::from_value(value.clone()).map_err(wrong)?;
+                summary.check()?;
+                Some(summary)
+            }
+        };
+        Ok(Self { signal, features, summary })
     }
 
     /// The effective configuration with every default filled in, keys in a fixed order.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::plan::{Plan, Scratch};
 use super::stream::{Cursor, Window};
 
-/// What the features of one span of a recording have stored.
+/// What the features of one span of a recording, or of a part of it, have stored.
 #[derive(Debug, Default)]
 pub struct Span {
     /// For each feature `[frames][rows][channels]`, unfinished.
@@ -63,6 +63,17 @@ impl Extractor {
     pub fn push(&mut self, samples: &[f32]) {
         self.buffer.extend_from_slice(samples);
         self.commit(0, 0);
+    }
+
+    /// Number of values computed and not yet taken.
+    pub fn stored(&self) -> usize {
+        self.raw.iter().map(Vec::len).sum()
+    }
+
+    /// Takes what is computed so far, so that a long recording is never held whole. The span's
+    /// other values follow.
+    pub fn take(&mut self) -> Span {
+        Span { raw: self.raw.iter_mut().map(std::mem::take).collect(), total: None }
     }
 
     /// Computes what remains. `at_end` says that the signal ends here; otherwise the pushed samples

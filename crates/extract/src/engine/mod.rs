@@ -14,5 +14,5 @@ mod stream;
 
 pub use extractor::{Extractor, Span};
 pub use plan::Plan;
-pub use recording::{FeatureArray, Features, Recording};
+pub use recording::{FeatureArray, Features, FinishError, Recording};
 pub use store::Store;

@@ -161,6 +161,17 @@ impl Plan {
         self.streams.iter().find_map(hop).unwrap_or(0)
     }
 
+    /// What the user should know of parameters that are possible but odd.
+    pub fn warnings(&self) -> Vec<String> {
+        let warning = |f: &PlannedFeature| match &f.feature.kernel {
+            Kernel::Spectrum(_, _, kernel) => {
+                kernel.warning().map(|warning| format!("{}: {warning}", f.name))
+            }
+            _ => None,
+        };
+        self.features.iter().filter_map(warning).collect()
+    }
+
     /// The longest transform, where there is one.
     pub fn longest_transform(&self) -> Option<usize> {
         let n_fft = |s: &StreamPlan| match &s.kind {

@@ -61,15 +61,14 @@ impl Recording {
         Self { plan, raw, peaks, total: None, folder: folder.to_path_buf() }
     }
 
-    /// Adds the next span; spans behind the end of the signal are ignored.
+    /// Adds the next span, or the next part of one.
     ///
     /// # Errors
     /// The temporary file cannot be written.
     pub fn add(&mut self, span: Span) -> io::Result<()> {
-        if self.total.is_some() {
-            return Ok(());
-        }
-        self.total = span.total;
+        // The first span that sees the end knows where it is; one behind it may still have frames
+        // whose samples the first had as context.
+        self.total = self.total.or(span.total);
         for (i, values) in span.raw.into_iter().enumerate() {
             let planned = &self.plan.features[i];
             if let Some(finish) = &planned.feature.finish {
@@ -208,7 +207,7 @@ impl Recording {
             out
         };
         let mut out = Store::new(&self.folder);
-        store.batches(2 * rayon::current_num_threads(), |chunks| {
+        store.batches(rayon::current_num_threads(), |chunks| {
             let finished: Vec<Vec<f32>> = if chunks.len() > 1 {
                 chunks.par_iter().map(finish_chunk).collect()
             } else {

@@ -59,12 +59,13 @@ impl Cursor {
                 let complete = past.map_or(0, |p| p / framing.hop as u64 + 1);
                 let mut end = self.end.min(complete);
                 if end < self.end {
-                    // Whole blocks only, and the padding before frame 0 may need 2 pad samples.
+                    // Whole blocks only.
                     let group = (LANES / gcd(LANES, plan.channels)) as u64;
                     end = self.next + end.saturating_sub(self.next) / group * group;
-                    if self.next == 0 && available < 2 * framing.pad as u64 + 1 {
-                        end = 0;
-                    }
+                }
+                // The padding before frame 0 may need 2 pad samples.
+                if self.next == 0 && available < 2 * framing.pad as u64 + 1 {
+                    end = 0;
                 }
                 end
             }

@@ -2,7 +2,7 @@
 
 use corsmal_dsp::decibel::Decibel;
 use corsmal_dsp::lanes::{Row, power_to_decibel};
-use corsmal_dsp::mel::{MelParams, SparseBank, mel_filter};
+use corsmal_dsp::mel::{MelParams, SparseBank, empty_filters, mel_filter};
 use serde::{Deserialize, Serialize};
 
 use super::{Finish, SpectrumKernel};
@@ -43,12 +43,21 @@ pub struct MelKernel {
     bank: SparseBank,
     scale: Scale,
     db: Decibel,
+    empty: Vec<usize>,
 }
+
+/// More bands than any use has; bounds the memory of filter bank and cosine transform.
+const MAX_MELS: usize = 4096;
 
 impl MelKernel {
     /// The kernel for a filter bank.
     pub fn new(params: &MelParams, scale: Scale, db: Decibel) -> corsmal_dsp::Result<Self> {
-        Ok(Self { bank: SparseBank::new(&mel_filter(params)?), scale, db })
+        if params.n_mels > MAX_MELS {
+            let allowed = format!("at most {MAX_MELS}");
+            return Err(corsmal_dsp::DspError::parameter("n_mels", params.n_mels, allowed));
+        }
+        let bank = mel_filter(params)?;
+        Ok(Self { bank: SparseBank::new(&bank), scale, db, empty: empty_filters(&bank) })
     }
 }
 
@@ -56,6 +65,16 @@ impl SpectrumKernel for MelKernel {
     fn rows(&self, spectrum: &[Row], out: &mut [Row]) {
         self.bank.apply_rows(spectrum, out);
         power_rows_to_scale(self.scale, &self.db, out);
+    }
+
+    fn warning(&self) -> Option<String> {
+        let (first, last) = (self.empty.first()?, self.empty.last()?);
+        Some(format!(
+            "{} of {} mel filters are empty (between {first} and {last}): fewer n_mels or a longer \
+             n_fft avoids that",
+            self.empty.len(),
+            self.bank.bands().len()
+        ))
     }
 }
 

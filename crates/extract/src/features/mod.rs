@@ -81,6 +81,11 @@ pub enum Quantity {
 pub trait SpectrumKernel: Send + Sync {
     /// `spectrum` holds the quantity's rows, `out` the feature's.
     fn rows(&self, spectrum: &[Row], out: &mut [Row]);
+
+    /// What the user should know of these parameters, though they are possible.
+    fn warning(&self) -> Option<String> {
+        None
+    }
 }
 
 /// Computes from frames of the waveform.
@@ -262,15 +267,28 @@ impl FeatureConfig {
         Ok(Self { name: name.to_string(), entry, parameters, coefficients, planner })
     }
 
-    /// Refuses a derived feature whose source is missing or comes later.
-    pub(crate) fn check_references(all: &[Self]) -> Result<(), ConfigError> {
+    /// Refuses what is impossible for signals of `sr` Hz, a derived feature whose source is missing
+    /// or comes later, and coefficients that a feature has not.
+    pub(crate) fn check(all: &[Self], sr: f64) -> Result<(), ConfigError> {
+        let mut coefficients: Vec<usize> = Vec::new();
         for (i, feature) in all.iter().enumerate() {
-            let Some(of) = feature.parameters.get("of").and_then(Value::as_str) else { continue };
-            let source = all[..i].iter().find(|f| f.name == of);
-            if source.is_none() {
-                let message = format!("= \"{of}\": expected the name of an earlier feature");
-                return Err(ConfigError::key(format!("features.{}.of", feature.name), message));
+            let key = |last: &str| format!("features.{}{last}", feature.name);
+            let planned = feature.plan(sr).map_err(|e| ConfigError::key(key(""), e))?;
+            let count = match &planned.kernel {
+                Kernel::Derived(of, _) => {
+                    let source = all[..i].iter().position(|f| f.name == *of);
+                    let message = || format!("= \"{of}\": expected the name of an earlier feature");
+                    coefficients[source.ok_or_else(|| ConfigError::key(key(".of"), message()))?]
+                }
+                _ => planned.labels.len(),
+            };
+            if let Some([first, end]) = feature.coefficients
+                && end > count
+            {
+                let message = format!("= [{first}, {end}]: at most {count}");
+                return Err(ConfigError::key(key(".coefficients"), message));
             }
+            coefficients.push(count);
         }
         Ok(())
     }

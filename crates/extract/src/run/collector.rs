@@ -30,7 +30,7 @@ pub struct Collector<'a> {
     options: &'a Options,
     progress: &'a dyn Progress,
     stop: &'a AtomicBool,
-    plans: Plans,
+    plans: Plans<'a>,
     /// Folder of temporary files: that of the output.
     folder: PathBuf,
     state: Mutex<State>,
@@ -64,8 +64,13 @@ type Parts = (Vec<Member>, Option<Vec<f32>>, u64);
 struct Partial {
     outcome: Outcome,
     planned: Planned,
-    spans: Vec<Option<Result<Span, Failed>>>,
-    missing: usize,
+    /// Number of spans, and of those that are added.
+    spans: usize,
+    added: usize,
+    /// Spans computed before their turn, each in parts.
+    early: BTreeMap<usize, Result<Vec<Span>, Failed>>,
+    /// `None` while a worker adds to it.
+    recording: Option<Result<Recording, Failed>>,
 }
 
 enum Work {
@@ -93,7 +98,7 @@ impl<'a> Collector<'a> {
             options,
             progress,
             stop,
-            plans: Plans::new(config.clone()),
+            plans: Plans::new(config.clone(), progress),
             folder,
             state: Mutex::new(state),
             changed: Condvar::new(),
@@ -140,7 +145,12 @@ impl<'a> Collector<'a> {
             if self.stop.load(Ordering::Relaxed) || state.error.is_some() {
                 return None;
             }
-            if let Some(job) = state.spans.pop_front() {
+            // Spans wait for those before them, so they are not computed far ahead either.
+            let ahead = state.spans.front().is_some_and(|job| {
+                let added = state.partial.get(&job.input).map_or(0, |partial| partial.added);
+                job.index >= added + AHEAD * self.options.jobs
+            });
+            if !ahead && let Some(job) = state.spans.pop_front() {
                 return Some(Work::Span(job));
             }
             if state.next < self.inputs.len() {
@@ -176,21 +186,26 @@ impl<'a> Collector<'a> {
         let signal = &planned.plan.config.signal;
         let crop = reader::crop(signal, (input.start, input.end), source.spec().sample_rate);
         let spans = reader::spans(source.as_ref(), signal, planned.resample.is_some(), &crop);
+        let mut recording = Recording::new(planned.plan.clone(), &self.folder);
         if let [span] = spans.as_slice() {
-            let computed = reader::compute(source.as_mut(), &planned, &crop, span, self.stop);
+            let computed =
+                reader::compute(source.as_mut(), &planned, &crop, span, self.stop, |part| {
+                    recording.add(part).map_err(|e| self.temporary(e))
+                });
             reader::describe(&mut outcome, source.as_ref());
             return match computed {
-                Ok(None) => {}
-                Ok(Some(span)) => self.complete(index, outcome, &planned, vec![Ok(span)]),
+                Ok(false) => {}
+                Ok(true) => self.complete(index, outcome, &planned, Ok(recording)),
                 Err(failed) => self.fail(index, outcome, failed),
             };
         }
-        let missing = spans.len();
         let partial = Partial {
             outcome,
             planned: planned.clone(),
-            spans: (0..missing).map(|_| None).collect(),
-            missing,
+            spans: spans.len(),
+            added: 0,
+            early: BTreeMap::new(),
+            recording: Some(Ok(recording)),
         };
         let mut state = self.lock();
         state.partial.insert(index, partial);
@@ -206,52 +221,85 @@ impl<'a> Collector<'a> {
     /// Computes one span of a recording that was cut.
     fn span(&self, job: SpanJob) {
         let input = &self.inputs[job.input];
+        let mut parts = Vec::new();
         let mut last = None;
-        let computed = reader::open(input).and_then(|mut source| {
+        let computed = reader::open(input).and_then(|source| {
             let signal = &job.planned.plan.config.signal;
             let crop = reader::crop(signal, (input.start, input.end), source.spec().sample_rate);
-            let span = reader::compute(source.as_mut(), &job.planned, &crop, &job.span, self.stop);
-            last = Some(source);
-            span
+            let source = last.insert(source).as_mut();
+            reader::compute(source, &job.planned, &crop, &job.span, self.stop, |part| {
+                parts.push(part);
+                Ok(())
+            })
         });
         let result = match computed {
-            Ok(None) => return,
-            Ok(Some(span)) => Ok(span),
+            Ok(false) => return,
+            Ok(true) => Ok(parts),
             Err(failed) => Err(failed),
         };
         let mut state = self.lock();
-        let Some(partial) = state.partial.get_mut(&job.input) else { return };
-        if let Some(source) = last {
-            reader::describe(&mut partial.outcome, source.as_ref());
+        if let Some(partial) = state.partial.get_mut(&job.input) {
+            if let Some(source) = last {
+                reader::describe(&mut partial.outcome, source.as_ref());
+            }
+            partial.early.insert(job.index, result);
         }
-        partial.spans[job.index] = Some(result);
-        partial.missing -= 1;
-        if partial.missing == 0
-            && let Some(partial) = state.partial.remove(&job.input)
-        {
+        drop(state);
+        self.join(job.input);
+    }
+
+    /// Adds the spans whose turn it is to their recording, unless another worker is at it.
+    fn join(&self, index: usize) {
+        let mut state = self.lock();
+        loop {
+            let Some(partial) = state.partial.get_mut(&index) else { return };
+            let Some(recording) = partial.recording.take() else { return };
+            if partial.added == partial.spans {
+                if let Some(partial) = state.partial.remove(&index) {
+                    drop(state);
+                    self.complete(index, partial.outcome, &partial.planned, recording);
+                }
+                return;
+            }
+            let Some(span) = partial.early.remove(&partial.added) else {
+                partial.recording = Some(recording);
+                return;
+            };
+            // Adding writes to a temporary file: not under the lock.
             drop(state);
-            let spans = partial.spans.into_iter().flatten().collect();
-            self.complete(job.input, partial.outcome, &partial.planned, spans);
+            let recording = match (recording, span) {
+                (Ok(mut recording), Ok(parts)) => parts
+                    .into_iter()
+                    .try_for_each(|part| recording.add(part))
+                    .map_err(|e| self.temporary(e))
+                    .map(|()| recording),
+                (Ok(_), Err(failed)) | (Err(failed), _) => Err(failed),
+            };
+            state = self.lock();
+            if let Some(partial) = state.partial.get_mut(&index) {
+                partial.recording = Some(recording);
+                partial.added += 1;
+            }
+            self.changed.notify_all();
         }
     }
 
-    /// Finishes a recording from its spans.
+    fn temporary(&self, error: std::io::Error) -> Failed {
+        let folder = self.folder.display();
+        Failed::new(Status::Io, format!("temporary file in {folder}: {error}"))
+    }
+
+    /// Finishes a recording whose spans are all added.
     fn complete(
         &self,
         index: usize,
         mut outcome: Outcome,
         planned: &Planned,
-        spans: Vec<Result<Span, Failed>>,
+        recording: Result<Recording, Failed>,
     ) {
         let plan = &planned.plan;
-        let temporary = |e: std::io::Error| {
-            Failed::new(Status::Io, format!("temporary file in {}: {e}", self.folder.display()))
-        };
         let finish = || -> Result<Parts, Failed> {
-            let mut recording = Recording::new(plan.clone(), &self.folder);
-            for span in spans {
-                recording.add(span?).map_err(temporary)?;
-            }
+            let recording = recording?;
             let total = recording.total();
             let features = super::signal::finish(recording, plan)?;
             Ok(match features {
@@ -259,7 +307,8 @@ impl<'a> Collector<'a> {
                 Features::Frames(arrays) => {
                     let compression = self.options.compression;
                     let id = &self.inputs[index].id;
-                    (Member::of(id, plan, arrays, compression).map_err(temporary)?, None, total)
+                    let members = Member::of(id, plan, arrays, compression);
+                    (members.map_err(|e| self.temporary(e))?, None, total)
                 }
             })
         };

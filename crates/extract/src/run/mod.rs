@@ -162,12 +162,7 @@ pub fn run(
     progress: &dyn Progress,
     stop: &AtomicBool,
 ) -> Result<Report, RunError> {
-    let parquet = options.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
-    if parquet && config.summary.is_none() {
-        let why =
-            "Parquet holds summary tables: the configuration needs a [summary], or write .npz";
-        return Err(RunError::Format { path: options.out.clone(), why: why.into() });
-    }
+    let parquet = is_parquet(&options.out, config)?;
     let provenance = Provenance::new(
         config.to_value().to_string(),
         config.hash(),
@@ -215,6 +210,24 @@ pub fn run(
     }
     let outcomes = sink.publish(&provenance)?;
     Ok(Report { outcomes, resumed, up_to_date: false })
+}
+
+/// Whether an output is Parquet, else `.npz`, by its extension.
+///
+/// # Errors
+/// [`RunError::Format`]: another extension, or a format that cannot hold what `config` gives.
+pub fn is_parquet(out: &Path, config: &Config) -> Result<bool, RunError> {
+    let refuse = |why: &str| Err(RunError::Format { path: out.into(), why: why.into() });
+    match out.extension() {
+        Some(e) if e.eq_ignore_ascii_case("npz") => Ok(false),
+        Some(e) if e.eq_ignore_ascii_case("parquet") => match config.summary {
+            Some(_) => Ok(true),
+            None => refuse(
+                "Parquet holds summary tables: the configuration needs a [summary], or write .npz",
+            ),
+        },
+        _ => refuse("must end in .npz or .parquet"),
+    }
 }
 
 /// The report of an output that is already complete; an error where it holds something else.

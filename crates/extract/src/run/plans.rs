@@ -1,6 +1,6 @@
 //! Plans for every combination of rate and channels that a run meets, made once.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex};
 
 use corsmal_audio::AudioSpec;
@@ -9,6 +9,7 @@ use corsmal_dsp::resample::ResamplePlan;
 use crate::config::Config;
 use crate::engine::Plan;
 use crate::frontend::channels_out;
+use crate::run::Progress;
 
 /// What a recording is computed with.
 #[derive(Clone)]
@@ -22,15 +23,23 @@ pub struct Planned {
 type Made = Result<Planned, String>;
 
 /// The plans of a run.
-pub struct Plans {
+pub struct Plans<'a> {
     config: Arc<Config>,
-    made: Mutex<HashMap<(u32, u16), Made>>,
+    progress: &'a dyn Progress,
+    state: Mutex<State>,
 }
 
-impl Plans {
-    /// No plans yet.
-    pub fn new(config: Arc<Config>) -> Self {
-        Self { config, made: Mutex::new(HashMap::new()) }
+#[derive(Default)]
+struct State {
+    made: HashMap<(u32, u16), Made>,
+    /// Each is given once per run, not for every rate and number of channels.
+    warnings: HashSet<String>,
+}
+
+impl<'a> Plans<'a> {
+    /// No plans yet; what a plan warns of goes to `progress`.
+    pub fn new(config: Arc<Config>, progress: &'a dyn Progress) -> Self {
+        Self { config, progress, state: Mutex::default() }
     }
 
     /// The plan for recordings like this one.
@@ -39,9 +48,21 @@ impl Plans {
     /// A sentence, where the configuration does not fit.
     pub fn of(&self, spec: &AudioSpec) -> Made {
         // Making a plan takes milliseconds; the lock keeps two workers from making the same one.
-        let mut made = self.made.lock().unwrap_or_else(|e| e.into_inner());
+        let mut state = self.state.lock().unwrap_or_else(|e| e.into_inner());
         let key = (spec.sample_rate, spec.channels);
-        made.entry(key).or_insert_with(|| self.make(spec)).clone()
+        if let Some(made) = state.made.get(&key) {
+            return made.clone();
+        }
+        let made = self.make(spec);
+        if let Ok(planned) = &made {
+            for warning in planned.plan.warnings() {
+                if state.warnings.insert(warning.clone()) {
+                    self.progress.warning(&warning);
+                }
+            }
+        }
+        state.made.insert(key, made.clone());
+        made
     }
 
     fn make(&self, spec: &AudioSpec) -> Made {

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use corsmal_audio::{AudioError, AudioSpec, BlockSource, Repair};
 
 use super::plans::Planned;
-use crate::config::{Normalize, SignalConfig};
+use crate::config::SignalConfig;
 use crate::engine::{Extractor, Span};
 use crate::frontend::FrontEnd;
 use crate::inputs::{Input, InputSource};
@@ -14,6 +14,8 @@ use crate::outcome::{Outcome, Status};
 
 /// Samples read at a time, all channels together.
 const BLOCK: usize = 1 << 16;
+/// Values computed of a span before they are handed on (8 MiB).
+const PART: usize = 1 << 21;
 /// Frames of a span; recordings of more than two are cut.
 const SPAN: u64 = 1 << 20;
 
@@ -78,9 +80,7 @@ pub fn spans(
     crop: &Range<u64>,
 ) -> Vec<Range<u64>> {
     let whole = 0..u64::MAX;
-    let separable = source.seekable()
-        && FrontEnd::is_pointwise(signal, resampled)
-        && signal.normalize == Normalize::None;
+    let separable = source.seekable() && FrontEnd::is_pointwise(signal, resampled);
     let Some(declared) = source.spec().declared_frames.filter(|_| separable) else {
         return vec![whole];
     };
@@ -96,14 +96,16 @@ pub fn spans(
     spans
 }
 
-/// Reads and computes one span. `None` when the run was stopped.
+/// Reads and computes one span, and hands it to `each` in parts of bounded size. Whether it came to
+/// its end: `false` when the run was stopped.
 pub fn compute(
     source: &mut dyn BlockSource,
     planned: &Planned,
     crop: &Range<u64>,
     span: &Range<u64>,
     stop: &AtomicBool,
-) -> Result<Option<Span>, Failed> {
+    mut each: impl FnMut(Span) -> Result<(), Failed>,
+) -> Result<bool, Failed> {
     let plan = &planned.plan;
     let config = &plan.config.signal;
     let channels = usize::from(source.spec().channels);
@@ -117,14 +119,16 @@ pub fn compute(
     skip_to(source, begin)?;
     let checked = may_be_non_finite(source.spec());
     let mut extractor = Extractor::new(plan.clone(), span.clone(), first);
-    let identity = front.is_identity() && config.normalize == Normalize::None;
-    let held = config.normalize != Normalize::None;
+    let identity = front.is_identity();
     let (mut block, mut signal) = (Vec::new(), Vec::new());
     let mut position = begin;
     let mut ended = false;
     while position < end {
         if stop.load(Ordering::Relaxed) {
-            return Ok(None);
+            return Ok(false);
+        }
+        if extractor.stored() > PART {
+            each(extractor.take())?;
         }
         let wanted = ((BLOCK / channels).max(1) as u64).min(end - position) as usize;
         let frames = if identity {
@@ -143,10 +147,8 @@ pub fn compute(
                 require_finite(samples, position, channels)?;
             }
             front.push(samples, &mut signal);
-            if !held {
-                extractor.push(&signal);
-                signal.clear();
-            }
+            extractor.push(&signal);
+            signal.clear();
             frames
         };
         if frames == 0 {
@@ -157,14 +159,26 @@ pub fn compute(
     }
     // The end of the crop is the end of the signal, too.
     let at_end = ended || end == crop.end;
-    if !identity {
-        if at_end {
-            front.finish(&mut signal);
-        }
-        normalize(config.normalize, &mut signal);
+    if !identity && at_end {
+        let mut silence = front.finish(&mut signal);
         extractor.push(&signal);
+        let room = (BLOCK / plan.channels).max(1) as u64;
+        signal.clear();
+        signal.resize(room as usize * plan.channels, 0.0);
+        while silence > 0 {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
+            if extractor.stored() > PART {
+                each(extractor.take())?;
+            }
+            let frames = silence.min(room);
+            extractor.push(&signal[..frames as usize * plan.channels]);
+            silence -= frames;
+        }
     }
-    Ok(Some(extractor.finish(at_end)))
+    each(extractor.finish(at_end))?;
+    Ok(true)
 }
 
 /// Goes to a frame, by reading where the source cannot seek.
@@ -208,21 +222,6 @@ pub fn require_finite(samples: &[f32], position: u64, channels: usize) -> Result
             at % channels
         ),
     ))
-}
-
-/// Brings a whole signal to a common level; silence stays as it is.
-pub fn normalize(rule: Normalize, signal: &mut [f32]) {
-    let level = match rule {
-        Normalize::None => return,
-        Normalize::Peak => signal.iter().fold(0.0, |m: f32, x| m.max(x.abs())),
-        Normalize::Rms => {
-            let sum: f64 = signal.iter().map(|x| f64::from(*x) * f64::from(*x)).sum();
-            (sum / signal.len().max(1) as f64).sqrt() as f32
-        }
-    };
-    if level > 0.0 {
-        signal.iter_mut().for_each(|x| *x /= level);
-    }
 }
 
 /// Fills an outcome with what the reader knows.

@@ -7,10 +7,11 @@ use std::sync::Arc;
 use corsmal_audio::AudioSpec;
 use thiserror::Error;
 
+use super::Quiet;
 use super::plans::{Planned, Plans};
 use super::reader::{self, Failed};
-use crate::config::{Config, Normalize};
-use crate::engine::{Extractor, Features, Plan, Recording};
+use crate::config::Config;
+use crate::engine::{Extractor, Features, FinishError, Plan, Recording};
 use crate::frontend::FrontEnd;
 use crate::outcome::Status;
 
@@ -36,14 +37,14 @@ impl From<Failed> for SignalError {
 /// Computes signals by one configuration; filters and transforms are made once per sample rate and
 /// number of channels.
 pub struct Signals {
-    plans: Plans,
+    plans: Plans<'static>,
     folder: PathBuf,
 }
 
 impl Signals {
     /// Signals by `config`. What does not fit in memory goes to the system's temporary folder.
     pub fn new(config: Arc<Config>) -> Self {
-        Self { plans: Plans::new(config), folder: std::env::temp_dir() }
+        Self { plans: Plans::new(config, &Quiet), folder: std::env::temp_dir() }
     }
 
     /// Begins a signal of `sample_rate` Hz and `channels` channels.
@@ -85,7 +86,7 @@ pub struct Signal {
     channels: usize,
     /// Input frames pushed.
     position: u64,
-    /// Behind the front end; the whole signal where its level is to be normalised.
+    /// What the front end gave for a block.
     held: Vec<f32>,
     folder: PathBuf,
 }
@@ -111,10 +112,8 @@ impl Signal {
             let block = &block[from as usize * self.channels..to as usize * self.channels];
             reader::require_finite(block, begin + from, self.channels)?;
             self.front.push(block, &mut self.held);
-            if self.plan.config.signal.normalize == Normalize::None {
-                self.extractor.push(&self.held);
-                self.held.clear();
-            }
+            self.extractor.push(&self.held);
+            self.held.clear();
         }
         Ok(())
     }
@@ -126,7 +125,6 @@ impl Signal {
     pub fn finish(self) -> Result<Features, SignalError> {
         let Self { plan, front, mut extractor, mut held, folder, .. } = self;
         front.finish(&mut held);
-        reader::normalize(plan.config.signal.normalize, &mut held);
         extractor.push(&held);
         drop(held);
         let mut recording = Recording::new(plan.clone(), &folder);
@@ -147,7 +145,10 @@ pub fn finish(recording: Recording, plan: &Plan) -> Result<Features, Failed> {
         let reason = format!("{total} samples, at least {needed} make one frame");
         return Err(Failed::new(Status::TooShort, reason));
     }
-    recording.finish().map_err(|e| Failed::new(Status::TooShort, e.to_string()))
+    recording.finish().map_err(|e| match e {
+        FinishError::Temporary(_) => Failed::new(Status::Io, e.to_string()),
+        FinishError::TooFewFrames { .. } => Failed::new(Status::TooShort, e.to_string()),
+    })
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! Inspection of a recording.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -12,8 +11,8 @@ use corsmal_plot::{to_png, to_svg};
 use serde::Serialize;
 
 use super::overview::Overview;
-use super::{Picture, PictureFormat};
-use crate::failure::{FAILED_FILES, Failure};
+use super::{Picture, PictureFormat, Refusal, print, to_json};
+use crate::failure::Failure;
 
 /// Frames read at once.
 const BLOCK: usize = 8192;
@@ -31,21 +30,12 @@ struct Report<'a> {
     health: &'a Health,
 }
 
-/// The JSON form of a refusal.
-#[derive(Serialize)]
-struct Refusal {
-    path: String,
-    status: &'static str,
-    byte: Option<u64>,
-    reason: String,
-}
-
 /// Reads the recording once and prints its report.
 pub fn inspect(path: &Path, picture: Option<&Picture>, json: bool) -> Result<ExitCode, Failure> {
     let name = path.display().to_string();
     let mut source = match open(path) {
         Ok(source) => source,
-        Err(error) => return refuse(name, &error, json),
+        Err(error) => return refuse(&name, &error, json),
     };
     let spec = source.spec().clone();
     let channels = usize::from(spec.channels);
@@ -59,7 +49,7 @@ pub fn inspect(path: &Path, picture: Option<&Picture>, json: bool) -> Result<Exi
         let samples = match next(source.as_mut(), &mut block) {
             Ok([]) => break,
             Ok(samples) => samples,
-            Err(error) => return refuse(name, &error, json),
+            Err(error) => return refuse(&name, &error, json),
         };
         meter.push(samples);
         if let Some(overview) = &mut overview {
@@ -71,8 +61,7 @@ pub fn inspect(path: &Path, picture: Option<&Picture>, json: bool) -> Result<Exi
     let reading = source.health();
     let report =
         Report { path: name, status: "ok", spec: &spec, seconds, reading, health: &health };
-    let text = if json { to_json(&report)? } else { report.text() };
-    std::io::stdout().write_all(text.as_bytes())?;
+    print(&if json { to_json(&report)? } else { report.text() })?;
 
     if let (Some(overview), Some(picture)) = (overview, picture) {
         let title = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -93,19 +82,9 @@ fn next<'a>(source: &mut dyn BlockSource, block: &'a mut [f32]) -> Result<&'a [f
     Ok(&block[..frames * usize::from(source.spec().channels)])
 }
 
-fn refuse(path: String, error: &AudioError, json: bool) -> Result<ExitCode, Failure> {
-    let (status, reason) = (error.status(), error.to_string());
-    if json {
-        let refusal = Refusal { path, status, byte: error.offset(), reason };
-        std::io::stdout().write_all(to_json(&refusal)?.as_bytes())?;
-    } else {
-        eprintln!("{path}: {reason}");
-    }
-    Ok(ExitCode::from(FAILED_FILES))
-}
-
-fn to_json(value: &impl Serialize) -> Result<String, Failure> {
-    Ok(serde_json::to_string_pretty(value)? + "\n")
+fn refuse(path: &str, error: &AudioError, json: bool) -> Result<ExitCode, Failure> {
+    let (status, reason) = (error.status(), &error.to_string());
+    Refusal { path, status, byte: error.offset(), reason }.print(json)
 }
 
 impl Report<'_> {

@@ -1,0 +1,183 @@
+//! Inspection of an output: contents, configuration, outcomes.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::ExitCode;
+
+use corsmal_extract::layout;
+use corsmal_extract::npz::NpzFile;
+use corsmal_extract::outcome::Outcome;
+use corsmal_extract::provenance::Provenance;
+use corsmal_extract::table::Table;
+use serde::Serialize;
+use serde_json::Value;
+
+use super::{Refusal, print, to_json};
+use crate::failure::Failure;
+use crate::progress::{counts, failure_line};
+
+/// Members shown as text; JSON has all.
+const SHOWN: usize = 20;
+
+/// Everything that is printed; its JSON form is the output of `--json`.
+#[derive(Serialize)]
+pub struct Report {
+    path: String,
+    format: &'static str,
+    members: Vec<Member>,
+    /// What only outputs of `extract` have.
+    #[serde(flatten)]
+    run: Option<Run>,
+}
+
+/// An array of an archive or a column of a table.
+#[derive(Serialize)]
+struct Member {
+    name: String,
+    #[serde(rename = "type")]
+    kind: String,
+    shape: Vec<u64>,
+}
+
+/// How an output was made and what became of its inputs.
+#[derive(Serialize)]
+struct Run {
+    meta: Provenance,
+    config: Value,
+    statuses: BTreeMap<&'static str, usize>,
+    failed: Vec<Outcome>,
+}
+
+type Failed = Box<dyn std::error::Error>;
+
+/// An `.npz`: all of it where it is one of ours, else its members.
+pub fn npz(path: &Path) -> Result<Report, Failed> {
+    let mut file = NpzFile::open(path)?;
+    let names = file.names().to_vec();
+    let mut members = Vec::with_capacity(names.len());
+    for name in names {
+        let header = file.header(&name)?;
+        members.push(Member { name, kind: header.dtype.to_string(), shape: header.shape });
+    }
+    if members.is_empty() {
+        return Err("a zip archive without .npy members".into());
+    }
+    let run = match layout::is_ours(&file) {
+        true => Some(Run::new(layout::read_table(&mut file)?)?),
+        false => None,
+    };
+    Ok(Report { path: path.display().to_string(), format: "npz", members, run })
+}
+
+/// A summary table.
+pub fn parquet(path: &Path) -> Result<Report, Failed> {
+    let found = corsmal_extract::parquet::read(path)?;
+    let table = &found.0;
+    let column = |name: &str, kind: &str| Member {
+        name: name.to_owned(),
+        kind: kind.to_owned(),
+        shape: vec![table.ids().len() as u64],
+    };
+    let labels = table.labels().map(|(name, _)| column(name, "text"));
+    let features = table.feature_names().iter().map(|name| column(name, "float32"));
+    let members = std::iter::once(column("id", "text")).chain(labels).chain(features).collect();
+    let path = path.display().to_string();
+    Ok(Report { path, format: "parquet", members, run: Some(Run::new(found)?) })
+}
+
+/// Prints what `read` finds in a file.
+pub fn inspect(
+    path: &Path,
+    read: fn(&Path) -> Result<Report, Failed>,
+    json: bool,
+) -> Result<ExitCode, Failure> {
+    match read(path) {
+        Ok(report) => {
+            print(&if json { to_json(&report)? } else { report.text() })?;
+            Ok(ExitCode::SUCCESS)
+        }
+        Err(error) => {
+            let path = path.display().to_string();
+            let reason = error.to_string();
+            Refusal { path: &path, status: "corrupt", byte: None, reason: &reason }.print(json)
+        }
+    }
+}
+
+impl Run {
+    fn new((table, meta): (Table, Provenance)) -> Result<Self, serde_json::Error> {
+        let config = serde_json::from_str(&meta.config)?;
+        let failed = table.outcomes().iter().filter(|o| !o.status.has_features());
+        let (statuses, failed) = (counts(table.outcomes()), failed.cloned().collect());
+        Ok(Self { meta, config, statuses, failed })
+    }
+
+    fn text(&self, lines: &mut Vec<String>) {
+        lines.push(format!("\n  configuration {}", self.meta.config_hash));
+        settings("", &self.config, lines);
+        if !self.failed.is_empty() {
+            lines.push("\n  without features".into());
+            lines.extend(self.failed.iter().map(|o| format!("    {}", failure_line(o))));
+        }
+    }
+}
+
+impl Report {
+    fn text(&self) -> String {
+        let mut lines = vec![self.path.clone()];
+        let arrays = format!("{} · {}", self.format, plural(self.members.len(), "member"));
+        lines.push(match &self.run {
+            None => format!("  {arrays}"),
+            Some(run) => {
+                let statuses: Vec<_> =
+                    run.statuses.iter().map(|(status, n)| format!("{n} {status}")).collect();
+                let inputs = plural(run.statuses.values().sum(), "input");
+                let Provenance { tool_version, shard, .. } = &run.meta;
+                format!(
+                    "  {arrays} · corsmal-feat {tool_version} · shard {shard} · {inputs}: {}",
+                    statuses.join(", ")
+                )
+            }
+        });
+        lines.push(String::new());
+        // The arrays of single recordings may be many; what covers the whole run is always shown.
+        let (single, whole): (Vec<_>, Vec<_>) = match self.run {
+            Some(_) if self.format == "npz" => {
+                self.members.iter().partition(|m| layout::is_frame_level(&m.name))
+            }
+            _ => (self.members.iter().collect(), Vec::new()),
+        };
+        let width = self.members.iter().map(|m| m.name.chars().count()).max().unwrap_or(0);
+        let row = |m: &&Member| {
+            let shape: Vec<_> = m.shape.iter().map(u64::to_string).collect();
+            let Member { name, kind, .. } = m;
+            format!("  {name:width$}  {kind:8}  {}", shape.join(" × ")).trim_end().to_owned()
+        };
+        lines.extend(single.iter().take(SHOWN).map(row));
+        if single.len() > SHOWN {
+            lines.push(format!("  … and {} more (--json lists all)", single.len() - SHOWN));
+        }
+        lines.extend(whole.iter().map(row));
+        if let Some(run) = &self.run {
+            run.text(&mut lines);
+        }
+        lines.join("\n") + "\n"
+    }
+}
+
+fn plural(n: usize, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
+}
+
+/// One line `key = value` for every setting.
+fn settings(key: &str, value: &Value, lines: &mut Vec<String>) {
+    match value {
+        Value::Object(table) => {
+            for (name, value) in table {
+                let dot = if key.is_empty() { "" } else { "." };
+                settings(&format!("{key}{dot}{name}"), value, lines);
+            }
+        }
+        value => lines.push(format!("    {key} = {value}")),
+    }
+}

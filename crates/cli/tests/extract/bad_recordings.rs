@@ -1,0 +1,166 @@
+//! Bad recordings become outcomes; the run goes on.
+
+use std::path::{Path, PathBuf};
+
+use corsmal_extract::outcome::{Outcome, Status};
+
+use crate::support::{extract, spec, table, wav};
+
+/// Two good recordings and every kind of bad one.
+fn zoo(folder: &Path) -> PathBuf {
+    let audio = folder.join("audio");
+    let at = |name: &str| audio.join(name);
+    let good = wav(&at("good.wav"), 2, 8000, 1);
+    let bytes = std::fs::read(&good).unwrap();
+    std::fs::write(at("empty.wav"), b"").unwrap();
+    std::fs::write(at("garbage.wav"), b"this was once a recording, honestly").unwrap();
+    std::fs::write(at("header.wav"), &bytes[..30]).unwrap();
+    std::fs::write(at("no_samples.wav"), &bytes[..44]).unwrap();
+    // One frame and a half are missing.
+    std::fs::write(at("truncated.wav"), &bytes[..bytes.len() - 6]).unwrap();
+    let mut adpcm = bytes.clone();
+    adpcm[20] = 2;
+    std::fs::write(at("adpcm.wav"), adpcm).unwrap();
+    let float = hound::WavSpec {
+        bits_per_sample: 32,
+        sample_format: hound::SampleFormat::Float,
+        ..spec(2)
+    };
+    for (name, bad) in [("nan.wav", f32::NAN), ("inf.wav", f32::INFINITY)] {
+        let mut writer = hound::WavWriter::create(at(name), float).unwrap();
+        for i in 0..16_000 {
+            writer.write_sample(if i == 9001 { bad } else { 0.1 }).unwrap();
+        }
+        writer.finalize().unwrap();
+    }
+    std::fs::write(at("noise.flac"), [b"fLaC".as_slice(), &[7; 400]].concat()).unwrap();
+    std::fs::write(at("noise.ogg"), [b"OggS".as_slice(), &[7; 400]].concat()).unwrap();
+    std::fs::write(at("noise.mp3"), [b"ID3".as_slice(), &[7; 400]].concat()).unwrap();
+    wav(&at("short.wav"), 2, 2047, 1);
+    wav(&at("three.wav"), 3, 8000, 1);
+    wav(&at("z.wav"), 2, 8000, 2);
+    audio
+}
+
+const NOT_CENTERED: &[&str] = &[
+    "--preset",
+    "mfcc-zcr",
+    "--set",
+    "mfcc.center=false",
+    "--set",
+    "zero_crossing_rate.center=false",
+];
+
+fn row<'a>(outcomes: &'a [Outcome], id: &str) -> &'a Outcome {
+    outcomes.iter().find(|o| o.id == id).unwrap()
+}
+
+#[test]
+fn each_has_its_outcome() {
+    let folder = tempfile::tempdir().unwrap();
+    let audio = zoo(folder.path());
+    let out = folder.path().join("feats.npz");
+    let run = extract(&audio, &out, NOT_CENTERED).with(1);
+    let table = table(&out);
+    let outcomes = table.outcomes();
+    assert_eq!(outcomes.len(), 15);
+    assert_eq!(table.ids(), ["good", "truncated", "z"]);
+    assert!(table.values().iter().all(|x| x.is_finite()));
+    for (id, status, words) in [
+        ("empty", Status::Empty, ""),
+        ("garbage", Status::Unsupported, ""),
+        ("header", Status::Corrupt, "byte"),
+        ("no_samples", Status::Empty, "no samples"),
+        ("adpcm", Status::Unsupported, "format tag 0x0002"),
+        ("nan", Status::NonFinite, "frame 4500 on (channel 1"),
+        ("inf", Status::NonFinite, "frame 4500 on (channel 1"),
+        ("short", Status::TooShort, "2047 samples, at least 2048"),
+        ("three", Status::Mismatch, "channels"),
+    ] {
+        let outcome = row(outcomes, id);
+        assert_eq!(outcome.status, status, "{id}: {}", outcome.reason);
+        assert!(outcome.reason.contains(words), "{id}: {}", outcome.reason);
+        assert_eq!(run.stderr.matches(&format!("/{id}.wav: {status}")).count(), 1, "{id}");
+    }
+    for id in ["noise.flac", "noise.ogg", "noise.mp3"] {
+        let outcome = row(outcomes, id);
+        assert!(!outcome.status.has_features() && !outcome.reason.is_empty(), "{outcome:?}");
+    }
+    let truncated = row(outcomes, "truncated");
+    assert_eq!(truncated.status, Status::Truncated);
+    assert_eq!((truncated.declared_frames, truncated.decoded_frames), (Some(8000), 7998));
+    assert_eq!(truncated.repairs, ["truncated", "partial_frame"]);
+    let good = row(outcomes, "good");
+    assert_eq!((good.sample_rate, good.channels), (Some(16_000), Some(2)));
+    // One line for each, and a summary.
+    assert_eq!(run.stderr.lines().count(), 12 + 1, "{}", run.stderr);
+    assert!(run.stderr.lines().last().unwrap().contains("2 ok, 1 too_short, 1 truncated"));
+}
+
+#[test]
+fn a_run_of_bad_recordings_only_still_has_its_outcomes() {
+    let folder = tempfile::tempdir().unwrap();
+    let bad = folder.path().join("bad.wav");
+    std::fs::write(&bad, b"").unwrap();
+    let out = folder.path().join("feats.npz");
+    for preset in ["logmel", "mfcc-zcr"] {
+        extract(&bad, &out, &["--preset", preset, "--overwrite"]).with(1);
+        assert!(table(&out).ids().is_empty());
+        assert_eq!(table(&out).outcomes().len(), 1);
+    }
+    let parquet = folder.path().join("feats.parquet");
+    extract(&bad, &parquet, &["--preset", "mfcc-zcr"]).with(1);
+    assert_eq!(corsmal_extract::parquet::read(&parquet).unwrap().0.outcomes().len(), 1);
+    // Nothing new: the same answer.
+    extract(&bad, &parquet, &["--preset", "mfcc-zcr"]).with(1);
+}
+
+#[test]
+fn strict_and_max_errors_stop_early_and_can_be_continued() {
+    let folder = tempfile::tempdir().unwrap();
+    let audio = zoo(folder.path());
+    let whole = folder.path().join("whole.npz");
+    extract(&audio, &whole, NOT_CENTERED).with(1);
+    let out = folder.path().join("feats.npz");
+    for stop in [&["--strict"][..], &["--max-errors", "2", "--resume"]] {
+        let run = extract(&audio, &out, &[NOT_CENTERED, stop].concat()).with(1);
+        let allowed = if stop[0] == "--strict" { "(0 allowed)" } else { "(2 allowed)" };
+        assert!(run.stderr.contains(allowed) && run.stderr.contains("--resume"), "{}", run.stderr);
+        assert!(!out.exists());
+    }
+    let pending = extract(&audio, &out, NOT_CENTERED).with(2);
+    assert!(pending.stderr.contains("--resume") && pending.stderr.contains("--overwrite"));
+    extract(&audio, &out, &[NOT_CENTERED, &["--resume", "--max-errors", "100"]].concat()).with(1);
+    assert!(std::fs::read(&out).unwrap() == std::fs::read(&whole).unwrap());
+}
+
+#[test]
+fn crops_beyond_the_end_are_empty_and_manifests_crop() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let one = wav(&at("a.wav"), 2, 16_000, 1);
+    let out = at("feats.npz");
+    extract(&one, &out, &["--preset", "mfcc-zcr", "--set", "signal.start=1"]).with(1);
+    assert_eq!(table(&out).outcomes()[0].status, Status::Empty);
+
+    let list = "path,id,start,end,label\n\
+                a.wav,all,,,x\na.wav,middle,0.25,0.75,y\na.wav,late,0.75,9,y\na.wav,after,2,3,z\n";
+    std::fs::write(at("list.csv"), list).unwrap();
+    extract(&at("list.csv"), &out, &["--preset", "mfcc-zcr", "--overwrite"]).with(1);
+    let table_of = table(&out);
+    assert_eq!(table_of.ids(), ["all", "middle", "late"]);
+    let frames: Vec<_> = table_of.outcomes().iter().map(|o| o.decoded_frames).collect();
+    assert_eq!(frames, [16_000, 8000, 4000, 0]);
+    assert_eq!(table_of.outcomes()[3].status, Status::Empty);
+    assert_eq!(table_of.labels().collect::<Vec<_>>()[0].1, ["x", "y", "y"]);
+
+    // The middle is what a file of these samples gives.
+    let mut reader = hound::WavReader::open(&one).unwrap();
+    let samples: Vec<i16> = reader.samples().map(|s| s.unwrap()).collect();
+    let mut writer = hound::WavWriter::create(at("middle.wav"), spec(2)).unwrap();
+    samples[2 * 4000..2 * 12_000].iter().for_each(|s| writer.write_sample(*s).unwrap());
+    writer.finalize().unwrap();
+    let alone = at("alone.npz");
+    extract(&at("middle.wav"), &alone, &["--preset", "mfcc-zcr"]).with(0);
+    assert_eq!(table(&alone).values().row(0), table_of.values().row(1));
+}

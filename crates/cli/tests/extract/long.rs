@@ -1,0 +1,86 @@
+//! A recording that is cut into spans gives what one pass over it gives.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use corsmal_extract::config::Config;
+use corsmal_extract::engine::{Extractor, Features, Plan, Recording};
+use corsmal_extract::npz::NpzFile;
+use corsmal_extract::outcome::Status;
+
+use crate::support::{extract, table, wav};
+
+/// More than three spans (2^20 frames each).
+const FRAMES: usize = 3 * (1 << 20) + 54_321;
+
+/// Log-mel of a mono recording in one pass, `[frames][bands]`.
+fn single_pass(path: &Path) -> Vec<f32> {
+    let config = Arc::new(Config::preset("logmel").unwrap());
+    let plan = Arc::new(Plan::new(&config, 16_000.0, 1).unwrap());
+    let mut reader = hound::WavReader::open(path).unwrap();
+    let samples: Vec<f32> =
+        reader.samples::<i16>().map(|s| f32::from(s.unwrap()) / 32_768.0).collect();
+    let mut extractor = Extractor::new(plan.clone(), 0..u64::MAX, 0);
+    extractor.push(&samples);
+    let mut recording = Recording::new(plan, path.parent().unwrap());
+    recording.add(extractor.finish(true)).unwrap();
+    let Features::Frames(arrays) = recording.finish().unwrap() else { panic!("no summary") };
+    arrays.into_iter().next().unwrap().values.into_vec().unwrap()
+}
+
+#[test]
+fn long_recordings() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let long = wav(&at("long.wav"), 1, FRAMES, 5);
+    let expected = single_pass(&long);
+    let one = at("one.npz");
+    extract(&long, &one, &["--jobs", "1"]).with(0);
+    let array = NpzFile::open(&one).unwrap().f32("long").unwrap();
+    assert_eq!(array.shape(), [1, 128, 1 + FRAMES / 512]);
+    // In memory order, frames last: the transposed view is in standard order.
+    let values = array.t();
+    assert!(values.iter().zip(&expected).all(|(a, b)| a.to_bits() == b.to_bits()));
+    for jobs in ["2", "5"] {
+        let out = at("more.npz");
+        extract(&long, &out, &["--jobs", jobs, "--overwrite"]).with(0);
+        assert!(std::fs::read(&out).unwrap() == std::fs::read(&one).unwrap(), "--jobs {jobs}");
+    }
+
+    // Cut off behind the first span: the header promises two more.
+    let kept = (1 << 20) + 1000;
+    let bytes = std::fs::read(&long).unwrap();
+    std::fs::write(at("cut.wav"), &bytes[..44 + 2 * kept]).unwrap();
+    wav(&at("cut-ref.wav"), 1, kept, 5);
+    let out = at("cut.npz");
+    extract(&at("cut.wav"), &out, &["--jobs", "2"]).with(0);
+    let cut = table(&out);
+    let outcome = &cut.outcomes()[0];
+    assert_eq!((outcome.status, outcome.decoded_frames), (Status::Truncated, kept as u64));
+    let expected = single_pass(&at("cut-ref.wav"));
+    let array = NpzFile::open(&out).unwrap().f32("cut").unwrap();
+    assert_eq!(array.len(), expected.len());
+    assert!(array.t().iter().zip(&expected).all(|(a, b)| a.to_bits() == b.to_bits()));
+
+    // A crop that is itself cut into spans, from the middle of the recording.
+    let crop = ["--set", "signal.start=10.0", "--jobs", "2"];
+    let out = at("crop.npz");
+    extract(&long, &out, &crop).with(0);
+    assert_eq!(table(&out).outcomes()[0].decoded_frames, FRAMES as u64 - 160_000);
+    let samples = &bytes[44 + 2 * 160_000..];
+    let mut head = bytes[..44].to_vec();
+    head[40..44].copy_from_slice(&(samples.len() as u32).to_le_bytes());
+    head[4..8].copy_from_slice(&(samples.len() as u32 + 36).to_le_bytes());
+    std::fs::write(at("crop-ref.wav"), [&head, samples].concat()).unwrap();
+    let expected = single_pass(&at("crop-ref.wav"));
+    let array = NpzFile::open(&out).unwrap().f32("long").unwrap();
+    assert!(array.t().iter().zip(&expected).all(|(a, b)| a.to_bits() == b.to_bits()));
+
+    // What holds the whole signal (peak normalisation) and what cannot be cut (pre-emphasis) runs.
+    for set in ["signal.normalize=peak", "signal.preemphasis=0.5"] {
+        let (a, b) = (at("a.npz"), at("b.npz"));
+        extract(&long, &a, &["--set", set, "--jobs", "1", "--overwrite"]).with(0);
+        extract(&long, &b, &["--set", set, "--jobs", "2", "--overwrite"]).with(0);
+        assert!(std::fs::read(&a).unwrap() == std::fs::read(&b).unwrap(), "{set}");
+    }
+}

@@ -1,0 +1,164 @@
+//! What cannot work is refused before work starts: exit code 2, one message, nothing written.
+
+use std::path::Path;
+
+use crate::support::{ended, extract, extraction, names, tool, wav};
+
+/// The one message of a refused run, which must have these words.
+#[track_caller]
+fn refused(input: &Path, out: &Path, more: &[&str], words: &[&str]) {
+    let run = extract(input, out, more).with(2);
+    assert!(run.stderr.starts_with("error: "), "{}", run.stderr);
+    assert_eq!(run.stderr.matches("error: ").count(), 1, "{}", run.stderr);
+    assert!(run.stdout.is_empty());
+    for word in words {
+        assert!(run.stderr.contains(word), "{word:?} is not in: {}", run.stderr);
+    }
+}
+
+#[test]
+fn impossible_values_name_key_value_and_what_is_allowed() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = wav(&folder.path().join("a.wav"), 1, 4000, 1);
+    let out = folder.path().join("feats.npz");
+    for (set, words) in [
+        ("mfcc.n_melz=4", &["features.mfcc.n_melz", "unknown", "n_mels"][..]),
+        ("signal.chanels=mean", &["chanels", "channels"]),
+        ("summary.stat=mean", &["stat"]),
+        ("summary.stats=[\"mode\"]", &["mode", "median"]),
+        ("mfcc.hop_length=0", &["features.mfcc", "hop_length", "0", "at least 1"]),
+        ("mfcc.n_fft=0", &["features.mfcc", "n_fft", "0", "at least 1"]),
+        ("mfcc.n_fft=-5", &["n_fft", "-5"]),
+        ("mfcc.n_fft=1000000000000", &["n_fft", "1000000000000", "at most"]),
+        ("mfcc.n_mels=1000000000000", &["n_mels", "1000000000000", "at most"]),
+        ("rms.frame_length=1000000000000", &["frame_length", "1000000000000", "at most"]),
+        ("mfcc.win_length=4096", &["win_length", "4096", "2048"]),
+        ("mfcc.fmin=5000.0 mfcc.fmax=100.0", &["features.mfcc", "fm", "5000", "100"]),
+        ("mfcc.window=hannn", &["features.mfcc.window", "hannn", "hamming"]),
+        ("mfcc.pad_mode=wrap", &["features.mfcc.pad_mode", "wrap", "reflect"]),
+        ("mfcc.top_db=-1", &["top_db", "-1"]),
+        ("mfcc.amin=0", &["amin", "0"]),
+        ("mfcc.power=3", &["power", "3", "1 or 2"]),
+        ("mfcc.coefficients=[5,5]", &["coefficients", "first < end"]),
+        ("mfcc.coefficients=[0,21]", &["coefficients", "21", "at most 20"]),
+        ("delta.of=nothing", &["features.delta.of", "nothing", "earlier"]),
+        ("nonsense.kind=nonsense", &["nonsense", "mfcc"]),
+        ("signal.sample_rate=-1", &["signal.sample_rate", "-1", "768000"]),
+        ("signal.channels=left", &["signal.channels", "left", "downmix-7.1"]),
+        ("signal.start=2 signal.end=1", &["signal.end", "1", "2"]),
+        ("signal.preemphasis=nan", &["signal.preemphasis"]),
+        ("signal.length=1e9", &["signal.length", "1000000000", "seconds"]),
+        ("signal.sample_rate=8000 mfcc.fmin=4100.0", &["features.mfcc", "fmax", "4100"]),
+        ("nonsense", &["--set nonsense", "key=value"]),
+    ] {
+        let mut more = vec!["--preset", "mfcc-zcr"];
+        more.extend(set.split(' ').flat_map(|s| ["--set", s]));
+        refused(&input, &out, &more, words);
+    }
+    assert_eq!(names(folder.path()), ["a.wav"]);
+}
+
+#[test]
+fn wrong_names_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = wav(&folder.path().join("a.wav"), 1, 4000, 1);
+    let at = |name: &str| folder.path().join(name);
+    let out = at("feats.npz");
+    std::fs::create_dir(at("empty")).unwrap();
+    std::fs::create_dir(at("folder.npz")).unwrap();
+    std::fs::write(at("broken.toml"), "[features.mfcc\n").unwrap();
+    std::fs::write(at("none.toml"), "[signal]\n").unwrap();
+    std::fs::write(at("list.csv"), "path,start\na.wav,soon\n").unwrap();
+    std::fs::write(at("gone.csv"), "path\ngone.wav\n").unwrap();
+
+    refused(&at("gone.wav"), &out, &[], &["gone.wav", "no such file"]);
+    refused(&at("empty"), &out, &[], &["empty", "audio extension"]);
+    refused(&at("*.flac"), &out, &[], &["*.flac", "no"]);
+    refused(&at("list.csv"), &out, &[], &["list.csv, line 2", "start", "soon"]);
+    refused(&at("gone.csv"), &out, &[], &["gone.csv, line 2", "gone.wav"]);
+    refused(&input, &out, &["--in", input.to_str().unwrap()], &["a.wav"]);
+    refused(&input, &out, &["--preset", "nope"], &["nope", "logmel", "esc26"]);
+    refused(&input, &out, &["--config", at("gone.toml").to_str().unwrap()], &["gone.toml"]);
+    refused(&input, &out, &["--config", at("broken.toml").to_str().unwrap()], &["broken.toml"]);
+    refused(&input, &out, &["--config", at("none.toml").to_str().unwrap()], &["features"]);
+    refused(&input, &out, &["--jobs", "0"], &["--jobs 0", "at least 1"]);
+    refused(&input, &at("nowhere/feats.npz"), &[], &["nowhere"]);
+    refused(&input, &at("folder.npz"), &[], &["folder.npz"]);
+    refused(&input, &at("feats.csv"), &[], &["feats.csv", ".npz", ".parquet"]);
+    refused(&input, &at("feats"), &[], &["feats", ".npz", ".parquet"]);
+    refused(&input, &at("feats.parquet"), &[], &["feats.parquet", "summary"]);
+    if cfg!(target_os = "linux") {
+        // Not even root can write there.
+        refused(&input, Path::new("/proc/feats.npz"), &[], &["/proc/feats.npz"]);
+    }
+    let before = ["a.wav", "broken.toml", "empty", "folder.npz", "gone.csv", "list.csv"];
+    assert_eq!(names(folder.path()), [&before[..], &["none.toml"]].concat());
+}
+
+#[test]
+fn arguments_that_clap_refuses_end_with_two_as_well() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = wav(&folder.path().join("a.wav"), 1, 4000, 1);
+    let out = folder.path().join("feats.npz");
+    for more in [
+        &["--shard", "2/2"][..],
+        &["--shard", "x"],
+        &["--max-errors", "-1"],
+        &["--strict", "--max-errors", "3"],
+        &["--log-format", "xml"],
+        &["--preset", "logmel", "--config", "x.toml"],
+        &["--unknown"],
+    ] {
+        let run = extract(&input, &out, more).with(2);
+        assert!(run.stderr.starts_with("error: "), "{}", run.stderr);
+    }
+    ended(tool().arg("extract")).with(2);
+    assert!(!out.exists());
+}
+
+#[test]
+fn an_output_of_something_else_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = wav(&folder.path().join("a.wav"), 1, 4000, 1);
+    let other = wav(&folder.path().join("b.wav"), 1, 4000, 2);
+    let out = folder.path().join("feats.npz");
+    extract(&input, &out, &["--preset", "mfcc-zcr"]).with(0);
+    let bytes = std::fs::read(&out).unwrap();
+    let exists = "another configuration";
+    refused(&input, &out, &["--preset", "esc26"], &["feats.npz", exists, "--overwrite"]);
+    refused(&other, &out, &["--preset", "mfcc-zcr"], &["feats.npz", "other inputs"]);
+    wav(&input, 1, 4001, 1);
+    refused(&input, &out, &["--preset", "mfcc-zcr"], &["feats.npz", "changed"]);
+    assert_eq!(std::fs::read(&out).unwrap(), bytes);
+    extract(&input, &out, &["--preset", "esc26", "--overwrite"]).with(0);
+    assert_ne!(std::fs::read(&out).unwrap(), bytes);
+
+    std::fs::write(&out, "my thesis").unwrap();
+    refused(&input, &out, &[], &["feats.npz", "not an output of this tool"]);
+    assert_eq!(std::fs::read(&out).unwrap(), b"my thesis");
+}
+
+#[test]
+fn no_space_is_an_error_and_the_run_can_go_on() {
+    if !cfg!(unix) {
+        println!("skipped: no ulimit");
+        return;
+    }
+    let folder = crate::support::folder(30);
+    let input = folder.path().join("audio");
+    let out = folder.path().join("full/feats.npz");
+    let whole = folder.path().join("whole.npz");
+    std::fs::create_dir(folder.path().join("full")).unwrap();
+    // A limit on the size of files stands for a full disk.
+    let limited = extraction(&input, &out, &[]);
+    let mut shell = std::process::Command::new("sh");
+    shell.args(["-c", "trap '' XFSZ; ulimit -f 256; exec \"$0\" \"$@\""]);
+    shell.arg(limited.get_program()).args(limited.get_args());
+    let run = ended(&mut shell).with(2);
+    assert_eq!(run.stderr.matches("error: ").count(), 1, "{}", run.stderr);
+    assert!(run.stderr.contains("feats.npz"), "{}", run.stderr);
+    assert!(!out.exists());
+    extract(&input, &out, &["--resume"]).with(0);
+    extract(&input, &whole, &[]).with(0);
+    assert!(std::fs::read(&out).unwrap() == std::fs::read(&whole).unwrap());
+}
