@@ -1,5 +1,7 @@
 //! `train`, `classify` and `cross-validate` as a user runs them.
 
+#![allow(clippy::unwrap_used, reason = "tests")]
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
