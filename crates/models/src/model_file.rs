@@ -118,7 +118,11 @@ pub enum ModelFileError {
         reason: String,
     },
     /// The features offered were made with another configuration.
-    #[error("the model was trained on features with configuration {model}, these have {features}")]
+    #[error(
+        "the model was trained on features with {}, these have {}",
+        configuration(model),
+        configuration(features)
+    )]
     Configuration {
         /// hash in the model
         model: String,
@@ -279,6 +283,14 @@ impl Model {
         let mut bytes = Vec::new();
         file.take(MAX_FILE + 1).read_to_end(&mut bytes).map_err(io)?;
         Self::from_bytes(&bytes)
+    }
+}
+
+/// A hash in words; features of other programs have none.
+fn configuration(hash: &str) -> String {
+    match hash {
+        "" => "no configuration (of another program)".into(),
+        hash => format!("configuration {hash}"),
     }
 }
 

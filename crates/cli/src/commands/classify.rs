@@ -1,5 +1,6 @@
 //! `corsmal-feat classify`: recordings or features in, predictions out.
 
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -10,7 +11,7 @@ use corsmal_extract::npz::Compression;
 use corsmal_extract::outcome::Status;
 use corsmal_extract::run::{self, Options, RunError};
 use corsmal_models::ModelError;
-use corsmal_models::model_file::Model;
+use corsmal_models::model_file::{Model, ModelFileError};
 use ndarray::Axis;
 
 use crate::dataset_table::{DatasetTable, ForeignArgs};
@@ -63,7 +64,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     }
     let place = args.model.display();
     let model = Model::load(&args.model).map_err(|e| match e {
-        e @ corsmal_models::model_file::ModelFileError::Io { .. } => Failure::from(e),
+        e @ ModelFileError::Io { .. } => Failure::from(e),
         e => Failure::new(format!("{place}: {e}")),
     })?;
     let table = match &args.features {
@@ -76,7 +77,11 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     check_features(&model, &table)?;
     let (csv, failed) = predictions(&model, &table)?;
     if to_stdout {
-        std::io::Write::write_all(&mut std::io::stdout(), &csv)?;
+        match std::io::stdout().write_all(&csv) {
+            // Whoever reads has seen enough.
+            Err(e) if e.kind() == ErrorKind::BrokenPipe => {}
+            written => written?,
+        }
     } else {
         publish::write(&args.out, &csv)?;
     }

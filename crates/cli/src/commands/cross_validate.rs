@@ -99,7 +99,7 @@ fn print_head(
     folds: &Folds,
 ) {
     let (rows, features) = table.x.dim();
-    println!("features  {}: {rows} rows x {features}", table.path.display());
+    println!("features  {}: {rows} rows x {features} features", table.path.display());
     println!("target    {target}, {} classes", labels.len());
     match candidates {
         [only] => println!("pipeline  {}", pipeline::describe(only)),
@@ -110,18 +110,11 @@ fn print_head(
 
 fn print_folds(result: &CrossValidation, candidates: &[PipelineSpec], folds: &Folds) {
     let names = result.folds.iter().map(|f| f.name.chars().count());
-    let width = names.max().unwrap_or(0).max(10);
+    let width = names.max().unwrap_or(0).max(13);
     println!(
         "{:width$} {:>6} {:>6} {:>9} {:>12} {:>9}",
-        "fold, percent",
-        "train",
-        "test",
-        "accuracy",
-        "weighted F1",
-        "macro F1",
-        width = width.max(13)
+        "fold, percent", "train", "test", "accuracy", "weighted F1", "macro F1"
     );
-    let width = width.max(13);
     for (fold, plan) in result.folds.iter().zip(&folds.outer) {
         let (s, percent) = (&fold.scores, 100.0);
         print!(
@@ -162,7 +155,7 @@ fn print_folds(result: &CrossValidation, candidates: &[PipelineSpec], folds: &Fo
 
 fn print_classes(scores: &Scores, labels: &Labels) {
     let names = labels.names();
-    let width = names.iter().map(|n| n.chars().count()).max().unwrap_or(0).max(14);
+    let width = names.iter().map(|n| n.chars().count()).max().unwrap_or(0).max(15);
     println!(
         "{:width$} {:>9} {:>9} {:>9} {:>6}",
         "class, percent", "precision", "recall", "F1", "rows"
@@ -181,7 +174,7 @@ fn print_classes(scores: &Scores, labels: &Labels) {
     names.iter().for_each(|name| print!(" {name:>cell$}"));
     println!();
     for (name, row) in names.iter().zip(&scores.confusion) {
-        print!("{name:width$}", width = width.max(15));
+        print!("{name:width$}");
         row.iter().for_each(|count| print!(" {count:>cell$}"));
         println!();
     }
