@@ -172,7 +172,7 @@ impl<'a> Collector<'a> {
         };
         let signal = &planned.plan.config.signal;
         let crop = reader::crop(signal, input, source.spec().sample_rate);
-        let spans = reader::spans(source.as_ref(), signal, planned.resample.is_some(), &crop);
+        let spans = reader::spans(source.as_ref(), &planned, &crop);
         if let [span] = spans.as_slice() {
             let computed = reader::compute(source.as_mut(), &planned, &crop, span, self.stop);
             reader::describe(&mut outcome, source.as_ref());

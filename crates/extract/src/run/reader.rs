@@ -4,10 +4,11 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use corsmal_audio::{AudioError, AudioSpec, BlockSource, Repair};
+use corsmal_dsp::DspError;
 
 use super::plans::Planned;
 use crate::config::{Normalize, SignalConfig};
-use crate::engine::{Extractor, Span};
+use crate::engine::{Extractor, Refused, Span};
 use crate::frontend::FrontEnd;
 use crate::inputs::{Input, InputSource};
 use crate::outcome::{Outcome, Status};
@@ -46,6 +47,16 @@ impl From<AudioError> for Failed {
     }
 }
 
+impl From<Refused> for Failed {
+    fn from(error: Refused) -> Self {
+        let status = match error.source {
+            DspError::TooShort { .. } => Status::TooShort,
+            _ => Status::Unsupported,
+        };
+        Self::new(status, error.to_string())
+    }
+}
+
 /// Opens an input.
 pub fn open(input: &Input) -> Result<Box<dyn BlockSource>, Failed> {
     Ok(match &input.source {
@@ -70,15 +81,12 @@ pub fn crop(signal: &SignalConfig, input: &Input, sample_rate: u32) -> Range<u64
 }
 
 /// Spans of the signal that can be computed apart; one where it cannot be cut.
-pub fn spans(
-    source: &dyn BlockSource,
-    signal: &SignalConfig,
-    resampled: bool,
-    crop: &Range<u64>,
-) -> Vec<Range<u64>> {
+pub fn spans(source: &dyn BlockSource, planned: &Planned, crop: &Range<u64>) -> Vec<Range<u64>> {
     let whole = 0..u64::MAX;
+    let signal = &planned.plan.config.signal;
     let separable = source.seekable()
-        && FrontEnd::is_pointwise(signal, resampled)
+        && !planned.plan.needs_whole()
+        && FrontEnd::is_pointwise(signal, planned.resample.is_some())
         && signal.normalize == Normalize::None;
     let Some(declared) = source.spec().declared_frames.filter(|_| separable) else {
         return vec![whole];
@@ -163,7 +171,7 @@ pub fn compute(
         normalize(config.normalize, &mut signal);
         extractor.push(&signal);
     }
-    Ok(Some(extractor.finish(at_end)))
+    Ok(Some(extractor.finish(at_end)?))
 }
 
 /// Goes to a frame, by reading where the source cannot seek.
