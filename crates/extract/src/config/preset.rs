@@ -31,7 +31,7 @@ pub const PRESETS: &[Preset] = presets![
     "m4-code",
     "m4-paper",
     "m5-vggish",
-    "m6-code"
+    "m6-code",
 ];
 
 impl Preset {
