@@ -18,7 +18,21 @@ macro_rules! presets {
 }
 
 /// Every preset.
-pub const PRESETS: &[Preset] = presets!["logmel", "mfcc-zcr", "esc26", "esc28"];
+pub const PRESETS: &[Preset] = presets![
+    "logmel",
+    "mfcc-zcr",
+    "esc26",
+    "esc28",
+    "af193",
+    "a34f136",
+    "spec9216-code",
+    "m2",
+    "m3",
+    "m4-code",
+    "m4-paper",
+    "m5-vggish",
+    "m6-code",
+];
 
 impl Preset {
     /// The preset of that name.

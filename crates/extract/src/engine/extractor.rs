@@ -3,8 +3,14 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use corsmal_dsp::DspError;
+use ndarray::Array2;
+use rayon::prelude::*;
+use thiserror::Error;
+
 use super::plan::{Plan, Scratch};
 use super::stream::{Cursor, Window};
+use crate::features::Kernel;
 
 /// What the features of one span of a recording, or of a part of it, have stored.
 #[derive(Debug, Default)]
@@ -13,6 +19,16 @@ pub struct Span {
     pub raw: Vec<Vec<f32>>,
     /// Length of the signal in samples, where the span reached its end.
     pub total: Option<u64>,
+}
+
+/// A feature of the whole recording that does not exist for it.
+#[derive(Debug, Error)]
+#[error("{feature}: {source}")]
+pub struct Refused {
+    /// Name of the feature.
+    pub feature: String,
+    /// Why.
+    pub source: DspError,
 }
 
 /// Computes the features of one span, fed block by block.
@@ -78,11 +94,41 @@ impl Extractor {
 
     /// Computes what remains. `at_end` says that the signal ends here; otherwise the pushed samples
     /// reach as far beyond the span as its last frames need.
-    pub fn finish(mut self, at_end: bool) -> Span {
+    ///
+    /// # Errors
+    /// A feature of the whole recording does not exist for this one.
+    pub fn finish(mut self, at_end: bool) -> Result<Span, Refused> {
         let total = self.first + ((self.buffer.len() - self.head) / self.plan.channels) as u64;
         let total = at_end.then_some(total);
         self.advance(total);
-        Span { raw: self.raw, total }
+        if total.is_some_and(|n| n > 0) {
+            self.whole()?;
+        }
+        Ok(Span { raw: self.raw, total })
+    }
+
+    /// Computes the features of the whole recording, which the buffer holds.
+    fn whole(&mut self) -> Result<(), Refused> {
+        let channels = self.plan.channels;
+        for (planned, raw) in self.plan.features.iter().zip(&mut self.raw) {
+            let Kernel::Whole(_, kernel) = &planned.feature.kernel else { continue };
+            let each: Vec<Array2<f32>> = (0..channels)
+                .into_par_iter()
+                .map(|c| {
+                    let y: Vec<f32> = self.buffer[c..].iter().step_by(channels).copied().collect();
+                    kernel.channel(&y)
+                })
+                .collect::<Result<_, _>>()
+                .map_err(|source| Refused { feature: planned.name.clone(), source })?;
+            let Some((rows, frames)) = each.first().map(Array2::dim) else { continue };
+            raw.reserve_exact(frames * rows * channels);
+            for t in 0..frames {
+                for k in 0..rows {
+                    raw.extend(each.iter().map(|values| values[[k, t]]));
+                }
+            }
+        }
+        Ok(())
     }
 
     fn advance(&mut self, total: Option<u64>) {
@@ -94,6 +140,9 @@ impl Extractor {
 
     /// Drops samples that no frame needs any more, once they are half of the buffer.
     fn compact(&mut self) {
+        if self.plan.needs_whole() {
+            return;
+        }
         let keep = self
             .cursors
             .iter()

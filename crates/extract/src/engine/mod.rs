@@ -12,7 +12,7 @@ mod recording;
 mod store;
 mod stream;
 
-pub use extractor::{Extractor, Span};
+pub use extractor::{Extractor, Refused, Span};
 pub use plan::Plan;
 pub use recording::{FeatureArray, Features, FinishError, Recording};
 pub use store::Store;

@@ -9,7 +9,7 @@ use corsmal_dsp::time_domain::FrameParams;
 use corsmal_dsp::transform::Forward;
 
 use crate::config::Config;
-use crate::features::{Feature, Kernel, Quantity, WavePad};
+use crate::features::{Extent, Feature, Kernel, Quantity, WavePad};
 
 /// A feature with its place in the output.
 pub struct PlannedFeature {
@@ -23,6 +23,13 @@ pub struct PlannedFeature {
     pub kept: [usize; 2],
     /// Index of the feature that a derived one is computed from.
     pub source: Option<usize>,
+}
+
+impl PlannedFeature {
+    /// Whether it is one vector a recording, which statistics leave as it is.
+    pub fn is_vector(&self) -> bool {
+        matches!(self.feature.kernel, Kernel::Whole(Extent::Vector, _))
+    }
 }
 
 /// Frames of the waveform as a stream cuts them.
@@ -124,6 +131,7 @@ impl Plan {
                 }
                 Kernel::Exact(params, _) => join_exact(&mut streams, params, index)?,
                 Kernel::Wave(frame, pad, _) => streams.push(wave(frame, *pad, index)),
+                Kernel::Whole(..) => {}
                 Kernel::Derived(of, _) => {
                     source = features.iter().position(|f| f.name == *of);
                     labels = source.map(|s| features[s].labels.clone()).unwrap_or_default();
@@ -144,11 +152,24 @@ impl Plan {
         Ok(Self { sample_rate, channels, features, streams, config: config.clone() })
     }
 
-    /// Samples between the frames of a feature.
-    pub fn hop(&self, name: &str) -> usize {
-        let Some(mut index) = self.features.iter().position(|f| f.name == name) else { return 0 };
+    /// Whether a feature needs the whole recording, which can then not be cut into spans.
+    pub fn needs_whole(&self) -> bool {
+        self.features.iter().any(|f| matches!(f.feature.kernel, Kernel::Whole(..)))
+    }
+
+    /// Samples between the frames of a feature; 0 for a vector.
+    pub fn hop(&self, name: &str) -> f64 {
+        let Some(mut index) = self.features.iter().position(|f| f.name == name) else {
+            return 0.0;
+        };
         while let Some(source) = self.features[index].source {
             index = source;
+        }
+        if let Kernel::Whole(extent, _) = &self.features[index].feature.kernel {
+            return match extent {
+                Extent::Frames(hop) => *hop,
+                Extent::Vector => 0.0,
+            };
         }
         let hop = |s: &StreamPlan| {
             let member = match &s.kind {
@@ -156,9 +177,9 @@ impl Plan {
                 StreamKind::Exact { members, .. } => members.contains(&index),
                 StreamKind::Spectrum { members, .. } => members.iter().any(|(m, _)| *m == index),
             };
-            member.then_some(s.framing.hop)
+            member.then_some(s.framing.hop as f64)
         };
-        self.streams.iter().find_map(hop).unwrap_or(0)
+        self.streams.iter().find_map(hop).unwrap_or(0.0)
     }
 
     /// What the user should know of parameters that are possible but odd.
@@ -184,19 +205,23 @@ impl Plan {
     }
 
     /// Names of the statistics of a recording: `feature[coefficient].statistic`, with `chN/` before
-    /// where channels stay apart.
+    /// where channels stay apart; a vector's values have no statistic in their names.
     pub fn summary_names(&self) -> Vec<String> {
         let Some(summary) = &self.config.summary else { return Vec::new() };
         let mut names = Vec::new();
         for feature in &self.features {
-            for stat in &summary.stats {
+            let statistics: Vec<String> = match feature.is_vector() {
+                true => vec![String::new()],
+                false => summary.stats.iter().map(|stat| format!(".{stat}")).collect(),
+            };
+            for stat in &statistics {
                 let series = if summary.average_channels { 1 } else { self.channels };
                 for channel in 0..series {
                     let place = if series > 1 { format!("ch{channel}/") } else { String::new() };
                     names.extend(feature.labels.iter().map(|label| {
                         let index =
                             if label.is_empty() { String::new() } else { format!("[{label}]") };
-                        format!("{place}{}{index}.{stat}", feature.name)
+                        format!("{place}{}{index}{stat}", feature.name)
                     }));
                 }
             }

@@ -12,7 +12,7 @@ use super::extractor::Span;
 use super::plan::{Plan, PlannedFeature};
 use super::store::Store;
 use crate::features::Kernel;
-use crate::summary::Accumulator;
+use crate::summary::{Accumulator, Stat};
 
 /// Finished frames of one feature.
 pub struct FeatureArray {
@@ -140,11 +140,14 @@ impl Recording {
             None => Ok(Features::Frames(arrays)),
             Some(summary) => {
                 let mut row = Vec::new();
-                for mut array in arrays {
+                for (mut array, planned) in arrays.into_iter().zip(&self.plan.features) {
                     let channels = self.plan.channels;
                     let average = summary.average_channels && channels > 1;
                     let width = array.coefficients * if average { 1 } else { channels };
-                    let mut statistics = Accumulator::new(&summary.stats, width);
+                    // The mean of one frame is that frame.
+                    let stats =
+                        if planned.is_vector() { &[Stat::Mean][..] } else { &summary.stats };
+                    let mut statistics = Accumulator::new(stats, width);
                     let mut means = Vec::new();
                     array.values.batches(1, |chunks| {
                         for chunk in chunks {

@@ -1,26 +1,39 @@
 //! Features: one file each, with its parameters and one line in [`REGISTRY`].
 //!
 //! A feature declares what it reads (rows of a spectrum, frames of the waveform, or the whole
-//! recording), what it computes from that alone, and, where its values depend on the maximum of the
+//! recording, which is then held in memory), what it computes from that alone, and, where its values depend on the maximum of the
 //! recording (`top_db`), how stored values are finished once that is known.
 
+mod a34f136;
+mod af193;
+mod chroma_cqt;
+mod chroma_stft;
 mod delta;
+mod m2_mfcc;
+mod m3_spectrogram;
+mod m4_logmel;
+mod m6_spectrogram;
 mod mel_bands;
 mod melspectrogram;
 mod mfcc;
+mod onset_strength;
 mod poly_features;
 mod rms;
+mod spec9216;
 mod spectral_bandwidth;
 mod spectral_centroid;
 mod spectral_contrast;
 mod spectral_flatness;
 mod spectral_rolloff;
 mod stft;
+mod tonnetz;
+mod vggish_patches;
 mod zero_crossing_rate;
 
 use corsmal_dsp::lanes::Row;
 use corsmal_dsp::stft::StftParams;
 use corsmal_dsp::time_domain::FrameParams;
+use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -40,6 +53,18 @@ const REGISTRY: &[Entry] = &[
     Entry::of::<spectral_flatness::SpectralFlatness>(),
     Entry::of::<spectral_contrast::SpectralContrast>(),
     Entry::of::<poly_features::PolyFeatures>(),
+    Entry::of::<onset_strength::OnsetStrength>(),
+    Entry::of::<chroma_stft::ChromaStft>(),
+    Entry::of::<chroma_cqt::ChromaCqt>(),
+    Entry::of::<tonnetz::Tonnetz>(),
+    Entry::of::<af193::Af193>(),
+    Entry::of::<a34f136::A34f136>(),
+    Entry::of::<spec9216::Spec9216>(),
+    Entry::of::<m2_mfcc::M2Mfcc>(),
+    Entry::of::<m3_spectrogram::M3Spectrogram>(),
+    Entry::of::<m4_logmel::M4LogMel>(),
+    Entry::of::<vggish_patches::VggishPatches>(),
+    Entry::of::<m6_spectrogram::M6Spectrogram>(),
 ];
 
 /// Parameters of a feature, and how to plan it.
@@ -104,6 +129,15 @@ pub trait SlotKernel: Send + Sync {
     fn worker(&self) -> SlotFn<'_>;
 }
 
+/// Computes from a whole channel, which is held in memory until its end.
+pub trait WholeKernel: Send + Sync {
+    /// `[coefficients, frames]` of the samples of one channel; a vector is one frame.
+    ///
+    /// # Errors
+    /// A signal that the feature does not exist for.
+    fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>>;
+}
+
 /// Finishes stored values once the maxima of the recording are known.
 pub trait Finish: Send + Sync {
     /// Rows whose maximum is needed, and whether it is joint over channels.
@@ -123,8 +157,19 @@ pub enum Kernel {
     Exact(StftParams, Box<dyn SlotKernel>),
     /// Frames of the waveform; outside the signal its edge values count.
     Wave(FrameParams, WavePad, Box<dyn WaveKernel>),
+    /// The whole recording, channel by channel.
+    Whole(Extent, Box<dyn WholeKernel>),
     /// The finished frames of another feature, by name.
     Derived(String, corsmal_dsp::delta::DeltaParams),
+}
+
+/// What a whole-recording feature gives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Extent {
+    /// Frames this many samples apart.
+    Frames(f64),
+    /// One vector, which statistics leave as it is.
+    Vector,
 }
 
 /// What waveform features see before the first and after the last sample.
@@ -157,6 +202,23 @@ impl Feature {
         let kernel = Kernel::Exact(stft, kernel);
         Self { kernel, raw_rows, labels, complex: false, finish: None }
     }
+
+    /// A feature of the whole recording, one row a label.
+    fn whole(extent: Extent, kernel: impl WholeKernel + 'static, labels: Vec<String>) -> Self {
+        let raw_rows = labels.len();
+        let kernel = Kernel::Whole(extent, Box::new(kernel));
+        Self { kernel, raw_rows, labels, complex: false, finish: None }
+    }
+}
+
+/// Names of `n` coefficients: their indices.
+fn indices(n: usize) -> Vec<String> {
+    (0..n).map(|i| i.to_string()).collect()
+}
+
+/// Names of the pixels of an image of 96 x 96, row by row: `row,column`.
+fn pixels() -> Vec<String> {
+    (0..96).flat_map(|row| (0..96).map(move |column| format!("{row},{column}"))).collect()
 }
 
 type Planner = Box<dyn Fn(f64) -> corsmal_dsp::Result<Feature> + Send + Sync>;

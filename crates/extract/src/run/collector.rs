@@ -185,7 +185,7 @@ impl<'a> Collector<'a> {
         };
         let signal = &planned.plan.config.signal;
         let crop = reader::crop(signal, (input.start, input.end), source.spec().sample_rate);
-        let spans = reader::spans(source.as_ref(), signal, planned.resample.is_some(), &crop);
+        let spans = reader::spans(source.as_ref(), &planned, &crop);
         let mut recording = Recording::new(planned.plan.clone(), &self.folder);
         if let [span] = spans.as_slice() {
             let computed =

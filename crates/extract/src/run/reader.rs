@@ -4,10 +4,11 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use corsmal_audio::{AudioError, AudioSpec, BlockSource, Repair};
+use corsmal_dsp::DspError;
 
 use super::plans::Planned;
 use crate::config::SignalConfig;
-use crate::engine::{Extractor, Span};
+use crate::engine::{Extractor, Refused, Span};
 use crate::frontend::FrontEnd;
 use crate::inputs::{Input, InputSource};
 use crate::outcome::{Outcome, Status};
@@ -48,6 +49,16 @@ impl From<AudioError> for Failed {
     }
 }
 
+impl From<Refused> for Failed {
+    fn from(error: Refused) -> Self {
+        let status = match error.source {
+            DspError::TooShort { .. } => Status::TooShort,
+            _ => Status::Unsupported,
+        };
+        Self::new(status, error.to_string())
+    }
+}
+
 /// Opens an input.
 pub fn open(input: &Input) -> Result<Box<dyn BlockSource>, Failed> {
     Ok(match &input.source {
@@ -73,14 +84,11 @@ pub fn crop(
 }
 
 /// Spans of the signal that can be computed apart; one where it cannot be cut.
-pub fn spans(
-    source: &dyn BlockSource,
-    signal: &SignalConfig,
-    resampled: bool,
-    crop: &Range<u64>,
-) -> Vec<Range<u64>> {
+pub fn spans(source: &dyn BlockSource, planned: &Planned, crop: &Range<u64>) -> Vec<Range<u64>> {
     let whole = 0..u64::MAX;
-    let separable = source.seekable() && FrontEnd::is_pointwise(signal, resampled);
+    let separable = source.seekable()
+        && !planned.plan.needs_whole()
+        && FrontEnd::is_pointwise(&planned.plan.config.signal, planned.resample.is_some());
     let Some(declared) = source.spec().declared_frames.filter(|_| separable) else {
         return vec![whole];
     };
@@ -177,7 +185,7 @@ pub fn compute(
             silence -= frames;
         }
     }
-    each(extractor.finish(at_end))?;
+    each(extractor.finish(at_end)?)?;
     Ok(true)
 }
 

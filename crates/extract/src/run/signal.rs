@@ -124,11 +124,17 @@ impl Signal {
     /// No samples, too few for one frame, or a temporary file that fails.
     pub fn finish(self) -> Result<Features, SignalError> {
         let Self { plan, front, mut extractor, mut held, folder, .. } = self;
-        front.finish(&mut held);
+        let mut silence = front.finish(&mut held);
         extractor.push(&held);
-        drop(held);
+        held.clear();
+        held.resize(BLOCK * plan.channels, 0.0);
+        while silence > 0 {
+            let frames = silence.min(BLOCK as u64);
+            extractor.push(&held[..frames as usize * plan.channels]);
+            silence -= frames;
+        }
         let mut recording = Recording::new(plan.clone(), &folder);
-        let span = extractor.finish(true);
+        let span = extractor.finish(true).map_err(Failed::from)?;
         recording.add(span).map_err(|e| Failed::new(Status::Io, format!("temporary file: {e}")))?;
         Ok(finish(recording, &plan)?)
     }

@@ -57,7 +57,7 @@ impl Member {
             let header = Header::new(dtype, &shape).fortran();
             let hop = plan.hop(&array.name);
             let times: Vec<f64> =
-                (0..array.frames).map(|t| (t * hop) as f64 / plan.sample_rate).collect();
+                (0..array.frames).map(|t| t as f64 * hop / plan.sample_rate).collect();
             let data = match compression {
                 Compression::Stored => Data::Stored(array.values),
                 Compression::Deflated => {

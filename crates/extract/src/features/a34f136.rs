@@ -1,0 +1,39 @@
+//! `a34f136`: pyAudioAnalysis statistics of a recording (M5's random forests).
+
+use corsmal_dsp::frontends::M5A34f136;
+use corsmal_dsp::paa::short_names;
+use ndarray::{Array2, ArrayView2, Axis};
+use serde::{Deserialize, Serialize};
+
+use super::{Extent, Feature, FeatureKind, WholeKernel};
+
+/// `a34f136` has no parameters.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct A34f136 {}
+
+impl WholeKernel for M5A34f136 {
+    fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>> {
+        let vector = self.run(ArrayView2::from_shape((1, y.len()), y).expect("one row"))?;
+        Ok(vector.mapv(|x| x as f32).insert_axis(Axis(1)))
+    }
+}
+
+impl FeatureKind for A34f136 {
+    const KIND: &'static str = "a34f136";
+    const ABOUT: &'static str = "The 34 pyAudioAnalysis features of 50 ms frames and their deltas, \
+        mean and deviation over each second, mean over the seconds: one vector a channel. Holds the \
+        whole recording in memory.";
+
+    fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
+        let short = short_names();
+        let names = || short.iter().cloned().chain(short.iter().map(|n| format!("delta_{n}")));
+        let labels = ["mean", "std"].iter().flat_map(|s| names().map(move |n| format!("{n}_{s}")));
+        Ok(Feature::whole(Extent::Vector, M5A34f136::new(sr)?, labels.collect()))
+    }
+
+    /// There is nothing to refuse but low rates.
+    fn check(&self) -> corsmal_dsp::Result<()> {
+        Ok(())
+    }
+}

@@ -1,0 +1,101 @@
+//! `chroma_cqt`: energy in pitch classes of a constant-Q transform.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use corsmal_dsp::cqt::{ChromaCqt as Fold, ChromaCqtParams, CqtParams, CqtPlan, SignalTuning};
+use ndarray::Array2;
+use serde::{Deserialize, Serialize};
+
+use super::{Extent, Feature, FeatureKind, WholeKernel, indices};
+
+/// Parameters of `chroma_cqt`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ChromaCqt {
+    hop_length: usize,
+    n_chroma: usize,
+    n_octaves: usize,
+    bins_per_octave: usize,
+}
+
+impl Default for ChromaCqt {
+    fn default() -> Self {
+        Self { hop_length: 512, n_chroma: 12, n_octaves: 7, bins_per_octave: 36 }
+    }
+}
+
+/// Chroma of whole channels; transforms are kept by tuning in hundredths of a bin.
+pub struct ChromaOfChannel {
+    params: CqtParams,
+    tuning: SignalTuning,
+    transforms: Mutex<HashMap<i32, Arc<CqtPlan>>>,
+    fold: Fold,
+}
+
+impl ChromaOfChannel {
+    fn transform(&self, tuning: f64) -> corsmal_dsp::Result<Arc<CqtPlan>> {
+        let key = (tuning * 100.0).round() as i32;
+        let kept = || self.transforms.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(transform) = kept().get(&key) {
+            return Ok(transform.clone());
+        }
+        // Made outside the lock: of two made at once, one is kept.
+        let made = Arc::new(CqtPlan::new(&CqtParams { tuning, ..self.params })?);
+        Ok(kept().entry(key).or_insert(made).clone())
+    }
+}
+
+impl WholeKernel for ChromaOfChannel {
+    fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>> {
+        let tuning = self.tuning.estimate([y], self.params.bins_per_octave)?.unwrap_or(0.0);
+        Ok(self.fold.of_transform(self.transform(tuning)?.transform(y)?.view()))
+    }
+}
+
+impl ChromaCqt {
+    /// The kernel for signals of `sr` Hz.
+    pub fn kernel(&self, sr: f64) -> corsmal_dsp::Result<ChromaOfChannel> {
+        let params = CqtParams {
+            hop_length: self.hop_length,
+            n_bins: self.bins_per_octave.saturating_mul(self.n_octaves),
+            bins_per_octave: self.bins_per_octave,
+            ..CqtParams::new(sr)
+        };
+        let fold = ChromaCqtParams {
+            bins_per_octave: self.bins_per_octave,
+            n_chroma: self.n_chroma,
+            ..ChromaCqtParams::default()
+        };
+        let kernel = ChromaOfChannel {
+            params,
+            tuning: SignalTuning::new(sr)?,
+            transforms: Mutex::default(),
+            fold: Fold::new(params.n_bins, &fold)?,
+        };
+        kernel.transform(0.0)?;
+        Ok(kernel)
+    }
+
+    /// Samples between frames.
+    pub fn hop_length(&self) -> usize {
+        self.hop_length
+    }
+}
+
+impl FeatureKind for ChromaCqt {
+    const KIND: &'static str = "chroma_cqt";
+    const ABOUT: &'static str = "Magnitude of a constant-Q transform in n_chroma pitch classes from C \
+        on, each frame divided by its maximum (librosa.feature.chroma_cqt), under the tuning of \
+        the channel. Holds the whole recording in memory.";
+
+    fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
+        let extent = Extent::Frames(self.hop_length as f64);
+        Ok(Feature::whole(extent, self.kernel(sr)?, indices(self.n_chroma)))
+    }
+
+    /// Made for a common rate: the transform costs milliseconds, and more at higher ones.
+    fn check(&self) -> corsmal_dsp::Result<()> {
+        self.kernel(44_100.0).map(drop)
+    }
+}

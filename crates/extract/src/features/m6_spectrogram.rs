@@ -1,0 +1,37 @@
+//! `m6_spectrogram`: the input of M6 (ACC).
+
+use corsmal_dsp::frontends::{LibrosaVersion, M6Crop, M6Spectrogram as Plan};
+use ndarray::{Array2, ArrayView2};
+use serde::{Deserialize, Serialize};
+
+use super::{Extent, Feature, FeatureKind, WholeKernel, pixels};
+
+/// Parameters of `m6_spectrogram`.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct M6Spectrogram {
+    librosa: LibrosaVersion,
+}
+
+struct Image(Plan, f64);
+
+impl WholeKernel for Image {
+    fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>> {
+        let y = ArrayView2::from_shape((1, y.len()), y).expect("one row");
+        let image = self.0.run(y, self.1)?;
+        Ok(Array2::from_shape_vec((image.len(), 1), image.iter().copied().collect())
+            .expect("one column"))
+    }
+}
+
+impl FeatureKind for M6Spectrogram {
+    const KIND: &'static str = "m6_spectrogram";
+    const ABOUT: &'static str = "Decibel spectrogram of ten seconds at 22,050 Hz from the second \
+        detected onset on, peak-normalised, as an image of 96 x 96, row by row from 0 Hz (M6's \
+        input; resamples by itself). Holds the whole recording in memory.";
+
+    fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
+        let plan = Plan { librosa: self.librosa, crop: M6Crop::Onset };
+        Ok(Feature::whole(Extent::Vector, Image(plan, sr), pixels()))
+    }
+}

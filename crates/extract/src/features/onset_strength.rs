@@ -1,0 +1,72 @@
+//! `onset_strength`: how much the spectrum rises from frame to frame.
+
+use corsmal_dsp::DspError;
+use corsmal_dsp::decibel::Decibel;
+use corsmal_dsp::mel::{MelNorm, SparseBank, mel_filter};
+use corsmal_dsp::onset::{OnsetParams, onset_strength};
+use corsmal_dsp::stft::{StftParams, spectrogram};
+use ndarray::{Array2, ArrayView2};
+use serde::{Deserialize, Serialize};
+
+use super::{Extent, Feature, FeatureKind, WholeKernel};
+use crate::config::{MelSpec, StftSpec};
+
+/// Parameters of `onset_strength`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(default)]
+pub struct OnsetStrength {
+    #[serde(flatten)]
+    stft: StftSpec,
+    #[serde(flatten)]
+    mel: MelSpec,
+    lag: usize,
+    max_size: usize,
+}
+
+impl Default for OnsetStrength {
+    fn default() -> Self {
+        Self { stft: StftSpec::default(), mel: MelSpec::default(), lag: 1, max_size: 1 }
+    }
+}
+
+struct Envelope {
+    stft: StftParams,
+    bank: SparseBank,
+    params: OnsetParams,
+}
+
+impl WholeKernel for Envelope {
+    fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>> {
+        let power = spectrogram(
+            ArrayView2::from_shape((1, y.len()), y).expect("one row"),
+            &self.stft,
+            2.0,
+        )?;
+        let mut mel = self.bank.apply(power.view());
+        Decibel::default().power(mel.as_slice_mut().expect("made in C order"))?;
+        onset_strength(mel.view(), None, &self.params)
+    }
+}
+
+impl FeatureKind for OnsetStrength {
+    const KIND: &'static str = "onset_strength";
+    const ABOUT: &'static str = "Mean rise over lag frames of the mel bands in dB \
+        (librosa.onset.onset_strength), 80 dB below the maximum of each channel. Holds the whole \
+        recording in memory.";
+
+    fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
+        let stft = self.stft.params()?;
+        let bank = SparseBank::new(&mel_filter(&self.mel.params(sr, stft.n_fft, MelNorm::Slaney))?);
+        let defaults = OnsetParams::new(stft.n_fft, stft.hop_length)?;
+        let params = OnsetParams { lag: self.lag, max_size: self.max_size, ..defaults };
+        if params.lag == 0 {
+            return Err(DspError::parameter("lag", 0, "at least 1"));
+        }
+        if params.max_size == 0 {
+            return Err(DspError::parameter("max_size", 0, "at least 1"));
+        }
+        let kernel = Envelope { stft, bank, params };
+        let extent = Extent::Frames(stft.hop_length as f64);
+        Ok(Feature::whole(extent, kernel, vec![String::new()]))
+    }
+}
