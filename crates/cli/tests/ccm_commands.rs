@@ -1,5 +1,7 @@
 //! `synth`, `dataset check`, `evaluate` and `benchmark` as a user runs them.
 
+#![allow(clippy::unwrap_used)]
+
 use std::path::Path;
 use std::process::{Command, Output};
 

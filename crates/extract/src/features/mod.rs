@@ -120,11 +120,13 @@ pub struct Feature {
 
 type Planner = Box<dyn Fn(f64) -> corsmal_dsp::Result<Feature> + Send + Sync>;
 
+type Parse = fn(&str, &Map<String, Value>) -> Result<(Value, Planner), ConfigError>;
+
 /// A registered feature kind.
 pub struct Entry {
     kind: &'static str,
     about: &'static str,
-    parse: fn(&str, &Map<String, Value>) -> Result<(Value, Planner), ConfigError>,
+    parse: Parse,
 }
 
 impl Entry {

@@ -70,6 +70,9 @@ struct Partial {
     recording: Option<Result<Recording, Failed>>,
 }
 
+/// Arrays, summary row and length of a recording.
+type Computed = (Vec<Member>, Option<Vec<f32>>, u64);
+
 enum Work {
     Input(usize),
     Span(SpanJob),
@@ -295,7 +298,7 @@ impl<'a> Collector<'a> {
         recording: Result<Recording, Failed>,
     ) {
         let plan = &planned.plan;
-        let finish = || -> Result<(Vec<Member>, Option<Vec<f32>>, u64), Failed> {
+        let finish = || -> Result<Computed, Failed> {
             let recording = recording?;
             let total = recording.total();
             if total == 0 {
