@@ -108,7 +108,7 @@ impl FrontEnd {
                 self.resample = Some(stream);
             }
         }
-        self.emphasize(out, from);
+        self.emphasize(&mut out[from..]);
         match &mut self.held {
             Some((_, held)) => held.extend(out.drain(from..)),
             None => self.cut(out, from),
@@ -122,7 +122,7 @@ impl FrontEnd {
         if let Some(stream) = self.resample.take() {
             stream.finish(out);
         }
-        self.emphasize(out, from);
+        self.emphasize(&mut out[from..]);
         if let Some((rule, mut held)) = self.held.take() {
             held.extend(out.drain(from..));
             normalize(rule, &mut held);
@@ -132,10 +132,10 @@ impl FrontEnd {
         self.remaining.unwrap_or(0)
     }
 
-    /// Pre-emphasis of the frames behind `from`.
-    fn emphasize(&mut self, out: &mut Vec<f32>, from: usize) {
+    /// Pre-emphasis of whole frames.
+    fn emphasize(&mut self, frames: &mut [f32]) {
         if self.preemphasis != 0.0 {
-            for frame in out[from..].chunks_exact_mut(self.channels) {
+            for frame in frames.chunks_exact_mut(self.channels) {
                 if self.before.is_empty() {
                     self.before.extend_from_slice(frame);
                     continue;
