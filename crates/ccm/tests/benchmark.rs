@@ -1,5 +1,7 @@
 //! The benchmark on synthetic recordings, and its features on the real one.
 
+#![allow(clippy::unwrap_used)]
+
 mod shared_data;
 
 use std::path::Path;

@@ -1,5 +1,7 @@
 //! Data sets on disk, and the published splits and actions.
 
+#![allow(clippy::unwrap_used)]
+
 mod shared_data;
 
 use corsmal_ccm::dataset::{

@@ -1,5 +1,7 @@
 //! M5's stored predictions, fused by averaging, are its submission.
 
+#![allow(clippy::unwrap_used)]
+
 mod shared_data;
 
 use corsmal_ccm::predictions::ProbabilityTable;

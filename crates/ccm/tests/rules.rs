@@ -1,5 +1,7 @@
 //! The rule sets on small cases made by hand.
 
+#![allow(clippy::unwrap_used)]
+
 use std::io::Write;
 use std::path::PathBuf;
 

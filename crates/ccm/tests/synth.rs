@@ -1,5 +1,7 @@
 //! Synthetic data sets: same bytes for any number of threads, and what is in them.
 
+#![allow(clippy::unwrap_used)]
+
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -1,5 +1,7 @@
 //! Features by way of the engine against the array functions of `corsmal_dsp`.
 
+#![allow(clippy::unwrap_used)]
+
 use std::sync::Arc;
 
 use corsmal_dsp::af193::Af193;

@@ -23,7 +23,7 @@ fn single_pass(path: &Path) -> Vec<f32> {
     let mut extractor = Extractor::new(plan.clone(), 0..u64::MAX, 0);
     extractor.push(&samples);
     let mut recording = Recording::new(plan, path.parent().unwrap());
-    recording.add(extractor.finish(true)).unwrap();
+    recording.add(extractor.finish(true).unwrap()).unwrap();
     let Features::Frames(arrays) = recording.finish().unwrap() else { panic!("no summary") };
     arrays.into_iter().next().unwrap().values.into_vec().unwrap()
 }
