@@ -1,5 +1,5 @@
 //! The front end: decoded blocks to the signal that features see, in the order of
-//! [`SignalConfig`](crate::config::SignalConfig).
+//! [`SignalConfig`].
 
 use std::sync::Arc;
 

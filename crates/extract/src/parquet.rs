@@ -149,7 +149,7 @@ fn schema(table: &Table) -> Result<TypePtr, ParquetError> {
     Ok(Arc::new(Type::group_type_builder("features").with_fields(fields).build()?))
 }
 
-/// Reads back what [`write`] wrote.
+/// Reads back what [`write()`] wrote.
 ///
 /// # Errors
 /// [`ParquetTableError`]; Parquet files of other tools are refused.

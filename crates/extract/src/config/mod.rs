@@ -67,9 +67,6 @@ impl ConfigError {
     }
 }
 
-/// Highest sample rate that is read, in Hz.
-const HIGHEST_RATE: f64 = 768_000.0;
-
 /// A checked configuration.
 #[derive(Debug, Clone)]
 pub struct Config {
@@ -172,7 +169,7 @@ impl Config {
             .collect::<Result<Vec<_>, _>>()?;
         // Values that no sample rate makes possible are refused now, not at the first file.
         let rate = signal.sample_rate;
-        FeatureConfig::check(&features, if rate > 0.0 { rate } else { HIGHEST_RATE })?;
+        FeatureConfig::check(&features, (rate > 0.0).then_some(rate))?;
         let summary = match raw.summary {
             None => None,
             Some(value) => {

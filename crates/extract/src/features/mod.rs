@@ -1,4 +1,4 @@
-//! Features: one file each, with its parameters and one line in [`REGISTRY`].
+//! Features: one file each, with its parameters and one line in `REGISTRY`.
 //!
 //! A feature declares what it reads (rows of a spectrum, frames of the waveform, or the whole
 //! recording, which is then held in memory), what it computes from that alone, and, where its values depend on the maximum of the
@@ -221,6 +221,9 @@ fn pixels() -> Vec<String> {
     (0..96).flat_map(|row| (0..96).map(move |column| format!("{row},{column}"))).collect()
 }
 
+/// Rate in Hz by which coefficients are counted where the recordings give the rate.
+const USUAL_RATE: f64 = 44_100.0;
+
 type Planner = Box<dyn Fn(f64) -> corsmal_dsp::Result<Feature> + Send + Sync>;
 
 /// Checks a table of parameters: every parameter with its value, and the planner.
@@ -329,13 +332,21 @@ impl FeatureConfig {
         Ok(Self { name: name.to_string(), entry, parameters, coefficients, planner })
     }
 
-    /// Refuses what is impossible for signals of `sr` Hz, a derived feature whose source is missing
-    /// or comes later, and coefficients that a feature has not.
-    pub(crate) fn check(all: &[Self], sr: f64) -> Result<(), ConfigError> {
+    /// Refuses what is impossible at the sample rate `sr`, where that is configured; a derived
+    /// feature whose source is missing or comes later; coefficients that a feature has not.
+    pub(crate) fn check(all: &[Self], sr: Option<f64>) -> Result<(), ConfigError> {
         let mut coefficients: Vec<usize> = Vec::new();
         for (i, feature) in all.iter().enumerate() {
             let key = |last: &str| format!("features.{}{last}", feature.name);
-            let planned = feature.plan(sr).map_err(|e| ConfigError::key(key(""), e))?;
+            let planned = match (feature.plan(sr.unwrap_or(USUAL_RATE)), sr) {
+                (Ok(planned), _) => planned,
+                (Err(e), Some(_)) => return Err(ConfigError::key(key(""), e)),
+                // Possible at another rate: the recordings will tell.
+                (Err(_), None) => {
+                    coefficients.push(usize::MAX);
+                    continue;
+                }
+            };
             let count = match &planned.kernel {
                 Kernel::Derived(of, _) => {
                     let source = all[..i].iter().position(|f| f.name == *of);

@@ -74,7 +74,7 @@ impl NpzWriter {
 
     /// Continues a partial archive behind `entries`, cutting off whatever follows them.
     ///
-    /// Give entries that [`sound_entries`] found intact.
+    /// Give entries that [`super::sound_entries`] found intact.
     ///
     /// # Errors
     /// [`NpzError::Io`]; [`NpzError::Member`] when the entries do not follow each other without a
