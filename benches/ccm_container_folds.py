@@ -8,8 +8,8 @@ fusion  pipeline on A34F and pooled VGGish chosen by nested cross-validation
 
 In the nested runs every outer fold ranks all candidates by their weighted F1 on inner folds of its
 own six training containers (two held out at a time) and averages the probabilities of the best
-three, fitted on all six; the held-out containers are used once, for the score. Every pipeline learns the
-seven joint classes; the probabilities of type and level are sums over them. Fixed seeds.
+three, fitted on all six; the held-out containers are used once, for the score. Every pipeline
+learns the seven joint classes; the probabilities of type and level are sums over them. Fixed seeds.
 """
 
 from __future__ import annotations
