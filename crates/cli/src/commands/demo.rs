@@ -47,6 +47,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
             "One row of statistics for each recording",
             vec!["extract", "--in", &data, "--out", &table, "--preset", "mfcc-zcr", "--overwrite"],
         ),
+        ("What that output holds", vec!["inspect", &table]),
         (
             "A recording: format, health and picture",
             vec!["inspect", &recording, "--picture", &picture],

@@ -65,13 +65,9 @@ pub enum Normalize {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ResType {
-    /// librosa's default since 0.10.
+    /// librosa's default since 0.10; the only one that streams.
     #[default]
     SoxrHq,
-    /// The default of librosa 0.8 (resampy).
-    KaiserBest,
-    /// resampy's shorter filter.
-    KaiserFast,
 }
 
 /// The front end, in the order in which its steps run.
