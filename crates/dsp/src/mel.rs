@@ -4,9 +4,8 @@ use ndarray::{Array2, Array3, ArrayView3, Axis};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{DspError, Result};
-use crate::lanes::{LANES, Row};
+use crate::lanes::{Row, weighted_sums};
 use crate::real::Real;
-use crate::simd::vectorized;
 
 /// Normalisation of each mel filter.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -198,20 +197,7 @@ impl SparseBank {
 
     /// `bank @ power` for the rows of one lane block, `[bins] -> [bands]`.
     pub fn apply_rows(&self, power: &[Row], out: &mut [Row]) {
-        vectorized(
-            #[inline(always)]
-            || {
-                for ((first, weights), out) in self.bands.iter().zip(out) {
-                    let mut sum = [0.0; LANES];
-                    for (w, row) in weights.iter().zip(&power[*first..]) {
-                        for (sum, x) in sum.iter_mut().zip(&row.0) {
-                            *sum += w * x;
-                        }
-                    }
-                    out.0 = sum;
-                }
-            },
-        );
+        weighted_sums(&self.bands, power, out);
     }
 
     /// `bank @ spectrum` for `spectrum [channels, bins, frames]`.

@@ -4,35 +4,60 @@ use std::f64::consts::PI;
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::{Row, registers};
+use super::complex::{C, Dft, Pair, Points, add, load, mul, store, sub};
+use super::{Frames, Row, registers};
 use crate::error::{DspError, Result};
-
-/// A complex value of one register.
-#[derive(Clone, Copy)]
-struct C<V> {
-    re: V,
-    im: V,
-}
 
 /// Plan of a real-to-complex transform of `n_fft` points (a power of two) on rows.
 ///
-/// The samples of a frame are taken as `n_fft / 2` complex values, transformed by radix-4
-/// decimation in frequency (in place, digit-reversed), and unpacked into `n_fft / 2 + 1` bins.
-/// Tables are computed in double precision.
+/// The samples of a frame are taken as `n_fft / 2` complex values and transformed by decimation in
+/// frequency, in place: a pass of radix 4 over the whole frame, which can read windowed samples
+/// from where they lie, then quarter by quarter passes of radix 8 (and of 4, where the length
+/// asks for it) that stay in the cache. Bins `k` and `n_fft / 2 - k` unpack into those of the real
+/// transform as soon as their quarters are done. Tables are computed in double precision.
 pub struct LaneFft {
     arch: Arch,
     n_fft: usize,
-    /// Twiddles of each radix-4 stage, largest first: `w^j, w^2j, w^3j` as (re, im) pairs.
-    stages: Vec<Vec<[f32; 6]>>,
-    /// Position of bin `k` of the complex transform in its digit-reversed output.
+    /// The pass over the whole frame: for each column `w^0, w^j, w^2j, w^3j`, halved since
+    /// unpacking adds two halves.
+    first: Vec<[[f32; 2]; 4]>,
+    /// Passes over a quarter, all but the last.
+    stages: Vec<Stage>,
+    /// Points of the last pass, 4 or 8.
+    leaf: usize,
+    /// Position of value `p` of a quarter in its digit-reversed output.
     position: Vec<u32>,
-    /// `exp(-2 pi i k / n_fft)` for the unpacking of bin `k`.
+    /// `exp(-2 pi i k / n_fft)` for the unpacking of bin `k = q + 4 p`, at `[q][p]`.
     unpack: Vec<[f32; 2]>,
+}
+
+/// Twiddles of a pass over blocks, for each column `w^0, w^j, w^2j, ...`.
+enum Stage {
+    Four(Vec<[[f32; 2]; 4]>),
+    Eight(Vec<[[f32; 2]; 8]>),
+}
+
+/// `exp(-2 pi i k / n)`.
+fn turn(k: usize, n: usize) -> [f64; 2] {
+    let angle = -2.0 * PI * (k % n) as f64 / n as f64;
+    [angle.cos(), angle.sin()]
+}
+
+fn twiddles<const R: usize>(size: usize, scale: f64) -> Vec<[[f32; 2]; R]> {
+    let column = |j| std::array::from_fn(|q| turn(j * q, size).map(|x| (scale * x) as f32));
+    (0..size / R).map(column).collect()
+}
+
+/// Radices of the passes over `points` (8 or more) values: fours until the rest is eights.
+fn radices(points: usize) -> Vec<usize> {
+    let bits = points.trailing_zeros() as usize;
+    let fours = [0, 2, 1][bits % 3];
+    [vec![4; fours], vec![8; (bits - 2 * fours) / 3]].concat()
 }
 
 impl LaneFft {
     /// Shortest and longest supported transform.
-    pub const RANGE: std::ops::RangeInclusive<usize> = 16..=1 << 20;
+    pub const RANGE: std::ops::RangeInclusive<usize> = 64..=1 << 20;
 
     /// Whether a transform length is one of ours.
     pub fn supports(n_fft: usize) -> bool {
@@ -45,27 +70,32 @@ impl LaneFft {
     /// A length that [`LaneFft::supports`] denies.
     pub fn new(n_fft: usize) -> Result<Self> {
         if !Self::supports(n_fft) {
-            return Err(DspError::parameter("n_fft", n_fft, "a power of two from 16 to 2^20"));
+            return Err(DspError::parameter("n_fft", n_fft, "a power of two from 64 to 2^20"));
         }
         let m = n_fft / 2;
-        let turn = |k: usize, n: usize| {
-            let angle = -2.0 * PI * k as f64 / n as f64;
-            [angle.cos() as f32, angle.sin() as f32]
-        };
+        let quarter = m / 4;
+        let radices = radices(quarter);
+        let mut size = quarter;
         let mut stages = Vec::new();
-        let mut size = m;
-        while size > 8 {
-            let table = (0..size / 4).map(|j| {
-                let [a, b, c] = [turn(j, size), turn(2 * j, size), turn(3 * j, size)];
-                [a[0], a[1], b[0], b[1], c[0], c[1]]
+        for radix in &radices[..radices.len() - 1] {
+            stages.push(match radix {
+                8 => Stage::Eight(twiddles(size, 1.0)),
+                _ => Stage::Four(twiddles(size, 1.0)),
             });
-            stages.push(table.collect());
-            size /= 4;
+            size /= radix;
         }
-        let mut position = vec![0u32; m];
-        reversed(&mut position, 0, 0, 1, m);
-        let unpack = (0..=m / 2).map(|k| turn(k, n_fft)).collect();
-        Ok(Self { arch: Arch::new(), n_fft, stages, position, unpack })
+        let mut position = vec![0; quarter];
+        reversed(&mut position, &radices, 0, 0, 1);
+        let bin = |q| (0..quarter).map(move |p| turn(q + 4 * p, n_fft).map(|x| x as f32));
+        Ok(Self {
+            arch: Arch::new(),
+            n_fft,
+            first: twiddles(m, 0.5),
+            stages,
+            leaf: size,
+            position,
+            unpack: (0..4).flat_map(bin).collect(),
+        })
     }
 
     /// Length of the transform in samples, and rows of its input.
@@ -80,235 +110,299 @@ impl LaneFft {
 
     /// `|X|^2` of the windowed `frames` (`n_fft` rows, overwritten) into `power` (`n_bins` rows).
     pub fn power(&self, frames: &mut [Row], power: &mut [Row]) {
-        assert_eq!((frames.len(), power.len()), (self.n_fft, self.n_bins()));
-        self.arch.dispatch(PowerKernel { plan: self, frames, power });
+        self.first_pass(InPlace, frames);
+        self.power_of_passed(frames, power);
+    }
+
+    /// As [`power`](Self::power), of `frames` times `window` (`n_fft` values), read where they lie.
+    /// `work` (`n_fft` rows) is overwritten.
+    pub fn power_of(
+        &self,
+        frames: &impl Frames,
+        window: &[f32],
+        work: &mut [Row],
+        power: &mut [Row],
+    ) {
+        self.first_pass(Windowed { frames, window: window.as_chunks::<2>().0 }, work);
+        self.power_of_passed(work, power);
     }
 
     /// The complex spectrum of the windowed `frames` (`n_fft` rows, overwritten): real parts into
     /// the even and imaginary parts into the odd rows of `spectrum` (`2 n_bins` rows).
     pub fn complex(&self, frames: &mut [Row], spectrum: &mut [Row]) {
-        assert_eq!((frames.len(), spectrum.len()), (self.n_fft, 2 * self.n_bins()));
-        self.arch.dispatch(ComplexKernel { plan: self, frames, spectrum });
+        self.first_pass(InPlace, frames);
+        assert_eq!(spectrum.len(), 2 * self.n_bins());
+        let out = Complex(spectrum.as_chunks_mut::<2>().0);
+        self.arch.dispatch(Quarters { plan: self, work: frames, out });
+    }
+
+    fn power_of_passed(&self, work: &mut [Row], power: &mut [Row]) {
+        assert_eq!(power.len(), self.n_bins());
+        self.arch.dispatch(Quarters { plan: self, work, out: Power(power) });
+    }
+
+    fn first_pass(&self, source: impl Source, work: &mut [Row]) {
+        assert_eq!(work.len(), self.n_fft);
+        self.arch.dispatch(FirstPass { plan: self, source, work });
     }
 }
 
-/// Fills `position[k]` for the sub-transform of `size` that starts at `start` and holds the bins
+/// Fills `position[p]` for the sub-transform that starts at `start` and holds the values
 /// `offset, offset + stride, ...`.
-fn reversed(position: &mut [u32], start: usize, offset: usize, stride: usize, size: usize) {
-    if size <= 8 {
+fn reversed(position: &mut [u32], radices: &[usize], start: usize, offset: usize, stride: usize) {
+    let size: usize = radices.iter().product();
+    match radices {
         // Leaves leave their output in natural order.
-        for k in 0..size {
-            position[offset + k * stride] = (start + k) as u32;
+        [] | [_] => {
+            for k in 0..size {
+                position[offset + k * stride] = (start + k) as u32;
+            }
         }
-        return;
-    }
-    for r in 0..4 {
-        reversed(position, start + r * size / 4, offset + r * stride, stride * 4, size / 4);
+        [radix, rest @ ..] => {
+            for q in 0..*radix {
+                let start = start + q * size / radix;
+                reversed(position, rest, start, offset + q * stride, stride * radix);
+            }
+        }
     }
 }
 
-struct PowerKernel<'a> {
+/// Where the first pass takes its values.
+trait Source {
+    /// Value `j` of the packed frame; `stored` is what lies there in the working memory.
+    fn value<S: Simd>(&self, simd: S, stored: &Pair, j: usize, v: usize) -> C<S::f32s>;
+}
+
+struct InPlace;
+
+impl Source for InPlace {
+    #[inline(always)]
+    fn value<S: Simd>(&self, _: S, stored: &Pair, _: usize, v: usize) -> C<S::f32s> {
+        load::<S>(stored, v)
+    }
+}
+
+struct Windowed<'a, F> {
+    frames: &'a F,
+    window: &'a [[f32; 2]],
+}
+
+impl<F: Frames> Source for Windowed<'_, F> {
+    #[inline(always)]
+    fn value<S: Simd>(&self, simd: S, _: &Pair, j: usize, v: usize) -> C<S::f32s> {
+        let [re, im] = self.window[j];
+        C {
+            re: simd.mul_f32s(simd.splat_f32s(re), self.frames.row(2 * j).load::<S>(v)),
+            im: simd.mul_f32s(simd.splat_f32s(im), self.frames.row(2 * j + 1).load::<S>(v)),
+        }
+    }
+}
+
+struct FirstPass<'a, F> {
     plan: &'a LaneFft,
-    frames: &'a mut [Row],
-    power: &'a mut [Row],
+    source: F,
+    work: &'a mut [Row],
 }
 
-impl WithSimd for PowerKernel<'_> {
+impl<F: Source> WithSimd for FirstPass<'_, F> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        transform(simd, self.plan, self.frames);
-        let power = self.power;
-        unpack(simd, self.plan, self.frames, |k, v, x| {
-            let squared = simd.mul_add_e_f32s(x.re, x.re, simd.mul_f32s(x.im, x.im));
-            power[k].store::<S>(v, squared);
-        });
+        let Self { plan, source, work } = self;
+        let half = simd.splat_f32s(0.5);
+        let quarter = plan.first.len();
+        let parts = parts::<4>(work.as_chunks_mut::<2>().0, quarter);
+        for (j, w) in plan.first.iter().enumerate() {
+            for v in 0..registers::<S>() {
+                let x = Points::list(
+                    #[inline(always)]
+                    |q| source.value(simd, &parts[q][j], j + q * quarter, v),
+                );
+                let y: [_; 4] = Points::of(simd, x);
+                let y0 = C { re: simd.mul_f32s(half, y[0].re), im: simd.mul_f32s(half, y[0].im) };
+                store::<S>(&mut parts[0][j], v, y0);
+                store::<S>(&mut parts[1][j], v, mul(simd, y[1], w[1]));
+                store::<S>(&mut parts[2][j], v, mul(simd, y[2], w[2]));
+                store::<S>(&mut parts[3][j], v, mul(simd, y[3], w[3]));
+            }
+        }
     }
 }
 
-struct ComplexKernel<'a> {
-    plan: &'a LaneFft,
-    frames: &'a mut [Row],
-    spectrum: &'a mut [Row],
-}
-
-impl WithSimd for ComplexKernel<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        transform(simd, self.plan, self.frames);
-        let spectrum = self.spectrum;
-        unpack(simd, self.plan, self.frames, |k, v, x| {
-            spectrum[2 * k].store::<S>(v, x.re);
-            spectrum[2 * k + 1].store::<S>(v, x.im);
-        });
-    }
-}
-
-/// The complex transform of `n_fft / 2` points in place.
+/// The first `R` parts of `length` values.
 #[inline(always)]
-fn transform<S: Simd>(simd: S, plan: &LaneFft, rows: &mut [Row]) {
-    let Some((first, rest)) = plan.stages.split_first() else {
-        leaf(simd, rows);
-        return;
+fn parts<const R: usize>(block: &mut [Pair], length: usize) -> [&mut [Pair]; R]
+where
+    Points: Dft<R>,
+{
+    let mut parts = block.chunks_exact_mut(length);
+    Points::list(|_| parts.next().map_or(&mut [][..], |part| &mut part[..length]))
+}
+
+/// A pass over a block: transforms across its parts, then twiddles.
+#[inline(always)]
+fn pass<S: Simd, const R: usize>(simd: S, block: &mut [Pair], twiddles: &[[[f32; 2]; R]])
+where
+    Points: Dft<R>,
+{
+    let length = twiddles.len();
+    let mut parts = parts::<R>(block, length);
+    for (j, w) in twiddles.iter().enumerate() {
+        for v in 0..registers::<S>() {
+            let x = Points::list(
+                #[inline(always)]
+                |q| load::<S>(&parts[q][j], v),
+            );
+            let y: [_; R] = Points::of(simd, x);
+            let _: [(); R] = Points::list(
+                #[inline(always)]
+                |q| {
+                    let turned = if q == 0 { y[0] } else { mul(simd, y[q], w[q]) };
+                    store::<S>(&mut parts[q][j], v, turned);
+                },
+            );
+        }
+    }
+}
+
+/// The last pass: neighbouring points, into natural order.
+#[inline(always)]
+fn leaves<S: Simd, const R: usize>(simd: S, quarter: &mut [Pair])
+where
+    Points: Dft<R>,
+{
+    for leaf in quarter.as_chunks_mut::<R>().0 {
+        for v in 0..registers::<S>() {
+            let x = Points::list(
+                #[inline(always)]
+                |q| load::<S>(&leaf[q], v),
+            );
+            let y: [_; R] = Points::of(simd, x);
+            let _: [(); R] = Points::list(
+                #[inline(always)]
+                |q| store::<S>(&mut leaf[q], v, y[q]),
+            );
+        }
+    }
+}
+
+/// What becomes of a bin.
+trait Output<S: Simd> {
+    fn put(&mut self, simd: S, bin: usize, v: usize, x: C<S::f32s>);
+}
+
+struct Power<'a>(&'a mut [Row]);
+
+impl<S: Simd> Output<S> for Power<'_> {
+    #[inline(always)]
+    fn put(&mut self, simd: S, bin: usize, v: usize, x: C<S::f32s>) {
+        let squared = simd.mul_add_e_f32s(x.re, x.re, simd.mul_f32s(x.im, x.im));
+        self.0[bin].store::<S>(v, squared);
+    }
+}
+
+struct Complex<'a>(&'a mut [Pair]);
+
+impl<S: Simd> Output<S> for Complex<'_> {
+    #[inline(always)]
+    fn put(&mut self, _: S, bin: usize, v: usize, x: C<S::f32s>) {
+        store::<S>(&mut self.0[bin], v, x);
+    }
+}
+
+/// Everything behind the first pass.
+struct Quarters<'a, O> {
+    plan: &'a LaneFft,
+    work: &'a mut [Row],
+    out: O,
+}
+
+macro_rules! quarters_with_simd {
+    ($out:ty) => {
+        impl WithSimd for Quarters<'_, $out> {
+            type Output = ();
+
+            #[inline(always)]
+            fn with_simd<S: Simd>(self, simd: S) {
+                quarters(simd, self.plan, self.work.as_chunks_mut::<2>().0, self.out);
+            }
+        }
     };
-    stage(simd, rows, first);
-    // Depth first after the first stage: a quarter of a 2048-point block stays in the L1 cache.
-    let quarter = rows.len() / 4;
-    for part in rows.chunks_exact_mut(quarter) {
-        let mut size = quarter;
-        for twiddles in rest {
-            for block in part.chunks_exact_mut(size) {
-                stage(simd, block, twiddles);
-            }
-            size /= 4;
-        }
-        for block in part.chunks_exact_mut(size) {
-            leaf(simd, block);
-        }
-    }
 }
+quarters_with_simd!(Power<'_>);
+quarters_with_simd!(Complex<'_>);
 
+/// Quarter `q` holds the values `q + 4 p`, so that `m - k` of its values lies in quarter `4 - q`.
 #[inline(always)]
-fn add<S: Simd>(simd: S, a: C<S::f32s>, b: C<S::f32s>) -> C<S::f32s> {
-    C { re: simd.add_f32s(a.re, b.re), im: simd.add_f32s(a.im, b.im) }
-}
-
-#[inline(always)]
-fn sub<S: Simd>(simd: S, a: C<S::f32s>, b: C<S::f32s>) -> C<S::f32s> {
-    C { re: simd.sub_f32s(a.re, b.re), im: simd.sub_f32s(a.im, b.im) }
-}
-
-/// `a * (re + i im)`.
-#[inline(always)]
-fn mul<S: Simd>(simd: S, a: C<S::f32s>, re: f32, im: f32) -> C<S::f32s> {
-    let (wr, wi) = (simd.splat_f32s(re), simd.splat_f32s(im));
-    C {
-        re: simd.negate_mul_add_e_f32s(a.im, wi, simd.mul_f32s(a.re, wr)),
-        im: simd.mul_add_e_f32s(a.re, wi, simd.mul_f32s(a.im, wr)),
-    }
-}
-
-/// `-i a`.
-#[inline(always)]
-fn turn_back<S: Simd>(simd: S, a: C<S::f32s>) -> C<S::f32s> {
-    C { re: a.im, im: simd.neg_f32s(a.re) }
-}
-
-#[inline(always)]
-fn load<S: Simd>(pair: &[Row; 2], v: usize) -> C<S::f32s> {
-    C { re: pair[0].load::<S>(v), im: pair[1].load::<S>(v) }
-}
-
-#[inline(always)]
-fn store<S: Simd>(pair: &mut [Row; 2], v: usize, x: C<S::f32s>) {
-    pair[0].store::<S>(v, x.re);
-    pair[1].store::<S>(v, x.im);
-}
-
-/// The four-point transform.
-#[inline(always)]
-fn four<S: Simd>(simd: S, x: [C<S::f32s>; 4]) -> [C<S::f32s>; 4] {
-    let (even, odd) = (add(simd, x[0], x[2]), sub(simd, x[0], x[2]));
-    let (cross, turned) = (add(simd, x[1], x[3]), turn_back(simd, sub(simd, x[1], x[3])));
-    [add(simd, even, cross), add(simd, odd, turned), sub(simd, even, cross), sub(simd, odd, turned)]
-}
-
-/// One radix-4 stage over a block: four-point transforms across its quarters, then twiddles.
-#[inline(always)]
-fn stage<S: Simd>(simd: S, block: &mut [Row], twiddles: &[[f32; 6]]) {
-    let pairs = block.as_chunks_mut::<2>().0;
-    let quarter = pairs.len() / 4;
-    let (a, rest) = pairs.split_at_mut(quarter);
-    let (b, rest) = rest.split_at_mut(quarter);
-    let (c, d) = rest.split_at_mut(quarter);
-    for ((((a, b), c), d), w) in a.iter_mut().zip(b).zip(c).zip(d).zip(twiddles) {
-        for v in 0..registers::<S>() {
-            let x = [load::<S>(a, v), load::<S>(b, v), load::<S>(c, v), load::<S>(d, v)];
-            let y = four(simd, x);
-            store::<S>(a, v, y[0]);
-            store::<S>(b, v, mul(simd, y[1], w[0], w[1]));
-            store::<S>(c, v, mul(simd, y[2], w[2], w[3]));
-            store::<S>(d, v, mul(simd, y[3], w[4], w[5]));
-        }
-    }
-}
-
-/// The last 4 or 8 points, in natural order.
-#[inline(always)]
-fn leaf<S: Simd>(simd: S, block: &mut [Row]) {
-    let pairs = block.as_chunks_mut::<2>().0;
-    if let Ok(pairs) = <&mut [[Row; 2]; 8]>::try_from(&mut *pairs) {
-        eight(simd, pairs);
-    } else if let Ok(pairs) = <&mut [[Row; 2]; 4]>::try_from(&mut *pairs) {
-        for v in 0..registers::<S>() {
-            let y = four(simd, [0, 1, 2, 3].map(|i| load::<S>(&pairs[i], v)));
-            for (pair, y) in pairs.iter_mut().zip(y) {
-                store::<S>(pair, v, y);
-            }
-        }
-    } else {
-        unreachable!("leaves have four or eight points");
-    }
-}
-
-/// The eight-point transform as two four-point transforms.
-#[inline(always)]
-fn eight<S: Simd>(simd: S, pairs: &mut [[Row; 2]; 8]) {
-    const H: f32 = std::f32::consts::FRAC_1_SQRT_2;
+fn quarters<S: Simd>(simd: S, plan: &LaneFft, work: &mut [Pair], mut out: impl Output<S>) {
+    let [zeroth, low, middle, high] = parts::<4>(work, plan.first.len());
+    transform(simd, plan, zeroth);
+    let m = plan.n_fft / 2;
+    let zero = simd.splat_f32s(0.0);
     for v in 0..registers::<S>() {
-        let x = [0, 1, 2, 3, 4, 5, 6, 7].map(|i| load::<S>(&pairs[i], v));
-        let even = four(simd, [x[0], x[2], x[4], x[6]]);
-        let odd = four(simd, [x[1], x[3], x[5], x[7]]);
-        let turned =
-            [odd[0], mul(simd, odd[1], H, -H), turn_back(simd, odd[2]), mul(simd, odd[3], -H, -H)];
-        for i in 0..4 {
-            store::<S>(&mut pairs[i], v, add(simd, even[i], turned[i]));
-            store::<S>(&mut pairs[i + 4], v, sub(simd, even[i], turned[i]));
+        let z = load::<S>(&zeroth[0], v);
+        let (sum, difference) = (simd.add_f32s(z.re, z.im), simd.sub_f32s(z.re, z.im));
+        out.put(simd, 0, v, C { re: simd.add_f32s(sum, sum), im: zero });
+        out.put(simd, m, v, C { re: simd.add_f32s(difference, difference), im: zero });
+    }
+    let n = plan.position.len();
+    unpack(simd, plan, 0, zeroth, zeroth, (1..=n / 2).map(|p| (p, n - p)), &mut out);
+    transform(simd, plan, middle);
+    unpack(simd, plan, 2, middle, middle, (0..n / 2).map(|p| (p, n - 1 - p)), &mut out);
+    transform(simd, plan, low);
+    transform(simd, plan, high);
+    unpack(simd, plan, 1, low, high, (0..n).map(|p| (p, n - 1 - p)), &mut out);
+}
+
+/// The remaining passes over a quarter, depth first.
+#[inline(always)]
+fn transform<S: Simd>(simd: S, plan: &LaneFft, quarter: &mut [Pair]) {
+    let mut size = quarter.len();
+    for stage in &plan.stages {
+        for block in quarter.chunks_exact_mut(size) {
+            match stage {
+                Stage::Four(twiddles) => pass(simd, block, twiddles),
+                Stage::Eight(twiddles) => pass(simd, block, twiddles),
+            }
         }
+        size /= match stage {
+            Stage::Four(_) => 4,
+            Stage::Eight(_) => 8,
+        };
+    }
+    match plan.leaf {
+        8 => leaves::<S, 8>(simd, quarter),
+        _ => leaves::<S, 4>(simd, quarter),
     }
 }
 
-/// Bins of the real transform from the packed complex one; `each(bin, register, value)`.
+/// Bins `q + 4 p` of quarter `q`, and those that mirror them, for each `(p, mirrored p)`.
 #[inline(always)]
 fn unpack<S: Simd>(
     simd: S,
     plan: &LaneFft,
-    rows: &[Row],
-    mut each: impl FnMut(usize, usize, C<S::f32s>),
+    q: usize,
+    low: &[Pair],
+    high: &[Pair],
+    places: impl Iterator<Item = (usize, usize)>,
+    out: &mut impl Output<S>,
 ) {
-    let pairs = rows.as_chunks::<2>().0;
-    let m = pairs.len();
-    let half = simd.splat_f32s(0.5);
-    let zero = simd.splat_f32s(0.0);
-    for v in 0..registers::<S>() {
-        let z = load::<S>(&pairs[0], v);
-        each(0, v, C { re: simd.add_f32s(z.re, z.im), im: zero });
-        each(m, v, C { re: simd.sub_f32s(z.re, z.im), im: zero });
-        let z = load::<S>(&pairs[plan.position[m / 2] as usize], v);
-        each(m / 2, v, C { re: z.re, im: simd.neg_f32s(z.im) });
-    }
-    for k in 1..m / 2 {
-        let low = &pairs[plan.position[k] as usize];
-        let high = &pairs[plan.position[m - k] as usize];
-        let [wr, wi] = plan.unpack[k];
+    let m = plan.n_fft / 2;
+    let turns = &plan.unpack[q * plan.position.len()..];
+    for (p, mirrored) in places {
+        let k = q + 4 * p;
+        let low = &low[plan.position[p] as usize];
+        let high = &high[plan.position[mirrored] as usize];
         for v in 0..registers::<S>() {
             let (a, b) = (load::<S>(low, v), load::<S>(high, v));
             // Spectra of the even and (times i) of the odd samples, from z(k) and conj z(m - k).
-            let even = C {
-                re: simd.mul_f32s(half, simd.add_f32s(a.re, b.re)),
-                im: simd.mul_f32s(half, simd.sub_f32s(a.im, b.im)),
-            };
-            let odd = C {
-                re: simd.mul_f32s(half, simd.add_f32s(a.im, b.im)),
-                im: simd.mul_f32s(half, simd.sub_f32s(b.re, a.re)),
-            };
-            let turned = mul(simd, odd, wr, wi);
-            each(k, v, add(simd, even, turned));
-            let mirrored = sub(simd, even, turned);
-            each(m - k, v, C { re: mirrored.re, im: simd.neg_f32s(mirrored.im) });
+            let even = C { re: simd.add_f32s(a.re, b.re), im: simd.sub_f32s(a.im, b.im) };
+            let odd = C { re: simd.add_f32s(a.im, b.im), im: simd.sub_f32s(b.re, a.re) };
+            let turned = mul(simd, odd, turns[p]);
+            let mirror = sub(simd, even, turned);
+            out.put(simd, k, v, add(simd, even, turned));
+            out.put(simd, m - k, v, C { re: mirror.re, im: simd.neg_f32s(mirror.im) });
         }
     }
 }
@@ -339,13 +433,16 @@ mod tests {
 
     #[test]
     fn every_length_agrees_with_a_double_precision_transform() {
-        for n in (4..=14).map(|e| 1usize << e) {
+        for n in (6..=15).map(|e| 1usize << e) {
             let frames = noise(n);
             let plan = LaneFft::new(n).unwrap();
             let mut spectrum = vec![Row::ZERO; 2 * plan.n_bins()];
             plan.complex(&mut frames.clone(), &mut spectrum);
             let mut power = vec![Row::ZERO; plan.n_bins()];
             plan.power(&mut frames.clone(), &mut power);
+            let mut again = power.clone();
+            plan.power_of(&frames.as_slice(), &vec![1.0; n], &mut frames.clone(), &mut again);
+            assert_eq!(again, power);
             for slot in 0..LANES {
                 let want = reference(&frames, slot);
                 let scale = want.iter().map(|z| z.norm()).fold(0.0, f64::max);
@@ -363,6 +460,6 @@ mod tests {
     #[test]
     fn other_lengths_are_refused() {
         assert!(LaneFft::new(1000).is_err());
-        assert!(LaneFft::new(8).is_err());
+        assert!(LaneFft::new(32).is_err());
     }
 }

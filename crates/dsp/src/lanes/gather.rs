@@ -26,6 +26,11 @@ impl Slots {
         })
     }
 
+    /// Whether the block is full and starts with channel 0.
+    pub fn aligned(&self) -> bool {
+        self.len == LANES && self.first.is_multiple_of(self.channels)
+    }
+
     /// Frame and channel of slot `s`.
     #[inline(always)]
     pub fn pair(&self, s: usize) -> (usize, usize) {
@@ -38,7 +43,7 @@ impl Slots {
 /// `signal` is interleaved and starts at the first sample of frame 0.
 pub fn gather(signal: &[f32], hop: usize, window: &[f32], slots: Slots, rows: &mut [Row]) {
     debug_assert_eq!(window.len(), rows.len());
-    let aligned = slots.len == LANES && slots.first.is_multiple_of(slots.channels);
+    let aligned = slots.aligned();
     vectorized(
         #[inline(always)]
         || match slots.channels {
@@ -52,7 +57,8 @@ pub fn gather(signal: &[f32], hop: usize, window: &[f32], slots: Slots, rows: &m
     );
 }
 
-/// `FRAMES` whole frames of `CHANNELS` channels fill the lanes.
+/// `FRAMES` whole frames of `CHANNELS` channels fill the lanes: as many samples at a time are read
+/// frame by frame and transposed.
 #[inline(always)]
 fn groups<const CHANNELS: usize, const FRAMES: usize>(
     signal: &[f32],
@@ -61,17 +67,84 @@ fn groups<const CHANNELS: usize, const FRAMES: usize>(
     slots: Slots,
     rows: &mut [Row],
 ) {
-    let first = slots.first / CHANNELS;
-    let frames: [&[[f32; CHANNELS]]; FRAMES] = std::array::from_fn(|f| {
-        let start = (first + f) * hop * CHANNELS;
-        signal[start..start + window.len() * CHANNELS].as_chunks::<CHANNELS>().0
-    });
-    let rows = &mut rows[..window.len()];
-    for (n, (row, w)) in rows.iter_mut().zip(window).enumerate() {
-        let groups = row.0.as_chunks_mut::<CHANNELS>().0;
-        for (group, frame) in groups.iter_mut().zip(&frames) {
-            *group = frame[n].map(|x| x * w);
+    let frames = Aligned::<CHANNELS, FRAMES>::new(signal, hop, window.len(), slots).0;
+    let (tiles, rest) = rows[..window.len()].as_chunks_mut::<FRAMES>();
+    for (t, (tile, window)) in tiles.iter_mut().zip(window.as_chunks::<FRAMES>().0).enumerate() {
+        let mut samples = [[[0.0; CHANNELS]; FRAMES]; FRAMES];
+        for (samples, frame) in samples.iter_mut().zip(&frames) {
+            samples.copy_from_slice(&frame[t * FRAMES..(t + 1) * FRAMES]);
         }
+        for ((row, samples), w) in tile.iter_mut().zip(&transposed(samples)).zip(window) {
+            for (slot, x) in row.0.iter_mut().zip(samples.as_flattened()) {
+                *slot = x * w;
+            }
+        }
+    }
+    let done = window.len() - rest.len();
+    for (n, (row, w)) in (done..).zip(rest.iter_mut().zip(&window[done..])) {
+        for (group, frame) in row.0.as_chunks_mut::<CHANNELS>().0.iter_mut().zip(&frames) {
+            for (slot, x) in group.iter_mut().zip(&frame[n]) {
+                *slot = x * w;
+            }
+        }
+    }
+}
+
+/// The transpose of `N x N` values (a power of two): perfect shuffles of all of them, each of which
+/// a vector unit does by interleaving.
+#[inline(always)]
+fn transposed<T: Copy, const N: usize>(mut tile: [[T; N]; N]) -> [[T; N]; N] {
+    let half = N / 2;
+    for _ in 0..N.ilog2() {
+        let mut next = tile;
+        for i in 0..half {
+            for j in 0..half {
+                next[2 * i][2 * j] = tile[i][j];
+                next[2 * i][2 * j + 1] = tile[i + half][j];
+                next[2 * i + 1][2 * j] = tile[i][j + half];
+                next[2 * i + 1][2 * j + 1] = tile[i + half][j + half];
+            }
+        }
+        tile = next;
+    }
+    tile
+}
+
+/// Rows of samples, read where they lie.
+pub trait Frames {
+    /// Sample `n` of every slot's frame, without a window.
+    fn row(&self, n: usize) -> Row;
+}
+
+impl Frames for &[Row] {
+    #[inline(always)]
+    fn row(&self, n: usize) -> Row {
+        self[n]
+    }
+}
+
+/// `FRAMES` whole frames of `CHANNELS` channels of an interleaved signal, which fill the lanes.
+pub struct Aligned<'a, const CHANNELS: usize, const FRAMES: usize>([&'a [[f32; CHANNELS]]; FRAMES]);
+
+impl<'a, const CHANNELS: usize, const FRAMES: usize> Aligned<'a, CHANNELS, FRAMES> {
+    /// The frames of `length` samples of a full block of slots that starts with channel 0.
+    pub fn new(signal: &'a [f32], hop: usize, length: usize, slots: Slots) -> Self {
+        let first = slots.first / CHANNELS;
+        Self(std::array::from_fn(|f| {
+            let start = (first + f) * hop * CHANNELS;
+            signal[start..start + length * CHANNELS].as_chunks::<CHANNELS>().0
+        }))
+    }
+}
+
+impl<const CHANNELS: usize, const FRAMES: usize> Frames for Aligned<'_, CHANNELS, FRAMES> {
+    #[inline(always)]
+    fn row(&self, n: usize) -> Row {
+        let mut row = Row::ZERO;
+        for (group, frame) in row.0.as_chunks_mut::<CHANNELS>().0.iter_mut().zip(&self.0) {
+            group.copy_from_slice(&frame[n]);
+        }
+        row
     }
 }
 

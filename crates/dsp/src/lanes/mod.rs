@@ -6,15 +6,18 @@
 //! whatever shares its block. The instruction set (AVX-512, AVX2 + FMA, NEON, or plain code) is
 //! chosen at run time by the `pulp` crate; this module has no unsafe code.
 
+mod complex;
 mod decibel;
 mod fft;
 mod gather;
 mod spectrum;
+mod weighted;
 
 pub use decibel::power_to_decibel;
 pub use fft::LaneFft;
-pub use gather::{Slots, gather};
-pub use spectrum::Spectrum;
+pub use gather::{Aligned, Frames, Slots, gather};
+pub use spectrum::{Spectrum, square_roots};
+pub use weighted::weighted_sums;
 
 use pulp::Simd;
 

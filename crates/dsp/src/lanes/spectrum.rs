@@ -5,7 +5,7 @@ use std::sync::Arc;
 use num_complex::Complex;
 use realfft::{RealFftPlanner, RealToComplex};
 
-use super::{LANES, LaneFft, Row};
+use super::{Aligned, LANES, LaneFft, Row, Slots, gather};
 use crate::error::{DspError, Result};
 
 /// A real transform of rows: the lane kernel for powers of two, one slot after another (realfft in
@@ -64,20 +64,61 @@ impl Spectrum {
         }
     }
 
+    /// Power spectrum of the frames `slots` of an interleaved signal that starts with the first
+    /// sample of frame 0, times `window` (`n_fft` values). `work` (`n_fft` rows) is overwritten.
+    pub fn power_of(
+        &self,
+        signal: &[f32],
+        hop: usize,
+        window: &[f32],
+        slots: Slots,
+        work: &mut [Row],
+        out: &mut [Row],
+    ) {
+        if let Kind::Lanes(plan) = &self.kind
+            && slots.aligned()
+        {
+            // Wide enough to be read where they lie.
+            let n = self.n_fft;
+            match slots.channels {
+                4 => {
+                    let frames = Aligned::<4, 4>::new(signal, hop, n, slots);
+                    return plan.power_of(&frames, window, work, out);
+                }
+                8 => {
+                    let frames = Aligned::<8, 2>::new(signal, hop, n, slots);
+                    return plan.power_of(&frames, window, work, out);
+                }
+                16 => {
+                    let frames = Aligned::<16, 1>::new(signal, hop, n, slots);
+                    return plan.power_of(&frames, window, work, out);
+                }
+                _ => {}
+            }
+        }
+        gather(signal, hop, window, slots, work);
+        self.power(work, out);
+    }
+
     /// Magnitude spectrum (`n_bins` rows). `frames` is overwritten.
     pub fn magnitude(&self, frames: &mut [Row], out: &mut [Row]) {
         self.power(frames, out);
-        crate::simd::vectorized(
-            #[inline(always)]
-            || {
-                for row in out.iter_mut() {
-                    for x in &mut row.0 {
-                        *x = x.sqrt();
-                    }
-                }
-            },
-        );
+        square_roots(out);
     }
+}
+
+/// Magnitudes from powers.
+pub fn square_roots(rows: &mut [Row]) {
+    crate::simd::vectorized(
+        #[inline(always)]
+        || {
+            for row in rows.iter_mut() {
+                for x in &mut row.0 {
+                    *x = x.sqrt();
+                }
+            }
+        },
+    );
 }
 
 /// `each(bin, slot, value)` of every slot.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use corsmal_dsp::lanes::{LANES, Row, Slots, gather};
+use corsmal_dsp::lanes::{LANES, Row, Slots, gather, square_roots};
 use corsmal_dsp::transform::Forward;
 
 use super::plan::{Framing, Plan, Scratch, StreamKind};
@@ -163,11 +163,15 @@ fn run(
                 for ((m, quantity), start) in members.iter().zip(&starts) {
                     if current != Some(*quantity) {
                         let (time, out) = (&mut scratch.frames, &mut scratch.spectrum);
-                        gather(samples, params.hop_length, window, slots, time);
-                        match quantity {
-                            Quantity::Power => spectrum.power(time, &mut out[..bins]),
-                            Quantity::Magnitude => spectrum.magnitude(time, &mut out[..bins]),
-                            Quantity::Complex => spectrum.complex(time, out),
+                        let hop = params.hop_length;
+                        if *quantity == Quantity::Complex {
+                            gather(samples, hop, window, slots, time);
+                            spectrum.complex(time, out);
+                        } else if current != Some(Quantity::Power) {
+                            spectrum.power_of(samples, hop, window, slots, time, &mut out[..bins]);
+                        }
+                        if *quantity == Quantity::Magnitude {
+                            square_roots(&mut out[..bins]);
                         }
                         current = Some(*quantity);
                     }
