@@ -73,7 +73,7 @@ impl Deviation {
 
 /// Prints deviations and holds them against their limits.
 fn require(deviations: &[Deviation]) {
-    for Deviation { name, limit, values, absolute, relative } in deviations {
+    for Deviation { name, limit, values, absolute, relative, .. } in deviations {
         println!("| {name} | {values} | {absolute:.1e} | {relative:.1e} | {limit:.0e} |");
     }
     for Deviation { name, limit, relative, .. } in deviations {
