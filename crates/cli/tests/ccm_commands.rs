@@ -76,3 +76,59 @@ fn unusable_input_is_one_message_and_exit_code_2() {
     }
     assert!(!none.exists());
 }
+
+/// Every fault of a submission is one message with file, line and column, and no scores.
+#[test]
+fn submissions_with_faults_are_refused_and_quirks_are_noted() {
+    let dir = tempfile::tempdir().unwrap();
+    let data = dir.path().join("data");
+    let made = run(&["synth", "--out", text(&data), "--small", "--quiet"]);
+    assert!(made.status.success());
+    let annotations = data.join("ccm_train_annotation.csv");
+    // Estimates for every annotated recording, none of them right.
+    let table = std::fs::read_to_string(&annotations).unwrap();
+    let ids: Vec<&str> = table.lines().skip(1).map(|l| l.split(',').next().unwrap()).collect();
+    let header = "Configuration ID,Container capacity,Container mass,Filling mass,None,Pasta,Rice,\
+        Water,Filling type,Empty,Half-full,Full,Filling level,Width at the top,\
+        Width at the bottom,Height,Object safety,Distance,Angle difference,Execution time";
+    let row = |id: &str| format!("{id},100,-1,-1,-1,-1,-1,-1,1,-1,-1,-1,2,-1,-1,-1,-1,-1,-1,-1");
+    let rows: Vec<String> = ids.iter().map(|id| row(id)).collect();
+    let file = dir.path().join("s.csv");
+    let evaluate = |rows: &[String]| {
+        std::fs::write(&file, format!("{header}\n{}\n", rows.join("\n"))).unwrap();
+        let files = ["--submission", text(&file), "--annotations", text(&annotations)];
+        run(&[&["evaluate"], &files[..], &["--format", "json"]].concat())
+    };
+    let sound = evaluate(&rows);
+    assert!(sound.status.success(), "{}", lines(&sound.stderr));
+    let changed = |at: usize, to: String| {
+        let mut rows = rows.clone();
+        rows[at] = to;
+        rows
+    };
+    let (cut, extra) = (rows[1..].to_vec(), [&rows[..], &[row("999")]].concat());
+    for (rows, message) in [
+        (cut, format!("missing rows: id {}", ids[0])),
+        (extra, "rows that the annotations do not have: id 999".into()),
+        (changed(1, row(ids[0])), format!("more than one row: id {}", ids[0])),
+        (
+            changed(2, rows[2].replace(",100,", ",much,")),
+            "line 4, column 'Container capacity'".into(),
+        ),
+        (changed(2, rows[2].replace(",-1,1,-1", ",-1,9,-1")), "column 'Filling type': '9'".into()),
+        (
+            changed(2, rows[2].replace(",-1,2,-1", ",-1,1.5,-1")),
+            "column 'Filling level': '1.5'".into(),
+        ),
+    ] {
+        let output = evaluate(&rows);
+        let found = lines(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{found}");
+        assert!(found.contains(&message) && output.stdout.is_empty(), "{message}: {found}");
+    }
+    // A float label is a quirk of the official evaluators: scored as they do, and said.
+    let output = evaluate(&changed(2, rows[2].replace(",-1,1,-1", ",-1,1.0,-1")));
+    let scores: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(scores["s2"], 0.0);
+    assert!(scores["notes"][0].as_str().unwrap().contains("floating-point"), "{scores}");
+}

@@ -7,6 +7,7 @@ mod features;
 mod files;
 mod matrix;
 mod results;
+mod sections;
 mod tables;
 
 use std::path::PathBuf;
@@ -74,6 +75,7 @@ pub fn run(
             }
         }
     }
+    files::write_random(&options.out, &rows, options.seed)?;
     let report = tables::report(&set, &rows, &outcomes, &added, options.seed)?;
     tables::write_pictures(&options.out, &rows, &outcomes, options.seed)?;
     report.write(&options.out)?;
