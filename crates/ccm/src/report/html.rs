@@ -42,7 +42,8 @@ pub(super) fn page(report: &Report) -> String {
     for section in &report.sections {
         let _ = write!(out, "<a href=\"#{}\">{}</a>", section.id, escape(&section.title));
     }
-    out.push_str("</nav>\n</header>\n<main>\n<dl class=\"facts\">");
+    out.push_str("</nav>\n<p class=\"hint\">Click a heading of a table to sort by it.</p>\n");
+    out.push_str("</header>\n<main>\n<dl class=\"facts\">");
     for (name, value) in &report.facts {
         let _ = write!(out, "<div><dt>{}</dt><dd>{}</dd></div>", escape(name), escape(value));
     }
@@ -52,7 +53,7 @@ pub(super) fn page(report: &Report) -> String {
     }
     let _ = write!(
         out,
-        "</main>\n<footer><p>Click a heading to sort. The same tables are in \
+        "</main>\n<footer><p>The same tables are in \
          <code>tables/*.csv</code> and <code>report.json</code> beside this page.</p></footer>\n\
          <script>{SCRIPT}</script>\n</body>\n</html>\n"
     );
@@ -115,7 +116,7 @@ fn write_table(out: &mut String, table: &Table) {
 }
 
 /// Columns that a narrow page shows in the first cell instead.
-const MINOR: [&str; 2] = ["Inputs", "Protocol"];
+const MINOR: [&str; 3] = ["Inputs", "Protocol", "Best here"];
 
 fn words(table: &Table, column: usize) -> &'static str {
     if MINOR.contains(&table.columns[column].as_str()) { "words minor" } else { "words" }
