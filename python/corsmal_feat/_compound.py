@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ __all__ = [
     "a34_short",
     "a34f136",
     "a34f136_mean",
+    "fit_projection",
     "paa_fbank",
     "pca_fit",
     "pca_fit_transform",
@@ -110,6 +112,24 @@ def pca_project(
     components = np.ascontiguousarray(_doubles("components", components, 2))
     scale = _doubles("variance", variance, 1).ravel().tolist() if whiten else None
     return _core.pca_project(x, components, _doubles("mean", mean, 1).ravel().tolist(), scale)
+
+
+def fit_projection(
+    features: str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    *,
+    n_components: int = 128,
+    overwrite: bool = False,
+) -> None:
+    """Fits principal components to the summary in a file of `extract` (training recordings only)
+    and writes them to `out`, an .npz with `components`, `mean` and `explained_variance`.
+
+    The configuration key `projection.file` applies the file to other recordings, of whose features
+    it accepts no other configuration.
+    """
+    if not overwrite and os.path.exists(out):
+        raise ParameterError(f"out = {os.fspath(out)!r} exists: overwrite=True replaces it")
+    _core.fit_projection(features, int(n_components), out)
 
 
 def _fit(X: Any, n_components: int) -> tuple[Doubles, Doubles, Doubles]:

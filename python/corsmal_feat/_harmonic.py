@@ -346,16 +346,18 @@ def abs_cqt(y: Any, **kwargs: Any) -> Any:
     return np.abs(cqt(y, **kwargs))
 
 
-def af193(y: Any, sr: float) -> Any:
+def af193(y: Any, sr: float, *, librosa: str = "0.11") -> Any:
     """The baseline's vector [shape=(..., 193)] of `y` [shape=(..., n)]: means over time of 40 MFCC,
     12 chroma, 128 mel, 7 spectral contrast and 6 tonnetz rows; leading axes are independent.
 
     Chroma and contrast take magnitudes (not powers), tonnetz the harmonic part of the signal.
+    `librosa="0.8"` gives the published numbers: reflect padding, the constant-Q transform and the
+    end of the harmonic part as they were then, in single precision whatever the input.
     """
     y = audio(y)
     channels = rows(y, 1)
-    if y.dtype == np.float32:
-        return unrows(_core.af193(channels.astype(np.float32), float(sr)), y, 1)
+    if y.dtype == np.float32 or librosa != "0.11":
+        return unrows(_core.af193(channels.astype(np.float32), float(sr), librosa), y, 1)
     return unrows(np.stack([_af193_composed(channel, sr) for channel in channels]), y, 1)
 
 

@@ -105,6 +105,17 @@ def test_baseline_spectrogram_of_librosa_08(recording: tuple[np.ndarray, int]) -
 
 
 @needs_ccm
+def test_baseline_vector_of_librosa_08(recording: tuple[np.ndarray, int]) -> None:
+    y, sr = recording
+    expected = np.load(CCM / "baseline_feature_reference.npz")["af193"][0]
+    vector = corsmal.af193(y[0], sr, librosa="0.8")
+    parts = np.split(np.arange(193), [40, 52, 180, 187])
+    for part in parts:
+        atol = 1e-5 * np.abs(expected[part]).max()
+        np.testing.assert_allclose(vector[part], expected[part], rtol=0, atol=atol)
+
+
+@needs_ccm
 def test_published_row_of_the_real_recording(recording: tuple[np.ndarray, int]) -> None:
     published = np.load(CCM / "a34f_train.npz")
     same = (published["container"] == 3) & (published["sequence"] == "s1_fi0_fu0_b1_l0")

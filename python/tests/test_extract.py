@@ -137,6 +137,22 @@ def test_what_cannot_be_is_refused(folder: Path, tmp_path: Path):
         cf.load(tmp_path / "other.npz")
 
 
+def test_a_fitted_projection_is_applied(folder: Path, tmp_path: Path):
+    train = cf.extract([folder], preset="mfcc-zcr", out=tmp_path / "train.npz")
+    fitted = tmp_path / "pca.npz"
+    cf.corsmal.fit_projection(tmp_path / "train.npz", fitted, n_components=2)
+    chosen = {"projection.file": str(fitted)}
+    projected = cf.extract([folder], preset="mfcc-zcr", set=chosen)
+    assert projected.names == ["pca[0]", "pca[1]"]
+    pca = np.load(fitted)
+    expected = cf.corsmal.pca_project(train.summary, pca["components"], pca["mean"])
+    np.testing.assert_allclose(projected.summary, expected, rtol=1e-5, atol=1e-5)
+    with pytest.raises(cf.ParameterError, match="projection.file"):
+        cf.extract([folder], preset="esc26", set=chosen)
+    with pytest.raises(cf.ParameterError, match="exists"):
+        cf.corsmal.fit_projection(tmp_path / "train.npz", fitted)
+
+
 def test_a_short_recording_warns(tmp_path: Path):
     write(tmp_path / "short.wav", pour(0, seconds=0.05))
     with pytest.warns(UserWarning, match="shorter than n_fft"):

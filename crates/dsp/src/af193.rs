@@ -1,5 +1,5 @@
 //! AF193: the feature vector of the CORSMAL audio baseline, means over time of 40 MFCC, 12 chroma,
-//! 128 mel, 7 spectral contrast and 6 tonnetz rows at librosa 0.11's defaults.
+//! 128 mel, 7 spectral contrast and 6 tonnetz rows at librosa's defaults.
 //!
 //! All parts but the last share one transform; tonnetz comes from the harmonic part of the signal.
 
@@ -13,15 +13,15 @@ use crate::cqt::{ChromaCqt, ChromaCqtParams, CqtParams, CqtPlan, SignalTuning};
 use crate::decibel::Decibel;
 use crate::error::Result;
 use crate::frequency::fft_frequencies;
-use crate::hpss::{HpssParams, Part, Separator};
+use crate::hpss::HarmonicPart;
 use crate::lanes::{LANES, Row, power_to_decibel};
+use crate::librosa::LibrosaVersion;
 use crate::mel::{MelParams, SparseBank, mel_filter};
 use crate::mfcc::{MfccParams, mfcc_matrix};
 use crate::normalize::Norm;
 use crate::pitch::{PitchParams, TuningEstimator};
 use crate::real::require_finite;
 use crate::spectral::{Contrast, ContrastParams, contrast_from_extremes};
-use crate::stft::StftParams;
 use crate::sums;
 use crate::tonnetz::tonnetz;
 
@@ -59,7 +59,8 @@ type ByTuning<P> = Mutex<HashMap<i32, Arc<P>>>;
 /// Everything that recordings of one sample rate share; threads may use it together.
 pub struct Af193 {
     sr: f64,
-    separator: Separator<f32>,
+    librosa: LibrosaVersion,
+    harmonic: HarmonicPart,
     mel: SparseBank,
     mfcc: Array2<f64>,
     contrast: Contrast,
@@ -70,18 +71,28 @@ pub struct Af193 {
 }
 
 impl Af193 {
+    /// By the conventions of librosa 0.11.
+    ///
     /// # Errors
     /// A sample rate at which a part does not exist: spectral contrast needs more than 12.8 kHz.
     pub fn new(sr: f64) -> Result<Self> {
+        Self::of(sr, LibrosaVersion::V011)
+    }
+
+    /// By the conventions of a librosa; the published features are those of 0.8.
+    ///
+    /// # Errors
+    /// As [`Af193::new`].
+    pub fn of(sr: f64, librosa: LibrosaVersion) -> Result<Self> {
         let freqs = fft_frequencies(sr, N_FFT)?;
-        let stft = StftParams::new(N_FFT, HOP);
         let plan = Self {
             sr,
-            separator: Separator::new(&stft, HpssParams::default(), false)?,
+            librosa,
+            harmonic: HarmonicPart::new(librosa)?,
             mel: SparseBank::new(&mel_filter(&MelParams::new(sr, N_FFT))?),
             mfcc: mfcc_matrix(N_MELS, &MfccParams { n_mfcc: N_MFCC, ..MfccParams::default() })?,
             contrast: Contrast::new(&freqs, sr, &ContrastParams::default())?,
-            tuning: SignalTuning::new(sr)?,
+            tuning: SignalTuning::padded(sr, librosa.pad_mode())?,
             chroma: Mutex::default(),
             cqt: Mutex::default(),
             fold: ChromaCqt::new(CQT_BINS * CQT_OCTAVES, &ChromaCqtParams::default())?,
@@ -96,11 +107,8 @@ impl Af193 {
     /// No samples, or samples that are not finite.
     pub fn compute(&self, y: &[f32]) -> Result<[f32; LENGTH]> {
         require_finite("y", y)?;
-        let mut harmonic = vec![0.0; y.len()];
         let mut spectra = Spectra::new(self)?;
-        let magnitude =
-            self.separator
-                .separate(y, &mut [(Part::Harmonic, &mut harmonic)], |m| spectra.push(m))?;
+        let (harmonic, magnitude) = self.harmonic.of(y, |m| spectra.push(m))?;
         let mut vector = [0.0; LENGTH];
         let (mfcc, rest) = vector.split_at_mut(N_MFCC);
         let (chroma, rest) = rest.split_at_mut(N_CHROMA);
@@ -129,13 +137,14 @@ impl Af193 {
 
     fn cqt(&self, tuning: f64) -> Result<Arc<CqtPlan>> {
         cached(&self.cqt, tuning, || {
-            CqtPlan::new(&CqtParams {
+            let params = CqtParams {
                 hop_length: HOP,
                 n_bins: CQT_BINS * CQT_OCTAVES,
                 bins_per_octave: CQT_BINS,
                 tuning,
                 ..CqtParams::new(self.sr)
-            })
+            };
+            CqtPlan::new(&params.of(self.librosa))
         })
     }
 

@@ -5,6 +5,7 @@ use ndarray::{Array2, Array3, ArrayView2, ArrayView3, s};
 use num_complex::Complex;
 
 use crate::error::{DspError, Result};
+use crate::librosa::LibrosaVersion;
 use crate::median;
 use crate::real::{Real, require_finite};
 use crate::stft::StftParams;
@@ -270,6 +271,43 @@ fn masked<T: Real>(spectrum: &[Complex<T>], mask: &[T], out: &mut [Complex<T>]) 
             }
         },
     );
+}
+
+/// Takes the harmonic part of recordings (`effects.harmonic` with its defaults) by the conventions of
+/// a librosa.
+pub struct HarmonicPart {
+    separator: Separator<f32>,
+    librosa: LibrosaVersion,
+}
+
+impl HarmonicPart {
+    /// # Errors
+    /// None that the defaults allow.
+    pub fn new(librosa: LibrosaVersion) -> Result<Self> {
+        let stft = StftParams { pad_mode: librosa.pad_mode(), ..StftParams::new(2048, 512) };
+        Ok(Self { separator: Separator::new(&stft, HpssParams::default(), false)?, librosa })
+    }
+
+    /// The part of `y`, as long as it, and the magnitudes `[frames, bins]` of `y`, each of which is
+    /// shown to `observe`.
+    ///
+    /// # Errors
+    /// No samples.
+    pub fn of(
+        &self,
+        y: &[f32],
+        observe: impl FnMut(&[f32]),
+    ) -> Result<(Vec<f32>, Array2<f32>)> {
+        let mut part = vec![0.0; y.len()];
+        let parts = &mut [(Part::Harmonic, part.as_mut_slice())];
+        let magnitude = self.separator.separate(y, parts, observe)?;
+        if self.librosa == LibrosaVersion::V08 {
+            // It inverted without a length and filled up with zeros behind the last frame's centre.
+            let hop = self.separator.forward.params().hop_length;
+            part[hop * (magnitude.nrows() - 1)..].fill(0.0);
+        }
+        Ok((part, magnitude))
+    }
 }
 
 /// The asked parts of `y [channels, samples]`, each of its shape (librosa 0.11 `effects.hpss`,

@@ -16,6 +16,7 @@ pub mod frontends;
 pub mod hpss;
 pub mod istft;
 pub mod lanes;
+pub mod librosa;
 mod log2;
 pub mod median;
 pub mod mel;

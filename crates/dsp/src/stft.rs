@@ -50,6 +50,14 @@ impl PadMode {
             }
         }
     }
+
+    /// `y` with `pad` samples more at either end.
+    pub fn extended<T: Real>(self, y: &[T], pad: usize) -> Vec<T> {
+        let outside = |i: isize| self.index(i, y.len()).map_or(T::zero(), |i| y[i]);
+        let before = (0..pad as isize).map(|i| outside(i - pad as isize));
+        let after = (0..pad).map(|i| outside((y.len() + i) as isize));
+        before.chain(y.iter().copied()).chain(after).collect()
+    }
 }
 
 /// Parameters of the transform, in librosa's names.

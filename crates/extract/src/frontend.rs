@@ -1,19 +1,10 @@
 //! The front end: decoded blocks to the signal that features see, in the order of
 //! [`SignalConfig`].
 
-use std::sync::Arc;
-
-use corsmal_dsp::resample::{ResamplePlan, ResampleStream};
+use corsmal_dsp::frontends::downmix_71_weights;
+use corsmal_dsp::resample::{Converter, ConverterStream};
 
 use crate::config::{Channels, Normalize, SignalConfig};
-
-/// The 7.1 rule of ffmpeg's `-ac 1`: weights of FL, FR, FC, LFE, BL, BR, SL, SR, divided by their
-/// sum.
-const DOWNMIX_71: [f32; 8] = {
-    let h = std::f32::consts::FRAC_1_SQRT_2;
-    let sum = 2.0 * h + 1.0 + 4.0 * 0.5;
-    [h / sum, h / sum, 1.0 / sum, 0.0, 0.5 / sum, 0.5 / sum, 0.5 / sum, 0.5 / sum]
-};
 
 /// Channels that features see of a recording with `channels` channels.
 ///
@@ -41,7 +32,7 @@ pub struct FrontEnd {
     rule: Channels,
     channels_in: usize,
     channels: usize,
-    resample: Option<ResampleStream>,
+    resample: Option<ConverterStream>,
     preemphasis: f32,
     /// The frame before, for pre-emphasis; empty before the first.
     before: Vec<f32>,
@@ -60,12 +51,12 @@ impl FrontEnd {
     pub fn new(
         config: &SignalConfig,
         channels_in: usize,
-        resample: Option<Arc<ResamplePlan>>,
+        resample: Option<Converter>,
         sample_rate: f64,
     ) -> Result<Self, String> {
         let channels = channels_out(&config.channels, channels_in)?;
         let resample = resample
-            .map(|plan| ResampleStream::new(plan, channels))
+            .map(|converter| converter.stream(channels))
             .transpose()
             .map_err(|e| e.to_string())?;
         Ok(Self {
@@ -186,11 +177,12 @@ fn mix(rule: &Channels, channels: usize, input: &[f32], out: &mut Vec<f32>) {
         }
         Channels::Mean => out
             .extend(input.chunks_exact(channels).map(|x| x.iter().sum::<f32>() / channels as f32)),
-        Channels::Downmix71 => out.extend(
-            input
-                .chunks_exact(channels)
-                .map(|x| x.iter().zip(&DOWNMIX_71).map(|(x, w)| x * w).sum::<f32>()),
-        ),
+        Channels::Downmix71 => {
+            let weights = downmix_71_weights();
+            out.extend(input.chunks_exact(channels).map(|x| {
+                x.iter().zip(&weights).map(|(x, w)| f64::from(*x) * w).sum::<f64>() as f32
+            }));
+        }
         Channels::List(list) => {
             for frame in input.chunks_exact(channels) {
                 out.extend(list.iter().map(|c| frame[*c]));
@@ -205,7 +197,7 @@ mod tests {
 
     fn run(config: &SignalConfig, channels: usize, input: &[f32], block: usize) -> Vec<f32> {
         let plan = (config.sample_rate > 0.0)
-            .then(|| Arc::new(ResamplePlan::new(44100.0, config.sample_rate).unwrap()));
+            .then(|| Converter::new(44100.0, config.sample_rate, config.res_type).unwrap());
         let mut front = FrontEnd::new(config, channels, plan, 100.0).unwrap();
         let mut out = Vec::new();
         input.chunks(block * channels).for_each(|b| front.push(b, &mut out));

@@ -18,6 +18,7 @@ pub mod npy;
 pub mod npz;
 pub mod outcome;
 pub mod parquet;
+pub mod projection;
 pub mod provenance;
 pub mod run;
 pub mod summary;

@@ -11,6 +11,7 @@ use corsmal_extract::engine::{FeatureArray, Features};
 use corsmal_extract::inputs::{self, Shard};
 use corsmal_extract::npz::Compression;
 use corsmal_extract::outcome::Outcome;
+use corsmal_extract::projection::Projection;
 use corsmal_extract::run::{self, Options, Progress, Signals};
 use ndarray::{Array1, Array3};
 use numpy::PyReadonlyArrayDyn;
@@ -95,6 +96,17 @@ fn extract(
     };
     py.detach(|| interruptible(work))?;
     Ok(warnings.0.into_inner().unwrap_or_else(|e| e.into_inner()))
+}
+
+/// Fits principal components to the summary of a feature file and writes them to `out`.
+#[pyfunction]
+fn fit_projection(
+    py: Python<'_>,
+    features: PathBuf,
+    n_components: usize,
+    out: PathBuf,
+) -> PyResult<()> {
+    py.detach(|| Projection::fit(&features, n_components)?.save(&out)).map_err(value_error)
 }
 
 /// Does `work` in another thread and raises its flag when Python has an exception for this one.
@@ -196,5 +208,6 @@ pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<PySignals>()?;
     m.add_class::<PySignal>()?;
     m.add_function(wrap_pyfunction!(effective_config, m)?)?;
+    m.add_function(wrap_pyfunction!(fit_projection, m)?)?;
     m.add_function(wrap_pyfunction!(extract, m)?)
 }

@@ -13,7 +13,7 @@ use crate::value_error;
 
 type Singles<'py> = PyReadonlyArrayDyn<'py, f32>;
 
-fn librosa_version(name: &str) -> PyResult<LibrosaVersion> {
+pub(crate) fn librosa_version(name: &str) -> PyResult<LibrosaVersion> {
     match name {
         "0.8" => Ok(LibrosaVersion::V08),
         "0.11" => Ok(LibrosaVersion::V011),

@@ -8,6 +8,7 @@ use corsmal_dsp::cqt::{
 };
 use corsmal_dsp::hpss::{HpssParams, Part, masks as dsp_masks, separate as dsp_separate};
 use corsmal_dsp::istft::istft as dsp_istft;
+use corsmal_dsp::librosa::LibrosaVersion;
 use corsmal_dsp::tonnetz::tonnetz as dsp_tonnetz;
 use corsmal_dsp::vector::Lane;
 use corsmal_dsp::window::Window;
@@ -18,6 +19,7 @@ use pyo3::prelude::*;
 
 use crate::arrays::{Floats, each_precision, into_numpy, view2, view3};
 use crate::chroma::norm_of;
+use crate::frontends::librosa_version;
 use crate::spectrum::{StftTuple, pad_mode, stft_params};
 use crate::value_error;
 
@@ -133,6 +135,7 @@ fn cqt_params(tuple: CqtTuple) -> PyResult<CqtParams> {
         window: window.parse::<Window>().map_err(value_error)?,
         scale,
         pad_mode: pad_mode(padding)?,
+        ..CqtParams::new(sr)
     })
 }
 
@@ -180,8 +183,8 @@ fn tonnetz<'py>(py: Python<'py>, chroma: Floats<'py>) -> PyResult<Bound<'py, PyA
     each_precision!(py, view3(chroma), dsp_tonnetz(chroma))
 }
 
-/// The plan of the last sample rate.
-static AF193: Mutex<Option<(f64, Arc<Af193>)>> = Mutex::new(None);
+/// The plan of the last sample rate and librosa.
+static AF193: Mutex<Option<((f64, LibrosaVersion), Arc<Af193>)>> = Mutex::new(None);
 
 /// The vectors `[channels, 193]` of `y [channels, samples]`.
 #[pyfunction]
@@ -189,13 +192,14 @@ fn af193<'py>(
     py: Python<'py>,
     y: PyReadonlyArrayDyn<'py, f32>,
     sr: f64,
+    librosa: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let y = view2(&y)?;
+    let (y, key) = (view2(&y)?, (sr, librosa_version(librosa)?));
     let vectors = py.detach(|| {
         let mut last = AF193.lock().unwrap_or_else(PoisonError::into_inner);
         let plan = match &*last {
-            Some((rate, plan)) if *rate == sr => plan.clone(),
-            _ => last.insert((sr, Arc::new(Af193::new(sr)?))).1.clone(),
+            Some((made_for, plan)) if *made_for == key => plan.clone(),
+            _ => last.insert((key, Arc::new(Af193::of(key.0, key.1)?))).1.clone(),
         };
         drop(last);
         let mut vectors = Array2::zeros((y.nrows(), LENGTH));

@@ -19,6 +19,7 @@ Examples:
   corsmal-feat extract --in audio/ --out feats.npz
   corsmal-feat extract --in audio/ --out feats.parquet --preset mfcc-zcr --jobs 8
   corsmal-feat extract --in list.csv --out feats.npz --config my.toml --set mfcc.n_mels=64
+  corsmal-feat extract --in test/ --out test.npz --preset spec9216-code --project pca.npz
   sox in.flac -t wav - | corsmal-feat extract --in - --out feats.npz --preset esc26
 
 Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 interrupted.")]
@@ -73,20 +74,29 @@ pub struct ConfigArgs {
     /// A configuration file (TOML).
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Change one key, such as mfcc.n_mels=64 or signal.sample_rate=16000.
+    /// Change one key, such as mfcc.n_mels=64 or signal.sample_rate=16000; librosa=0.8 is everything
+    /// that gives the numbers of librosa 0.8.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
+    /// Put the statistics of each recording through a projection that `corsmal-feat pca` fitted.
+    #[arg(long, value_name = "FILE")]
+    pub project: Option<PathBuf>,
 }
 
 impl ConfigArgs {
     /// The effective configuration; `logmel` by default.
     pub fn load(&self) -> Result<Config, Failure> {
+        let mut overrides = self.overrides.clone();
+        if let Some(path) = &self.project {
+            let path = serde_json::json!(path.display().to_string());
+            overrides.push(format!("projection.file={path}"));
+        }
         match &self.config {
-            Some(path) => Ok(Config::load(path, &self.overrides)?),
+            Some(path) => Ok(Config::load(path, &overrides)?),
             None => {
                 let name = self.preset.as_deref().unwrap_or("logmel");
                 let preset = corsmal_extract::config::Preset::find(name)?;
-                Ok(Config::with_overrides(preset.toml, name, &self.overrides)?)
+                Ok(Config::with_overrides(preset.toml, name, &overrides)?)
             }
         }
     }

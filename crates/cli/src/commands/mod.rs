@@ -13,6 +13,7 @@ mod features;
 mod fuse;
 mod inspect;
 mod merge;
+mod pca;
 mod presets;
 mod synth;
 mod train;
@@ -38,6 +39,8 @@ pub enum Command {
     Inspect(inspect::Args),
     /// Show the main job end to end on synthetic recordings.
     Demo(demo::Args),
+    /// Fit principal components to training features, for `extract --project`.
+    Pca(pca::Args),
     /// Learn a classifier from features with labels and write it to a model file.
     Train(train::Args),
     /// Predict the classes of recordings, or of features, with a trained model.
@@ -70,6 +73,7 @@ impl Command {
             Self::Features(args) => features::run(args),
             Self::Inspect(args) => inspect::run(args),
             Self::Demo(args) => demo::run(args),
+            Self::Pca(args) => pca::run(args),
             Self::Train(args) => train::run(args),
             Self::Classify(args) => classify::run(args),
             Self::CrossValidate(args) => cross_validate::run(args),

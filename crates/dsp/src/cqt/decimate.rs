@@ -4,15 +4,16 @@ use std::f64::consts::PI;
 
 use pulp::{Arch, Simd, WithSimd};
 
+use crate::resample::halving;
 use crate::vector::Lane;
 use crate::window::bessel_i0;
 
 /// Outputs of one pass over the taps, in registers.
 const REGISTERS: usize = 8;
 
-/// A 2:1 low-pass filter of soxr's "HQ" quality.
+/// A 2:1 low-pass filter, of soxr's "HQ" quality unless made otherwise.
 ///
-/// The last or only halving is a Kaiser-windowed sinc whose pass band ends at 0.913743 of the lower
+/// Of soxr's, the last or only halving is a Kaiser-windowed sinc whose pass band ends at 0.913743 of the lower
 /// Nyquist frequency and whose stop band starts there. Halvings before it are short half-band
 /// filters, equiripple up to an eighth of the rate. soxr shares the ripple that it allows among all
 /// stages, which makes the filters longer the more there are. Found from the impulse responses of
@@ -78,6 +79,17 @@ impl Decimator {
             cutoff * sinc * window / bessel_i0(beta)
         });
         Self { taps: taps.collect() }
+    }
+
+    /// resampy's windowed sinc, librosa's converter up to 0.9.
+    pub fn windowed_sinc(fast: bool) -> Self {
+        let mut taps = halving(fast);
+        // A zero at either end makes the reach even.
+        if taps.len() / 2 % 2 == 1 {
+            taps.insert(0, 0.0);
+            taps.push(0.0);
+        }
+        Self { taps }
     }
 
     /// Samples before and after an input that its response reaches, an even number.

@@ -19,8 +19,10 @@ pub use tuning::SignalTuning;
 use crate::error::{DspError, Result};
 use crate::frequency::require_rate;
 use crate::lanes::{LANES, LaneFft, Row, Slots, gather};
+use crate::librosa::LibrosaVersion;
 use crate::normalize::Norm;
 use crate::real::require_finite;
+use crate::resample::{ResType, resample};
 use crate::stft::{PadMode, StftParams};
 use crate::transform::Forward;
 use crate::vector::Lane;
@@ -58,6 +60,8 @@ pub struct CqtParams {
     pub scale: bool,
     /// Padding of the signal's ends, in each octave.
     pub pad_mode: PadMode,
+    /// Converter between octaves.
+    pub res_type: ResType,
 }
 
 /// More bins are refused.
@@ -79,6 +83,25 @@ impl CqtParams {
             window: Window::Hann,
             scale: true,
             pad_mode: PadMode::Constant,
+            res_type: ResType::SoxrHq,
+        }
+    }
+
+    /// The same bins by the conventions of another librosa. Up to 0.9 the bandwidth of a filter was
+    /// the distance to the next bin above, not half of that between its neighbours, and octaves were
+    /// converted by `kaiser_fast`.
+    #[must_use]
+    pub fn of(self, librosa: LibrosaVersion) -> Self {
+        let step = 2.0_f64.powf(1.0 / self.bins_per_octave as f64);
+        let narrower = match librosa {
+            LibrosaVersion::V08 => (step * step - 1.0) / (step * step + 1.0) / (step - 1.0),
+            LibrosaVersion::V011 => 1.0,
+        };
+        Self {
+            filter_scale: self.filter_scale * narrower,
+            pad_mode: librosa.pad_mode(),
+            res_type: librosa.fast_res_type(),
+            ..self
         }
     }
 
@@ -148,7 +171,7 @@ impl CqtPlan {
             return Err(DspError::parameter("n_bins", p.n_bins, allowed));
         }
         let n_octaves = p.n_bins.div_ceil(p.bins_per_octave);
-        let early = early_halvings(nyquist, cutoff, p.hop_length, n_octaves);
+        let early = early_halvings(pass_band(p.res_type) * nyquist, cutoff, p.hop_length, n_octaves);
         let base = p.sr / f64::from(1u32 << early);
         let (mut sr, mut hop) = (base, p.hop_length >> early);
         let mut octaves: Vec<Octave> = Vec::with_capacity(n_octaves);
@@ -189,7 +212,11 @@ impl CqtPlan {
             end = first;
         }
         let early_decimators = [Decimator::early(early), Decimator::last(early.max(1))];
-        let decimator = Decimator::last(1);
+        let decimator = match p.res_type {
+            ResType::SoxrHq => Decimator::last(1),
+            ResType::KaiserBest => Decimator::windowed_sinc(false),
+            ResType::KaiserFast => Decimator::windowed_sinc(true),
+        };
         Ok(Self { params: *p, early, early_decimators, decimator, octaves })
     }
 
@@ -207,7 +234,7 @@ impl CqtPlan {
         if y.is_empty() || y.len() < factor {
             return Err(DspError::TooShort { name: "y", actual: y.len(), needed: factor });
         }
-        let mut signal = self.decimated_early(y);
+        let mut signal = self.decimated_early(y)?;
         let mut lengths = signal.len();
         let mut frames = usize::MAX;
         for octave in &self.octaves {
@@ -226,18 +253,24 @@ impl CqtPlan {
                 None => self.respond(octave, &signal, part)?,
             }
             if octave.halve && i + 1 < self.octaves.len() {
-                signal = self.decimator.halve(&signal, signal.len().div_ceil(2));
+                signal = self.halved(&signal);
             }
         }
         Ok(out)
     }
 
     /// The signal of the first octave.
-    fn decimated_early<T: Lane>(&self, y: &[T]) -> Vec<T> {
+    fn decimated_early<T: Lane>(&self, y: &[T]) -> Result<Vec<T>> {
         if self.early == 0 {
-            return y.to_vec();
+            return Ok(y.to_vec());
         }
         let factor = 1usize << self.early;
+        if self.params.res_type != ResType::SoxrHq {
+            let y = ArrayView2::from_shape((1, y.len()), y).expect("one row");
+            let res_type = self.params.res_type;
+            let signal = resample(y, factor as f64, 1.0, res_type, true, true)?;
+            return Ok(signal.into_raw_vec_and_offset().0);
+        }
         // soxr rounds the number of samples half up, librosa pads to the next larger with a zero.
         let n = (y.len() + factor / 2) / factor;
         let mut signal = y.to_vec();
@@ -249,7 +282,17 @@ impl CqtPlan {
         }
         signal = last.halve(&signal, n);
         signal.resize(y.len().div_ceil(factor), T::zero());
-        signal
+        Ok(signal)
+    }
+
+    /// The signal of the next octave.
+    fn halved<T: Lane>(&self, signal: &[T]) -> Vec<T> {
+        let n = signal.len().div_ceil(2);
+        // resampy gives whole samples only, librosa pads to the next larger with a zero.
+        let filtered = if self.params.res_type == ResType::SoxrHq { n } else { signal.len() / 2 };
+        let mut halved = self.decimator.halve(signal, filtered);
+        halved.resize(n, T::zero());
+        halved
     }
 
     fn stft(&self, octave: &Octave) -> StftParams {
@@ -292,13 +335,7 @@ impl CqtPlan {
         mut out: ArrayViewMut2<Complex<T>>,
     ) {
         let n_fft = octave.basis.n_fft;
-        let pad = n_fft / 2;
-        let mut padded = Vec::with_capacity(signal.len() + n_fft);
-        let outside =
-            |i: isize| self.params.pad_mode.index(i, signal.len()).map_or(0.0, |i| signal[i]);
-        padded.extend((0..pad as isize).map(|i| outside(i - pad as isize)));
-        padded.extend_from_slice(signal);
-        padded.extend((0..pad).map(|i| outside((signal.len() + i) as isize)));
+        let padded = self.params.pad_mode.extended(signal, n_fft / 2);
         let window = vec![1.0; n_fft];
         let mut frames = vec![Row::ZERO; n_fft];
         let mut spectrum = vec![Row::ZERO; 2 * fft.n_bins()];
@@ -357,6 +394,15 @@ fn same_lengths(
             let length = wavelets.length(above.first + i, 2.0 * sr);
             (wavelets.length(k, sr) - length).abs() <= 1e-9 * length
         })
+}
+
+/// Share of the Nyquist frequency that octaves may fill; librosa up to 0.9 took the pass band of its
+/// converter.
+fn pass_band(res_type: ResType) -> f64 {
+    match res_type {
+        ResType::SoxrHq => 1.0,
+        ResType::KaiserBest | ResType::KaiserFast => 0.85,
+    }
 }
 
 /// Halvings of the rate that the highest filter and the hop allow before the first octave.

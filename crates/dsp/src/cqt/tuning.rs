@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::lanes::{LANES, LaneFft, Row, Slots, gather};
 use crate::pitch::{PitchParams, TuningEstimator};
 use crate::real::Real;
-use crate::stft::StftParams;
+use crate::stft::{PadMode, StftParams};
 use crate::transform::Forward;
 use crate::window::get_window;
 
@@ -27,7 +27,15 @@ impl SignalTuning {
     /// # Errors
     /// `sr` that is not positive.
     pub fn new(sr: f64) -> Result<Self> {
-        let stft = StftParams::new(N_FFT, HOP);
+        Self::padded(sr, PadMode::default())
+    }
+
+    /// With another padding of the ends.
+    ///
+    /// # Errors
+    /// `sr` that is not positive.
+    pub fn padded(sr: f64, pad_mode: PadMode) -> Result<Self> {
+        let stft = StftParams { pad_mode, ..StftParams::new(N_FFT, HOP) };
         let window = get_window(stft.window, N_FFT, true);
         let params = PitchParams::new(sr, N_FFT);
         TuningEstimator::<f32>::new(params)?;
@@ -69,9 +77,7 @@ impl SignalTuning {
     }
 
     fn collect_in_lanes<T: Real>(&self, y: &[f32], estimator: &mut TuningEstimator<T>) {
-        let pad = N_FFT / 2;
-        let mut padded = vec![0.0; y.len() + N_FFT];
-        padded[pad..pad + y.len()].copy_from_slice(y);
+        let padded = self.precise.params().pad_mode.extended(y, N_FFT / 2);
         let mut frames = vec![Row::ZERO; N_FFT];
         let mut power = vec![Row::ZERO; self.lanes.n_bins()];
         let mut magnitudes = vec![T::zero(); LANES * power.len()];

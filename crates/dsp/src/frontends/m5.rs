@@ -6,7 +6,7 @@ use realfft::RealFftPlanner;
 use super::mono_at;
 use crate::error::{DspError, Result};
 use crate::mono::to_mono;
-use crate::paa::{MidTerm, PaaPlan, file_vector};
+use crate::paa::{MidTerm, PaaPlan, Peak, file_vector};
 use crate::resample::ResType;
 use crate::window::{Window, get_window};
 
@@ -39,7 +39,9 @@ pub fn downmix_71(y: ArrayView2<f32>) -> Result<Array1<f64>> {
 }
 
 /// The 136 values per recording that the random forests take: 34 short-term features of 50 ms
-/// frames and their deltas, mean and deviation over each second, mean over the seconds.
+/// frames and their deltas, mean and deviation over each second, mean over the seconds. The
+/// pyAudioAnalysis of the time divided by the peak before centring, which moves the first cepstral
+/// coefficient.
 #[derive(Debug)]
 pub struct M5A34f136 {
     plan: PaaPlan,
@@ -54,7 +56,7 @@ impl M5A34f136 {
     pub fn new(sr: f64) -> Result<Self> {
         let samples = |seconds: f64| (seconds * sr).round_ties_even().max(0.0) as usize;
         let (frame, second) = (samples(0.05), samples(1.0));
-        let plan = PaaPlan::new(sr, frame, frame)?;
+        let plan = PaaPlan::new(sr, frame, frame)?.with_peak(Peak::Raw);
         Ok(Self { plan, mid: MidTerm::from_samples(second, second, frame, frame)? })
     }
 

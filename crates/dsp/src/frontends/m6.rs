@@ -27,12 +27,18 @@ pub enum M6Crop {
 
 /// Decibel spectrogram of ten seconds of the mean channel at 22,050 Hz, peak-normalised, as an
 /// image of 96 x 96.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct M6Spectrogram {
     /// Conventions of padding and resampling; the system ran on 0.8.
     pub librosa: LibrosaVersion,
     /// Where to begin.
     pub crop: M6Crop,
+}
+
+impl Default for M6Spectrogram {
+    fn default() -> Self {
+        Self { librosa: LibrosaVersion::V08, crop: M6Crop::Onset }
+    }
 }
 
 impl M6Spectrogram {

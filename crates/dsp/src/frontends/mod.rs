@@ -25,10 +25,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::decibel::Decibel;
 use crate::error::Result;
+pub use crate::librosa::LibrosaVersion;
 use crate::mono::to_mono;
 use crate::real::Real;
 use crate::resample::{ResType, resample};
-use crate::stft::{PadMode, StftParams, spectrogram};
+use crate::stft::{StftParams, spectrogram};
 
 /// What a system's paper says or what its published code does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -39,36 +40,6 @@ pub enum Variant {
     Code,
     /// The paper's words.
     Paper,
-}
-
-/// The librosa whose conventions a system was built on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum LibrosaVersion {
-    /// 0.8: reflect padding, resampy's windowed sinc.
-    #[default]
-    #[serde(rename = "0.8")]
-    V08,
-    /// 0.11: zero padding, libsoxr.
-    #[serde(rename = "0.11")]
-    V011,
-}
-
-impl LibrosaVersion {
-    /// Padding of centred frames.
-    pub fn pad_mode(self) -> PadMode {
-        match self {
-            Self::V08 => PadMode::Reflect,
-            Self::V011 => PadMode::Constant,
-        }
-    }
-
-    /// Converter where a system asked for resampy's `kaiser_fast`.
-    pub fn fast_res_type(self) -> ResType {
-        match self {
-            Self::V08 => ResType::KaiserFast,
-            Self::V011 => ResType::SoxrHq,
-        }
-    }
 }
 
 /// Mean over the channels at `target_sr` (librosa `load` with `mono=True`).

@@ -48,12 +48,23 @@ pub fn short_names() -> Vec<String> {
     names
 }
 
+/// The largest magnitude that a recording is divided by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Peak {
+    /// Of the centred recording (version 0.3.14).
+    #[default]
+    Centred,
+    /// Of the recording as it came, which versions of early 2020 took.
+    Raw,
+}
+
 /// Tables for one sample rate, window and step (in samples).
 #[derive(Clone)]
 pub struct PaaPlan {
     sr: f64,
     window: usize,
     step: usize,
+    peak: Peak,
     fft: Arc<dyn Fft<f64>>,
     /// Of the bins in hertz, one bin high as pyAudioAnalysis has them.
     frequencies: Vec<f64>,
@@ -88,12 +99,19 @@ impl PaaPlan {
             sr,
             window,
             step,
+            peak: Peak::default(),
             fft: FftPlanner::new().plan_fft_forward(window),
             frequencies: (1..=num_fft).map(|k| k as f64 * (sr / (2.0 * num_fft as f64))).collect(),
             filters: tables::filters(sr, num_fft)?,
             dct: tables::dct(),
             chroma: tables::chroma_bins(sr, num_fft)?,
         })
+    }
+
+    /// The same with another peak to divide by.
+    #[must_use]
+    pub fn with_peak(self, peak: Peak) -> Self {
+        Self { peak, ..self }
     }
 
     /// Frames of a signal of `n` samples; no padding.
@@ -113,7 +131,7 @@ impl PaaPlan {
         if frames == 0 {
             return Err(DspError::TooShort { name: "y", actual: y.len(), needed: self.window });
         }
-        let signal = normalized(y);
+        let signal = normalized(y, self.peak);
         let rows = if deltas { 2 * N_SHORT } else { N_SHORT };
         let mut out = Array2::zeros((rows, frames));
         let mut frame = Frame::new(self);
@@ -132,14 +150,16 @@ impl PaaPlan {
 }
 
 /// The signal over 32768, without its mean, over its peak.
-fn normalized<T: Real>(y: ArrayView1<T>) -> Vec<f64> {
+fn normalized<T: Real>(y: ArrayView1<T>, peak: Peak) -> Vec<f64> {
     let mut signal: Vec<f64> = y.iter().map(|v| v.wide() / 32768.0).collect();
+    let largest = |signal: &[f64]| signal.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let raw = largest(&signal);
     let mean = pairwise_sum(&signal) / signal.len() as f64;
-    let mut peak = 0.0f64;
-    for v in &mut signal {
-        *v -= mean;
-        peak = peak.max(v.abs());
-    }
+    signal.iter_mut().for_each(|v| *v -= mean);
+    let peak = match peak {
+        Peak::Centred => largest(&signal),
+        Peak::Raw => raw,
+    };
     for v in &mut signal {
         *v /= peak + 1e-10;
     }

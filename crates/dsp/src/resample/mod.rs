@@ -5,6 +5,7 @@
 //! bits: a whole array ([`resample`]), a stream in blocks of any size ([`ResampleStream`]), and any
 //! range of outputs of a long recording ([`ResamplePlan::segment`]).
 
+mod converter;
 mod design;
 mod kernel;
 mod sinc;
@@ -20,7 +21,9 @@ use crate::error::{DspError, Result};
 use crate::real::{Real, require_finite};
 use stage::{Frames, Stage};
 
-pub use sinc::resample_windowed_sinc;
+pub use converter::{Converter, ConverterStream};
+pub(crate) use sinc::halving;
+pub use sinc::{SincPlan, SincStream, resample_windowed_sinc};
 pub use stream::ResampleStream;
 
 /// The converter, by librosa's name.

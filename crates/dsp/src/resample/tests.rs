@@ -153,3 +153,28 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn windowed_sinc_streams_give_the_bits_and_length_of_arrays() {
+    for (from, to) in [(44100.0, 22050.0), (8000.0, 22050.0), (48000.0, 44100.0)] {
+        for res_type in [ResType::KaiserBest, ResType::KaiserFast, ResType::SoxrHq] {
+            let converter = Converter::new(from, to, res_type).unwrap();
+            for frames in [0, 1, 2, 37, 400, 1501] {
+                let input = noise(2 * frames, 5);
+                let channels = Array2::from_shape_vec((frames, 2), input.clone()).unwrap();
+                let whole = match frames {
+                    0 => Array2::zeros((2, 0)),
+                    _ => resample(channels.t(), from, to, res_type, true, false).unwrap(),
+                };
+                for block in [1, 7, 64, 2000] {
+                    let mut out = Vec::new();
+                    let mut stream = converter.stream(2).unwrap();
+                    input.chunks(2 * block).for_each(|b| stream.push(b, &mut out).unwrap());
+                    stream.finish(&mut out);
+                    let want: Vec<f32> = whole.t().iter().copied().collect();
+                    assert_eq!(out, want, "{res_type:?} {from} -> {to}, {frames} by {block}");
+                }
+            }
+        }
+    }
+}

@@ -1,5 +1,6 @@
 //! The front end: from what a file holds to the signal that features see.
 
+use corsmal_dsp::resample::ResType;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
@@ -61,15 +62,6 @@ pub enum Normalize {
     Rms,
 }
 
-/// Kind of resampling filter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ResType {
-    /// librosa's default since 0.10; the only one that streams.
-    #[default]
-    SoxrHq,
-}
-
 /// The front end, in the order in which its steps run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -82,7 +74,8 @@ pub struct SignalConfig {
     pub end: f64,
     /// Rate in Hz to resample to; 0 keeps that of the recording.
     pub sample_rate: f64,
-    /// Filter of the resampling.
+    /// Filter of the resampling: `soxr_hq` is librosa's default since 0.10, `kaiser_best` was it
+    /// before.
     pub res_type: ResType,
     /// `y[n] = x[n] - preemphasis * x[n - 1]`, the first sample unchanged; 0 for none.
     pub preemphasis: f64,

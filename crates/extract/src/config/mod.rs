@@ -3,10 +3,12 @@
 
 mod chain;
 mod groups;
+mod librosa;
 mod preset;
 mod set;
 
-pub use chain::{Channels, Normalize, ResType, SignalConfig};
+pub use chain::{Channels, Normalize, SignalConfig};
+pub use corsmal_dsp::resample::ResType;
 pub use groups::{DbRef, DbSpec, FrameSpec, MelSpec, StftSpec, TopDb};
 pub use preset::{PRESETS, Preset};
 
@@ -17,6 +19,7 @@ use serde_json::{Map, Value};
 use thiserror::Error;
 
 use crate::features::{self, FeatureConfig};
+use crate::projection::ProjectionConfig;
 use crate::summary::SummaryConfig;
 
 /// Version of the configuration's meaning; part of its hash.
@@ -76,6 +79,8 @@ pub struct Config {
     pub features: Vec<FeatureConfig>,
     /// Statistics over frames; `None` writes frame-level features.
     pub summary: Option<SummaryConfig>,
+    /// Fitted projection that the statistics of a recording go through.
+    pub projection: Option<ProjectionConfig>,
 }
 
 #[derive(Deserialize)]
@@ -87,6 +92,7 @@ struct Raw {
     signal: Map<String, Value>,
     features: Map<String, Value>,
     summary: Option<Value>,
+    projection: Option<Value>,
 }
 
 impl Config {
@@ -154,6 +160,7 @@ impl Config {
                 object.remove("summary");
             }
         }
+        librosa::resolve(&mut value)?;
         let raw: Raw = serde_json::from_value(value).map_err(|e| top_level(&e))?;
         let _ = raw.description;
         let signal: SignalConfig = typed("signal", &raw.signal)?;
@@ -180,24 +187,37 @@ impl Config {
                 Some(summary)
             }
         };
-        Ok(Self { signal, features, summary })
+        let mut config = Self { signal, features, summary, projection: None };
+        if let Some(value) = raw.projection {
+            config.projection = Some(ProjectionConfig::parse(&config, value)?);
+        }
+        Ok(config)
     }
 
     /// The effective configuration with every default filled in, keys in a fixed order.
     pub fn to_value(&self) -> Value {
         let features: Map<String, Value> =
             self.features.iter().map(|f| (f.name().to_string(), f.to_value())).collect();
-        serde_json::json!({
+        let mut value = serde_json::json!({
             "schema": SCHEMA,
             "signal": self.signal,
             "features": features,
             "summary": self.summary,
-        })
+        });
+        if let Some(projection) = &self.projection {
+            value["projection"] = projection.to_value();
+        }
+        value
     }
 
-    /// BLAKE3 of the effective configuration, in hexadecimal.
+    /// BLAKE3 of the effective configuration, in hexadecimal. Of a projection the content of its
+    /// file counts, not where that lies.
     pub fn hash(&self) -> String {
-        blake3::hash(self.to_value().to_string().as_bytes()).to_hex().to_string()
+        let mut value = self.to_value();
+        if let Some(projection) = value.get_mut("projection").and_then(Value::as_object_mut) {
+            projection.remove("file");
+        }
+        blake3::hash(value.to_string().as_bytes()).to_hex().to_string()
     }
 }
 

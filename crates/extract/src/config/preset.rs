@@ -24,14 +24,17 @@ pub const PRESETS: &[Preset] = presets![
     "esc26",
     "esc28",
     "af193",
+    "af193-paper",
     "a34f136",
     "spec9216-code",
+    "m1",
     "m2",
     "m3",
     "m4-code",
     "m4-paper",
     "m5-vggish",
     "m6-code",
+    "m6-paper",
 ];
 
 impl Preset {

@@ -4,7 +4,7 @@ use serde_json::{Map, Value};
 
 use super::ConfigError;
 
-/// Applies one assignment to a configuration tree. A key that starts with none of the three tables
+/// Applies one assignment to a configuration tree. A key that starts with none of the other tables
 /// is a feature's (`mfcc.n_mels` is `features.mfcc.n_mels`); the value is TOML, or else a plain
 /// string.
 pub fn apply(tree: &mut Value, assignment: &str) -> Result<(), ConfigError> {
@@ -17,11 +17,11 @@ pub fn apply(tree: &mut Value, assignment: &str) -> Result<(), ConfigError> {
     };
     let (key, text) = (key.trim(), text.trim());
     let mut parts: Vec<&str> = key.split('.').collect();
-    if parts.iter().any(|p| p.is_empty()) || parts.len() < 2 {
+    if parts.iter().any(|p| p.is_empty()) || (parts.len() < 2 && key != "librosa") {
         let message = "expected a dotted key, such as signal.sample_rate or mfcc.n_mels";
         return Err(ConfigError::key(key, message));
     }
-    if !matches!(parts[0], "signal" | "features" | "summary") {
+    if !matches!(parts[0], "signal" | "features" | "summary" | "projection" | "librosa") {
         parts.insert(0, "features");
     }
     let value = toml::from_str::<Map<String, Value>>(&format!("value = {text}"))
@@ -29,7 +29,7 @@ pub fn apply(tree: &mut Value, assignment: &str) -> Result<(), ConfigError> {
         .and_then(|mut table| table.remove("value"))
         .unwrap_or_else(|| Value::String(text.to_string()));
     let mut place = tree;
-    let (last, path) = parts.split_last().expect("two parts at least");
+    let (last, path) = parts.split_last().expect("one part at least");
     for part in path {
         let object = place
             .as_object_mut()

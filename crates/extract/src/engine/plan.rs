@@ -9,7 +9,7 @@ use corsmal_dsp::time_domain::FrameParams;
 use corsmal_dsp::transform::Forward;
 
 use crate::config::Config;
-use crate::features::{Extent, Feature, Kernel, Quantity, WavePad};
+use crate::features::{Extent, Feature, Kernel, Quantity};
 
 /// A feature with its place in the output.
 pub struct PlannedFeature {
@@ -208,6 +208,9 @@ impl Plan {
     /// where channels stay apart; a vector's values have no statistic in their names.
     pub fn summary_names(&self) -> Vec<String> {
         let Some(summary) = &self.config.summary else { return Vec::new() };
+        if let Some(projection) = &self.config.projection {
+            return projection.names();
+        }
         let mut names = Vec::new();
         for feature in &self.features {
             let statistics: Vec<String> = match feature.is_vector() {
@@ -306,11 +309,7 @@ fn transform_framing(params: &StftParams) -> Framing {
     }
 }
 
-fn wave(frame: &FrameParams, pad: WavePad, member: usize) -> StreamPlan {
-    let mode = match pad {
-        WavePad::Zero => PadMode::Constant,
-        WavePad::Edge => PadMode::Edge,
-    };
+fn wave(frame: &FrameParams, mode: PadMode, member: usize) -> StreamPlan {
     let framing =
         Framing { length: frame.frame_length, hop: frame.hop_length, pad: frame.pad(), mode };
     StreamPlan { framing, kind: StreamKind::Wave { member } }

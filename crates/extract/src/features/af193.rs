@@ -1,15 +1,18 @@
 //! `af193`: the feature vector of the CORSMAL audio baseline.
 
 use corsmal_dsp::af193::{Af193 as Vector, names};
+use corsmal_dsp::librosa::LibrosaVersion;
 use ndarray::{Array1, Array2, Axis};
 use serde::{Deserialize, Serialize};
 
 use super::{Extent, Feature, FeatureKind, WholeKernel};
 
-/// `af193` has no parameters.
+/// Parameters of `af193`.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Af193 {}
+pub struct Af193 {
+    librosa: LibrosaVersion,
+}
 
 impl WholeKernel for Vector {
     fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>> {
@@ -20,11 +23,11 @@ impl WholeKernel for Vector {
 impl FeatureKind for Af193 {
     const KIND: &'static str = "af193";
     const ABOUT: &'static str = "193 means over frames: 40 MFCC, 12 chroma, 128 mel powers, 7 \
-        spectral contrast, 6 tonnetz of the harmonic part (librosa 0.11's defaults). One vector a \
+        spectral contrast, 6 tonnetz of the harmonic part (defaults of librosa 0.11, or of 0.8). One vector a \
         channel; holds the whole recording in memory.";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
-        Ok(Feature::whole(Extent::Vector, Vector::new(sr)?, names()))
+        Ok(Feature::whole(Extent::Vector, Vector::of(sr, self.librosa)?, names()))
     }
 
     /// There is nothing to refuse, and its tables are not cheap.

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use corsmal_dsp::cqt::{ChromaCqt as Fold, ChromaCqtParams, CqtParams, CqtPlan, SignalTuning};
+use corsmal_dsp::librosa::LibrosaVersion;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
@@ -17,11 +18,18 @@ pub struct ChromaCqt {
     n_chroma: usize,
     n_octaves: usize,
     bins_per_octave: usize,
+    librosa: LibrosaVersion,
 }
 
 impl Default for ChromaCqt {
     fn default() -> Self {
-        Self { hop_length: 512, n_chroma: 12, n_octaves: 7, bins_per_octave: 36 }
+        Self {
+            hop_length: 512,
+            n_chroma: 12,
+            n_octaves: 7,
+            bins_per_octave: 36,
+            librosa: LibrosaVersion::default(),
+        }
     }
 }
 
@@ -68,13 +76,18 @@ impl ChromaCqt {
             ..ChromaCqtParams::default()
         };
         let kernel = ChromaOfChannel {
-            params,
-            tuning: SignalTuning::new(sr)?,
+            params: params.of(self.librosa),
+            tuning: SignalTuning::padded(sr, self.librosa.pad_mode())?,
             transforms: Mutex::default(),
             fold: Fold::new(params.n_bins, &fold)?,
         };
         kernel.transform(0.0)?;
         Ok(kernel)
+    }
+
+    /// The librosa whose conventions are followed.
+    pub fn librosa(&self) -> LibrosaVersion {
+        self.librosa
     }
 
     /// Samples between frames.

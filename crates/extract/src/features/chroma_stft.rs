@@ -7,6 +7,7 @@ use corsmal_dsp::stft::{StftParams, spectrogram};
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
+use super::melspectrogram::quantity_of;
 use super::{Extent, Feature, FeatureKind, WholeKernel, indices};
 use crate::config::StftSpec;
 
@@ -20,44 +21,47 @@ pub struct ChromaStft {
     #[serde(flatten)]
     stft: StftSpec,
     n_chroma: usize,
+    power: f64,
 }
 
 impl Default for ChromaStft {
     fn default() -> Self {
-        Self { stft: StftSpec::default(), n_chroma: 12 }
+        Self { stft: StftSpec::default(), n_chroma: 12, power: 2.0 }
     }
 }
 
 struct Classes {
     stft: StftParams,
     params: ChromaParams,
+    power: f64,
 }
 
 impl WholeKernel for Classes {
     fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>> {
         let y = ArrayView2::from_shape((1, y.len()), y).expect("one row");
-        let power = spectrogram(y, &self.stft, 2.0)?;
+        let spectrum = spectrogram(y, &self.stft, self.power)?;
         let ChromaParams { sr, n_fft, n_chroma, .. } = self.params;
         let pitch = PitchParams::new(sr, n_fft);
-        let tuning = estimate_tuning(power.view(), None, pitch, RESOLUTION, n_chroma)?;
+        let tuning = estimate_tuning(spectrum.view(), None, pitch, RESOLUTION, n_chroma)?;
         let params = ChromaParams { tuning: tuning.unwrap_or(0.0), ..self.params };
         let bank = chroma_filter::<f32>(&params)?;
-        Ok(chroma(power.view(), bank.view(), Some(Norm::Max))?.index_axis_move(Axis(0), 0))
+        Ok(chroma(spectrum.view(), bank.view(), Some(Norm::Max))?.index_axis_move(Axis(0), 0))
     }
 }
 
 impl FeatureKind for ChromaStft {
     const KIND: &'static str = "chroma_stft";
-    const ABOUT: &'static str = "Energy in n_chroma pitch classes from C on, each frame divided by its \
-        maximum (librosa.feature.chroma_stft), under the tuning of the channel. Holds the whole \
-        recording in memory.";
+    const ABOUT: &'static str = "Power (power = 2) or magnitude (power = 1) in n_chroma pitch \
+        classes from C on, each frame divided by its maximum (librosa.feature.chroma_stft), under \
+        the tuning of the channel. Holds the whole recording in memory.";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let stft = self.stft.params()?;
+        quantity_of(self.power)?;
         let params = ChromaParams { n_chroma: self.n_chroma, ..ChromaParams::new(sr, stft.n_fft) };
         chroma_filter::<f32>(&params)?;
         let labels = indices(self.n_chroma);
         let extent = Extent::Frames(stft.hop_length as f64);
-        Ok(Feature::whole(extent, Classes { stft, params }, labels))
+        Ok(Feature::whole(extent, Classes { stft, params, power: self.power }, labels))
     }
 }

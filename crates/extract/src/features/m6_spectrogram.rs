@@ -7,10 +7,28 @@ use serde::{Deserialize, Serialize};
 use super::{Extent, Feature, FeatureKind, WholeKernel, pixels};
 
 /// Parameters of `m6_spectrogram`.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(default)]
 pub struct M6Spectrogram {
     librosa: LibrosaVersion,
+    begin: Begin,
+}
+
+/// Where the ten seconds begin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Begin {
+    /// At the second detected onset (the released code).
+    #[default]
+    Onset,
+    /// At the start of what is taken of the recording (the paper's crop by annotations).
+    Start,
+}
+
+impl Default for M6Spectrogram {
+    fn default() -> Self {
+        Self { librosa: Plan::default().librosa, begin: Begin::default() }
+    }
 }
 
 struct Image(Plan, f64);
@@ -27,11 +45,15 @@ impl WholeKernel for Image {
 impl FeatureKind for M6Spectrogram {
     const KIND: &'static str = "m6_spectrogram";
     const ABOUT: &'static str = "Decibel spectrogram of ten seconds at 22,050 Hz from the second \
-        detected onset on, peak-normalised, as an image of 96 x 96, row by row from 0 Hz (M6's \
+        detected onset (or the start) on, peak-normalised, as an image of 96 x 96, row by row from 0 Hz (M6's \
         input; resamples by itself). Holds the whole recording in memory.";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
-        let plan = Plan { librosa: self.librosa, crop: M6Crop::Onset };
+        let crop = match self.begin {
+            Begin::Onset => M6Crop::Onset,
+            Begin::Start => M6Crop::At(0.0),
+        };
+        let plan = Plan { librosa: self.librosa, crop };
         Ok(Feature::whole(Extent::Vector, Image(plan, sr), pixels()))
     }
 }

@@ -4,11 +4,14 @@
 //! recording, which is then held in memory), what it computes from that alone, and, where its values depend on the maximum of the
 //! recording (`top_db`), how stored values are finished once that is known.
 
+mod a34_short;
 mod a34f136;
 mod af193;
 mod chroma_cqt;
 mod chroma_stft;
+mod cqt;
 mod delta;
+mod hpss;
 mod m2_mfcc;
 mod m3_spectrogram;
 mod m4_logmel;
@@ -31,7 +34,7 @@ mod vggish_patches;
 mod zero_crossing_rate;
 
 use corsmal_dsp::lanes::Row;
-use corsmal_dsp::stft::StftParams;
+use corsmal_dsp::stft::{PadMode, StftParams};
 use corsmal_dsp::time_domain::FrameParams;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
@@ -54,10 +57,13 @@ const REGISTRY: &[Entry] = &[
     Entry::of::<spectral_contrast::SpectralContrast>(),
     Entry::of::<poly_features::PolyFeatures>(),
     Entry::of::<onset_strength::OnsetStrength>(),
+    Entry::of::<hpss::Hpss>(),
+    Entry::of::<cqt::Cqt>(),
     Entry::of::<chroma_stft::ChromaStft>(),
     Entry::of::<chroma_cqt::ChromaCqt>(),
     Entry::of::<tonnetz::Tonnetz>(),
     Entry::of::<af193::Af193>(),
+    Entry::of::<a34_short::A34Short>(),
     Entry::of::<a34f136::A34f136>(),
     Entry::of::<spec9216::Spec9216>(),
     Entry::of::<m2_mfcc::M2Mfcc>(),
@@ -155,8 +161,8 @@ pub enum Kernel {
     /// Magnitudes of a transform in double precision, rounded to single precision as librosa
     /// stores them.
     Exact(StftParams, Box<dyn SlotKernel>),
-    /// Frames of the waveform; outside the signal its edge values count.
-    Wave(FrameParams, WavePad, Box<dyn WaveKernel>),
+    /// Frames of the waveform, with what they see outside the signal.
+    Wave(FrameParams, PadMode, Box<dyn WaveKernel>),
     /// The whole recording, channel by channel.
     Whole(Extent, Box<dyn WholeKernel>),
     /// The finished frames of another feature, by name.
@@ -170,15 +176,6 @@ pub enum Extent {
     Frames(f64),
     /// One vector, which statistics leave as it is.
     Vector,
-}
-
-/// What waveform features see before the first and after the last sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum WavePad {
-    /// Zeros.
-    Zero,
-    /// The first or last sample.
-    Edge,
 }
 
 /// A planned feature.
@@ -214,6 +211,11 @@ impl Feature {
 /// Names of `n` coefficients: their indices.
 fn indices(n: usize) -> Vec<String> {
     (0..n).map(|i| i.to_string()).collect()
+}
+
+/// Name of a coefficient by its frequency.
+fn hertz(frequency: f64) -> String {
+    format!("{frequency:.1}Hz")
 }
 
 /// Names of the pixels of an image of 96 x 96, row by row: `row,column`.

@@ -1,9 +1,10 @@
 //! `rms`: root-mean-square level of the waveform.
 
+use corsmal_dsp::stft::PadMode;
 use corsmal_dsp::time_domain::FrameParams;
 use serde::{Deserialize, Serialize};
 
-use super::{Feature, FeatureKind, Kernel, WaveKernel, WavePad};
+use super::{Feature, FeatureKind, Kernel, WaveKernel};
 use crate::config::FrameSpec;
 
 /// Parameters of `rms`.
@@ -12,6 +13,7 @@ use crate::config::FrameSpec;
 pub struct Rms {
     #[serde(flatten)]
     frame: FrameSpec,
+    pad_mode: PadMode,
 }
 
 struct Level(FrameParams);
@@ -41,7 +43,7 @@ impl FeatureKind for Rms {
     fn plan(&self, _: f64) -> corsmal_dsp::Result<Feature> {
         let frame = self.frame.params()?;
         Ok(Feature {
-            kernel: Kernel::Wave(frame, WavePad::Zero, Box::new(Level(frame))),
+            kernel: Kernel::Wave(frame, self.pad_mode, Box::new(Level(frame))),
             raw_rows: 1,
             labels: vec![String::new()],
             complex: false,

@@ -4,7 +4,7 @@ use corsmal_dsp::lanes::Row;
 use serde::{Deserialize, Serialize};
 
 use super::mel_bands::{DecibelFinish, Scale, power_rows_to_scale};
-use super::{Feature, FeatureKind, Kernel, Quantity, SpectrumKernel};
+use super::{Feature, FeatureKind, Kernel, Quantity, SpectrumKernel, hertz};
 use crate::config::{DbSpec, StftSpec};
 
 /// What is kept of a complex bin.
@@ -76,7 +76,7 @@ impl FeatureKind for Stft {
             Scale::Linear => Box::new(Copy),
             scale => Box::new(Scaled { scale, db: decibel }),
         };
-        let hz = |k: usize| format!("{:.1}Hz", k as f64 * sr / stft.n_fft as f64);
+        let hz = |k: usize| hertz(k as f64 * sr / stft.n_fft as f64);
         let finish = DecibelFinish::of(self.scale, &self.db, bins);
         Ok(Feature {
             kernel: Kernel::Spectrum(stft, quantity, kernel),

@@ -1,5 +1,6 @@
 //! `tonnetz`: tonal centroids.
 
+use corsmal_dsp::hpss::HarmonicPart;
 use corsmal_dsp::tonnetz::{DIMENSIONS, tonnetz};
 use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
@@ -13,13 +14,21 @@ use super::{Extent, Feature, FeatureKind, WholeKernel, indices};
 pub struct Tonnetz {
     #[serde(flatten)]
     chroma: ChromaCqt,
+    /// Of the harmonic part of the sound, as the baseline's vector has it.
+    harmonic: bool,
 }
 
-struct Centroids(ChromaOfChannel);
+struct Centroids {
+    chroma: ChromaOfChannel,
+    harmonic: Option<HarmonicPart>,
+}
 
 impl WholeKernel for Centroids {
     fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>> {
-        let chroma = self.0.channel(y)?;
+        let chroma = match &self.harmonic {
+            Some(part) => self.chroma.channel(&part.of(y, |_| {})?.0)?,
+            None => self.chroma.channel(y)?,
+        };
         let centroids = tonnetz(chroma.view().insert_axis(Axis(0)))?;
         Ok(centroids.index_axis_move(Axis(0), 0).mapv(|x| x as f32))
     }
@@ -28,11 +37,15 @@ impl WholeKernel for Centroids {
 impl FeatureKind for Tonnetz {
     const KIND: &'static str = "tonnetz";
     const ABOUT: &'static str = "Six tonal centroids (fifths, minor and major thirds) of the \
-        constant-Q chroma (librosa.feature.tonnetz). Holds the whole recording in memory.";
+        constant-Q chroma (librosa.feature.tonnetz), with harmonic = true of the harmonic part of \
+        the sound. Holds the whole recording in memory.";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let extent = Extent::Frames(self.chroma.hop_length() as f64);
-        Ok(Feature::whole(extent, Centroids(self.chroma.kernel(sr)?), indices(DIMENSIONS)))
+        let harmonic = self.harmonic.then(|| HarmonicPart::new(self.chroma.librosa()));
+        let kernel =
+            Centroids { chroma: self.chroma.kernel(sr)?, harmonic: harmonic.transpose()? };
+        Ok(Feature::whole(extent, kernel, indices(DIMENSIONS)))
     }
 
     fn check(&self) -> corsmal_dsp::Result<()> {

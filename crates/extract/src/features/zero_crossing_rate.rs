@@ -1,9 +1,10 @@
 //! `zero_crossing_rate`: share of samples at which the signal changes sign.
 
+use corsmal_dsp::stft::PadMode;
 use corsmal_dsp::time_domain::{FrameParams, ZeroCrossingParams};
 use serde::{Deserialize, Serialize};
 
-use super::{Feature, FeatureKind, Kernel, WaveKernel, WavePad};
+use super::{Feature, FeatureKind, Kernel, WaveKernel};
 use crate::config::FrameSpec;
 
 /// Parameters of `zero_crossing_rate`.
@@ -104,7 +105,7 @@ impl FeatureKind for ZeroCrossingRate {
         };
         params.check()?;
         Ok(Feature {
-            kernel: Kernel::Wave(frame, WavePad::Edge, Box::new(Crossings { frame, params })),
+            kernel: Kernel::Wave(frame, PadMode::Edge, Box::new(Crossings { frame, params })),
             raw_rows: 1,
             labels: vec![String::new()],
             complex: false,

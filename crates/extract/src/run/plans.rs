@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex};
 
 use corsmal_audio::AudioSpec;
-use corsmal_dsp::resample::ResamplePlan;
+use corsmal_dsp::resample::Converter;
 
 use crate::config::Config;
 use crate::engine::Plan;
@@ -17,7 +17,7 @@ pub struct Planned {
     /// The features.
     pub plan: Arc<Plan>,
     /// The resampling filters, where the rate changes.
-    pub resample: Option<Arc<ResamplePlan>>,
+    pub resample: Option<Converter>,
 }
 
 type Made = Result<Planned, String>;
@@ -71,7 +71,7 @@ impl<'a> Plans<'a> {
         let rate = if signal.sample_rate > 0.0 { signal.sample_rate } else { native };
         let channels = channels_out(&signal.channels, usize::from(spec.channels))?;
         let resample = (rate != native)
-            .then(|| ResamplePlan::new(native, rate).map(Arc::new))
+            .then(|| Converter::new(native, rate, signal.res_type))
             .transpose()
             .map_err(|e| e.to_string())?;
         let plan = Plan::new(&self.config, rate, channels).map_err(|e| e.to_string())?;

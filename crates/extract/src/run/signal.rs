@@ -151,10 +151,17 @@ pub fn finish(recording: Recording, plan: &Plan) -> Result<Features, Failed> {
         let reason = format!("{total} samples, at least {needed} make one frame");
         return Err(Failed::new(Status::TooShort, reason));
     }
-    recording.finish().map_err(|e| match e {
+    let features = recording.finish().map_err(|e| match e {
         FinishError::Temporary(_) => Failed::new(Status::Io, e.to_string()),
         FinishError::TooFewFrames { .. } => Failed::new(Status::TooShort, e.to_string()),
-    })
+    })?;
+    match (&plan.config.projection, features) {
+        (Some(projection), Features::Summary(row)) => projection
+            .apply(&row)
+            .map(Features::Summary)
+            .map_err(|reason| Failed::new(Status::Unsupported, reason)),
+        (_, features) => Ok(features),
+    }
 }
 
 #[cfg(test)]

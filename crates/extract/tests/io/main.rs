@@ -5,5 +5,6 @@
 
 mod inputs;
 mod outputs;
+mod projection;
 mod resume;
 mod support;

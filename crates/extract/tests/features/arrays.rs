@@ -1,69 +1,33 @@
 //! Features by way of the engine against the array functions of `corsmal_dsp`.
 
-#![allow(clippy::unwrap_used)]
-
 use std::sync::Arc;
 
 use corsmal_dsp::af193::Af193;
 use corsmal_dsp::chroma::{ChromaParams, chroma, chroma_filter};
-use corsmal_dsp::cqt::{ChromaCqtParams, CqtParams, SignalTuning, chroma_cqt};
+use corsmal_dsp::cqt::{ChromaCqtParams, CqtParams, SignalTuning, chroma_cqt, cqt};
 use corsmal_dsp::decibel::Decibel;
 use corsmal_dsp::frequency::fft_frequencies;
 use corsmal_dsp::frontends::{
     M2Mfcc, M3Spectrogram, M4LogMel, M5A34f136, M5VggishPatches, M6Spectrogram, Spec9216, Variant,
 };
+use corsmal_dsp::hpss::{HarmonicPart, HpssParams, masks};
+use corsmal_dsp::librosa::LibrosaVersion;
 use corsmal_dsp::mel::{MelParams, SparseBank, mel_filter};
 use corsmal_dsp::normalize::Norm;
 use corsmal_dsp::onset::{OnsetParams, onset_strength};
+use corsmal_dsp::paa::PaaPlan;
 use corsmal_dsp::pitch::{PitchParams, estimate_tuning};
 use corsmal_dsp::spectral::{
     Bandwidth, ContrastParams, Flatness, Frequencies, poly_features, spectral_bandwidth,
     spectral_centroid, spectral_contrast, spectral_flatness, spectral_rolloff,
 };
-use corsmal_dsp::stft::{StftParams, spectrogram};
+use corsmal_dsp::stft::{PadMode, StftParams, spectrogram};
 use corsmal_dsp::tonnetz::tonnetz;
 use corsmal_extract::config::Config;
-use corsmal_extract::engine::{Extractor, Features, Plan, Recording};
+use corsmal_extract::engine::{Extractor, Features, Plan};
 use ndarray::{Array2, Array3, ArrayView2, Axis, concatenate, s};
 
-const SR: f64 = 22_050.0;
-
-/// Two tones over noise, another mixture in every channel, `[channels, n]`.
-fn signal(channels: usize, n: usize) -> Array2<f32> {
-    let mut state = 7_u32;
-    let mut noise = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (state >> 8) as f32 / (1 << 23) as f32 - 1.0
-    };
-    Array2::from_shape_fn((channels, n), |(c, i)| {
-        let tone = |hz: f64| (std::f64::consts::TAU * hz * i as f64 / SR).sin() as f32;
-        let level = 0.3 / (c + 1) as f32;
-        level * tone(440.0 * (c + 1) as f64) + 0.1 * tone(1760.0) + 0.02 * noise()
-    })
-}
-
-fn features(config: &Arc<Config>, y: ArrayView2<f32>, sr: f64, block: usize) -> Features {
-    let plan = Arc::new(Plan::new(config, sr, y.nrows()).unwrap());
-    let interleaved: Vec<f32> = y.t().iter().copied().collect();
-    let mut extractor = Extractor::new(plan.clone(), 0..u64::MAX, 0);
-    interleaved.chunks(block * y.nrows()).for_each(|b| extractor.push(b));
-    let folder = std::env::temp_dir();
-    let mut recording = Recording::new(plan, &folder);
-    recording.add(extractor.finish(true).unwrap()).unwrap();
-    recording.finish().unwrap()
-}
-
-/// Frames of the only feature of a configuration, `[channels, coefficients, frames]`.
-fn frames(toml: &str, y: ArrayView2<f32>, block: usize) -> Array3<f32> {
-    let config = Arc::new(Config::with_overrides(toml, "test", &[]).unwrap());
-    let Features::Frames(mut arrays) = features(&config, y, SR, block) else {
-        panic!("no summary was asked for")
-    };
-    let array = arrays.remove(0);
-    let shape = (array.frames, array.coefficients, y.nrows());
-    let values = Array3::from_shape_vec(shape, array.values.into_vec().unwrap()).unwrap();
-    values.reversed_axes()
-}
+use crate::support::{SR, alone, features, frames, signal};
 
 fn close(name: &str, got: &Array3<f32>, want: &Array3<f64>, tolerance: f64) {
     assert_eq!(got.dim(), want.dim(), "{name}");
@@ -119,24 +83,6 @@ fn spectral_features_are_those_of_arrays_whatever_the_blocks() {
     }
 }
 
-#[test]
-fn silence_is_finite() {
-    let y = Array2::zeros((2, 5000));
-    for kind in corsmal_extract::features::kinds() {
-        // A delta needs its source, a patch 0.96 s; silence has no RMS to divide by.
-        if ["delta", "vggish_patches", "spec9216"].contains(&kind) {
-            continue;
-        }
-        let got = frames(&format!("[features.{kind}]"), y.view(), 5000);
-        assert!(!got.is_empty() && got.iter().all(|x| x.is_finite()), "{kind}");
-    }
-}
-
-/// A channel by itself, `[1, n]`.
-fn alone(y: &Array2<f32>, c: usize) -> ArrayView2<'_, f32> {
-    y.slice(s![c..c + 1, ..])
-}
-
 /// What a feature of the whole recording is for one channel, `[coefficients, frames]`.
 type Whole = fn(ArrayView2<f32>) -> Array2<f32>;
 
@@ -154,7 +100,7 @@ fn chroma_of_cqt(y: ArrayView2<f32>) -> Array3<f32> {
 
 #[test]
 fn whole_recording_features_are_those_of_arrays_channel_by_channel() {
-    let cases: [(&str, &str, Whole); 12] = [
+    let cases: [(&str, &str, Whole); 18] = [
         ("chroma_cqt", "", |y| chroma_of_cqt(y).index_axis_move(Axis(0), 0)),
         ("tonnetz", "", |y| {
             let chroma = chroma_of_cqt(y);
@@ -172,6 +118,44 @@ fn whole_recording_features_are_those_of_arrays_channel_by_channel() {
         ("af193", "", |y| {
             let vector = Af193::new(SR).unwrap().compute(y.as_slice().unwrap()).unwrap();
             column(vector.map(f64::from))
+        }),
+        ("af193", "librosa = '0.8'", |y| {
+            let plan = Af193::of(SR, LibrosaVersion::V08).unwrap();
+            column(plan.compute(y.as_slice().unwrap()).unwrap().map(f64::from))
+        }),
+        ("tonnetz", "librosa = '0.8'\nharmonic = true", |y| {
+            let part = HarmonicPart::new(LibrosaVersion::V08).unwrap();
+            let (part, _) = part.of(y.as_slice().unwrap(), |_| {}).unwrap();
+            let tuning = SignalTuning::padded(SR, PadMode::Reflect).unwrap();
+            let tuning = tuning.estimate([part.as_slice()], 36).unwrap().unwrap_or(0.0);
+            let (n_bins, bins_per_octave) = (252, 36);
+            let cqt = CqtParams { n_bins, bins_per_octave, tuning, ..CqtParams::new(SR) };
+            let part = ArrayView2::from_shape((1, part.len()), &part).unwrap();
+            let cqt = cqt.of(LibrosaVersion::V08);
+            let chroma = chroma_cqt(part, &cqt, &ChromaCqtParams::default()).unwrap();
+            tonnetz(chroma.view()).unwrap().index_axis_move(Axis(0), 0).mapv(|x| x as f32)
+        }),
+        ("hpss", "component = 'percussive'\nkernel_size = [17, 31]", |y| {
+            let magnitude = spectrogram(y, &StftParams::new(2048, 512), 1.0).unwrap();
+            let params = HpssParams { kernel_harmonic: 17, ..HpssParams::default() };
+            let (_, percussive) = masks(magnitude.view(), &params).unwrap();
+            (magnitude * percussive).index_axis_move(Axis(0), 0)
+        }),
+        ("cqt", "tuning = 0.25", |y| {
+            let params = CqtParams { tuning: 0.25, ..CqtParams::new(SR) };
+            cqt(y, &params).unwrap().index_axis_move(Axis(0), 0).mapv(|z| z.norm())
+        }),
+        ("cqt", "scale = 'amplitude_to_db'\namin = 1e-6", |y| {
+            let values = cqt(y, &CqtParams::new(SR)).unwrap().index_axis_move(Axis(0), 0);
+            let mut power = values.mapv(|z| z.norm() * z.norm());
+            let decibel = Decibel { amin: 1e-6, ..Decibel::default() };
+            decibel.power(power.as_slice_mut().unwrap()).unwrap();
+            power
+        }),
+        ("a34_short", "window = 0.04\nstep = 0.02\ndeltas = true", |y| {
+            let counts = y.row(0).mapv(|x| f64::from(x) * 32768.0);
+            let plan = PaaPlan::new(SR, 882, 441).unwrap();
+            plan.short_term(counts.view(), true).unwrap().mapv(|x| x as f32)
         }),
         ("a34f136", "", |y| column(M5A34f136::new(SR).unwrap().run(y).unwrap())),
         ("spec9216", "fixed_len = 30000", |y| {
@@ -218,7 +202,7 @@ fn vectors_pass_through_summaries_without_a_statistic() {
     let names = Plan::new(&config, SR, 1).unwrap().summary_names();
     assert_eq!(names.len(), 195);
     assert_eq!([&names[0], &names[193]], ["af193[mfcc_0]", "rms.std"]);
-    let Features::Summary(row) = features(&config, y.view(), SR, 977) else {
+    let Ok(Features::Summary(row)) = features(&config, y.view(), SR, 977) else {
         panic!("a summary was asked for")
     };
     let want = Af193::new(SR).unwrap().compute(y.as_slice().unwrap()).unwrap();

@@ -1,0 +1,49 @@
+//! `corsmal-feat pca`: principal components of training features, as a file for `extract`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use corsmal_extract::projection::Projection;
+
+use crate::failure::Failure;
+use crate::publish;
+
+/// Arguments of `pca`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  corsmal-feat extract --in train/ --out train.npz --preset spec9216-code
+  corsmal-feat pca --features train.npz --n-components 128 --out pca.npz
+  corsmal-feat extract --in test/ --out test.npz --preset spec9216-code --project pca.npz
+
+The file knows the configuration of its features and is refused with any other. Fit on training
+recordings only: extract never fits.")]
+pub struct Args {
+    /// Training features: an .npz or .parquet of `extract` with summaries.
+    #[arg(long, value_name = "FILE")]
+    features: PathBuf,
+    /// Components to keep, at most the rows of the file.
+    #[arg(long, value_name = "N", default_value_t = 128)]
+    n_components: usize,
+    /// Projection file to write (.npz).
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Replace an existing file.
+    #[arg(long)]
+    overwrite: bool,
+    /// Print nothing.
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+/// Fits and writes the projection.
+pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    publish::check(&args.out, args.overwrite)?;
+    let projection = Projection::fit(&args.features, args.n_components)?;
+    projection.save(&args.out)?;
+    if !args.quiet {
+        let (from, to) = (projection.n_inputs(), projection.n_components());
+        println!("{}: {from} features to {to} components", args.out.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,89 @@
+//! `hpss`: the harmonic or the percussive part of a spectrogram.
+
+use corsmal_dsp::hpss::{HpssParams, masks};
+use corsmal_dsp::stft::{StftParams, spectrogram};
+use ndarray::{Array2, ArrayView2, Axis};
+use serde::{Deserialize, Serialize};
+
+use super::{Extent, Feature, FeatureKind, WholeKernel, hertz};
+use crate::config::StftSpec;
+
+/// A part of the sound.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Component {
+    /// What is steady along time.
+    #[default]
+    Harmonic,
+    /// What is spread over frequency.
+    Percussive,
+}
+
+/// Parameters of `hpss`.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Hpss {
+    #[serde(flatten)]
+    stft: StftSpec,
+    component: Component,
+    /// Frames of the filter along time, bins of the filter along frequency.
+    kernel_size: [usize; 2],
+    power: f64,
+    /// Of the harmonic and of the percussive mask.
+    margin: [f64; 2],
+}
+
+impl Default for Hpss {
+    fn default() -> Self {
+        let p = HpssParams::default();
+        Self {
+            stft: StftSpec::default(),
+            component: Component::default(),
+            kernel_size: [p.kernel_harmonic, p.kernel_percussive],
+            power: p.power,
+            margin: [p.margin_harmonic, p.margin_percussive],
+        }
+    }
+}
+
+struct Magnitudes {
+    stft: StftParams,
+    params: HpssParams,
+    component: Component,
+}
+
+impl WholeKernel for Magnitudes {
+    fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>> {
+        let y = ArrayView2::from_shape((1, y.len()), y).expect("one row");
+        let magnitude = spectrogram(y, &self.stft, 1.0)?;
+        let (harmonic, percussive) = masks(magnitude.view(), &self.params)?;
+        let mask = match self.component {
+            Component::Harmonic => harmonic,
+            Component::Percussive => percussive,
+        };
+        Ok((magnitude * mask).index_axis_move(Axis(0), 0))
+    }
+}
+
+impl FeatureKind for Hpss {
+    const KIND: &'static str = "hpss";
+    const ABOUT: &'static str = "Magnitudes of the component (harmonic or percussive) of the sound, \
+        parted by medians over kernel_size frames and bins (librosa.decompose.hpss of |stft|): one \
+        value per frequency bin. Holds the whole recording in memory.";
+
+    fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
+        let stft = self.stft.params()?;
+        let params = HpssParams {
+            kernel_harmonic: self.kernel_size[0],
+            kernel_percussive: self.kernel_size[1],
+            power: self.power,
+            margin_harmonic: self.margin[0],
+            margin_percussive: self.margin[1],
+        };
+        params.check()?;
+        let labels = (0..stft.n_bins()).map(|k| hertz(k as f64 * sr / stft.n_fft as f64));
+        let extent = Extent::Frames(stft.hop_length as f64);
+        let kernel = Magnitudes { stft, params, component: self.component };
+        Ok(Feature::whole(extent, kernel, labels.collect()))
+    }
+}

@@ -1,0 +1,117 @@
+//! What holds for every registered feature, whatever it computes: registration alone enrols it.
+
+use corsmal_extract::config::Config;
+use corsmal_extract::engine::Plan;
+use corsmal_extract::features::{Entry, Kernel, registry};
+use ndarray::{Array2, Array3, Axis, concatenate, s};
+use std::sync::Arc;
+
+use crate::support::{SR, alone, frames, signal, try_frames};
+
+/// A configuration of the feature with its defaults, and what it is derived from before it.
+fn configuration(feature: &Entry) -> String {
+    let source = feature.defaults()["of"].as_str().map(|of| format!("[features.{of}]\n"));
+    format!("{}[features.{}]\n", source.unwrap_or_default(), feature.kind())
+}
+
+/// Whether the feature holds the whole recording.
+fn is_whole(feature: &Entry) -> bool {
+    let config = Config::with_overrides(&configuration(feature), "test", &[]).unwrap();
+    let plan = Plan::new(&Arc::new(config), SR, 1).unwrap();
+    matches!(plan.features.last().unwrap().feature.kernel, Kernel::Whole(..))
+}
+
+fn is_finite(values: &Array3<f32>) -> bool {
+    !values.is_empty() && values.iter().all(|x| x.is_finite())
+}
+
+/// A second and a half: enough for a patch of every feature.
+const SAMPLES: usize = 33_000;
+
+#[test]
+fn silence_is_finite_or_refused_as_silence() {
+    let y = Array2::zeros((2, SAMPLES));
+    for feature in registry() {
+        match try_frames(&configuration(feature), y.view(), SAMPLES) {
+            Ok(values) => assert!(is_finite(&values), "{}", feature.kind()),
+            Err(reason) => assert!(reason.contains("silence"), "{}: {reason}", feature.kind()),
+        }
+    }
+}
+
+#[test]
+fn single_samples_are_finite_or_refused_as_too_few() {
+    for value in [0.5, -1.0] {
+        let y = Array2::from_elem((2, 1), value);
+        for feature in registry() {
+            let kind = feature.kind();
+            match try_frames(&configuration(feature), y.view(), 1) {
+                Ok(values) => assert!(values.iter().all(|x| x.is_finite()), "{kind}"),
+                Err(reason) => {
+                    let says = reason.contains("needed") || reason.contains("at least");
+                    assert!(says, "{kind}: {reason}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn any_split_into_blocks_gives_the_same_bits() {
+    let y = signal(2, SAMPLES);
+    for feature in registry() {
+        let toml = configuration(feature);
+        let whole = frames(&toml, y.view(), SAMPLES);
+        assert!(is_finite(&whole), "{}", feature.kind());
+        let blocks: &[usize] = if is_whole(feature) { &[977] } else { &[1, 977, 16_384] };
+        for block in blocks {
+            let split = frames(&toml, y.view(), *block);
+            assert_eq!(split, whole, "{} in blocks of {block}", feature.kind());
+        }
+    }
+}
+
+#[test]
+fn channels_are_independent() {
+    let y = signal(3, SAMPLES);
+    for feature in registry() {
+        let toml = configuration(feature);
+        let together = frames(&toml, y.view(), SAMPLES);
+        for c in 0..3 {
+            let by_itself = frames(&toml, alone(&y, c), SAMPLES);
+            let of_it = together.slice(s![c..c + 1, .., ..]);
+            assert_eq!(of_it, by_itself, "{}: channel {c}", feature.kind());
+        }
+    }
+}
+
+#[test]
+fn a_delay_of_one_hop_is_a_delay_of_one_frame_or_the_feature_says_that_it_sees_the_whole() {
+    // Silence around the sound keeps what depends on the maximum of the recording.
+    let quiet = Array2::<f32>::zeros((1, 8192));
+    let sound = signal(1, 12_000);
+    let y = concatenate(Axis(1), &[quiet.view(), sound.view(), quiet.view()]).unwrap();
+    for feature in registry() {
+        let kind = feature.kind();
+        if is_whole(feature) {
+            assert!(feature.about().contains("whole"), "{kind}: {}", feature.about());
+            continue;
+        }
+        let toml = configuration(feature);
+        let config = Config::with_overrides(&toml, "test", &[]).unwrap();
+        let hop = Plan::new(&Arc::new(config), SR, 1).unwrap().hop(kind) as usize;
+        let before = Array2::<f32>::zeros((1, hop));
+        let delayed = concatenate(Axis(1), &[before.view(), y.view()]).unwrap();
+        let (plain, delayed) =
+            (frames(&toml, y.view(), SAMPLES), frames(&toml, delayed.view(), SAMPLES));
+        let n = plain.dim().2;
+        assert_eq!(delayed.dim().2, n + 1, "{kind}");
+        // Frames whose neighbours all lie in the signal.
+        let (first, last) = (8, n - 8);
+        assert_eq!(
+            plain.slice(s![.., .., first..last]),
+            delayed.slice(s![.., .., first + 1..last + 1]),
+            "{kind}"
+        );
+    }
+}

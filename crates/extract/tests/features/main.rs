@@ -1,0 +1,8 @@
+//! Features by way of the engine: against array functions, against one another, against the originals.
+
+#![allow(clippy::unwrap_used)]
+
+mod arrays;
+mod conformance;
+mod real_audio;
+mod support;
