@@ -43,6 +43,18 @@ fn from_synthetic_recordings_to_the_report() {
     assert!(lines(&reported.stdout).contains("SYNTHETIC"));
     assert!(out.join("report.html").exists());
 
+    // Its models take recordings, its features are training files.
+    let (model, folder) =
+        (out.join("models/zcr-mfcc-rf-corrected.model"), format!("{data}/train/2"));
+    let classified = run(&["classify", "--model", text(&model), "--in", &folder, "-q"]);
+    assert!(classified.status.success(), "{}", lines(&classified.stderr));
+    assert!(lines(&classified.stdout).starts_with("id,path,status,predicted,p_empty,p_pasta half"));
+    assert_eq!(classified.stdout.iter().filter(|&&b| b == b'\n').count(), 1 + 7);
+    let kept = std::fs::read_dir(out.join("features")).unwrap().next().unwrap().unwrap().path();
+    let learn = ["--features", text(&kept), "--target", "type", "--classifier", "knn"];
+    let validated = run(&[&["cross-validate"], &learn[..]].concat());
+    assert!(lines(&validated.stdout).contains("one group of container held out"));
+
     let submission = out.join("submissions/zcr-mfcc-rf-corrected-held-out.csv");
     let annotations = Path::new(data).join("ccm_train_annotation.csv");
     let (submission, annotations) = (text(&submission), text(&annotations));
@@ -54,6 +66,28 @@ fn from_synthetic_recordings_to_the_report() {
     // By simple physics the type is easy to hear.
     assert!(scores["T2"].as_f64().unwrap() > 50.0, "{scores}");
     assert_eq!(scores["recordings"], 57);
+}
+
+#[test]
+fn the_demo_ends_with_model_predictions_scores_and_report() {
+    let dir = tempfile::tempdir().unwrap();
+    let shown = run(&["demo", "--out", text(dir.path())]);
+    assert!(shown.status.success(), "{}", lines(&shown.stderr));
+    let shown = lines(&shown.stdout);
+    for part in [
+        "$ corsmal-feat synth --out",
+        "$ corsmal-feat benchmark --data",
+        "$ corsmal-feat classify --model",
+        "$ corsmal-feat evaluate --submission",
+        "SYNTHETIC",
+        "rules paper, 57 recordings",
+        "report/report.html",
+    ] {
+        assert!(shown.contains(part), "{part}: {shown}");
+    }
+    let made = |name: &str| std::fs::read_to_string(dir.path().join(name)).unwrap();
+    assert_eq!(made("predictions.csv").lines().count(), 1 + 7);
+    assert!(made("report/report.html").contains("SYNTHETIC"));
 }
 
 #[test]

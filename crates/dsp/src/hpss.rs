@@ -293,11 +293,7 @@ impl HarmonicPart {
     ///
     /// # Errors
     /// No samples.
-    pub fn of(
-        &self,
-        y: &[f32],
-        observe: impl FnMut(&[f32]),
-    ) -> Result<(Vec<f32>, Array2<f32>)> {
+    pub fn of(&self, y: &[f32], observe: impl FnMut(&[f32])) -> Result<(Vec<f32>, Array2<f32>)> {
         let mut part = vec![0.0; y.len()];
         let parts = &mut [(Part::Harmonic, part.as_mut_slice())];
         let magnitude = self.separator.separate(y, parts, observe)?;

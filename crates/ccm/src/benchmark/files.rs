@@ -8,7 +8,6 @@ use corsmal_plot::{BarChart, ConfusionMatrix as MatrixPicture, Series, to_svg};
 use ndarray::Array2;
 
 use super::baselines::Outcome;
-use super::features::FeatureSource;
 use super::results::{Estimate, Rows, Target};
 use crate::dataset::{Filling, Subset};
 use crate::error::{CcmError, Result};
@@ -24,13 +23,8 @@ pub(super) fn prepare(out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Writes the submissions of a baseline and, corrected, its model.
-pub(super) fn write_outcome(
-    out: &Path,
-    outcome: &Outcome,
-    rows: &Rows,
-    source: &dyn FeatureSource,
-) -> Result<()> {
+/// Writes the submissions of a baseline and its model.
+pub(super) fn write_outcome(out: &Path, outcome: &Outcome, rows: &Rows) -> Result<()> {
     let name = format!("{}-{}", outcome.baseline.slug(), outcome.variant.name());
     let held_out = outcome.held_out.iter().map(|(row, e)| (&rows.training[*row], e));
     write_submissions(out, &format!("{name}-held-out"), &held_out.collect::<Vec<_>>())?;
@@ -38,15 +32,20 @@ pub(super) fn write_outcome(
         let pairs: Vec<_> = part.rows.iter().zip(estimates).collect();
         write_submissions(out, &format!("{name}-{}", slug(part.subset)), &pairs)?;
     }
+    // Published PCA is fitted on what it reduces, so that there is no projection for recordings to
+    // come.
+    if outcome.model.n_features() != outcome.feature_names.len() {
+        return Ok(());
+    }
     let fault = |e: &dyn std::fmt::Display| CcmError::Request(format!("model {name}: {e}"));
     let labels = Labels::new(Filling::all().map(Filling::name).collect()).map_err(|e| fault(&e))?;
     let header = ModelHeader {
         pipeline: outcome.spec.clone(),
         labels,
         target: "joint".into(),
-        feature_names: Vec::new(),
-        feature_config: source.identity(outcome.baseline.features).into(),
-        feature_config_hash: outcome.configuration.clone(),
+        feature_names: outcome.feature_names.clone(),
+        feature_config: outcome.config.to_value(),
+        feature_config_hash: outcome.config.hash(),
         provenance: serde_json::json!({
             "baseline": outcome.baseline.name(),
             "variant": outcome.variant.name(),

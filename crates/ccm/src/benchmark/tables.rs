@@ -183,7 +183,7 @@ fn facts(set: &DataSet, rows: &Rows, outcomes: &[Outcome], seed: u64) -> Vec<(St
     }
     let mut sets: Vec<String> = outcomes
         .iter()
-        .map(|o| format!("{} {:.8}", o.baseline.features.name(), o.configuration))
+        .map(|o| format!("{} {:.8}", o.baseline.features.preset(), o.config.hash()))
         .collect();
     sets.dedup();
     facts.push(("Feature configurations".into(), sets.join(", ")));

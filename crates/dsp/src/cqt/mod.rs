@@ -171,7 +171,8 @@ impl CqtPlan {
             return Err(DspError::parameter("n_bins", p.n_bins, allowed));
         }
         let n_octaves = p.n_bins.div_ceil(p.bins_per_octave);
-        let early = early_halvings(pass_band(p.res_type) * nyquist, cutoff, p.hop_length, n_octaves);
+        let early =
+            early_halvings(pass_band(p.res_type) * nyquist, cutoff, p.hop_length, n_octaves);
         let base = p.sr / f64::from(1u32 << early);
         let (mut sr, mut hop) = (base, p.hop_length >> early);
         let mut octaves: Vec<Octave> = Vec::with_capacity(n_octaves);

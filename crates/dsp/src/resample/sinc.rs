@@ -235,9 +235,9 @@ impl SincStream {
     fn give(&mut self, out: &mut Vec<f32>) {
         let Self { held, channels, start, weights, .. } = self;
         let frames = held.len() / *channels;
-        out.extend((0..*channels).map(|c| {
-            weights.output(*start, frames, |i| held[i * *channels + c])
-        }));
+        out.extend(
+            (0..*channels).map(|c| weights.output(*start, frames, |i| held[i * *channels + c])),
+        );
         self.given += 1;
         self.time += 1.0 / self.plan.ratio;
     }

@@ -74,9 +74,6 @@ mod tests {
     #[test]
     fn other_versions_are_refused() {
         let refused = config("[features.mfcc]", &["librosa=0.9"]).unwrap_err();
-        assert_eq!(
-            refused,
-            "configuration key librosa: = 0.9: expected \"0.8\" or \"0.11\""
-        );
+        assert_eq!(refused, "configuration key librosa: = 0.9: expected \"0.8\" or \"0.11\"");
     }
 }

@@ -43,8 +43,7 @@ impl FeatureKind for Tonnetz {
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let extent = Extent::Frames(self.chroma.hop_length() as f64);
         let harmonic = self.harmonic.then(|| HarmonicPart::new(self.chroma.librosa()));
-        let kernel =
-            Centroids { chroma: self.chroma.kernel(sr)?, harmonic: harmonic.transpose()? };
+        let kernel = Centroids { chroma: self.chroma.kernel(sr)?, harmonic: harmonic.transpose()? };
         Ok(Feature::whole(extent, kernel, indices(DIMENSIONS)))
     }
 

@@ -161,14 +161,18 @@ fn the_row_of_the_ccm_recording_in_the_features_of_m5() {
     let Some(root) = shared() else { return };
     let mut npz = open(&root, "ccm/a34f_train.npz");
     let (x, containers) = (npz.f64("X").unwrap(), npz.f64("container").unwrap());
-    let at = npz.strings("sequence").unwrap().iter().zip(&containers).position(|(name, c)| {
-        name == "s1_fi0_fu0_b1_l0" && *c == 3.0
-    });
+    let at = npz
+        .strings("sequence")
+        .unwrap()
+        .iter()
+        .zip(&containers)
+        .position(|(name, c)| name == "s1_fi0_fu0_b1_l0" && *c == 3.0);
     let want = row(&x, at.unwrap());
     let got = values("a34f136", &[], &root.join(CCM));
-    let off = ArrayView1::from(&got).iter().zip(&want).fold(0.0, |m: f64, (g, w)| {
-        m.max((f64::from(*g) - w).abs() / w.abs().max(1.0))
-    });
+    let off = ArrayView1::from(&got)
+        .iter()
+        .zip(&want)
+        .fold(0.0, |m: f64, (g, w)| m.max((f64::from(*g) - w).abs() / w.abs().max(1.0)));
     println!("| a34f136, of max(1, value) | 136 | | {off:.1e} | 3e-4 |");
     assert!(off <= 3e-4, "{off:e}");
 }
