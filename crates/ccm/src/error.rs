@@ -61,6 +61,9 @@ pub enum CcmError {
         /// What the annotations have.
         expected: String,
     },
+    /// The user stopped the work; what is done is kept for the next run.
+    #[error("interrupted; the same command continues")]
+    Interrupted,
     /// A request that cannot be met; the text says why and what is possible.
     #[error("{0}")]
     Request(String),

@@ -6,6 +6,7 @@
 
 pub mod benchmark;
 pub mod dataset;
+pub mod decision;
 pub mod error;
 pub mod paper;
 pub mod predictions;

@@ -5,11 +5,15 @@
 mod shared_data;
 
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
-use corsmal_ccm::benchmark::{Baseline, BaselineFeatures, FeatureSet, FeatureSource, Options, run};
+use corsmal_ccm::benchmark::{Baseline, FeatureSet, Options};
+use corsmal_ccm::report::Report;
 use corsmal_ccm::synth::{self, Size};
+use corsmal_extract::engine::Features;
 use corsmal_extract::npz::NpzFile;
+use corsmal_extract::run::Signals;
 use ndarray::Axis;
 use shared_data::ccm;
 
@@ -19,39 +23,42 @@ fn features_are_those_of_the_published_code() {
     let Some(path) = ccm("baseline_feature_reference.npz") else { return };
     let wav = ccm("audio/s1_fi0_fu0_b1_l0_audio.wav").unwrap();
     let mut reference = NpzFile::open(&path).unwrap();
-    let zcr = reference.f64("zcr_mfcc26").unwrap().index_axis(Axis(0), 0).to_owned();
-    let spectrogram = reference.f32("spectrogram96").unwrap().index_axis(Axis(0), 0).to_owned();
-    let ours = BaselineFeatures.vector(FeatureSet::ZcrMfcc, &wav, None).unwrap();
-    assert_eq!(ours.len(), zcr.len());
-    for (a, b) in ours.iter().zip(&zcr) {
-        assert!((f64::from(*a) - b).abs() < 1e-3 * b.abs().max(1.0), "{a} {b}");
-    }
-    let ours = BaselineFeatures.vector(FeatureSet::Spectrogram, &wav, None).unwrap();
-    assert_eq!(ours.len(), spectrogram.len());
-    for (a, b) in ours.iter().zip(&spectrogram) {
-        assert!((a - b).abs() < 0.02, "{a} {b}");
+    for (set, name) in [
+        (FeatureSet::ZcrMfcc, "zcr_mfcc26"),
+        (FeatureSet::Af193, "af193"),
+        (FeatureSet::Spectrogram, "spectrogram96"),
+    ] {
+        let expected = reference.f64(name).unwrap().index_axis(Axis(0), 0).to_owned();
+        let ours = vector(set, &wav);
+        assert_eq!(ours.len(), expected.len(), "{name}");
+        for (i, (a, b)) in ours.iter().zip(&expected).enumerate() {
+            let limit = if set == FeatureSet::Spectrogram { 0.02 } else { 1e-3 * b.abs().max(1.0) };
+            assert!((f64::from(*a) - b).abs() < limit, "{name} {i}: {a} {b}");
+        }
     }
 }
 
-/// Counts how often features are computed; the values are a few statistics of the file's bytes.
-struct Counting(AtomicUsize);
-
-impl FeatureSource for Counting {
-    fn identity(&self, set: FeatureSet) -> String {
-        format!("counting {}", set.slug())
+fn vector(set: FeatureSet, wav: &Path) -> Vec<f32> {
+    let signals = Signals::new(Arc::new(set.config().unwrap()));
+    let mut source = corsmal_audio::open(wav).unwrap();
+    let (rate, channels) = (source.spec().sample_rate, source.spec().channels);
+    let mut signal = signals.start(rate, channels).unwrap();
+    let mut block = vec![0.0; 4096 * usize::from(channels)];
+    loop {
+        let frames = source.read(&mut block).unwrap();
+        if frames == 0 {
+            break;
+        }
+        signal.push(&block[..frames * usize::from(channels)]).unwrap();
     }
-
-    fn vector(
-        &self,
-        set: FeatureSet,
-        path: &Path,
-        _: Option<(f64, f64)>,
-    ) -> Result<Vec<f32>, String> {
-        self.0.fetch_add(1, Ordering::Relaxed);
-        let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
-        let step = bytes.len() / set.width();
-        Ok((0..set.width()).map(|i| f32::from(bytes[i * step])).collect())
+    match signal.finish().unwrap() {
+        Features::Summary(row) => row,
+        Features::Frames(_) => panic!("a summary is configured"),
     }
+}
+
+fn run(options: &Options) -> corsmal_ccm::Result<Report> {
+    corsmal_ccm::benchmark::run(options, &|_| {}, &AtomicBool::new(false))
 }
 
 #[test]
@@ -68,11 +75,10 @@ fn the_report_is_complete_and_features_are_kept() {
             .filter(|b| b.features == FeatureSet::ZcrMfcc)
             .collect(),
         added: Vec::new(),
+        jobs: 2,
         seed: 1,
     };
-    let source = Counting(AtomicUsize::new(0));
-    let report = run(&options, &source, &|_| {}).unwrap();
-    assert_eq!(source.0.load(Ordering::Relaxed), 133);
+    let report = run(&options).unwrap();
     assert!(report.warning.unwrap().contains("SYNTHETIC"));
 
     let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
@@ -86,17 +92,67 @@ fn the_report_is_complete_and_features_are_kept() {
     // Three baselines in two variants and the random estimates, each with a public figure.
     assert_eq!(level.lines().filter(|l| l.starts_with("ours,")).count(), 7);
     let json: serde_json::Value = serde_json::from_str(&read("report.json")).unwrap();
-    assert_eq!(json["sections"][0]["id"], "level");
+    assert_eq!(json["sections"][1]["id"], "level");
     let submission = read("submissions/zcr-mfcc-rf-corrected-public-test.csv");
     assert_eq!(submission.lines().count(), 1 + 19);
     assert!(out.join("figures/zcr-mfccs-rf-corrected-joint-confusion.svg").exists());
+    let with_ids = read("submissions/zcr-mfcc-rf-corrected-held-out-2022.csv");
+    assert!(with_ids.starts_with("Configuration ID,") && with_ids.lines().count() == 1 + 114);
+    assert!(read("submissions/random-training.csv").lines().count() == 1 + 114);
     let model =
         corsmal_models::model_file::Model::load(&out.join("models/zcr-mfcc-rf-corrected.model"));
-    assert_eq!(model.unwrap().n_features(), 26);
+    let header = model.unwrap().header().clone();
+    let config = FeatureSet::ZcrMfcc.config().unwrap();
+    assert_eq!((header.feature_config_hash, header.feature_names.len()), (config.hash(), 26));
 
-    run(&options, &source, &|_| {}).unwrap();
-    assert_eq!(source.0.load(Ordering::Relaxed), 133, "cached features were not used");
+    // The second run takes the features that are there; changed recordings are computed anew.
+    let features = std::fs::read_dir(out.join("features")).unwrap();
+    let kept: Vec<_> = features.map(|f| f.unwrap().path()).collect();
+    let times = || -> Vec<_> {
+        kept.iter().map(|f| std::fs::metadata(f).unwrap().modified().unwrap()).collect()
+    };
+    let before = times();
+    assert_eq!(kept.len(), 2);
+    run(&options).unwrap();
+    assert_eq!(times(), before, "kept features were not used");
     assert!(read("tables/level.csv") == level, "a second run differs");
+    let copy = data.join("train/1/audio/s0_fi0_fu0_b1_l0_audio.wav");
+    let bytes = std::fs::read(&copy).unwrap();
+    std::fs::write(&copy, &bytes[..bytes.len() / 2]).unwrap();
+    run(&options).unwrap();
+    let changed = times().iter().zip(&before).filter(|(now, then)| now != then).count();
+    assert_eq!(changed, 1, "training features are those of the recordings as they are now");
+    std::fs::write(&copy, "RIFF").unwrap();
+    let error = run(&options).unwrap_err().to_string();
+    assert!(error.contains("s0_fi0_fu0_b1_l0_audio.wav: corrupt"), "{error}");
+}
+
+/// The flat release withholds which container a test file shows: it is predicted and named by id.
+#[test]
+fn flat_test_recordings_are_submitted_by_id() {
+    let dir = tempfile::tempdir().unwrap();
+    let data = dir.path().join("data");
+    synth::generate(&data, Size::Small, 4).unwrap();
+    let test = data.join("test_pub/audio");
+    std::fs::create_dir_all(&test).unwrap();
+    for (id, name) in [(0, "s0_fi1_fu1_b1_l0"), (1, "s0_fi3_fu2_b1_l0")] {
+        let from = data.join(format!("train/1/audio/{name}_audio.wav"));
+        std::fs::copy(from, test.join(format!("{id:06}.wav"))).unwrap();
+    }
+    let out = dir.path().join("report");
+    let knn = Baseline::all().into_iter().take(1).collect();
+    let options =
+        Options { data, out: out.clone(), baselines: knn, added: Vec::new(), jobs: 2, seed: 1 };
+    run(&options).unwrap();
+    let by_id = out.join("submissions/zcr-mfcc-knn-corrected-public-test-2022.csv");
+    let table = std::fs::read_to_string(by_id).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().skip(1).map(|l| l.split(',').collect()).collect();
+    assert_eq!(rows.iter().map(|r| r[0]).collect::<Vec<_>>(), ["0", "1"]);
+    for row in rows {
+        let sum: f64 = row[4..8].iter().map(|p| p.parse::<f64>().unwrap()).sum();
+        assert!((sum - 1.0).abs() < 1e-5 && row[1] == "-1", "{row:?}");
+    }
+    assert!(!out.join("submissions/zcr-mfcc-knn-corrected-public-test.csv").exists());
 }
 
 #[test]
@@ -109,9 +165,10 @@ fn an_unusable_file_to_add_stops_before_the_work() {
         out: dir.path().join("report"),
         baselines: Vec::new(),
         added: vec![("x".into(), file)],
+        jobs: 1,
         seed: 1,
     };
-    let error = run(&options, &BaselineFeatures, &|_| {}).unwrap_err().to_string();
+    let error = run(&options).unwrap_err().to_string();
     assert!(error.contains("p.csv: no column"), "{error}");
     assert!(!options.out.exists());
 }

@@ -5,7 +5,7 @@
 mod shared_data;
 
 use corsmal_ccm::dataset::{
-    Annotations, Container, DataSet, PublishedSplit, SequenceName, check, read_actions,
+    Annotations, Container, DataSet, PublishedSplit, SequenceName, Subset, check, read_actions,
     training_order,
 };
 use corsmal_ccm::synth::{self, Size};
@@ -99,6 +99,21 @@ fn the_flat_release_is_explained_by_its_annotations() {
         set.recordings.iter().map(|r| (r.container, r.name)).collect()
     };
     assert_eq!(names(&set), names(&tree));
+}
+
+#[test]
+fn flat_test_files_are_told_apart_by_their_folders() {
+    let dir = tempfile::tempdir().unwrap();
+    for part in ["train", "test_pub", "test_priv"] {
+        let audio = dir.path().join(part).join("audio");
+        std::fs::create_dir_all(&audio).unwrap();
+        std::fs::write(audio.join("000000.wav"), "").unwrap();
+    }
+    let set = DataSet::open(dir.path()).unwrap();
+    assert!(set.odd.is_empty(), "{:?}", set.odd);
+    let parts: Vec<_> = set.recordings.iter().map(|r| (r.part, r.id)).collect();
+    assert_eq!(parts, Subset::ALL.map(|part| (part, Some(0))));
+    assert_eq!(check(&set).unplaced, 3);
 }
 
 #[test]

@@ -4,7 +4,7 @@
 
 mod shared_data;
 
-use corsmal_ccm::predictions::ProbabilityTable;
+use corsmal_ccm::predictions::{ProbabilityTable, RowName};
 use corsmal_ccm::submission::Submission;
 use shared_data::ccm;
 
@@ -25,10 +25,10 @@ fn averages_of_m5_are_its_submission() {
     let kind = fuse(&["type_rf", "type_vggish_agg"]);
     let level = fuse(&["level_rf", "level_vggish_agg", "level_r21d_agg"]);
     for (fused, estimates) in [(kind, &submission.kind), (level, &submission.level)] {
-        let top = fused.top();
         let equal = submission.keys.iter().zip(&estimates.values).filter(|(key, value)| {
-            let row = fused.keys.iter().position(|k| k == *key).unwrap();
-            top[row] as f64 == **value
+            let name = RowName::Recording(**key);
+            let row = fused.rows.iter().find(|row| row.name == name).unwrap();
+            row.class.unwrap() as f64 == **value
         });
         assert_eq!(equal.count(), 228);
     }

@@ -43,7 +43,8 @@ pub struct DatasetArgs {
     /// Label column to learn. `joint` is type and level together where there is no such column.
     #[arg(long, visible_alias = "y", value_name = "COLUMN")]
     pub target: String,
-    /// Label column of groups that must not be split between training and test, as container.
+    /// Label column of groups that must not be split between training and test. A column called
+    /// container or group is taken by itself where no --cv is given.
     #[arg(long, value_name = "COLUMN")]
     pub groups: Option<String>,
 }

@@ -12,6 +12,9 @@ use crate::failure::Failure;
 /// Inner folds of a choice, and folds without groups, unless there are fewer groups.
 const FOLDS: usize = 5;
 
+/// Columns that are groups unless the user says otherwise.
+const GROUPS: [&str; 2] = ["container", "group"];
+
 /// A plan as written by the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CvPlan {
@@ -72,8 +75,8 @@ pub struct Folds {
 }
 
 impl Folds {
-    /// Carries out a plan; without one, each group once where there are groups, else stratified
-    /// folds.
+    /// Carries out a plan; without one, each group once where there are groups (`groups`, or a
+    /// column called [`GROUPS`]), else stratified folds.
     pub fn new(
         plan: Option<&CvPlan>,
         table: &DatasetTable,
@@ -81,7 +84,11 @@ impl Folds {
         (labels, y): (&Labels, &[usize]),
         seed: u32,
     ) -> Result<Self, Failure> {
-        let default = groups.map_or(CvPlan::K(FOLDS), |column| CvPlan::Group(column.into()));
+        let known = || GROUPS.into_iter().find(|column| has_groups(table, column));
+        let default = match groups.or_else(known) {
+            Some(column) => CvPlan::Group(column.into()),
+            None => CvPlan::K(FOLDS),
+        };
         let plan = plan.unwrap_or(&default);
         let column = match plan {
             CvPlan::Group(column) | CvPlan::Fold(column) => Some(column.as_str()),
@@ -132,6 +139,10 @@ impl Folds {
         }
         found
     }
+}
+
+fn has_groups(table: &DatasetTable, column: &str) -> bool {
+    table.column(column).is_ok_and(|values| Labels::of(&values).0.len() > 1)
 }
 
 fn stratified(labels: &Labels, y: &[usize], k: usize, seed: u32) -> Result<Vec<Fold>, Failure> {

@@ -7,8 +7,10 @@ mod folds;
 mod interrupt;
 mod label_file;
 mod pipeline;
+mod prediction_lines;
 mod progress;
 mod publish;
+mod voting;
 
 use std::process::ExitCode;
 

@@ -43,6 +43,18 @@ fn from_synthetic_recordings_to_the_report() {
     assert!(lines(&reported.stdout).contains("SYNTHETIC"));
     assert!(out.join("report.html").exists());
 
+    // Its models take recordings, its features are training files.
+    let (model, folder) =
+        (out.join("models/zcr-mfcc-rf-corrected.model"), format!("{data}/train/2"));
+    let classified = run(&["classify", "--model", text(&model), "--in", &folder, "-q"]);
+    assert!(classified.status.success(), "{}", lines(&classified.stderr));
+    assert!(lines(&classified.stdout).starts_with("id,path,status,predicted,p_empty,p_pasta half"));
+    assert_eq!(classified.stdout.iter().filter(|&&b| b == b'\n').count(), 1 + 7);
+    let kept = std::fs::read_dir(out.join("features")).unwrap().next().unwrap().unwrap().path();
+    let learn = ["--features", text(&kept), "--target", "type", "--classifier", "knn"];
+    let validated = run(&[&["cross-validate"], &learn[..]].concat());
+    assert!(lines(&validated.stdout).contains("one group of container held out"));
+
     let submission = out.join("submissions/zcr-mfcc-rf-corrected-held-out.csv");
     let annotations = Path::new(data).join("ccm_train_annotation.csv");
     let (submission, annotations) = (text(&submission), text(&annotations));
@@ -54,6 +66,28 @@ fn from_synthetic_recordings_to_the_report() {
     // By simple physics the type is easy to hear.
     assert!(scores["T2"].as_f64().unwrap() > 50.0, "{scores}");
     assert_eq!(scores["recordings"], 57);
+}
+
+#[test]
+fn the_demo_ends_with_model_predictions_scores_and_report() {
+    let dir = tempfile::tempdir().unwrap();
+    let shown = run(&["demo", "--out", text(dir.path())]);
+    assert!(shown.status.success(), "{}", lines(&shown.stderr));
+    let shown = lines(&shown.stdout);
+    for part in [
+        "$ corsmal-feat synth --out",
+        "$ corsmal-feat benchmark --data",
+        "$ corsmal-feat classify --model",
+        "$ corsmal-feat evaluate --submission",
+        "SYNTHETIC",
+        "rules paper, 57 recordings",
+        "report/report.html",
+    ] {
+        assert!(shown.contains(part), "{part}: {shown}");
+    }
+    let made = |name: &str| std::fs::read_to_string(dir.path().join(name)).unwrap();
+    assert_eq!(made("predictions.csv").lines().count(), 1 + 7);
+    assert!(made("report/report.html").contains("SYNTHETIC"));
 }
 
 #[test]
@@ -75,4 +109,60 @@ fn unusable_input_is_one_message_and_exit_code_2() {
         assert!(message.starts_with("error: ") && message.lines().count() == 1, "{message}");
     }
     assert!(!none.exists());
+}
+
+/// Every fault of a submission is one message with file, line and column, and no scores.
+#[test]
+fn submissions_with_faults_are_refused_and_quirks_are_noted() {
+    let dir = tempfile::tempdir().unwrap();
+    let data = dir.path().join("data");
+    let made = run(&["synth", "--out", text(&data), "--small", "--quiet"]);
+    assert!(made.status.success());
+    let annotations = data.join("ccm_train_annotation.csv");
+    // Estimates for every annotated recording, none of them right.
+    let table = std::fs::read_to_string(&annotations).unwrap();
+    let ids: Vec<&str> = table.lines().skip(1).map(|l| l.split(',').next().unwrap()).collect();
+    let header = "Configuration ID,Container capacity,Container mass,Filling mass,None,Pasta,Rice,\
+        Water,Filling type,Empty,Half-full,Full,Filling level,Width at the top,\
+        Width at the bottom,Height,Object safety,Distance,Angle difference,Execution time";
+    let row = |id: &str| format!("{id},100,-1,-1,-1,-1,-1,-1,1,-1,-1,-1,2,-1,-1,-1,-1,-1,-1,-1");
+    let rows: Vec<String> = ids.iter().map(|id| row(id)).collect();
+    let file = dir.path().join("s.csv");
+    let evaluate = |rows: &[String]| {
+        std::fs::write(&file, format!("{header}\n{}\n", rows.join("\n"))).unwrap();
+        let files = ["--submission", text(&file), "--annotations", text(&annotations)];
+        run(&[&["evaluate"], &files[..], &["--format", "json"]].concat())
+    };
+    let sound = evaluate(&rows);
+    assert!(sound.status.success(), "{}", lines(&sound.stderr));
+    let changed = |at: usize, to: String| {
+        let mut rows = rows.clone();
+        rows[at] = to;
+        rows
+    };
+    let (cut, extra) = (rows[1..].to_vec(), [&rows[..], &[row("999")]].concat());
+    for (rows, message) in [
+        (cut, format!("missing rows: id {}", ids[0])),
+        (extra, "rows that the annotations do not have: id 999".into()),
+        (changed(1, row(ids[0])), format!("more than one row: id {}", ids[0])),
+        (
+            changed(2, rows[2].replace(",100,", ",much,")),
+            "line 4, column 'Container capacity'".into(),
+        ),
+        (changed(2, rows[2].replace(",-1,1,-1", ",-1,9,-1")), "column 'Filling type': '9'".into()),
+        (
+            changed(2, rows[2].replace(",-1,2,-1", ",-1,1.5,-1")),
+            "column 'Filling level': '1.5'".into(),
+        ),
+    ] {
+        let output = evaluate(&rows);
+        let found = lines(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{found}");
+        assert!(found.contains(&message) && output.stdout.is_empty(), "{message}: {found}");
+    }
+    // A float label is a quirk of the official evaluators: scored as they do, and said.
+    let output = evaluate(&changed(2, rows[2].replace(",-1,1,-1", ",-1,1.0,-1")));
+    let scores: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(scores["s2"], 0.0);
+    assert!(scores["notes"][0].as_str().unwrap().contains("floating-point"), "{scores}");
 }

@@ -252,10 +252,19 @@ fn what_cannot_be_learned_from_is_refused() {
     let found = plain(&["--groups", "group", "--cv", "k=9"]);
     assert!(found.starts_with("warning: ") && found.contains("1 of 3 features have one value"));
     assert!(found.contains("4 groups cannot make 9 folds"), "{found}");
+    let open = ["cross-validate", "--features", text(&odd), "--target", "type"];
+    let by_group = done(&[&open[..], &["--classifier", "knn"]].concat());
+    assert!(by_group.contains("one group of group held out"), "groups are not split: {by_group}");
     assert!(plain(&["--cv", "lists=0/1"]).contains("give --groups"));
     assert!(plain(&["--x", "Z"]).contains("no member \"Z\""));
     assert!(plain(&["--ids", "type"]).contains("id \"rice\" occurs twice"));
     assert!(validate("mass", &[]).contains("is a decimal number"));
+    small_table(&odd, |x, _| x.fill(1.0));
+    let constant = plain(&["--standardize"]);
+    assert!(constant.contains("3 of 3 features have one value"), "{constant}");
+    assert!(constant.contains("has the same value in all"), "{constant}");
+    let train = ["train", "--features", text(&odd), "--target", "type", "--classifier", "svm"];
+    refused(&[&train[..], &["--standardize", "--out", text(&out)]].concat());
     assert!(!out.exists());
 }
 

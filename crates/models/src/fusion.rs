@@ -35,28 +35,79 @@ pub fn average(models: &[ArrayView2<'_, f64>], weights: &[f64]) -> Result<Array2
     Ok(mean)
 }
 
-/// The class most windows of a recording were given, the lowest among equals. `offsets` has one
-/// entry more than there are recordings: recording r owns windows `offsets[r]..offsets[r + 1]`.
-/// `None` for a recording without windows.
-///
-/// # Errors
-/// Offsets that decrease or reach beyond the windows, or classes outside the table.
-pub fn majority_vote(
-    windows: &[usize],
-    offsets: &[usize],
-    n_classes: usize,
-) -> Result<Vec<Option<usize>>> {
-    crate::table::check_labels(windows.len(), windows, n_classes)?;
-    let recordings = offsets.windows(2).map(|pair| {
-        let Some(own) = windows.get(pair[0]..pair[1]) else {
-            let (what, expected) = ("windows of the recordings", windows.len());
-            return Err(ModelError::Length { what, expected, actual: pair[0].max(pair[1]) });
-        };
-        let mut votes = vec![0.0; n_classes];
-        own.iter().for_each(|&class| votes[class] += 1.0);
-        Ok((!own.is_empty()).then(|| argmax(&votes)))
-    });
-    recordings.collect()
+/// Windows of one recording, counted as they come, so that their number costs no memory.
+#[derive(Clone, Debug)]
+pub struct WindowVotes {
+    counts: Vec<usize>,
+    /// sums of probabilities; `None` once a window had none
+    sums: Option<Vec<f64>>,
+}
+
+/// A class of windows in which nothing happens: it wins only where no other class has enough
+/// windows. With 6 windows of `none` that is how M4 decides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Background {
+    /// the class
+    pub class: usize,
+    /// windows that another class needs
+    pub least: usize,
+}
+
+impl WindowVotes {
+    /// No windows yet.
+    pub fn new(n_classes: usize) -> Self {
+        Self { counts: vec![0; n_classes], sums: Some(vec![0.0; n_classes]) }
+    }
+
+    /// Adds a window: its class and, where the classifier has them, its probabilities.
+    ///
+    /// # Errors
+    /// A class outside the table, or not one probability per class.
+    pub fn add(&mut self, class: usize, proba: Option<&[f64]>) -> Result<()> {
+        crate::table::check_labels(1, &[class], self.counts.len())?;
+        if let Some(proba) = proba.filter(|p| p.len() != self.counts.len()) {
+            let (what, expected) = ("probabilities of a window", self.counts.len());
+            return Err(ModelError::Length { what, expected, actual: proba.len() });
+        }
+        self.counts[class] += 1;
+        self.sums = self.sums.take().zip(proba).map(|(mut sums, proba)| {
+            sums.iter_mut().zip(proba).for_each(|(sum, p)| *sum += p);
+            sums
+        });
+        Ok(())
+    }
+
+    /// Windows added.
+    pub fn windows(&self) -> usize {
+        self.counts.iter().sum()
+    }
+
+    /// The class that most windows were given, the lowest among equals; `None` without windows.
+    pub fn majority(&self, background: Option<Background>) -> Option<usize> {
+        let mut votes: Vec<f64> = self.counts.iter().map(|&n| n as f64).collect();
+        if let Some(Background { class, least }) = background {
+            let enough = |(c, n): (usize, &usize)| c != class && *n >= least;
+            if self.counts.iter().enumerate().any(enough) {
+                votes[class] = -1.0;
+            } else {
+                votes[class] = f64::INFINITY;
+            }
+        }
+        (self.windows() > 0).then(|| argmax(&votes))
+    }
+
+    /// Share of windows of each class; zero without windows.
+    pub fn shares(&self) -> Vec<f64> {
+        let all = self.windows().max(1) as f64;
+        self.counts.iter().map(|&n| n as f64 / all).collect()
+    }
+
+    /// Mean probabilities; `None` without windows, or where some window had none.
+    pub fn mean(&self) -> Option<Vec<f64>> {
+        let all = self.windows() as f64;
+        let sums = self.sums.as_ref().filter(|_| all > 0.0)?;
+        Some(sums.iter().map(|sum| sum / all).collect())
+    }
 }
 
 /// For every row the pair (a, b) of classes with the largest product of probabilities among the
@@ -124,12 +175,42 @@ mod tests {
         assert!(average(&[], &[]).is_err());
     }
 
+    fn votes(classes: &[usize], n_classes: usize) -> WindowVotes {
+        let mut votes = WindowVotes::new(n_classes);
+        classes.iter().for_each(|&class| votes.add(class, None).unwrap());
+        votes
+    }
+
     #[test]
     fn votes_and_breaks_ties_low() {
-        let found = majority_vote(&[2, 2, 1, 1, 0, 0], &[0, 3, 5, 5, 6], 3).unwrap();
-        assert_eq!(found, [Some(2), Some(0), None, Some(0)]);
-        assert!(majority_vote(&[0], &[0, 2], 1).is_err());
-        assert!(majority_vote(&[0], &[1, 0], 1).is_err());
+        assert_eq!(votes(&[2, 2, 1], 3).majority(None), Some(2));
+        assert_eq!(votes(&[1, 0], 3).majority(None), Some(0));
+        assert_eq!(votes(&[], 3).majority(None), None);
+        assert_eq!(votes(&[1, 0, 1, 1], 2).shares(), [0.25, 0.75]);
+        assert!(votes(&[], 1).add(1, None).is_err());
+        assert!(votes(&[], 2).add(1, Some(&[1.0])).is_err());
+    }
+
+    /// M4: the most frequent of the other classes where one has more than five windows, else none.
+    #[test]
+    fn background_gives_way_to_enough_windows_of_another_class() {
+        let m4 = Some(Background { class: 0, least: 6 });
+        let few = [&[0; 20][..], &[1; 5], &[2; 5]].concat();
+        assert_eq!(votes(&few, 4).majority(m4), Some(0));
+        let enough = [&[0; 20][..], &[1; 5], &[2; 6]].concat();
+        assert_eq!(votes(&enough, 4).majority(m4), Some(2));
+        assert_eq!(votes(&[1; 5], 4).majority(m4), Some(0));
+    }
+
+    #[test]
+    fn means_need_probabilities_of_every_window() {
+        let mut votes = WindowVotes::new(2);
+        assert_eq!(votes.mean(), None);
+        votes.add(0, Some(&[0.75, 0.25])).unwrap();
+        votes.add(1, Some(&[0.25, 0.75])).unwrap();
+        assert_eq!(votes.mean(), Some(vec![0.5, 0.5]));
+        votes.add(1, None).unwrap();
+        assert_eq!((votes.mean(), votes.windows()), (None, 3));
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::results::{Estimate, Target};
 use crate::error::Result;
+use crate::predictions::read_capacities;
 use crate::submission::{RowKey, Submission};
 use crate::table::Table;
 
@@ -23,9 +24,11 @@ impl Added {
     /// [`crate::CcmError`] as [`Submission::read`].
     pub fn read(name: &str, path: &Path) -> Result<Self> {
         let table = Table::read(path)?;
-        let by_key = match table.find("fileName") {
-            Some(file) => capacities(&table, file)?,
-            None => submission(&Submission::from_table(&table)?),
+        let by_key = if table.find("fileName").is_some() {
+            let capacities = read_capacities(path)?.into_iter();
+            capacities.map(|(k, capacity_ml)| (k, Estimate { capacity_ml, ..blank(k) })).collect()
+        } else {
+            submission(&Submission::from_table(&table)?)
         };
         Ok(Self { name: name.to_string(), by_key })
     }
@@ -52,23 +55,6 @@ fn blank(key: RowKey) -> Estimate {
         level_probabilities: None,
         capacity_ml: None,
     }
-}
-
-fn capacities(table: &Table, file: usize) -> Result<HashMap<RowKey, Estimate>> {
-    let capacity = table.column("capacity[mL]")?;
-    let mut by_key = HashMap::new();
-    for row in 0..table.rows() {
-        let stem = table.text(row, file).trim_start_matches("id");
-        let stem = stem.split('.').next().unwrap_or_default();
-        let key = stem
-            .split_once('_')
-            .and_then(|(c, s)| Some(RowKey::Sequence(c.parse().ok()?, s.parse().ok()?)))
-            .ok_or_else(|| table.fault(row, file, "a name such as id10_0000.png"))?;
-        let value = table.number(row, capacity)?;
-        let capacity_ml = (value > -1.0).then_some(value);
-        by_key.insert(key, Estimate { capacity_ml, ..blank(key) });
-    }
-    Ok(by_key)
 }
 
 fn submission(submission: &Submission) -> HashMap<RowKey, Estimate> {

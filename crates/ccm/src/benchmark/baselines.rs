@@ -1,5 +1,8 @@
 //! The twelve audio baselines: four feature sets, three classifiers, seven joint classes.
 
+use std::sync::Arc;
+
+use corsmal_extract::config::Config;
 use corsmal_models::classifiers::{
     ClassifierSpec, Gamma, KNearestParams, RandomForestParams, SvmParams,
 };
@@ -107,7 +110,9 @@ pub(super) struct Outcome {
     /// The pipeline that predicted the tests, and what it is.
     pub(super) model: Pipeline,
     pub(super) spec: PipelineSpec,
-    pub(super) configuration: String,
+    /// The features that it takes.
+    pub(super) config: Arc<Config>,
+    pub(super) feature_names: Vec<String>,
 }
 
 impl Baseline {
@@ -193,7 +198,8 @@ impl Baseline {
             tests,
             model,
             spec,
-            configuration: matrices.configuration.clone(),
+            config: matrices.config.clone(),
+            feature_names: matrices.names.clone(),
         })
     }
 
@@ -241,7 +247,8 @@ impl Baseline {
             tests,
             model,
             spec,
-            configuration: matrices.configuration.clone(),
+            config: matrices.config.clone(),
+            feature_names: matrices.names.clone(),
         })
     }
 }

@@ -8,12 +8,11 @@ use corsmal_plot::{BarChart, ConfusionMatrix as MatrixPicture, Series, to_svg};
 use ndarray::Array2;
 
 use super::baselines::Outcome;
-use super::features::FeatureSource;
-use super::results::{Estimate, Rows};
-use crate::dataset::Filling;
+use super::results::{Estimate, Rows, Target};
+use crate::dataset::{Filling, Subset};
 use crate::error::{CcmError, Result};
 use crate::scores::ConfusionMatrix;
-use crate::submission::{Format, Submission};
+use crate::submission::{Format, RowKey, Submission, pseudo_random};
 
 /// Makes the folders, so that a wrong path fails before the work.
 pub(super) fn prepare(out: &Path) -> Result<()> {
@@ -24,23 +23,19 @@ pub(super) fn prepare(out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Writes the submissions of a baseline and, corrected, its model.
-pub(super) fn write_outcome(
-    out: &Path,
-    outcome: &Outcome,
-    rows: &Rows,
-    source: &dyn FeatureSource,
-) -> Result<()> {
+/// Writes the submissions of a baseline and its model.
+pub(super) fn write_outcome(out: &Path, outcome: &Outcome, rows: &Rows) -> Result<()> {
     let name = format!("{}-{}", outcome.baseline.slug(), outcome.variant.name());
-    let write = |part: &str, estimates: &mut dyn Iterator<Item = &Estimate>| {
-        let predictions: Vec<_> = estimates.map(Estimate::prediction).collect();
-        let keys: Vec<_> = predictions.iter().map(|p| p.key).collect();
-        let path = out.join("submissions").join(format!("{name}-{part}.csv"));
-        Submission::write(&path, Format::Y2020, &predictions, &keys)
-    };
-    write("held-out", &mut outcome.held_out.iter().map(|(_, e)| e))?;
+    let held_out = outcome.held_out.iter().map(|(row, e)| (&rows.training[*row], e));
+    write_submissions(out, &format!("{name}-held-out"), &held_out.collect::<Vec<_>>())?;
     for (part, estimates) in rows.tests.iter().zip(&outcome.tests) {
-        write(&part.subset.name().replace(' ', "-"), &mut estimates.iter())?;
+        let pairs: Vec<_> = part.rows.iter().zip(estimates).collect();
+        write_submissions(out, &format!("{name}-{}", slug(part.subset)), &pairs)?;
+    }
+    // Published PCA is fitted on what it reduces, so that there is no projection for recordings to
+    // come.
+    if outcome.model.n_features() != outcome.feature_names.len() {
+        return Ok(());
     }
     let fault = |e: &dyn std::fmt::Display| CcmError::Request(format!("model {name}: {e}"));
     let labels = Labels::new(Filling::all().map(Filling::name).collect()).map_err(|e| fault(&e))?;
@@ -48,9 +43,9 @@ pub(super) fn write_outcome(
         pipeline: outcome.spec.clone(),
         labels,
         target: "joint".into(),
-        feature_names: Vec::new(),
-        feature_config: source.identity(outcome.baseline.features).into(),
-        feature_config_hash: outcome.configuration.clone(),
+        feature_names: outcome.feature_names.clone(),
+        feature_config: outcome.config.to_value(),
+        feature_config_hash: outcome.config.hash(),
         provenance: serde_json::json!({
             "baseline": outcome.baseline.name(),
             "variant": outcome.variant.name(),
@@ -60,6 +55,41 @@ pub(super) fn write_outcome(
     };
     let model = Model::new(header, outcome.model.clone()).map_err(|e| fault(&e))?;
     model.save(&out.join("models").join(format!("{name}.model"))).map_err(|e| fault(&e))
+}
+
+/// Writes the pseudo-random estimates of every part as submissions.
+pub(super) fn write_random(out: &Path, rows: &Rows, seed: u64) -> Result<()> {
+    let parts = rows.tests.iter().map(|t| (t.subset, &t.rows));
+    for (part, targets) in parts.chain([(Subset::Training, &rows.training)]) {
+        let keys: Vec<_> = targets.iter().map(|t| t.key).collect();
+        let estimates: Vec<_> =
+            pseudo_random(&keys, seed).into_iter().map(Estimate::from).collect();
+        let pairs: Vec<_> = targets.iter().zip(&estimates).collect();
+        write_submissions(out, &format!("random-{}", slug(part)), &pairs)?;
+    }
+    Ok(())
+}
+
+fn slug(part: Subset) -> String {
+    part.name().replace(' ', "-")
+}
+
+/// Writes estimates in every official format that can name the recordings: of 2020 by container and
+/// sequence, of 2022, with class probabilities, by id.
+fn write_submissions(out: &Path, name: &str, pairs: &[(&Target, &Estimate)]) -> Result<()> {
+    let sequence = |t: &Target| matches!(t.key, RowKey::Sequence(..)).then_some(t.key);
+    let id = |t: &Target| t.recording.id.map(RowKey::Id);
+    let formats: [(Format, &str, &dyn Fn(&Target) -> Option<RowKey>); 2] =
+        [(Format::Y2020, "", &sequence), (Format::Y2022, "-2022", &id)];
+    for (format, suffix, key) in formats {
+        let keys: Option<Vec<RowKey>> = pairs.iter().map(|(target, _)| key(target)).collect();
+        let Some(keys) = keys else { continue };
+        let predictions: Vec<_> =
+            keys.iter().zip(pairs).map(|(key, (_, e))| e.prediction(*key)).collect();
+        let path = out.join("submissions").join(format!("{name}{suffix}.csv"));
+        Submission::write(&path, format, &predictions, &keys)?;
+    }
+    Ok(())
 }
 
 /// Writes a confusion matrix and its per-class bars as SVG files.

@@ -1,147 +1,155 @@
-//! Feature matrices of a data set, kept in files.
+//! Feature matrices of a data set: outputs of `extract`, kept below `features/`.
 //!
-//! `features/<set>-<hash>.npy` holds `[recordings, values]` float32; the hash is that of the
-//! configuration, of every recording's path, size and time of change, and of its crop.
+//! `features/<set>-<configuration>-<part>.npz` is used again when it holds the same recordings by the
+//! same configuration, continued where a run was interrupted, and replaced otherwise. Label columns
+//! make it a training file for `train` and `cross-validate`.
 
-use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
+use corsmal_extract::config::Config;
+use corsmal_extract::inputs::{Input, InputSource, Shard};
+use corsmal_extract::layout;
+use corsmal_extract::npz::{Compression, NpzFile};
+use corsmal_extract::run::{self, Quiet, RunError};
 use ndarray::Array2;
-use rayon::prelude::*;
 
-use super::features::{FeatureSet, FeatureSource};
-use super::results::Rows;
-use crate::dataset::{Actions, DataSet, Recording};
+use super::features::FeatureSet;
+use super::results::{Rows, Target};
+use crate::dataset::{Actions, DataSet, Filling};
 use crate::error::{CcmError, Result};
 
 /// Features of the training recordings and of each test part, `[recordings, values]`.
 pub(super) struct Matrices {
     pub(super) training: Array2<f64>,
     pub(super) tests: Vec<Array2<f64>>,
-    /// Hash of the configuration.
-    pub(super) configuration: String,
+    /// Name of each value.
+    pub(super) names: Vec<String>,
+    /// By which they were computed.
+    pub(super) config: Arc<Config>,
 }
 
-pub(super) fn load(
-    set: &DataSet,
-    rows: &Rows,
-    features: FeatureSet,
-    source: &dyn FeatureSource,
-    out: &Path,
-) -> Result<Matrices> {
-    let actions = if features.cropped() { set.actions()? } else { Actions::new() };
-    let crop = |r: &Recording| {
-        r.container.zip(r.name).and_then(|key| actions.get(&key).copied().flatten())
-    };
-    let training = rows.training.iter().map(|r| (&r.recording, crop(&r.recording))).collect();
-    Ok(Matrices {
-        training: part(training, features, source, out)?,
-        tests: rows
-            .tests
-            .iter()
-            .map(|t| {
-                let all = t.rows.iter().map(|r| (&r.recording, None)).collect();
-                part(all, features, source, out)
-            })
-            .collect::<Result<_>>()?,
-        configuration: hash(&[&source.identity(features)]),
-    })
+/// Where features are kept and how they are computed.
+pub(super) struct Store<'a> {
+    pub(super) folder: PathBuf,
+    pub(super) jobs: usize,
+    pub(super) stop: &'a AtomicBool,
 }
 
-type Job<'a> = (&'a Recording, Option<(f64, f64)>);
+impl Store<'_> {
+    /// The features of every part, computed where they are not there yet.
+    pub(super) fn load(
+        &self,
+        set: &DataSet,
+        rows: &Rows,
+        features: FeatureSet,
+    ) -> Result<Matrices> {
+        let config = features.config().map_err(|e| CcmError::Request(e.to_string()))?;
+        let config = Arc::new(config);
+        let actions = if features.cropped() { set.actions()? } else { Actions::new() };
+        let name = |part: &str| {
+            format!("{}-{:.12}-{}.npz", features.slug(), config.hash(), part.replace(' ', "-"))
+        };
+        let training = inputs(&set.root, &rows.training, &actions);
+        let (training, names) = self.part(&name("training"), &training, &config)?;
+        let mut tests = Vec::with_capacity(rows.tests.len());
+        for test in &rows.tests {
+            let inputs = inputs(&set.root, &test.rows, &Actions::new());
+            let (values, own) = self.part(&name(test.subset.name()), &inputs, &config)?;
+            if own != names {
+                return Err(CcmError::Request(format!(
+                    "{}: {} recordings have other features than those of training: another number \
+                     of channels?",
+                    set.root.display(),
+                    test.subset.name()
+                )));
+            }
+            tests.push(values);
+        }
+        Ok(Matrices { training, tests, names, config })
+    }
 
-fn part(
-    jobs: Vec<Job<'_>>,
-    features: FeatureSet,
-    source: &dyn FeatureSource,
-    out: &Path,
-) -> Result<Array2<f64>> {
-    let shape = (jobs.len(), features.width());
-    let path = cache_path(&jobs, features, source, out)?;
-    let values = match read(&path, shape) {
-        Some(values) => values,
-        None => {
-            let vectors: Vec<Vec<f32>> = jobs
-                .par_iter()
-                .map(|(recording, crop)| {
-                    let vector = source.vector(features, &recording.path, *crop);
-                    let vector = vector.and_then(|v| {
-                        let sound = v.len() == shape.1 && v.iter().all(|x| x.is_finite());
-                        if sound { Ok(v) } else { Err("features are not finite numbers".into()) }
-                    });
-                    vector.map_err(|what| {
-                        CcmError::Request(format!("{}: {what}", recording.path.display()))
-                    })
-                })
-                .collect::<Result<_>>()?;
-            let values = vectors.concat();
-            write(&path, shape, &values).map_err(|e| CcmError::io(&path, e))?;
-            values
+    fn part(
+        &self,
+        name: &str,
+        inputs: &[Input],
+        config: &Arc<Config>,
+    ) -> Result<(Array2<f64>, Vec<String>)> {
+        let path = self.folder.join(name);
+        let fault = |e: &dyn std::fmt::Display| CcmError::Request(e.to_string());
+        let extract = |overwrite: bool| {
+            let options = run::Options {
+                out: path.clone(),
+                compression: Compression::Stored,
+                jobs: self.jobs,
+                shard: Shard::default(),
+                resume: !overwrite,
+                overwrite,
+                max_errors: None,
+            };
+            run::run(inputs, config, &options, &Quiet, self.stop)
+        };
+        let report = match extract(false) {
+            Err(RunError::Interrupted) => return Err(CcmError::Interrupted),
+            // Kept features of other recordings, or of an earlier version, are of no use.
+            Err(RunError::Exists { .. } | RunError::Changed { .. } | RunError::Ledger(_)) => {
+                extract(true)
+            }
+            done => done,
+        };
+        let report = match report {
+            Err(RunError::Interrupted) => return Err(CcmError::Interrupted),
+            report => report.map_err(|e| fault(&e))?,
+        };
+        if let Some(bad) = report.outcomes.iter().find(|o| !o.status.has_features()) {
+            return Err(CcmError::Request(format!(
+                "{}: {}: {} ({} recordings have no features)",
+                bad.path,
+                bad.status,
+                bad.reason,
+                report.failed()
+            )));
+        }
+        let mut npz = NpzFile::open(&path).map_err(|e| fault(&e))?;
+        let (table, _) = layout::read_table(&mut npz).map_err(|e| fault(&e))?;
+        Ok((table.values().mapv(f64::from), table.feature_names().to_vec()))
+    }
+}
+
+/// Recordings with their labels, cropped to their action where one is annotated.
+fn inputs(root: &Path, targets: &[Target], actions: &Actions) -> Vec<Input> {
+    let input = |target: &Target| {
+        let recording = &target.recording;
+        let action = recording.container.zip(recording.name).and_then(|k| actions.get(&k).copied());
+        // An annotation beyond the end leaves nothing: then the whole recording counts.
+        let crop = action.flatten().filter(|&(start, _)| begins_inside(&recording.path, start));
+        let relative = recording.path.strip_prefix(root).unwrap_or(&recording.path);
+        let text = |value: Option<String>| value.unwrap_or_default();
+        let filling = target.filling;
+        let labels = [
+            ("container", text(recording.container.map(|c| c.number().to_string()))),
+            ("scenario", text(recording.name.map(|n| n.scenario.to_string()))),
+            ("type", text(filling.map(|f| f.kind().name().to_string()))),
+            ("level", text(filling.map(|f| f.level().name().to_string()))),
+            ("joint", text(filling.map(Filling::name))),
+        ];
+        Input {
+            id: relative.with_extension("").to_string_lossy().replace('\\', "/"),
+            source: InputSource::File(recording.path.clone()),
+            start: crop.map(|(start, _)| start),
+            end: crop.map(|(_, end)| end),
+            labels: labels.map(|(name, value)| (name.to_string(), value)).to_vec(),
         }
     };
-    let values = values.into_iter().map(f64::from).collect();
-    Array2::from_shape_vec(shape, values).map_err(|e| CcmError::Request(e.to_string()))
+    targets.iter().map(input).collect()
 }
 
-fn cache_path(
-    jobs: &[Job<'_>],
-    features: FeatureSet,
-    source: &dyn FeatureSource,
-    out: &Path,
-) -> Result<PathBuf> {
-    let mut parts = vec![source.identity(features)];
-    for (recording, crop) in jobs {
-        let path = &recording.path;
-        let meta = std::fs::metadata(path).map_err(|e| CcmError::io(path, e))?;
-        let changed =
-            meta.modified().ok().and_then(|t| t.duration_since(std::time::UNIX_EPOCH).ok());
-        parts.push(format!("{} {} {changed:?} {crop:?}", path.display(), meta.len()));
-    }
-    let name = format!("{}-{}.npy", features.slug(), hash(&parts));
-    Ok(out.join("features").join(name))
-}
-
-/// The first 64 bits of BLAKE3 over the parts, in hexadecimal.
-fn hash<T: AsRef<str>>(parts: &[T]) -> String {
-    let mut hasher = blake3::Hasher::new();
-    for part in parts {
-        hasher.update(part.as_ref().as_bytes());
-        hasher.update(&[0]);
-    }
-    hasher.finalize().to_hex()[..16].to_string()
-}
-
-/// The values of a cached matrix of this shape; `None` where there is none or it is unusable.
-fn read(path: &Path, shape: (usize, usize)) -> Option<Vec<f32>> {
-    let mut bytes = Vec::new();
-    std::fs::File::open(path).ok()?.read_to_end(&mut bytes).ok()?;
-    let data = bytes.strip_prefix(header(shape).as_slice())?;
-    (data.len() == shape.0 * shape.1 * 4).then(|| {
-        data.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+/// Whether a second lies in a recording; what cannot be read is for the extraction to tell.
+fn begins_inside(path: &Path, start: f64) -> bool {
+    corsmal_audio::open(path).is_ok_and(|source| {
+        let spec = source.spec();
+        let seconds = |frames: u64| frames as f64 / f64::from(spec.sample_rate);
+        spec.declared_frames.is_none_or(|frames| start < seconds(frames))
     })
-}
-
-fn write(path: &Path, shape: (usize, usize), values: &[f32]) -> std::io::Result<()> {
-    let part = path.with_extension("npy.part");
-    let mut file = std::io::BufWriter::new(std::fs::File::create(&part)?);
-    file.write_all(&header(shape))?;
-    for value in values {
-        file.write_all(&value.to_le_bytes())?;
-    }
-    file.flush()?;
-    drop(file);
-    std::fs::rename(part, path)
-}
-
-/// Header of a float32 matrix in numpy's format, version 1.0.
-fn header((rows, columns): (usize, usize)) -> Vec<u8> {
-    let mut text =
-        format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
-    let length = (text.len() + 11).div_ceil(64) * 64 - 10;
-    text.push_str(&" ".repeat(length - text.len() - 1));
-    text.push('\n');
-    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-    bytes.extend((length as u16).to_le_bytes());
-    bytes.extend(text.as_bytes());
-    bytes
 }

@@ -7,17 +7,20 @@ mod features;
 mod files;
 mod matrix;
 mod results;
+mod sections;
 mod tables;
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 pub use added::Added;
 pub use baselines::{Baseline, Learner, Variant};
-pub use features::{BaselineFeatures, FeatureSet, FeatureSource};
+pub use features::FeatureSet;
 
 use crate::dataset::DataSet;
-use crate::error::Result;
+use crate::error::{CcmError, Result};
 use crate::report::Report;
+use matrix::Store;
 
 /// What to run.
 #[derive(Clone, Debug)]
@@ -30,6 +33,8 @@ pub struct Options {
     pub baselines: Vec<Baseline>,
     /// Prediction files of other methods that join the tables, by name.
     pub added: Vec<(String, PathBuf)>,
+    /// Recordings that are extracted at a time, at least 1.
+    pub jobs: usize,
     /// Seed of the forests and of the pseudo-random estimates.
     pub seed: u64,
 }
@@ -38,16 +43,13 @@ pub struct Options {
 /// `submissions/`, `models/` and `features/` below the output folder.
 ///
 /// `progress` is told each step. Features already in `features/` are reused when their
-/// configuration and the recordings are the same.
+/// configuration and the recordings are the same. `stop` ends the work at the next recording or
+/// baseline.
 ///
 /// # Errors
 /// [`crate::CcmError`] when the data set has no labelled training recordings, when a file to add is
-/// unusable, when a recording cannot be read, and when something cannot be written.
-pub fn run(
-    options: &Options,
-    source: &dyn FeatureSource,
-    progress: &dyn Fn(&str),
-) -> Result<Report> {
+/// unusable, when a recording cannot be read, when something cannot be written, and when stopped.
+pub fn run(options: &Options, progress: &dyn Fn(&str), stop: &AtomicBool) -> Result<Report> {
     let added = options
         .added
         .iter()
@@ -56,6 +58,7 @@ pub fn run(
     let set = DataSet::open(&options.data)?;
     let rows = results::Rows::of(&set)?;
     files::prepare(&options.out)?;
+    let store = Store { folder: options.out.join("features"), jobs: options.jobs, stop };
     let mut outcomes = Vec::new();
     for feature_set in FeatureSet::ALL {
         let wanted: Vec<_> =
@@ -64,16 +67,20 @@ pub fn run(
             continue;
         }
         progress(&format!("features: {}", feature_set.name()));
-        let matrices = matrix::load(&set, &rows, feature_set, source, &options.out)?;
+        let matrices = store.load(&set, &rows, feature_set)?;
         for baseline in wanted {
             for variant in Variant::ALL {
+                if stop.load(Ordering::Relaxed) {
+                    return Err(CcmError::Interrupted);
+                }
                 progress(&format!("{}, {}", baseline.name(), variant.name()));
                 let outcome = baseline.run(variant, &rows, &matrices, options.seed)?;
-                files::write_outcome(&options.out, &outcome, &rows, source)?;
+                files::write_outcome(&options.out, &outcome, &rows)?;
                 outcomes.push(outcome);
             }
         }
     }
+    files::write_random(&options.out, &rows, options.seed)?;
     let report = tables::report(&set, &rows, &outcomes, &added, options.seed)?;
     tables::write_pictures(&options.out, &rows, &outcomes, options.seed)?;
     report.write(&options.out)?;

@@ -36,16 +36,20 @@ impl Rows {
     pub(super) fn of(set: &DataSet) -> Result<Self> {
         let (mut training, mut public, mut private) = (Vec::new(), Vec::new(), Vec::new());
         for recording in &set.recordings {
-            let Some((container, sequence)) = recording.container.zip(recording.sequence) else {
-                continue;
+            let sequence = recording.container.zip(recording.sequence);
+            let key = match (sequence, recording.id) {
+                (Some((container, sequence)), _) => RowKey::Sequence(container.number(), sequence),
+                // Which container a flat test file shows is withheld.
+                (None, Some(id)) if recording.part != Subset::Training => RowKey::Id(id),
+                _ => continue,
             };
             let target = Target {
                 recording: recording.clone(),
-                key: RowKey::Sequence(container.number(), sequence),
+                key,
                 filling: recording.filling(),
-                annotation: set.annotation(recording).cloned(),
+                annotation: sequence.and_then(|_| set.annotation(recording).cloned()),
             };
-            match container.subset() {
+            match recording.part {
                 Subset::Training if target.filling.is_some() => training.push(target),
                 Subset::Training => {}
                 Subset::Public => public.push(target),
@@ -104,14 +108,28 @@ impl Estimate {
         }
     }
 
-    pub(super) fn prediction(&self) -> Prediction {
+    /// As it is submitted under the name `key`.
+    pub(super) fn prediction(&self, key: RowKey) -> Prediction {
         Prediction {
             kind: self.kind.and_then(|k| FillingType::from_number(k as i64)),
             level: self.level.and_then(|l| FillingLevel::from_number(l as i64)),
             kind_probabilities: self.kind_probabilities,
             level_probabilities: self.level_probabilities,
             capacity_ml: self.capacity_ml,
-            ..Prediction::empty(self.key)
+            ..Prediction::empty(key)
+        }
+    }
+}
+
+impl From<Prediction> for Estimate {
+    fn from(p: Prediction) -> Self {
+        Self {
+            key: p.key,
+            kind: p.kind.map(|k| k as usize),
+            level: p.level.map(|l| l as usize),
+            kind_probabilities: p.kind_probabilities,
+            level_probabilities: p.level_probabilities,
+            capacity_ml: p.capacity_ml,
         }
     }
 }
@@ -176,7 +194,7 @@ fn by_paper(targets: &[&Target], estimates: &[Estimate], seed: u64) -> Option<sc
         targets.iter().map(|t| t.annotation.clone()).collect::<Option<_>>()?;
     let keys: Vec<_> = targets.iter().map(|t| t.key).collect();
     let annotations = Annotations { path: "annotations".into(), rows, levels_in_percent: false };
-    let predictions: Vec<_> = estimates.iter().map(Estimate::prediction).collect();
+    let predictions: Vec<_> = estimates.iter().map(|e| e.prediction(e.key)).collect();
     let submission = Submission::from_predictions("estimates", Format::Y2020, &predictions);
     let random = pseudo_random(&keys, seed);
     let baseline = Submission::from_predictions("random", Format::Y2020, &random);

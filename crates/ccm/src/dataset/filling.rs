@@ -39,6 +39,12 @@ impl FillingType {
     pub fn name(self) -> &'static str {
         ["none", "pasta", "rice", "water"][self as usize]
     }
+
+    /// The type with this name or number.
+    pub fn parse(text: &str) -> Option<Self> {
+        let named = Self::ALL.into_iter().find(|k| k.name().eq_ignore_ascii_case(text));
+        named.or_else(|| Self::from_number(text.parse().ok()?))
+    }
 }
 
 impl FillingLevel {
@@ -58,6 +64,12 @@ impl FillingLevel {
     /// English name in lower case.
     pub fn name(self) -> &'static str {
         ["empty", "half", "full"][self as usize]
+    }
+
+    /// The level with this name or number (50 and 90 are percent).
+    pub fn parse(text: &str) -> Option<Self> {
+        let named = Self::ALL.into_iter().find(|l| l.name().eq_ignore_ascii_case(text));
+        named.or_else(|| Self::from_number(text.parse().ok()?))
     }
 
     /// Share of the capacity that is filled: 0, 0.5 or 0.9.
@@ -123,6 +135,16 @@ impl Filling {
             kind => format!("{} {}", kind.name(), self.level.name()),
         }
     }
+
+    /// The filling with this name (`pasta half`), pair of type and level (`1-1`, `pasta-half`) or
+    /// joint class.
+    pub fn parse(text: &str) -> Option<Self> {
+        let pair = text.split_once([' ', '-']);
+        let pair = pair.and_then(|(k, l)| FillingType::parse(k).zip(FillingLevel::parse(l)));
+        let named = || Self::all().find(|f| f.name().eq_ignore_ascii_case(text));
+        let numbered = || Self::from_joint(text.parse().ok()?);
+        pair.and_then(|(k, l)| Self::new(k, l)).or_else(named).or_else(numbered)
+    }
 }
 
 #[cfg(test)]
@@ -147,8 +169,13 @@ mod tests {
         for (class, filling) in Filling::all().enumerate() {
             assert_eq!(filling.joint(), class);
             assert_eq!(Filling::from_joint(class), Some(filling));
+            let pair = format!("{}-{}", filling.kind() as u8, filling.level() as u8);
+            for text in [filling.name(), pair, class.to_string()] {
+                assert_eq!(Filling::parse(&text), Some(filling), "{text}");
+            }
         }
         assert_eq!(Filling::from_joint(7), None);
+        assert_eq!(["1-0", "7", "tea", "pasta"].map(Filling::parse), [None; 4]);
         assert_eq!(Filling::new(FillingType::Rice, FillingLevel::Empty), None);
         assert_eq!(Filling::new(FillingType::None, FillingLevel::Full), None);
     }

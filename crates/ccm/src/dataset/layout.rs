@@ -9,10 +9,11 @@ use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use super::annotation::{Annotation, Annotations};
-use super::container::Container;
+use super::container::{Container, Subset};
 use super::filling::Filling;
 use super::name::SequenceName;
 use crate::error::{CcmError, Result};
+use crate::submission::RowKey;
 
 /// Folders deeper than this are not searched.
 const MAX_DEPTH: usize = 6;
@@ -22,6 +23,8 @@ const MAX_DEPTH: usize = 6;
 pub struct Recording {
     /// The file.
     pub path: PathBuf,
+    /// Part of the data set.
+    pub part: Subset,
     /// Container; `None` for a flat file that no annotation explains.
     pub container: Option<Container>,
     /// Flat number (2021 release).
@@ -98,7 +101,8 @@ impl DataSet {
         for path in wavs {
             match place(root, &path, &index) {
                 Ok(recording) => {
-                    let key = (recording.container, recording.sequence, recording.id);
+                    let key =
+                        (recording.part, recording.container, recording.sequence, recording.id);
                     if !seen.insert(key) {
                         let what = "the same recording is there twice".into();
                         set.odd.push(Oddity { path, what });
@@ -116,7 +120,8 @@ impl DataSet {
                 root.display()
             )));
         }
-        set.recordings.sort_by_key(|r| (r.container.is_none(), r.container, r.sequence, r.id));
+        set.recordings
+            .sort_by_key(|r| (r.container.is_none(), r.container, r.sequence, r.part, r.id));
         Ok(set)
     }
 
@@ -158,24 +163,68 @@ impl<'a> Index<'a> {
     }
 }
 
+/// What the path of a recording says by itself.
+pub(crate) struct PathParts {
+    folders: Vec<String>,
+    /// Number of the container whose folder it is in; an error where the data set has no such one.
+    container: Option<std::result::Result<Container, u8>>,
+    name: Option<SequenceName>,
+    number: Option<u32>,
+}
+
+impl PathParts {
+    pub(crate) fn of(path: &Path) -> Self {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let folders: Vec<_> = path
+            .ancestors()
+            .skip(1)
+            .filter_map(|p| p.file_name().map(|n| n.to_string_lossy().into_owned()))
+            .collect();
+        let container = folders.iter().find_map(|f| f.parse().ok());
+        let digits = stem.strip_suffix("_audio").unwrap_or(&stem);
+        Self {
+            container: container.map(|n: u8| Container::new(n).ok_or(n)),
+            name: SequenceName::parse(&stem),
+            number: digits.parse().ok().filter(|_| digits.bytes().all(|b| b.is_ascii_digit())),
+            folders,
+        }
+    }
+
+    /// How submissions name the recording, where the path tells.
+    pub(crate) fn key(&self) -> Option<RowKey> {
+        match (&self.container, self.name, self.number) {
+            (Some(Ok(c)), Some(name), _) => Some(RowKey::Sequence(c.number(), name.number(*c)?)),
+            (Some(Ok(c)), None, Some(n)) => {
+                Some(RowKey::Sequence(c.number(), u16::try_from(n).ok()?))
+            }
+            (None, None, Some(id)) => Some(RowKey::Id(id)),
+            _ => None,
+        }
+    }
+
+    /// The part of the flat release, by the names of its folders (`test_pub`, `test_priv`).
+    fn flat_part(&self) -> Subset {
+        let has = |text: &str| self.folders.iter().any(|f| f.to_lowercase().contains(text));
+        match (has("test"), has("priv")) {
+            (false, _) => Subset::Training,
+            (true, false) => Subset::Public,
+            (true, true) => Subset::Private,
+        }
+    }
+}
+
 /// What a file is, from its path and the annotations.
 fn place(root: &Path, path: &Path, index: &Index<'_>) -> std::result::Result<Recording, String> {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let folders: Vec<_> = path
-        .strip_prefix(root)
-        .unwrap_or(path)
-        .ancestors()
-        .skip(1)
-        .filter_map(|p| p.file_name().map(|n| n.to_string_lossy().into_owned()))
-        .collect();
-    let container =
-        folders.iter().find_map(|f| f.parse().ok()).map(|n: u8| Container::new(n).ok_or(n));
-    let digits = stem.strip_suffix("_audio").unwrap_or(&stem);
-    let number: Option<u32> =
-        digits.parse().ok().filter(|_| digits.bytes().all(|b| b.is_ascii_digit()));
-    let blank =
-        Recording { path: path.into(), container: None, id: None, sequence: None, name: None };
-    match (container, SequenceName::parse(&stem), number) {
+    let parts = PathParts::of(path.strip_prefix(root).unwrap_or(path));
+    let blank = Recording {
+        path: path.into(),
+        part: Subset::Training,
+        container: None,
+        id: None,
+        sequence: None,
+        name: None,
+    };
+    match (parts.container, parts.name, parts.number) {
         (Some(Err(n)), ..) => Err(format!("the data set has no container {n}")),
         (Some(Ok(container)), Some(name), _) => {
             let sequence = name.number(container).ok_or_else(|| {
@@ -186,6 +235,7 @@ fn place(root: &Path, path: &Path, index: &Index<'_>) -> std::result::Result<Rec
                 )
             })?;
             let recording = Recording {
+                part: container.subset(),
                 container: Some(container),
                 sequence: Some(sequence),
                 name: Some(name),
@@ -203,17 +253,22 @@ fn place(root: &Path, path: &Path, index: &Index<'_>) -> std::result::Result<Rec
         }
         (Some(Ok(container)), None, Some(number)) => {
             let sequence = u16::try_from(number).map_err(|_| "its number is too large")?;
-            let recording =
-                Recording { container: Some(container), sequence: Some(sequence), ..blank };
+            let recording = Recording {
+                part: container.subset(),
+                container: Some(container),
+                sequence: Some(sequence),
+                ..blank
+            };
             let name = index.find(&recording).and_then(Annotation::name);
             Ok(Recording { name, ..recording })
         }
         (None, None, Some(id)) => {
             // The numbers of test files start again at 0, so only training files use the ids of
             // the training annotations.
-            let test = folders.iter().any(|f| f.to_lowercase().contains("test"));
-            let annotated = index.by_id.get(&id).filter(|_| !test);
+            let part = parts.flat_part();
+            let annotated = index.by_id.get(&id).filter(|_| part == Subset::Training);
             Ok(Recording {
+                part,
                 id: Some(id),
                 container: annotated.and_then(|a| Container::new(a.container)),
                 sequence: annotated.and_then(|a| a.sequence),

@@ -14,6 +14,7 @@ pub use annotation::{Annotation, Annotations, Dimensions};
 pub use check::{ContainerFindings, Findings, check};
 pub use container::{CONTAINER_FOLDS, Category, Container, Subset};
 pub use filling::{Filling, FillingLevel, FillingType};
+pub(crate) use layout::PathParts;
 pub use layout::{DataSet, Oddity, Recording};
 pub use name::SequenceName;
 pub use splits::{PublishedSplit, training_order};

@@ -9,25 +9,38 @@ use crate::scores::ConfusionMatrix;
 /// Side of a cell, and room for the labels, in user units.
 const CELL: usize = 54;
 const LEFT: usize = 92;
-const TOP: usize = 20;
+const TOP: usize = 34;
+/// The line below a matrix needs so much.
+const NARROWEST: usize = 280;
+
+/// How recordings of each class were estimated: the confusion matrix and the F1 of each class.
+pub fn classes(caption: &str, names: &[String], matrix: &ConfusionMatrix) -> Figure {
+    let svg = confusion(caption, names, matrix) + &class_bars(caption, names, matrix);
+    Figure { caption: caption.to_string(), wide: names.len() > 4, svg }
+}
 
 /// A confusion matrix: rows are true classes, columns estimated ones, shade is the share of the
-/// row. The column "none" appears only where some recording was not estimated.
-pub fn confusion(caption: &str, names: &[String], matrix: &ConfusionMatrix) -> Figure {
+/// row. The column "none given" appears only where some recording was not estimated.
+fn confusion(caption: &str, names: &[String], matrix: &ConfusionMatrix) -> String {
     let classes = matrix.counts.len();
     let unestimated = matrix.counts.iter().any(|row| row[classes] > 0);
     let columns = classes + usize::from(unestimated);
-    let (width, height) = (LEFT + columns * CELL + 2, TOP + classes * CELL + 24);
+    let width = (LEFT + columns * CELL + 2).max(NARROWEST);
+    let height = TOP + classes * CELL + 26;
     let mut svg = format!(
         "<svg viewBox=\"0 0 {width} {height}\" style=\"max-width:{width}px\" role=\"img\" \
-         aria-label=\"{}\">",
+         aria-label=\"{}: confusion matrix\">",
         escape(caption)
     );
-    let label = |c: usize| names.get(c).map_or("none", String::as_str);
+    let label = |c: usize| names.get(c).map_or("none given", String::as_str);
     for column in 0..columns {
         let x = LEFT + column * CELL + CELL / 2;
-        let _ =
-            write!(svg, "<text class=\"tick\" x=\"{x}\" y=\"14\">{}</text>", escape(label(column)));
+        // Names of two words take two lines.
+        let words: Vec<&str> = label(column).splitn(2, ' ').collect();
+        for (line, word) in words.iter().rev().enumerate() {
+            let y = TOP - 7 - 14 * line;
+            let _ = write!(svg, "<text class=\"tick\" x=\"{x}\" y=\"{y}\">{}</text>", escape(word));
+        }
     }
     for (row, counts) in matrix.counts.iter().enumerate() {
         let y = TOP + row * CELL;
@@ -65,34 +78,35 @@ pub fn confusion(caption: &str, names: &[String], matrix: &ConfusionMatrix) -> F
     }
     let _ = write!(
         svg,
-        "<text class=\"axis\" x=\"{}\" y=\"{}\">true class by row, estimated class by column</text></svg>",
-        LEFT,
-        height - 6
+        "<text class=\"axis\" x=\"4\" y=\"{}\">rows: true class, columns: estimated class</text></svg>",
+        height - 8
     );
-    Figure { caption: caption.to_string(), svg }
+    svg
 }
 
-/// F1 of each class as horizontal bars.
-pub fn class_bars(caption: &str, names: &[String], matrix: &ConfusionMatrix) -> Figure {
+/// F1 of each class as horizontal bars, as wide as the matrix above them.
+fn class_bars(caption: &str, names: &[String], matrix: &ConfusionMatrix) -> String {
     const BAR: usize = 26;
-    const LENGTH: usize = 260;
     let classes = matrix.classes();
-    let (width, height) = (LEFT + LENGTH + 60, classes.len() * BAR + 8);
+    let width = (LEFT + classes.len() * CELL + 2).max(NARROWEST);
+    let length = width - LEFT - 50;
+    let height = classes.len() * BAR + 30;
     let mut svg = format!(
         "<svg viewBox=\"0 0 {width} {height}\" style=\"max-width:{width}px\" role=\"img\" \
-         aria-label=\"{}\">",
+         aria-label=\"{}: F1 of each class\">\
+         <text class=\"axis\" x=\"4\" y=\"14\">F1 of each class, percent</text>",
         escape(caption)
     );
     for (i, scores) in classes.iter().enumerate() {
-        let y = i * BAR + 4;
-        let length = scores.f1 * LENGTH as f64;
+        let y = i * BAR + 26;
+        let part = scores.f1 * length as f64;
         let name = names.get(i).map_or("", String::as_str);
         let _ = write!(
             svg,
             "<g><title>{}: precision {:.1} %, recall {:.1} %, {} recordings</title>\
              <text class=\"tick end\" x=\"{}\" y=\"{}\">{}</text>\
-             <rect class=\"track\" x=\"{LEFT}\" y=\"{y}\" width=\"{LENGTH}\" height=\"18\" rx=\"4\"/>\
-             <rect class=\"hit\" x=\"{LEFT}\" y=\"{y}\" width=\"{length:.1}\" height=\"18\" rx=\"4\"/>\
+             <rect class=\"track\" x=\"{LEFT}\" y=\"{y}\" width=\"{length}\" height=\"18\" rx=\"4\"/>\
+             <rect class=\"hit\" x=\"{LEFT}\" y=\"{y}\" width=\"{part:.1}\" height=\"18\" rx=\"4\"/>\
              <text class=\"value\" x=\"{}\" y=\"{}\">{:.1}</text></g>",
             escape(name),
             100.0 * scores.precision,
@@ -101,11 +115,11 @@ pub fn class_bars(caption: &str, names: &[String], matrix: &ConfusionMatrix) -> 
             LEFT - 8,
             y + 13,
             escape(name),
-            LEFT + LENGTH + 8,
+            LEFT + length + 8,
             y + 13,
             100.0 * scores.f1,
         );
     }
     svg.push_str("</svg>");
-    Figure { caption: caption.to_string(), svg }
+    svg
 }

@@ -9,7 +9,7 @@ use serde::{Serialize, Serializer};
 
 use crate::error::{CcmError, Result};
 
-pub use figure::{class_bars, confusion};
+pub use figure::classes;
 
 /// What a person reads.
 #[derive(Clone, Debug, Serialize)]
@@ -37,7 +37,16 @@ pub struct Section {
     pub text: Vec<String>,
     /// Tables.
     pub tables: Vec<Table>,
-    /// Pictures.
+    /// Pictures; the first group is shown, the others unfold.
+    pub figures: Vec<FigureGroup>,
+}
+
+/// Pictures that belong together.
+#[derive(Clone, Debug, Serialize)]
+pub struct FigureGroup {
+    /// Heading.
+    pub title: String,
+    /// The pictures.
     pub figures: Vec<Figure>,
 }
 
@@ -93,7 +102,10 @@ pub enum Cell {
 pub struct Figure {
     /// What it shows.
     pub caption: String,
-    /// An SVG element that takes its colours from the page.
+    /// Takes two places where there is room.
+    #[serde(skip)]
+    pub wide: bool,
+    /// SVG elements that take their colours from the page.
     #[serde(skip)]
     pub svg: String,
 }
@@ -142,6 +154,19 @@ impl Report {
 }
 
 impl Table {
+    /// Without columns in which nothing is known.
+    pub fn without_empty_columns(mut self) -> Self {
+        let known = |column: usize| self.rows.iter().any(|row| row.cells[column] != Cell::None);
+        let keep: Vec<bool> = (0..self.columns.len()).map(known).collect();
+        let mut at = keep.iter();
+        self.columns.retain(|_| at.next().copied().unwrap_or(true));
+        for row in &mut self.rows {
+            let mut at = keep.iter();
+            row.cells.retain(|_| at.next().copied().unwrap_or(true));
+        }
+        self
+    }
+
     /// The table as CSV, with a first column that says whose figures a row holds.
     fn csv(&self) -> Result<String> {
         let mut writer = csv::Writer::from_writer(Vec::new());

@@ -2,8 +2,6 @@ for (const table of document.querySelectorAll("table")) {
   const heads = [...table.tHead.rows[0].cells];
   const body = table.tBodies[0];
   heads.forEach((head, column) => {
-    const first = body.rows[0] && body.rows[0].cells[column];
-    if (first && first.classList.contains("words")) head.classList.add("words");
     head.firstElementChild.addEventListener("click", () => {
       const number = [...body.rows].some(r => "value" in r.cells[column].dataset);
       // Figures sort from the best down at first, words from A.

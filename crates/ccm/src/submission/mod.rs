@@ -10,6 +10,8 @@ pub use writer::Prediction;
 use std::fmt;
 use std::path::PathBuf;
 
+use crate::dataset::Subset;
+
 /// How a row names its recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum RowKey {
@@ -89,6 +91,18 @@ pub struct Submission {
     pub angle: Estimates,
     /// What was odd but usable.
     pub notes: Vec<String>,
+}
+
+/// The rows of a whole part in the order of the official files: ids from 0 in 2022, sequence numbers
+/// container by container in 2020.
+pub fn official_rows(part: Subset, format: Format) -> Vec<RowKey> {
+    let sizes = part.containers().map(|c| (c.number(), c.recordings()));
+    match format {
+        Format::Y2022 => (0..sizes.map(|(_, n)| n as u32).sum()).map(RowKey::Id).collect(),
+        Format::Y2020 => sizes
+            .flat_map(|(container, n)| (0..n as u16).map(move |s| RowKey::Sequence(container, s)))
+            .collect(),
+    }
 }
 
 impl Submission {

@@ -1,6 +1,6 @@
 //! Writing submissions, checked first.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::io::Write;
 use std::path::Path;
 
@@ -110,7 +110,8 @@ impl Submission {
         }
     }
 
-    /// Writes predictions in an official format; the file appears only when complete.
+    /// Writes predictions in an official format, in the order of `expected` (the official scripts
+    /// pair rows by position); the file appears only when complete.
     ///
     /// # Errors
     /// [`CcmError`] when keys are not of the format, are doubled, or are not exactly those of
@@ -121,12 +122,12 @@ impl Submission {
         predictions: &[Prediction],
         expected: &[RowKey],
     ) -> Result<()> {
-        check(path, format, predictions, expected)?;
+        let by_key = check(path, format, predictions, expected)?;
         let mut text = String::from(match format {
             Format::Y2020 => HEADER_2020,
             Format::Y2022 => HEADER_2022,
         });
-        for p in predictions {
+        for p in expected.iter().filter_map(|key| by_key.get(key)) {
             text.push('\n');
             text.push_str(&row(p));
         }
@@ -139,12 +140,12 @@ impl Submission {
     }
 }
 
-fn check(
+fn check<'a>(
     path: &Path,
     format: Format,
-    predictions: &[Prediction],
+    predictions: &'a [Prediction],
     expected: &[RowKey],
-) -> Result<()> {
+) -> Result<HashMap<RowKey, &'a Prediction>> {
     let rows_error = |problem, rows: String| CcmError::Rows {
         path: path.to_path_buf(),
         problem,
@@ -170,7 +171,7 @@ fn check(
     }
     match missing.into_iter().min() {
         Some(key) => Err(rows_error("missing rows", key.to_string())),
-        None => Ok(()),
+        None => Ok(predictions.iter().map(|p| (p.key, p)).collect()),
     }
 }
 
@@ -226,7 +227,8 @@ mod tests {
         ] {
             let path = dir.path().join("s.csv");
             let predictions = [example(keys[0]), Prediction::empty(keys[1])];
-            Submission::write(&path, format, &predictions, &keys).unwrap();
+            let mixed = [predictions[1].clone(), predictions[0].clone()];
+            Submission::write(&path, format, &mixed, &keys).unwrap();
             let read = Submission::read(&path).unwrap();
             let held = Submission::from_predictions("s", format, &predictions);
             assert_eq!(read.keys, held.keys);

@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use corsmal_ccm::benchmark::{self, Baseline, BaselineFeatures, Options};
+use corsmal_ccm::CcmError;
+use corsmal_ccm::benchmark::{self, Baseline, Options};
 
-use crate::failure::Failure;
+use crate::failure::{Failure, INTERRUPTED};
 
 /// Arguments of `benchmark`.
 #[derive(clap::Args)]
@@ -30,6 +31,9 @@ pub struct Args {
     /// Seed of the forests and of the pseudo-random estimates.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Recordings that are extracted at a time; by default one for each core.
+    #[arg(long, value_name = "N", env = "CORSMAL_FEAT_JOBS", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
     /// Do not say what is being done.
     #[arg(long)]
     quiet: bool,
@@ -55,15 +59,28 @@ fn named_file(text: &str) -> Result<(String, PathBuf), String> {
 /// Runs the baselines and writes the report.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let baselines = if args.baselines.is_empty() { Baseline::all() } else { args.baselines };
-    let options =
-        Options { data: args.data, out: args.out, baselines, added: args.add, seed: args.seed };
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    let options = Options {
+        data: args.data,
+        out: args.out,
+        baselines,
+        added: args.add,
+        jobs: args.jobs.map_or_else(cores, usize::from),
+        seed: args.seed,
+    };
     let quiet = args.quiet;
     let progress = |step: &str| {
         if !quiet {
             eprintln!("{step}");
         }
     };
-    let report = benchmark::run(&options, &BaselineFeatures, &progress)?;
+    let report = match benchmark::run(&options, &progress, crate::interrupt::flag()) {
+        Err(error @ CcmError::Interrupted) => {
+            eprintln!("{error}");
+            return Ok(ExitCode::from(INTERRUPTED));
+        }
+        report => report?,
+    };
     if !quiet {
         if let Some(warning) = &report.warning {
             println!("{warning}");

@@ -27,7 +27,8 @@ Examples:
   corsmal-feat cross-validate --features a34f_train.npz --target level --groups container \\
     --cv lists=1,4,7/2,5,8/3,6,9 --classifier svm --standardize --tune C=1,10 --tune gamma=scale,0.01
 
-With --tune the parameters are chosen anew in every fold, on inner folds of its training rows.")]
+With --tune the parameters are chosen anew in every fold, on inner folds of its training rows.
+`compare-predictions` tests whether the --predictions of two runs differ.")]
 pub struct Args {
     #[command(flatten)]
     dataset: DatasetArgs,
@@ -35,7 +36,7 @@ pub struct Args {
     pipeline: PipelineArgs,
     /// What is held out: group=COLUMN (each group once), k=N folds (of whole groups with --groups,
     /// else stratified), lists=1,4,7/2,5,8/3,6,9 of --groups, or fold=COLUMN. Default: each group
-    /// of --groups, or k=5.
+    /// of --groups, or of a label column container or group, or k=5.
     #[arg(long, value_name = "PLAN")]
     cv: Option<CvPlan>,
     /// Print everything as JSON instead of tables.

@@ -33,7 +33,11 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let (data, report) = (path("ccm"), path("report"));
     let recording = path("ccm/train/1/audio/s0_fi3_fu2_b1_l0_audio.wav");
     let (logmel, table) = (path("logmel.npz"), path("mfcc-zcr.npz"));
-    let (picture, models) = (path("recording.png"), "zcr-mfcc-knn,zcr-mfcc-svm,zcr-mfcc-rf");
+    let (picture, baselines) = (path("recording.png"), "zcr-mfcc-knn,zcr-mfcc-svm,zcr-mfcc-rf");
+    let model = path("report/models/zcr-mfcc-rf-corrected.model");
+    let (folder, predictions) = (path("ccm/train/1"), path("predictions.csv"));
+    let submission = path("report/submissions/zcr-mfcc-rf-corrected-held-out.csv");
+    let annotations = path("ccm/ccm_train_annotation.csv");
     let steps: &[(&str, Vec<&str>)] = &[
         (
             "Synthetic recordings, 8 channels, in the layout of the CCM data set",
@@ -53,8 +57,49 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
             vec!["inspect", &recording, "--picture", &picture],
         ),
         (
-            "The audio baselines with this representation, scored (synthetic data!)",
-            vec!["benchmark", "--data", &data, "--out", &report, "--baselines", models, "--quiet"],
+            "Three audio baselines trained, held-out containers predicted, all scored",
+            vec![
+                "benchmark",
+                "--data",
+                &data,
+                "--out",
+                &report,
+                "--baselines",
+                baselines,
+                "--quiet",
+            ],
+        ),
+        (
+            "The trained forest on recordings (it knows them: this shows the form, not the quality)",
+            vec![
+                "classify",
+                "--model",
+                &model,
+                "--in",
+                &folder,
+                "--out",
+                &predictions,
+                "--overwrite",
+            ],
+        ),
+        (
+            "The forest window by window, as it would hear a live stream",
+            vec![
+                "classify", "--model", &model, "--in", &recording, "--window", "1", "--hop", "0.5",
+            ],
+        ),
+        (
+            "Scores of its held-out predictions by the paper's rules. SYNTHETIC data: they mean \
+             nothing about real recordings",
+            vec![
+                "evaluate",
+                "--submission",
+                &submission,
+                "--annotations",
+                &annotations,
+                "--rules",
+                "paper",
+            ],
         ),
     ];
     for (about, words) in steps {
@@ -67,7 +112,8 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         }
     }
     println!(
-        "\nDone in {:.1} s. Look at {picture} and {report}/report.html; in Python:\n\
+        "\nDone in {:.1} s. Open {report}/report.html (SYNTHETIC data, it says so) and {picture};\n\
+         predictions are in {predictions}. In Python:\n\
          \n  import numpy as np\n  feats = np.load(\"{logmel}\")\n  print(list(feats)[0], feats[list(feats)[0]].shape)  # [channels, mel bands, frames]\n\
          \nThe same on your own recordings:\n\
          \n  corsmal-feat extract --in YOUR_FOLDER --out feats.npz",

@@ -2,6 +2,7 @@
 
 mod benchmark;
 mod classify;
+mod compare_predictions;
 mod completions;
 mod cross_validate;
 mod dataset;
@@ -9,6 +10,7 @@ mod demo;
 mod evaluate;
 mod extract;
 mod features;
+mod fuse;
 mod inspect;
 mod merge;
 mod pca;
@@ -45,6 +47,10 @@ pub enum Command {
     Classify(classify::Args),
     /// Score a classifier on rows that it was not trained on.
     CrossValidate(cross_validate::Args),
+    /// Test whether two classifiers differ on the same held-out recordings.
+    ComparePredictions(compare_predictions::Args),
+    /// Make one prediction from several files, from windows, or from type and level.
+    Fuse(fuse::Args),
     /// Run the paper's audio baselines on a CCM data set and write the report.
     Benchmark(benchmark::Args),
     /// Print shell completions or the man page.
@@ -71,6 +77,8 @@ impl Command {
             Self::Train(args) => train::run(args),
             Self::Classify(args) => classify::run(args),
             Self::CrossValidate(args) => cross_validate::run(args),
+            Self::ComparePredictions(args) => compare_predictions::run(args),
+            Self::Fuse(args) => fuse::run(args),
             Self::Benchmark(args) => benchmark::run(args),
             Self::Completions(args) => completions::run(args),
             Self::Dataset(args) => dataset::run(args),

@@ -5,6 +5,7 @@ mod plans;
 mod reader;
 mod signal;
 mod sink;
+mod windows;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -27,6 +28,7 @@ use collector::Collector;
 use sink::Sink;
 
 pub use signal::{Signal, SignalError, Signals};
+pub use windows::{Window, Windowing, Windows};
 
 /// Why a run could not start or go on. Bad recordings are not among these: they are outcomes.
 #[derive(Debug, Error)]

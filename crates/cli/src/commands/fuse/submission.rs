@@ -1,0 +1,162 @@
+//! Fused type and level as an official submission.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::ValueEnum;
+use corsmal_ccm::dataset::{Annotations, Subset};
+use corsmal_ccm::decision::{Rule, decide, decide_joint};
+use corsmal_ccm::predictions::read_capacities;
+use corsmal_ccm::submission::{self, Prediction, RowKey, Submission, official_rows};
+
+use super::{Args, Format};
+use crate::failure::{FAILED_FILES, Failure};
+
+/// Arguments about submissions.
+#[derive(clap::Args)]
+pub struct SubmissionArgs {
+    /// Official format of the submission; 2022 has class probabilities.
+    #[arg(long, value_enum, default_value = "2020")]
+    format: Format,
+    /// Decide type and level together: level empty goes with type none only.
+    #[arg(long)]
+    feasible: bool,
+    /// With --feasible: food boxes are never filled with water.
+    #[arg(long, requires = "feasible")]
+    dry_boxes: bool,
+    /// Capacity estimates: fileName (id10_0000.png) and capacity[mL].
+    #[arg(long, value_name = "CSV")]
+    capacity: Option<PathBuf>,
+    /// Official annotations, to name recordings by id (2022) or container and sequence (2020).
+    #[arg(long, value_name = "CSV")]
+    annotations: Option<PathBuf>,
+    /// Refuse a submission that has not exactly the recordings of this part, and write them in the
+    /// official order.
+    #[arg(long, value_enum)]
+    part: Option<Part>,
+}
+
+/// A part of the data set.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Part {
+    /// Containers 1 to 9, 684 recordings.
+    Training,
+    /// Containers 10 to 12, 228 recordings.
+    Public,
+    /// Containers 13 to 15, 228 recordings.
+    Private,
+}
+
+impl SubmissionArgs {
+    /// These go with --type, --level and --joint.
+    pub fn refuse_without_submission(&self) -> Result<(), Failure> {
+        let given = [
+            ("--feasible", self.feasible),
+            ("--capacity", self.capacity.is_some()),
+            ("--annotations", self.annotations.is_some()),
+            ("--part", self.part.is_some()),
+        ];
+        match given.iter().find(|(_, given)| *given) {
+            Some((name, _)) => {
+                Err(Failure::new(format!("{name} is for submissions, made of --type and --level")))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// Decides, checks and writes.
+pub fn run(args: &Args) -> Result<ExitCode, Failure> {
+    let options = &args.submission;
+    if args.out.as_os_str() == "-" {
+        return Err(Failure::new("--out -: a submission is checked and written as a file"));
+    }
+    let fused = |paths: &[PathBuf], weights: &Option<Vec<f64>>| {
+        let some = !paths.is_empty();
+        some.then(|| args.fused(paths, weights.as_deref())).transpose()
+    };
+    let joint = fused(&args.joint, &args.weights)?;
+    let kind = fused(&args.kind, &args.type_weights)?;
+    let level = fused(&args.level, &args.level_weights)?;
+    let rule = match (options.feasible, options.dry_boxes) {
+        (false, _) => Rule::Separate,
+        (true, false) => Rule::Joint,
+        (true, true) => Rule::JointDryBoxes,
+    };
+    if rule != Rule::Separate && (kind.is_none() || level.is_none()) {
+        return Err(Failure::new("--feasible decides over --type and --level together"));
+    }
+    let mut predictions = match (&joint, &kind, &level) {
+        (Some(joint), ..) => decide_joint(joint)?,
+        (None, None, None) => {
+            return Err(Failure::new(
+                "nothing to fuse: give --predictions, --type, --level or --joint",
+            ));
+        }
+        (None, kind, level) => decide(kind.as_ref(), level.as_ref(), rule)?,
+    };
+    if let Some(path) = &options.capacity {
+        let mut capacities = read_capacities(path)?;
+        for prediction in &mut predictions {
+            prediction.capacity_ml = capacities.remove(&prediction.key).ok_or_else(|| {
+                Failure::new(format!("{}: has no line for {}", path.display(), prediction.key))
+            })?;
+        }
+        if let Some(extra) = capacities.keys().min() {
+            let text = format!("{}: {extra} is among no predictions", path.display());
+            return Err(Failure::new(text));
+        }
+    }
+    let format = match options.format {
+        Format::Y2020 => submission::Format::Y2020,
+        Format::Y2022 => submission::Format::Y2022,
+    };
+    if let Some(path) = &options.annotations {
+        rename(&mut predictions, &Annotations::read(path)?, format)?;
+    }
+    let expected: Vec<RowKey> = match options.part {
+        None => predictions.iter().map(|p| p.key).collect(),
+        Some(Part::Training) => official_rows(Subset::Training, format),
+        Some(Part::Public) => official_rows(Subset::Public, format),
+        Some(Part::Private) => official_rows(Subset::Private, format),
+    };
+    Submission::write(&args.out, format, &predictions, &expected)?;
+    let failed = predictions.iter().filter(|p| p.kind.is_none() && p.level.is_none()).count();
+    eprintln!(
+        "{}: {} recordings, {failed} without an estimate",
+        args.out.display(),
+        predictions.len()
+    );
+    Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
+}
+
+/// Names recordings as the format does, by the annotations.
+fn rename(
+    predictions: &mut [Prediction],
+    annotations: &Annotations,
+    format: submission::Format,
+) -> Result<(), Failure> {
+    let pairs = annotations.rows.iter().filter_map(|row| {
+        let sequence = RowKey::Sequence(row.container, row.sequence?);
+        Some((sequence, RowKey::Id(row.id?)))
+    });
+    let names: HashMap<RowKey, RowKey> = match format {
+        submission::Format::Y2022 => pairs.collect(),
+        submission::Format::Y2020 => pairs.map(|(sequence, id)| (id, sequence)).collect(),
+    };
+    for prediction in predictions {
+        let fits = matches!(
+            (format, prediction.key),
+            (submission::Format::Y2022, RowKey::Id(_))
+                | (submission::Format::Y2020, RowKey::Sequence(..))
+        );
+        if !fits {
+            prediction.key = *names.get(&prediction.key).ok_or_else(|| {
+                let path = annotations.path.display();
+                Failure::new(format!("{path}: has no line for {}", prediction.key))
+            })?;
+        }
+    }
+    Ok(())
+}

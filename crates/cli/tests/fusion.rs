@@ -1,0 +1,223 @@
+//! `fuse` and `compare-predictions` as a user runs them.
+
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn run(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_corsmal-feat")).args(arguments).output().unwrap()
+}
+
+fn done(arguments: &[&str]) -> String {
+    let output = run(arguments);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {message}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn refused(arguments: &[&str]) -> String {
+    let output = run(arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+    assert!(output.stdout.is_empty());
+    message
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// A file of the reference data; `None`, with a message, where they are absent.
+fn shared(name: &str) -> Option<PathBuf> {
+    let root = std::env::var("CORSMAL_SHARED")
+        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared").to_string());
+    let path = Path::new(&root).join("data/ccm").join(name);
+    if !path.exists() {
+        eprintln!("skipped: {} absent", path.display());
+        return None;
+    }
+    Some(path)
+}
+
+/// The command of docs/benchmark.md: type, level and capacity of every row are M5's.
+#[test]
+fn the_winning_submission_is_rebuilt() {
+    let Some(dir) = shared("m5_predictions") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("m5.csv");
+    let file = |name: &str| dir.join(name).to_str().unwrap().to_string();
+    let types = [file("publictest_type_rf.csv"), file("publictest_type_vggish_agg.csv")];
+    let levels =
+        ["rf", "vggish_agg", "r21d_agg"].map(|n| file(&format!("publictest_level_{n}.csv")));
+    let capacity = file("capacity_estimation_combination_public_test.csv");
+    let [t1, t2] = types.each_ref().map(String::as_str);
+    let [l1, l2, l3] = levels.each_ref().map(String::as_str);
+    done(&[
+        "fuse",
+        "--type",
+        t1,
+        t2,
+        "--level",
+        l1,
+        l2,
+        l3,
+        "--capacity",
+        &capacity,
+        "--format",
+        "2020",
+        "--part",
+        "public",
+        "--out",
+        text(&out),
+    ]);
+    let rows = |path: &Path| -> Vec<Vec<f64>> {
+        let table = std::fs::read_to_string(path).unwrap();
+        let cells = |line: &str| line.split(',').map(|c| c.parse().unwrap()).collect();
+        table.lines().skip(1).map(cells).collect()
+    };
+    let (ours, published) = (rows(&out), rows(&dir.join("submission_public_test.csv")));
+    assert_eq!(ours.len(), 228);
+    for (ours, published) in ours.iter().zip(&published) {
+        assert_eq!(ours[..4], published[..4]);
+        // Their mean of two capacities was rounded on its way through another file.
+        assert!((ours[4] - published[4]).abs() < 1e-9);
+    }
+    // Deciding both together leaves no infeasible pair.
+    done(&[
+        "fuse",
+        "--type",
+        t1,
+        t2,
+        "--level",
+        l1,
+        l2,
+        l3,
+        "--feasible",
+        "--dry-boxes",
+        "--format",
+        "2020",
+        "--out",
+        text(&out),
+        "--overwrite",
+    ]);
+    for row in rows(&out) {
+        assert_eq!(row[2] == 0.0, row[3] == 0.0, "{row:?}");
+        assert!(!(row[0] == 12.0 && row[2] == 3.0), "{row:?}");
+    }
+}
+
+#[test]
+fn submissions_are_checked_before_they_are_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let put = |name: &str, lines: &str| std::fs::write(at(name), lines).unwrap();
+    put(
+        "type.csv",
+        "id,path,predicted,p_none,p_pasta,p_rice,p_water\n\
+        000000,a/000000.wav,none,1,0,0,0\n000001,a/000001.wav,rice,0.1,0.2,0.6,0.1\n",
+    );
+    put(
+        "level.csv",
+        "id,path,predicted,p_empty,p_half,p_full\n\
+        000001,a/000001.wav,full,0.1,0.2,0.7\n000000,a/000000.wav,,,,\n",
+    );
+    let (kind, level, out) = (at("type.csv"), at("level.csv"), at("s.csv"));
+    let fuse = ["fuse", "--type", text(&kind), "--level", text(&level), "--out", text(&out)];
+    let output = run(&[&fuse[..], &["--format", "2022"]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let table = std::fs::read_to_string(&out).unwrap();
+    let lines: Vec<_> = table.lines().collect();
+    let zero = "0,-1,-1,-1,1.000000,0.000000,0.000000,0.000000,0,-1,-1,-1,-1,-1,-1,-1,-1,-1,-1,-1";
+    assert_eq!(lines[1], zero);
+    assert!(lines[2].starts_with("1,-1,-1,-1,0.100000,0.200000,0.600000,0.100000,2,0.100000"));
+    std::fs::remove_file(&out).unwrap();
+    for (extra, message) in [
+        (&["--format", "2020"][..], "id 0 is not how this format names rows"),
+        (&["--format", "2022", "--part", "public"], "missing rows: id 2"),
+        (&["--format", "2022", "--capacity", text(&kind)], "no column 'fileName'"),
+        (&["--format", "2022", "--annotations", text(&kind)], "type.csv"),
+        (&["--type-weights", "1,2"], "weights: 2 where 1 are needed"),
+        (&["--type-weights=-1"], "positive"),
+        (&["--joint", text(&kind)], "--joint"),
+        (&["--vote", "majority", "--background", "tea"], "tea"),
+    ] {
+        let found = refused(&[&fuse[..], extra].concat());
+        assert!(found.contains(message), "{found}");
+        assert!(!out.exists());
+    }
+    let generic = ["fuse", "--predictions", text(&kind), text(&level), "--out", text(&out)];
+    assert!(refused(&generic).contains("has the classes empty, half, full"));
+    let misused = ["fuse", "--predictions", text(&kind), "--feasible", "--out", text(&out)];
+    assert!(refused(&misused).contains("--feasible is for submissions"));
+    assert!(refused(&["fuse", "--out", text(&out)]).contains("nothing to fuse"));
+    put("odd.csv", "id,predicted,p_none,p_rice\nx,tea,1,0\n");
+    let odd = at("odd.csv");
+    let odd = ["fuse", "--predictions", text(&odd), "--out", text(&out)];
+    assert!(refused(&odd).contains("line 2, column 'predicted': 'tea'"));
+    assert!(!out.exists());
+}
+
+#[test]
+fn prediction_files_are_averaged_by_id() {
+    let folder = tempfile::tempdir().unwrap();
+    let (a, b) = (folder.path().join("a.csv"), folder.path().join("b.csv"));
+    std::fs::write(
+        &a,
+        "id,path,status,predicted,p_x,p_y\nr,r.wav,ok,x,0.75,0.25\ns,s.wav,ok,y,0,1\n",
+    )
+    .unwrap();
+    std::fs::write(
+        &b,
+        "id,path,status,predicted,p_x,p_y\ns,s.wav,corrupt,,,\nr,r.wav,ok,y,0.25,0.75\n",
+    )
+    .unwrap();
+    let fuse = ["fuse", "--out", "-", "--weights", "1,3", "--predictions", text(&a), text(&b)];
+    let output = run(&fuse);
+    assert_eq!(output.status.code(), Some(1), "one recording has no prediction");
+    let table = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(table, "id,path,predicted,p_x,p_y\nr,r.wav,y,0.375,0.625\ns,s.wav,,,\n");
+}
+
+#[test]
+fn two_classifiers_are_tested_on_the_same_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    let (a, b) = (folder.path().join("a.csv"), folder.path().join("b.csv"));
+    // The first errs in two rows, the second in eight others: p = 0.109375 by the binomial test.
+    let table = |wrong: std::ops::Range<usize>| -> String {
+        let line = |row: usize| {
+            let predicted = if wrong.contains(&row) { "tea" } else { "rice" };
+            format!("r{row},{},rice,{predicted},0.5,0.5\n", row % 4)
+        };
+        format!("id,fold,true,predicted,p_rice,p_tea\n{}", (0..20).map(line).collect::<String>())
+    };
+    std::fs::write(&a, table(0..2)).unwrap();
+    std::fs::write(&b, table(2..10)).unwrap();
+    let compare = ["compare-predictions", text(&a), text(&b)];
+    let report: Value = serde_json::from_str(&done(&[&compare[..], &["--json"]].concat())).unwrap();
+    assert_eq!(report["mcnemar"]["only_first"], 8);
+    assert_eq!(report["mcnemar"]["only_second"], 2);
+    assert!((report["mcnemar"]["p_value"].as_f64().unwrap() - 0.109_375).abs() < 1e-12);
+    assert_eq!(report["folds"], 4);
+    let difference = report["bootstrap_folds"]["difference"].as_f64().unwrap();
+    assert!(difference < 0.0 && report["bootstrap_rows"]["difference"] == difference);
+    let shown = done(&compare);
+    for part in ["McNemar: 8 right only in the first, 2 only", "over recordings", "over 4 folds"] {
+        assert!(shown.contains(part), "{shown}");
+    }
+    let other = folder.path().join("other.csv");
+    for (lines, message) in [
+        (table(0..2).replace("r7,", "r77,"), "\"r77\" is not in"),
+        (table(0..2).lines().take(9).collect::<Vec<_>>().join("\n"), "\"r8\" is not in"),
+        (table(0..2).replace("r7,3,rice", "r7,3,tea"), "\"r7\" is rice in"),
+        (table(0..2).replace("r7,", "r6,"), "repeats \"r6\""),
+        ("id,predicted\nr,x\n".into(), "needs the columns id, true and predicted"),
+        ("id,true,predicted\n".into(), "has no predictions"),
+    ] {
+        std::fs::write(&other, lines).unwrap();
+        let found = refused(&["compare-predictions", text(&a), text(&other)]);
+        assert!(found.contains(message), "{found}");
+    }
+}

@@ -1,0 +1,245 @@
+//! A recording or an endless stream cut into windows, each computed as a recording of its own.
+
+use corsmal_audio::{BlockSource, Repair};
+
+use super::reader::{self, Failed};
+use super::signal::{SignalError, Signals};
+use crate::engine::Features;
+use crate::inputs::Input;
+use crate::outcome::Status;
+
+/// Frames read at a time.
+const BLOCK: u64 = 1 << 14;
+/// Shortest and longest window or hop in seconds; what a window covers is held in memory.
+const SECONDS: std::ops::RangeInclusive<f64> = 0.01..=600.0;
+
+/// Length of windows and distance from one to the next, in seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Windowing {
+    window: f64,
+    hop: f64,
+}
+
+impl Windowing {
+    /// `None` unless both are 0.01 to 600 seconds.
+    pub fn new(window: f64, hop: f64) -> Option<Self> {
+        (SECONDS.contains(&window) && SECONDS.contains(&hop)).then_some(Self { window, hop })
+    }
+}
+
+/// A window and its features.
+pub struct Window {
+    /// Where it begins, in seconds of the recording.
+    pub start: f64,
+    /// Where it ends.
+    pub end: f64,
+    /// What a recording of these samples alone has.
+    pub features: Result<Features, SignalError>,
+}
+
+/// The windows of a recording, each as soon as its last sample is there. Only the samples of one
+/// window are held.
+///
+/// Windows begin at multiples of the hop and are whole: what remains at the end is left out, but a
+/// recording shorter than a window is one window. The samples of a window are those of an input with
+/// its start and end. A failure to read is the last item.
+pub struct Windows<'a> {
+    source: Box<dyn BlockSource>,
+    signals: &'a Signals,
+    windowing: Windowing,
+    /// Second in the recording where the first window begins, and frame where the input ends.
+    base: f64,
+    limit: u64,
+    /// Interleaved samples from frame `first` on.
+    held: Vec<f32>,
+    first: u64,
+    number: u64,
+    ended: bool,
+}
+
+impl<'a> Windows<'a> {
+    /// Opens an input.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn open(
+        input: &Input,
+        signals: &'a Signals,
+        windowing: Windowing,
+    ) -> Result<Self, SignalError> {
+        let source = reader::open(input)?;
+        let rate = f64::from(source.spec().sample_rate);
+        Ok(Self {
+            source,
+            signals,
+            windowing,
+            base: input.start.unwrap_or(0.0),
+            limit: input.end.map_or(u64::MAX, |end| (end * rate) as u64),
+            held: Vec::new(),
+            first: 0,
+            number: 0,
+            ended: false,
+        })
+    }
+
+    /// Whether the recording turned out shorter than its header says, once all windows are there.
+    pub fn is_truncated(&self) -> bool {
+        let lost = |r: &Repair| matches!(r, Repair::Truncated { .. } | Repair::LostFrames { .. });
+        self.source.health().repairs.iter().any(lost)
+    }
+
+    fn channels(&self) -> usize {
+        usize::from(self.source.spec().channels)
+    }
+
+    /// First frame that is not there yet.
+    fn reached(&self) -> u64 {
+        self.first + (self.held.len() / self.channels()) as u64
+    }
+
+    /// Reads at most `frames` frames; whether there were any.
+    fn read(&mut self, frames: u64) -> Result<bool, Failed> {
+        let (channels, before) = (self.channels(), self.held.len());
+        self.held.resize(before + frames.min(BLOCK) as usize * channels, 0.0);
+        let read = self.source.read(&mut self.held[before..]);
+        self.held.truncate(before + read.as_ref().map_or(0, |n| n * channels));
+        Ok(read? > 0)
+    }
+
+    /// Drops what lies before a frame.
+    fn forget(&mut self, frame: u64) -> Result<(), Failed> {
+        loop {
+            let dropped = self.reached().min(frame) - self.first;
+            self.held.drain(..dropped as usize * self.channels());
+            self.first += dropped;
+            if self.first >= frame || !self.read(frame - self.first)? {
+                return Ok(());
+            }
+        }
+    }
+
+    fn cut(&mut self) -> Result<Option<Window>, Failed> {
+        let spec = self.source.spec();
+        let (sample_rate, channels) = (spec.sample_rate, spec.channels);
+        let rate = f64::from(sample_rate);
+        let start = self.base + self.number as f64 * self.windowing.hop;
+        let end = ((start + self.windowing.window) * rate) as u64;
+        self.forget((start * rate) as u64)?;
+        let wanted = end.min(self.limit);
+        while self.reached() < wanted && self.read(wanted - self.reached())? {}
+        if self.held.is_empty() && self.number == 0 {
+            return Err(Failed::new(Status::Empty, "no samples"));
+        }
+        if self.reached() < end && self.number > 0 {
+            return Ok(None);
+        }
+        self.number += 1;
+        let frames = wanted.min(self.reached()).saturating_sub(self.first) as usize;
+        let samples = &self.held[..frames * usize::from(channels)];
+        let features = self.signals.start(sample_rate, channels).and_then(|mut signal| {
+            signal.push(samples)?;
+            signal.finish()
+        });
+        let seconds = |frame: u64| frame as f64 / rate;
+        let (start, end) = (seconds(self.first), seconds(self.first + frames as u64));
+        Ok(Some(Window { start, end, features }))
+    }
+}
+
+impl Iterator for Windows<'_> {
+    type Item = Result<Window, SignalError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.ended {
+            return None;
+        }
+        let item = self.cut().map_err(SignalError::from).transpose();
+        self.ended = !matches!(item, Some(Ok(_)));
+        item
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::config::Config;
+    use crate::inputs::InputSource;
+
+    fn input(path: &std::path::Path, span: (Option<f64>, Option<f64>)) -> Input {
+        let source = InputSource::File(path.into());
+        Input { id: "x".into(), source, start: span.0, end: span.1, labels: Vec::new() }
+    }
+
+    /// Two channels of noise at 8 kHz.
+    fn recording(folder: &std::path::Path, frames: u32) -> std::path::PathBuf {
+        let path = folder.join(format!("{frames}.wav"));
+        let spec = hound::WavSpec {
+            channels: 2,
+            sample_rate: 8000,
+            bits_per_sample: 16,
+            sample_format: hound::SampleFormat::Int,
+        };
+        let mut writer = hound::WavWriter::create(&path, spec).unwrap();
+        for i in 0..2 * frames {
+            writer.write_sample((i.wrapping_mul(2_654_435_761) >> 17) as i16).unwrap();
+        }
+        writer.finalize().unwrap();
+        path
+    }
+
+    fn spans(path: &std::path::Path, span: (Option<f64>, Option<f64>)) -> Vec<(f64, f64)> {
+        let signals = Signals::new(Arc::new(Config::preset("esc26").unwrap()));
+        let windowing = Windowing::new(1.0, 0.25).unwrap();
+        let windows = Windows::open(&input(path, span), &signals, windowing).unwrap();
+        windows.map(|w| w.map(|w| (w.start, w.end)).unwrap()).collect()
+    }
+
+    #[test]
+    fn windows_are_whole_and_a_short_recording_is_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let long = recording(folder.path(), 12_100);
+        assert_eq!(spans(&long, (None, None)), [(0.0, 1.0), (0.25, 1.25), (0.5, 1.5)]);
+        assert_eq!(spans(&long, (Some(0.2), Some(1.3))), [(0.2, 1.2)]);
+        assert_eq!(spans(&long, (Some(0.5), Some(0.75))), [(0.5, 0.75)]);
+        let short = recording(folder.path(), 4000);
+        assert_eq!(spans(&short, (None, None)), [(0.0, 0.5)]);
+    }
+
+    #[test]
+    fn a_window_has_the_features_of_its_samples_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = recording(folder.path(), 12_100);
+        let signals = Signals::new(Arc::new(Config::preset("esc26").unwrap()));
+        let windows = |hop, span| {
+            let windowing = Windowing::new(1.0, hop).unwrap();
+            let windows = Windows::open(&input(&path, span), &signals, windowing).unwrap();
+            windows.map(|w| match w.unwrap().features.unwrap() {
+                Features::Summary(row) => row,
+                Features::Frames(_) => panic!("a summary was configured"),
+            })
+        };
+        let all: Vec<_> = windows(0.25, (None, None)).collect();
+        for (number, row) in all.iter().enumerate() {
+            let start = number as f64 * 0.25;
+            let alone: Vec<_> = windows(9.0, (Some(start), Some(start + 1.0))).collect();
+            assert_eq!(alone, [row.clone()]);
+        }
+        assert_ne!(all[0], all[1]);
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_the_last_item() {
+        let folder = tempfile::tempdir().unwrap();
+        let signals = Signals::new(Arc::new(Config::preset("esc26").unwrap()));
+        let empty = recording(folder.path(), 0);
+        let windowing = Windowing::new(1.0, 1.0).unwrap();
+        let mut windows = Windows::open(&input(&empty, (None, None)), &signals, windowing).unwrap();
+        assert_eq!(windows.next().unwrap().err().unwrap().status, Status::Empty);
+        assert!(windows.next().is_none());
+        let absent = input(&folder.path().join("absent.wav"), (None, None));
+        assert!(Windows::open(&absent, &signals, windowing).is_err());
+        assert!(Windowing::new(0.0, 1.0).is_none() && Windowing::new(1.0, f64::NAN).is_none());
+    }
+}
