@@ -199,7 +199,7 @@ fn what_cannot_be_compared_is_refused() {
     let bytes = std::fs::read(files.path("a.npz")).unwrap();
     std::fs::write(files.path("torn.npz"), &bytes[..bytes.len() / 2]).unwrap();
     refused(&files.run("a.npz", "torn.npz", &[]), &["torn.npz", "not a readable npz archive"]);
-    std::fs::write(files.path("torn.npy"), &Header::new(DType::F32, &[9]).encode()).unwrap();
+    std::fs::write(files.path("torn.npy"), Header::new(DType::F32, &[9]).encode()).unwrap();
     refused(&files.run("a.npz", "torn.npy", &[]), &["torn.npy", "36 bytes of data"]);
     npz(&files.path("two.npz"), &[("y", &levels()), ("z", &levels())]);
     let out = files.run("a.npz", "two.npz", &[]);

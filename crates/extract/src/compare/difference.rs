@@ -163,9 +163,9 @@ impl Moments {
         }
         let step = [other.mean[0] - self.mean[0], other.mean[1] - self.mean[1]];
         let weight = self.count * other.count / count;
-        for side in 0..2 {
-            self.squares[side] += other.squares[side] + step[side] * step[side] * weight;
-            self.mean[side] += step[side] * other.count / count;
+        for (side, step) in step.into_iter().enumerate() {
+            self.squares[side] += other.squares[side] + step * step * weight;
+            self.mean[side] += step * other.count / count;
         }
         self.product += other.product + step[0] * step[1] * weight;
         self.differences += other.differences;

@@ -42,9 +42,9 @@ const NOISE: f64 = 1e-5;
 impl Pair {
     /// Pairs two arrays; leading axes of length one are not counted. Gives them back where their
     /// shapes differ.
-    pub(super) fn new(a: ArrayD<f64>, b: ArrayD<f64>) -> Result<Self, (ArrayD<f64>, ArrayD<f64>)> {
+    pub(super) fn new(a: ArrayD<f64>, b: ArrayD<f64>) -> Result<Self, Box<[ArrayD<f64>; 2]>> {
         if trimmed(a.shape()) != trimmed(b.shape()) {
-            return Err((a, b));
+            return Err(Box::new([a, b]));
         }
         Ok(Self { a: cube(a), b: cube(b), axes: Axes::Frames })
     }

@@ -125,7 +125,8 @@ impl Collector {
         let shape = x.shape().to_vec();
         let pair = match Pair::new(x, y) {
             Ok(pair) => pair,
-            Err((x, y)) => {
+            Err(arrays) => {
+                let [x, y] = *arrays;
                 let array = found.place.clone();
                 feature.shapes.push(Shapes { array, a: shape, b: y.shape().to_vec() });
                 feature.differing += 1;

@@ -244,10 +244,13 @@ fn lifter(ratios: &[f64]) -> Option<(usize, &'static str)> {
     })
 }
 
+/// One step of a sum or maximum.
+type Join = fn(f64, f64) -> f64;
+
 /// What the frames of one side have in common.
 fn frame_norm(pair: &Pair) -> String {
     for (side, values) in [("b", &pair.b), ("a", &pair.a)] {
-        let norms: [(&str, fn(f64, f64) -> f64); 3] = [
+        let norms: [(&str, Join); 3] = [
             ("maximum 1 (norm = inf)", |sum, v| sum.max(v.abs())),
             ("sum 1 (norm = 1)", |sum, v| sum + v.abs()),
             ("length 1 (norm = 2)", |sum, v| sum + v * v),
