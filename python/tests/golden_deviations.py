@@ -1,7 +1,7 @@
 """Prints how far the package is from each function's golden cases; docs/parity.md quotes it.
 
-Of every function: cases, refusals, the largest deviation, the largest one relative to the largest value
-of its case, and the largest one relative to the case's own tolerance.
+Of every function: cases, refusals, the largest deviation, the largest one relative to the largest
+value of its case, and the largest one relative to the case's own tolerance.
 """
 
 from __future__ import annotations
