@@ -160,7 +160,7 @@ mod tests {
         let mut writer =
             SerializedFileWriter::new(file, Arc::new(schema.unwrap()), properties).unwrap();
         let mut group = writer.next_row_group().unwrap();
-        let mut text =
+        let text =
             |values: &[&str],
              group: &mut parquet::file::writer::SerializedRowGroupWriter<'_, _>| {
                 let values: Vec<ByteArray> = values.iter().map(|&v| v.into()).collect();
