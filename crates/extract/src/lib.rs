@@ -4,6 +4,7 @@
 //! `engine` computes, `npz`, `table` and `parquet` hold what comes out, `ledger` remembers what is
 //! done, `run` ties them together.
 
+pub mod compare;
 pub mod config;
 pub mod engine;
 pub mod features;

@@ -9,6 +9,10 @@ use std::io::Read;
 
 use thiserror::Error;
 
+mod decode;
+
+pub(crate) use decode::{Endian, array, components};
+
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
 const ALIGNMENT: usize = 64;
 /// Longest header text that is read; numpy's own default limit is 10,000.
@@ -32,9 +36,20 @@ pub enum NpyError {
         /// What is there.
         actual: String,
     },
+    /// Python objects: only unpickling could read them, which runs code.
+    #[error("holds Python objects (pickle), which are never read; save it as numbers")]
+    Pickled,
+    /// The elements are not what was asked for.
+    #[error("expected {expected}, found {actual}")]
+    Kind {
+        /// What was asked for.
+        expected: &'static str,
+        /// Type and shape that are there.
+        actual: String,
+    },
     /// The element type is not one that is read here.
     #[error(
-        "element type {descr:?} is not read; expected one of b1, i1-i8, u1-u8, f4, f8, c8, c16, U"
+        "element type {descr:?} is not read; expected one of b1, i1-i8, u1-u8, f2-f8, c8, c16, U"
     )]
     DType {
         /// The `descr` of the header.
@@ -103,12 +118,15 @@ impl DType {
     /// Reads numpy's type string, as `<f4`.
     ///
     /// # Errors
-    /// [`NpyError::DType`] for types outside the list of [`Kind`].
+    /// [`NpyError::DType`] for types outside the list of [`Kind`], [`NpyError::Pickled`] for objects.
     pub fn parse(descr: &str) -> Result<Self, NpyError> {
         let unknown = || NpyError::DType { descr: descr.chars().take(40).collect() };
         let mut rest = descr.chars();
         let order = rest.next().ok_or_else(unknown)?;
         let kind = rest.next().ok_or_else(unknown)?;
+        if kind == 'O' {
+            return Err(NpyError::Pickled);
+        }
         let size: usize = rest.as_str().parse().map_err(|_| unknown())?;
         let big_endian = match order {
             '<' | '|' => false,
@@ -120,7 +138,7 @@ impl DType {
             ('b', 1) => (Kind::Bool, 1),
             ('i', 1 | 2 | 4 | 8) => (Kind::Int, size),
             ('u', 1 | 2 | 4 | 8) => (Kind::UInt, size),
-            ('f', 4 | 8) => (Kind::Float, size),
+            ('f', 2 | 4 | 8) => (Kind::Float, size),
             ('c', 8 | 16) => (Kind::Complex, size),
             ('U', 0..=MAX_STRING) => (Kind::Text, 4 * size),
             _ => return Err(unknown()),

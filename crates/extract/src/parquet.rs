@@ -22,6 +22,10 @@ use crate::layout::{json_lines, parse_outcomes};
 use crate::provenance::{LAYOUT_VERSION, Provenance};
 use crate::table::{ID, Table, TableError};
 
+mod columns;
+
+pub use columns::{Columns, columns};
+
 const META: &str = "corsmal.meta";
 const CONFIG: &str = "corsmal.config";
 const OUTCOMES: &str = "corsmal.outcomes";

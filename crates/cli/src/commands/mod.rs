@@ -2,6 +2,7 @@
 
 mod benchmark;
 mod classify;
+mod compare;
 mod compare_predictions;
 mod completions;
 mod cross_validate;
@@ -37,6 +38,8 @@ pub enum Command {
     Features(features::Args),
     /// Show format and health of a recording, with a picture on request.
     Inspect(inspect::Args),
+    /// Show how two feature files differ, and why they probably do.
+    Compare(compare::Args),
     /// Show the main job end to end on synthetic recordings.
     Demo(demo::Args),
     /// Fit principal components to training features, for `extract --project`.
@@ -72,6 +75,7 @@ impl Command {
             Self::Presets(args) => presets::run(args),
             Self::Features(args) => features::run(args),
             Self::Inspect(args) => inspect::run(args),
+            Self::Compare(args) => compare::run(args),
             Self::Demo(args) => demo::run(args),
             Self::Pca(args) => pca::run(args),
             Self::Train(args) => train::run(args),

@@ -4,7 +4,6 @@
 //! The writer is our own because resuming an interrupted run means continuing a zip archive behind
 //! its last sound entry, before any central directory exists; no zip library offers that.
 
-mod decode;
 mod headers;
 mod packed;
 pub mod reader;

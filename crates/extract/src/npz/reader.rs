@@ -8,15 +8,14 @@ use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use ndarray::{ArrayD, IxDyn, ShapeBuilder};
+use ndarray::ArrayD;
 use serde::de::DeserializeOwned;
 use zip::read::ZipFile;
 use zip::{CompressionMethod, ZipArchive};
 
 use super::NpzError;
-use super::decode::{Element, Endian};
 use super::writer::{Compression, EntryRecord};
-use crate::npy::{DType, Header, Kind, NpyError, Order};
+use crate::npy::{self, DType, Endian, Header, Kind, NpyError};
 
 /// A deflated member may always grow to this many bytes (1 GiB).
 pub const MAX_INFLATED: u64 = 1 << 30;
@@ -24,7 +23,6 @@ pub const MAX_INFLATED: u64 = 1 << 30;
 pub const MAX_RATIO: u64 = 200;
 
 const EXTENSION: &str = ".npy";
-const CHUNK: usize = 1 << 20;
 
 /// An open archive.
 #[derive(Debug)]
@@ -90,7 +88,7 @@ impl NpzFile {
     /// [`NpzError`] names the member and what is wrong with it; complex numbers and text are
     /// refused.
     pub fn f32(&mut self, name: &str) -> Result<ArrayD<f32>, NpzError> {
-        self.array(name)
+        self.read(name, |body, header, wrong| npy::array(body, header).map_err(|e| wrong.npy(e)))
     }
 
     /// A numeric member as 64-bit floats.
@@ -98,7 +96,18 @@ impl NpzFile {
     /// # Errors
     /// As [`NpzFile::f32`].
     pub fn f64(&mut self, name: &str) -> Result<ArrayD<f64>, NpzError> {
-        self.array(name)
+        self.read(name, |body, header, wrong| npy::array(body, header).map_err(|e| wrong.npy(e)))
+    }
+
+    /// A numeric member as 64-bit floats, complex numbers as an additional first axis of real and
+    /// imaginary parts.
+    ///
+    /// # Errors
+    /// [`NpzError`] names the member and what is wrong with it; text is refused.
+    pub fn components(&mut self, name: &str) -> Result<ArrayD<f64>, NpzError> {
+        self.read(name, |body, header, wrong| {
+            npy::components(body, header).map_err(|e| wrong.npy(e))
+        })
     }
 
     /// A one-dimensional text member (`U`); padding is removed.
@@ -182,35 +191,6 @@ impl NpzFile {
 
     fn index(&self, name: &str) -> Option<usize> {
         self.archive.index_for_name(&format!("{name}{EXTENSION}"))
-    }
-
-    fn array<T: Element>(&mut self, name: &str) -> Result<ArrayD<T>, NpzError> {
-        self.read(name, |body, header, wrong| {
-            let too_large = || {
-                wrong.npy(NpyError::TooLarge {
-                    shape: header.shape.clone(),
-                    itemsize: header.dtype.itemsize,
-                })
-            };
-            let count = header.elements().map_err(|e| wrong.npy(e))?;
-            let count = usize::try_from(count).map_err(|_| too_large())?;
-            let convert = T::converter(header.dtype)
-                .ok_or_else(|| wrong.kind("real numbers (b, i, u, f)", header))?;
-            let mut values: Vec<T> = Vec::new();
-            values.try_reserve_exact(count).map_err(|_| too_large())?;
-            let itemsize = header.dtype.itemsize;
-            let mut chunk = vec![0u8; (CHUNK / itemsize).min(count.max(1)) * itemsize];
-            let mut left = count * itemsize;
-            while left > 0 {
-                let now = left.min(chunk.len());
-                body.read_exact(&mut chunk[..now]).map_err(|e| wrong.npy(e.into()))?;
-                convert(&chunk[..now], &mut values);
-                left -= now;
-            }
-            let shape: Vec<usize> = header.shape.iter().map(|&n| n as usize).collect();
-            let shape = IxDyn(&shape).set_f(header.order == Order::Fortran);
-            ArrayD::from_shape_vec(shape, values).map_err(|_| too_large())
-        })
     }
 
     /// Opens a member, checks its sizes against each other and hands its data to `take`, which must

@@ -327,3 +327,32 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn half_precision_and_complex_numbers_are_read() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("a.npz");
+    let mut writer = NpzWriter::create(&path, Compression::Stored).unwrap();
+    // 1.5, -2, the smallest subnormal, infinity.
+    let bits = [0x3e00u16, 0xc000, 0x0001, 0x7c00];
+    let bytes: Vec<u8> = bits.iter().flat_map(|b| b.to_be_bytes()).collect();
+    let half = DType::parse(">f2").unwrap();
+    writer.array("half", &Header::new(half, &[4]), &bytes).unwrap();
+    let parts = ramp(12);
+    let part = |i: usize| f64::from(parts[i]);
+    let header = Header::new(DType::C64, &[2, 3]);
+    writer.array("c", &header, bytemuck::cast_slice(&parts)).unwrap();
+    writer.array("fortran", &header.fortran(), bytemuck::cast_slice(&parts)).unwrap();
+    writer.finish().unwrap();
+    let mut npz = NpzFile::open(&path).unwrap();
+    let values: Vec<f64> = npz.f64("half").unwrap().into_iter().collect();
+    assert_eq!(values, [1.5, -2.0, 2f64.powi(-24), f64::INFINITY]);
+    assert_eq!(npz.f32("half").unwrap()[1], -2.0);
+    assert!(npz.f64("c").unwrap_err().to_string().contains("real numbers"));
+    let (c, fortran) = (npz.components("c").unwrap(), npz.components("fortran").unwrap());
+    assert_eq!((c.shape(), fortran.shape()), (&[2, 2, 3][..], &[2, 2, 3][..]));
+    // Element [1, 0] is number 3 in C order and number 1 in Fortran order.
+    assert_eq!([c[[0, 1, 0]], c[[1, 1, 0]]], [part(6), part(7)]);
+    assert_eq!([fortran[[0, 1, 0]], fortran[[1, 1, 0]]], [part(2), part(3)]);
+    assert_eq!(npz.components("half").unwrap().shape(), [4]);
+}

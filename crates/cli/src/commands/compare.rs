@@ -1,0 +1,219 @@
+//! `corsmal-feat compare`: how two feature files differ, and why they probably do.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use corsmal_extract::compare::{self, FeatureReport, Options, Report, Setting, Tolerance};
+use serde_json::Value;
+
+use crate::failure::Failure;
+
+/// Exit code when the files differ by more than the tolerance.
+const DIFFER: u8 = 1;
+/// Names shown of a long list; JSON has all.
+const SHOWN: usize = 10;
+
+/// Arguments of `compare`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  corsmal-feat compare feats.npz librosa.npz --map clip=logmel
+  corsmal-feat compare old.npz new.npz --atol 1e-4 --rtol 1e-5 --json
+
+Files may be outputs of `extract`, any .npz or .npy with numeric arrays, or a Parquet table. Arrays are paired
+by name, outputs of `extract` by recording and feature, tables by id and column; the only array of each file
+needs no name. The last axis is taken as frames, the one before as coefficients, the one before that as
+channels (librosa's order). Two arrays are in memory at a time.
+
+Likely causes are derived from the values, each with its evidence: offsets, factors, clamps, padding, order of
+axes and channels, and so on. docs/parity.md says what lies behind them.
+
+Exit codes: 0 all within the tolerance, 1 differences (also arrays in one file only), 2 could not run.")]
+pub struct Args {
+    /// The first file.
+    a: PathBuf,
+    /// The second file.
+    b: PathBuf,
+    /// Values are equal when they differ by at most this share of the largest magnitude of their arrays.
+    #[arg(long, value_name = "SHARE", default_value = "1e-5", value_parser = number)]
+    tolerance: f64,
+    /// Values are equal when they differ by at most ATOL + RTOL * |b|, as numpy.allclose.
+    #[arg(long, value_name = "ATOL", conflicts_with = "tolerance", value_parser = number)]
+    atol: Option<f64>,
+    /// The relative part of --atol.
+    #[arg(long, value_name = "RTOL", conflicts_with = "tolerance", value_parser = number)]
+    rtol: Option<f64>,
+    /// Compare array A of the first file with array B of the second; may be repeated.
+    #[arg(long, value_name = "A=B", value_parser = pair)]
+    map: Vec<(String, String)>,
+    /// Print everything as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
+        _ => Err("expected a number from 0 on".into()),
+    }
+}
+
+fn pair(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((a, b)) if !a.is_empty() && !b.is_empty() => Ok((a.into(), b.into())),
+        _ => Err("expected A=B, two names of arrays".into()),
+    }
+}
+
+/// Compares two files.
+pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    let tolerance = match (args.atol, args.rtol) {
+        (None, None) => Tolerance::OfLargest(args.tolerance),
+        (atol, rtol) => Tolerance::Each { atol: atol.unwrap_or(0.0), rtol: rtol.unwrap_or(0.0) },
+    };
+    let report = compare::compare(&args.a, &args.b, &Options { tolerance, map: args.map })?;
+    let text = match args.json {
+        true => serde_json::to_string_pretty(&report)? + "\n",
+        false => text(&report),
+    };
+    std::io::stdout().write_all(text.as_bytes())?;
+    for refused in &report.refused {
+        eprintln!("not compared: {} ({})", refused.array, refused.reason);
+    }
+    Ok(if report.within { ExitCode::SUCCESS } else { ExitCode::from(DIFFER) })
+}
+
+fn text(report: &Report) -> String {
+    let mut lines = Vec::new();
+    for (side, file) in [("a", &report.a), ("b", &report.b)] {
+        let version = file.tool_version.as_ref().map(|v| format!(", corsmal-feat {v}"));
+        lines.push(format!(
+            "{side}  {} ({}{})",
+            file.path,
+            file.format,
+            version.unwrap_or_default()
+        ));
+    }
+    settings(report, &mut lines);
+    lines.push(String::new());
+    lines.extend(table(&report.features));
+    for feature in &report.features {
+        details(feature, &mut lines);
+    }
+    for (side, names) in [("a", &report.only_a), ("b", &report.only_b)] {
+        if !names.is_empty() {
+            lines.push(format!("\nonly in {side}: {}", listing(names)));
+        }
+    }
+    let differing = report.features.iter().filter(|f| f.differing > 0).count();
+    lines.push(match (report.within, differing) {
+        (true, _) => "\nequal within the tolerance".into(),
+        (false, 0) => {
+            "\nwhat is in both is equal within the tolerance; the files do not hold the same".into()
+        }
+        (false, n) => {
+            format!("\n{n} of {} differ by more than the tolerance", report.features.len())
+        }
+    });
+    lines.join("\n") + "\n"
+}
+
+fn settings(report: &Report, lines: &mut Vec<String>) {
+    let Some(settings) = &report.settings else { return };
+    let same = settings.hash_a == settings.hash_b;
+    lines.push(format!(
+        "\nconfiguration {}, {} inputs",
+        if same { "the same" } else { "different" },
+        if settings.same_inputs { "the same" } else { "other" }
+    ));
+    let shown = |value: &Option<Value>| match value {
+        Some(value) => value.to_string(),
+        None => "absent".into(),
+    };
+    let width = settings.differences.iter().map(|s| s.key.len()).max().unwrap_or(0);
+    let row = |s: &Setting| format!("  {:width$}  {} | {}", s.key, shown(&s.a), shown(&s.b));
+    lines.extend(settings.differences.iter().map(row));
+}
+
+fn table(features: &[FeatureReport]) -> Vec<String> {
+    let heads =
+        ["feature", "arrays", "differ", "equal", "max abs", "max rel", "rms", "correlation"];
+    let mut rows = vec![heads.map(str::to_string)];
+    rows.extend(features.iter().map(|f| {
+        let d = &f.difference;
+        let number = |value: f64| if value == 0.0 { "0".into() } else { format!("{value:.3e}") };
+        let compared = d.values > 0;
+        let some = |text: String| if compared { text } else { "-".into() };
+        [
+            f.feature.clone(),
+            f.arrays.to_string(),
+            f.differing.to_string(),
+            some(format!("{:.1} %", 100.0 * d.equal as f64 / d.values.max(1) as f64)),
+            some(number(d.largest.as_ref().map_or(0.0, |e| e.value))),
+            some(number(d.max_relative)),
+            some(number(d.rms)),
+            d.correlation.map_or("-".into(), |r| format!("{r:.6}")),
+        ]
+    }));
+    let width = |k: usize| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..heads.len()).map(width).collect();
+    let line = |row: &[String; 8]| {
+        let cells = row.iter().zip(&widths).enumerate().map(|(k, (cell, &width))| match k {
+            0 => format!("{cell:width$}"),
+            _ => format!("{cell:>width$}"),
+        });
+        cells.collect::<Vec<_>>().join("  ").trim_end().to_string()
+    };
+    rows.iter().map(line).collect()
+}
+
+fn details(feature: &FeatureReport, lines: &mut Vec<String>) {
+    let d = &feature.difference;
+    if feature.shapes.is_empty() && d.equal == d.values {
+        return;
+    }
+    lines.push(format!("\n{}", feature.feature));
+    let [a, b] = &feature.dtypes;
+    if a != b {
+        lines.push(format!("  types {a} and {b}"));
+    }
+    if let Some(first) = feature.shapes.first() {
+        let count = feature.shapes.len();
+        lines.push(format!(
+            "  shapes {:?} and {:?} in {} ({count} such)",
+            first.a, first.b, first.array
+        ));
+    }
+    if let Some(e) = &d.largest {
+        let place =
+            if e.position.is_empty() { String::new() } else { format!(" at {}", e.position) };
+        lines.push(format!(
+            "  largest difference {:.6e}: {} and {} in {}{place}",
+            e.value, e.a, e.b, e.array
+        ));
+    }
+    if d.one_sided > 0 {
+        lines.push(format!("  {} values are finite, or a number, on one side only", d.one_sided));
+    }
+    if feature.causes.is_empty() {
+        lines.push("  no known cause fits".into());
+    }
+    for found in &feature.causes {
+        lines.push(format!("  likely cause: {}", found.cause.cause));
+        let arrays = if feature.arrays > 1 && found.array != "the table" {
+            format!(" ({}; {} of {} arrays)", found.array, found.arrays, feature.arrays)
+        } else {
+            String::new()
+        };
+        lines.push(format!("    {}{arrays}", found.cause.evidence));
+    }
+}
+
+fn listing(names: &[String]) -> String {
+    let shown: Vec<&str> = names.iter().take(SHOWN).map(String::as_str).collect();
+    match names.len().checked_sub(SHOWN + 1) {
+        None => shown.join(", "),
+        Some(more) => format!("{} and {} more (--json lists all)", shown.join(", "), more + 1),
+    }
+}

@@ -1,0 +1,249 @@
+//! Formats, matching, configurations, and what is refused.
+
+use std::io::Write;
+use std::path::Path;
+use std::process::Output;
+
+use corsmal_extract::npy::{DType, Header};
+use corsmal_extract::npz::{Compression, NpzWriter};
+use serde_json::{Value, json};
+
+use crate::support::{Files, levels, npz, powers, text, tool};
+
+/// Two channels of noise and a chirp, a second at 16 kHz; the second channel is 30 dB lower.
+fn recording(path: &Path, seed: u64) {
+    let spec = hound::WavSpec {
+        channels: 2,
+        sample_rate: 16_000,
+        bits_per_sample: 16,
+        sample_format: hound::SampleFormat::Int,
+    };
+    let mut writer = hound::WavWriter::create(path, spec).unwrap();
+    let mut state = seed;
+    for t in 0..16_000 {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(99);
+        let noise = (state >> 40) as f64 / (1u64 << 24) as f64 - 0.5;
+        let s = t as f64 / 16_000.0;
+        let chirp = (std::f64::consts::TAU * (200.0 + 1500.0 * s) * s).sin();
+        let sample = 8000.0 * chirp + 600.0 * noise;
+        writer.write_sample(sample as i16).unwrap();
+        writer.write_sample((sample / 32.0) as i16).unwrap();
+    }
+    writer.finalize().unwrap();
+}
+
+/// Features of two recordings, with these arguments.
+fn extract(files: &Files, out: &str, more: &[&str]) {
+    let audio = files.path("audio");
+    if !audio.is_dir() {
+        std::fs::create_dir(&audio).unwrap();
+        recording(&audio.join("one.wav"), 1);
+        recording(&audio.join("two.wav"), 2);
+    }
+    let out = files.path(out);
+    let mut args = vec!["extract", "--in", audio.to_str().unwrap(), "--out", out.to_str().unwrap()];
+    args.extend(more);
+    let run = tool(&args);
+    assert!(run.status.success(), "{}", text(&run.stderr));
+}
+
+fn kinds(report: &Value, feature: &str) -> Vec<String> {
+    let features = report["features"].as_array().unwrap();
+    let feature = features.iter().find(|f| f["feature"] == feature).unwrap();
+    let causes = feature["causes"].as_array().unwrap();
+    causes.iter().map(|c| c["kind"].as_str().unwrap().to_string()).collect()
+}
+
+#[test]
+fn outputs_are_compared_by_recording_and_feature() {
+    let files = Files::new();
+    extract(&files, "a.npz", &[]);
+    extract(&files, "b.npz", &["--set", "melspectrogram.pad_mode=reflect"]);
+    let report = files.json("a.npz", "b.npz", &[]);
+    let settings = report["settings"]["differences"].as_array().unwrap();
+    let key = "features.melspectrogram.pad_mode";
+    assert_eq!(settings, &[json!({"key": key, "a": "constant", "b": "reflect"})]);
+    assert_ne!(report["settings"]["hash_a"], report["settings"]["hash_b"]);
+    assert_eq!(report["settings"]["same_inputs"], true);
+    assert_eq!(kinds(&report, "melspectrogram"), ["edge_frames"]);
+    let features = report["features"].as_array().unwrap();
+    let names: Vec<&str> = features.iter().map(|f| f["feature"].as_str().unwrap()).collect();
+    assert_eq!(names, ["melspectrogram", "frame times"]);
+    assert_eq!((&features[0]["arrays"], &features[0]["differing"]), (&json!(2), &json!(2)));
+    assert_eq!(features[1]["differing"], 0);
+    let shown = text(&files.run("a.npz", "b.npz", &[]).stdout);
+    for words in
+        ["configuration different, the same inputs", "\"constant\" | \"reflect\"", "channel "]
+    {
+        assert!(shown.contains(words), "{words:?} is not in: {shown}");
+    }
+}
+
+#[test]
+fn causes_of_real_configurations() {
+    let files = Files::new();
+    extract(&files, "a.npz", &[]);
+    let cause = |set: &str| {
+        let out = format!("{set}.npz");
+        extract(&files, &out, &["--set", set]);
+        let report = files.json("a.npz", &out, &[]);
+        let causes = report["features"][0]["causes"].as_array().unwrap().clone();
+        let first = causes.first().unwrap_or_else(|| panic!("no cause of {set}: {report:#}"));
+        format!("{}: {}", first["kind"].as_str().unwrap(), first["cause"].as_str().unwrap())
+    };
+    let joint = cause("melspectrogram.joint=true");
+    assert!(joint.starts_with("floor: joint") && joint.contains("b clamps 80 dB below"), "{joint}");
+    let range = cause("melspectrogram.top_db=40");
+    assert!(range.starts_with("floor: another lower limit"), "{range}");
+    let center = cause("melspectrogram.center=false");
+    assert!(center.starts_with("frames: b begins at frame 2 of the other"), "{center}");
+    let norm = cause("melspectrogram.norm=none");
+    assert!(norm.contains("norm slaney against none"), "{norm}");
+    let linear = cause("melspectrogram.scale=linear");
+    assert!(linear.starts_with("transform: decibels of powers"), "{linear}");
+    let scale = cause("melspectrogram.htk=true");
+    assert!(scale.starts_with("mel_scale: a has Slaney's mel scale, b HTK's"), "{scale}");
+}
+
+#[test]
+fn tables_of_both_formats() {
+    let files = Files::new();
+    extract(&files, "a.npz", &["--preset", "mfcc-zcr"]);
+    extract(&files, "b.parquet", &["--preset", "mfcc-zcr"]);
+    let out = files.run("a.npz", "b.parquet", &[]);
+    assert_eq!(out.status.code(), Some(0), "{}{}", text(&out.stdout), text(&out.stderr));
+    extract(&files, "c.parquet", &["--preset", "mfcc-zcr", "--set", "mfcc.ref=0.001"]);
+    let report = files.json("b.parquet", "c.parquet", &[]);
+    let features = report["features"].as_array().unwrap();
+    assert_eq!((&features[0]["feature"], &features[0]["differing"]), (&json!("mfcc"), &json!(2)));
+    let largest = &features[0]["largest"];
+    assert!(largest["position"].as_str().unwrap().contains("mfcc["), "{largest}");
+    assert!(["one", "two"].contains(&largest["array"].as_str().unwrap()));
+    assert_eq!(features[1]["feature"], "zero_crossing_rate");
+    assert_eq!(features[1]["differing"], 0);
+}
+
+#[test]
+fn arrays_by_map_by_name_and_alone() {
+    let files = Files::new();
+    npz(&files.path("a.npz"), &[("x", &levels()), ("y", &powers())]);
+    npz(&files.path("b.npz"), &[("z", &levels()), ("y", &powers())]);
+    let report = files.json("a.npz", "b.npz", &[]);
+    assert_eq!((&report["only_a"], &report["only_b"]), (&json!(["x"]), &json!(["z"])));
+    assert_eq!(report["within"], false);
+    let out = files.run("a.npz", "b.npz", &["--map", "x=z"]);
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stdout));
+    let unknown = files.run("a.npz", "b.npz", &["--map", "x=nothing"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(text(&unknown.stderr).contains("no array \"nothing\" to map; there are \"z\", \"y\""));
+    assert_eq!(files.run("a.npz", "b.npz", &["--map", "x"]).status.code(), Some(2));
+
+    // The only array of each file needs no name, here a .npy of doubles in Fortran order.
+    npz(&files.path("one.npz"), &[("x", &levels())]);
+    let values = levels();
+    let mut bytes = Header::new(DType::F64, &[3, 40, 60]).fortran().encode();
+    let turned = values.view().reversed_axes();
+    bytes.extend(turned.iter().flat_map(|&v| f64::from(v).to_ne_bytes()));
+    std::fs::write(files.path("other.npy"), bytes).unwrap();
+    let report = files.json("one.npz", "other.npy", &[]);
+    assert_eq!(report["within"], true, "{report:#}");
+    assert_eq!(report["features"][0]["dtypes"], json!(["<f4", "<f8"]));
+    assert_eq!(report["features"][0]["equal"], 7200);
+}
+
+#[test]
+fn complex_numbers_are_compared_by_part() {
+    let files = Files::new();
+    for (name, factor) in [("a.npz", 1.0f32), ("b.npz", 2.0)] {
+        let mut writer = NpzWriter::create(&files.path(name), Compression::Stored).unwrap();
+        let values: Vec<f32> = (0..480).map(|i| factor * (i as f32 * 0.7).sin()).collect();
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_ne_bytes()).collect();
+        writer.array("x", &Header::new(DType::C64, &[12, 20]).fortran(), &bytes).unwrap();
+        writer.finish().unwrap();
+    }
+    let report = files.json("a.npz", "b.npz", &[]);
+    assert_eq!(report["features"][0]["values"], 480);
+    assert_eq!(report["features"][0]["causes"][0]["kind"], "ratio");
+}
+
+#[test]
+fn missing_values_are_counted() {
+    let (files, mut b) = (Files::new(), levels());
+    b[(0, 0, 0)] = f32::NAN;
+    b[(1, 2, 3)] = f32::INFINITY;
+    npz(&files.path("a.npz"), &[("x", &levels())]);
+    npz(&files.path("b.npz"), &[("x", &b)]);
+    let report = files.json("a.npz", "b.npz", &[]);
+    assert_eq!(report["features"][0]["one_sided"], 2);
+    assert_eq!(report["features"][0]["largest"], Value::Null);
+    assert_eq!(files.json("b.npz", "b.npz", &[])["within"], true);
+}
+
+#[track_caller]
+fn refused(out: &Output, words: &[&str]) {
+    let message = text(&out.stderr);
+    assert_eq!(out.status.code(), Some(2), "{message}");
+    assert!(out.stdout.is_empty());
+    for word in words {
+        assert!(message.contains(word), "{word:?} is not in: {message}");
+    }
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused() {
+    let files = Files::new();
+    npz(&files.path("a.npz"), &[("x", &levels())]);
+    refused(&files.run("a.npz", "missing.npz", &[]), &["missing.npz", "No such file"]);
+    std::fs::write(files.path("text.npz"), "no archive").unwrap();
+    refused(&files.run("text.npz", "a.npz", &[]), &["text.npz", "expected a .npz archive"]);
+    let bytes = std::fs::read(files.path("a.npz")).unwrap();
+    std::fs::write(files.path("torn.npz"), &bytes[..bytes.len() / 2]).unwrap();
+    refused(&files.run("a.npz", "torn.npz", &[]), &["torn.npz", "not a readable npz archive"]);
+    std::fs::write(files.path("torn.npy"), Header::new(DType::F32, &[9]).encode()).unwrap();
+    refused(&files.run("a.npz", "torn.npy", &[]), &["torn.npy", "36 bytes of data"]);
+    npz(&files.path("two.npz"), &[("y", &levels()), ("z", &levels())]);
+    let out = files.run("a.npz", "two.npz", &[]);
+    refused(&out, &["no numeric arrays in common", "a.npz has \"x\"", "two.npz has \"y\", \"z\""]);
+    std::fs::write(files.path("torn.parquet"), b"PAR1 and no more").unwrap();
+    refused(&files.run("a.npz", "torn.parquet", &[]), &["torn.parquet"]);
+}
+
+/// An array of one Python object as numpy writes it; the pickle itself must never be looked at.
+fn pickled() -> Vec<u8> {
+    let text = "{'descr': '|O', 'fortran_order': False, 'shape': (1,), }\n";
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((text.len() as u16).to_le_bytes());
+    bytes.extend(text.as_bytes());
+    bytes.extend(b"\x80\x04]\x94.");
+    bytes
+}
+
+fn archive(path: &Path, members: &[(&str, Vec<u8>)]) {
+    let mut writer = zip::ZipWriter::new(std::fs::File::create(path).unwrap());
+    for (name, bytes) in members {
+        let options = zip::write::SimpleFileOptions::default();
+        writer.start_file(format!("{name}.npy"), options).unwrap();
+        writer.write_all(bytes).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn python_objects_are_never_read() {
+    let files = Files::new();
+    let mut numbers = Header::new(DType::F32, &[3]).encode();
+    numbers.extend([0u8; 12]);
+    archive(&files.path("only.npz"), &[("x", pickled())]);
+    refused(&files.run("only.npz", "only.npz", &[]), &["no numeric arrays in common"]);
+    std::fs::write(files.path("o.npy"), pickled()).unwrap();
+    refused(&files.run("o.npy", "only.npz", &[]), &["o.npy", "Python objects (pickle)"]);
+
+    // Beside numbers they are named, and the files do not count as equal.
+    archive(&files.path("both.npz"), &[("x", pickled()), ("y", numbers.clone())]);
+    let out = files.run("both.npz", "both.npz", &[]);
+    assert_eq!(out.status.code(), Some(1));
+    assert!(text(&out.stderr).contains("not compared: x"), "{}", text(&out.stderr));
+    // In one file only they concern nobody.
+    archive(&files.path("numbers.npz"), &[("y", numbers)]);
+    assert_eq!(files.run("both.npz", "numbers.npz", &[]).status.code(), Some(0));
+}

@@ -1,0 +1,68 @@
+//! Running the command on files made here.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use corsmal_extract::npz::{Compression, NpzWriter};
+use ndarray::Array3;
+use serde_json::Value;
+
+pub fn tool(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_corsmal-feat")).args(args).output().unwrap()
+}
+
+pub fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// Decibels of 3 channels, 40 coefficients, 60 frames: none like another, from -60 to 0 dB.
+pub fn levels() -> Array3<f32> {
+    let mut state = 7u64;
+    Array3::from_shape_simple_fn((3, 40, 60), || {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        -0.5 - 59.0 * ((state >> 33) as f32 / (1u64 << 31) as f32)
+    })
+}
+
+/// The same as powers.
+pub fn powers() -> Array3<f32> {
+    levels().mapv(|v| 10f32.powf(v / 10.0))
+}
+
+pub fn npz(path: &Path, arrays: &[(&str, &Array3<f32>)]) {
+    let mut writer = NpzWriter::create(path, Compression::Deflated).unwrap();
+    for (name, values) in arrays {
+        let (c, k, t) = values.dim();
+        let values: Vec<f32> = values.iter().copied().collect();
+        writer.floats(name, &[c, k, t], &values).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+pub struct Files {
+    folder: tempfile::TempDir,
+}
+
+impl Files {
+    pub fn new() -> Self {
+        Self { folder: tempfile::tempdir().unwrap() }
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub fn run(&self, a: &str, b: &str, more: &[&str]) -> Output {
+        let (a, b) = (self.path(a), self.path(b));
+        let mut args = vec!["compare", a.to_str().unwrap(), b.to_str().unwrap()];
+        args.extend(more);
+        tool(&args)
+    }
+
+    pub fn json(&self, a: &str, b: &str, more: &[&str]) -> Value {
+        let out = self.run(a, b, &[more, &["--json"]].concat());
+        assert!(out.stderr.is_empty(), "{}", text(&out.stderr));
+        serde_json::from_slice(&out.stdout).unwrap()
+    }
+}

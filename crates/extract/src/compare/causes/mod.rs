@@ -1,0 +1,119 @@
+//! Likely causes of differences, each derived from the values and shown with its evidence.
+//!
+//! A cause is a change of the first file's values that makes the second's of them (`scale`,
+//! `transform`, `arrangement`, `mel_scale`), or a confinement of the differences to places that one
+//! choice affects (`places`, `floor`). Nothing is guessed from names.
+
+mod arrangement;
+mod factor;
+mod fit;
+mod floor;
+mod mel_scale;
+mod places;
+mod precision;
+mod scale;
+mod transform;
+
+use ndarray::ArrayD;
+use serde::Serialize;
+
+use super::pair::{self, Pair};
+
+/// Kinds of causes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum CauseKind {
+    /// Equal but for the rounding of single precision.
+    Rounding,
+    /// One side was stored with fewer digits.
+    Precision,
+    /// The same values in another order of axes.
+    Axes,
+    /// The same channels in another order.
+    ChannelOrder,
+    /// One channel, or their mean, against all.
+    ChannelCount,
+    /// Frames are shifted, or there are more of them.
+    Frames,
+    /// Coefficients are shifted, rolled, or there are more of them.
+    Coefficients,
+    /// A constant added.
+    Offset,
+    /// A constant factor.
+    Ratio,
+    /// A constant factor and a constant added.
+    Affine,
+    /// A logarithm, a power or a root.
+    Transform,
+    /// Only frames at the ends differ.
+    EdgeFrames,
+    /// Only values at a lower limit differ.
+    Floor,
+    /// Only some coefficients differ.
+    Bands,
+    /// Only some channels differ.
+    Channels,
+    /// Single values differ by whole steps.
+    Steps,
+    /// HTK's mel scale against Slaney's.
+    MelScale,
+}
+
+/// A likely cause.
+#[derive(Debug, Clone, Serialize)]
+pub struct Cause {
+    /// Its kind.
+    pub kind: CauseKind,
+    /// What probably happened.
+    pub cause: String,
+    /// What in the values says so.
+    pub evidence: String,
+}
+
+impl Cause {
+    fn new(kind: CauseKind, cause: impl Into<String>, evidence: impl Into<String>) -> Self {
+        Self { kind, cause: cause.into(), evidence: evidence.into() }
+    }
+}
+
+/// Likely causes for two arrays of one shape.
+pub(super) fn of_values(pair: &Pair, dtypes: [&str; 2]) -> Vec<Cause> {
+    let noise = pair.noise();
+    if let Some(cause) = precision::detect(pair, dtypes, noise) {
+        return vec![cause];
+    }
+    if let Some(cause) = arrangement::same_shape(pair, noise) {
+        return vec![cause];
+    }
+    let confined = confinements(pair, noise);
+    if !confined.is_empty() && confined.iter().all(|c| c.kind != CauseKind::Channels) {
+        return confined;
+    }
+    let changed = scale::detect(pair, noise).or_else(|| transform::detect(pair, noise));
+    let Some((cause, changed)) = changed else {
+        return match mel_scale::detect(pair) {
+            Some(cause) => vec![cause],
+            None if confined.is_empty() => places::detect_larger(pair, noise),
+            None => confined,
+        };
+    };
+    // What the change leaves over may have a cause of its own.
+    let rest = Pair { a: changed, b: pair.b.clone(), axes: pair.axes };
+    let rest = confinements(&rest, 2.0 * noise);
+    let after = |c: Cause| Cause { evidence: format!("of what that leaves: {}", c.evidence), ..c };
+    std::iter::once(cause).chain(rest.into_iter().map(after)).collect()
+}
+
+fn confinements(pair: &Pair, noise: f64) -> Vec<Cause> {
+    match floor::detect(pair, noise) {
+        Some(cause) => vec![cause],
+        None => places::detect(pair, noise),
+    }
+}
+
+/// Likely causes for two arrays of different shapes.
+pub(super) fn of_shapes(a: ArrayD<f64>, b: ArrayD<f64>) -> Vec<Cause> {
+    let noise = pair::noise(&b);
+    arrangement::other_shape(a, b, noise).into_iter().collect()
+}

@@ -1,0 +1,192 @@
+//! Numeric columns of any Parquet table, ours or another tool's.
+
+use std::path::Path;
+
+use ndarray::Array2;
+use parquet::basic::Type as Physical;
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::{ByteArray, DataType};
+use parquet::errors::ParquetError;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+
+use super::{ParquetTableError, ROWS, io, layer, layout, shielded};
+use crate::table::ID;
+
+/// The numbers of a table.
+#[derive(Debug)]
+pub struct Columns {
+    /// The text column `id`, where there is one.
+    pub ids: Option<Vec<String>>,
+    /// Names of the numeric columns.
+    pub names: Vec<String>,
+    /// `[rows, columns]`; nulls are NaN.
+    pub values: Array2<f64>,
+    /// Columns that are neither numbers nor text.
+    pub skipped: Vec<String>,
+}
+
+/// Reads the numeric columns of a table: floats, integers and booleans that are not nested.
+///
+/// # Errors
+/// [`ParquetTableError`].
+pub fn columns(path: &Path) -> Result<Columns, ParquetTableError> {
+    shielded(path, || read(path))
+}
+
+fn read(path: &Path) -> Result<Columns, ParquetTableError> {
+    let file = std::fs::File::open(path).map_err(|e| io(path, e))?;
+    let reader = SerializedFileReader::new(file).map_err(|e| layer(path, e))?;
+    let schema = reader.metadata().file_metadata().schema_descr_ptr();
+    let (mut ids, mut names, mut skipped) = (None, Vec::new(), Vec::new());
+    let mut series: Vec<Vec<f64>> = Vec::new();
+    for (index, column) in schema.columns().iter().enumerate() {
+        let name = column.path().string();
+        let levels = column.max_def_level();
+        let mut parts = (0..reader.num_row_groups())
+            .map(|group| reader.get_row_group(group)?.get_column_reader(index));
+        let numeric = matches!(
+            column.physical_type(),
+            Physical::FLOAT
+                | Physical::DOUBLE
+                | Physical::INT32
+                | Physical::INT64
+                | Physical::BOOLEAN
+        );
+        if numeric && column.max_rep_level() == 0 {
+            let values = parts
+                .try_fold(Vec::new(), |values, part| numbers(part?, levels, values))
+                .map_err(|e| layer(path, e))?;
+            names.push(name);
+            series.push(values);
+        } else if column.physical_type() == Physical::BYTE_ARRAY && column.max_rep_level() == 0 {
+            if name == ID {
+                let values = parts
+                    .try_fold(Vec::new(), |values, part| texts(part?, levels, values))
+                    .map_err(|e| layer(path, e))?;
+                ids = Some(values);
+            }
+        } else {
+            skipped.push(name);
+        }
+    }
+    let rows = ids.as_ref().map(Vec::len).or(series.first().map(Vec::len)).unwrap_or(0);
+    if let Some(other) = series.iter().find(|column| column.len() != rows) {
+        return Err(layout(path, format!("{rows} rows in each column"), other.len()));
+    }
+    let values = Array2::from_shape_fn((rows, series.len()), |(row, column)| series[column][row]);
+    Ok(Columns { ids, names, values, skipped })
+}
+
+fn numbers(
+    reader: ColumnReader,
+    levels: i16,
+    mut into: Vec<f64>,
+) -> Result<Vec<f64>, ParquetError> {
+    let missing = f64::NAN;
+    match reader {
+        ColumnReader::FloatColumnReader(r) => append(r, levels, &mut into, f64::from, missing),
+        ColumnReader::DoubleColumnReader(r) => append(r, levels, &mut into, |v| v, missing),
+        ColumnReader::Int32ColumnReader(r) => append(r, levels, &mut into, f64::from, missing),
+        ColumnReader::Int64ColumnReader(r) => append(r, levels, &mut into, |v| v as f64, missing),
+        ColumnReader::BoolColumnReader(r) => {
+            append(r, levels, &mut into, |v| f64::from(u8::from(v)), missing)
+        }
+        _ => Err(ParquetError::General("a numeric column holds another type".into())),
+    }?;
+    Ok(into)
+}
+
+fn texts(
+    reader: ColumnReader,
+    levels: i16,
+    mut into: Vec<String>,
+) -> Result<Vec<String>, ParquetError> {
+    let ColumnReader::ByteArrayColumnReader(reader) = reader else {
+        return Err(ParquetError::General("a text column holds another type".into()));
+    };
+    let text = |v: ByteArray| String::from_utf8_lossy(v.data()).into_owned();
+    append(reader, levels, &mut into, text, String::new())?;
+    Ok(into)
+}
+
+/// Appends the rows of a column, `missing` where the definition level says that there is no value.
+fn append<T: DataType, V: Clone>(
+    mut reader: ColumnReaderImpl<T>,
+    levels: i16,
+    into: &mut Vec<V>,
+    convert: impl Fn(T::T) -> V,
+    missing: V,
+) -> Result<(), ParquetError> {
+    loop {
+        let (mut defined, mut values) = (Vec::new(), Vec::new());
+        let wanted = (levels > 0).then_some(&mut defined);
+        if reader.read_records(ROWS, wanted, None, &mut values)?.0 == 0 {
+            return Ok(());
+        }
+        let mut values = values.into_iter().map(&convert);
+        if levels == 0 {
+            into.extend(values);
+        } else {
+            into.extend(defined.iter().map(|&level| match level == levels {
+                true => values.next().unwrap_or_else(|| missing.clone()),
+                false => missing.clone(),
+            }));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use parquet::data_type::{ByteArrayType, DoubleType, Int64Type};
+    use parquet::file::properties::WriterProperties;
+    use parquet::file::writer::SerializedFileWriter;
+    use parquet::schema::parser::parse_message_type;
+
+    use super::*;
+
+    #[test]
+    fn tables_of_other_tools_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("foreign.parquet");
+        // As pandas writes them: everything optional.
+        let schema = parse_message_type(
+            "message m { optional binary id (UTF8); optional double x; required int64 n;
+             optional binary note (UTF8); }",
+        );
+        let file = std::fs::File::create(&path).unwrap();
+        let properties = Arc::new(WriterProperties::builder().build());
+        let mut writer =
+            SerializedFileWriter::new(file, Arc::new(schema.unwrap()), properties).unwrap();
+        let mut group = writer.next_row_group().unwrap();
+        let text =
+            |values: &[&str],
+             group: &mut parquet::file::writer::SerializedRowGroupWriter<'_, _>| {
+                let values: Vec<ByteArray> = values.iter().map(|&v| v.into()).collect();
+                let mut column = group.next_column().unwrap().unwrap();
+                let levels = vec![1; values.len()];
+                column.typed::<ByteArrayType>().write_batch(&values, Some(&levels), None).unwrap();
+                column.close().unwrap();
+            };
+        text(&["a", "b", "c"], &mut group);
+        let mut column = group.next_column().unwrap().unwrap();
+        let doubles = column.typed::<DoubleType>();
+        doubles.write_batch(&[0.5, -2.0], Some(&[1, 0, 1]), None).unwrap();
+        column.close().unwrap();
+        let mut column = group.next_column().unwrap().unwrap();
+        column.typed::<Int64Type>().write_batch(&[7, 8, 9], None, None).unwrap();
+        column.close().unwrap();
+        text(&["one", "two", "three"], &mut group);
+        group.close().unwrap();
+        writer.close().unwrap();
+
+        let found = columns(&path).unwrap();
+        assert_eq!(found.ids.unwrap(), ["a", "b", "c"]);
+        assert_eq!(found.names, ["x", "n"]);
+        assert_eq!(found.values.column(1).to_vec(), [7.0, 8.0, 9.0]);
+        let x = found.values.column(0);
+        assert_eq!([x[0], x[2]], [0.5, -2.0]);
+        assert!(x[1].is_nan() && found.skipped.is_empty());
+    }
+}
