@@ -76,6 +76,8 @@ pub struct Config {
     pub features: Vec<FeatureConfig>,
     /// Statistics over frames; `None` writes frame-level features.
     pub summary: Option<SummaryConfig>,
+    /// What the configuration says of itself; no number depends on it, nor the hash.
+    pub description: String,
 }
 
 #[derive(Deserialize)]
@@ -155,7 +157,6 @@ impl Config {
             }
         }
         let raw: Raw = serde_json::from_value(value).map_err(|e| top_level(&e))?;
-        let _ = raw.description;
         let signal: SignalConfig = typed("signal", &raw.signal)?;
         signal.check()?;
         if raw.features.is_empty() {
@@ -180,7 +181,7 @@ impl Config {
                 Some(summary)
             }
         };
-        Ok(Self { signal, features, summary })
+        Ok(Self { signal, features, summary, description: raw.description })
     }
 
     /// The effective configuration with every default filled in, keys in a fixed order.
