@@ -141,7 +141,7 @@ fn extract(args: &Args, model: &Model, to_stdout: bool) -> Result<Option<Dataset
         max_errors: None,
     };
     let stop = crate::interrupt::flag();
-    let meter = Meter::new(LogFormat::Text, &config);
+    let meter = Meter::new(LogFormat::Text);
     let result = if args.quiet {
         run::run(&found, &config, &options, &run::Quiet, stop)
     } else {
