@@ -41,6 +41,11 @@ pub trait BlockSource: Send {
     /// The source cannot seek, or the system refuses.
     fn seek(&mut self, frame: u64) -> Result<(), AudioError>;
 
+    /// The byte of the file at which `frame` begins, where frames lie side by side in it.
+    fn byte_of(&self, _frame: u64) -> Option<u64> {
+        None
+    }
+
     /// Repairs, truncation and frames read so far; complete once `read` has returned 0.
     fn health(&self) -> &ReadReport;
 }

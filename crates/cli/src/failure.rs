@@ -4,6 +4,8 @@ use std::fmt;
 
 /// Exit code of a run that finished but had failed files.
 pub const FAILED_FILES: u8 = 1;
+/// Exit code of a command that could not run or go on.
+pub const COULD_NOT_RUN: u8 = 2;
 /// Exit code of a run that the user stopped.
 pub const INTERRUPTED: u8 = 130;
 

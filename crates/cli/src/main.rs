@@ -1,5 +1,8 @@
 //! The `corsmal-feat` command: parse arguments, run one command, turn its end into an exit code.
 
+#[macro_use]
+mod streams;
+
 mod commands;
 mod dataset_table;
 mod failure;
@@ -32,7 +35,7 @@ fn main() -> ExitCode {
         Ok(code) => code,
         Err(failure) => {
             eprintln!("error: {failure}");
-            ExitCode::from(2)
+            ExitCode::from(failure::COULD_NOT_RUN)
         }
     }
 }

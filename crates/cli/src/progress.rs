@@ -6,7 +6,6 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
-use corsmal_extract::config::Config;
 use corsmal_extract::outcome::Outcome;
 use corsmal_extract::run::{Progress, Report};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -26,14 +25,13 @@ pub struct Meter {
     format: LogFormat,
     bar: ProgressBar,
     started: Instant,
-    /// Seconds of audio written.
+    /// Seconds of audio read.
     seconds: Mutex<f64>,
-    rate: f64,
 }
 
 impl Meter {
     /// Draws a bar only on a terminal.
-    pub fn new(format: LogFormat, config: &Config) -> Self {
+    pub fn new(format: LogFormat) -> Self {
         let target = match format {
             LogFormat::Text => ProgressDrawTarget::stderr_with_hz(8),
             LogFormat::Json => ProgressDrawTarget::hidden(),
@@ -43,12 +41,36 @@ impl Meter {
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
-        let rate = config.signal.sample_rate;
-        Self { format, bar, started: Instant::now(), seconds: Mutex::new(0.0), rate }
+        Self { format, bar, started: Instant::now(), seconds: Mutex::new(0.0) }
     }
 
     fn line(&self, text: &str) {
         self.bar.suspend(|| eprintln!("{text}"));
+    }
+
+    /// The one line of a run that was only checked.
+    pub fn checked(&self, inputs: usize, config_hash: &str) {
+        match self.format {
+            LogFormat::Json => {
+                let line = json!({
+                    "event": "checked", "inputs": inputs, "config_hash": config_hash,
+                });
+                eprintln!("{line}");
+            }
+            LogFormat::Text => eprintln!(
+                "{inputs} recordings, configuration {}, nothing was read or written",
+                &config_hash[..12]
+            ),
+        }
+    }
+
+    /// Why a run ended before its last recording.
+    pub fn stopped(format: LogFormat, event: &str, message: &str) {
+        match format {
+            LogFormat::Json => eprintln!("{}", json!({"event": event, "message": message})),
+            LogFormat::Text if event == "error" => eprintln!("error: {message}"),
+            LogFormat::Text => eprintln!("{message}"),
+        }
     }
 
     /// The last lines of a run.
@@ -58,19 +80,24 @@ impl Meter {
         let seconds = *self.seconds.lock().unwrap_or_else(|e| e.into_inner());
         let statuses = counts(&report.outcomes);
         if self.format == LogFormat::Json {
-            let line = json!({
-                "event": "finished", "out": out.display().to_string(), "statuses": statuses,
-                "resumed": report.resumed, "up_to_date": report.up_to_date,
-                "elapsed_s": elapsed.as_secs_f64(), "audio_s": seconds,
-            });
-            eprintln!("{line}");
+            eprintln!(
+                "{}",
+                json!({
+                    "event": "finished", "out": out.display().to_string(), "statuses": statuses,
+                    "resumed": report.resumed, "up_to_date": report.up_to_date,
+                    "elapsed_s": elapsed.as_secs_f64(), "audio_s": seconds,
+                })
+            );
             return;
         }
         if report.up_to_date {
             eprintln!("{}: up to date, nothing to do", out.display());
             return;
         }
-        let counts: Vec<String> = statuses.iter().map(|(s, n)| format!("{n} {s}")).collect();
+        let mut counts: Vec<String> = statuses.iter().map(|(s, n)| format!("{n} {s}")).collect();
+        if counts.is_empty() {
+            counts.push("no recordings".into());
+        }
         eprintln!(
             "{}: {} in {} ({:.0} s of audio, {:.0} x real time){}",
             out.display(),
@@ -97,11 +124,7 @@ impl Progress for Meter {
     }
 
     fn done(&self, outcome: &Outcome) {
-        let rate = match outcome.sample_rate {
-            _ if self.rate > 0.0 => self.rate,
-            Some(rate) => f64::from(rate),
-            None => f64::INFINITY,
-        };
+        let rate = outcome.sample_rate.map_or(f64::INFINITY, f64::from);
         let total = {
             let mut seconds = self.seconds.lock().unwrap_or_else(|e| e.into_inner());
             *seconds += outcome.decoded_frames as f64 / rate;

@@ -9,8 +9,8 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Identity of standard input, which cannot be sampled without being consumed.
-pub const STDIN: &str = "stdin";
+/// Identity of standard input, pipes and devices, which cannot be sampled without being consumed.
+pub const STREAM: &str = "stream";
 
 /// Files up to this size are hashed whole (256 KiB).
 pub const WHOLE: u64 = 4 * EDGE;
@@ -18,11 +18,15 @@ pub const WHOLE: u64 = 4 * EDGE;
 const EDGE: u64 = 64 * 1024;
 const BLOCK: u64 = 4 * 1024;
 
-/// Computes the identity of a file.
+/// Computes the identity of a file; [`STREAM`] where it is none.
 ///
 /// # Errors
 /// Whatever opening, seeking or reading reports.
 pub fn of_file(path: &Path) -> io::Result<String> {
+    // Before it is opened: that would wait for whoever writes to a pipe.
+    if !std::fs::metadata(path)?.is_file() {
+        return Ok(STREAM.into());
+    }
     let mut file = File::open(path)?;
     let size = file.metadata()?.len();
     let mut hasher = blake3::Hasher::new();

@@ -14,10 +14,13 @@
 //! would begin with `__`, the prefix of an output's own arrays, get `./` in front.
 
 mod ids;
+mod wildcard;
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::fmt;
-use std::path::{Component, Path, PathBuf};
+use std::io;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use thiserror::Error;
@@ -41,7 +44,7 @@ pub enum InputError {
         /// The file or folder.
         path: PathBuf,
         /// Its reason.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// A folder or glob without recordings.
     #[error("{path}: no file with an audio extension ({extensions})")]
@@ -90,7 +93,7 @@ pub enum InputError {
 }
 
 impl InputError {
-    pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
+    pub(crate) fn io(path: &Path, source: io::Error) -> Self {
         Self::Io { path: path.into(), source }
     }
 }
@@ -132,10 +135,10 @@ pub struct Input {
 ///
 /// # Errors
 /// [`InputError`] names the path, and in a manifest the line.
-pub fn collect(names: &[String]) -> Result<Vec<Input>, InputError> {
+pub fn collect<S: AsRef<OsStr>>(names: &[S]) -> Result<Vec<Input>, InputError> {
     let mut found = Vec::new();
     for name in names {
-        find(name, &mut found)?;
+        find(name.as_ref(), &mut found)?;
     }
     let ids = ids::assign(&found)?;
     let mut columns: Vec<String> = Vec::new();
@@ -254,7 +257,7 @@ impl Found {
     }
 }
 
-fn find(name: &str, found: &mut Vec<Found>) -> Result<(), InputError> {
+fn find(name: &OsStr, found: &mut Vec<Found>) -> Result<(), InputError> {
     if name == "-" {
         let naming = Naming::Given("stdin".into());
         let (start, end, labels) = (None, None, Vec::new());
@@ -266,7 +269,7 @@ fn find(name: &str, found: &mut Vec<Found>) -> Result<(), InputError> {
         Ok(meta) if meta.is_dir() => {
             let mut files = Vec::new();
             walk(path, &mut files)?;
-            push_sorted(name, path, files, found)
+            push_sorted(path, path, files, found)
         }
         Ok(_) if has_extension(path, &manifest::EXTENSIONS) => find_manifest(path, found),
         Ok(_) => {
@@ -274,11 +277,11 @@ fn find(name: &str, found: &mut Vec<Found>) -> Result<(), InputError> {
             found.push(Found::file(path.into(), relative));
             Ok(())
         }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            if !name.contains(['*', '?', '[']) {
-                return Err(InputError::Missing { path: path.into() });
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            match name.to_str().filter(|name| wildcard::is_glob(name)) {
+                Some(pattern) => find_glob(pattern, found),
+                None => Err(InputError::Missing { path: path.into() }),
             }
-            find_glob(name, found)
         }
         Err(error) => Err(InputError::io(path, error)),
     }
@@ -309,58 +312,53 @@ fn find_manifest(path: &Path, found: &mut Vec<Found>) -> Result<(), InputError> 
 }
 
 fn find_glob(pattern: &str, found: &mut Vec<Found>) -> Result<(), InputError> {
-    let options = glob::MatchOptions {
-        case_sensitive: true,
-        require_literal_separator: true,
-        require_literal_leading_dot: true,
-    };
-    let matches = glob::glob_with(pattern, options)
-        .map_err(|e| InputError::Glob { pattern: pattern.into(), reason: e.to_string() })?;
     let mut files = Vec::new();
-    for path in matches {
-        let path = path.map_err(|e| {
-            let at = e.path().to_path_buf();
-            InputError::io(&at, e.into())
-        })?;
+    for path in wildcard::expand(pattern)? {
         walk(&path, &mut files)?;
     }
-    let is_literal =
-        |part: &Component<'_>| !part.as_os_str().to_string_lossy().contains(['*', '?', '[']);
-    let root: PathBuf = Path::new(pattern).components().take_while(is_literal).collect();
-    push_sorted(pattern, &root, files, found)
+    push_sorted(Path::new(pattern), &wildcard::root(pattern), files, found)
 }
 
 /// Appends the audio files at or below `path`.
 fn walk(path: &Path, files: &mut Vec<PathBuf>) -> Result<(), InputError> {
     let is_audio = |path: &Path| has_extension(path, &corsmal_audio::EXTENSIONS);
-    let visible = |entry: &walkdir::DirEntry| {
-        entry.depth() == 0 || !entry.file_name().as_encoded_bytes().starts_with(b".")
-    };
+    let visible = |entry: &walkdir::DirEntry| !is_hidden(entry);
     for entry in WalkDir::new(path).follow_links(true).into_iter().filter_entry(visible) {
         match entry {
             Ok(entry) if entry.file_type().is_file() && is_audio(entry.path()) => {
                 files.push(entry.into_path());
             }
             Ok(_) => {}
-            // A link back to a folder that is being searched shows nothing new.
-            Err(error) if error.loop_ancestor().is_some() => {}
             Err(error) => {
-                let at = error.path().unwrap_or(path).to_path_buf();
-                match std::io::Error::from(error) {
-                    // A dangling link: a recording that will fail on its own, or none of ours.
-                    e if e.kind() == std::io::ErrorKind::NotFound => {
-                        files.extend(is_audio(&at).then_some(at));
-                    }
-                    e => return Err(InputError::io(&at, e)),
-                }
+                let at = error.path().filter(|at| is_audio(at)).map(Path::to_path_buf);
+                let is_loop = error.loop_ancestor().is_some();
+                unless_harmless(path, error)?;
+                // A dangling link to a recording, which will fail on its own.
+                files.extend(at.filter(|_| !is_loop));
             }
         }
     }
     Ok(())
 }
 
+/// Whether an entry below a folder that was named is skipped.
+fn is_hidden(entry: &walkdir::DirEntry) -> bool {
+    entry.depth() > 0 && entry.file_name().as_encoded_bytes().starts_with(b".")
+}
+
+/// Passes over links back to a folder that is being searched, and links to nothing.
+fn unless_harmless(folder: &Path, error: walkdir::Error) -> Result<(), InputError> {
+    let at = error.path().unwrap_or(folder).to_path_buf();
+    let is_loop = error.loop_ancestor().is_some();
+    match io::Error::from(error) {
+        _ if is_loop => Ok(()),
+        error if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        error => Err(InputError::io(&at, error)),
+    }
+}
+
 fn push_sorted(
-    name: &str,
+    name: &Path,
     root: &Path,
     mut files: Vec<PathBuf>,
     found: &mut Vec<Found>,

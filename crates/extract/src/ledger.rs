@@ -16,6 +16,7 @@ use thiserror::Error;
 
 use crate::npz::{EntryRecord, sound_entries};
 use crate::outcome::Outcome;
+use crate::provenance::Provenance;
 
 /// Layout of the ledger; a run continues only ledgers of its own.
 pub const VERSION: u32 = 1;
@@ -84,6 +85,18 @@ pub struct Header {
 }
 
 impl Header {
+    /// The run that makes an output of this provenance in this format.
+    pub fn new(provenance: &Provenance, format: &str) -> Self {
+        Self {
+            ledger_version: VERSION,
+            tool_version: provenance.tool_version.clone(),
+            config_hash: provenance.config_hash.clone(),
+            inputs_hash: provenance.inputs_hash.clone(),
+            shard: provenance.shard.clone(),
+            format: format.into(),
+        }
+    }
+
     fn fields(&self) -> [(&'static str, String); 6] {
         [
             ("ledger version", self.ledger_version.to_string()),
@@ -176,6 +189,29 @@ impl Ledger {
     /// Whether an interrupted run stands beside `out`.
     pub fn is_pending(out: &Path) -> bool {
         fs::metadata(ledger_path(out)).is_ok_and(|meta| meta.len() > 0)
+    }
+
+    /// Refuses while another run is writing `out`.
+    ///
+    /// # Errors
+    /// [`LedgerError::Locked`], [`LedgerError::Io`].
+    pub fn require_idle(out: &Path) -> Result<(), LedgerError> {
+        Self::lock(out).map(drop)
+    }
+
+    /// Removes what a run has left beside the complete `out`, unless another run is at work there.
+    ///
+    /// # Errors
+    /// [`LedgerError::Io`].
+    pub fn forget(out: &Path) -> Result<(), LedgerError> {
+        if !Self::is_pending(out) {
+            return Ok(());
+        }
+        match Self::lock(out) {
+            Ok(ledger) => ledger.discard(),
+            Err(LedgerError::Locked { .. }) => Ok(()),
+            Err(error) => Err(error),
+        }
     }
 
     /// The partial output that this run writes.

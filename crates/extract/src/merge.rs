@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::inputs::Shard;
 use crate::layout::{self, LayoutError};
-use crate::ledger::part_path;
+use crate::ledger::{Header, Ledger, LedgerError, ledger_path};
 use crate::npz::{NpzError, NpzFile, NpzWriter};
 use crate::parquet::{self, ParquetTableError};
 use crate::provenance::Provenance;
@@ -27,12 +27,19 @@ pub enum MergeError {
     #[error(transparent)]
     Parquet(#[from] ParquetTableError),
     /// The result cannot be put in its place.
-    #[error("{path}: {source}")]
-    Io {
-        /// The file.
+    #[error(transparent)]
+    Ledger(#[from] LedgerError),
+    /// The result is there already, or an interrupted run that was to write it.
+    #[error("{path} exists; --overwrite replaces it")]
+    Exists {
+        /// The output or its ledger.
         path: PathBuf,
-        /// The reason.
-        source: std::io::Error,
+    },
+    /// The result must have another name.
+    #[error("{path}: must end in .npz or .parquet")]
+    Extension {
+        /// The output.
+        path: PathBuf,
     },
     /// The files are not the shards of one run.
     #[error("{path}: expected {expected}, found {actual}")]
@@ -55,31 +62,35 @@ pub enum MergeError {
 }
 
 /// Merges all shards of a run, given in any order. The kind of output follows from the extension of
-/// `out`: `.parquet`, else `.npz`. `out` appears only when it is complete.
+/// `out`. As in a run, `out` appears only when it is complete, and nothing else writes it meanwhile.
 ///
 /// # Errors
 /// [`MergeError`] names the shard that does not fit.
-pub fn merge(shards: &[PathBuf], out: &Path) -> Result<(), MergeError> {
-    let part = part_path(out);
-    if out.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet")) {
-        merge_parquet(shards, out, &part)?;
-    } else {
-        merge_npz(shards, out, &part)?;
+pub fn merge(shards: &[PathBuf], out: &Path, overwrite: bool) -> Result<(), MergeError> {
+    let parquet = match out.extension() {
+        Some(e) if e.eq_ignore_ascii_case("parquet") => true,
+        Some(e) if e.eq_ignore_ascii_case("npz") => false,
+        _ => return Err(MergeError::Extension { path: out.into() }),
+    };
+    let pending = Ledger::is_pending(out).then(|| ledger_path(out));
+    let taken = if out.exists() { Some(out.into()) } else { pending };
+    if let Some(path) = taken.filter(|_| !overwrite) {
+        return Err(MergeError::Exists { path });
     }
-    std::fs::rename(&part, out).map_err(|source| MergeError::Io { path: out.into(), source })
+    if parquet { merge_parquet(shards, out) } else { merge_npz(shards, out) }
 }
 
-fn merge_parquet(shards: &[PathBuf], out: &Path, part: &Path) -> Result<(), MergeError> {
+fn merge_parquet(shards: &[PathBuf], out: &Path) -> Result<(), MergeError> {
     let mut read = Vec::new();
     for path in shards {
         let (table, provenance) = parquet::read(path)?;
         read.push(Piece { path: path.clone(), table, provenance, file: () });
     }
     let (_, table, provenance) = join(read, out)?;
-    Ok(parquet::write(part, &table, &provenance)?)
+    publish(out, &provenance, "parquet", |part| Ok(parquet::write(part, &table, &provenance)?))
 }
 
-fn merge_npz(shards: &[PathBuf], out: &Path, part: &Path) -> Result<(), MergeError> {
+fn merge_npz(shards: &[PathBuf], out: &Path) -> Result<(), MergeError> {
     let mut read = Vec::new();
     for path in shards {
         let mut file = NpzFile::open(path)?;
@@ -88,17 +99,37 @@ fn merge_npz(shards: &[PathBuf], out: &Path, part: &Path) -> Result<(), MergeErr
     }
     let (mut files, table, provenance) = join(read, out)?;
     let (witness, _) = files[0].raw(layout::COMPRESSION_WITNESS)?;
-    let mut writer = NpzWriter::create(part, witness.compression)?;
-    for file in &mut files {
-        let names: Vec<String> =
-            file.names().iter().filter(|name| layout::is_frame_level(name)).cloned().collect();
-        for name in names {
-            let (entry, raw) = file.raw(&name)?;
-            writer.copy(&entry, raw)?;
+    publish(out, &provenance, "npz", |part| {
+        let mut writer = NpzWriter::create(part, witness.compression)?;
+        for file in &mut files {
+            let names: Vec<String> =
+                file.names().iter().filter(|name| layout::is_frame_level(name)).cloned().collect();
+            for name in names {
+                let (entry, raw) = file.raw(&name)?;
+                writer.copy(&entry, raw)?;
+            }
+        }
+        layout::write_table(&mut writer, &table, &provenance)?;
+        Ok(writer.finish()?)
+    })
+}
+
+/// Has the partial output written under the lock of a ledger, and gives it its name.
+fn publish(
+    out: &Path,
+    provenance: &Provenance,
+    format: &str,
+    write: impl FnOnce(&Path) -> Result<(), MergeError>,
+) -> Result<(), MergeError> {
+    let ledger = Ledger::create(out, &Header::new(provenance, format))?;
+    match write(&ledger.part()) {
+        Ok(()) => Ok(ledger.publish()?),
+        Err(error) => {
+            // The first error is the one that matters.
+            let _ = ledger.discard();
+            Err(error)
         }
     }
-    layout::write_table(&mut writer, &table, &provenance)?;
-    Ok(writer.finish()?)
 }
 
 /// One shard.

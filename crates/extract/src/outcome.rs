@@ -15,6 +15,8 @@ pub enum Status {
     Empty,
     /// Cannot be decoded: the bytes contradict the format.
     Corrupt,
+    /// The first bytes are of no audio format that is read.
+    NotAudio,
     /// A sound file of a format or codec that is not read.
     Unsupported,
     /// Holds NaN or infinite samples.
@@ -40,6 +42,7 @@ impl Status {
             Self::Truncated => "truncated",
             Self::Empty => "empty",
             Self::Corrupt => "corrupt",
+            Self::NotAudio => "not_audio",
             Self::Unsupported => "unsupported",
             Self::NonFinite => "non_finite",
             Self::TooShort => "too_short",
@@ -73,7 +76,8 @@ pub struct Outcome {
     /// Frames (samples per channel) that the header promises, where it does.
     #[serde(default)]
     pub declared_frames: Option<u64>,
-    /// Frames (samples per channel) that were decoded.
+    /// Frames (samples per channel) of the file that were decoded, up to the failure if there was one;
+    /// where only a stretch is taken, those of the stretch.
     #[serde(default)]
     pub decoded_frames: u64,
     /// Sampling rate of the file in Hz, once its header was understood.
@@ -118,11 +122,12 @@ impl Outcome {
 mod tests {
     use super::*;
 
-    const ALL: [Status; 9] = [
+    const ALL: [Status; 10] = [
         Status::Ok,
         Status::Truncated,
         Status::Empty,
         Status::Corrupt,
+        Status::NotAudio,
         Status::Unsupported,
         Status::NonFinite,
         Status::TooShort,

@@ -86,10 +86,15 @@ pub struct SummaryConfig {
 }
 
 impl SummaryConfig {
-    /// Refuses an empty list.
+    /// Refuses an empty list, and columns that would have the same name.
     pub fn check(&self) -> Result<(), ConfigError> {
         if self.stats.is_empty() {
             return Err(ConfigError::key("summary.stats", format!("is empty: {STATS}")));
+        }
+        for (index, stat) in self.stats.iter().enumerate() {
+            if self.stats[..index].contains(stat) {
+                return Err(ConfigError::key("summary.stats", format!("names {stat} twice")));
+            }
         }
         Ok(())
     }

@@ -105,6 +105,8 @@ impl RecordingPicture {
                 above = y;
             }
         }
+        let unit = TextStyle { upwards: true, ..style(10.0, Anchor::Middle) };
+        on.text(mel.x - 48.0, mel.y + mel.h / 2.0, "Hz", unit);
         let name = TextStyle { color: INK, ..style(11.0, Anchor::Start) };
         on.text(14.0, middle + 4.0, &channel.label, name);
         Ok(())

@@ -13,6 +13,7 @@ const LISTED: usize = 6;
 
 /// Arguments of `dataset`.
 #[derive(clap::Args)]
+#[command(after_help = "Example:\n  corsmal-feat dataset check ~/CCM")]
 pub struct Args {
     #[command(subcommand)]
     action: Action,

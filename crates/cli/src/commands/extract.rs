@@ -1,5 +1,6 @@
 //! `corsmal-feat extract`: recordings in, feature tensors or tables out.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -7,9 +8,10 @@ use std::sync::Arc;
 use corsmal_extract::config::Config;
 use corsmal_extract::inputs::{self, Shard};
 use corsmal_extract::npz::Compression;
-use corsmal_extract::run::{self, Options, Quiet, RunError};
+use corsmal_extract::run::{self, Options, Progress, Quiet, RunError};
+use serde_json::json;
 
-use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
+use crate::failure::{COULD_NOT_RUN, FAILED_FILES, Failure, INTERRUPTED};
 use crate::progress::{LogFormat, Meter};
 
 /// Arguments of `extract`.
@@ -27,7 +29,7 @@ pub struct Args {
     /// Recordings: files, folders (searched through), globs, manifests (.csv, .jsonl), or - for a
     /// WAV stream on standard input.
     #[arg(long = "in", value_name = "PATH", num_args = 1.., required = true)]
-    inputs: Vec<String>,
+    inputs: Vec<OsString>,
     /// Output: .npz, or .parquet for summary tables.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -35,7 +37,8 @@ pub struct Args {
     config: ConfigArgs,
     /// Worker threads; by default one for each core.
     #[arg(long, value_name = "N", env = "CORSMAL_FEAT_JOBS")]
-    jobs: Option<usize>,
+    #[arg(value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
     /// Only the i-th of n parts of the inputs, counted from 0; `merge` joins the outputs.
     #[arg(long, value_name = "I/N", default_value = "0/1")]
     shard: Shard,
@@ -104,60 +107,65 @@ impl ConfigArgs {
 
 /// Runs the extraction.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    let format = args.log_format;
+    match (extract(args), format) {
+        (Err(failure), LogFormat::Json) => {
+            eprintln!("{}", json!({"event": "error", "message": failure.to_string()}));
+            Ok(ExitCode::from(COULD_NOT_RUN))
+        }
+        (result, _) => result,
+    }
+}
+
+fn extract(args: Args) -> Result<ExitCode, Failure> {
     let config = Arc::new(args.config.load()?);
-    let jobs = match args.jobs {
-        Some(0) => return Err(Failure::new("--jobs 0 is not possible: at least 1")),
-        Some(jobs) => jobs,
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-    };
     let found = inputs::collect(&args.inputs)?;
     if found.is_empty() {
-        let names = args.inputs.join(" ");
-        return Err(Failure::new(format!("--in {names}: no recordings found")));
-    }
-    if args.dry_run {
-        run::is_parquet(&args.out, &config)?;
-        for input in args.shard.of(&found) {
-            println!("{}\t{}", input.id, input.source);
-        }
-        eprintln!(
-            "{} recordings, configuration {}, nothing was read or written",
-            args.shard.of(&found).len(),
-            &config.hash()[..12]
-        );
-        return Ok(ExitCode::SUCCESS);
+        let names: Vec<_> = args.inputs.iter().map(|name| name.to_string_lossy()).collect();
+        return Err(Failure::new(format!("--in {}: no recordings found", names.join(" "))));
     }
     let options = Options {
         out: args.out,
         compression: if args.compress { Compression::Deflated } else { Compression::Stored },
-        jobs,
+        jobs: args.jobs.map_or_else(cores, usize::from),
         shard: args.shard,
         resume: args.resume,
         overwrite: args.overwrite,
         max_errors: if args.strict { Some(0) } else { args.max_errors },
     };
-    let stop = crate::interrupt::flag();
-    let meter = Meter::new(args.log_format, &config);
-    let result = if args.quiet {
-        run::run(&found, &config, &options, &Quiet, stop)
-    } else {
-        run::run(&found, &config, &options, &meter, stop)
-    };
-    match result {
+    let meter = (!args.quiet).then(|| Meter::new(args.log_format));
+    if args.dry_run {
+        run::check_output(&options.out, &config)?;
+        let inputs = options.shard.of(&found);
+        for input in inputs {
+            println!("{}\t{}", input.id, input.source);
+        }
+        if let Some(meter) = meter {
+            meter.checked(inputs.len(), &config.hash());
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
+    let progress: &dyn Progress = meter.as_ref().map_or(&Quiet, |meter| meter);
+    match run::run(&found, &config, &options, progress, crate::interrupt::flag()) {
         Ok(report) => {
-            if !args.quiet {
+            if let Some(meter) = &meter {
                 meter.finish(&report, &options.out);
             }
             Ok(if report.failed() > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
         }
         Err(error @ RunError::Interrupted) => {
-            eprintln!("{error}");
+            Meter::stopped(args.log_format, "interrupted", &error.to_string());
             Ok(ExitCode::from(INTERRUPTED))
         }
         Err(error @ RunError::TooManyErrors { .. }) => {
-            eprintln!("error: {error}; --resume continues the run");
+            let message = format!("{error}; --resume continues the run");
+            Meter::stopped(args.log_format, "error", &message);
             Ok(ExitCode::from(FAILED_FILES))
         }
         Err(error) => Err(error.into()),
     }
+}
+
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
 }

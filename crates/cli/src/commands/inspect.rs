@@ -5,7 +5,7 @@ mod overview;
 mod recording;
 
 use std::fs::File;
-use std::io::{Read, Write};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -97,7 +97,7 @@ impl Refusal<'_> {
     /// Says why a file cannot be shown.
     fn print(&self, json: bool) -> Result<ExitCode, Failure> {
         if json {
-            print(&to_json(self)?)?;
+            print!("{}", to_json(self)?);
         } else {
             let reason = self.reason.strip_prefix(&format!("{}: ", self.path));
             eprintln!("{}: {}", self.path, reason.unwrap_or(self.reason));
@@ -108,10 +108,6 @@ impl Refusal<'_> {
 
 fn to_json(value: &impl Serialize) -> Result<String, Failure> {
     Ok(serde_json::to_string_pretty(value)? + "\n")
-}
-
-fn print(text: &str) -> Result<(), Failure> {
-    Ok(std::io::stdout().write_all(text.as_bytes())?)
 }
 
 /// Prints what the file is.

@@ -21,10 +21,13 @@ pub struct Args {
     /// The merged output.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    /// Replace an existing output.
+    #[arg(long)]
+    overwrite: bool,
 }
 
 /// Merges shards.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
-    corsmal_extract::merge::merge(&args.shards, &args.out)?;
+    corsmal_extract::merge::merge(&args.shards, &args.out, args.overwrite)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -1,8 +1,11 @@
 //! `corsmal-feat presets`: the configurations that come with the tool, and what their numbers are.
 
 use std::process::ExitCode;
+use std::sync::Arc;
 
-use corsmal_extract::config::{Config, PRESETS, Preset};
+use corsmal_extract::config::{Config, PRESETS, Preset, SignalConfig};
+use corsmal_extract::engine::Plan;
+use corsmal_extract::frontend::channels_out;
 
 use crate::failure::Failure;
 
@@ -25,7 +28,7 @@ pub struct Args {
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let Some(name) = args.name else {
         for preset in PRESETS {
-            println!("{:<16} {}", preset.name, preset.description());
+            println!("{:<16} {}", preset.name, Config::preset(preset.name)?.description);
         }
         return Ok(ExitCode::SUCCESS);
     };
@@ -34,8 +37,8 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         print!("{}", preset.toml);
         return Ok(ExitCode::SUCCESS);
     }
-    let config = Config::preset(&name)?;
-    println!("{}\n\nConfiguration hash: {}\n", preset.description(), config.hash());
+    let config = Arc::new(Config::preset(&name)?);
+    println!("{}\n\nConfiguration hash: {}\n", config.description, config.hash());
     for feature in &config.features {
         println!("{}: {}", feature.name(), feature.about());
         if let Some([first, end]) = feature.coefficients() {
@@ -43,18 +46,40 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         }
         println!("  {}\n", feature.to_value());
     }
+    if let Some(changes) = signal_changes(&config) {
+        println!("Signal: {changes}\n");
+    }
     match &config.summary {
         None => println!(
-            "Output: for each recording and feature an array [channels, coefficients, frames]."
+            "Output: for each recording and feature an array [channels, coefficients, frames], and the \
+             times of its frames in seconds."
         ),
-        Some(summary) => {
-            let stats: Vec<String> = summary.stats.iter().map(ToString::to_string).collect();
-            println!(
-                "Output: one row a recording; for each feature {} over its frames, {}.",
-                stats.join(", "),
-                if summary.average_channels { "channels averaged" } else { "channel by channel" }
-            );
-        }
+        Some(_) => println!("Output: one row a recording. {}", columns(&config)?),
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Keys of the front end that are not at their defaults.
+fn signal_changes(config: &Config) -> Option<String> {
+    let (set, default) = (config.to_value(), serde_json::json!(SignalConfig::default()));
+    let changed = set["signal"].as_object()?.iter().filter(|(key, value)| default[*key] != **value);
+    let changed: Vec<String> = changed.map(|(key, value)| format!("{key} = {value}")).collect();
+    (!changed.is_empty()).then(|| changed.join(", "))
+}
+
+/// Number, order and names of the columns, for recordings as those of the CCM data set.
+fn columns(config: &Arc<Config>) -> Result<String, Failure> {
+    const CHANNELS: usize = 8;
+    const RATE: f64 = 44_100.0;
+    let channels = channels_out(&config.signal.channels, CHANNELS).map_err(Failure::new)?;
+    let rate = if config.signal.sample_rate > 0.0 { config.signal.sample_rate } else { RATE };
+    let names = Plan::new(config, rate, channels)?.summary_names();
+    let (first, last) = (names.first(), names.last());
+    Ok(format!(
+        "Of {CHANNELS} channels at {RATE} Hz, {} columns, {} to {}: feature by feature, in it statistic \
+         by statistic, in that channel by channel.",
+        names.len(),
+        first.map_or("", String::as_str),
+        last.map_or("", String::as_str)
+    ))
 }

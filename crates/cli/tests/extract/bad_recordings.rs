@@ -68,7 +68,7 @@ fn each_has_its_outcome() {
     assert!(table.values().iter().all(|x| x.is_finite()));
     for (id, status, words) in [
         ("empty", Status::Empty, ""),
-        ("garbage", Status::Unsupported, ""),
+        ("garbage", Status::NotAudio, "starts with"),
         ("header", Status::Corrupt, "byte"),
         ("no_samples", Status::Empty, "no samples"),
         ("adpcm", Status::Unsupported, "format tag 0x0002"),
@@ -86,6 +86,9 @@ fn each_has_its_outcome() {
         let outcome = row(outcomes, id);
         assert!(!outcome.status.has_features() && !outcome.reason.is_empty(), "{outcome:?}");
     }
+    // The header of hound's float files is 68 bytes long, a frame 8.
+    assert_eq!(row(outcomes, "nan").byte_offset, Some(68 + 8 * 4500));
+    assert_eq!(row(outcomes, "nan").decoded_frames, 8000);
     let truncated = row(outcomes, "truncated");
     assert_eq!(truncated.status, Status::Truncated);
     assert_eq!((truncated.declared_frames, truncated.decoded_frames), (Some(8000), 7998));
@@ -126,6 +129,9 @@ fn strict_and_max_errors_stop_early_and_can_be_continued() {
         let run = extract(&audio, &out, &[NOT_CENTERED, stop].concat()).with(1);
         let allowed = if stop[0] == "--strict" { "(0 allowed)" } else { "(2 allowed)" };
         assert!(run.stderr.contains(allowed) && run.stderr.contains("--resume"), "{}", run.stderr);
+        // Nothing is written behind the one that was too many.
+        let failed = if stop[0] == "--strict" { "after 1 failed" } else { "after 3 failed" };
+        assert!(run.stderr.contains(failed), "{}", run.stderr);
         assert!(!out.exists());
     }
     let pending = extract(&audio, &out, NOT_CENTERED).with(2);
@@ -142,6 +148,11 @@ fn crops_beyond_the_end_are_empty_and_manifests_crop() {
     let out = at("feats.npz");
     extract(&one, &out, &["--preset", "mfcc-zcr", "--set", "signal.start=1"]).with(1);
     assert_eq!(table(&out).outcomes()[0].status, Status::Empty);
+    // Frames are counted in the file, not in the signal that features see.
+    let resampled = ["--preset", "esc26", "--set", "signal.length=3", "--overwrite"];
+    extract(&one, &out, &resampled).with(0);
+    let outcome = table(&out).outcomes()[0].clone();
+    assert_eq!((outcome.declared_frames, outcome.decoded_frames), (Some(16_000), 16_000));
 
     let list = "path,id,start,end,label\n\
                 a.wav,all,,,x\na.wav,middle,0.25,0.75,y\na.wav,late,0.75,9,y\na.wav,after,2,3,z\n";
@@ -163,4 +174,18 @@ fn crops_beyond_the_end_are_empty_and_manifests_crop() {
     let alone = at("alone.npz");
     extract(&at("middle.wav"), &alone, &["--preset", "mfcc-zcr"]).with(0);
     assert_eq!(table(&alone).values().row(0), table_of.values().row(1));
+}
+
+#[test]
+fn a_rate_that_would_make_billions_of_samples_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = wav(&folder.path().join("slow.wav"), 1, 200_000, 1);
+    let mut bytes = std::fs::read(&input).unwrap();
+    bytes[24..28].copy_from_slice(&1u32.to_le_bytes());
+    std::fs::write(&input, bytes).unwrap();
+    let out = folder.path().join("feats.npz");
+    extract(&input, &out, &["--preset", "esc26"]).with(1);
+    let outcome = table(&out).outcomes()[0].clone();
+    assert_eq!(outcome.status, Status::Unsupported);
+    assert!(outcome.reason.contains("22050 is more than 100 times the 1 Hz"), "{}", outcome.reason);
 }

@@ -106,8 +106,8 @@ fn two_runs_do_not_write_one_output() {
     while !std::fs::metadata(&ledger).is_ok_and(|m| m.len() > 0) {
         std::thread::sleep(Duration::from_millis(1));
     }
-    for more in ["--resume", "--overwrite"] {
-        let second = extract(&folder.path().join("audio"), &out, &[more]).with(2);
+    for more in [&[][..], &["--resume"], &["--overwrite"]] {
+        let second = extract(&folder.path().join("audio"), &out, more).with(2);
         assert!(second.stderr.contains("another run"), "{}", second.stderr);
     }
     drop(first.stdin.take());

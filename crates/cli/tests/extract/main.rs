@@ -8,4 +8,5 @@ mod crashes;
 mod long;
 mod outputs;
 mod refusals;
+mod streams;
 mod support;

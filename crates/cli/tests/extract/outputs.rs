@@ -158,6 +158,16 @@ fn a_log_for_machines_is_json_lines() {
     assert_eq!(of("finished")[0]["statuses"]["ok"], 3);
     let again = extract(&audio, &out, &["--log-format", "json"]).with(1);
     assert_eq!(log(&again).last().unwrap()["up_to_date"], true);
+    // What ends a run is an event, too.
+    let json = |more: &[&str]| {
+        let run = extract(&audio, &out, &[&["--log-format", "json"], more].concat());
+        let last = log(&run).pop().unwrap();
+        (run.code, last["event"].as_str().unwrap().to_string())
+    };
+    assert_eq!(json(&["--overwrite", "--strict"]), (Some(1), "error".into()));
+    assert_eq!(json(&["--overwrite", "--preset", "nope"]), (Some(2), "error".into()));
+    assert_eq!(json(&["--preset", "esc26"]), (Some(2), "error".into()));
+    assert_eq!(json(&["--dry-run"]), (Some(0), "checked".into()));
     let quiet = extract(&audio, &out, &["--quiet", "--overwrite"]).with(1);
     assert!(quiet.stderr.is_empty() && quiet.stdout.is_empty());
 }
@@ -175,4 +185,31 @@ fn what_librosa_warns_of_is_warned_of_once() {
     let short = wav(&folder.path().join("short.wav"), 1, 1000, 1);
     let run = extract(&short, &out, &["--overwrite"]).with(0);
     assert!(run.stderr.contains("warning: short: 1000 samples"), "{}", run.stderr);
+}
+
+#[test]
+fn a_shard_without_recordings_says_so() {
+    let folder = folder(1);
+    let out = folder.path().join("feats.npz");
+    let run = extract(&folder.path().join("audio"), &out, &["--shard", "0/2"]).with(0);
+    assert!(run.stderr.contains("feats.npz: no recordings in "), "{}", run.stderr);
+    assert!(table(&out).ids().is_empty());
+}
+
+#[test]
+fn every_command_has_help_with_an_example_and_a_manual_page() {
+    let commands = ended(tool().arg("--help")).with(0).stdout;
+    let commands = commands.split("Commands:").nth(1).unwrap().split("Options:").next().unwrap();
+    let commands: Vec<&str> =
+        commands.lines().filter_map(|l| l.strip_prefix("  ")?.split(' ').next()).collect();
+    for command in commands.into_iter().filter(|c| !c.is_empty() && *c != "help") {
+        let help = ended(tool().args([command, "--help"])).with(0).stdout;
+        assert!(help.contains("Example"), "{command}");
+        let page = ended(tool().args(["completions", "man", command])).with(0).stdout;
+        assert!(page.contains(&format!(".TH corsmal-feat-{command} 1")), "{command}: {page}");
+    }
+    let all = ended(tool().args(["completions", "man"])).with(0).stdout;
+    assert!(all.contains("extract") && all.contains(".TH corsmal-feat 1"));
+    let unknown = ended(tool().args(["completions", "man", "nope"])).with(2);
+    assert!(unknown.stderr.contains("nope") && unknown.stderr.contains("extract"));
 }

@@ -26,6 +26,7 @@ fn impossible_values_name_key_value_and_what_is_allowed() {
         ("signal.chanels=mean", &["chanels", "channels"]),
         ("summary.stat=mean", &["stat"]),
         ("summary.stats=[\"mode\"]", &["mode", "median"]),
+        ("summary.stats=[\"median\",\"p50\"]", &["summary.stats", "median", "twice"]),
         ("mfcc.hop_length=0", &["features.mfcc", "hop_length", "0", "at least 1"]),
         ("mfcc.n_fft=0", &["features.mfcc", "n_fft", "0", "at least 1"]),
         ("mfcc.n_fft=-5", &["n_fft", "-5"]),
@@ -81,9 +82,11 @@ fn wrong_names_are_refused() {
     refused(&input, &out, &["--config", at("gone.toml").to_str().unwrap()], &["gone.toml"]);
     refused(&input, &out, &["--config", at("broken.toml").to_str().unwrap()], &["broken.toml"]);
     refused(&input, &out, &["--config", at("none.toml").to_str().unwrap()], &["features"]);
-    refused(&input, &out, &["--jobs", "0"], &["--jobs 0", "at least 1"]);
-    refused(&input, &at("nowhere/feats.npz"), &[], &["nowhere"]);
-    refused(&input, &at("folder.npz"), &[], &["folder.npz"]);
+    for dry in [&[][..], &["--dry-run"]] {
+        refused(&input, &at("nowhere/feats.npz"), dry, &["nowhere/feats.npz", "no folder"]);
+        refused(&input, &at("folder.npz"), dry, &["folder.npz", "is a folder"]);
+    }
+    refused(&input, &at("folder.npz"), &["--overwrite"], &["folder.npz", "is a folder"]);
     refused(&input, &at("feats.csv"), &[], &["feats.csv", ".npz", ".parquet"]);
     refused(&input, &at("feats"), &[], &["feats", ".npz", ".parquet"]);
     refused(&input, &at("feats.parquet"), &[], &["feats.parquet", "summary"]);
@@ -102,6 +105,8 @@ fn arguments_that_clap_refuses_end_with_two_as_well() {
     let out = folder.path().join("feats.npz");
     for more in [
         &["--shard", "2/2"][..],
+        &["--jobs", "0"],
+        &["--jobs", "1025"],
         &["--shard", "x"],
         &["--max-errors", "-1"],
         &["--strict", "--max-errors", "3"],
@@ -133,9 +138,21 @@ fn an_output_of_something_else_is_kept() {
     extract(&input, &out, &["--preset", "esc26", "--overwrite"]).with(0);
     assert_ne!(std::fs::read(&out).unwrap(), bytes);
 
+    let shard = folder.path().join("shard.npz");
+    extract(&input, &shard, &[]).with(0);
     std::fs::write(&out, "my thesis").unwrap();
     refused(&input, &out, &[], &["feats.npz", "not an output of this tool"]);
+    let merge = |out: &Path, more: &[&str]| {
+        ended(tool().arg("merge").arg(&shard).arg("--out").arg(out).args(more))
+    };
+    let refusal = merge(&out, &[]).with(2).stderr;
+    assert!(refusal.contains("feats.npz exists; --overwrite"), "{refusal}");
+    let refusal = merge(&folder.path().join("feats.txt"), &[]).with(2).stderr;
+    assert!(refusal.contains("feats.txt: must end in .npz or .parquet"), "{refusal}");
     assert_eq!(std::fs::read(&out).unwrap(), b"my thesis");
+    merge(&out, &["--overwrite"]).with(0);
+    assert!(std::fs::read(&out).unwrap() == std::fs::read(&shard).unwrap());
+    assert_eq!(names(folder.path()), ["a.wav", "b.wav", "feats.npz", "shard.npz"]);
 }
 
 #[test]
@@ -146,19 +163,26 @@ fn no_space_is_an_error_and_the_run_can_go_on() {
     }
     let folder = crate::support::folder(30);
     let input = folder.path().join("audio");
-    let out = folder.path().join("full/feats.npz");
-    let whole = folder.path().join("whole.npz");
+    wav(&input.join("long.wav"), 2, 420_000, 1);
     std::fs::create_dir(folder.path().join("full")).unwrap();
-    // A limit on the size of files stands for a full disk.
-    let limited = extraction(&input, &out, &[]);
-    let mut shell = std::process::Command::new("sh");
-    shell.args(["-c", "trap '' XFSZ; ulimit -f 256; exec \"$0\" \"$@\""]);
-    shell.arg(limited.get_program()).args(limited.get_args());
-    let run = ended(&mut shell).with(2);
-    assert_eq!(run.stderr.matches("error: ").count(), 1, "{}", run.stderr);
-    assert!(run.stderr.contains("feats.npz"), "{}", run.stderr);
-    assert!(!out.exists());
-    extract(&input, &out, &["--resume"]).with(0);
-    extract(&input, &whole, &[]).with(0);
-    assert!(std::fs::read(&out).unwrap() == std::fs::read(&whole).unwrap());
+    // The long recording's values, 25 MiB, go to a temporary file before they are summarised.
+    let summary = &["--set", "melspectrogram.hop_length=16", "--set", "summary.stats=[\"mean\"]"];
+    for (name, more, place) in
+        [("frames", &[][..], "frames.npz"), ("rows", summary, "full: temporary file")]
+    {
+        let out = folder.path().join(format!("full/{name}.npz"));
+        let whole = folder.path().join(format!("{name}.npz"));
+        // A limit on the size of files stands for a full disk.
+        let limited = extraction(&input, &out, more);
+        let mut shell = std::process::Command::new("sh");
+        shell.args(["-c", "trap '' XFSZ; ulimit -f 256; exec \"$0\" \"$@\""]);
+        shell.arg(limited.get_program()).args(limited.get_args());
+        let run = ended(&mut shell).with(2);
+        assert_eq!(run.stderr.matches("error: ").count(), 1, "{}", run.stderr);
+        assert!(run.stderr.contains(place), "{}", run.stderr);
+        assert!(!out.exists());
+        extract(&input, &out, &[more, &["--resume"]].concat()).with(0);
+        extract(&input, &whole, more).with(0);
+        assert!(std::fs::read(&out).unwrap() == std::fs::read(&whole).unwrap());
+    }
 }

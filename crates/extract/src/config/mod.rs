@@ -81,6 +81,8 @@ pub struct Config {
     pub summary: Option<SummaryConfig>,
     /// Fitted projection that the statistics of a recording go through.
     pub projection: Option<ProjectionConfig>,
+    /// What the configuration says of itself; no number depends on it, nor the hash.
+    pub description: String,
 }
 
 #[derive(Deserialize)]
@@ -162,7 +164,6 @@ impl Config {
         }
         librosa::resolve(&mut value)?;
         let raw: Raw = serde_json::from_value(value).map_err(|e| top_level(&e))?;
-        let _ = raw.description;
         let signal: SignalConfig = typed("signal", &raw.signal)?;
         signal.check()?;
         if raw.features.is_empty() {
@@ -187,7 +188,8 @@ impl Config {
                 Some(summary)
             }
         };
-        let mut config = Self { signal, features, summary, projection: None };
+        let description = raw.description;
+        let mut config = Self { signal, features, summary, projection: None, description };
         if let Some(value) = raw.projection {
             config.projection = Some(ProjectionConfig::parse(&config, value)?);
         }

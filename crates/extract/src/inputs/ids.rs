@@ -1,6 +1,7 @@
 //! Unique ids for a list of inputs.
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::path::{Component, Path};
 
 use super::{Found, InputError, InputSource, Naming};
@@ -19,6 +20,9 @@ pub(super) fn refusal(id: &str) -> Option<String> {
         format!("must not end in {NPY}")
     } else if id.len() > LONGEST {
         format!("must not be longer than {LONGEST} bytes")
+    } else if id.starts_with('/') || id.split('/').any(|part| part == "..") {
+        // What unpacks the archive would write elsewhere.
+        "must not be an absolute path or hold ..".to_string()
     } else if id.chars().any(char::is_control) {
         "must not hold control characters".to_string()
     } else {
@@ -87,10 +91,20 @@ fn id_of(path: &Path) -> String {
     let parts: Vec<String> = path
         .components()
         .filter_map(|part| match part {
-            Component::Normal(name) => Some(name.to_string_lossy().into_owned()),
+            Component::Normal(name) => Some(readable(name)),
             _ => None,
         })
         .collect();
     let id = parts.join("/").replace(char::is_control, "\u{fffd}");
     if id.starts_with(RESERVED) { format!("./{id}") } else { id }
+}
+
+/// A name as text: bytes that are not UTF-8 as `\xff`, so that different names stay different.
+fn readable(name: &OsStr) -> String {
+    let mut text = String::new();
+    for chunk in name.as_encoded_bytes().utf8_chunks() {
+        text.push_str(chunk.valid());
+        text.extend(chunk.invalid().iter().map(|byte| format!("\\x{byte:02x}")));
+    }
+    text
 }

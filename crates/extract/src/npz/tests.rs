@@ -299,8 +299,6 @@ fn text_without_bytes_costs_nothing() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(300))]
-
     #[test]
     fn any_damage_gives_an_answer(
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),

@@ -15,7 +15,7 @@ use std::time::Duration;
 use super::plans::{Planned, Plans};
 use super::reader::{self, Failed};
 use super::sink::{Finished, Member, Sink};
-use super::{Options, Progress, RunError, identity_of};
+use super::{Options, Progress, RunError, folder_of, identity_of};
 use crate::config::Config;
 use crate::engine::{Features, Recording, Span};
 use crate::inputs::Input;
@@ -88,10 +88,7 @@ impl<'a> Collector<'a> {
         stop: &'a AtomicBool,
         sink: Sink,
     ) -> Self {
-        let folder = match options.out.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent.to_path_buf(),
-            _ => PathBuf::from("."),
-        };
+        let folder = folder_of(&options.out).to_path_buf();
         let state = State { next: sink.next, written: sink.next, ..State::default() };
         Self {
             inputs,
@@ -111,7 +108,7 @@ impl<'a> Collector<'a> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.options.jobs)
             .build()
-            .map_err(|e| RunError::Temporary(std::io::Error::other(e)))?;
+            .map_err(|e| RunError::Jobs { jobs: self.options.jobs, why: e.to_string() })?;
         pool.scope(|scope| {
             for _ in 0..self.options.jobs {
                 scope.spawn(|_| self.worker());
@@ -188,9 +185,11 @@ impl<'a> Collector<'a> {
         let spans = reader::spans(source.as_ref(), &planned, &crop);
         let mut recording = Recording::new(planned.plan.clone(), &self.folder);
         if let [span] = spans.as_slice() {
+            let decoded = &mut outcome.decoded_frames;
+            let span = (&crop, span);
             let computed =
-                reader::compute(source.as_mut(), &planned, &crop, span, self.stop, |part| {
-                    recording.add(part).map_err(|e| self.temporary(e))
+                reader::compute(source.as_mut(), &planned, span, self.stop, decoded, |part| {
+                    recording.add(part).map_err(Failed::temporary)
                 });
             reader::describe(&mut outcome, source.as_ref());
             return match computed {
@@ -223,11 +222,13 @@ impl<'a> Collector<'a> {
         let input = &self.inputs[job.input];
         let mut parts = Vec::new();
         let mut last = None;
+        let mut decoded = 0;
         let computed = reader::open(input).and_then(|source| {
             let signal = &job.planned.plan.config.signal;
             let crop = reader::crop(signal, (input.start, input.end), source.spec().sample_rate);
             let source = last.insert(source).as_mut();
-            reader::compute(source, &job.planned, &crop, &job.span, self.stop, |part| {
+            let (span, decoded) = ((&crop, &job.span), &mut decoded);
+            reader::compute(source, &job.planned, span, self.stop, decoded, |part| {
                 parts.push(part);
                 Ok(())
             })
@@ -242,6 +243,7 @@ impl<'a> Collector<'a> {
             if let Some(source) = last {
                 reader::describe(&mut partial.outcome, source.as_ref());
             }
+            partial.outcome.decoded_frames += decoded;
             partial.early.insert(job.index, result);
         }
         drop(state);
@@ -271,7 +273,7 @@ impl<'a> Collector<'a> {
                 (Ok(mut recording), Ok(parts)) => parts
                     .into_iter()
                     .try_for_each(|part| recording.add(part))
-                    .map_err(|e| self.temporary(e))
+                    .map_err(Failed::temporary)
                     .map(|()| recording),
                 (Ok(_), Err(failed)) | (Err(failed), _) => Err(failed),
             };
@@ -284,16 +286,11 @@ impl<'a> Collector<'a> {
         }
     }
 
-    fn temporary(&self, error: std::io::Error) -> Failed {
-        let folder = self.folder.display();
-        Failed::new(Status::Io, format!("temporary file in {folder}: {error}"))
-    }
-
     /// Finishes a recording whose spans are all added.
     fn complete(
         &self,
         index: usize,
-        mut outcome: Outcome,
+        outcome: Outcome,
         planned: &Planned,
         recording: Result<Recording, Failed>,
     ) {
@@ -308,13 +305,12 @@ impl<'a> Collector<'a> {
                     let compression = self.options.compression;
                     let id = &self.inputs[index].id;
                     let members = Member::of(id, plan, arrays, compression);
-                    (members.map_err(|e| self.temporary(e))?, None, total)
+                    (members.map_err(Failed::temporary)?, None, total)
                 }
             })
         };
         match finish() {
             Ok((arrays, row, total)) => {
-                outcome.decoded_frames = total;
                 if let Some(longest) = plan.longest_transform()
                     && total < longest as u64
                 {
@@ -330,8 +326,13 @@ impl<'a> Collector<'a> {
         }
     }
 
-    /// An input without features.
+    /// An input without features; or the end of the run, where the fault is not the input's.
     fn fail(&self, index: usize, mut outcome: Outcome, failed: Failed) {
+        if let Some(source) = failed.temporary {
+            let path = self.folder.clone();
+            self.lock().error.get_or_insert(RunError::Temporary { path, source });
+            return self.changed.notify_all();
+        }
         outcome.status = failed.status;
         outcome.reason = failed.reason;
         outcome.byte_offset = failed.byte_offset;
@@ -348,11 +349,16 @@ impl<'a> Collector<'a> {
             let Ok(mut sink) = self.sink.try_lock() else { return };
             loop {
                 let index = sink.next;
-                let Some(finished) = self.lock().ready.remove(&index) else { break };
+                let mut state = self.lock();
+                if state.error.is_some() {
+                    return;
+                }
+                let Some(finished) = state.ready.remove(&index) else { break };
+                drop(state);
                 match sink.write(&self.inputs[index], finished) {
                     Ok(outcome) => self.written(&outcome),
                     Err(error) => {
-                        self.lock().error = Some(error);
+                        self.lock().error.get_or_insert(error);
                         self.changed.notify_all();
                         return;
                     }

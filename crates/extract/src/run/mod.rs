@@ -92,10 +92,26 @@ pub enum RunError {
     /// The existing output cannot be read.
     #[error(transparent)]
     Layout(#[from] LayoutError),
-    /// A temporary file failed.
-    #[error("temporary file beside the output: {0}")]
-    Temporary(std::io::Error),
+    /// A temporary file beside the output failed.
+    #[error("{path}: temporary file: {source}")]
+    Temporary {
+        /// Its folder.
+        path: PathBuf,
+        /// The reason.
+        source: std::io::Error,
+    },
+    /// So many workers are not possible.
+    #[error("jobs = {jobs} is not possible: {why}")]
+    Jobs {
+        /// Number asked for.
+        jobs: usize,
+        /// What is possible, or what the system says.
+        why: String,
+    },
 }
+
+/// Most worker threads.
+pub const MAX_JOBS: usize = 1024;
 
 /// How to run.
 #[derive(Debug, Clone)]
@@ -104,7 +120,7 @@ pub struct Options {
     pub out: PathBuf,
     /// Compression of `.npz` members.
     pub compression: Compression,
-    /// Worker threads, at least 1.
+    /// Worker threads, 1 to [`MAX_JOBS`].
     pub jobs: usize,
     /// Part of the inputs.
     pub shard: Shard,
@@ -164,7 +180,10 @@ pub fn run(
     progress: &dyn Progress,
     stop: &AtomicBool,
 ) -> Result<Report, RunError> {
-    let parquet = is_parquet(&options.out, config)?;
+    let parquet = check_output(&options.out, config)?;
+    if !(1..=MAX_JOBS).contains(&options.jobs) {
+        return Err(RunError::Jobs { jobs: options.jobs, why: format!("1 to {MAX_JOBS}") });
+    }
     let provenance = Provenance::new(
         config.to_value().to_string(),
         config.hash(),
@@ -177,21 +196,16 @@ pub fn run(
             return Ok(report);
         }
         if !options.resume && Ledger::is_pending(&options.out) {
+            Ledger::require_idle(&options.out)?;
             return Err(RunError::Pending { path: ledger::ledger_path(&options.out) });
         }
     }
-    let header = ledger::Header {
-        ledger_version: ledger::VERSION,
-        tool_version: provenance.tool_version.clone(),
-        config_hash: provenance.config_hash.clone(),
-        inputs_hash: provenance.inputs_hash.clone(),
-        shard: provenance.shard.clone(),
-        format: match (parquet, options.compression) {
-            (true, _) => "parquet".into(),
-            (false, Compression::Stored) => "npz stored".into(),
-            (false, Compression::Deflated) => "npz deflated".into(),
-        },
+    let format = match (parquet, options.compression) {
+        (true, _) => "parquet",
+        (false, Compression::Stored) => "npz stored",
+        (false, Compression::Deflated) => "npz deflated",
     };
+    let header = ledger::Header::new(&provenance, format);
     let (ledger, records) = if options.resume && !options.overwrite {
         Ledger::resume(&options.out, &header)?
     } else {
@@ -217,19 +231,33 @@ pub fn run(
 /// Whether an output is Parquet, else `.npz`, by its extension.
 ///
 /// # Errors
-/// [`RunError::Format`]: another extension, or a format that cannot hold what `config` gives.
-pub fn is_parquet(out: &Path, config: &Config) -> Result<bool, RunError> {
-    let refuse = |why: &str| Err(RunError::Format { path: out.into(), why: why.into() });
-    match out.extension() {
-        Some(e) if e.eq_ignore_ascii_case("npz") => Ok(false),
-        Some(e) if e.eq_ignore_ascii_case("parquet") => match config.summary {
-            Some(_) => Ok(true),
-            None => refuse(
-                "Parquet holds summary tables: the configuration needs a [summary], or write .npz",
-            ),
-        },
-        _ => refuse("must end in .npz or .parquet"),
+/// [`RunError::Format`]: another extension, a format that cannot hold what `config` gives, a folder
+/// of that name, or no folder to put it in.
+pub fn check_output(out: &Path, config: &Config) -> Result<bool, RunError> {
+    let refuse = |why: String| Err(RunError::Format { path: out.into(), why });
+    let parquet = match out.extension() {
+        Some(e) if e.eq_ignore_ascii_case("npz") => false,
+        Some(e) if e.eq_ignore_ascii_case("parquet") => true,
+        _ => return refuse("must end in .npz or .parquet".into()),
+    };
+    if parquet && config.summary.is_none() {
+        let why = "Parquet holds summary tables: the configuration needs a [summary], \
+                   or write .npz";
+        return refuse(why.into());
     }
+    if out.is_dir() {
+        return refuse("is a folder".into());
+    }
+    let folder = folder_of(out);
+    if !folder.is_dir() {
+        return refuse(format!("there is no folder {}", folder.display()));
+    }
+    Ok(parquet)
+}
+
+/// The folder that a file is in.
+fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// The report of an output that is already complete; an error where it holds something else.
@@ -263,18 +291,23 @@ fn finished(
         return Err(refuse(why));
     }
     let outcomes = table.outcomes().to_vec();
+    if outcomes.iter().any(|outcome| outcome.identity == identity::STREAM) {
+        return Err(refuse("holds features of a stream, which cannot be read again to compare"));
+    }
     let same = outcomes.len() == inputs.len()
         && outcomes.iter().zip(inputs).all(|(o, i)| o.identity == identity_of(i));
     if !same {
         return Err(refuse("holds features of files that have changed since"));
     }
+    // What a kill between the last two steps of that run has left.
+    Ledger::forget(out)?;
     Ok(Some(Report { resumed: outcomes.len(), outcomes, up_to_date: true }))
 }
 
 /// Identity of an input as it is now; empty where it cannot be read.
 fn identity_of(input: &Input) -> String {
     match &input.source {
-        InputSource::Stdin => identity::STDIN.to_string(),
+        InputSource::Stdin => identity::STREAM.to_string(),
         InputSource::File(path) => identity::of_file(path).unwrap_or_default(),
     }
 }

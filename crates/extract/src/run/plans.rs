@@ -11,6 +11,10 @@ use crate::engine::Plan;
 use crate::frontend::channels_out;
 use crate::run::Progress;
 
+/// Largest ratio of resampling: a header that says 1 Hz would turn a small file into billions of
+/// samples.
+const MAX_EXPANSION: f64 = 100.0;
+
 /// What a recording is computed with.
 #[derive(Clone)]
 pub struct Planned {
@@ -18,6 +22,15 @@ pub struct Planned {
     pub plan: Arc<Plan>,
     /// The resampling filters, where the rate changes.
     pub resample: Option<Converter>,
+}
+
+impl Planned {
+    /// Frames to take at a time of recordings at `sample_rate` Hz, so that the front end makes about
+    /// `frames` of them at most.
+    pub fn step(&self, frames: usize, sample_rate: u32) -> usize {
+        let ratio = (self.plan.sample_rate / f64::from(sample_rate)).max(1.0);
+        ((frames as f64 / ratio) as usize).max(1)
+    }
 }
 
 type Made = Result<Planned, String>;
@@ -70,6 +83,12 @@ impl<'a> Plans<'a> {
         let native = f64::from(spec.sample_rate);
         let rate = if signal.sample_rate > 0.0 { signal.sample_rate } else { native };
         let channels = channels_out(&signal.channels, usize::from(spec.channels))?;
+        if rate > native * MAX_EXPANSION {
+            return Err(format!(
+                "signal.sample_rate = {rate} is more than {MAX_EXPANSION} times the {native} Hz of the \
+                 recording"
+            ));
+        }
         let resample = (rate != native)
             .then(|| Converter::new(native, rate, signal.res_type))
             .transpose()

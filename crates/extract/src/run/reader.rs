@@ -1,5 +1,6 @@
 //! One span of one recording: opened, read, pushed through front end and extractor.
 
+use std::io;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -28,12 +29,20 @@ pub struct Failed {
     pub reason: String,
     /// Byte in the file, where known.
     pub byte_offset: Option<u64>,
+    /// A temporary file failed, which is not the recording's fault.
+    pub temporary: Option<io::Error>,
 }
 
 impl Failed {
     /// A failure without a place.
     pub fn new(status: Status, reason: impl Into<String>) -> Self {
-        Self { status, reason: reason.into(), byte_offset: None }
+        Self { status, reason: reason.into(), byte_offset: None, temporary: None }
+    }
+
+    /// A temporary file failed.
+    pub fn temporary(error: io::Error) -> Self {
+        let reason = format!("temporary file: {error}");
+        Self { temporary: Some(error), ..Self::new(Status::Io, reason) }
     }
 }
 
@@ -41,11 +50,12 @@ impl From<AudioError> for Failed {
     fn from(error: AudioError) -> Self {
         let status = match error.status() {
             "empty" => Status::Empty,
+            "not_audio" => Status::NotAudio,
             "corrupt" => Status::Corrupt,
             "io" => Status::Io,
             _ => Status::Unsupported,
         };
-        Self { status, reason: error.to_string(), byte_offset: error.offset() }
+        Self { byte_offset: error.offset(), ..Self::new(status, error.to_string()) }
     }
 }
 
@@ -104,14 +114,15 @@ pub fn spans(source: &dyn BlockSource, planned: &Planned, crop: &Range<u64>) -> 
     spans
 }
 
-/// Reads and computes one span, and hands it to `each` in parts of bounded size. Whether it came to
-/// its end: `false` when the run was stopped.
+/// Reads and computes one span of a crop, and hands it to `each` in parts of bounded size; adds to
+/// `decoded` the frames of the file that belong to it. Whether it came to its end: `false` when the
+/// run was stopped.
 pub fn compute(
     source: &mut dyn BlockSource,
     planned: &Planned,
-    crop: &Range<u64>,
-    span: &Range<u64>,
+    (crop, span): (&Range<u64>, &Range<u64>),
     stop: &AtomicBool,
+    decoded: &mut u64,
     mut each: impl FnMut(Span) -> Result<(), Failed>,
 ) -> Result<bool, Failed> {
     let plan = &planned.plan;
@@ -125,12 +136,19 @@ pub fn compute(
     let begin = crop.start.saturating_add(first);
     let end = crop.end.min(crop.start.saturating_add(span.end.saturating_add(after as u64)));
     skip_to(source, begin)?;
+    let own = crop.start.saturating_add(span.start)..crop.start.saturating_add(span.end);
     let checked = may_be_non_finite(source.spec());
     let mut extractor = Extractor::new(plan.clone(), span.clone(), first);
     let identity = front.is_identity();
     let (mut block, mut signal) = (Vec::new(), Vec::new());
+    let step = planned.step(BLOCK / channels, source.spec().sample_rate);
     let mut position = begin;
     let mut ended = false;
+    // Frames read belong to the span, to its context, or in part to both.
+    let mut count = |position: u64, frames: usize| {
+        let end = (position + frames as u64).min(own.end);
+        *decoded += end.saturating_sub(position.max(own.start));
+    };
     while position < end {
         if stop.load(Ordering::Relaxed) {
             return Ok(false);
@@ -138,21 +156,24 @@ pub fn compute(
         if extractor.stored() > PART {
             each(extractor.take())?;
         }
-        let wanted = ((BLOCK / channels).max(1) as u64).min(end - position) as usize;
+        let wanted = (step as u64).min(end - position) as usize;
         let frames = if identity {
             let room = extractor.room(wanted);
             let frames = source.read(room)?;
+            count(position, frames);
             if checked {
-                require_finite(&room[..frames * channels], position, channels)?;
+                let byte_of = |frame| source.byte_of(frame);
+                require_finite(&room[..frames * channels], position, channels, byte_of)?;
             }
             extractor.commit(wanted, frames);
             frames
         } else {
             block.resize(wanted * channels, 0.0);
             let frames = source.read(&mut block)?;
+            count(position, frames);
             let samples = &block[..frames * channels];
             if checked {
-                require_finite(samples, position, channels)?;
+                require_finite(samples, position, channels, |frame| source.byte_of(frame))?;
             }
             front.push(samples, &mut signal);
             extractor.push(&signal);
@@ -215,21 +236,25 @@ fn may_be_non_finite(spec: &AudioSpec) -> bool {
     !(spec.format.contains("pcm_s") || spec.format.contains("pcm_u"))
 }
 
-/// Refuses samples that features cannot be computed of; `position` is that of the first frame.
-pub fn require_finite(samples: &[f32], position: u64, channels: usize) -> Result<(), Failed> {
+/// Refuses samples that features cannot be computed of; `position` is that of the first frame, and
+/// `byte_of` knows where in the file a frame begins.
+pub fn require_finite(
+    samples: &[f32],
+    position: u64,
+    channels: usize,
+    byte_of: impl Fn(u64) -> Option<u64>,
+) -> Result<(), Failed> {
     if samples.iter().fold(true, |all, x| all & x.is_finite()) {
         return Ok(());
     }
     let bad = samples.iter().filter(|x| !x.is_finite()).count();
     let at = samples.iter().position(|x| !x.is_finite()).unwrap_or(0);
-    Err(Failed::new(
-        Status::NonFinite,
-        format!(
-            "NaN or infinite from frame {} on (channel {}; {bad} such samples in that block)",
-            position + (at / channels) as u64,
-            at % channels
-        ),
-    ))
+    let frame = position + (at / channels) as u64;
+    let reason = format!(
+        "NaN or infinite from frame {frame} on (channel {}; {bad} such samples in that block)",
+        at % channels
+    );
+    Err(Failed { byte_offset: byte_of(frame), ..Failed::new(Status::NonFinite, reason) })
 }
 
 /// Fills an outcome with what the reader knows.

@@ -15,7 +15,7 @@ use crate::engine::{Extractor, Features, FinishError, Plan, Recording};
 use crate::frontend::FrontEnd;
 use crate::outcome::Status;
 
-/// Frames that go through the front end at a time.
+/// Frames that come out of the front end at a time.
 const BLOCK: usize = 1 << 14;
 
 /// Why a signal has no features.
@@ -59,7 +59,9 @@ impl Signals {
         }
         let format = "memory".into();
         let spec = AudioSpec { sample_rate, channels, format, declared_frames: None };
-        let Planned { plan, resample } = self.plans.of(&spec).map_err(refuse)?;
+        let planned = self.plans.of(&spec).map_err(refuse)?;
+        let step = planned.step(BLOCK, sample_rate);
+        let Planned { plan, resample } = planned;
         let config = &plan.config.signal;
         let front = FrontEnd::new(config, usize::from(channels), resample, plan.sample_rate)
             .map_err(refuse)?;
@@ -68,6 +70,7 @@ impl Signals {
             extractor: Extractor::new(plan.clone(), 0..u64::MAX, 0),
             crop: reader::crop(config, (None, None), sample_rate),
             channels: usize::from(channels),
+            step,
             position: 0,
             held: Vec::new(),
             folder: self.folder.clone(),
@@ -84,6 +87,8 @@ pub struct Signal {
     /// Input frames that count.
     crop: Range<u64>,
     channels: usize,
+    /// Input frames taken at a time.
+    step: usize,
     /// Input frames pushed.
     position: u64,
     /// What the front end gave for a block.
@@ -103,14 +108,14 @@ impl Signal {
     /// NaN or infinite samples.
     pub fn push(&mut self, samples: &[f32]) -> Result<(), SignalError> {
         let whole = samples.len() / self.channels * self.channels;
-        for block in samples[..whole].chunks(BLOCK * self.channels) {
+        for block in samples[..whole].chunks(self.step * self.channels) {
             let frames = (block.len() / self.channels) as u64;
             let begin = self.position;
             self.position += frames;
             let inside = |frame: u64| frame.clamp(begin, self.position) - begin;
             let (from, to) = (inside(self.crop.start), inside(self.crop.end));
             let block = &block[from as usize * self.channels..to as usize * self.channels];
-            reader::require_finite(block, begin + from, self.channels)?;
+            reader::require_finite(block, begin + from, self.channels, |_| None)?;
             self.front.push(block, &mut self.held);
             self.extractor.push(&self.held);
             self.held.clear();
@@ -135,7 +140,7 @@ impl Signal {
         }
         let mut recording = Recording::new(plan.clone(), &folder);
         let span = extractor.finish(true).map_err(Failed::from)?;
-        recording.add(span).map_err(|e| Failed::new(Status::Io, format!("temporary file: {e}")))?;
+        recording.add(span).map_err(Failed::temporary)?;
         Ok(finish(recording, &plan)?)
     }
 }
@@ -151,9 +156,9 @@ pub fn finish(recording: Recording, plan: &Plan) -> Result<Features, Failed> {
         let reason = format!("{total} samples, at least {needed} make one frame");
         return Err(Failed::new(Status::TooShort, reason));
     }
-    let features = recording.finish().map_err(|e| match e {
-        FinishError::Temporary(_) => Failed::new(Status::Io, e.to_string()),
-        FinishError::TooFewFrames { .. } => Failed::new(Status::TooShort, e.to_string()),
+    let features = recording.finish().map_err(|error| match error {
+        FinishError::Temporary(source) => Failed::temporary(source),
+        few @ FinishError::TooFewFrames { .. } => Failed::new(Status::TooShort, few.to_string()),
     })?;
     match (&plan.config.projection, features) {
         (Some(projection), Features::Summary(row)) => projection

@@ -74,6 +74,40 @@ fn what_is_not_there_is_named() {
     assert_eq!(ids(&["-"]).unwrap(), ["stdin"]);
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn names_that_are_not_utf8_are_kept_apart() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+
+    let dir = folder(&["a/ü.wav"]);
+    for name in [&b"x\xfe.wav"[..], b"x\xff.wav"] {
+        fs::write(dir.path().join("a").join(OsStr::from_bytes(name)), b"").unwrap();
+    }
+    let expected = ["x\\xfe", "x\\xff", "ü"];
+    assert_eq!(in_folder(dir.path(), &["a"]).unwrap(), expected);
+    assert_eq!(in_folder(dir.path(), &["a/*.wav"]).unwrap(), expected);
+    assert_eq!(in_folder(dir.path(), &["**/*.wav"]).unwrap(), expected.map(|id| format!("a/{id}")));
+    let named = dir.path().join("a").join(OsStr::from_bytes(b"x\xff.wav"));
+    let found = inputs::collect(&[&named]).unwrap();
+    assert_eq!((found[0].id.as_str(), &found[0].source), ("x\\xff", &InputSource::File(named)));
+}
+
+#[test]
+fn globs_follow_the_rules_of_shells() {
+    let dir = folder(&["1/a.wav", "1/b/c.wav", "1/.d/e.wav", "1/.f.wav", "2/a.wav", "x[1].wav"]);
+    let at = |pattern: &str| in_folder(dir.path(), &[pattern]);
+    assert_eq!(at("*/a.wav").unwrap(), ["1/a", "2/a"]);
+    assert_eq!(at("[12]/*.wav").unwrap(), ["1/a", "2/a"]);
+    assert_eq!(at("[!2]/*.wav").unwrap(), ["1/a"]);
+    assert_eq!(at("**/?.wav").unwrap(), ["1/a", "1/b/c", "2/a"]);
+    assert_eq!(at("1/**").unwrap(), ["a", "b/c"]);
+    assert_eq!(at("1/*").unwrap(), ["a", "b/c"]);
+    assert_eq!(at("x[1].wav").unwrap(), ["x[1]"]);
+    assert!(at("*/nothing.wav").unwrap_err().contains("no file with an audio extension"));
+    assert!(at("**x/*.wav").unwrap_err().contains("not a glob"));
+}
+
 #[cfg(unix)]
 #[test]
 fn links_are_followed_but_not_in_circles() {
@@ -96,7 +130,7 @@ fn manifests_bring_stretches_and_labels() {
         "\u{feff}level,path,id,start,end\n0,data/a.wav,,,\nhalf,data/a.wav,a-2,0.5,1.25\n\"a,b\",data/b.wav,,2,\n",
     )
     .unwrap();
-    let found = inputs::collect(&[text(&csv).into()]).unwrap();
+    let found = inputs::collect(&[&csv]).unwrap();
     let row = |id: &str, file: &str, start, end, level: &str| Input {
         id: id.into(),
         source: InputSource::File(dir.path().join(file)),
@@ -119,7 +153,7 @@ fn manifests_bring_stretches_and_labels() {
         r#"{"path": "data/b.wav", "id": null, "start": 2, "level": "a,b"}"#,
     ];
     fs::write(&json, lines.join("\n")).unwrap();
-    assert_eq!(inputs::collect(&[text(&json).into()]).unwrap(), expected);
+    assert_eq!(inputs::collect(&[&json]).unwrap(), expected);
 }
 
 #[test]
@@ -149,6 +183,8 @@ fn manifest_errors_name_the_line() {
         ("m.csv", "path,id\n,x\n", "line 2: no path"),
         ("m.csv", "path,id\na.wav,__x\n", "line 2: id \"__x\" must not begin with __"),
         ("m.csv", "path,id\na.wav,x.npy\n", "line 2: id \"x.npy\" must not end in .npy"),
+        ("m.csv", "path,id\na.wav,../x\n", "line 2: id \"../x\" must not be an absolute path"),
+        ("m.csv", "path,id\na.wav,/x\n", "line 2: id \"/x\" must not be an absolute path"),
         ("m.csv", "path\n.\n", "is a folder"),
         ("m.jsonl", "{\"path\": \"a.wav\"}\n[1]\n", "line 2: "),
         ("m.jsonl", "{\"path\": \"a.wav\", \"x\": [1]}\n", "line 1: \"x\" must be a string"),

@@ -123,7 +123,7 @@ fn merged_shards_are_the_whole_run_byte_for_byte() {
             for (file, index) in shards.iter().rev().zip(0..) {
                 write_npz(file, compression, Shard { index, count });
             }
-            merge(&shards, &path("merged.npz")).unwrap();
+            merge(&shards, &path("merged.npz"), true).unwrap();
             let equal =
                 fs::read(path("merged.npz")).unwrap() == fs::read(path("whole.npz")).unwrap();
             assert!(equal, "{count} shards, {compression:?}");
@@ -137,7 +137,7 @@ fn merged_shards_are_the_whole_run_byte_for_byte() {
         shards.push(path(&format!("{index}.parquet")));
         parquet::write(&shards[index], &table(shard), &provenance(shard)).unwrap();
     }
-    merge(&shards, &path("merged.parquet")).unwrap();
+    merge(&shards, &path("merged.parquet"), false).unwrap();
     let merged = fs::read(path("merged.parquet")).unwrap();
     assert!(merged == fs::read(path("whole.parquet")).unwrap());
 }
@@ -151,17 +151,17 @@ fn only_the_shards_of_one_run_are_merged() {
         write_npz(&path(&name), Compression::Stored, Shard { index, count: 2 });
     }
     let out = path("merged.npz");
-    let error = merge(&[path("1.npz")], &out).unwrap_err().to_string();
+    let error = merge(&[path("1.npz")], &out, false).unwrap_err().to_string();
     assert!(error.contains("expected shard 0/1, found 1/2"), "{error}");
-    let error = merge(&[path("0.npz"), path("0.npz")], &out).unwrap_err().to_string();
+    let error = merge(&[path("0.npz"), path("0.npz")], &out, false).unwrap_err().to_string();
     assert!(error.contains("expected shard 1/2, found 0/2"), "{error}");
-    assert!(merge(&[], &out).is_err());
+    assert!(merge(&[], &out, false).is_err());
     let mut writer = NpzWriter::create(&path("1.npz"), Compression::Stored).unwrap();
     let shard = Shard { index: 1, count: 2 };
     let other = Provenance { config_hash: "other".into(), ..provenance(shard) };
     layout::write_table(&mut writer, &table(shard), &other).unwrap();
     writer.finish().unwrap();
-    let error = merge(&[path("0.npz"), path("1.npz")], &out).unwrap_err().to_string();
+    let error = merge(&[path("0.npz"), path("1.npz")], &out, false).unwrap_err().to_string();
     assert!(error.contains("1.npz: expected tool version, configuration"), "{error}");
     assert!(!out.exists());
 }

@@ -210,8 +210,9 @@ impl KNearest {
                         _ => low_norms[q] + low_norm - 2.0 * dot,
                     };
                     let slack = unit * length * low_norm.sqrt() + 1e-12 * (norms[q] + self.norms[start + j]);
-                    // False for NaN: what overflowed is looked at.
-                    let ruled_out = about - slack >= heap.farthest();
+                    let least = about - slack;
+                    // What overflowed is looked at.
+                    let ruled_out = least.is_finite() && least >= heap.farthest();
                     if !ruled_out {
                         heap.push(self.distance(block.row(q), norms[q], start + j), start + j);
                     }

@@ -12,7 +12,7 @@ use corsmal_extract::table::Table;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::{Refusal, print, to_json};
+use super::{Refusal, to_json};
 use crate::failure::Failure;
 use crate::progress::{counts, failure_line};
 
@@ -93,7 +93,7 @@ pub fn inspect(
 ) -> Result<ExitCode, Failure> {
     match read(path) {
         Ok(report) => {
-            print(&if json { to_json(&report)? } else { report.text() })?;
+            print!("{}", if json { to_json(&report)? } else { report.text() });
             Ok(ExitCode::SUCCESS)
         }
         Err(error) => {

@@ -11,7 +11,7 @@ use corsmal_plot::{to_png, to_svg};
 use serde::Serialize;
 
 use super::overview::Overview;
-use super::{Picture, PictureFormat, Refusal, print, to_json};
+use super::{Picture, PictureFormat, Refusal, to_json};
 use crate::failure::Failure;
 
 /// Frames read at once.
@@ -61,7 +61,7 @@ pub fn inspect(path: &Path, picture: Option<&Picture>, json: bool) -> Result<Exi
     let reading = source.health();
     let report =
         Report { path: name, status: "ok", spec: &spec, seconds, reading, health: &health };
-    print(&if json { to_json(&report)? } else { report.text() })?;
+    print!("{}", if json { to_json(&report)? } else { report.text() });
 
     if let (Some(overview), Some(picture)) = (overview, picture) {
         let title = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -91,10 +91,11 @@ impl Report<'_> {
     /// Format, size and length in one line.
     fn facts(&self) -> String {
         let AudioSpec { sample_rate, channels, format, .. } = self.spec;
-        let plural = if *channels == 1 { "" } else { "s" };
         format!(
-            "{format} · {channels} channel{plural} · {sample_rate} Hz · {:.3} s ({} frames)",
-            self.seconds, self.health.frames
+            "{format} · {} · {sample_rate} Hz · {:.3} s ({})",
+            counted((*channels).into(), "channel"),
+            self.seconds,
+            counted(self.health.frames, "frame")
         )
     }
 
@@ -135,13 +136,13 @@ impl Report<'_> {
             notes.push("dead (constant)".to_owned());
         }
         if channel.clipped_runs > 0 {
-            notes.push(format!("clipped in {} places", channel.clipped_runs));
+            notes.push(format!("clipped in {}", counted(channel.clipped_runs, "place")));
         }
         if let Some((first, _)) = self.health.duplicates.iter().find(|(_, second)| *second == i) {
             notes.push(format!("same as channel {first}"));
         }
         if channel.non_finite > 0 {
-            notes.push(format!("{} samples not finite", channel.non_finite));
+            notes.push(format!("{} not finite", counted(channel.non_finite, "sample")));
         }
         notes.join(", ")
     }
@@ -165,6 +166,10 @@ impl Report<'_> {
             most.1
         ))
     }
+}
+
+fn counted(count: u64, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 fn decibels(level: Option<f64>) -> String {

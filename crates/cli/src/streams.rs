@@ -1,0 +1,39 @@
+//! Standard output and error, whose other end may be closed or full. The macros of this file stand
+//! in for the standard ones in the whole crate: those panic there.
+
+use std::fmt::Arguments;
+use std::io::{self, ErrorKind, Write};
+use std::process::exit;
+
+macro_rules! print {
+    ($($text:tt)*) => { $crate::streams::out(format_args!($($text)*)) };
+}
+
+macro_rules! println {
+    () => { print!("\n") };
+    ($($text:tt)*) => { print!("{}\n", format_args!($($text)*)) };
+}
+
+macro_rules! eprintln {
+    ($($text:tt)*) => { $crate::streams::err(format_args!($($text)*)) };
+}
+
+/// Prints to standard output. A reader that has seen enough (`| head`) ends the process as a
+/// success; output that cannot be written is a failure.
+pub fn out(text: Arguments<'_>) {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_fmt(text).and_then(|()| stdout.flush()) {
+        Ok(()) => {}
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => exit(0),
+        Err(error) => {
+            eprintln!("error: standard output: {error}");
+            exit(2)
+        }
+    }
+}
+
+/// Prints a line to standard error. Work goes on where nobody reads it.
+pub fn err(text: Arguments<'_>) {
+    // One write for the line, so that lines of several threads do not mix.
+    let _ = io::stderr().write_all(format!("{text}\n").as_bytes());
+}
