@@ -8,17 +8,18 @@ fusion  classifiers on A34F and VGGish (`ccm_vggish.py` has the inputs), weighed
         containers
 
 Protocol of a34f and fusion, written down before their scores on held-out containers were seen. (An
-earlier script of this repository and its held-out scores were known: docs/classifiers.md.) In every outer
-fold, {1,4,7}, {2,5,8}, {3,6,9} held out:
+earlier script of this repository and its held-out scores were known: docs/classifiers.md.) In
+every outer fold, {1,4,7}, {2,5,8}, {3,6,9} held out:
 
-* Candidates: LEARNERS on every input, trained on the seven joint classes (probabilities added up over the
-  classes of type or level), and DIRECT learners trained on the target itself.
+* Candidates: LEARNERS on every input, trained on the seven joint classes (probabilities added up
+  over the classes of type or level), and DIRECT learners trained on the target itself.
 * Each of the six training containers is held out once; `stacking.weights` of these out-of-fold
   probabilities, for type and for level apart.
 * All candidates are fitted on the six containers, their probabilities weighted, the largest taken.
 
-Scores: mean over the outer folds, as M5's. Nothing else is chosen. Fixed seeds, one run. --check runs it
-all with the recordings' labels shuffled: type must end near 28 %, level near 36 % weighted F1 or below.
+Scores: mean over the outer folds, as M5's. Nothing else is chosen. Fixed seeds, one run. --check
+runs it all with the recordings' labels shuffled: type must end near 28 %, level near 36 % weighted
+F1 or below.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ def merged(proba: Matrix, classes: Labels) -> Matrix:
 def candidates(
     sets: dict[str, Matrix], targets: dict[str, Labels], train: Labels, test: Labels, folds: Labels
 ) -> dict[str, dict[str, tuple[Matrix, Matrix]]]:
-    """By target and candidate: out-of-fold probabilities of `train`, and probabilities of `test`."""
+    """By target and candidate: out-of-fold probabilities of `train`, and those of `test`."""
 
     def both(x: Matrix, y: Labels, make: Callable[[], Model]) -> tuple[Matrix, Matrix]:
         def fit_predict(a: Labels, b: Labels) -> Matrix:

@@ -1,10 +1,10 @@
 """Inputs for filling level from VGGish sequences (one vector each 0.96 s) and A34F.
 
-What tells half from full in a recording: how long the filling flows, and how its sound has changed when it
-stops (the resonance of the container rises with the filling). So besides plain pooling over equal parts
-of a recording, small patch models learn from the manual annotations of *training* recordings when something
-is poured or shaken and how full the container then is; recordings are pooled over the activity found. No
-annotation of a test recording is used.
+What tells half from full in a recording: how long the filling flows, and how its sound has changed
+when it stops (the resonance of the container rises with the filling). So besides plain pooling
+over equal parts of a recording, small patch models learn from the manual annotations of *training*
+recordings when something is poured or shaken and how full the container then is; recordings are
+pooled over the activity found. No annotation of a test recording is used.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def equal_parts(sequence: Matrix, parts: int) -> Matrix:
 
 
 def patch_labels(recordings: Recordings) -> tuple[Labels, Labels]:
-    """For each patch what is heard (0 nothing, else the type) and how full it is (0 nothing, 1 to 4)."""
+    """For each patch what is heard (0 nothing, else the type) and how full it is (0 nothing, 1-4)."""
     content, filling = [], []
     for row, sequence in enumerate(recordings.sequences()):
         start, end = recordings.action[row]
@@ -117,8 +117,8 @@ def patch_inputs(recordings: Recordings) -> Matrix:
 def patch_probabilities(
     recordings: Recordings, train: Labels, test: Labels
 ) -> tuple[Matrix, Matrix]:
-    """Probabilities of `patch_labels` for every patch: of training containers by models of the other
-    training containers, of the rest by models of all training containers."""
+    """Probabilities of `patch_labels` for every patch: of training containers by models of the
+    other training containers, of the rest by models of all training containers."""
     x, owner = patch_inputs(recordings), recordings.owners()
     inside = np.flatnonzero(np.isin(owner, train))
     outside = np.flatnonzero(np.isin(owner, test))

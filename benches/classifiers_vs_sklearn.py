@@ -2,9 +2,9 @@
 
     python benches/classifiers_vs_sklearn.py [--tables 0,1,2] [--only knn,rf,et,svm] [--repeats 5]
 
-Both sides get the same numpy array, float64 or (`--dtype float32`) float32, the same parameters, and
-two threads; they take turns and the medians are given. The tables are Gaussian classes on low-dimensional
-subspaces, seeded. Every row is trained on and every row predicted.
+Both sides get the same numpy array, float64 or (`--dtype float32`) float32, the same parameters,
+and two threads; they take turns and the medians are given. The tables are Gaussian classes on
+low-dimensional subspaces, seeded. Every row is trained on and every row predicted.
 """
 
 from __future__ import annotations
@@ -82,8 +82,8 @@ def main() -> None:
                 for side, make in enumerate(PAIRS[name]):
                     model = make()
                     for step, work in (
-                        ("fit", lambda m=model: m.fit(x, y)),
-                        ("predict", lambda m=model: m.predict(x)),
+                        ("fit", lambda m=model, x=x, y=y: m.fit(x, y)),
+                        ("predict", lambda m=model, x=x: m.predict(x)),
                     ):
                         taken.setdefault((step, side), []).append(seconds(work))
             for step in ("fit", "predict"):

@@ -1,10 +1,10 @@
 """The 12 CORSMAL audio baselines on ESC-10, from the .ogg files: a Markdown table.
 
-    python benches/esc10_baselines.py --tool target/release/corsmal-feat [--shared ../shared] [--work DIR]
+    python benches/esc10_baselines.py --tool corsmal-feat [--shared ../shared] [--work DIR]
 
-Runs `corsmal-feat extract` and `corsmal-feat cross-validate --cv fold=fold` and prints mean accuracy
-over the five published folds beside the reference runs; forests: mean of seeds 0 to 4. The settings are
-those of the published baselines, nothing is chosen.
+Runs `corsmal-feat extract` and `corsmal-feat cross-validate --cv fold=fold` and prints mean
+accuracy over the five published folds beside the reference runs; forests: mean of seeds 0 to 4.
+The settings are those of the published baselines, nothing is chosen.
 """
 
 from __future__ import annotations

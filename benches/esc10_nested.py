@@ -4,13 +4,15 @@
 
 Protocol, written down before any score on a published fold was seen:
 
-* Inputs: statistics over frames (CONFIG) of the whole clip and of windows of 1 s and of 2.5 s, hop half a
-  window. Windows that are quieter than 1 % of the clip's loudest window are left out (padding).
-* Candidates: each of the three lengths with each of LEARNERS. A clip's probabilities are the mean of
-  those of its windows.
-* For each published fold: out-of-fold probabilities of every candidate on the four other folds, each held
-  out once; `stacking.weights` of the nine candidates; the nine fitted on all four, weighted, and scored on
-  the fold. Score: mean accuracy over the five folds. Nothing else is chosen. One run, fixed seeds.
+* Inputs: statistics over frames (CONFIG) of the whole clip and of windows of 1 s and of 2.5 s, hop
+  half a window. Windows that are quieter than 1 % of the clip's loudest window are left out
+  (padding).
+* Candidates: each of the three lengths with each of LEARNERS. A clip's probabilities are the mean
+  of those of its windows.
+* For each published fold: out-of-fold probabilities of every candidate on the four other folds,
+  each held out once; `stacking.weights` of the nine candidates; the nine fitted on all four,
+  weighted, and scored on the fold. Score: mean accuracy over the five folds. Nothing else is
+  chosen. One run, fixed seeds.
 
 --check runs all of it with the labels shuffled: it must end near 10 %.
 """
@@ -78,7 +80,9 @@ class Windows:
         if failed:
             raise SystemExit(f"no features: {failed}")
         x, clip = found.summary.astype(np.float64), found.labels["clip"].astype(np.int64)
-        loudness = x[:, [i for i, n in enumerate(found.names) if "rms" in n and "mean" in n]].mean(1)
+        loudness = x[:, [i for i, n in enumerate(found.names) if "rms" in n and "mean" in n]].mean(
+            1
+        )
         loudest = np.zeros(len(clips))
         np.maximum.at(loudest, clip, loudness)
         keep = loudness >= QUIET * loudest[clip]
@@ -117,7 +121,7 @@ def main() -> None:
     for fold in np.unique(folds):
         train, test = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
         inner = [
-            held_out(lambda a, b, w=w, m=m: w.predict(m, y, train[a], train[b]), folds[train])
+            held_out(lambda a, b, w=w, m=m, t=train: w.predict(m, y, t[a], t[b]), folds[train])
             for w, m in candidates
         ]
         w = weights(inner, y[train])

@@ -1,9 +1,9 @@
 """Honest choice among classifiers: weights learnt on folds inside the training rows.
 
-Used by the nested evaluations beside it. Every candidate gives out-of-fold probabilities on inner folds
-of the training rows; the weights, at least 0 and of sum 1, that minimise the log loss of the weighted
-mean of these probabilities weigh the candidates fitted on all training rows (a super learner, van der
-Laan et al. 2007).
+Used by the nested evaluations beside it. Every candidate gives out-of-fold probabilities on inner
+folds of the training rows; the weights, at least 0 and of sum 1, that minimise the log loss of the
+weighted mean of these probabilities weigh the candidates fitted on all training rows (a super
+learner, van der Laan et al. 2007).
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def held_out(fit_predict: Callable[[Labels, Labels], Matrix], folds: Labels) -> 
 
 
 def weights(probas: Sequence[Matrix], truth: Labels) -> npt.NDArray[np.float64]:
-    """Weights of the mean with the smallest log loss (expectation maximisation: the loss is convex)."""
+    """Weights of the mean with the smallest log loss (by expectation maximisation: it is convex)."""
     rows = np.arange(len(truth))
     likelihood = np.stack([p[rows, truth] for p in probas], axis=1).clip(1e-6)
     w = np.full(len(probas), 1 / len(probas))
