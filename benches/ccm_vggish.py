@@ -88,7 +88,7 @@ def equal_parts(sequence: Matrix, parts: int) -> Matrix:
 
 
 def patch_labels(recordings: Recordings) -> tuple[Labels, Labels]:
-    """For each patch what is heard (0 nothing, else the type) and how full it is (0 nothing, 1-4)."""
+    """For each patch what is heard (0 nothing, else the type) and how full it is (0, or 1 to 4)."""
     content, filling = [], []
     for row, sequence in enumerate(recordings.sequences()):
         start, end = recordings.action[row]

@@ -1,6 +1,7 @@
 """The 12 CORSMAL audio baselines on ESC-10, from the .ogg files: a Markdown table.
 
-    python benches/esc10_baselines.py --tool corsmal-feat [--shared ../shared] [--work DIR]
+    python benches/esc10_baselines.py [--tool corsmal-feat] [--shared ../shared] [--work DIR]
+        [--librosa 0.8]
 
 Runs `corsmal-feat extract` and `corsmal-feat cross-validate --cv fold=fold` and prints mean
 accuracy over the five published folds beside the reference runs; forests: mean of seeds 0 to 4.
@@ -53,6 +54,7 @@ def main() -> None:
     parser.add_argument("--tool", default="corsmal-feat")
     parser.add_argument("--shared", default="../shared", type=pathlib.Path)
     parser.add_argument("--work", type=pathlib.Path, help="keeps the features here")
+    parser.add_argument("--librosa", help="conventions of the features, if not the presets' own")
     arguments = parser.parse_args()
     data = arguments.shared / "data" / "esc10"
     reference: dict[tuple[str, str], list[float]] = {}
@@ -68,7 +70,8 @@ def main() -> None:
             features = work / f"{preset}.npz"
             if not features.exists():
                 inputs = ["--in", work / "esc10.csv", "--out", features, "--preset", preset]
-                subprocess.run([arguments.tool, "extract", *inputs], check=True)
+                switch = ["--set", f"librosa={arguments.librosa}"] if arguments.librosa else []
+                subprocess.run([arguments.tool, "extract", *inputs, *switch], check=True)
             for classifier, options in CLASSIFIERS.items():
                 seeds = range(5) if classifier.startswith("RF") else range(1)
                 runs = [

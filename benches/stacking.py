@@ -68,7 +68,7 @@ def held_out(fit_predict: Callable[[Labels, Labels], Matrix], folds: Labels) -> 
 
 
 def weights(probas: Sequence[Matrix], truth: Labels) -> npt.NDArray[np.float64]:
-    """Weights of the mean with the smallest log loss (by expectation maximisation: it is convex)."""
+    """Weights of the mean with the smallest log loss (convex; by expectation maximisation)."""
     rows = np.arange(len(truth))
     likelihood = np.stack([p[rows, truth] for p in probas], axis=1).clip(1e-6)
     w = np.full(len(probas), 1 / len(probas))
