@@ -2,7 +2,8 @@
 
     python benches/esc10_nested.py [--shared ../shared] [--cache DIR] [--check]
 
-Protocol, written down before any score on a published fold was seen:
+Protocol, written down before any score of these candidates on a published fold was seen (those of
+the baselines, `esc10_baselines.py`, were known):
 
 * Inputs: statistics over frames (CONFIG) of the whole clip and of windows of 1 s and of 2.5 s, hop
   half a window. Windows that are quieter than 1 % of the clip's loudest window are left out

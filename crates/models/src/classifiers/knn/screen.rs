@@ -72,12 +72,11 @@ impl Screen {
                 let scores = scores.to_slice().expect("rows of a new array");
                 let mut cut = cut(*limit, slack);
                 for (chunk, at) in scores.chunks(CHUNK).zip((start..).step_by(CHUNK)) {
-                    // False for NaN: what overflowed is looked at.
-                    if !chunk.iter().fold(false, |any, score| any | !(*score > cut)) {
+                    if chunk.iter().fold(true, |all, &score| all & ruled_out(score, cut)) {
                         continue;
                     }
                     for (&score, row) in chunk.iter().zip(at..) {
-                        if !(score > cut) {
+                        if !ruled_out(score, cut) {
                             let (low, high) = bounds(score, slack);
                             *limit = look(Seen { query, row, low, high });
                             cut = self::cut(*limit, slack);
@@ -116,6 +115,11 @@ impl Screen {
 /// The smallest single-precision value that no score up to `limit` can exceed.
 fn cut(limit: f64, slack: f64) -> f32 {
     if slack.is_finite() { ((limit + slack) as f32).next_up() } else { f32::NAN }
+}
+
+/// False for NaN: what overflowed is looked at.
+fn ruled_out(score: f32, cut: f32) -> bool {
+    score > cut
 }
 
 fn bounds(score: f32, slack: f64) -> (f64, f64) {
