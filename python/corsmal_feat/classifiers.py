@@ -71,7 +71,10 @@ def _features(X: Any, owner: str) -> Matrix:
                 f"Found array with 0 {what}(s) (shape={array.shape}) while a minimum of 1 is "
                 f"required by {owner}."
             )
-    if not np.isfinite(array).all():
+    with np.errstate(over="ignore", invalid="ignore"):
+        # Finite unless something is not (or the sum itself overflows): a quick first look.
+        looks_finite = np.isfinite(array.sum())
+    if not looks_finite and not np.isfinite(array).all():
         found = "NaN" if np.isnan(array).any() else "infinity"
         raise ParameterError(f"Input X contains {found}: {owner} accepts finite features only.")
     return array

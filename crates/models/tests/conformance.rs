@@ -50,6 +50,21 @@ fn same_result_for_any_number_of_threads() {
 }
 
 #[test]
+fn a_row_gets_the_same_alone_and_among_others() {
+    let (x, y) = clouds(83, 7, 3, 8);
+    for spec in all() {
+        let model = spec.train(x.view(), &y, 3).unwrap();
+        let together = model.predict_proba(x.view()).unwrap();
+        for (row, expected) in x.axis_chunks_iter(Axis(0), 1).zip(together.outer_iter()) {
+            let alone = model.predict_proba(row).unwrap();
+            for (a, b) in alone.row(0).iter().zip(expected) {
+                assert!((a - b).abs() < 1e-12, "{}: {a} and {b}", spec.name());
+            }
+        }
+    }
+}
+
+#[test]
 fn classes_without_rows_get_probability_zero() {
     let (x, mut y) = clouds(120, 5, 2, 3);
     y.iter_mut().for_each(|c| *c = 1 + 2 * *c);

@@ -28,8 +28,14 @@ pub(super) struct Plan<'a> {
     pub seed: u64,
 }
 
-/// Rows predicted together: each tree comes into the cache once per block.
+/// Most rows predicted together: each tree comes into the cache once per block.
 const ROW_BLOCK: usize = 256;
+/// Rows that walk through a tree at once.
+const TOGETHER: usize = 8;
+/// Values of a block that stay in the cache.
+const BLOCK_VALUES: usize = 1 << 17;
+/// Blocks there should at least be, for the threads to share.
+const BLOCKS: usize = 8;
 
 impl Trees {
     /// Grows the trees in parallel, each from its own seed: the number of threads does not matter.
@@ -66,6 +72,29 @@ impl Trees {
     }
 }
 
+impl Trees {
+    /// Adds the leaf fractions of one tree: `rows` `[rows, features]`, `sums` `[rows, classes]`.
+    fn add(&self, tree: &Tree, rows: &[f32], sums: &mut [f64]) {
+        let (features, classes) = (self.n_features, self.n_classes);
+        let add = |sums: &mut [f64], leaf: &[f32]| {
+            sums.iter_mut().zip(leaf).for_each(|(s, &p)| *s += f64::from(p));
+        };
+        let groups = rows.chunks(TOGETHER * features).zip(sums.chunks_mut(TOGETHER * classes));
+        for (rows, sums) in groups {
+            if rows.len() == TOGETHER * features {
+                let rows = std::array::from_fn(|i| &rows[i * features..(i + 1) * features]);
+                let leaves: [_; TOGETHER] = tree.leaves(rows, classes);
+                sums.chunks_mut(classes).zip(leaves).for_each(|(sums, leaf)| add(sums, leaf));
+                continue;
+            }
+            for (row, sums) in rows.chunks(features).zip(sums.chunks_mut(classes)) {
+                let [leaf] = tree.leaves([row], classes);
+                add(sums, leaf);
+            }
+        }
+    }
+}
+
 impl Classify for Trees {
     fn n_features(&self) -> usize {
         self.n_features
@@ -77,20 +106,21 @@ impl Classify for Trees {
 
     fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
         let mut proba = Array2::zeros((x.nrows(), self.n_classes));
+        let block = (BLOCK_VALUES / self.n_features).min(x.nrows().div_ceil(BLOCKS));
+        let block = block.clamp(TOGETHER, ROW_BLOCK);
         proba
-            .axis_chunks_iter_mut(Axis(0), ROW_BLOCK)
+            .axis_chunks_iter_mut(Axis(0), block)
             .into_par_iter()
-            .zip(x.axis_chunks_iter(Axis(0), ROW_BLOCK))
+            .zip(x.axis_chunks_iter(Axis(0), block))
             .for_each(|(mut out, rows)| {
                 // Out of single range saturates: still on the right side of every threshold.
                 let rows = rows.mapv(|v| v as f32).as_standard_layout().into_owned();
+                let rows = rows.as_slice().expect("standard layout");
+                let mut sums = vec![0.0; out.len()];
                 for tree in &self.trees {
-                    for (mut out, row) in out.outer_iter_mut().zip(rows.outer_iter()) {
-                        let row = row.to_slice().expect("standard layout");
-                        let leaf = tree.leaf(row, self.n_classes);
-                        out.iter_mut().zip(leaf).for_each(|(o, &p)| *o += f64::from(p));
-                    }
+                    self.add(tree, rows, &mut sums);
                 }
+                out.iter_mut().zip(sums).for_each(|(o, s)| *o = s);
                 for mut row in out.outer_iter_mut() {
                     // Single precision fractions: their sum is one only to seven digits.
                     let sum = row.sum();

@@ -1,13 +1,19 @@
 //! k nearest neighbours by exhaustive search, in blocks.
 //!
-//! Euclidean and cosine distances (‖a‖² + ‖b‖² − 2a·b) are first estimated by a matrix product in single
-//! precision per block, with an error bound; only rows that may be near are computed exactly. Others come
-//! from plain loops. Equal distances are ordered as scikit-learn 1.9's brute-force search orders
-//! them (a binary max-heap filled in row order), equal votes go to the lowest class.
+//! Euclidean and cosine distances (‖a‖² + ‖b‖² − 2a·b) are first estimated in single precision with an
+//! error bound ([`screen`]); only rows that may be near are computed exactly. Others come from plain
+//! loops. Equal distances are ordered as scikit-learn 1.9's brute-force search orders them (a binary
+//! max-heap filled in row order, [`nearest`]), equal votes go to the lowest class.
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, s};
+mod nearest;
+mod screen;
+
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+
+use nearest::Nearest;
+use screen::Screen;
 
 use super::{Classify, Train};
 use crate::error::{ModelError, Result};
@@ -84,7 +90,7 @@ impl Train for KNearestParams {
         }
         let x = match self.metric {
             Metric::Cosine => unit_rows(x),
-            _ => x.as_standard_layout().into_owned(),
+            _ => copied(x),
         };
         let norms = squared_lengths(x.view());
         Ok(KNearest {
@@ -100,10 +106,10 @@ impl Train for KNearestParams {
     }
 }
 
-/// Query rows of one block: enough to keep the matrix product busy, small enough for the cache.
-const QUERY_BLOCK: usize = 128;
-/// Training rows of one block.
-const TRAIN_BLOCK: usize = 512;
+/// Most query rows of one block: enough to keep the matrix product busy, small enough for the cache.
+const QUERY_BLOCK: usize = 256;
+/// Blocks there should at least be, for the threads to share.
+const BLOCKS: usize = 8;
 /// Fewer query rows than this are not worth a copy of the training rows in single precision.
 const SCREEN_FROM: usize = 16;
 
@@ -121,14 +127,15 @@ impl Classify for KNearest {
         let screen = (by_products && x.nrows() >= SCREEN_FROM)
             .then(|| Screen::new(self.x.view(), self.metric == Metric::Euclidean));
         let mut proba = Array2::zeros((x.nrows(), self.n_classes));
+        let rows = x.nrows().div_ceil(BLOCKS).clamp(SCREEN_FROM, QUERY_BLOCK);
         proba
-            .axis_chunks_iter_mut(Axis(0), QUERY_BLOCK)
+            .axis_chunks_iter_mut(Axis(0), rows)
             .into_par_iter()
-            .zip(x.axis_chunks_iter(Axis(0), QUERY_BLOCK))
+            .zip(x.axis_chunks_iter(Axis(0), rows))
             .for_each(|(mut votes, block)| {
                 let heaps = self.search(block, screen.as_ref());
                 for (mut row, heap) in votes.outer_iter_mut().zip(heaps) {
-                    self.vote(&heap, row.as_slice_mut().expect("rows of a new array"));
+                    self.vote(heap, row.as_slice_mut().expect("rows of a new array"));
                 }
             });
         Ok(proba)
@@ -148,32 +155,6 @@ impl Classify for KNearest {
     }
 }
 
-/// Training rows in single precision, for a first look that rules most of them out. Its errors are
-/// bounded, so what is ruled out could not have been among the nearest.
-struct Screen {
-    x: Array2<f32>,
-    /// subtracted before rounding: distances do not change, errors shrink
-    centre: Array1<f64>,
-    norms: Vec<f64>,
-}
-
-impl Screen {
-    fn new(x: ArrayView2<'_, f64>, centred: bool) -> Self {
-        let rows = x.nrows() as f64;
-        let centre = match centred {
-            true => x.sum_axis(Axis(0)) / rows,
-            false => Array1::zeros(x.ncols()),
-        };
-        let (x, norms) = Self::lower(x, &centre);
-        Self { x, centre, norms }
-    }
-
-    fn lower(x: ArrayView2<'_, f64>, centre: &Array1<f64>) -> (Array2<f32>, Vec<f64>) {
-        let shifted = &x - centre;
-        (shifted.mapv(|v| v as f32), squared_lengths(shifted.view()))
-    }
-}
-
 impl KNearest {
     /// The k nearest training rows of each query row; squared distances for the euclidean metric.
     fn search(&self, block: ArrayView2<'_, f64>, screen: Option<&Screen>) -> Vec<Nearest> {
@@ -182,43 +163,56 @@ impl KNearest {
             _ => block.as_standard_layout().into_owned(),
         };
         let norms = squared_lengths(block.view());
-        let mut heaps = vec![Nearest::new(self.k); block.nrows()];
         let Some(screen) = screen else {
-            for ((heap, query), &norm) in heaps.iter_mut().zip(block.outer_iter()).zip(&norms) {
-                for row in 0..self.x.nrows() {
-                    heap.push(self.distance(query, norm, row), row);
-                }
-            }
-            return heaps;
+            let nearest = |(query, &norm): (ArrayView1<'_, f64>, &f64)| {
+                let mut heap = Nearest::new(self.k);
+                (0..self.x.nrows()).for_each(|row| heap.push(self.distance(query, norm, row), row));
+                heap
+            };
+            return block.outer_iter().zip(&norms).map(nearest).collect();
         };
-        let (low, low_norms) = Screen::lower(block.view(), &screen.centre);
-        // Rounding of both factors and of every sum: (n + 4)·u·‖a‖‖b‖ for a product, twice that for
-        // a squared distance; the double precision formula's own errors are far below.
-        let unit = 2.0 * (self.x.ncols() as f64 + 4.0) * f64::from(f32::EPSILON) / 2.0;
-        let mut products = Array2::zeros((block.nrows(), TRAIN_BLOCK));
-        for start in (0..self.x.nrows()).step_by(TRAIN_BLOCK) {
-            let end = (start + TRAIN_BLOCK).min(self.x.nrows());
-            let mut products = products.slice_mut(s![.., ..end - start]);
-            let rows = screen.x.slice(s![start..end, ..]);
-            ndarray::linalg::general_mat_mul(1.0, &low, &rows.t(), 0.0, &mut products);
-            for (q, heap) in heaps.iter_mut().enumerate() {
-                let length = low_norms[q].sqrt();
-                for ((j, &dot), &low_norm) in products.row(q).iter().enumerate().zip(&screen.norms[start..end]) {
-                    let dot = f64::from(dot);
-                    let about = match self.metric {
-                        Metric::Cosine => 1.0 - dot,
-                        _ => low_norms[q] + low_norm - 2.0 * dot,
-                    };
-                    let slack = unit * length * low_norm.sqrt() + 1e-12 * (norms[q] + self.norms[start + j]);
-                    let least = about - slack;
-                    // What overflowed is looked at.
-                    let ruled_out = least.is_finite() && least >= heap.farthest();
-                    if !ruled_out {
-                        heap.push(self.distance(block.row(q), norms[q], start + j), start + j);
-                    }
-                }
-            }
-        }
+        let found: Vec<Option<Nearest>> = self
+            .candidates(block.view(), screen)
+            .into_iter()
+            .enumerate()
+            .map(|(q, rows)| {
+                let exact = |row| (self.distance(block.row(q), norms[q], row), row);
+                Nearest::of(self.k, rows.into_iter().map(exact).collect())
+            })
+            .collect();
+        let tied: Vec<usize> = (0..found.len()).filter(|&q| found[q].is_none()).collect();
+        let mut in_order = self.in_order(block.select(Axis(0), &tied).view(), screen).into_iter();
+        found.into_iter().map(|f| f.or_else(|| in_order.next())).map(|f| f.expect("one per tie")).collect()
+    }
+
+    /// Training rows, for each query row, among which the k nearest are.
+    fn candidates(&self, block: ArrayView2<'_, f64>, screen: &Screen) -> Vec<Vec<usize>> {
+        // Per query row the k lowest upper bounds, ascending, and what was below the last of them.
+        let mut highs = vec![Vec::with_capacity(self.k + 1); block.nrows()];
+        let mut seen = vec![Vec::new(); block.nrows()];
+        screen.scan(block, |pair| {
+            let highs: &mut Vec<f64> = &mut highs[pair.query];
+            highs.insert(highs.partition_point(|&h| h <= pair.high), pair.high);
+            highs.truncate(self.k);
+            seen[pair.query].push((pair.low, pair.row));
+            if highs.len() < self.k { f64::INFINITY } else { highs[self.k - 1] }
+        });
+        let below = |(seen, highs): (Vec<(f64, usize)>, Vec<f64>)| {
+            let limit = highs[self.k - 1];
+            seen.into_iter().filter(|&(low, _)| low <= limit).map(|(_, row)| row).collect()
+        };
+        seen.into_iter().zip(highs).map(below).collect()
+    }
+
+    /// The same with every training row offered in its order, for rows whose ties matter.
+    fn in_order(&self, block: ArrayView2<'_, f64>, screen: &Screen) -> Vec<Nearest> {
+        let norms = squared_lengths(block);
+        let mut heaps = vec![Nearest::new(self.k); block.nrows()];
+        screen.scan(block, |pair| {
+            let (heap, query) = (&mut heaps[pair.query], block.row(pair.query));
+            heap.push(self.distance(query, norms[pair.query], pair.row), pair.row);
+            screen.score(heap.farthest(), query)
+        });
         heaps
     }
 
@@ -239,7 +233,7 @@ impl KNearest {
     }
 
     /// Class fractions of the neighbours' votes.
-    fn vote(&self, nearest: &Nearest, votes: &mut [f64]) {
+    fn vote(&self, nearest: Nearest, votes: &mut [f64]) {
         let neighbours = nearest.sorted();
         let distance = |d: f64| if self.metric == Metric::Euclidean { d.sqrt() } else { d };
         let on_top = neighbours[0].0 == 0.0;
@@ -272,58 +266,21 @@ fn lanes(a: &[f64], b: &[f64], step: impl Fn(f64, f64) -> f64, join: impl Fn(f64
 }
 
 fn squared_lengths(x: ArrayView2<'_, f64>) -> Vec<f64> {
-    x.outer_iter().map(|row| row.dot(&row)).collect()
+    x.axis_iter(Axis(0)).into_par_iter().map(|row| row.dot(&row)).collect()
+}
+
+/// A copy made by all threads.
+fn copied(x: ArrayView2<'_, f64>) -> Array2<f64> {
+    let mut copy = Array2::zeros(x.raw_dim());
+    copy.axis_iter_mut(Axis(0))
+        .into_par_iter()
+        .zip(x.axis_iter(Axis(0)))
+        .for_each(|(mut to, from)| to.assign(&from));
+    copy
 }
 
 fn unit_rows(x: ArrayView2<'_, f64>) -> Array2<f64> {
     let lengths: Array1<f64> = squared_lengths(x).into_iter().map(f64::sqrt).collect();
     let lengths = lengths.mapv(|l| if l == 0.0 { 1.0 } else { l });
     x.as_standard_layout().into_owned() / &lengths.insert_axis(Axis(1))
-}
-
-/// The k smallest (distance, row) so far: a binary heap with the largest on top. Which of several
-/// equal distances survive follows from this very layout, so it is spelled out here.
-#[derive(Clone, Debug)]
-struct Nearest(Vec<(f64, usize)>);
-
-impl Nearest {
-    fn new(k: usize) -> Self {
-        Self(vec![(f64::INFINITY, usize::MAX); k])
-    }
-
-    fn push(&mut self, distance: f64, row: usize) {
-        let heap = &mut self.0;
-        // Rounding can give a little less than zero, overflow infinity or NaN: farthest of all.
-        let distance = if distance < f64::MAX { distance.max(0.0) } else { f64::MAX };
-        if distance >= heap[0].0 {
-            return;
-        }
-        let mut at = 0;
-        loop {
-            let (left, right) = (2 * at + 1, 2 * at + 2);
-            let child = match (heap.get(left), heap.get(right)) {
-                (None, _) => break,
-                (Some(l), Some(r)) if r.0 > l.0 => right,
-                _ => left,
-            };
-            if heap[child].0 <= distance {
-                break;
-            }
-            heap[at] = heap[child];
-            at = child;
-        }
-        heap[at] = (distance, row);
-    }
-
-    /// The largest distance kept; infinite until there are k.
-    fn farthest(&self) -> f64 {
-        self.0[0].0
-    }
-
-    /// Nearest first.
-    fn sorted(&self) -> Vec<(f64, usize)> {
-        let mut found = self.0.clone();
-        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        found
-    }
 }

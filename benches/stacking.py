@@ -1,0 +1,89 @@
+"""Honest choice among classifiers: weights learnt on folds inside the training rows.
+
+Used by the nested evaluations beside it. Every candidate gives out-of-fold probabilities on inner
+folds of the training rows; the weights, at least 0 and of sum 1, that minimise the log loss of the
+weighted mean of these probabilities weigh the candidates fitted on all training rows (a super
+learner, van der Laan et al. 2007).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+Matrix = npt.NDArray[np.float64]
+Labels = npt.NDArray[np.int64]
+
+
+class Model(Protocol):
+    """What is asked of a classifier."""
+
+    def fit(self, x: Matrix, y: Labels) -> object: ...
+
+    def predict_proba(self, x: Matrix) -> Matrix: ...
+
+
+class Standardized:
+    """A classifier behind standardisation with the training rows' mean and deviation."""
+
+    def __init__(self, classifier: Model) -> None:
+        self.classifier = classifier
+
+    def fit(self, x: Matrix, y: Labels) -> Standardized:
+        self.mean, self.scale = x.mean(axis=0), x.std(axis=0)
+        self.scale[self.scale < 1e-9] = 1
+        self.classifier.fit((x - self.mean) / self.scale, y)
+        return self
+
+    def predict_proba(self, x: Matrix) -> Matrix:
+        return self.classifier.predict_proba((x - self.mean) / self.scale)
+
+
+def weighted_f1(truth: Labels, predicted: Labels) -> float:
+    """F1 of each class weighted by its rows."""
+    total = 0.0
+    for label in np.unique(truth):
+        hits = np.sum((truth == label) & (predicted == label))
+        rows = np.sum(truth == label)
+        total += 2 * hits / (rows + np.sum(predicted == label)) * rows
+    return float(total / len(truth))
+
+
+def held_out(fit_predict: Callable[[Labels, Labels], Matrix], folds: Labels) -> Matrix:
+    """Probabilities of every row from a model that has not seen its fold.
+
+    `fit_predict` takes the positions of training and test rows."""
+    rows = np.arange(len(folds))
+    parts = [
+        (rows[folds == f], fit_predict(rows[folds != f], rows[folds == f]))
+        for f in np.unique(folds)
+    ]
+    proba = np.zeros((len(folds), parts[0][1].shape[1]))
+    for test, values in parts:
+        proba[test] = values
+    return proba
+
+
+def weights(probas: Sequence[Matrix], truth: Labels) -> npt.NDArray[np.float64]:
+    """Weights of the mean with the smallest log loss (convex; by expectation maximisation)."""
+    rows = np.arange(len(truth))
+    likelihood = np.stack([p[rows, truth] for p in probas], axis=1).clip(1e-6)
+    w = np.full(len(probas), 1 / len(probas))
+    for _ in range(1000):
+        share = likelihood * w
+        w = (share / share.sum(axis=1, keepdims=True)).mean(axis=0)
+    return w
+
+
+def mixture(probas: Sequence[Matrix], w: npt.NDArray[np.float64]) -> Matrix:
+    """The weighted mean."""
+    return sum(np.multiply(p, v) for p, v in zip(probas, w, strict=True))
+
+
+def shown(names: Mapping[str, object] | Sequence[str], w: npt.NDArray[np.float64]) -> str:
+    """Names with weights of at least one per cent, the heaviest first."""
+    pairs = sorted(zip(w, names, strict=True), reverse=True)
+    return ", ".join(f"{name} {value:.2f}" for value, name in pairs if value >= 0.01)

@@ -1,0 +1,49 @@
+//! The screen in single precision changes nothing: rows asked for together (screened) get what each
+//! gets alone (compared with every training row).
+
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod common;
+
+use common::clouds;
+use corsmal_models::classifiers::{ClassifierSpec, KNearestParams, Metric, Weights};
+use ndarray::{Array2, Axis};
+
+fn same_together_and_alone(x: &Array2<f64>, y: &[usize], what: &str) {
+    for metric in [Metric::Euclidean, Metric::Cosine] {
+        for k in [1, 5, 20] {
+            let weights = if k == 5 { Weights::Uniform } else { Weights::Distance };
+            let spec = ClassifierSpec::from(KNearestParams { k, metric, weights, p: 2.0 });
+            let model = spec.train(x.view(), y, 3).unwrap();
+            let together = model.predict_proba(x.view()).unwrap();
+            for (row, expected) in x.axis_chunks_iter(Axis(0), 1).zip(together.outer_iter()) {
+                let alone = model.predict_proba(row).unwrap();
+                assert_eq!(alone.row(0), expected, "{what}, {metric:?}, k = {k}");
+            }
+        }
+    }
+}
+
+#[test]
+fn rows_of_different_lengths() {
+    let (x, y) = clouds(700, 30, 3, 1);
+    same_together_and_alone(&x, &y, "clouds");
+    same_together_and_alone(&(&x + 1e6), &y, "far from zero");
+}
+
+#[test]
+fn rows_at_equal_distances_and_doubled_rows() {
+    let (x, y) = clouds(600, 3, 3, 2);
+    same_together_and_alone(&x.mapv(f64::round), &y, "grid");
+    same_together_and_alone(&Array2::zeros((600, 4)), &y, "all alike");
+}
+
+#[test]
+fn values_beyond_single_precision() {
+    let (mut x, y) = clouds(600, 6, 3, 3);
+    same_together_and_alone(&(&x * 1e30), &y, "large");
+    same_together_and_alone(&(&x * 1e-30), &y, "small");
+    x.row_mut(7).fill(1e60);
+    x.row_mut(8).fill(-1e200);
+    same_together_and_alone(&x, &y, "two outliers");
+}
