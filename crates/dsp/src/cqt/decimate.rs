@@ -2,11 +2,13 @@
 
 use std::f64::consts::PI;
 
-use pulp::bytemuck::{cast_slice, cast_slice_mut};
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::vector::Lane;
 use crate::window::bessel_i0;
+
+/// Outputs of one pass over the taps, in registers.
+const REGISTERS: usize = 8;
 
 /// A 2:1 low-pass filter of soxr's "HQ" quality.
 ///
@@ -91,26 +93,30 @@ impl Decimator {
         // Taps at even distances weigh the even samples, the others the odd ones. Both run over
         // contiguous outputs, as convolutions whose inputs start `reach / 2` samples early.
         let tap = |h: &f64| T::of(h * std::f64::consts::SQRT_2);
-        let taps = [0, 1].map(|odd| self.taps.iter().skip(odd).step_by(2).map(tap).collect());
+        let even: Vec<T> = self.taps.iter().step_by(2).map(tap).collect();
+        let odd: Vec<T> = self.taps.iter().skip(1).step_by(2).map(tap).collect();
+        let room = n.next_multiple_of(64 * REGISTERS) + self.reach() + 1;
+        let phase = |offset: usize| {
+            let mut samples = vec![T::zero(); room];
+            let values = y.iter().skip(offset).step_by(2);
+            samples[self.reach() / 2..].iter_mut().zip(values).for_each(|(slot, x)| *slot = *x);
+            samples
+        };
         let mut out = vec![T::zero(); n];
-        Arch::new().dispatch(Decimate { y, taps, lead: self.reach() / 2, out: &mut out });
+        Arch::new().dispatch(Decimate {
+            even: (&even, &phase(0)),
+            odd: (&odd, &phase(1)),
+            out: &mut out,
+        });
         out
     }
 }
 
-/// Outputs whose sums are held at a time, a multiple of the lanes of every register.
-const BLOCK: usize = 256;
-/// Lanes of the widest register.
-const WIDEST: usize = 16;
-
-/// A tap number `q * lanes + r` shifts its samples by `q` registers and `r`. Each register of
-/// samples is read once for the taps of every `r`, and only their sums are shifted.
 struct Decimate<'a, T> {
-    y: &'a [T],
-    /// Taps of the even and of the odd samples.
-    taps: [Vec<T>; 2],
-    /// Zeros before the samples.
-    lead: usize,
+    /// Taps and samples `x[2 (i - reach / 2)]`.
+    even: (&'a [T], &'a [T]),
+    /// Taps and samples `x[2 (i - reach / 2) + 1]`.
+    odd: (&'a [T], &'a [T]),
     out: &'a mut [T],
 }
 
@@ -118,46 +124,22 @@ impl<T: Lane> WithSimd for Decimate<'_, T> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(mut self, simd: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let lanes = T::lanes::<S>();
-        let (zero, one) = (T::splat(simd, T::zero()), T::splat(simd, T::one()));
-        // Sums of a block for one `r`: one register more than outputs.
-        let width = BLOCK / lanes + 1;
-        let registers = self.out.len().div_ceil(BLOCK) * (BLOCK / lanes) + 1;
-        let phases = [0, 1].map(|odd| {
-            let taps = &mut self.taps[odd];
-            taps.resize(taps.len().next_multiple_of(lanes), T::zero());
-            let mut samples = vec![zero; registers + taps.len() / lanes];
-            let values: &mut [T] = cast_slice_mut(&mut samples);
-            let every_second = self.y.iter().skip(odd).step_by(2);
-            values[self.lead..].iter_mut().zip(every_second).for_each(|(slot, x)| *slot = *x);
-            samples
-        });
-        let mut sums = vec![zero; lanes * width];
-        for (block, out) in self.out.chunks_mut(BLOCK).enumerate() {
-            for at in 0..width {
-                let mut sum = [zero; WIDEST];
-                for (taps, samples) in self.taps.iter().zip(&phases) {
-                    let samples = &samples[block * (BLOCK / lanes) + at..];
-                    for (taps, &x) in taps.chunks_exact(lanes).zip(samples) {
-                        for (sum, tap) in sum[..lanes].iter_mut().zip(taps) {
-                            *sum = T::multiply_add(simd, T::splat(simd, *tap), x, *sum);
-                        }
+        for (i, out) in self.out.chunks_mut(REGISTERS * lanes).enumerate() {
+            let first = i * REGISTERS * lanes;
+            let mut sum = [T::splat(simd, T::zero()); REGISTERS];
+            for (taps, samples) in [self.even, self.odd] {
+                for (k, tap) in taps.iter().enumerate() {
+                    let tap = T::splat(simd, *tap);
+                    let samples = &samples[first + k..first + k + REGISTERS * lanes];
+                    for (sum, x) in sum.iter_mut().zip(samples.chunks_exact(lanes)) {
+                        *sum = T::multiply_add(simd, tap, T::load(simd, x), *sum);
                     }
                 }
-                for (r, sum) in sum[..lanes].iter().enumerate() {
-                    sums[r * width + at] = *sum;
-                }
             }
-            let sums: &[T] = cast_slice(&sums);
-            for (i, out) in out.chunks_mut(lanes).enumerate() {
-                let mut y = zero;
-                for r in 0..lanes {
-                    let shifted = (r * width + i) * lanes + r;
-                    let part = T::load(simd, &sums[shifted..shifted + lanes]);
-                    y = T::multiply_add(simd, one, part, y);
-                }
-                T::store(simd, out, y);
+            for (out, sum) in out.chunks_mut(lanes).zip(sum) {
+                T::store(simd, out, sum);
             }
         }
     }
