@@ -3,27 +3,29 @@
 //!
 //! All parts but the last share one transform; tonnetz comes from the harmonic part of the signal.
 
-use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
-use ndarray::{Array2, ArrayView2, Axis};
+use ndarray::{Array2, Axis};
 
 use crate::chroma::{Chroma, ChromaParams, chroma_filter};
 use crate::cqt::{ChromaCqt, ChromaCqtParams, CqtParams, CqtPlan, SignalTuning};
 use crate::decibel::Decibel;
 use crate::error::Result;
 use crate::frequency::fft_frequencies;
-use crate::hpss::HarmonicPart;
+use crate::hpss::{self, HarmonicPart};
 use crate::lanes::{LANES, Row, power_to_decibel};
 use crate::librosa::LibrosaVersion;
 use crate::mel::{MelParams, SparseBank, mel_filter};
 use crate::mfcc::{MfccParams, mfcc_matrix};
 use crate::normalize::Norm;
 use crate::pitch::{PitchParams, TuningEstimator};
+use crate::pool::Pool;
 use crate::real::require_finite;
+use crate::simd::vectorized;
 use crate::spectral::{Contrast, ContrastParams, contrast_from_extremes};
 use crate::sums;
 use crate::tonnetz::tonnetz;
+use crate::tuned::ByTuning;
 
 const N_FFT: usize = 2048;
 const HOP: usize = 512;
@@ -53,9 +55,6 @@ pub fn names() -> Vec<String> {
     parts.iter().flat_map(|(part, n)| (0..*n).map(move |i| format!("{part}_{i}"))).collect()
 }
 
-/// Tables by tuning in hundredths of a bin.
-type ByTuning<P> = Mutex<HashMap<i32, Arc<P>>>;
-
 /// Everything that recordings of one sample rate share; threads may use it together.
 pub struct Af193 {
     sr: f64,
@@ -68,6 +67,7 @@ pub struct Af193 {
     chroma: ByTuning<Chroma<f32>>,
     cqt: ByTuning<CqtPlan>,
     fold: ChromaCqt,
+    works: Pool<Work>,
 }
 
 impl Af193 {
@@ -93,9 +93,10 @@ impl Af193 {
             mfcc: mfcc_matrix(N_MELS, &MfccParams { n_mfcc: N_MFCC, ..MfccParams::default() })?,
             contrast: Contrast::new(&freqs, sr, &ContrastParams::default())?,
             tuning: SignalTuning::padded(sr, librosa.pad_mode())?,
-            chroma: Mutex::default(),
-            cqt: Mutex::default(),
+            chroma: ByTuning::default(),
+            cqt: ByTuning::default(),
             fold: ChromaCqt::new(CQT_BINS * CQT_OCTAVES, &ChromaCqtParams::default())?,
+            works: Pool::default(),
         };
         plan.cqt(0.0)?;
         Ok(plan)
@@ -107,36 +108,61 @@ impl Af193 {
     /// No samples, or samples that are not finite.
     pub fn compute(&self, y: &[f32]) -> Result<[f32; LENGTH]> {
         require_finite("y", y)?;
-        let mut spectra = Spectra::new(self)?;
-        let (harmonic, magnitude) = self.harmonic.of(y, |m| spectra.push(m))?;
+        let mut work = self.works.take();
+        let vector = self.compute_in(&mut work, y);
+        self.works.give_back(work);
+        vector
+    }
+
+    fn compute_in(&self, work: &mut Work, y: &[f32]) -> Result<[f32; LENGTH]> {
+        let Work { separation, harmonic, power, mel, contrast, peaks, valleys } = work;
+        power.resize(N_FFT / 2 + 1, 0.0);
+        contrast.resize(self.contrast.scratch_len(), 0.0);
+        mel.clear();
+        peaks.clear();
+        valleys.clear();
+        let mut spectra = Spectra {
+            plan: self,
+            frames: 0,
+            power,
+            mel,
+            mel_sum: [0.0; N_MELS],
+            contrast,
+            peaks,
+            valleys,
+            pitches: TuningEstimator::new(PitchParams::new(self.sr, N_FFT))?,
+        };
+        self.harmonic.of(y, harmonic, separation, |m| spectra.push(m))?;
         let mut vector = [0.0; LENGTH];
         let (mfcc, rest) = vector.split_at_mut(N_MFCC);
         let (chroma, rest) = rest.split_at_mut(N_CHROMA);
         let (mel, rest) = rest.split_at_mut(N_MELS);
         let (contrast, tonnetz) = rest.split_at_mut(N_CONTRAST);
         let tuning = spectra.finish(mfcc, mel, contrast)?;
-        self.chroma_mean(magnitude.view(), tuning, chroma)?;
-        self.tonnetz_mean(&harmonic, tonnetz)?;
+        self.chroma_mean(separation.magnitude(), tuning, chroma)?;
+        self.tonnetz_mean(harmonic, tonnetz)?;
         Ok(vector)
     }
 
-    fn chroma_mean(&self, magnitude: ArrayView2<f32>, tuning: f64, out: &mut [f32]) -> Result<()> {
-        let chroma = cached(&self.chroma, tuning, || {
+    fn chroma_mean(&self, magnitude: &[f32], tuning: f64, out: &mut [f32]) -> Result<()> {
+        let chroma = self.chroma.get(tuning, || {
             let params = ChromaParams { tuning, ..ChromaParams::new(self.sr, N_FFT) };
             Ok(Chroma::new(chroma_filter(&params)?.view(), Some(Norm::Max)))
         })?;
         let mut frame = [0.0; N_CHROMA];
         let mut sum = [0.0; N_CHROMA];
-        for spectrum in magnitude.rows() {
-            chroma.frame(spectrum.to_slice().expect("standard layout"), &mut frame);
+        let spectra = magnitude.chunks_exact(N_FFT / 2 + 1);
+        let frames = spectra.len();
+        for spectrum in spectra {
+            chroma.frame(spectrum, &mut frame);
             sum.iter_mut().zip(frame).for_each(|(sum, x)| *sum += f64::from(x));
         }
-        store_means(&sum, magnitude.nrows(), out);
+        store_means(&sum, frames, out);
         Ok(())
     }
 
     fn cqt(&self, tuning: f64) -> Result<Arc<CqtPlan>> {
-        cached(&self.cqt, tuning, || {
+        self.cqt.get(tuning, || {
             let params = CqtParams {
                 hop_length: HOP,
                 n_bins: CQT_BINS * CQT_OCTAVES,
@@ -150,29 +176,12 @@ impl Af193 {
 
     fn tonnetz_mean(&self, harmonic: &[f32], out: &mut [f32]) -> Result<()> {
         let tuning = self.tuning.estimate([harmonic], CQT_BINS)?.unwrap_or(0.0);
-        let transform = self.cqt(tuning)?.transform(harmonic)?;
-        let chroma = self.fold.of_transform(transform.view());
+        let chroma = self.fold.of_signal(&*self.cqt(tuning)?, harmonic)?;
         let centroids = tonnetz(chroma.view().insert_axis(Axis(0)))?;
         let sum: Vec<f64> = centroids.index_axis(Axis(0), 0).sum_axis(Axis(1)).to_vec();
         store_means(&sum, chroma.ncols(), out);
         Ok(())
     }
-}
-
-/// The table for `tuning`, made if it is the first of its kind.
-fn cached<P>(
-    tables: &ByTuning<P>,
-    tuning: f64,
-    make: impl FnOnce() -> Result<P>,
-) -> Result<Arc<P>> {
-    let key = (tuning * 100.0).round() as i32;
-    let lock = || tables.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(table) = lock().get(&key) {
-        return Ok(table.clone());
-    }
-    // Made outside the lock: two threads may make the same table, and one of them is kept.
-    let table = Arc::new(make()?);
-    Ok(lock().entry(key).or_insert(table).clone())
 }
 
 fn store_means(sums: &[f64], frames: usize, out: &mut [f32]) {
@@ -181,77 +190,88 @@ fn store_means(sums: &[f64], frames: usize, out: &mut [f32]) {
     }
 }
 
-/// What is collected frame by frame from the magnitude spectra.
-struct Spectra<'p> {
-    plan: &'p Af193,
-    frames: usize,
+/// Working memory of a recording, which later ones use again.
+#[derive(Default)]
+struct Work {
+    separation: hpss::Work<f32>,
+    harmonic: Vec<f32>,
     power: Vec<f32>,
     /// Mel powers of all frames, [`N_MELS`] each.
     mel: Vec<Row>,
-    mel_sum: [f64; N_MELS],
-    contrast_scratch: Vec<f32>,
+    contrast: Vec<f32>,
     peaks: Vec<f64>,
     valleys: Vec<f64>,
+}
+
+/// What is collected frame by frame from the magnitude spectra.
+struct Spectra<'p, 'w> {
+    plan: &'p Af193,
+    frames: usize,
+    power: &'w mut Vec<f32>,
+    mel: &'w mut Vec<Row>,
+    mel_sum: [f64; N_MELS],
+    contrast: &'w mut Vec<f32>,
+    peaks: &'w mut Vec<f64>,
+    valleys: &'w mut Vec<f64>,
     pitches: TuningEstimator<f32>,
 }
 
-impl<'p> Spectra<'p> {
-    fn new(plan: &'p Af193) -> Result<Self> {
-        Ok(Self {
-            plan,
-            frames: 0,
-            power: vec![0.0; N_FFT / 2 + 1],
-            mel: Vec::new(),
-            mel_sum: [0.0; N_MELS],
-            contrast_scratch: vec![0.0; plan.contrast.scratch_len()],
-            peaks: Vec::new(),
-            valleys: Vec::new(),
-            pitches: TuningEstimator::new(PitchParams::new(plan.sr, N_FFT))?,
-        })
-    }
-
+impl Spectra<'_, '_> {
     fn push(&mut self, magnitude: &[f32]) {
         self.frames += 1;
-        self.power.iter_mut().zip(magnitude).for_each(|(p, m)| *p = m * m);
         let first = self.mel.len();
         self.mel.resize(first + N_MELS / LANES, Row::ZERO);
-        let slots = self.mel[first..].iter_mut().flat_map(|row| &mut row.0);
-        for (((start, weights), slot), sum) in
-            self.plan.mel.bands().iter().zip(slots).zip(&mut self.mel_sum)
-        {
-            *slot = sums::sum_pairs(weights, &self.power[*start..], |w, p| w * p);
-            *sum += f64::from(*slot);
-        }
+        let mel = &mut self.mel[first..];
+        vectorized(
+            #[inline(always)]
+            || {
+                self.power.iter_mut().zip(magnitude).for_each(|(p, m)| *p = m * m);
+                let slots = mel.iter_mut().flat_map(|row| &mut row.0);
+                for (((start, weights), slot), sum) in
+                    self.plan.mel.bands().iter().zip(slots).zip(&mut self.mel_sum)
+                {
+                    *slot = sums::sum_pairs(weights, &self.power[*start..], |w, p| w * p);
+                    *sum += f64::from(*slot);
+                }
+            },
+        );
         let at = self.peaks.len();
         self.peaks.resize(at + N_CONTRAST, 0.0);
         self.valleys.resize(at + N_CONTRAST, 0.0);
-        self.plan.contrast.peaks_valleys(
-            magnitude,
-            &mut self.contrast_scratch,
-            &mut self.peaks[at..],
-            &mut self.valleys[at..],
-        );
+        let (peaks, valleys) = (&mut self.peaks[at..], &mut self.valleys[at..]);
+        self.plan.contrast.peaks_valleys(magnitude, self.contrast, peaks, valleys);
         self.pitches.push(magnitude, None);
     }
 
     /// Writes the means and returns the tuning.
-    fn finish(mut self, mfcc: &mut [f32], mel: &mut [f32], contrast: &mut [f32]) -> Result<f64> {
+    fn finish(self, mfcc: &mut [f32], mel: &mut [f32], contrast: &mut [f32]) -> Result<f64> {
         store_means(&self.mel_sum, self.frames, mel);
 
         let decibel = Decibel::default();
-        power_to_decibel(&mut self.mel, decibel.amin as f32, decibel.offset() as f32);
-        let values = || self.mel.iter().flat_map(|row| row.0);
-        let peak = values().fold(f32::NEG_INFINITY, f32::max);
-        let floor = decibel.top_db.map_or(f32::NEG_INFINITY, |top_db| peak - top_db as f32);
-        let mut log_mel = [0.0; N_MELS];
-        for (i, x) in values().enumerate() {
-            log_mel[i % N_MELS] += f64::from(x.max(floor));
-        }
+        power_to_decibel(self.mel, decibel.amin as f32, decibel.offset() as f32);
+        let log_mel = vectorized(
+            #[inline(always)]
+            || {
+                let peak = self.mel.iter().fold(f32::NEG_INFINITY, |max, row| {
+                    row.0.iter().fold(max, |max, x| if *x > max { *x } else { max })
+                });
+                let floor = decibel.top_db.map_or(f32::NEG_INFINITY, |range| peak - range as f32);
+                let mut sums = [0.0; N_MELS];
+                for frame in self.mel.chunks_exact(N_MELS / LANES) {
+                    for (sums, row) in sums.chunks_exact_mut(LANES).zip(frame) {
+                        for (sum, x) in sums.iter_mut().zip(&row.0) {
+                            *sum += f64::from(if *x > floor { *x } else { floor });
+                        }
+                    }
+                }
+                sums
+            },
+        );
         // The cosine transform is linear: that of the mean is the mean of all.
         let cepstrum = self.plan.mfcc.dot(&ndarray::aview1(&log_mel));
         store_means(cepstrum.as_slice().expect("a new array"), self.frames, mfcc);
 
-        contrast_from_extremes(&mut self.peaks, &mut self.valleys, false)?;
+        contrast_from_extremes(self.peaks, self.valleys, false)?;
         let mut sum = [0.0; N_CONTRAST];
         for frame in self.peaks.chunks_exact(N_CONTRAST) {
             sum.iter_mut().zip(frame).for_each(|(sum, x)| *sum += x);

@@ -7,6 +7,7 @@ use crate::error::{DspError, Result};
 use crate::frequency::{hz_to_octs, require_rate};
 use crate::normalize::Norm;
 use crate::real::{Real, require_finite};
+use crate::simd::vectorized;
 use crate::sums;
 
 /// Parameters of a chroma filter bank, in librosa's names.
@@ -118,9 +119,23 @@ impl<T: Real> Chroma<T> {
 
     /// Pitch classes of one spectrum of `bins` powers (or magnitudes) into `out`; silence is 0.
     pub fn frame(&self, spectrum: &[T], out: &mut [T]) {
-        for (slot, row) in out.iter_mut().zip(self.weights.chunks_exact(self.bins)) {
-            *slot = sums::sum_pairs(row, spectrum, |w, s| w * s);
-        }
+        let row = |class: usize| &self.weights[class * self.bins..(class + 1) * self.bins];
+        let spectrum = &spectrum[..self.bins];
+        vectorized(
+            #[inline(always)]
+            || {
+                let (fours, rest) = out.as_chunks_mut::<4>();
+                let single = 4 * fours.len();
+                for (i, four) in fours.iter_mut().enumerate() {
+                    let class = 4 * i;
+                    let rows = [row(class), row(class + 1), row(class + 2), row(class + 3)];
+                    *four = sums::dots(rows, spectrum);
+                }
+                for (i, slot) in rest.iter_mut().enumerate() {
+                    [*slot] = sums::dots([row(single + i)], spectrum);
+                }
+            },
+        );
         if let Some(norm) = self.norm {
             norm.normalize(out);
         }

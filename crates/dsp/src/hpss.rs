@@ -1,7 +1,7 @@
 //! Harmonic-percussive separation by median filtering (librosa 0.11 `decompose.hpss`,
 //! `effects.hpss`, after FitzGerald 2010 and Driedger et al. 2014).
 
-use ndarray::{Array2, Array3, ArrayView2, ArrayView3, s};
+use ndarray::{Array2, Array3, ArrayView2, ArrayView3, ArrayViewMut2, s};
 use num_complex::Complex;
 
 use crate::error::{DspError, Result};
@@ -151,6 +151,25 @@ pub enum Part {
     Percussive,
 }
 
+/// Working memory of a separation, which later ones may use again.
+#[derive(Default)]
+pub struct Work<T> {
+    /// Magnitudes of all frames, `[frames][bins]`.
+    magnitude: Vec<T>,
+    /// Spectra of the frames under the filter along time.
+    waiting: Vec<Complex<T>>,
+    harmonic: Vec<T>,
+    percussive: Vec<T>,
+    mask: Vec<T>,
+}
+
+impl<T: Real> Work<T> {
+    /// Magnitude spectra of the recording last separated, `[frames][bins]`.
+    pub fn magnitude(&self) -> &[T] {
+        &self.magnitude
+    }
+}
+
 /// Separates recordings; made once for all of them.
 #[derive(Clone)]
 pub struct Separator<T: Real> {
@@ -172,7 +191,7 @@ impl<T: Lane> Separator<T> {
     }
 
     /// Writes `parts` of `y` to as many buffers of its length, calls `observe` with each magnitude
-    /// spectrum in turn, and returns them all as `[frames, bins]`.
+    /// spectrum in turn, and leaves them all in `work`.
     ///
     /// The complex spectra are kept for the frames under the median filter only.
     ///
@@ -185,8 +204,9 @@ impl<T: Lane> Separator<T> {
         &self,
         y: &[T],
         parts: &mut [(Part, &mut [T])],
+        work: &mut Work<T>,
         mut observe: impl FnMut(&[T]),
-    ) -> Result<Array2<T>> {
+    ) -> Result<()> {
         let stft = self.forward.params();
         let (frames, bins) = (stft.n_frames(y.len()), stft.n_bins());
         if frames == 0 {
@@ -198,33 +218,32 @@ impl<T: Lane> Separator<T> {
             assert_eq!(out.len(), y.len(), "one output sample per input sample");
             out.fill(T::zero());
         }
-        let mut magnitude = Array2::zeros((frames, bins));
         // Spectra wait for the frames that the filter along time looks ahead.
         let kept = (BLOCK + self.params.kernel_harmonic).min(frames).next_multiple_of(BLOCK);
-        let mut waiting = Array2::zeros((kept, bins));
+        let Work { magnitude, waiting, harmonic, percussive, mask } = work;
+        magnitude.resize(frames * bins, T::zero());
+        waiting.resize(kept * bins, Complex::default());
+        for block in [&mut *harmonic, &mut *percussive, &mut *mask] {
+            block.resize(BLOCK * bins, T::zero());
+        }
         let (mut scratch, mut inverse) = (self.forward.scratch(), self.inverse.scratch());
-        let mut harmonic = Array2::zeros((BLOCK, bins));
-        let mut percussive = Array2::zeros((BLOCK, bins));
-        let mut mask = vec![T::zero(); BLOCK * bins];
         let mut analysed = 0;
         for first in (0..frames).step_by(BLOCK) {
             let end = frames.min(first + BLOCK);
             while analysed < frames.min(end + self.params.kernel_harmonic / 2) {
                 let spectrum = self.forward.spectrum(y, analysed, &mut scratch);
-                let mut row = magnitude.row_mut(analysed);
-                let row = row.as_slice_mut().expect("a new array");
-                let mut kept = waiting.row_mut(analysed % kept);
-                round(spectrum, kept.as_slice_mut().expect("a new array"), row);
+                let row = &mut magnitude[analysed * bins..(analysed + 1) * bins];
+                round(spectrum, &mut waiting[analysed % kept * bins..][..bins], row);
                 observe(row);
                 analysed += 1;
             }
             let n = end - first;
-            let (mut h, mut q) =
-                (harmonic.slice_mut(s![..n, ..]), percussive.slice_mut(s![..n, ..]));
-            median::down(magnitude.view(), self.params.kernel_harmonic, first..end, h.view_mut());
-            let rows = magnitude.slice(s![first..end, ..]);
-            median::across(rows, self.params.kernel_percussive, q.view_mut());
-            let (h, q) = (h.as_slice().expect("whole rows"), q.as_slice().expect("whole rows"));
+            let (h, q) = (&mut harmonic[..n * bins], &mut percussive[..n * bins]);
+            let whole = ArrayView2::from_shape((frames, bins), &*magnitude).expect("every frame");
+            let rows = |values| ArrayViewMut2::from_shape((n, bins), values).expect("n frames");
+            median::down(whole, self.params.kernel_harmonic, first..end, rows(&mut *h));
+            let frames = whole.slice(s![first..end, ..]);
+            median::across(frames, self.params.kernel_percussive, rows(&mut *q));
             for (part, out) in &mut *parts {
                 let mask = &mut mask[..n * bins];
                 self.params.mask(*part, h, q, mask);
@@ -233,8 +252,8 @@ impl<T: Lane> Separator<T> {
                         let values = inverse.bins().iter_mut().zip(mask);
                         values.for_each(|(z, m)| *z = Complex::new(*m, T::zero()));
                     } else {
-                        let spectrum = waiting.row(t % kept);
-                        masked(spectrum.to_slice().expect("a new array"), mask, inverse.bins());
+                        let spectrum = &waiting[t % kept * bins..][..bins];
+                        masked(spectrum, mask, inverse.bins());
                     }
                     self.inverse.add(t, out, &mut inverse);
                 }
@@ -243,7 +262,7 @@ impl<T: Lane> Separator<T> {
         for (_, out) in parts {
             self.inverse.normalize(inverted, out);
         }
-        Ok(magnitude)
+        Ok(())
     }
 }
 
@@ -288,21 +307,27 @@ impl HarmonicPart {
         Ok(Self { separator: Separator::new(&stft, HpssParams::default(), false)?, librosa })
     }
 
-    /// The part of `y`, as long as it, and the magnitudes `[frames, bins]` of `y`, each of which is
-    /// shown to `observe`.
+    /// Writes the part of `y` to `part`, as long as it. Magnitude spectra are shown to `observe` one
+    /// after the other, and stay in `work`.
     ///
     /// # Errors
     /// No samples.
-    pub fn of(&self, y: &[f32], observe: impl FnMut(&[f32])) -> Result<(Vec<f32>, Array2<f32>)> {
-        let mut part = vec![0.0; y.len()];
+    pub fn of(
+        &self,
+        y: &[f32],
+        part: &mut Vec<f32>,
+        work: &mut Work<f32>,
+        observe: impl FnMut(&[f32]),
+    ) -> Result<()> {
+        part.resize(y.len(), 0.0);
         let parts = &mut [(Part::Harmonic, part.as_mut_slice())];
-        let magnitude = self.separator.separate(y, parts, observe)?;
+        self.separator.separate(y, parts, work, observe)?;
         if self.librosa == LibrosaVersion::V08 {
             // It inverted without a length and filled up with zeros behind the last frame's centre.
-            let hop = self.separator.forward.params().hop_length;
-            part[hop * (magnitude.nrows() - 1)..].fill(0.0);
+            let stft = self.separator.forward.params();
+            part[stft.hop_length * (stft.n_frames(y.len()) - 1)..].fill(0.0);
         }
-        Ok((part, magnitude))
+        Ok(())
     }
 }
 
@@ -322,12 +347,13 @@ pub fn separate<T: Lane>(
     require_finite("y", y.iter())?;
     let y = y.as_standard_layout();
     let mut separated = vec![Array2::zeros(y.dim()); parts.len()];
+    let mut work = Work::default();
     for (c, y) in y.rows().into_iter().enumerate() {
         let y = y.to_slice().expect("standard layout");
         let mut rows: Vec<_> = separated.iter_mut().map(|part| part.row_mut(c)).collect();
         let outputs = rows.iter_mut().map(|row| row.as_slice_mut().expect("a new array"));
         let mut parts: Vec<_> = parts.iter().copied().zip(outputs).collect();
-        separator.separate(y, &mut parts, |_| {})?;
+        separator.separate(y, &mut parts, &mut work, |_| {})?;
     }
     Ok(separated)
 }

@@ -27,6 +27,7 @@ pub mod onset;
 pub mod paa;
 pub mod pca;
 pub mod pitch;
+mod pool;
 pub mod real;
 pub mod resample;
 pub mod resize;
@@ -37,6 +38,7 @@ mod sums;
 pub mod time_domain;
 pub mod tonnetz;
 pub mod transform;
+pub mod tuned;
 pub mod vector;
 pub mod window;
 

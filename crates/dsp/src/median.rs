@@ -75,13 +75,14 @@ impl<T: Lane> WithSimd for Down<'_, '_, T> {
         if self.size == NETWORK {
             for first in (0..self.wanted.len()).step_by(BLOCK) {
                 let rows: [&[T]; SPAN] = std::array::from_fn(|k| row(first + k));
+                let mut medians = [T::splat(simd, T::zero()); BLOCK];
                 for c in (0..columns).step_by(lanes) {
                     let end = columns.min(c + lanes);
                     let mut x = [T::splat(simd, T::zero()); SPAN];
                     for (v, row) in x.iter_mut().zip(&rows) {
                         *v = T::load(simd, &row[c..end]);
                     }
-                    let medians = medians31::<T, S>(simd, &x);
+                    medians31::<T, S>(simd, &x, &mut medians);
                     for (k, &v) in medians.iter().enumerate().take(self.wanted.len() - first) {
                         let mut line = self.out.row_mut(first + k);
                         let line = line.as_slice_mut().expect("contiguous rows");
@@ -139,9 +140,9 @@ impl<T: Lane> WithSimd for Across<'_, '_, T> {
                 }
             }
             if self.size == NETWORK {
-                for (c, block) in medians.chunks_exact_mut(BLOCK).enumerate() {
+                for (c, block) in medians.as_chunks_mut().0.iter_mut().enumerate() {
                     let x = strip[c * BLOCK..].first_chunk().expect("padded to whole blocks");
-                    block.copy_from_slice(&medians31::<T, S>(simd, x));
+                    medians31::<T, S>(simd, x, block);
                 }
             } else {
                 slide::<T, S>(simd, self.size, &strip, &mut medians);
@@ -190,13 +191,11 @@ fn slide<T: Lane, S: Simd>(simd: S, size: usize, x: &[T::V<S>], medians: &mut [T
 /// Of the windows `o..o + m` the lower half adds the values from `o + m / 2 - 1` on, the upper half
 /// those from `o + 31` on.
 #[inline(always)]
-fn medians31<T: Lane, S: Simd>(simd: S, x: &[T::V<S>; SPAN]) -> [T::V<S>; BLOCK] {
+fn medians31<T: Lane, S: Simd>(simd: S, x: &[T::V<S>; SPAN], out: &mut [T::V<S>; BLOCK]) {
     let net = Net::<T, S> { simd, x };
-    let mut out = [x[0]; BLOCK];
     let core = net.merge8(net.eight(15), net.eight(23));
-    net.medians8(net.select16(core, net.eight(7)), 0, &mut out);
-    net.medians8(net.select16(core, net.eight(31)), 8, &mut out);
-    out
+    net.medians8(net.select16(core, net.eight(7)), 0, out);
+    net.medians8(net.select16(core, net.eight(31)), 8, out);
 }
 
 /// Comparator networks over the registers `x`.

@@ -8,6 +8,8 @@ use crate::error::{DspError, Result};
 use crate::frequency::fft_frequencies;
 use crate::log2::log2;
 use crate::real::Real;
+use crate::simd::vectorized;
+use crate::sums::largest;
 
 /// Parameters of the tracker, in librosa's names.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +48,7 @@ pub struct Peak<T> {
 #[derive(Debug, Clone)]
 pub struct PitchTracker {
     params: PitchParams,
-    /// Bins with `fmin <= f < fmax`.
+    /// Bins with `fmin <= f < fmax`, `first..end`.
     first: usize,
     end: usize,
 }
@@ -65,6 +67,12 @@ impl PitchTracker {
         Ok(Self { params, first, end })
     }
 
+    /// Bins that peaks are looked for in and their neighbours: the length of spectrum that
+    /// [`peaks`](Self::peaks) needs when it is given a reference.
+    pub fn reach(&self) -> usize {
+        (self.end + 1).min(self.n_bins())
+    }
+
     /// Bins of a spectrum, `n_fft / 2 + 1`.
     pub fn n_bins(&self) -> usize {
         self.params.n_fft / 2 + 1
@@ -72,6 +80,8 @@ impl PitchTracker {
 
     /// Calls `each` with the peaks of one spectrum of non-negative magnitudes (or powers), in bin
     /// order. Peaks exceed `reference`, or `threshold` times the maximum where that is `None`.
+    ///
+    /// With a reference, [`reach`](Self::reach) bins are enough.
     pub fn peaks<T: Real>(
         &self,
         magnitude: &[T],
@@ -79,7 +89,11 @@ impl PitchTracker {
         mut each: impl FnMut(Peak<T>),
     ) {
         let reference = reference.unwrap_or_else(|| {
-            T::of(self.params.threshold) * magnitude.iter().fold(T::zero(), |m, s| s.max(m))
+            let largest = vectorized(
+                #[inline(always)]
+                || largest(magnitude),
+            );
+            T::of(self.params.threshold) * largest
         });
         let kept = |s: T| if s > reference { s } else { T::zero() };
         let last = magnitude.len().saturating_sub(1);
@@ -169,6 +183,11 @@ impl<T: Real> TuningEstimator<T> {
     pub fn new(params: PitchParams) -> Result<Self> {
         let tracker = PitchTracker::new(params)?;
         Ok(Self { tracker, pitches: Vec::new(), magnitudes: Vec::new() })
+    }
+
+    /// The tracker behind it.
+    pub fn tracker(&self) -> &PitchTracker {
+        &self.tracker
     }
 
     /// Adds the peaks of one spectrum of non-negative magnitudes or powers.

@@ -74,21 +74,24 @@ impl<F: Real> Forward<F> {
         let p = &self.params;
         let start = (t * p.hop_length) as isize - p.pad() as isize;
         let inside = usize::try_from(start).ok().and_then(|s| y.get(s..s + p.n_fft));
-        if let Some(samples) = inside {
-            for (slot, x) in scratch.frame.iter_mut().zip(samples) {
-                *slot = F::of(x.wide());
-            }
-        } else {
-            for (k, slot) in scratch.frame.iter_mut().enumerate() {
+        let frame = &mut scratch.frame;
+        if inside.is_none() {
+            for (k, slot) in frame.iter_mut().enumerate() {
                 let index = p.pad_mode.index(start + k as isize, y.len());
                 *slot = index.map_or(F::zero(), |i| F::of(y[i].wide()));
             }
         }
-        if let Some(window) = &self.window {
-            for (x, &w) in scratch.frame.iter_mut().zip(window) {
-                *x *= w;
-            }
-        }
+        crate::simd::vectorized(
+            #[inline(always)]
+            || {
+                if let Some(samples) = inside {
+                    frame.iter_mut().zip(samples).for_each(|(slot, x)| *slot = F::of(x.wide()));
+                }
+                if let Some(window) = &self.window {
+                    frame.iter_mut().zip(window).for_each(|(x, w)| *x *= *w);
+                }
+            },
+        );
         self.fft
             .process_with_scratch(&mut scratch.frame, &mut scratch.spectrum, &mut scratch.fft)
             .expect("buffers made by the plan itself");
@@ -157,19 +160,34 @@ impl<F: Real> Inverse<F> {
 
     /// Divides `y` by the sum of the squared windows of `frames` frames, where there is any.
     pub fn normalize(&self, frames: usize, y: &mut [F]) {
-        let p = &self.params;
-        let mut weight = vec![0.0; y.len()];
-        for t in 0..frames {
-            let (skip, weight) = overlap(p, t, &mut weight);
-            for (sum, square) in weight.iter_mut().zip(&self.squares[skip..]) {
-                *sum += square;
-            }
+        let (hop, pad) = (self.params.hop_length, self.params.pad());
+        // Between the first whole window and the last frame's start the sum repeats every hop.
+        let steady_from = (self.params.n_fft - 1).saturating_sub(pad).min(y.len());
+        let steady_to = (frames * hop).saturating_sub(pad).clamp(steady_from, y.len());
+        let steady = &mut y[steady_from..steady_to];
+        let sums: Vec<F> = (0..hop.min(steady.len()))
+            .map(|i| self.divisor(frames, pad + steady_from + i))
+            .collect();
+        crate::simd::vectorized(
+            #[inline(always)]
+            || {
+                for y in steady.chunks_mut(hop) {
+                    y.iter_mut().zip(&sums).for_each(|(y, sum)| *y /= *sum);
+                }
+            },
+        );
+        for i in (0..steady_from).chain(steady_to..y.len()) {
+            y[i] /= self.divisor(frames, pad + i);
         }
-        for (y, weight) in y.iter_mut().zip(weight) {
-            if weight > F::min_positive_value().wide() {
-                *y /= F::of(weight);
-            }
-        }
+    }
+
+    /// Sum of the squared windows over sample `at` (padding included), 1 where there is none.
+    fn divisor(&self, frames: usize, at: usize) -> F {
+        let hop = self.params.hop_length;
+        let first = (at + 1).saturating_sub(self.params.n_fft).div_ceil(hop);
+        let end = frames.min(at / hop + 1);
+        let sum: f64 = (first..end).map(|t| self.squares[at - t * hop]).sum();
+        if sum > F::min_positive_value().wide() { F::of(sum) } else { F::one() }
     }
 }
 

@@ -3,6 +3,7 @@
 
 use corsmal_dsp::frontends::downmix_71_weights;
 use corsmal_dsp::resample::{Converter, ConverterStream};
+use corsmal_dsp::simd::vectorized;
 
 use crate::config::{Channels, Normalize, SignalConfig};
 
@@ -168,27 +169,45 @@ fn normalize(rule: Normalize, signal: &mut [f32]) {
 
 /// Applies a channel rule to interleaved frames.
 fn mix(rule: &Channels, channels: usize, input: &[f32], out: &mut Vec<f32>) {
-    match rule {
-        Channels::All => out.extend_from_slice(input),
-        Channels::Mean if channels == 1 => out.extend_from_slice(input),
-        // Summed channel by channel in single precision, as numpy's mean over axis 0.
-        Channels::Mean if channels == 8 => {
-            out.extend(input.as_chunks::<8>().0.iter().map(|x| x.iter().sum::<f32>() / 8.0));
-        }
-        Channels::Mean => out
-            .extend(input.chunks_exact(channels).map(|x| x.iter().sum::<f32>() / channels as f32)),
-        Channels::Downmix71 => {
-            let weights = downmix_71_weights();
-            out.extend(input.chunks_exact(channels).map(|x| {
-                x.iter().zip(&weights).map(|(x, w)| f64::from(*x) * w).sum::<f64>() as f32
-            }));
-        }
-        Channels::List(list) => {
-            for frame in input.chunks_exact(channels) {
-                out.extend(list.iter().map(|c| frame[*c]));
+    let kept = match rule {
+        Channels::All => return out.extend_from_slice(input),
+        Channels::Mean if channels == 1 => return out.extend_from_slice(input),
+        Channels::Mean | Channels::Downmix71 => 1,
+        Channels::List(list) => list.len(),
+    };
+    let from = out.len();
+    out.resize(from + input.len() / channels * kept, 0.0);
+    let out = &mut out[from..];
+    vectorized(
+        #[inline(always)]
+        || match rule {
+            // Summed channel by channel in single precision, as numpy's mean over axis 0.
+            Channels::Mean if channels == 8 => {
+                for (out, frame) in out.iter_mut().zip(input.as_chunks::<8>().0) {
+                    *out = frame.iter().fold(0.0, |sum, x| sum + x) / 8.0;
+                }
             }
-        }
-    }
+            Channels::All | Channels::Mean => {
+                for (out, frame) in out.iter_mut().zip(input.chunks_exact(channels)) {
+                    *out = frame.iter().fold(0.0, |sum, x| sum + x) / channels as f32;
+                }
+            }
+            Channels::Downmix71 => {
+                let weights = downmix_71_weights();
+                for (out, frame) in out.iter_mut().zip(input.as_chunks::<8>().0) {
+                    let weighted = frame.iter().zip(&weights).map(|(x, w)| f64::from(*x) * w);
+                    *out = weighted.sum::<f64>() as f32;
+                }
+            }
+            Channels::List(list) => {
+                for (i, channel) in list.iter().enumerate() {
+                    let frames = input.chunks_exact(channels).map(|frame| frame[*channel]);
+                    let slots = out.iter_mut().skip(i).step_by(kept);
+                    slots.zip(frames).for_each(|(out, x)| *out = x);
+                }
+            }
+        },
+    );
 }
 
 #[cfg(test)]

@@ -2,12 +2,12 @@
 //! `feature.chroma_cqt`).
 
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis};
-use num_complex::Complex;
 
 use super::{C1, CqtParams, CqtPlan, per_channel};
 use crate::error::{DspError, Result};
 use crate::normalize::Norm;
 use crate::real::{Real, require_finite};
+use crate::simd::vectorized;
 use crate::vector::Lane;
 
 /// Parameters of the folding of bins into pitch classes, in librosa's names.
@@ -122,6 +122,12 @@ impl ChromaCqt {
             let row = row.as_slice_mut().expect("a new array");
             class.iter().for_each(|(w, k)| add(*k, *w, row));
         }
+        self.finish(&mut chroma);
+        chroma
+    }
+
+    /// Threshold and norm of every frame.
+    fn finish<T: Real>(&self, chroma: &mut Array2<T>) {
         if let Some(threshold) = self.threshold.map(T::of) {
             chroma.mapv_inplace(|x| if x < threshold { T::zero() } else { x });
         }
@@ -133,18 +139,40 @@ impl ChromaCqt {
                 column.iter_mut().zip(&frame).for_each(|(slot, x)| *slot = *x);
             }
         }
-        chroma
     }
 
-    /// Chromagram `[n_chroma, frames]` of one channel's constant-Q transform `[n_input, frames]`.
-    pub fn of_transform<T: Real>(&self, c: ArrayView2<Complex<T>>) -> Array2<T> {
-        self.fold(c.ncols(), |k, w, row| {
-            let w = T::of(f64::from(w));
-            for (sum, z) in row.iter_mut().zip(c.row(k)) {
-                let (re, im) = (z.re.wide(), z.im.wide());
-                *sum += w * T::of((re * re + im * im).sqrt());
+    /// Chromagram `[n_chroma, frames]` of the constant-Q transform of one channel, of which only
+    /// the magnitudes at hand are kept.
+    ///
+    /// # Errors
+    /// As [`CqtPlan::transform`].
+    ///
+    /// # Panics
+    /// When `plan` has another number of bins.
+    pub fn of_signal<T: Lane>(&self, plan: &CqtPlan, y: &[T]) -> Result<Array2<T>> {
+        assert_eq!(plan.params().n_bins, self.n_input, "bins of the transform");
+        let mut parts = vec![Vec::new(); self.n_input];
+        for (class, bins) in self.classes.iter().enumerate() {
+            bins.iter().for_each(|(w, k)| parts[*k].push((class, T::of(f64::from(*w)))));
+        }
+        let mut chroma = Array2::zeros((self.classes.len(), plan.n_frames(y.len())));
+        plan.respond_to(y, |bin, frame, re, im| {
+            for (class, w) in &parts[bin] {
+                let mut row = chroma.row_mut(*class);
+                let row = &mut row.as_slice_mut().expect("a new array")[frame..];
+                vectorized(
+                    #[inline(always)]
+                    || {
+                        for ((sum, re), im) in row.iter_mut().zip(re).zip(im) {
+                            let (re, im) = (re.wide(), im.wide());
+                            *sum += *w * T::of((re * re + im * im).sqrt());
+                        }
+                    },
+                );
             }
-        })
+        })?;
+        self.finish(&mut chroma);
+        Ok(chroma)
     }
 
     /// Chromagram `[channels, n_chroma, frames]` of magnitudes `[channels, n_input, frames]`.
@@ -183,7 +211,7 @@ pub fn chroma_cqt<T: Lane>(
 ) -> Result<Array3<T>> {
     let fold = ChromaCqt::new(cqt.n_bins, p)?;
     let plan = CqtPlan::new(cqt)?;
-    per_channel(y, |y| Ok(fold.of_transform(plan.transform(y)?.view())))
+    per_channel(y, |y| fold.of_signal(&plan, y))
 }
 
 #[cfg(test)]

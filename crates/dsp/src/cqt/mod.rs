@@ -8,9 +8,10 @@ mod chroma;
 mod decimate;
 mod tuning;
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
-use ndarray::{Array2, Array3, ArrayView2, ArrayViewMut2, Axis, s};
+use ndarray::{Array2, Array3, ArrayView2, Axis};
 use num_complex::Complex;
 
 pub use chroma::{ChromaCqt, ChromaCqtParams, chroma_cqt, cq_to_chroma};
@@ -231,40 +232,66 @@ impl CqtPlan {
     /// # Errors
     /// A signal shorter than the early decimation needs, or without samples.
     pub fn transform<T: Lane>(&self, y: &[T]) -> Result<Array2<Complex<T>>> {
+        let mut out = Array2::zeros((self.params.n_bins, self.n_frames(y.len())));
+        self.respond_to(y, |bin, frame, re, im| {
+            let mut row = out.row_mut(bin);
+            let row = row.as_slice_mut().expect("a new array");
+            for ((z, re), im) in row[frame..].iter_mut().zip(re).zip(im) {
+                *z = Complex::new(*re, *im);
+            }
+        })?;
+        Ok(out)
+    }
+
+    /// Frames of the transform of `n` samples.
+    pub fn n_frames(&self, n: usize) -> usize {
+        let mut length = n.div_ceil(1 << self.early);
+        let mut frames = usize::MAX;
+        for octave in &self.octaves {
+            frames = frames.min(1 + length / octave.hop);
+            if octave.halve {
+                length = length.div_ceil(2);
+            }
+        }
+        frames
+    }
+
+    /// Calls `each(bin, frame, re, im)` with the responses of every bin to a run of frames from
+    /// `frame` on; bins of an octave come in order, octaves from the highest down.
+    ///
+    /// # Errors
+    /// As [`transform`](Self::transform).
+    fn respond_to<T: Lane>(
+        &self,
+        y: &[T],
+        mut each: impl FnMut(usize, usize, &[T], &[T]),
+    ) -> Result<()> {
         let factor = 1usize << self.early;
         if y.is_empty() || y.len() < factor {
             return Err(DspError::TooShort { name: "y", actual: y.len(), needed: factor });
         }
-        let mut signal = self.decimated_early(y)?;
-        let mut lengths = signal.len();
-        let mut frames = usize::MAX;
-        for octave in &self.octaves {
-            frames = frames.min(1 + lengths / octave.hop);
-            if octave.halve {
-                lengths = lengths.div_ceil(2);
-            }
+        let frames = self.n_frames(y.len());
+        let mut signal = Cow::Borrowed(y);
+        if self.early > 0 {
+            signal = Cow::Owned(self.decimated_early(y)?);
         }
-        let mut out = Array2::zeros((self.params.n_bins, frames));
         for (i, octave) in self.octaves.iter().enumerate() {
-            let bins = octave.first..octave.first + octave.gains.len();
-            let part = out.slice_mut(s![bins, ..]);
             let narrow = T::as_f32(&signal).zip(octave.lanes.as_deref());
             match narrow {
-                Some((signal, fft)) => self.respond_in_lanes(octave, fft, signal, part),
-                None => self.respond(octave, &signal, part)?,
+                Some((signal, fft)) => {
+                    self.respond_in_lanes(octave, fft, signal, frames, &mut each);
+                }
+                None => self.respond(octave, &signal, frames, &mut each)?,
             }
             if octave.halve && i + 1 < self.octaves.len() {
-                signal = self.halved(&signal);
+                signal = Cow::Owned(self.halved(&signal));
             }
         }
-        Ok(out)
+        Ok(())
     }
 
-    /// The signal of the first octave.
+    /// The signal of the first octave, where it has a lower rate.
     fn decimated_early<T: Lane>(&self, y: &[T]) -> Result<Vec<T>> {
-        if self.early == 0 {
-            return Ok(y.to_vec());
-        }
         let factor = 1usize << self.early;
         if self.params.res_type != ResType::SoxrHq {
             let y = ArrayView2::from_shape((1, y.len()), y).expect("one row");
@@ -274,14 +301,14 @@ impl CqtPlan {
         }
         // soxr rounds the number of samples half up, librosa pads to the next larger with a zero.
         let n = (y.len() + factor / 2) / factor;
-        let mut signal = y.to_vec();
+        let mut signal = Cow::Borrowed(y);
         let [early, last] = &self.early_decimators;
         for level in 1..self.early {
             // The response after the end counts in the later stages.
             let after = n << (self.early - level);
-            signal = early.halve(&signal, after + last.reach());
+            signal = Cow::Owned(early.halve(&signal, after + last.reach()));
         }
-        signal = last.halve(&signal, n);
+        let mut signal = last.halve(&signal, n);
         signal.resize(y.len().div_ceil(factor), T::zero());
         Ok(signal)
     }
@@ -304,24 +331,26 @@ impl CqtPlan {
         }
     }
 
-    /// Filter responses of one octave into `out` `[bins, frames]`, frame by frame.
+    /// Filter responses of one octave, frame by frame.
     fn respond<T: Lane>(
         &self,
         octave: &Octave,
         signal: &[T],
-        mut out: ArrayViewMut2<Complex<T>>,
+        frames: usize,
+        each: &mut impl FnMut(usize, usize, &[T], &[T]),
     ) -> Result<()> {
         let forward = Forward::<T>::new(&self.stft(octave))?;
         let mut scratch = forward.scratch();
-        for (t, mut column) in out.axis_iter_mut(Axis(1)).enumerate() {
+        for t in 0..frames {
             let spectrum = forward.spectrum(signal, t, &mut scratch);
             let filters = octave.basis.rows.iter().zip(&octave.gains);
-            for (((first, weights), gain), out) in filters.zip(&mut column) {
-                let mut sum = Complex::default();
+            for (bin, ((first, weights), gain)) in (octave.first..).zip(filters) {
+                let mut sum = Complex::<T>::default();
                 for (w, x) in weights.iter().zip(&spectrum[*first..]) {
                     sum += x * Complex::new(T::of(w.re.into()), T::of(w.im.into()));
                 }
-                *out = sum.scale(T::of(f64::from(*gain)));
+                let sum = sum.scale(T::of(f64::from(*gain)));
+                each(bin, t, &[sum.re], &[sum.im]);
             }
         }
         Ok(())
@@ -333,25 +362,22 @@ impl CqtPlan {
         octave: &Octave,
         fft: &LaneFft,
         signal: &[f32],
-        mut out: ArrayViewMut2<Complex<T>>,
+        frames: usize,
+        each: &mut impl FnMut(usize, usize, &[T], &[T]),
     ) {
         let n_fft = octave.basis.n_fft;
         let padded = self.params.pad_mode.extended(signal, n_fft / 2);
         let window = vec![1.0; n_fft];
-        let mut frames = vec![Row::ZERO; n_fft];
+        let mut samples = vec![Row::ZERO; n_fft];
         let mut spectrum = vec![Row::ZERO; 2 * fft.n_bins()];
         let mut response = vec![[Row::ZERO; 2]; octave.basis.rows.len()];
-        for slots in Slots::blocks(out.ncols(), 1) {
-            gather(&padded, octave.hop, &window, slots, &mut frames);
-            fft.complex(&mut frames, &mut spectrum);
+        for slots in Slots::blocks(frames, 1) {
+            gather(&padded, octave.hop, &window, slots, &mut samples);
+            fft.complex(&mut samples, &mut spectrum);
             project(&octave.basis, &octave.gains, &spectrum, &mut response);
-            let columns = slots.first..slots.first + slots.len;
-            for (mut row, [re, im]) in
-                out.slice_mut(s![.., columns]).rows_mut().into_iter().zip(&response)
-            {
-                for ((z, re), im) in row.iter_mut().zip(re.0).zip(im.0) {
-                    *z = Complex::new(T::of(re.into()), T::of(im.into()));
-                }
+            for (bin, [re, im]) in (octave.first..).zip(&response) {
+                let [re, im] = [re, im].map(|row| row.0.map(|x| T::of(x.into())));
+                each(bin, slots.first, &re[..slots.len], &im[..slots.len]);
             }
         }
     }
@@ -372,7 +398,11 @@ fn project(basis: &Basis, gains: &[f32], spectrum: &[Row], response: &mut [[Row;
                         im[l] += w.re * x[1].0[l] + w.im * x[0].0[l];
                     }
                 }
-                *response = [Row(re.map(|x| x * gain)), Row(im.map(|x| x * gain))];
+                let [re_out, im_out] = response;
+                for l in 0..LANES {
+                    re_out.0[l] = re[l] * gain;
+                    im_out.0[l] = im[l] * gain;
+                }
             }
         },
     );

@@ -4,6 +4,7 @@ use crate::error::Result;
 use crate::lanes::{LANES, LaneFft, Row, Slots, gather};
 use crate::pitch::{PitchParams, TuningEstimator};
 use crate::real::Real;
+use crate::simd::vectorized;
 use crate::stft::{PadMode, StftParams};
 use crate::transform::Forward;
 use crate::window::get_window;
@@ -80,17 +81,33 @@ impl SignalTuning {
         let padded = self.precise.params().pad_mode.extended(y, N_FFT / 2);
         let mut frames = vec![Row::ZERO; N_FFT];
         let mut power = vec![Row::ZERO; self.lanes.n_bins()];
-        let mut magnitudes = vec![T::zero(); LANES * power.len()];
+        let reach = estimator.tracker().reach();
+        let mut magnitudes = vec![T::zero(); LANES * reach];
         for slots in Slots::blocks(self.precise.params().n_frames(y.len()), 1) {
             gather(&padded, HOP, &self.window, slots, &mut frames);
             self.lanes.power(&mut frames, &mut power);
-            for (s, magnitude) in
-                magnitudes.chunks_exact_mut(power.len()).take(slots.len).enumerate()
-            {
+            // The square root keeps the order, so the largest power has the largest magnitude.
+            let mut largest = Row::ZERO;
+            vectorized(
+                #[inline(always)]
+                || {
+                    for row in &power {
+                        for (top, x) in largest.0.iter_mut().zip(&row.0) {
+                            *top = if *x > *top { *x } else { *top };
+                        }
+                    }
+                    for row in &mut power[..reach] {
+                        row.0.iter_mut().for_each(|x| *x = x.sqrt());
+                    }
+                },
+            );
+            let threshold = T::of(self.params.threshold);
+            for (s, magnitude) in magnitudes.chunks_exact_mut(reach).take(slots.len).enumerate() {
                 for (m, row) in magnitude.iter_mut().zip(&power) {
-                    *m = T::of(f64::from(row.0[s].sqrt()));
+                    *m = T::of(row.0[s].into());
                 }
-                estimator.push(magnitude, None);
+                let reference = threshold * T::of(largest.0[s].sqrt().into());
+                estimator.push(magnitude, Some(reference));
             }
         }
     }

@@ -35,7 +35,13 @@ pub fn downmix_71(y: ArrayView2<f32>) -> Result<Array1<f64>> {
             return Err(DspError::Shape { name: "y", expected, actual: y.shape().to_vec() });
         }
     };
-    Ok(mix.mapv(|v| (v * 32768.0).round().clamp(-32768.0, 32767.0)))
+    Ok(mix.mapv(count_16))
+}
+
+/// The 16-bit count of a sample in -1..1.
+#[inline(always)]
+fn count_16(v: f64) -> f64 {
+    (v * 32768.0).round().clamp(-32768.0, 32767.0)
 }
 
 /// The 136 values per recording that the random forests take: 34 short-term features of 50 ms
@@ -65,7 +71,12 @@ impl M5A34f136 {
     /// # Errors
     /// Another number of channels, non-finite samples, less than 50 ms.
     pub fn run(&self, y: ArrayView2<f32>) -> Result<Array1<f64>> {
-        let short = self.plan.short_term(downmix_71(y)?.view(), true)?;
+        let short = match y.as_slice() {
+            Some(mono) if y.nrows() == 1 => {
+                self.plan.short_term_of(mono, |v| count_16(v.into()), true)?
+            }
+            _ => self.plan.short_term(downmix_71(y)?.view(), true)?,
+        };
         Ok(file_vector(self.mid.statistics(short.view()).view()))
     }
 }

@@ -17,7 +17,8 @@ use rustfft::{Fft, FftPlanner};
 use crate::error::{DspError, Result};
 use crate::frequency::require_rate;
 use crate::real::{Real, require_finite};
-use crate::sums::{sum, sum_pairs};
+use crate::simd::vectorized;
+use crate::sums::{extremes, sum, sum_pairs};
 use tables::{ChromaBin, Filter, N_CHROMA, N_MFCC};
 
 pub use midterm::{MidTerm, file_vector};
@@ -126,18 +127,31 @@ impl PaaPlan {
     /// # Errors
     /// Non-finite samples, or fewer than one window of them.
     pub fn short_term<T: Real>(&self, y: ArrayView1<T>, deltas: bool) -> Result<Array2<f64>> {
+        let y = y.as_standard_layout();
+        self.short_term_of(y.as_slice().expect("standard layout"), |v| v.wide(), deltas)
+    }
+
+    /// As [`short_term`](Self::short_term), of the counts that `count` makes of the samples. No copy
+    /// of the signal is made.
+    pub(crate) fn short_term_of<T: Real>(
+        &self,
+        y: &[T],
+        count: impl Fn(T) -> f64 + Copy,
+        deltas: bool,
+    ) -> Result<Array2<f64>> {
         require_finite("y", y)?;
         let frames = self.n_frames(y.len());
         if frames == 0 {
             return Err(DspError::TooShort { name: "y", actual: y.len(), needed: self.window });
         }
-        let signal = normalized(y, self.peak);
+        let level = Level::of(y, count, self.peak);
         let rows = if deltas { 2 * N_SHORT } else { N_SHORT };
         let mut out = Array2::zeros((rows, frames));
         let mut frame = Frame::new(self);
         for t in 0..frames {
             let start = t * self.step;
-            frame.analyse(self, &signal[start..start + self.window], t == 0);
+            level.apply(&y[start..start + self.window], count, &mut frame.signal);
+            frame.analyse(self, t == 0);
             for (i, &v) in frame.features.iter().enumerate() {
                 out[[i, t]] = v;
                 if deltas && t > 0 {
@@ -149,115 +163,157 @@ impl PaaPlan {
     }
 }
 
-/// The signal over 32768, without its mean, over its peak.
-fn normalized<T: Real>(y: ArrayView1<T>, peak: Peak) -> Vec<f64> {
-    let mut signal: Vec<f64> = y.iter().map(|v| v.wide() / 32768.0).collect();
-    let largest = |signal: &[f64]| signal.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-    let raw = largest(&signal);
-    let mean = pairwise_sum(&signal) / signal.len() as f64;
-    signal.iter_mut().for_each(|v| *v -= mean);
-    let peak = match peak {
-        Peak::Centred => largest(&signal),
-        Peak::Raw => raw,
-    };
-    for v in &mut signal {
-        *v /= peak + 1e-10;
-    }
-    signal
+/// What the whole signal decides: counts become `(count / 32768 - mean) / peak`.
+struct Level {
+    mean: f64,
+    /// A little more than the largest magnitude.
+    peak: f64,
 }
 
-/// numpy's summation order, which decides what a constant signal leaves after its mean is taken off.
-fn pairwise_sum(x: &[f64]) -> f64 {
-    if x.len() < 8 {
-        return x.iter().sum();
+impl Level {
+    fn of<T: Real>(y: &[T], count: impl Fn(T) -> f64 + Copy, peak: Peak) -> Self {
+        let sample = |v: T| count(v) / 32768.0;
+        let mean = pairwise_sum(y, sample) / y.len() as f64;
+        let (low, high) = vectorized(
+            #[inline(always)]
+            || extremes(y, sample),
+        );
+        // Rounding keeps the order: the largest magnitude belongs to one of the two.
+        let peak = match peak {
+            Peak::Centred => (high - mean).abs().max((low - mean).abs()),
+            Peak::Raw => high.abs().max(low.abs()),
+        };
+        Self { mean, peak: peak + 1e-10 }
+    }
+
+    fn apply<T: Real>(&self, y: &[T], count: impl Fn(T) -> f64, out: &mut [f64]) {
+        vectorized(
+            #[inline(always)]
+            || {
+                for (out, v) in out.iter_mut().zip(y) {
+                    *out = (count(*v) / 32768.0 - self.mean) / self.peak;
+                }
+            },
+        );
+    }
+}
+
+/// Independent sums of numpy's summation.
+const SUMS: usize = 8;
+
+/// Sum in numpy's order, which decides what a constant signal leaves after its mean is taken off.
+fn pairwise_sum<T: Real>(x: &[T], value: impl Fn(T) -> f64 + Copy) -> f64 {
+    if x.len() < SUMS {
+        return x.iter().map(|v| value(*v)).sum();
     }
     if x.len() > 128 {
-        let half = x.len() / 2 / 8 * 8;
-        return pairwise_sum(&x[..half]) + pairwise_sum(&x[half..]);
+        let half = x.len() / 2 / SUMS * SUMS;
+        return pairwise_sum(&x[..half], value) + pairwise_sum(&x[half..], value);
     }
-    let mut r = [0.0; 8];
-    let blocks = x.chunks_exact(8);
-    let rest = blocks.remainder();
-    for block in blocks {
-        for (sum, v) in r.iter_mut().zip(block) {
-            *sum += v;
-        }
-    }
-    let sum = ((r[0] + r[1]) + (r[2] + r[3])) + ((r[4] + r[5]) + (r[6] + r[7]));
-    rest.iter().fold(sum, |sum, v| sum + v)
+    vectorized(
+        #[inline(always)]
+        || {
+            let mut r = [0.0; SUMS];
+            let (blocks, rest) = x.as_chunks::<SUMS>();
+            for block in blocks {
+                for (sum, v) in r.iter_mut().zip(block) {
+                    *sum += value(*v);
+                }
+            }
+            let sum = ((r[0] + r[1]) + (r[2] + r[3])) + ((r[4] + r[5]) + (r[6] + r[7]));
+            rest.iter().fold(sum, |sum, v| sum + value(*v))
+        },
+    )
 }
 
 /// Working memory of one frame after another.
 struct Frame {
+    /// The frame at hand, to be filled.
+    signal: Vec<f64>,
     features: [f64; N_SHORT],
     spectrum: Vec<Complex<f64>>,
     scratch: Vec<Complex<f64>>,
-    /// Magnitudes of this frame and the sum of them; the same of the frame before.
     magnitude: Vec<f64>,
-    total: f64,
-    previous: Vec<f64>,
-    previous_total: f64,
     power: Vec<f64>,
+    /// Magnitudes relative to the largest.
+    relative: Vec<f64>,
+    /// Magnitudes relative to their sum, of this frame and of the one before.
+    share: Vec<f64>,
+    previous: Vec<f64>,
 }
 
 impl Frame {
     fn new(plan: &PaaPlan) -> Self {
-        let bins = plan.window / 2;
+        let bins = || vec![0.0; plan.window / 2];
         Self {
+            signal: vec![0.0; plan.window],
             features: [0.0; N_SHORT],
             spectrum: vec![Complex::default(); plan.window],
             scratch: vec![Complex::default(); plan.fft.get_inplace_scratch_len()],
-            magnitude: vec![0.0; bins],
-            total: 0.0,
-            previous: vec![0.0; bins],
-            previous_total: 0.0,
-            power: vec![0.0; bins],
+            magnitude: bins(),
+            power: bins(),
+            relative: bins(),
+            share: bins(),
+            previous: bins(),
         }
     }
 
-    fn analyse(&mut self, plan: &PaaPlan, x: &[f64], first: bool) {
-        std::mem::swap(&mut self.magnitude, &mut self.previous);
-        self.previous_total = self.total;
-        for (z, &v) in self.spectrum.iter_mut().zip(x) {
+    fn analyse(&mut self, plan: &PaaPlan, first: bool) {
+        for (z, &v) in self.spectrum.iter_mut().zip(&self.signal) {
             *z = Complex::new(v, 0.0);
         }
         plan.fft.process_with_scratch(&mut self.spectrum, &mut self.scratch);
-        let bins = self.magnitude.len() as f64;
-        for ((m, p), z) in self.magnitude.iter_mut().zip(&mut self.power).zip(&self.spectrum) {
-            *m = z.norm_sqr().sqrt() / bins;
-            *p = *m * *m;
-        }
-        self.total = sum(&self.magnitude, |m| m + EPS);
-
-        let energy = sum(x, |v| v * v);
-        let spectral_energy = sum(&self.power, |p| p);
-        self.features[0] = zero_crossing_rate(x);
-        self.features[1] = energy / x.len() as f64;
-        self.features[2] = block_entropy(x, energy);
-        (self.features[3], self.features[4]) = self.centroid_and_spread(plan);
-        self.features[5] = block_entropy(&self.magnitude, spectral_energy);
-        self.features[6] = if first { 0.0 } else { self.flux() };
+        let spectral_energy = vectorized(
+            #[inline(always)]
+            || self.in_vectors(plan, first),
+        );
         self.features[7] = self.rolloff(spectral_energy);
         self.cepstrum(plan);
         self.chroma(plan, spectral_energy);
     }
 
-    /// Of the magnitudes relative to the largest.
-    fn centroid_and_spread(&self, plan: &PaaPlan) -> (f64, f64) {
-        let max = self.magnitude.iter().copied().fold(0.0, f64::max);
+    /// Everything that runs over all samples or bins, but the roll-off. Returns the energy of the
+    /// spectrum.
+    #[inline(always)]
+    fn in_vectors(&mut self, plan: &PaaPlan, first: bool) -> f64 {
+        let bins = self.magnitude.len() as f64;
+        for ((m, p), z) in self.magnitude.iter_mut().zip(&mut self.power).zip(&self.spectrum) {
+            *m = z.norm_sqr().sqrt() / bins;
+            *p = *m * *m;
+        }
+        let energy = sum(&self.signal, |v| v * v);
+        let spectral_energy = sum(&self.power, |p| p);
+        self.features[0] = zero_crossing_rate(&self.signal);
+        self.features[1] = energy / self.signal.len() as f64;
+        self.features[2] = block_entropy(&self.signal, energy);
+        (self.features[3], self.features[4]) = self.centroid_and_spread(plan);
+        self.features[5] = block_entropy(&self.magnitude, spectral_energy);
+        self.features[6] = self.flux();
+        if first {
+            self.features[6] = 0.0;
+        }
+        spectral_energy
+    }
+
+    #[inline(always)]
+    fn centroid_and_spread(&mut self, plan: &PaaPlan) -> (f64, f64) {
+        let (_, max) = extremes(&self.magnitude, |m| m);
         let scale = if max == 0.0 { EPS } else { max };
-        let magnitude = &self.magnitude;
-        let total = sum(magnitude, |m| m / scale) + EPS;
-        let centroid = sum_pairs(magnitude, &plan.frequencies, |m, f| f * (m / scale)) / total;
-        let offset = |m: f64, f: f64| (f - centroid).powi(2) * (m / scale);
-        let spread = (sum_pairs(magnitude, &plan.frequencies, offset) / total).sqrt();
+        self.relative.iter_mut().zip(&self.magnitude).for_each(|(r, m)| *r = m / scale);
+        let total = sum(&self.relative, |r| r) + EPS;
+        let centroid = sum_pairs(&self.relative, &plan.frequencies, |r, f| f * r) / total;
+        let offset = |r: f64, f: f64| (f - centroid) * (f - centroid) * r;
+        let spread = (sum_pairs(&self.relative, &plan.frequencies, offset) / total).sqrt();
         let nyquist = plan.sr / 2.0;
         (centroid / nyquist, spread / nyquist)
     }
 
-    fn flux(&self) -> f64 {
-        let rise = |m: f64, p: f64| (m / self.total - p / self.previous_total).powi(2);
-        sum_pairs(&self.magnitude, &self.previous, rise)
+    #[inline(always)]
+    fn flux(&mut self) -> f64 {
+        std::mem::swap(&mut self.share, &mut self.previous);
+        let total = sum(&self.magnitude, |m| m + EPS);
+        self.share.iter_mut().zip(&self.magnitude).for_each(|(s, m)| *s = m / total);
+        sum_pairs(&self.share, &self.previous, |s, p| (s - p) * (s - p))
     }
 
     fn rolloff(&self, energy: f64) -> f64 {
@@ -301,14 +357,17 @@ impl Frame {
 }
 
 /// A zero sample counts as half a crossing on each side.
+#[inline(always)]
 fn zero_crossing_rate(x: &[f64]) -> f64 {
-    let sign = |v: f64| i32::from(v > 0.0) - i32::from(v < 0.0);
-    let changes: i32 = x.windows(2).map(|w| (sign(w[1]) - sign(w[0])).abs()).sum();
+    let sign = |v: &f64| i32::from(*v > 0.0) - i32::from(*v < 0.0);
+    let pairs = x.iter().zip(x.get(1..).unwrap_or_default());
+    let changes: i32 = pairs.map(|(a, b)| (sign(b) - sign(a)).abs()).sum();
     f64::from(changes) / 2.0 / (x.len() as f64 - 1.0)
 }
 
 /// Entropy of the energies of ten blocks relative to the energy of all (a tail that fills no block
 /// counts in the total only).
+#[inline(always)]
 fn block_entropy(x: &[f64], energy: f64) -> f64 {
     let len = x.len() / BLOCKS;
     let terms = (0..BLOCKS).map(|b| {
@@ -353,6 +412,6 @@ mod tests {
     #[test]
     fn pairwise_order() {
         let x: Vec<f64> = (0..1000).map(|i| 1.0 / (i as f64 + 1.0)).collect();
-        assert!((pairwise_sum(&x) - 7.485470860550345).abs() < 1e-14);
+        assert!((pairwise_sum(&x, |v| v) - 7.485470860550345).abs() < 1e-14);
     }
 }

@@ -1,5 +1,7 @@
 //! Spectral contrast (librosa 0.11 `feature.spectral_contrast`, after Jiang et al. 2002).
 
+use std::ops::Range;
+
 use ndarray::{Array3, ArrayView3};
 
 use crate::columns::for_each_column;
@@ -7,6 +9,7 @@ use crate::decibel::Decibel;
 use crate::error::{DspError, Result};
 use crate::frequency::require_rate;
 use crate::real::Real;
+use crate::simd::vectorized;
 
 /// Parameters of the contrast, in librosa's names.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,6 +35,14 @@ impl Default for ContrastParams {
 struct Band {
     bins: Vec<usize>,
     count: usize,
+}
+
+impl Band {
+    /// The bins as a range, which they are unless the first wrapped around.
+    fn range(&self) -> Option<Range<usize>> {
+        let range = *self.bins.first()?..*self.bins.last()? + 1;
+        (range.len() == self.bins.len()).then_some(range)
+    }
 }
 
 /// Tables of the bands for one set of bin frequencies.
@@ -126,17 +137,30 @@ impl Contrast {
         peak: &mut [f64],
         valley: &mut [f64],
     ) {
-        for ((band, peak), valley) in self.bands.iter().zip(peak).zip(valley) {
-            let values = &mut scratch[..band.bins.len()];
-            for (slot, k) in values.iter_mut().zip(&band.bins) {
-                *slot = magnitude[*k];
-            }
-            (*valley, *peak) = extremes(values, band.count);
-        }
+        vectorized(
+            #[inline(always)]
+            || {
+                for ((band, peak), valley) in self.bands.iter().zip(peak).zip(valley) {
+                    let values = &mut scratch[..band.bins.len()];
+                    match band.range() {
+                        Some(range) => values.copy_from_slice(&magnitude[range]),
+                        None => values
+                            .iter_mut()
+                            .zip(&band.bins)
+                            .for_each(|(slot, k)| *slot = magnitude[*k]),
+                    }
+                    (*valley, *peak) = extremes(values, band.count);
+                }
+            },
+        );
     }
 }
 
+/// Values that are compared with the last kept one at a time.
+const AT_ONCE: usize = 16;
+
 /// Means of the `count` smallest and the `count` largest values; NaN where there are none.
+#[inline(always)]
 fn extremes<T: Real>(values: &mut [T], count: usize) -> (f64, f64) {
     if values.is_empty() {
         return (f64::NAN, f64::NAN);
@@ -156,6 +180,7 @@ fn extremes<T: Real>(values: &mut [T], count: usize) -> (f64, f64) {
 }
 
 /// The first `count` values in the order of `before`.
+#[inline(always)]
 fn first_sorted<T: Real>(
     values: &[T],
     count: usize,
@@ -172,16 +197,23 @@ fn first_sorted<T: Real>(
             j -= 1;
         }
     }
-    for x in tail {
-        let mut j = count - 1;
-        if !before(*x, kept_part[j]) {
+    for block in tail.chunks(AT_ONCE) {
+        let last = kept_part[count - 1];
+        // Most blocks hold nothing to keep.
+        if !block.iter().fold(false, |any, x| any | before(*x, last)) {
             continue;
         }
-        while j > 0 && before(*x, kept_part[j - 1]) {
-            kept_part[j] = kept_part[j - 1];
-            j -= 1;
+        for x in block {
+            let mut j = count - 1;
+            if !before(*x, kept_part[j]) {
+                continue;
+            }
+            while j > 0 && before(*x, kept_part[j - 1]) {
+                kept_part[j] = kept_part[j - 1];
+                j -= 1;
+            }
+            kept_part[j] = *x;
         }
-        kept_part[j] = *x;
     }
     kept
 }

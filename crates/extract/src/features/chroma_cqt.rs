@@ -1,10 +1,10 @@
 //! `chroma_cqt`: energy in pitch classes of a constant-Q transform.
 
-use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use corsmal_dsp::cqt::{ChromaCqt as Fold, ChromaCqtParams, CqtParams, CqtPlan, SignalTuning};
 use corsmal_dsp::librosa::LibrosaVersion;
+use corsmal_dsp::tuned::ByTuning;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
@@ -33,31 +33,24 @@ impl Default for ChromaCqt {
     }
 }
 
-/// Chroma of whole channels; transforms are kept by tuning in hundredths of a bin.
+/// Chroma of whole channels.
 pub struct ChromaOfChannel {
     params: CqtParams,
     tuning: SignalTuning,
-    transforms: Mutex<HashMap<i32, Arc<CqtPlan>>>,
+    transforms: ByTuning<CqtPlan>,
     fold: Fold,
 }
 
 impl ChromaOfChannel {
     fn transform(&self, tuning: f64) -> corsmal_dsp::Result<Arc<CqtPlan>> {
-        let key = (tuning * 100.0).round() as i32;
-        let kept = || self.transforms.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(transform) = kept().get(&key) {
-            return Ok(transform.clone());
-        }
-        // Made outside the lock: of two made at once, one is kept.
-        let made = Arc::new(CqtPlan::new(&CqtParams { tuning, ..self.params })?);
-        Ok(kept().entry(key).or_insert(made).clone())
+        self.transforms.get(tuning, || CqtPlan::new(&CqtParams { tuning, ..self.params }))
     }
 }
 
 impl WholeKernel for ChromaOfChannel {
     fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>> {
         let tuning = self.tuning.estimate([y], self.params.bins_per_octave)?.unwrap_or(0.0);
-        Ok(self.fold.of_transform(self.transform(tuning)?.transform(y)?.view()))
+        self.fold.of_signal(&*self.transform(tuning)?, y)
     }
 }
 
@@ -78,7 +71,7 @@ impl ChromaCqt {
         let kernel = ChromaOfChannel {
             params: params.of(self.librosa),
             tuning: SignalTuning::padded(sr, self.librosa.pad_mode())?,
-            transforms: Mutex::default(),
+            transforms: ByTuning::default(),
             fold: Fold::new(params.n_bins, &fold)?,
         };
         kernel.transform(0.0)?;

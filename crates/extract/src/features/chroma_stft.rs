@@ -1,9 +1,11 @@
 //! `chroma_stft`: energy in pitch classes.
 
-use corsmal_dsp::chroma::{ChromaParams, chroma, chroma_filter};
+use corsmal_dsp::chroma::{Chroma, ChromaParams, chroma_filter};
+use corsmal_dsp::columns::map_columns;
 use corsmal_dsp::normalize::Norm;
 use corsmal_dsp::pitch::{PitchParams, estimate_tuning};
 use corsmal_dsp::stft::{StftParams, spectrogram};
+use corsmal_dsp::tuned::ByTuning;
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +36,7 @@ struct Classes {
     stft: StftParams,
     params: ChromaParams,
     power: f64,
+    banks: ByTuning<Chroma<f32>>,
 }
 
 impl WholeKernel for Classes {
@@ -43,9 +46,15 @@ impl WholeKernel for Classes {
         let ChromaParams { sr, n_fft, n_chroma, .. } = self.params;
         let pitch = PitchParams::new(sr, n_fft);
         let tuning = estimate_tuning(spectrum.view(), None, pitch, RESOLUTION, n_chroma)?;
-        let params = ChromaParams { tuning: tuning.unwrap_or(0.0), ..self.params };
-        let bank = chroma_filter::<f32>(&params)?;
-        Ok(chroma(spectrum.view(), bank.view(), Some(Norm::Max))?.index_axis_move(Axis(0), 0))
+        let tuning = tuning.unwrap_or(0.0);
+        let bank = self.banks.get(tuning, || {
+            let bank = chroma_filter(&ChromaParams { tuning, ..self.params })?;
+            Ok(Chroma::new(bank.view(), Some(Norm::Max)))
+        })?;
+        let chroma = map_columns(spectrum.view(), n_chroma, |_, _, spectrum, out| {
+            bank.frame(spectrum, out);
+        });
+        Ok(chroma.index_axis_move(Axis(0), 0))
     }
 }
 
@@ -62,6 +71,7 @@ impl FeatureKind for ChromaStft {
         chroma_filter::<f32>(&params)?;
         let labels = indices(self.n_chroma);
         let extent = Extent::Frames(stft.hop_length as f64);
-        Ok(Feature::whole(extent, Classes { stft, params, power: self.power }, labels))
+        let classes = Classes { stft, params, power: self.power, banks: ByTuning::default() };
+        Ok(Feature::whole(extent, classes, labels))
     }
 }

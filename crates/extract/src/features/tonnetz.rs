@@ -1,6 +1,6 @@
 //! `tonnetz`: tonal centroids.
 
-use corsmal_dsp::hpss::HarmonicPart;
+use corsmal_dsp::hpss::{HarmonicPart, Work};
 use corsmal_dsp::tonnetz::{DIMENSIONS, tonnetz};
 use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
@@ -26,7 +26,11 @@ struct Centroids {
 impl WholeKernel for Centroids {
     fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>> {
         let chroma = match &self.harmonic {
-            Some(part) => self.chroma.channel(&part.of(y, |_| {})?.0)?,
+            Some(harmonic) => {
+                let mut part = Vec::new();
+                harmonic.of(y, &mut part, &mut Work::default(), |_| {})?;
+                self.chroma.channel(&part)?
+            }
             None => self.chroma.channel(y)?,
         };
         let centroids = tonnetz(chroma.view().insert_axis(Axis(0)))?;

@@ -160,9 +160,15 @@ impl<'a> Collector<'a> {
             {
                 return None;
             }
-            // A timeout, since a stop from outside notifies nobody.
-            let wait = self.changed.wait_timeout(state, Duration::from_millis(50));
-            state = wait.unwrap_or_else(|e| e.into_inner()).0;
+            // Channels of a recording that another worker has may need a hand meanwhile.
+            drop(state);
+            let helped = rayon::yield_now() == Some(rayon::Yield::Executed);
+            state = self.lock();
+            if !helped {
+                // A timeout, since neither such channels nor a stop from outside notify anybody.
+                let wait = self.changed.wait_timeout(state, Duration::from_millis(5));
+                state = wait.unwrap_or_else(|e| e.into_inner()).0;
+            }
         }
     }
 

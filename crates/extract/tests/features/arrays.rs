@@ -10,7 +10,7 @@ use corsmal_dsp::frequency::fft_frequencies;
 use corsmal_dsp::frontends::{
     M2Mfcc, M3Spectrogram, M4LogMel, M5A34f136, M5VggishPatches, M6Spectrogram, Spec9216, Variant,
 };
-use corsmal_dsp::hpss::{HarmonicPart, HpssParams, masks};
+use corsmal_dsp::hpss::{HarmonicPart, HpssParams, Work, masks};
 use corsmal_dsp::librosa::LibrosaVersion;
 use corsmal_dsp::mel::{MelParams, SparseBank, mel_filter};
 use corsmal_dsp::normalize::Norm;
@@ -124,8 +124,9 @@ fn whole_recording_features_are_those_of_arrays_channel_by_channel() {
             column(plan.compute(y.as_slice().unwrap()).unwrap().map(f64::from))
         }),
         ("tonnetz", "librosa = '0.8'\nharmonic = true", |y| {
-            let part = HarmonicPart::new(LibrosaVersion::V08).unwrap();
-            let (part, _) = part.of(y.as_slice().unwrap(), |_| {}).unwrap();
+            let harmonic = HarmonicPart::new(LibrosaVersion::V08).unwrap();
+            let mut part = Vec::new();
+            harmonic.of(y.as_slice().unwrap(), &mut part, &mut Work::default(), |_| {}).unwrap();
             let tuning = SignalTuning::padded(SR, PadMode::Reflect).unwrap();
             let tuning = tuning.estimate([part.as_slice()], 36).unwrap().unwrap_or(0.0);
             let (n_bins, bins_per_octave) = (252, 36);

@@ -37,7 +37,7 @@ pub fn run(args: &Args, model: &Model, lines: &mut PredictionLines<'_>) -> Resul
         max_errors: None,
     };
     let stop = crate::interrupt::flag();
-    let meter = Meter::new(LogFormat::Text, &config);
+    let meter = Meter::new(LogFormat::Text);
     let result = if args.quiet {
         run::run(&found, &config, &options, &run::Quiet, stop)
     } else {
