@@ -73,17 +73,7 @@ impl<F: Real> Forward<F> {
     ) -> &'s [Complex<F>] {
         let p = &self.params;
         let start = (t * p.hop_length) as isize - p.pad() as isize;
-        let inside = usize::try_from(start).ok().and_then(|s| y.get(s..s + p.n_fft));
-        if let Some(samples) = inside {
-            for (slot, x) in scratch.frame.iter_mut().zip(samples) {
-                *slot = F::of(x.wide());
-            }
-        } else {
-            for (k, slot) in scratch.frame.iter_mut().enumerate() {
-                let index = p.pad_mode.index(start + k as isize, y.len());
-                *slot = index.map_or(F::zero(), |i| F::of(y[i].wide()));
-            }
-        }
+        p.pad_mode.read(y, start, &mut scratch.frame);
         if let Some(window) = &self.window {
             for (x, &w) in scratch.frame.iter_mut().zip(window) {
                 *x *= w;
