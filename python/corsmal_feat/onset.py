@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import floats, rows, unrows
+from ._arrays import audio, floats, rows, unrows
 from ._mel import melspectrogram
 from .errors import ParameterError
 from .spectrum import power_to_db
@@ -21,6 +21,13 @@ def _count(name: str, value: Any) -> int:
     if not isinstance(value, (int, np.integer)) or value < 1:
         raise ParameterError(f"{name} = {value} is not possible: an integer, at least 1")
     return int(value)
+
+
+def _double_melspectrogram(*, y: Any, **kwargs: Any) -> Any:
+    """`melspectrogram` by a transform in double precision: differences of decibels bring out its
+    rounding where a spectrum is mostly empty."""
+    y = audio(y)
+    return melspectrogram(y=y.astype(np.float64), **kwargs).astype(y.dtype)
 
 
 def onset_strength(
@@ -74,7 +81,7 @@ def onset_strength(
     n_fft, hop_length = _count("n_fft", n_fft), _count("hop_length", hop_length)
     if S is None:
         if feature is None:
-            feature = melspectrogram
+            feature = _double_melspectrogram
             kwargs.setdefault("fmax", 0.5 * sr)
         mel = feature(y=y, sr=sr, n_fft=n_fft, hop_length=hop_length, **kwargs)
         S = power_to_db(np.abs(mel))
