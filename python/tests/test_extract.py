@@ -147,7 +147,7 @@ def test_a_fitted_projection_is_applied(folder: Path, tmp_path: Path):
     pca = np.load(fitted)
     expected = cf.corsmal.pca_project(train.summary, pca["components"], pca["mean"])
     np.testing.assert_allclose(projected.summary, expected, rtol=1e-5, atol=1e-5)
-    with pytest.raises(cf.ParameterError, match="projection.file"):
+    with pytest.raises(cf.ParameterError, match=r"projection\.file"):
         cf.extract([folder], preset="esc26", set=chosen)
     with pytest.raises(cf.ParameterError, match="exists"):
         cf.corsmal.fit_projection(tmp_path / "train.npz", fitted)
