@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from math import prod
 from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from ._core import ParameterError
+from . import _core
+from .errors import ParameterError
 
 Singles = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
@@ -17,15 +19,15 @@ Same = TypeVar("Same", Singles, Doubles, Floats)
 
 
 def floats(name: str, value: Any, min_ndim: int = 1) -> Floats:
-    """A finite float32 or float64 array; integers are refused with a hint, as librosa does."""
+    """A float32 or float64 array; others are refused with a hint."""
     array = np.asarray(value)
     if array.dtype not in (np.float32, np.float64):
         hint = ""
         if array.dtype.kind in "iu":
             bits = 8 * array.dtype.itemsize - 1
             hint = f"; divide {array.dtype} samples by 2**{bits} and cast to float32 first"
-        elif array.dtype == np.float16:
-            return floats(name, array.astype(np.float32), min_ndim)
+        elif array.dtype.kind == "f":
+            hint = "; cast it first, as by .astype(numpy.float32)"
         raise ParameterError(f"{name} has dtype {array.dtype}, expected float32 or float64{hint}")
     if array.ndim < min_ndim:
         raise ParameterError(f"{name} has {array.ndim} dimensions, expected at least {min_ndim}")
@@ -35,14 +37,26 @@ def floats(name: str, value: Any, min_ndim: int = 1) -> Floats:
 def audio(y: Any) -> Floats:
     """`y` [shape=(..., n)], finite."""
     array = floats("y", y)
-    if not np.isfinite(array).all():
+    flags = array.flags
+    contiguous = flags.c_contiguous or flags.f_contiguous
+    if not (_core.all_finite(array) if contiguous else np.isfinite(array).all()):
         raise ParameterError("y holds NaN or infinite values")
     return array
 
 
 def rows(array: Same, keep: int) -> Same:
     """Leading axes flattened to one and the last `keep` axes kept, contiguous."""
-    return np.ascontiguousarray(array.reshape((-1, *array.shape[array.ndim - keep :])))
+    return np.ascontiguousarray(array.reshape(_flattened(array.shape, keep)))
+
+
+def _flattened(shape: tuple[int, ...], keep: int) -> Any:
+    split = len(shape) - keep
+    return (prod(shape[:split]), *shape[split:])
+
+
+def channels(y: Same) -> Same:
+    """A signal as [shape=(channels, n)], planar or, where it already is, interleaved."""
+    return y if y.ndim == 2 and y.flags.f_contiguous else rows(y, 1)
 
 
 def unrows(result: Same, like: Floats, keep: int) -> Same:

@@ -39,6 +39,31 @@ def chroma_stft(
     Without `tuning` one is estimated on the same spectrogram over all channels and frames; it can
     change abruptly with small changes of the input, so give `tuning=0` where frames are to be
     compared between recordings. `dtype` is that of the filter bank.
+
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)]
+        Signal at the sample rate `sr` in Hz.
+    S : [shape=(..., 1 + n_fft // 2, t)], optional
+        A spectrogram to use instead, as it is.
+    norm : float, optional
+        Norm that each frame is divided by (`numpy.inf`: its maximum), None for none.
+    n_fft, hop_length, win_length, window, center, pad_mode
+        See `stft`; hop_length is 512 here.
+    tuning : float, optional
+        Deviation from A440 in fractions of a bin.
+    n_chroma, ctroct, octwidth, base_c, dtype
+        See `filters.chroma`.
+
+    Returns
+    -------
+    [shape=(..., n_chroma, t)] in the precision of `y` or `S`
+
+    Examples
+    --------
+    >>> y = np.zeros((8, 44100), np.float32)
+    >>> corsmal_feat.feature.chroma_stft(y=y, sr=44100, tuning=0).shape
+    (8, 12, 87)
     """
     s, n_fft = spectrogram(y, S, n_fft, hop_length, win_length, window, center, pad_mode, 2.0)
     if tuning is None:

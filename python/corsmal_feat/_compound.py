@@ -9,7 +9,7 @@ import numpy as np
 
 from . import _core
 from ._arrays import Doubles, floats, rows, unrows
-from ._core import ParameterError
+from .errors import ParameterError
 
 __all__ = [
     "a34_short",

@@ -12,21 +12,20 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._core import ParameterError, RunError
 from ._extract import Config, configuration, extract, interleaved, whole_rate
-from ._parameters import Parametrised, not_fitted
+from ._sklearn import BaseEstimator, TransformerMixin, not_fitted
+from .errors import DecodeError, ParameterError
 
 __all__ = ["FeatureExtractor"]
 
 Matrix = npt.NDArray[np.float32]
 
 
-class FeatureExtractor(Parametrised):
+class FeatureExtractor(TransformerMixin, BaseEstimator):
     """Recordings in, one row of features for each out: the first step of a scikit-learn `Pipeline`.
 
     The rows are the summary of the configuration, so it needs one (`preset="esc26"`, "esc28",
-    "mfcc-zcr", or a [summary] of its own). scikit-learn is not needed to use it; with it, it is a
-    transformer like any other (`clone`, `cross_val_score`, `GridSearchCV`).
+    "mfcc-zcr", or a [summary] of its own). It also works without scikit-learn.
 
     Parameters
     ----------
@@ -36,6 +35,11 @@ class FeatureExtractor(Parametrised):
 
     Rows to transform are paths, or signals in memory: a list of float arrays, each [shape=(n,) or
     (channels, n)], or one array [shape=(recordings, n) or (recordings, channels, n)].
+
+    Examples
+    --------
+    >>> model = make_pipeline(FeatureExtractor("esc26"), StandardScaler(), corsmal_feat.SVC())
+    >>> model.fit(["a.wav", "b.wav"], ["water", "rice"])  # doctest: +SKIP
     """
 
     def __init__(
@@ -56,20 +60,11 @@ class FeatureExtractor(Parametrised):
     _names: list[str] | None = None
 
     def __sklearn_tags__(self) -> Any:
-        from sklearn.utils import (  # type: ignore[import-untyped]
-            InputTags,
-            Tags,
-            TargetTags,
-            TransformerTags,
-        )
-
-        return Tags(
-            estimator_type=None,
-            target_tags=TargetTags(required=False),
-            transformer_tags=TransformerTags(preserves_dtype=[]),
-            input_tags=InputTags(three_d_array=True, string=True),
-            requires_fit=False,
-        )
+        tags = super().__sklearn_tags__()
+        tags.input_tags.three_d_array = tags.input_tags.string = True
+        tags.transformer_tags.preserves_dtype = []
+        tags.requires_fit = False
+        return tags
 
     def __sklearn_is_fitted__(self) -> bool:
         return True
@@ -93,7 +88,7 @@ class FeatureExtractor(Parametrised):
 
         Raises
         ------
-        RunError : a recording that has no features, since a row cannot be left out here
+        DecodeError : a recording that has no features, since a row cannot be left out here
         """
         names, matrix = self._compute(_recordings(X))
         if self._names is not None and names != self._names:
@@ -142,7 +137,7 @@ class FeatureExtractor(Parametrised):
         row_of: dict[str, Matrix] = {}
         for name, outcome in zip(different, found.outcomes, strict=True):
             if outcome["status"] not in ("ok", "truncated"):
-                raise RunError(f"{name}: {outcome['status']}: {outcome['reason']}")
+                raise DecodeError(f"{name}: {outcome['status']}: {outcome['reason']}")
             row_of[name] = next(rows)
         return found.names, np.stack([row_of[name] for name in names])
 
@@ -159,7 +154,7 @@ class FeatureExtractor(Parametrised):
             except ParameterError as error:
                 raise ParameterError(f"recording {position}: {error}") from error
 
-        with ThreadPoolExecutor(self.jobs or os.cpu_count()) as pool:
+        with ThreadPoolExecutor(self.jobs or _core.jobs()) as pool:
             computed = list(pool.map(row, range(len(signals))))
         names = computed[0][0]
         for position, (others, _) in enumerate(computed):
@@ -188,6 +183,8 @@ def _signal(y: Any, position: int) -> Matrix:
     """A signal in memory [shape=(n, channels)]."""
     if np.iscomplexobj(y):
         raise ParameterError(f"Complex data not supported: recording {position}")
+    if np.asarray(y).dtype == object:
+        y = np.asarray(y, dtype=np.float64)
     if not np.ndim(y):
         raise ParameterError(
             f"recording {position} is a single value. Reshape your data to (recordings, n), or put "

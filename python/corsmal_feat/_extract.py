@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import audio
-from ._core import ParameterError
+from .errors import ParameterError
 
 __all__ = ["Features", "SignalExtractor", "extract", "load"]
 

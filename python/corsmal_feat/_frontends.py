@@ -11,10 +11,10 @@ import numpy as np
 
 from . import _core
 from ._arrays import Doubles, Singles, audio, floats, rows
-from ._core import ParameterError
 from ._mel import mfcc
 from ._mono import to_mono
 from ._time_domain import zero_crossing_rate
+from .errors import ParameterError
 
 __all__ = [
     "esc26",

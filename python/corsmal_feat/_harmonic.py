@@ -12,10 +12,10 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import audio, floats, rows, unrows
 from ._chroma import chroma_stft
-from ._core import ParameterError
 from ._mel import melspectrogram, mfcc
 from ._pitch import estimate_tuning
 from ._spectral import spectral_contrast
+from .errors import ParameterError
 from .filters import window_name
 from .spectrum import stft, stft_params, warn_short
 
@@ -55,7 +55,27 @@ def istft(
     out: Any = None,
 ) -> Any:
     """Signal [shape=(..., n)] of a spectrogram [shape=(..., 1 + n_fft/2, frames)]
-    (librosa.istft)."""
+    (librosa.istft).
+
+    Parameters
+    ----------
+    stft_matrix : complex64 or complex128 [shape=(..., 1 + n_fft // 2, t)]
+        Spectrogram.
+    hop_length, win_length, n_fft, window, center
+        As they were in `stft`.
+    length : int, optional
+        Samples of the result.
+
+    Returns
+    -------
+    float32 or float64 [shape=(..., n)]
+
+    Examples
+    --------
+    >>> y = np.random.default_rng(0).normal(size=8000)
+    >>> np.allclose(corsmal_feat.istft(corsmal_feat.stft(y), length=8000), y)
+    True
+    """
     d = np.asarray(stft_matrix)
     if d.ndim < 2:
         raise ParameterError(f"stft_matrix has {d.ndim} dimensions, expected at least 2")
@@ -117,7 +137,7 @@ def _separate(
     y = audio(y)
     stft_tuple = stft_params(n_fft, hop_length, win_length, "hann", center, pad_mode)
     params = _hpss_params(kernel_size, power, margin)
-    warn_short(y, n_fft)
+    warn_short(y, n_fft, stacklevel=3)
     separated = _core.separate(rows(y, 1), stft_tuple, params, bool(mask), *parts)
     return [unrows(part, y, 1) for part in separated]
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._arrays import Floats, floats, rows, unrows
-from ._core import ParameterError
+from ._arrays import Floats, channels, floats, rows, unrows
+from .errors import ParameterError
 from .filters import mel_params, warn_empty
-from .spectrum import power_to_db, spectrogram
+from .spectrum import length_of, power_to_db, signal
 
 
 def melspectrogram(
@@ -31,13 +31,44 @@ def melspectrogram(
     htk: bool = False,
     norm: Any = "slaney",
 ) -> Any:
-    """Mel spectrogram [shape=(..., n_mels, t)] (librosa.feature.melspectrogram)."""
-    s, n_fft = spectrogram(y, S, n_fft, hop_length, win_length, window, center, pad_mode, power)
-    params = mel_params(sr, n_fft, n_mels, fmin, fmax, htk, norm)
-    result, empty = _core.apply_mel(rows(s, 2), params)
+    """Mel spectrogram (librosa.feature.melspectrogram).
+
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)], optional
+        Signal at the sample rate `sr` in Hz.
+    S : [shape=(..., 1 + n_fft // 2, t)], optional
+        A spectrogram to use instead, as it is.
+    n_fft, hop_length, win_length, window, center, pad_mode
+        See `stft`; hop_length is 512 here.
+    power : float
+        Exponent of the magnitudes.
+    n_mels, fmin, fmax, htk, norm
+        See `filters.mel`.
+
+    Returns
+    -------
+    [shape=(..., n_mels, t)] in the precision of `y` or `S`
+
+    Examples
+    --------
+    >>> y = np.zeros((8, 44100), np.float32)
+    >>> corsmal_feat.feature.melspectrogram(y=y, sr=44100).shape
+    (8, 128, 87)
+    """
+    if S is not None:
+        s = floats("S", S, 2)
+        bank = mel_params(sr, length_of(s, n_fft), n_mels, fmin, fmax, htk, norm)
+        result, empty = _core.apply_mel(rows(s, 2), bank)
+        leading = s.shape[:-2]
+    else:
+        y, stft = signal(y, n_fft, hop_length, win_length, window, center, pad_mode)
+        bank = mel_params(sr, n_fft, n_mels, fmin, fmax, htk, norm)
+        result, empty = _core.melspectrogram(channels(y), stft, float(power), bank)
+        leading = y.shape[:-1]
     if empty:
         warn_empty()
-    return unrows(result, s, 2)
+    return result.reshape((*leading, *result.shape[1:]))
 
 
 def mfcc(
@@ -52,7 +83,36 @@ def mfcc(
     mel_norm: Any = "slaney",
     **kwargs: Any,
 ) -> Any:
-    """Mel-frequency cepstral coefficients [shape=(..., n_mfcc, t)] (librosa.feature.mfcc)."""
+    """Mel-frequency cepstral coefficients (librosa.feature.mfcc).
+
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)], optional
+        Signal at the sample rate `sr` in Hz. Its mel spectrogram is taken in dB with a range of
+        80 dB below the maximum over all channels.
+    S : [shape=(..., n_mels, t)], optional
+        A mel spectrogram in dB to use instead.
+    n_mfcc : int
+        Coefficients, at most as many as mel bands.
+    dct_type : {1, 2, 3}
+        Type of the cosine transform.
+    norm : {"ortho", None}
+        Its normalisation.
+    lifter : float
+        Cepstral liftering, 0 for none.
+    mel_norm, **kwargs
+        `norm` and the other arguments of `melspectrogram`.
+
+    Returns
+    -------
+    [shape=(..., n_mfcc, t)] in the precision of `y` or `S`
+
+    Examples
+    --------
+    >>> y = np.zeros((8, 44100), np.float32)
+    >>> corsmal_feat.feature.mfcc(y=y, sr=44100, n_mfcc=13).shape
+    (8, 13, 87)
+    """
     if norm not in ("ortho", None):
         raise ParameterError(f"norm = {norm!r} is not possible: 'ortho' or None")
     if n_mfcc < 1:
@@ -60,14 +120,35 @@ def mfcc(
     if S is None:
         S = power_to_db(melspectrogram(y=y, sr=sr, norm=mel_norm, **kwargs))
     s: Floats = floats("S", S, 2)
-    result = _core.mfcc(rows(s, 2), int(n_mfcc), int(dct_type), norm == "ortho", float(lifter))
-    return unrows(result, s, 2)
+    cepstrum = (int(n_mfcc), int(dct_type), norm == "ortho", float(lifter))
+    return unrows(_core.mfcc(rows(s, 2), cepstrum), s, 2)
 
 
 def delta(
     data: Any, *, width: int = 9, order: int = 1, axis: int = -1, mode: str = "interp"
 ) -> Any:
-    """Local derivative by a Savitzky-Golay fit (librosa.feature.delta)."""
+    """Local derivative along an axis, by a Savitzky-Golay fit (librosa.feature.delta).
+
+    Parameters
+    ----------
+    data : float32 or float64
+        Features, frames along `axis`.
+    width : int
+        Frames that the fit takes, an odd number, at least 3.
+    order : int
+        Order of the derivative and degree of the polynomial.
+    mode : {"interp", "nearest", "mirror", "constant", "wrap"}
+        What happens at the ends.
+
+    Returns
+    -------
+    per frame, in the shape and precision of `data`
+
+    Examples
+    --------
+    >>> corsmal_feat.feature.delta(np.arange(10.0)).round(6)
+    array([1., 1., 1., 1., 1., 1., 1., 1., 1., 1.])
+    """
     if width < 3 or width % 2 == 0:
         raise ParameterError(f"width = {width} is not possible: an odd number, at least 3")
     if order < 1:

@@ -9,7 +9,22 @@ from ._arrays import audio
 
 
 def to_mono(y: Any) -> Any:
-    """Mean over all leading axes [shape=(n,)] (librosa.to_mono)."""
+    """Mean over all leading axes [shape=(n,)] (librosa.to_mono).
+
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)]
+        Signals in its leading axes.
+
+    Returns
+    -------
+    [shape=(n,)] in the precision of `y`
+
+    Examples
+    --------
+    >>> corsmal_feat.to_mono(np.array([[1.0, 2.0], [3.0, 4.0]]))
+    array([2., 3.])
+    """
     y = audio(y)
     if y.ndim == 1:
         return y

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import Floats, rows, unrows
-from ._core import ParameterError
+from .errors import ParameterError
 from .spectrum import spectrogram
 
 PitchParams = tuple[float, int, float, float, float]
@@ -69,7 +69,33 @@ def piptrack(
     ref: float | Callable[..., Any] | None = None,
 ) -> tuple[Any, Any]:
     """Interpolated frequencies in Hz and magnitudes of spectral peaks, 0 elsewhere, each
-    [shape=(..., d, t)] (librosa.piptrack)."""
+    [shape=(..., d, t)] (librosa.piptrack).
+
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)]
+        Signal at the sample rate `sr` in Hz.
+    S : [shape=(..., 1 + n_fft // 2, t)], optional
+        A spectrogram to use instead, as it is.
+    n_fft, hop_length, win_length, window, center, pad_mode
+        See `stft`; hop_length is `n_fft // 4` by default.
+    fmin, fmax : float
+        Range of the frequencies in Hz.
+    threshold : float
+        Peaks are above this multiple of `ref`.
+    ref : float or callable, optional
+        Level to compare with, by default the maximum of the frame.
+
+    Returns
+    -------
+    two arrays [shape=(..., 1 + n_fft // 2, t)]: Hz and magnitudes
+
+    Examples
+    --------
+    >>> pitches, magnitudes = corsmal_feat.piptrack(y=np.zeros(44100), sr=44100)
+    >>> pitches.shape
+    (1025, 87)
+    """
     s, levels, params = _tracked(
         y, sr, S, n_fft, hop_length, fmin, fmax, threshold, win_length, window, center, pad_mode,
         ref,
@@ -97,7 +123,33 @@ def estimate_tuning(
     ref: float | Callable[..., Any] | None = None,
 ) -> float:
     """Tuning in fractions of a bin, in [-0.5, 0.5): one for all channels and frames, and a
-    discontinuous function of them (librosa.estimate_tuning)."""
+    discontinuous function of them (librosa.estimate_tuning).
+
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)]
+        Signal at the sample rate `sr` in Hz.
+    S : [shape=(..., 1 + n_fft // 2, t)], optional
+        A spectrogram to use instead, as it is.
+    n_fft : int
+        Length of the transform.
+    resolution : float
+        Step of the result in fractions of a bin.
+    bins_per_octave : int
+        Bins of an octave.
+    **kwargs
+        Further arguments of `piptrack`.
+
+    Returns
+    -------
+    float
+
+    Examples
+    --------
+    >>> t = np.arange(44100) / 44100
+    >>> round(corsmal_feat.estimate_tuning(y=np.sin(2 * np.pi * 440 * t), sr=44100), 2)
+    -0.03
+    """
     s, levels, params = _tracked(
         y, sr, S, n_fft, hop_length, fmin, fmax, threshold, win_length, window, center, pad_mode,
         ref,
@@ -109,7 +161,26 @@ def estimate_tuning(
 def pitch_tuning(
     frequencies: npt.ArrayLike, *, resolution: float = 0.01, bins_per_octave: int = 12
 ) -> float:
-    """Tuning of frequencies in Hz, in fractions of a bin (librosa.pitch_tuning)."""
+    """Tuning of frequencies in Hz, in fractions of a bin (librosa.pitch_tuning).
+
+    Parameters
+    ----------
+    frequencies : float [any shape]
+        Hz; those of 0 and below do not count.
+    resolution : float
+        Step of the result in fractions of a bin.
+    bins_per_octave : int
+        Bins of an octave.
+
+    Returns
+    -------
+    float, in [-0.5, 0.5)
+
+    Examples
+    --------
+    >>> corsmal_feat.pitch_tuning(np.array([440.0, 880.0]))
+    0.0
+    """
     array = np.atleast_1d(np.asarray(frequencies))
     if array.dtype != np.float32:
         array = array.astype(np.float64)

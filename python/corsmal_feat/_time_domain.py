@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from . import _core
-from ._arrays import audio, floats, rows, unrows
-from ._core import ParameterError
+from ._arrays import audio, channels, floats, rows, unrows
+from .errors import ParameterError
 
 
 def zero_crossing_rate(
@@ -20,8 +20,36 @@ def zero_crossing_rate(
     pad: bool = False,
     zero_pos: bool = True,
 ) -> Any:
-    """Share of samples per frame where the sign changes [shape=(..., 1, t)]
-    (librosa.feature.zero_crossing_rate)."""
+    """Share of the samples of a frame at which the sign changes
+    (librosa.feature.zero_crossing_rate).
+
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)]
+        Signal.
+    frame_length, hop_length : int
+        Samples of a frame, and between frames.
+    center : bool
+        Frames are centred, the first and the last sample repeated.
+    threshold : float
+        Values of at most this magnitude count as zero.
+    ref_magnitude : float or callable, optional
+        What `threshold` is a multiple of, such as `numpy.max` of the magnitudes.
+    pad : bool
+        The first sample of a frame counts as a crossing.
+    zero_pos : bool
+        Zero is positive (or a sign of its own).
+
+    Returns
+    -------
+    float64 [shape=(..., 1, t)]
+
+    Examples
+    --------
+    >>> y = np.tile(np.float32([1, -1]), 4096)
+    >>> corsmal_feat.feature.zero_crossing_rate(y)[0, 4].round(4)
+    np.float64(0.9995)
+    """
     y = audio(y)
     frame = framing(frame_length, hop_length, center)
     if callable(ref_magnitude):
@@ -29,7 +57,7 @@ def zero_crossing_rate(
     elif ref_magnitude is not None:
         threshold = threshold * float(ref_magnitude)
     crossings = (float(threshold), bool(zero_pos), bool(pad))
-    return unrows(_core.zero_crossing_rate(rows(y, 1), frame, crossings), y, 1)
+    return unrows(_core.zero_crossing_rate(channels(y), frame, crossings), y, 1)
 
 
 def rms(
@@ -41,7 +69,28 @@ def rms(
     center: bool = True,
     pad_mode: str = "constant",
 ) -> Any:
-    """Root-mean-square level per frame [shape=(..., 1, t)], float32 (librosa.feature.rms)."""
+    """Root-mean-square level of each frame (librosa.feature.rms).
+
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)], optional
+        Signal.
+    S : [shape=(..., 1 + frame_length // 2, t)], optional
+        A magnitude spectrogram to use instead.
+    frame_length, hop_length : int
+        Samples of a frame, and between frames.
+    center, pad_mode
+        See `stft`.
+
+    Returns
+    -------
+    float32 [shape=(..., 1, t)]
+
+    Examples
+    --------
+    >>> corsmal_feat.feature.rms(y=np.full(4096, 0.5, np.float32))[0, 4]
+    np.float32(0.5)
+    """
     if S is not None:
         s = floats("S", S, 2)
         return unrows(_core.rms_of_spectrogram(rows(s, 2), int(frame_length)), s, 2)
@@ -49,7 +98,7 @@ def rms(
         raise ParameterError("y or S must be given")
     y = audio(y)
     frame = framing(frame_length, hop_length, center)
-    return unrows(_core.rms(rows(y, 1), frame, str(pad_mode)), y, 1)
+    return unrows(_core.rms(channels(y), frame, str(pad_mode)), y, 1)
 
 
 def framing(frame_length: int, hop_length: int, center: bool) -> tuple[int, int, bool]:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._core import ParameterError
+from .errors import ParameterError
 
 __all__ = ["chroma", "get_window", "mel"]
 
@@ -24,7 +24,26 @@ def window_name(window: Any) -> str:
 
 
 def get_window(window: Any, Nx: int, *, fftbins: bool = True) -> npt.NDArray[np.float64]:
-    """A window of `Nx` points, periodic unless `fftbins=False` (librosa.filters.get_window)."""
+    """A window of `Nx` points, periodic unless `fftbins=False` (librosa.filters.get_window).
+
+    Parameters
+    ----------
+    window : str or ("kaiser", beta)
+        Name.
+    Nx : int
+        Points.
+    fftbins : bool
+        Periodic, as transforms need it, or symmetric.
+
+    Returns
+    -------
+    float64 [shape=(Nx,)]
+
+    Examples
+    --------
+    >>> corsmal_feat.filters.get_window("hann", 4)
+    array([0. , 0.5, 1. , 0.5])
+    """
     return _core.get_window(window_name(window), int(Nx), bool(fftbins))
 
 
@@ -59,7 +78,32 @@ def mel(
     norm: Any = "slaney",
     dtype: npt.DTypeLike = np.float32,
 ) -> npt.NDArray[Any]:
-    """Mel filter bank [shape=(n_mels, 1 + n_fft/2)], float32 (librosa.filters.mel)."""
+    """Mel filter bank [shape=(n_mels, 1 + n_fft/2)], float32 (librosa.filters.mel).
+
+    Parameters
+    ----------
+    sr : float
+        Sample rate in Hz.
+    n_fft, n_mels : int
+        Length of the transform, bands.
+    fmin, fmax : float
+        Range in Hz; fmax is `sr / 2` by default.
+    htk : bool
+        HTK's scale, or Slaney's.
+    norm : {"slaney", None} or float
+        Bands of equal area, of height 1, or of a norm of 1.
+    dtype : dtype
+        Of the result; computed as float32.
+
+    Returns
+    -------
+    [shape=(n_mels, 1 + n_fft // 2)]
+
+    Examples
+    --------
+    >>> corsmal_feat.filters.mel(sr=44100, n_fft=2048).shape
+    (128, 1025)
+    """
     bank, empty = _core.mel(mel_params(sr, n_fft, n_mels, fmin, fmax, htk, norm))
     if empty:
         warn_empty()
@@ -110,6 +154,33 @@ def chroma(
     base_c: bool = True,
     dtype: npt.DTypeLike = np.float32,
 ) -> npt.NDArray[Any]:
-    """Chroma filter bank [shape=(n_chroma, 1 + n_fft/2)] (librosa.filters.chroma)."""
+    """Chroma filter bank [shape=(n_chroma, 1 + n_fft/2)] (librosa.filters.chroma).
+
+    Parameters
+    ----------
+    sr : float
+        Sample rate in Hz.
+    n_fft, n_chroma : int
+        Length of the transform, bins of the octave.
+    tuning : float
+        Deviation from A440 in fractions of a bin.
+    ctroct, octwidth : float
+        Centre and width in octaves of the dominance window; width None for none.
+    norm : float, optional
+        Norm of each column.
+    base_c : bool
+        Begin with C, not A.
+    dtype : dtype
+        Of the result.
+
+    Returns
+    -------
+    [shape=(n_chroma, 1 + n_fft // 2)]
+
+    Examples
+    --------
+    >>> corsmal_feat.filters.chroma(sr=44100, n_fft=2048).shape
+    (12, 1025)
+    """
     params = chroma_params(sr, n_fft, n_chroma, tuning, ctroct, octwidth, norm, base_c)
     return _core.chroma_filter(params).astype(dtype, copy=False)

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import floats, rows, unrows
-from ._core import ParameterError
+from ._arrays import audio, floats, rows, unrows
 from ._mel import melspectrogram
+from .errors import ParameterError
 from .spectrum import power_to_db
 
 __all__ = ["onset_backtrack", "onset_detect", "onset_strength"]
@@ -21,6 +21,13 @@ def _count(name: str, value: Any) -> int:
     if not isinstance(value, (int, np.integer)) or value < 1:
         raise ParameterError(f"{name} = {value} is not possible: an integer, at least 1")
     return int(value)
+
+
+def _double_melspectrogram(*, y: Any, **kwargs: Any) -> Any:
+    """`melspectrogram` by a transform in double precision: differences of decibels bring out its
+    rounding where a spectrum is mostly empty."""
+    y = audio(y)
+    return melspectrogram(y=y.astype(np.float64), **kwargs).astype(y.dtype)
 
 
 def onset_strength(
@@ -40,14 +47,41 @@ def onset_strength(
     **kwargs: Any,
 ) -> Any:
     """Spectral flux envelope [shape=(..., t)] of the mel spectrogram in dB, or of S in dB
-    (librosa.onset.onset_strength). Further keyword arguments go to `feature`."""
+    (librosa.onset.onset_strength). Further keyword arguments go to `feature`.
+
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)]
+        Signal at the sample rate `sr` in Hz.
+    S : [shape=(..., d, t)], optional
+        A spectrogram in dB to use instead.
+    lag, max_size : int
+        Frames to look back, and bands of the maximum filter.
+    ref : [shape of S], optional
+        What to compare with instead of the filtered S.
+    detrend, center : bool
+        Remove the slow part; align frames with their centres.
+    feature, aggregate : callable
+        Instead of `melspectrogram` and the mean over bands.
+    n_fft, hop_length : int
+        See `stft`.
+
+    Returns
+    -------
+    [shape=(..., t)] in the precision of `y` or `S`
+
+    Examples
+    --------
+    >>> corsmal_feat.onset.onset_strength(y=np.zeros(44100, np.float32), sr=44100).shape
+    (87,)
+    """
     if aggregate is False:
         raise ParameterError("aggregate = False is not possible: a function or None")
     lag, max_size = _count("lag", lag), _count("max_size", max_size)
     n_fft, hop_length = _count("n_fft", n_fft), _count("hop_length", hop_length)
     if S is None:
         if feature is None:
-            feature = melspectrogram
+            feature = _double_melspectrogram
             kwargs.setdefault("fmax", 0.5 * sr)
         mel = feature(y=y, sr=sr, n_fft=n_fft, hop_length=hop_length, **kwargs)
         S = power_to_db(np.abs(mel))

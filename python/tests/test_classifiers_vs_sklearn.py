@@ -20,7 +20,8 @@ from corsmal_feat.classifiers import (
     RandomForest,
 )
 from sklearn import ensemble, linear_model, neighbors, svm, tree
-from sklearn.base import clone
+from sklearn.base import clone, is_classifier
+from sklearn.ensemble import VotingClassifier
 from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
@@ -160,6 +161,20 @@ def test_inside_pipelines_and_searches(table):
     assert clone(SVC(C=3)).get_params()["C"] == 3
 
 
+@pytest.mark.parametrize("labels", [("water", "rice", "pasta"), (2, 0, 5)])
+def test_they_are_classifiers_to_scikit_learn(labels):
+    rng = np.random.default_rng(0)
+    which = np.arange(90) % 3
+    x, y = rng.normal(size=(90, 4)) + 3 * which[:, None], np.array(labels)[which]
+    for estimator in ESTIMATORS:
+        assert is_classifier(estimator)
+        assert cross_val_score(estimator, x, y, cv=3, error_score="raise").mean() > 0.9
+        assert clone(estimator).fit(x, y).classes_.tolist() == sorted(labels)
+    soft = VotingClassifier([("knn", KNN()), ("svm", SVC(probability=True))], voting="soft")
+    assert soft.fit(x, y).score(x, y) > 0.9
+    assert not hasattr(SVC(), "predict_proba") and hasattr(SVC(probability=True), "predict_proba")
+
+
 ESTIMATORS = [
     KNN(),
     SVC(),
@@ -170,7 +185,6 @@ ESTIMATORS = [
 ]
 #: checks of what these estimators do not claim
 NOT_OURS = {
-    "KNN-check_fit2d_1sample": "the refusal names the rows in other words",
     "LogisticRegression-check_non_transformer_estimators_n_iter": "the steps taken are not kept",
 } | {
     f"{name}-check_class_weight_classifiers": "written for trees with min_weight_fraction_leaf"
@@ -181,7 +195,6 @@ NOT_OURS = {
 def checks():
     found = []
     with warnings.catch_warnings():
-        # Ours do not inherit from scikit-learn's base class: they work without it.
         warnings.simplefilter("ignore", UserWarning)
         for estimator in ESTIMATORS:
             for instance, check in estimator_checks_generator(estimator):

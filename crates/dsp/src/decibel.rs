@@ -1,7 +1,11 @@
 //! Decibels (librosa 0.11 `power_to_db`, `amplitude_to_db`).
 
+use rayon::prelude::*;
+
 use crate::error::{DspError, Result};
-use crate::real::Real;
+use crate::lanes::{LANES, Row, power_to_decibel};
+use crate::real::{Real, part_finite};
+use crate::simd::vectorized;
 
 /// Reference, floor and range of a conversion to decibels.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,24 +45,102 @@ impl Decibel {
     }
 
     /// Power values to decibels in place. The `top_db` clamp takes its maximum over the whole
-    /// slice, as librosa takes it over the whole array, channels included.
+    /// slice, as librosa takes it over the whole array, channels included; NaN spreads with it.
     ///
     /// # Errors
     /// `amin <= 0` or `top_db < 0`.
     pub fn power<T: Real>(&self, values: &mut [T]) -> Result<()> {
         self.check()?;
-        let (amin, offset, ten) = (T::of(self.amin), T::of(self.offset()), T::of(10.0));
-        let mut peak = T::neg_infinity();
-        for v in values.iter_mut() {
-            *v = ten * v.max(amin).log10() - offset;
-            peak = peak.max(*v);
-        }
-        if let Some(top_db) = self.top_db {
-            let floor = peak - T::of(top_db);
-            values.iter_mut().for_each(|v| *v = v.max(floor));
-        }
+        let peaks = values.par_chunks_mut(PART).map(|part| self.convert(part));
+        let peak = peaks.reduce(T::neg_infinity, larger);
+        self.clamp(values, peak);
         Ok(())
     }
+
+    /// [`power`](Self::power) of `values` as a new array.
+    ///
+    /// # Errors
+    /// As `power`.
+    pub fn of<T: Real>(&self, values: &[T]) -> Result<Vec<T>> {
+        self.check()?;
+        let mut out = vec![T::zero(); values.len()];
+        let parts = out.par_chunks_mut(PART).zip(values.par_chunks(PART));
+        let peaks = parts.map(|(part, values)| {
+            part.copy_from_slice(values);
+            self.convert(part)
+        });
+        let peak = peaks.reduce(T::neg_infinity, larger);
+        self.clamp(&mut out, peak);
+        Ok(out)
+    }
+
+    /// Decibels in place without the clamp; the largest of them.
+    fn convert<T: Real>(&self, values: &mut [T]) -> T {
+        let floor = self.amin as f32;
+        if let Some(values) = T::as_f32_mut(values)
+            && floor.is_normal()
+            && part_finite(values)
+        {
+            return T::of(f64::from(convert_rows(values, floor, self.offset() as f32)));
+        }
+        let (amin, offset, ten) = (T::of(self.amin), T::of(self.offset()), T::of(10.0));
+        values.iter_mut().fold(T::neg_infinity(), |peak, v| {
+            // Written so that NaN stays NaN.
+            let floored = if *v < amin { amin } else { *v };
+            *v = ten * floored.log10() - offset;
+            larger(peak, *v)
+        })
+    }
+
+    fn clamp<T: Real>(&self, values: &mut [T], peak: T) {
+        let Some(top_db) = self.top_db else { return };
+        let floor = peak - T::of(top_db);
+        values.par_chunks_mut(PART).for_each(|part| {
+            vectorized(
+                #[inline(always)]
+                || part.iter_mut().for_each(|v| *v = larger(*v, floor)),
+            );
+        });
+    }
+}
+
+/// Values that one thread takes at a time: they stay in its cache.
+const PART: usize = 1 << 14;
+
+/// The larger one, NaN where one is.
+fn larger<T: Real>(a: T, b: T) -> T {
+    if a > b || a.is_nan() { a } else { b }
+}
+
+/// Decibels in place by rows; the largest of them.
+fn convert_rows(values: &mut [f32], amin: f32, offset: f32) -> f32 {
+    const ROWS: usize = 16;
+    let mut rows = [Row::ZERO; ROWS];
+    let mut peak = [f32::NEG_INFINITY; LANES];
+    for part in values.chunks_mut(ROWS * LANES) {
+        if part.len() < ROWS * LANES {
+            // What is left of the row becomes the floor, which is no peak.
+            rows = [Row::ZERO; ROWS];
+        }
+        for (row, values) in rows.iter_mut().zip(part.chunks(LANES)) {
+            row.0[..values.len()].copy_from_slice(values);
+        }
+        power_to_decibel(&mut rows, amin, offset);
+        for (row, values) in rows.iter().zip(part.chunks_mut(LANES)) {
+            values.copy_from_slice(&row.0[..values.len()]);
+        }
+        vectorized(
+            #[inline(always)]
+            || {
+                for row in &rows {
+                    for (peak, x) in peak.iter_mut().zip(&row.0) {
+                        *peak = if *x > *peak { *x } else { *peak };
+                    }
+                }
+            },
+        );
+    }
+    peak.into_iter().fold(f32::NEG_INFINITY, f32::max)
 }
 
 #[cfg(test)]
@@ -77,6 +159,22 @@ mod tests {
         let mut x = vec![1.0_f32, 1e-12, 1e-3];
         Decibel::default().power(&mut x).unwrap();
         assert_eq!(x[1], -80.0);
+    }
+
+    #[test]
+    fn both_precisions_agree_and_nan_spreads_with_the_clamp() {
+        let x: Vec<f64> = (0..40_000).map(|i| f64::from(i * 7919 % 40_000) * 1e-3).collect();
+        let single: Vec<f32> = x.iter().map(|x| *x as f32).collect();
+        let decibel = Decibel { reference: 3.0, amin: 1e-6, top_db: Some(60.0) };
+        let (want, got) = (decibel.of(&x).unwrap(), decibel.of(&single).unwrap());
+        assert!(want.iter().zip(&got).all(|(w, g)| (w - f64::from(*g)).abs() < 2e-5));
+        let mut in_place = single.clone();
+        decibel.power(&mut in_place).unwrap();
+        assert_eq!(in_place, got);
+        let spoilt = [1.0, f32::NAN, 2.0];
+        assert!(decibel.of(&spoilt).unwrap().iter().all(|x| x.is_nan()));
+        let raw = Decibel { top_db: None, ..decibel }.of(&spoilt).unwrap();
+        assert!(raw[0].is_finite() && raw[1].is_nan());
     }
 
     #[test]

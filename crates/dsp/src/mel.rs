@@ -1,11 +1,12 @@
 //! Mel scale and filter bank (librosa 0.11 `filters.mel`, `feature.melspectrogram`).
 
-use ndarray::{Array2, Array3, ArrayView3, Axis};
+use ndarray::{Array2, Array3, ArrayView3, Axis, s};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{DspError, Result};
 use crate::lanes::{Row, weighted_sums};
 use crate::real::Real;
+use crate::tiles::for_each_tile;
 
 /// Normalisation of each mel filter.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -176,6 +177,7 @@ pub fn empty_filters(bank: &Array2<f32>) -> Vec<usize> {
 /// A filter bank without its zeros: for each band the first bin and the weights from there on.
 #[derive(Debug, Clone)]
 pub struct SparseBank {
+    bins: usize,
     bands: Vec<(usize, Vec<f32>)>,
 }
 
@@ -185,9 +187,14 @@ impl SparseBank {
         let span = |row: ndarray::ArrayView1<f32>| {
             let first = row.iter().position(|w| *w != 0.0).unwrap_or(0);
             let last = row.iter().rposition(|w| *w != 0.0).map_or(first, |i| i + 1);
-            (first, row.slice(ndarray::s![first..last]).to_vec())
+            (first, row.slice(s![first..last]).to_vec())
         };
-        Self { bands: bank.axis_iter(Axis(0)).map(span).collect() }
+        Self { bins: bank.ncols(), bands: bank.axis_iter(Axis(0)).map(span).collect() }
+    }
+
+    /// Bins of the spectra that the bank is for.
+    pub fn bins(&self) -> usize {
+        self.bins
     }
 
     /// For each band its first bin and weights.
@@ -200,21 +207,39 @@ impl SparseBank {
         weighted_sums(&self.bands, power, out);
     }
 
+    /// [`apply`](Self::apply) to a spectrum that may not fit.
+    ///
+    /// # Errors
+    /// Another number of bins.
+    pub fn product<T: Real>(&self, spectrum: ArrayView3<T>) -> Result<Array3<T>> {
+        if spectrum.dim().1 != self.bins {
+            let expected = format!("{} bins for this n_fft", self.bins);
+            let actual = spectrum.shape().to_vec();
+            return Err(DspError::Shape { name: "S", expected, actual });
+        }
+        Ok(self.apply(spectrum))
+    }
+
     /// `bank @ spectrum` for `spectrum [channels, bins, frames]`.
     pub fn apply<T: Real>(&self, spectrum: ArrayView3<T>) -> Array3<T> {
         let (channels, _, frames) = spectrum.dim();
         let mut out = Array3::zeros((channels, self.bands.len(), frames));
-        for c in 0..channels {
-            for (m, (first, weights)) in self.bands.iter().enumerate() {
-                let mut band = out.slice_mut(ndarray::s![c, m, ..]);
-                for (k, w) in weights.iter().enumerate() {
-                    band.scaled_add(
-                        T::of(f64::from(*w)),
-                        &spectrum.slice(ndarray::s![c, first + k, ..]),
-                    );
+        for_each_tile(
+            out.view_mut(),
+            || (),
+            |(), mut tile| {
+                let frames = tile.first..tile.first + tile.out.ncols();
+                let spectrum = spectrum.slice(s![tile.channel, .., frames]);
+                for ((first, weights), mut band) in self.bands.iter().zip(tile.out.outer_iter_mut())
+                {
+                    for (w, bin) in
+                        weights.iter().zip(spectrum.slice(s![*first.., ..]).outer_iter())
+                    {
+                        band.scaled_add(T::of(f64::from(*w)), &bin);
+                    }
                 }
-            }
-        }
+            },
+        );
         out
     }
 }

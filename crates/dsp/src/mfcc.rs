@@ -2,11 +2,13 @@
 
 use std::f64::consts::{PI, SQRT_2};
 
-use ndarray::{Array2, Array3, ArrayView3};
+use ndarray::linalg::general_mat_mul;
+use ndarray::{Array2, Array3, ArrayView3, s};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{DspError, Result};
 use crate::real::Real;
+use crate::tiles::for_each_tile;
 
 /// Normalisation of a cosine transform.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -115,10 +117,15 @@ pub fn mfcc<T: Real>(log_mel: ArrayView3<T>, p: &MfccParams) -> Result<Array3<T>
     let (channels, n_mels, frames) = log_mel.dim();
     let matrix = mfcc_matrix(n_mels, p)?.mapv(T::of);
     let mut out = Array3::zeros((channels, matrix.nrows(), frames));
-    for c in 0..channels {
-        let product = matrix.dot(&log_mel.index_axis(ndarray::Axis(0), c));
-        out.index_axis_mut(ndarray::Axis(0), c).assign(&product);
-    }
+    for_each_tile(
+        out.view_mut(),
+        || (),
+        |(), mut tile| {
+            let frames = tile.first..tile.first + tile.out.ncols();
+            let log_mel = log_mel.slice(s![tile.channel, .., frames]);
+            general_mat_mul(T::one(), &matrix, &log_mel, T::zero(), &mut tile.out);
+        },
+    );
     Ok(out)
 }
 

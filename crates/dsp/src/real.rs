@@ -1,24 +1,31 @@
 //! The two sample types, `f32` and `f64`.
 
 use num_traits::{Float, FromPrimitive, NumAssign};
+use rayon::prelude::*;
 use rustfft::FftNum;
 
 use crate::error::{DspError, Result};
+use crate::simd::vectorized;
 
 /// A real sample type: `f32` or `f64`.
 ///
 /// librosa keeps the precision of its input from end to end; functions of this crate are generic
 /// over `Real` for the same reason.
 pub trait Real: Float + FromPrimitive + NumAssign + FftNum + std::iter::Sum + Default {
+    /// Whether this is the single-precision type.
+    const SINGLE: bool;
     /// Nearest value of this type.
     fn of(x: f64) -> Self;
     /// Exact widening.
     fn wide(self) -> f64;
     /// The slice as `f32` samples, where this is the `f32` type.
     fn as_f32(slice: &[Self]) -> Option<&[f32]>;
+    /// As [`as_f32`](Self::as_f32), to write.
+    fn as_f32_mut(slice: &mut [Self]) -> Option<&mut [f32]>;
 }
 
 impl Real for f32 {
+    const SINGLE: bool = true;
     #[inline(always)]
     fn of(x: f64) -> Self {
         x as f32
@@ -30,9 +37,13 @@ impl Real for f32 {
     fn as_f32(slice: &[Self]) -> Option<&[f32]> {
         Some(slice)
     }
+    fn as_f32_mut(slice: &mut [Self]) -> Option<&mut [f32]> {
+        Some(slice)
+    }
 }
 
 impl Real for f64 {
+    const SINGLE: bool = false;
     #[inline(always)]
     fn of(x: f64) -> Self {
         x
@@ -44,6 +55,22 @@ impl Real for f64 {
     fn as_f32(_: &[Self]) -> Option<&[f32]> {
         None
     }
+    fn as_f32_mut(_: &mut [Self]) -> Option<&mut [f32]> {
+        None
+    }
+}
+
+/// Whether all `values` are finite, on all threads of the pool.
+pub fn all_finite<T: Real>(values: &[T]) -> bool {
+    values.par_chunks(1 << 16).all(part_finite)
+}
+
+/// [`all_finite`] on this thread.
+pub(crate) fn part_finite<T: Real>(values: &[T]) -> bool {
+    vectorized(
+        #[inline(always)]
+        || values.iter().fold(true, |finite, x| finite & x.is_finite()),
+    )
 }
 
 /// Refuses NaN and infinities, as librosa's `util.valid_audio` does.

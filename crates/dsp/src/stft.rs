@@ -1,13 +1,17 @@
 //! Short-time Fourier transform of whole arrays (librosa 0.11 `stft`, `istft` conventions).
 
-use ndarray::{Array3, ArrayView2};
+use ndarray::{Array3, ArrayView2, ArrayViewMut3, Axis};
 use num_complex::Complex;
-use realfft::RealFftPlanner;
+use num_traits::Zero;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{DspError, Result};
+use crate::lanes::{LANES, Row};
 use crate::real::Real;
-use crate::window::{Window, padded_window};
+use crate::simd::vectorized;
+use crate::tiles::{LanePlan, for_each_tile, neighbours, planar, write_columns};
+use crate::transform::Forward;
+use crate::window::Window;
 
 /// How `center = true` fills the `n_fft / 2` samples before the first and after the last one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -57,6 +61,21 @@ impl PadMode {
         let before = (0..pad as isize).map(|i| outside(i - pad as isize));
         let after = (0..pad).map(|i| outside((y.len() + i) as isize));
         before.chain(y.iter().copied()).chain(after).collect()
+    }
+
+    /// Samples `start..` of `y`, padded where they lie outside, into `out`.
+    pub(crate) fn read<T: Real, F: Real>(self, y: &[T], start: isize, out: &mut [F]) {
+        let n = y.len() as isize;
+        let head = (-start).clamp(0, out.len() as isize) as usize;
+        let tail = (n - start).clamp(head as isize, out.len() as isize) as usize;
+        let pad = |k: usize| self.index(start + k as isize, y.len());
+        for k in (0..head).chain(tail..out.len()) {
+            out[k] = pad(k).map_or(F::zero(), |i| F::of(y[i].wide()));
+        }
+        if head < tail {
+            let from = (start + head as isize) as usize;
+            out[head..tail].iter_mut().zip(&y[from..]).for_each(|(o, x)| *o = F::of(x.wide()));
+        }
     }
 }
 
@@ -123,77 +142,120 @@ impl StftParams {
     }
 }
 
-/// Calls `each(channel, frame, spectrum)` with every spectrum of `n_fft / 2 + 1` bins, computed in
-/// double precision whatever `T` is, as librosa does.
-fn for_each_spectrum<T: Real>(
-    y: ArrayView2<T>,
-    p: &StftParams,
-    mut each: impl FnMut(usize, usize, &[Complex<f64>]),
-) -> Result<()> {
+/// Frames of `y [channels, samples]`, at least one.
+pub(crate) fn frames_of<T>(y: ArrayView2<T>, p: &StftParams) -> Result<usize> {
     p.check()?;
     let (channels, n) = y.dim();
-    let frames = p.n_frames(n);
-    if frames == 0 && channels > 0 {
-        let needed = if p.center { 1 } else { p.n_fft };
-        return Err(DspError::TooShort { name: "y", actual: n, needed });
-    }
-    let window = padded_window(p.window, p.win_length, p.n_fft)?;
-    let fft = RealFftPlanner::<f64>::new().plan_fft_forward(p.n_fft);
-    let (mut frame, mut spectrum, mut scratch) =
-        (fft.make_input_vec(), fft.make_output_vec(), fft.make_scratch_vec());
-    for c in 0..channels {
-        let signal = y.row(c);
-        for t in 0..frames {
-            let start = (t * p.hop_length) as isize - p.pad() as isize;
-            for (k, (slot, w)) in frame.iter_mut().zip(&window).enumerate() {
-                let sample = p.pad_mode.index(start + k as isize, n).map(|i| signal[i].wide());
-                *slot = sample.unwrap_or(0.0) * w;
-            }
-            fft.process_with_scratch(&mut frame, &mut spectrum, &mut scratch)
-                .expect("buffers made by the plan itself");
-            each(c, t, &spectrum);
+    match p.n_frames(n) {
+        0 if channels > 0 => {
+            let needed = if p.center { 1 } else { p.n_fft };
+            Err(DspError::TooShort { name: "y", actual: n, needed })
         }
+        frames => Ok(frames),
     }
-    Ok(())
 }
 
-/// Complex spectrogram `[channels, n_fft / 2 + 1, frames]` of `y [channels, samples]`
-/// (librosa 0.11 `stft`): the transform runs in double precision and is rounded to `T` on store.
+/// Complex spectrogram `[channels, n_fft / 2 + 1, frames]` of `y [channels, samples]` (librosa 0.11
+/// `stft`). `f32` signals are transformed in single precision (within 1e-6 of the largest value of
+/// a frame), `f64` signals in double precision.
 ///
 /// # Errors
 /// Impossible parameters, or a signal too short for one frame.
 pub fn stft<T: Real>(y: ArrayView2<T>, p: &StftParams) -> Result<Array3<Complex<T>>> {
-    let (channels, n) = y.dim();
-    let mut out = Array3::zeros((channels, p.n_bins(), p.n_frames(n)));
-    for_each_spectrum(y, p, |c, t, spectrum| {
-        for (k, z) in spectrum.iter().enumerate() {
-            out[[c, k, t]] = Complex::new(T::of(z.re), T::of(z.im));
-        }
-    })?;
+    let y = planar(y);
+    let mut out = Array3::zeros((y.nrows(), p.n_bins(), frames_of(y.view(), p)?));
+    if T::SINGLE {
+        let plan = LanePlan::new(p)?;
+        let state = || (plan.frames(), vec![Row::ZERO; 2 * p.n_bins()]);
+        for_each_tile(out.view_mut(), state, |(frames, spectrum), mut tile| {
+            let y = single(y.view(), tile.channel);
+            for (b, mut block) in tile.out.axis_chunks_iter_mut(Axis(1), LANES).enumerate() {
+                frames.complex(y, tile.first + b * LANES, spectrum);
+                let rows = block.outer_iter_mut().zip(spectrum.as_chunks().0);
+                for (row, [re, im]) in rows {
+                    let row = neighbours(row);
+                    vectorized(
+                        #[inline(always)]
+                        || {
+                            for (slot, (re, im)) in row.iter_mut().zip(re.0.iter().zip(&im.0)) {
+                                let (re, im) = (f64::from(*re), f64::from(*im));
+                                *slot = Complex::new(T::of(re), T::of(im));
+                            }
+                        },
+                    );
+                }
+            }
+        });
+    } else {
+        each_spectrum(y.view(), p, out.view_mut(), |z| z)?;
+    }
     Ok(out)
 }
 
-/// `|stft|^power` as `[channels, n_fft / 2 + 1, frames]` (librosa 0.11 `_spectrogram`).
+/// Channel `c` of a contiguous single-precision signal.
+pub(crate) fn single<'a, T: Real>(y: ArrayView2<'a, T>, c: usize) -> &'a [f32] {
+    let row = y.index_axis_move(Axis(0), c).to_slice().and_then(T::as_f32);
+    row.expect("contiguous and of single precision")
+}
+
+/// `|stft|^power` as `[channels, n_fft / 2 + 1, frames]` (librosa 0.11 `_spectrogram`), by a
+/// transform in double precision whatever `T` is, as features need that amplify its rounding.
 ///
 /// # Errors
 /// As [`stft`].
 pub fn spectrogram<T: Real>(y: ArrayView2<T>, p: &StftParams, power: f64) -> Result<Array3<T>> {
-    let (channels, n) = y.dim();
-    let mut out = Array3::zeros((channels, p.n_bins(), p.n_frames(n)));
-    for_each_spectrum(y, p, |c, t, spectrum| {
-        for (k, z) in spectrum.iter().enumerate() {
-            // librosa rounds the complex value first and takes the magnitude of that.
-            let magnitude = Complex::new(T::of(z.re), T::of(z.im)).norm();
-            out[[c, k, t]] = if power == 1.0 {
-                magnitude
-            } else if power == 2.0 {
-                magnitude * magnitude
-            } else {
-                magnitude.powf(T::of(power))
-            };
+    let y = planar(y);
+    let mut out = Array3::zeros((y.nrows(), p.n_bins(), frames_of(y.view(), p)?));
+    let raise = |z: Complex<T>| {
+        let magnitude = magnitude(z);
+        if power == 1.0 {
+            magnitude
+        } else if power == 2.0 {
+            magnitude * magnitude
+        } else {
+            magnitude.powf(T::of(power))
         }
-    })?;
+    };
+    each_spectrum(y.view(), p, out.view_mut(), raise)?;
     Ok(out)
+}
+
+/// Magnitude of a bin as librosa has it: of the value rounded to `T`.
+#[inline(always)]
+pub(crate) fn magnitude<T: Real>(z: Complex<T>) -> T {
+    if T::SINGLE {
+        let (re, im) = (z.re.wide(), z.im.wide());
+        T::of((re * re + im * im).sqrt())
+    } else {
+        z.norm()
+    }
+}
+
+/// Fills `out` with `value` of every bin, transformed in double precision and rounded to `T`.
+fn each_spectrum<T: Real, R: Copy + Send + Zero>(
+    y: ArrayView2<T>,
+    p: &StftParams,
+    out: ArrayViewMut3<R>,
+    value: impl Fn(Complex<T>) -> R + Sync,
+) -> Result<()> {
+    let forward = Forward::<f64>::new(p)?;
+    let bins = p.n_bins();
+    let state = || (forward.scratch(), vec![R::zero(); LANES * bins]);
+    for_each_tile(out, state, |(scratch, columns), mut tile| {
+        let y = y.row(tile.channel);
+        let y = y.to_slice().expect("contiguous");
+        for (b, block) in tile.out.axis_chunks_iter_mut(Axis(1), LANES).enumerate() {
+            let first = tile.first + b * LANES;
+            for (t, column) in columns.chunks_exact_mut(bins).take(block.ncols()).enumerate() {
+                let spectrum = forward.spectrum(y, first + t, scratch);
+                for (slot, z) in column.iter_mut().zip(spectrum) {
+                    *slot = value(Complex::new(T::of(z.re), T::of(z.im)));
+                }
+            }
+            write_columns(columns, block);
+        }
+    });
+    Ok(())
 }
 
 #[cfg(test)]

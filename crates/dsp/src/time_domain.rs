@@ -2,10 +2,14 @@
 //! `feature.zero_crossing_rate`, `feature.rms`).
 
 use ndarray::{Array3, ArrayView2, ArrayView3};
+use rayon::prelude::*;
 
 use crate::error::{DspError, Result};
 use crate::real::Real;
+use crate::simd::vectorized;
 use crate::stft::PadMode;
+use crate::sums;
+use crate::tiles::{for_each_tile, planar};
 
 /// How a signal is cut into frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -119,26 +123,39 @@ pub fn zero_crossing_rate<T: Real>(
     let frames = frame.frames_of(n)?;
     let (threshold, pad) = (T::of(p.threshold), frame.pad() as isize);
     let first = usize::from(p.pad);
+    let y = planar(y);
     let mut out = Array3::zeros((channels, 1, frames));
-    // crossings[i]: changes of sign at samples 1..=i; outside the signal nothing changes.
-    let mut crossings = vec![0u32; n];
-    for c in 0..channels {
-        let signal = y.row(c);
-        let mut sign = p.sign(signal[0], threshold);
-        for i in 1..n {
-            let next = p.sign(signal[i], threshold);
-            crossings[i] = crossings[i - 1] + u32::from(next != sign);
-            sign = next;
-        }
+    let channels: Vec<_> = out.outer_iter_mut().zip(y.outer_iter()).collect();
+    channels.into_par_iter().for_each(|(mut out, signal)| {
+        let crossings = crossings(signal.to_slice().expect("contiguous"), p, threshold);
         let until = |i: isize| crossings[i.clamp(0, n as isize - 1) as usize];
-        for t in 0..frames {
+        for (t, slot) in out.iter_mut().enumerate() {
             let start = (t * frame.hop_length) as isize - pad;
             let last = start + frame.frame_length as isize - 1;
             let count = (until(last) - until(start)) as usize + first;
-            out[[c, 0, t]] = count as f64 / frame.frame_length as f64;
+            *slot = count as f64 / frame.frame_length as f64;
         }
-    }
+    });
     Ok(out)
+}
+
+/// Changes of sign at samples `1..=i`, by `i`; outside the signal nothing changes.
+fn crossings<T: Real>(signal: &[T], p: &ZeroCrossingParams, threshold: T) -> Vec<u32> {
+    let mut changes = vec![0_u32; signal.len()];
+    vectorized(
+        #[inline(always)]
+        || {
+            for (change, pair) in changes[1..].iter_mut().zip(signal.windows(2)) {
+                *change = u32::from(p.sign(pair[0], threshold) != p.sign(pair[1], threshold));
+            }
+        },
+    );
+    let mut total = 0;
+    for change in &mut changes {
+        total += *change;
+        *change = total;
+    }
+    changes
 }
 
 /// Root of the mean square of each frame, `[channels, 1, frames]`, always `f32` (librosa 0.11
@@ -151,20 +168,29 @@ pub fn rms<T: Real>(
     frame: &FrameParams,
     pad_mode: PadMode,
 ) -> Result<Array3<f32>> {
+    let y = planar(y);
     let (channels, n) = y.dim();
     let frames = frame.frames_of(n)?;
     let mut out = Array3::zeros((channels, 1, frames));
-    for c in 0..channels {
-        let signal = y.row(c);
-        for t in 0..frames {
-            let start = (t * frame.hop_length) as isize - frame.pad() as isize;
-            let sum: f64 = (start..start + frame.frame_length as isize)
-                .filter_map(|i| pad_mode.index(i, n))
-                .map(|i| signal[i].wide() * signal[i].wide())
-                .sum();
-            out[[c, 0, t]] = (sum / frame.frame_length as f64).sqrt() as f32;
+    let state = || vec![T::zero(); frame.frame_length];
+    for_each_tile(out.view_mut(), state, |padded, mut tile| {
+        let signal = y.row(tile.channel);
+        let signal = signal.to_slice().expect("contiguous");
+        for (t, slot) in tile.out.iter_mut().enumerate() {
+            let start = ((tile.first + t) * frame.hop_length) as isize - frame.pad() as isize;
+            let inside = usize::try_from(start).ok();
+            let samples = inside.and_then(|s| signal.get(s..s + frame.frame_length));
+            let samples = samples.unwrap_or_else(|| {
+                pad_mode.read(signal, start, padded);
+                padded
+            });
+            let sum = vectorized(
+                #[inline(always)]
+                || sums::sum(samples, |x| x.wide() * x.wide()),
+            );
+            *slot = (sum / frame.frame_length as f64).sqrt() as f32;
         }
-    }
+    });
     Ok(out)
 }
 

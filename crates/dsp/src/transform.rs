@@ -76,10 +76,7 @@ impl<F: Real> Forward<F> {
         let inside = usize::try_from(start).ok().and_then(|s| y.get(s..s + p.n_fft));
         let frame = &mut scratch.frame;
         if inside.is_none() {
-            for (k, slot) in frame.iter_mut().enumerate() {
-                let index = p.pad_mode.index(start + k as isize, y.len());
-                *slot = index.map_or(F::zero(), |i| F::of(y[i].wide()));
-            }
+            p.pad_mode.read(y, start, frame);
         }
         crate::simd::vectorized(
             #[inline(always)]

@@ -1,9 +1,15 @@
 //! numpy arrays in and out. No `ndarray` type of the numpy crate crosses into our crates: the two
 //! may be built against different `ndarray` versions.
 
-use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Dimension};
+use corsmal_dsp::Real;
+use corsmal_dsp::spectral::Spectra;
+use corsmal_dsp::stft::StftParams;
+use ndarray::{Array2, ArrayView2, ArrayView3, Dimension};
 use numpy::{Element, IntoPyArray, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+
+use crate::spectrum::{StftTuple, stft_params};
+use crate::value_error;
 
 /// A contiguous float array from Python, in the precision it came in.
 #[derive(FromPyObject)]
@@ -18,18 +24,65 @@ pub enum Floats<'py> {
 pub fn view2<'a, T: Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> PyResult<ArrayView2<'a, T>> {
     let shape = array.shape();
     let &[rows, columns] = shape else {
-        return Err(crate::value_error(format!("expected two dimensions, got shape {shape:?}")));
+        return Err(value_error(format!("expected two dimensions, got shape {shape:?}")));
     };
-    ArrayView2::from_shape((rows, columns), array.as_slice()?).map_err(crate::value_error)
+    ArrayView2::from_shape((rows, columns), array.as_slice()?).map_err(value_error)
+}
+
+/// A signal as `[channels, samples]`, planar or interleaved.
+pub fn signal<'a, T: Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> PyResult<ArrayView2<'a, T>> {
+    let shape = array.shape();
+    match *shape {
+        [channels, samples] if !array.is_c_contiguous() && array.is_fortran_contiguous() => {
+            let frames = ArrayView2::from_shape((samples, channels), array.as_slice()?);
+            Ok(frames.map_err(value_error)?.reversed_axes())
+        }
+        _ => view2(array),
+    }
+}
+
+/// `array` as it lies in memory.
+pub fn view1<'a, T: Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> PyResult<&'a [T]> {
+    Ok(array.as_slice()?)
 }
 
 /// `array` as `[channels, rows, frames]`.
 pub fn view3<'a, T: Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> PyResult<ArrayView3<'a, T>> {
     let shape = array.shape();
     let &[a, b, c] = shape else {
-        return Err(crate::value_error(format!("expected three dimensions, got shape {shape:?}")));
+        return Err(value_error(format!("expected three dimensions, got shape {shape:?}")));
     };
-    ArrayView3::from_shape((a, b, c), array.as_slice()?).map_err(crate::value_error)
+    ArrayView3::from_shape((a, b, c), array.as_slice()?).map_err(value_error)
+}
+
+/// What spectral features are computed from.
+#[derive(FromPyObject)]
+pub enum Source<'py> {
+    /// A signal and the parameters of its transform.
+    Signal(Floats<'py>, StftTuple),
+    /// A spectrogram.
+    Spectrogram(Floats<'py>),
+}
+
+impl<'py> Source<'py> {
+    /// The array, and the transform where it is a signal.
+    pub fn parts(self) -> PyResult<(Floats<'py>, Option<StftParams>)> {
+        match self {
+            Self::Signal(y, params) => Ok((y, Some(stft_params(&params)?))),
+            Self::Spectrogram(s) => Ok((s, None)),
+        }
+    }
+}
+
+/// The spectra of a signal, or those that `array` holds.
+pub fn spectra<'a, T: Real + Element>(
+    array: &'a PyReadonlyArrayDyn<'_, T>,
+    stft: Option<&StftParams>,
+) -> PyResult<Spectra<'a, T>> {
+    match stft {
+        Some(params) => Spectra::of(signal(array)?, params).map_err(value_error),
+        None => Ok(view3(array)?.into()),
+    }
 }
 
 /// An owned array handed to numpy without a copy (when it is in C order, as ours are).
@@ -46,14 +99,6 @@ pub fn into_numpy<'py, T: Element + Clone, D: Dimension>(
     Ok(data.into_pyarray(py).reshape(shape)?.into_any())
 }
 
-/// Either precision of a three-dimensional result.
-pub enum Tensor {
-    /// numpy.float32
-    F32(Array3<f32>),
-    /// numpy.float64
-    F64(Array3<f64>),
-}
-
 /// Either precision of a two-dimensional result.
 pub enum Matrix {
     /// numpy.float32
@@ -62,21 +107,15 @@ pub enum Matrix {
     F64(Array2<f64>),
 }
 
-macro_rules! into_either {
-    ($name:ident) => {
-        impl $name {
-            /// Hands the array to numpy.
-            pub fn into_numpy(self, py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
-                match self {
-                    Self::F32(a) => into_numpy(py, a),
-                    Self::F64(a) => into_numpy(py, a),
-                }
-            }
+impl Matrix {
+    /// Hands the array to numpy.
+    pub fn into_numpy(self, py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+        match self {
+            Self::F32(a) => into_numpy(py, a),
+            Self::F64(a) => into_numpy(py, a),
         }
-    };
+    }
 }
-into_either!(Tensor);
-into_either!(Matrix);
 
 /// `each_precision!(py, view(array), result)`: `result` for the view of either precision of
 /// `array: Floats`, computed without the GIL and handed to numpy.
@@ -85,15 +124,39 @@ macro_rules! each_precision {
         match $array {
             $crate::arrays::Floats::F32($array) => {
                 let $array = $view(&$array)?;
-                let result = $py.detach(|| $result).map_err($crate::value_error)?;
+                let result =
+                    $crate::pool::compute($py, || $result)?.map_err($crate::value_error)?;
                 $crate::arrays::into_numpy($py, result)
             }
             $crate::arrays::Floats::F64($array) => {
                 let $array = $view(&$array)?;
-                let result = $py.detach(|| $result).map_err($crate::value_error)?;
+                let result =
+                    $crate::pool::compute($py, || $result)?.map_err($crate::value_error)?;
                 $crate::arrays::into_numpy($py, result)
             }
         }
     };
 }
 pub(crate) use each_precision;
+
+/// As [`each_precision`], for the spectra of `source: Source`.
+macro_rules! each_spectra {
+    ($py:ident, $source:ident, $result:expr) => {{
+        let (array, stft) = $source.parts()?;
+        match array {
+            $crate::arrays::Floats::F32(array) => {
+                let $source = $crate::arrays::spectra(&array, stft.as_ref())?;
+                let result =
+                    $crate::pool::compute($py, || $result)?.map_err($crate::value_error)?;
+                $crate::arrays::into_numpy($py, result)
+            }
+            $crate::arrays::Floats::F64(array) => {
+                let $source = $crate::arrays::spectra(&array, stft.as_ref())?;
+                let result =
+                    $crate::pool::compute($py, || $result)?.map_err($crate::value_error)?;
+                $crate::arrays::into_numpy($py, result)
+            }
+        }
+    }};
+}
+pub(crate) use each_spectra;

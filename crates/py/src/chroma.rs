@@ -12,6 +12,7 @@ use numpy::{Element, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, each_precision, into_numpy, view2, view3};
+use crate::pool::compute;
 use crate::value_error;
 
 /// Tracker parameters from the front end: (sr, n_fft, fmin, fmax, threshold).
@@ -50,7 +51,7 @@ impl<'py, T: Real + Element> Spectrogram<'py, T> {
     fn peaks(&self, py: Python<'py>, params: PitchParams) -> PyResult<PitchesMagnitudes<'py>> {
         let (s, reference) = (view3(&self.s)?, self.reference.as_ref().map(view2).transpose()?);
         let (pitches, magnitudes) =
-            py.detach(|| dsp_piptrack(s, reference, params)).map_err(value_error)?;
+            compute(py, || dsp_piptrack(s, reference, params))?.map_err(value_error)?;
         Ok((into_numpy(py, pitches)?, into_numpy(py, magnitudes)?))
     }
 
@@ -62,7 +63,7 @@ impl<'py, T: Real + Element> Spectrogram<'py, T> {
         bins_per_octave: usize,
     ) -> PyResult<Option<f64>> {
         let (s, reference) = (view3(&self.s)?, self.reference.as_ref().map(view2).transpose()?);
-        py.detach(|| dsp_estimate_tuning(s, reference, params, resolution, bins_per_octave))
+        compute(py, || dsp_estimate_tuning(s, reference, params, resolution, bins_per_octave))?
             .map_err(value_error)
     }
 }
@@ -111,11 +112,11 @@ fn pitch_tuning(
     match frequencies {
         Floats::F32(f) => {
             let f = f.as_slice()?;
-            py.detach(|| dsp_pitch_tuning(f, resolution, bins_per_octave))
+            compute(py, || dsp_pitch_tuning(f, resolution, bins_per_octave))?
         }
         Floats::F64(f) => {
             let f = f.as_slice()?;
-            py.detach(|| dsp_pitch_tuning(f, resolution, bins_per_octave))
+            compute(py, || dsp_pitch_tuning(f, resolution, bins_per_octave))?
         }
     }
     .map_err(value_error)
@@ -125,7 +126,7 @@ fn pitch_tuning(
 #[pyfunction]
 fn chroma_filter(py: Python<'_>, params: ChromaTuple) -> PyResult<Bound<'_, PyAny>> {
     let params = chroma_params(params)?;
-    into_numpy(py, py.detach(|| dsp_chroma_filter::<f64>(&params)).map_err(value_error)?)
+    into_numpy(py, compute(py, || dsp_chroma_filter::<f64>(&params))?.map_err(value_error)?)
 }
 
 /// Chromagram under a filter bank, which is rounded to single precision (as librosa's) unless

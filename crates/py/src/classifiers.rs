@@ -10,7 +10,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::arrays::{into_numpy, view2};
-use crate::value_error;
+use crate::pool::compute;
+use crate::{model_error, value_error};
 
 /// A trained model, of any classifier, as it is kept in a file.
 #[pyclass(frozen, name = "TrainedModel", module = "corsmal_feat._core")]
@@ -46,7 +47,7 @@ impl PyModel {
         let labels = Labels::new(labels).map_err(value_error)?;
         let provenance = serde_json::from_str(provenance).map_err(value_error)?;
         let x = view2(&x)?;
-        let fitted = py.detach(|| spec.train(x, &y, labels.len())).map_err(value_error)?;
+        let fitted = compute(py, || spec.train(x, &y, labels.len()))?.map_err(value_error)?;
         let header = ModelHeader {
             pipeline: spec,
             labels,
@@ -67,7 +68,7 @@ impl PyModel {
         x: PyReadonlyArrayDyn<'py, f64>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let x = view2(&x)?;
-        let classes = py.detach(|| self.0.predict(x)).map_err(value_error)?;
+        let classes = compute(py, || self.0.predict(x))?.map_err(value_error)?;
         let classes: Vec<i64> = classes.into_iter().map(|c| c as i64).collect();
         Ok(classes.into_pyarray(py).into_any())
     }
@@ -79,7 +80,7 @@ impl PyModel {
         x: PyReadonlyArrayDyn<'py, f64>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let x = view2(&x)?;
-        let proba = py.detach(|| self.0.predict_proba(x)).map_err(value_error)?;
+        let proba = compute(py, || self.0.predict_proba(x))?.map_err(value_error)?;
         into_numpy(py, proba)
     }
 
@@ -95,24 +96,24 @@ impl PyModel {
 
     /// The bytes of the model file.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        Ok(PyBytes::new(py, &self.0.to_bytes().map_err(value_error)?))
+        Ok(PyBytes::new(py, &self.0.to_bytes().map_err(model_error)?))
     }
 
     /// A model from the bytes of a model file.
     #[staticmethod]
     fn from_bytes(bytes: &[u8]) -> PyResult<Self> {
-        Model::from_bytes(bytes).map(Self).map_err(value_error)
+        Model::from_bytes(bytes).map(Self).map_err(model_error)
     }
 
     /// Writes the model file, whole or not at all.
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        self.0.save(&path).map_err(value_error)
+        self.0.save(&path).map_err(model_error)
     }
 
     /// Reads a model file.
     #[staticmethod]
     fn load(path: PathBuf) -> PyResult<Self> {
-        Model::load(&path).map(Self).map_err(value_error)
+        Model::load(&path).map(Self).map_err(model_error)
     }
 }
 

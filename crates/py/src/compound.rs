@@ -10,6 +10,7 @@ use numpy::PyReadonlyArrayDyn;
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, Matrix, into_numpy, view2};
+use crate::pool::compute;
 use crate::value_error;
 
 type Doubles<'py> = PyReadonlyArrayDyn<'py, f64>;
@@ -33,7 +34,7 @@ fn a34_short<'py>(
         let plan = PaaPlan::new(sr, frame.0, frame.1)?;
         y.outer_iter().map(|signal| plan.short_term(signal, deltas)).collect::<Result<Vec<_>, _>>()
     };
-    into_numpy(py, stacked(&py.detach(run).map_err(value_error)?)?)
+    into_numpy(py, stacked(&compute(py, run)?.map_err(value_error)?)?)
 }
 
 /// `[channels, 136, windows]`; `frame` and `mid` are (window, step) in samples.
@@ -52,7 +53,7 @@ fn a34f136<'py>(
         let windows = |signal| Ok(mid.statistics(plan.short_term(signal, true)?.view()));
         y.outer_iter().map(windows).collect::<corsmal_dsp::Result<Vec<_>>>()
     };
-    into_numpy(py, stacked(&py.detach(run).map_err(value_error)?)?)
+    into_numpy(py, stacked(&compute(py, run)?.map_err(value_error)?)?)
 }
 
 fn stacked(parts: &[Array2<f64>]) -> PyResult<Array3<f64>> {
@@ -83,11 +84,11 @@ fn sk_resize<'py>(
     let result = match image {
         Floats::F32(s) => {
             let s = view2(&s)?;
-            Matrix::F32(py.detach(|| resize(s, &params)).map_err(value_error)?)
+            Matrix::F32(compute(py, || resize(s, &params))?.map_err(value_error)?)
         }
         Floats::F64(s) => {
             let s = view2(&s)?;
-            Matrix::F64(py.detach(|| resize(s, &params)).map_err(value_error)?)
+            Matrix::F64(compute(py, || resize(s, &params))?.map_err(value_error)?)
         }
     };
     result.into_numpy(py)
@@ -101,7 +102,7 @@ fn pca_fit<'py>(
     n_components: usize,
 ) -> PyResult<[Bound<'py, PyAny>; 3]> {
     let x = view2(&x)?;
-    let pca = py.detach(|| Pca::fit(x, n_components)).map_err(value_error)?;
+    let pca = compute(py, || Pca::fit(x, n_components))?.map_err(value_error)?;
     Ok([
         into_numpy(py, pca.components)?,
         into_numpy(py, pca.mean)?,
@@ -133,7 +134,7 @@ fn pca_project<'py>(
     }
     let (mean, explained_variance) = (Array1::from_vec(mean), Array1::from_vec(variance));
     let pca = Pca { mean, components, explained_variance };
-    into_numpy(py, py.detach(|| pca.project(x, whiten)).map_err(value_error)?)
+    into_numpy(py, compute(py, || pca.project(x, whiten))?.map_err(value_error)?)
 }
 
 pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -19,12 +19,17 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
 use crate::arrays::{into_numpy, view2};
-use crate::{RunError, value_error};
+use crate::pool::{self, compute};
+use crate::{ConfigError, RunError, value_error};
 
 /// How often a run asks whether Python has a signal for us.
 const POLL: Duration = Duration::from_millis(50);
 
 const FINISHED: &str = "the signal is finished: start another one";
+
+fn config_error(error: impl std::fmt::Display) -> PyErr {
+    ConfigError::new_err(error.to_string())
+}
 
 /// The configuration from `(kind, text)`, `kind` being "preset", "path", "toml" or "json".
 fn config_of((kind, text): (&str, &str), overrides: &[String]) -> PyResult<Arc<Config>> {
@@ -33,10 +38,10 @@ fn config_of((kind, text): (&str, &str), overrides: &[String]) -> PyResult<Arc<C
             .and_then(|preset| Config::with_overrides(preset.toml, text, overrides)),
         "path" => Config::load(Path::new(text), overrides),
         "toml" => Config::with_overrides(text, "text", overrides),
-        "json" => Config::from_tree(serde_json::from_str(text).map_err(value_error)?, overrides),
-        other => return Err(value_error(format!("kind = {other} of a configuration is unknown"))),
+        "json" => Config::from_tree(serde_json::from_str(text).map_err(config_error)?, overrides),
+        other => return Err(config_error(format!("kind = {other} of a configuration is unknown"))),
     };
-    config.map(Arc::new).map_err(value_error)
+    config.map(Arc::new).map_err(config_error)
 }
 
 /// The effective configuration as JSON, and its hash.
@@ -81,7 +86,7 @@ fn extract(
     let jobs = match jobs {
         Some(0) => return Err(value_error("jobs = 0 is not possible: at least 1")),
         Some(jobs) => jobs,
-        None => std::thread::available_parallelism().map_or(1, usize::from),
+        None => pool::jobs()?,
     };
     let compression = Compression::Stored;
     let shard = "0/1".parse::<Shard>().map_err(value_error)?;
@@ -106,7 +111,7 @@ fn fit_projection(
     n_components: usize,
     out: PathBuf,
 ) -> PyResult<()> {
-    py.detach(|| Projection::fit(&features, n_components)?.save(&out)).map_err(value_error)
+    compute(py, || Projection::fit(&features, n_components)?.save(&out))?.map_err(value_error)
 }
 
 /// Does `work` in another thread and raises its flag when Python has an exception for this one.
@@ -148,7 +153,7 @@ impl PySignals {
 
     /// Begins a signal.
     fn start(&self, py: Python<'_>, sample_rate: u32, channels: u16) -> PyResult<PySignal> {
-        let signal = py.detach(|| self.0.start(sample_rate, channels)).map_err(value_error)?;
+        let signal = compute(py, || self.0.start(sample_rate, channels))?.map_err(value_error)?;
         Ok(PySignal(Some(signal)))
     }
 }
@@ -170,7 +175,7 @@ impl PySignal {
         let view = view2(&block)?;
         let samples = view.as_slice().ok_or_else(|| value_error("block is not contiguous"))?;
         let signal = self.open()?;
-        py.detach(|| signal.push(samples)).map_err(value_error)
+        compute(py, || signal.push(samples))?.map_err(value_error)
     }
 
     /// Names of the summary's values; empty without a summary.
@@ -183,7 +188,7 @@ impl PySignal {
     fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<Finished<'py>> {
         let Some(signal) = self.0.take() else { return Err(value_error(FINISHED)) };
         let channels = signal.plan().channels;
-        match py.detach(|| signal.finish()).map_err(value_error)? {
+        match compute(py, || signal.finish())?.map_err(value_error)? {
             Features::Summary(row) => {
                 Ok((Some(into_numpy(py, Array1::from_vec(row))?), Vec::new()))
             }

@@ -8,6 +8,7 @@ use numpy::PyReadonlyArrayDyn;
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, into_numpy, view2, view3};
+use crate::pool::compute;
 use crate::resample::res_type;
 use crate::value_error;
 
@@ -33,11 +34,11 @@ fn spec9216<'py>(
     let image = match y {
         Floats::F32(y) => {
             let y = view2(&y)?;
-            py.detach(|| plan.run(y.row(0)))
+            compute(py, || plan.run(y.row(0)))?
         }
         Floats::F64(y) => {
             let y = view2(&y)?;
-            py.detach(|| plan.run(y.row(0)))
+            compute(py, || plan.run(y.row(0)))?
         }
     };
     into_numpy(py, image.map_err(value_error)?)
@@ -51,7 +52,7 @@ fn m1_stft<'py>(
     hop_length: usize,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (y, plan) = (view2(&y)?, M1Stft { n_fft, hop_length });
-    into_numpy(py, py.detach(|| plan.run(y)).map_err(value_error)?)
+    into_numpy(py, compute(py, || plan.run(y))?.map_err(value_error)?)
 }
 
 #[pyfunction]
@@ -63,7 +64,7 @@ fn m2_mfcc<'py>(
     librosa: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (y, plan) = (view2(&y)?, M2Mfcc { librosa: librosa_version(librosa)?, padded });
-    into_numpy(py, py.detach(|| plan.run(y, sr)).map_err(value_error)?)
+    into_numpy(py, compute(py, || plan.run(y, sr))?.map_err(value_error)?)
 }
 
 #[pyfunction]
@@ -75,7 +76,7 @@ fn m3_spectrogram<'py>(
     hop_length: usize,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (y, plan) = (view2(&y)?, M3Spectrogram { n_fft, hop_length });
-    into_numpy(py, py.detach(|| plan.run(y, sr)).map_err(value_error)?)
+    into_numpy(py, compute(py, || plan.run(y, sr))?.map_err(value_error)?)
 }
 
 #[pyfunction]
@@ -93,19 +94,19 @@ fn m4_logmel<'py>(
         }
     };
     let y = view2(&y)?;
-    into_numpy(py, py.detach(|| M4LogMel { variant }.run(y, sr)).map_err(value_error)?)
+    into_numpy(py, compute(py, || M4LogMel { variant }.run(y, sr))?.map_err(value_error)?)
 }
 
 #[pyfunction]
 fn m4_windows<'py>(py: Python<'py>, features: Singles<'py>) -> PyResult<Bound<'py, PyAny>> {
     let features = view3(&features)?;
-    into_numpy(py, py.detach(|| dsp_m4_windows(features)))
+    into_numpy(py, compute(py, || dsp_m4_windows(features))?)
 }
 
 #[pyfunction]
 fn m5_a34f136<'py>(py: Python<'py>, y: Singles<'py>, sr: f64) -> PyResult<Bound<'py, PyAny>> {
     let y = view2(&y)?;
-    into_numpy(py, py.detach(|| M5A34f136::new(sr)?.run(y)).map_err(value_error)?)
+    into_numpy(py, compute(py, || M5A34f136::new(sr)?.run(y))?.map_err(value_error)?)
 }
 
 #[pyfunction]
@@ -116,7 +117,7 @@ fn m5_vggish_patches<'py>(
     converter: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (y, plan) = (view2(&y)?, M5VggishPatches { res_type: res_type(converter)? });
-    into_numpy(py, py.detach(|| plan.run(y, sr)).map_err(value_error)?)
+    into_numpy(py, compute(py, || plan.run(y, sr))?.map_err(value_error)?)
 }
 
 #[pyfunction]
@@ -129,7 +130,7 @@ fn m6_spectrogram<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let crop = start.map_or(M6Crop::Onset, M6Crop::At);
     let (y, plan) = (view2(&y)?, M6Spectrogram { librosa: librosa_version(librosa)?, crop });
-    into_numpy(py, py.detach(|| plan.run(y, sr)).map_err(value_error)?)
+    into_numpy(py, compute(py, || plan.run(y, sr))?.map_err(value_error)?)
 }
 
 pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -20,6 +20,7 @@ use pyo3::prelude::*;
 use crate::arrays::{Floats, each_precision, into_numpy, view2, view3};
 use crate::chroma::norm_of;
 use crate::frontends::librosa_version;
+use crate::pool::compute;
 use crate::spectrum::{StftTuple, pad_mode, stft_params};
 use crate::value_error;
 
@@ -41,11 +42,11 @@ fn istft<'py>(
     match spectrogram {
         Complexes::Single(d) => {
             let d = view3(&d)?;
-            into_numpy(py, py.detach(|| dsp_istft(d, &params, length)).map_err(value_error)?)
+            into_numpy(py, compute(py, || dsp_istft(d, &params, length))?.map_err(value_error)?)
         }
         Complexes::Double(d) => {
             let d = view3(&d)?;
-            into_numpy(py, py.detach(|| dsp_istft(d, &params, length)).map_err(value_error)?)
+            into_numpy(py, compute(py, || dsp_istft(d, &params, length))?.map_err(value_error)?)
         }
     }
 }
@@ -65,7 +66,7 @@ fn masks_of<'py, T: Lane + Element>(
     params: HpssTuple,
 ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     let params = hpss_params(params);
-    let (harmonic, percussive) = py.detach(|| dsp_masks(s, &params)).map_err(value_error)?;
+    let (harmonic, percussive) = compute(py, || dsp_masks(s, &params))?.map_err(value_error)?;
     Ok((into_numpy(py, harmonic)?, into_numpy(py, percussive)?))
 }
 
@@ -92,7 +93,7 @@ fn separate_parts<'py, T: Lane + Element>(
 ) -> PyResult<Vec<Bound<'py, PyAny>>> {
     let (stft, params) = (stft_params(stft)?, hpss_params(params));
     let separated =
-        py.detach(|| dsp_separate(y, &stft, &params, mask, parts)).map_err(value_error)?;
+        compute(py, || dsp_separate(y, &stft, &params, mask, parts))?.map_err(value_error)?;
     separated.into_iter().map(|part| into_numpy(py, part)).collect()
 }
 
@@ -195,7 +196,7 @@ fn af193<'py>(
     librosa: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (y, key) = (view2(&y)?, (sr, librosa_version(librosa)?));
-    let vectors = py.detach(|| {
+    let vectors = compute(py, || {
         let mut last = AF193.lock().unwrap_or_else(PoisonError::into_inner);
         let plan = match &*last {
             Some((made_for, plan)) if *made_for == key => plan.clone(),
@@ -208,7 +209,7 @@ fn af193<'py>(
             vector.assign(&ndarray::aview1(&computed));
         }
         Ok(vectors)
-    });
+    })?;
     into_numpy(py, vectors.map_err(|e: corsmal_dsp::DspError| value_error(e))?)
 }
 

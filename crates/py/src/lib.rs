@@ -8,21 +8,29 @@ mod arrays;
 mod chroma;
 mod classifiers;
 mod compound;
+mod evaluate;
 mod extract;
 mod frontends;
 mod harmonic;
 mod mel;
 mod onset;
+mod pool;
 mod resample;
 mod spectral;
 mod spectrum;
 mod time_domain;
 
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
-pyo3::create_exception!(_core, ParameterError, PyValueError, "A parameter or array was refused.");
-pyo3::create_exception!(_core, RunError, PyRuntimeError, "A run could not start or go on.");
+pyo3::import_exception!(corsmal_feat.errors, ConfigError);
+pyo3::import_exception!(corsmal_feat.errors, ModelError);
+pyo3::import_exception!(corsmal_feat.errors, ParameterError);
+pyo3::import_exception!(corsmal_feat.errors, RunError);
+
+/// A refused model file.
+pub(crate) fn model_error(error: impl std::fmt::Display) -> PyErr {
+    ModelError::new_err(error.to_string())
+}
 
 /// Any of our refusals as `ParameterError` (a `ValueError`).
 pub(crate) fn value_error(error: impl std::fmt::Display) -> PyErr {
@@ -32,12 +40,12 @@ pub(crate) fn value_error(error: impl std::fmt::Display) -> PyErr {
 #[pymodule]
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    m.add("ParameterError", m.py().get_type::<ParameterError>())?;
-    m.add("RunError", m.py().get_type::<RunError>())?;
     classifiers::register(m)?;
+    evaluate::register(m)?;
     spectrum::register(m)?;
     harmonic::register(m)?;
     mel::register(m)?;
+    pool::register(m)?;
     time_domain::register(m)?;
     resample::register(m)?;
     compound::register(m)?;

@@ -3,10 +3,13 @@
 use corsmal_dsp::decibel::Decibel;
 use corsmal_dsp::delta::{DeltaMode, DeltaParams, delta as dsp_delta};
 use corsmal_dsp::mel::{MelNorm, MelParams, SparseBank, empty_filters, mel_filter};
+use corsmal_dsp::melspectrogram::melspectrogram as dsp_melspectrogram;
 use corsmal_dsp::mfcc::{DctNorm, MfccParams, mfcc as dsp_mfcc};
+use ndarray::Array1;
 use pyo3::prelude::*;
 
-use crate::arrays::{Floats, Matrix, Tensor, into_numpy, view2, view3};
+use crate::arrays::{Floats, each_precision, into_numpy, signal, view1, view2, view3};
+use crate::spectrum::{StftTuple, stft_params};
 use crate::value_error;
 
 /// Filter bank parameters from the front end: (sr, n_fft, n_mels, fmin, fmax, htk, norm), `norm`
@@ -38,6 +41,12 @@ fn mel<'py>(py: Python<'py>, params: MelTuple) -> PyResult<(Bound<'py, PyAny>, b
     Ok((into_numpy(py, bank)?, empty))
 }
 
+/// The filter bank without its zeros, and whether it has empty rows.
+fn sparse(params: MelTuple) -> PyResult<(SparseBank, bool)> {
+    let bank = mel_filter(&mel_params(params)?).map_err(value_error)?;
+    Ok((SparseBank::new(&bank), !empty_filters(&bank).is_empty()))
+}
+
 /// `bank @ S` and whether the bank has empty rows.
 #[pyfunction]
 fn apply_mel<'py>(
@@ -45,32 +54,21 @@ fn apply_mel<'py>(
     s: Floats<'py>,
     params: MelTuple,
 ) -> PyResult<(Bound<'py, PyAny>, bool)> {
-    let bank = mel_filter(&mel_params(params)?).map_err(value_error)?;
-    let empty = !empty_filters(&bank).is_empty();
-    let sparse = SparseBank::new(&bank);
-    let result = match s {
-        Floats::F32(s) => {
-            let s = checked_bins(view3(&s)?, &bank)?;
-            Tensor::F32(py.detach(|| sparse.apply(s)))
-        }
-        Floats::F64(s) => {
-            let s = checked_bins(view3(&s)?, &bank)?;
-            Tensor::F64(py.detach(|| sparse.apply(s)))
-        }
-    };
-    Ok((result.into_numpy(py)?, empty))
+    let (bank, empty) = sparse(params)?;
+    Ok((each_precision!(py, view3(s), bank.product(s))?, empty))
 }
 
-fn checked_bins<'a, T>(
-    s: ndarray::ArrayView3<'a, T>,
-    bank: &ndarray::Array2<f32>,
-) -> PyResult<ndarray::ArrayView3<'a, T>> {
-    if s.dim().1 == bank.ncols() {
-        Ok(s)
-    } else {
-        let (got, want) = (s.dim().1, bank.ncols());
-        Err(value_error(format!("S has {got} bins, expected {want} for this n_fft")))
-    }
+/// `bank @ |stft(y)|^power` and whether the bank has empty rows.
+#[pyfunction]
+fn melspectrogram<'py>(
+    py: Python<'py>,
+    y: Floats<'py>,
+    stft: StftTuple,
+    power: f64,
+    params: MelTuple,
+) -> PyResult<(Bound<'py, PyAny>, bool)> {
+    let (stft, (bank, empty)) = (stft_params(&stft)?, sparse(params)?);
+    Ok((each_precision!(py, signal(y), dsp_melspectrogram(y, &stft, power, &bank))?, empty))
 }
 
 /// Power values to decibels; the clamp is joint over the whole array.
@@ -83,43 +81,20 @@ fn power_to_db<'py>(
     top_db: Option<f64>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let decibel = Decibel { reference, amin, top_db };
-    match s {
-        Floats::F32(s) => {
-            let mut values = s.as_slice()?.to_vec();
-            py.detach(|| decibel.power(&mut values)).map_err(value_error)?;
-            into_numpy(py, ndarray::Array1::from_vec(values))
-        }
-        Floats::F64(s) => {
-            let mut values = s.as_slice()?.to_vec();
-            py.detach(|| decibel.power(&mut values)).map_err(value_error)?;
-            into_numpy(py, ndarray::Array1::from_vec(values))
-        }
-    }
+    each_precision!(py, view1(s), decibel.of(s).map(Array1::from_vec))
 }
 
-/// Cepstral coefficients of a log-mel spectrogram.
+/// Cepstral coefficients of a log-mel spectrogram; `params` is (n_mfcc, dct_type, ortho, lifter).
 #[pyfunction]
 fn mfcc<'py>(
     py: Python<'py>,
     log_mel: Floats<'py>,
-    n_mfcc: usize,
-    dct_type: u8,
-    ortho: bool,
-    lifter: f64,
+    params: (usize, u8, bool, f64),
 ) -> PyResult<Bound<'py, PyAny>> {
+    let (n_mfcc, dct_type, ortho, lifter) = params;
     let norm = if ortho { DctNorm::Ortho } else { DctNorm::None };
     let params = MfccParams { n_mfcc, dct_type, norm, lifter };
-    let result = match log_mel {
-        Floats::F32(s) => {
-            let s = view3(&s)?;
-            Tensor::F32(py.detach(|| dsp_mfcc(s, &params)).map_err(value_error)?)
-        }
-        Floats::F64(s) => {
-            let s = view3(&s)?;
-            Tensor::F64(py.detach(|| dsp_mfcc(s, &params)).map_err(value_error)?)
-        }
-    };
-    result.into_numpy(py)
+    each_precision!(py, view3(log_mel), dsp_mfcc(log_mel, &params))
 }
 
 /// Derivative of each row along the frames.
@@ -144,22 +119,13 @@ fn delta<'py>(
         }
     };
     let params = DeltaParams { width, order, mode };
-    let result = match data {
-        Floats::F32(d) => {
-            let d = view2(&d)?;
-            Matrix::F32(py.detach(|| dsp_delta(d, &params)).map_err(value_error)?)
-        }
-        Floats::F64(d) => {
-            let d = view2(&d)?;
-            Matrix::F64(py.detach(|| dsp_delta(d, &params)).map_err(value_error)?)
-        }
-    };
-    result.into_numpy(py)
+    each_precision!(py, view2(data), dsp_delta(data, &params))
 }
 
 pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(mel, m)?)?;
     m.add_function(wrap_pyfunction!(apply_mel, m)?)?;
+    m.add_function(wrap_pyfunction!(melspectrogram, m)?)?;
     m.add_function(wrap_pyfunction!(power_to_db, m)?)?;
     m.add_function(wrap_pyfunction!(mfcc, m)?)?;
     m.add_function(wrap_pyfunction!(delta, m)?)

@@ -11,6 +11,7 @@ use numpy::{Element, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, each_precision, into_numpy, view2, view3};
+use crate::pool::compute;
 use crate::value_error;
 
 /// Peak conditions from the front end: (pre_max, post_max, pre_avg, post_avg, delta, wait); the
@@ -31,13 +32,13 @@ impl<'py, T: Real + Element> Compared<'py, T> {
 
     fn strength(&self, py: Python<'py>, params: &OnsetParams) -> PyResult<Bound<'py, PyAny>> {
         let (s, reference) = (view3(&self.s)?, self.reference.as_ref().map(view3).transpose()?);
-        let envelope = py.detach(|| dsp_onset_strength(s, reference, params));
+        let envelope = compute(py, || dsp_onset_strength(s, reference, params))?;
         into_numpy(py, envelope.map_err(value_error)?)
     }
 
     fn rises(&self, py: Python<'py>, params: &OnsetParams) -> PyResult<Bound<'py, PyAny>> {
         let (s, reference) = (view3(&self.s)?, self.reference.as_ref().map(view3).transpose()?);
-        let rises = py.detach(|| dsp_onset_rises(s, reference, params));
+        let rises = compute(py, || dsp_onset_rises(s, reference, params))?;
         into_numpy(py, rises.map_err(value_error)?)
     }
 }
@@ -113,7 +114,8 @@ fn onsets<T: Real>(
     pick: &PeakPick,
 ) -> PyResult<Vec<Vec<usize>>> {
     let channel = |row: ArrayView1<T>| dsp_onset_detect(&row.to_vec(), normalize, pick);
-    py.detach(|| envelope.outer_iter().map(channel).collect::<Result<_, _>>()).map_err(value_error)
+    compute(py, || envelope.outer_iter().map(channel).collect::<Result<_, _>>())?
+        .map_err(value_error)
 }
 
 #[pyfunction]

@@ -4,6 +4,7 @@ use corsmal_dsp::resample::{ResType, resample as dsp_resample};
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, Matrix, view2};
+use crate::pool::compute;
 use crate::value_error;
 
 /// The converter of librosa's name.
@@ -33,12 +34,12 @@ fn resample<'py>(
         Floats::F32(y) => {
             let y = view2(&y)?;
             let run = || dsp_resample(y, from, to, res_type, fix, scale);
-            Matrix::F32(py.detach(run).map_err(value_error)?)
+            Matrix::F32(compute(py, run)?.map_err(value_error)?)
         }
         Floats::F64(y) => {
             let y = view2(&y)?;
             let run = || dsp_resample(y, from, to, res_type, fix, scale);
-            Matrix::F64(py.detach(run).map_err(value_error)?)
+            Matrix::F64(compute(py, run)?.map_err(value_error)?)
         }
     };
     result.into_numpy(py)

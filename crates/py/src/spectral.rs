@@ -6,7 +6,7 @@ use corsmal_dsp::spectral::{self, Bandwidth, Contrast, ContrastParams, Flatness,
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::arrays::{Floats, each_precision, into_numpy, view2, view3};
+use crate::arrays::{Floats, Source, each_precision, each_spectra, into_numpy, view2, view3};
 use crate::value_error;
 
 /// Row frequencies of a spectrogram: `[bins]`, or `[channels, bins, frames]`.
@@ -32,17 +32,17 @@ fn to_mono<'py>(py: Python<'py>, y: Floats<'py>) -> PyResult<Bound<'py, PyAny>> 
 #[pyfunction]
 fn spectral_centroid<'py>(
     py: Python<'py>,
-    s: Floats<'py>,
+    s: Source<'py>,
     freq: PyReadonlyArrayDyn<'py, f64>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let freq = frequencies(&freq)?;
-    each_precision!(py, view3(s), spectral::spectral_centroid(s, freq))
+    each_spectra!(py, s, spectral::spectral_centroid(s, freq))
 }
 
 #[pyfunction]
 fn spectral_bandwidth<'py>(
     py: Python<'py>,
-    s: Floats<'py>,
+    s: Source<'py>,
     freq: PyReadonlyArrayDyn<'py, f64>,
     centroid: Option<PyReadonlyArrayDyn<'py, f64>>,
     norm: bool,
@@ -50,28 +50,28 @@ fn spectral_bandwidth<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let (freq, params) = (frequencies(&freq)?, Bandwidth { p, norm });
     let centroid = centroid.as_ref().map(view2).transpose()?;
-    each_precision!(py, view3(s), spectral::spectral_bandwidth(s, freq, centroid, params))
+    each_spectra!(py, s, spectral::spectral_bandwidth(s, freq, centroid, params))
 }
 
 #[pyfunction]
 fn spectral_rolloff<'py>(
     py: Python<'py>,
-    s: Floats<'py>,
+    s: Source<'py>,
     freq: PyReadonlyArrayDyn<'py, f64>,
     roll_percent: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let freq = frequencies(&freq)?;
-    each_precision!(py, view3(s), spectral::spectral_rolloff(s, freq, roll_percent))
+    each_spectra!(py, s, spectral::spectral_rolloff(s, freq, roll_percent))
 }
 
 #[pyfunction]
 fn spectral_flatness<'py>(
     py: Python<'py>,
-    s: Floats<'py>,
+    s: Source<'py>,
     amin: f64,
     power: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
-    each_precision!(py, view3(s), spectral::spectral_flatness(s, Flatness { amin, power }))
+    each_spectra!(py, s, spectral::spectral_flatness(s, Flatness { amin, power }))
 }
 
 /// The contrast and whether its lowest band is empty.
@@ -80,7 +80,7 @@ fn spectral_flatness<'py>(
 #[expect(clippy::too_many_arguments, reason = "librosa's parameters, one by one")]
 fn spectral_contrast<'py>(
     py: Python<'py>,
-    s: Floats<'py>,
+    s: Source<'py>,
     freq: PyReadonlyArrayDyn<'py, f64>,
     sr: f64,
     fmin: f64,
@@ -91,7 +91,7 @@ fn spectral_contrast<'py>(
     let params = ContrastParams { fmin, n_bands, quantile, linear };
     let freq = freq.as_slice()?;
     let empty = Contrast::new(freq, sr, &params).map_err(value_error)?.lowest_is_empty();
-    let result = each_precision!(py, view3(s), spectral::spectral_contrast(s, freq, sr, &params))?;
+    let result = each_spectra!(py, s, spectral::spectral_contrast(s, freq, sr, &params))?;
     Ok((result, empty))
 }
 
@@ -99,13 +99,13 @@ fn spectral_contrast<'py>(
 #[pyfunction]
 fn poly_features<'py>(
     py: Python<'py>,
-    s: Floats<'py>,
+    s: Source<'py>,
     freq: PyReadonlyArrayDyn<'py, f64>,
     order: usize,
 ) -> PyResult<(Bound<'py, PyAny>, bool)> {
     let freq = frequencies(&freq)?;
     let mut deficient = false;
-    let result = each_precision!(py, view3(s), {
+    let result = each_spectra!(py, s, {
         spectral::poly_features(s, freq, order).map(|(coefficients, flag)| {
             deficient = flag;
             coefficients

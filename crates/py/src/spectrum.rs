@@ -1,10 +1,12 @@
 //! Windows and the short-time Fourier transform.
 
+use corsmal_dsp::real::all_finite as dsp_all_finite;
 use corsmal_dsp::stft::{PadMode, StftParams, spectrogram as dsp_spectrogram, stft as dsp_stft};
 use corsmal_dsp::window::{Window, get_window as dsp_get_window};
 use pyo3::prelude::*;
 
-use crate::arrays::{Floats, Tensor, into_numpy, view2};
+use crate::arrays::{Floats, each_precision, into_numpy, signal, view1};
+use crate::pool::compute;
 use crate::value_error;
 
 /// Transform parameters, all resolved by the front end: (n_fft, hop_length, win_length, window,
@@ -53,19 +55,25 @@ fn get_window<'py>(
     into_numpy(py, ndarray::Array1::from_vec(dsp_get_window(window, nx, fftbins)))
 }
 
+/// Whether all values are finite.
+#[pyfunction]
+fn all_finite<'py>(py: Python<'py>, array: Floats<'py>) -> PyResult<bool> {
+    match array {
+        Floats::F32(array) => {
+            let values = view1(&array)?;
+            compute(py, || dsp_all_finite(values))
+        }
+        Floats::F64(array) => {
+            let values = view1(&array)?;
+            compute(py, || dsp_all_finite(values))
+        }
+    }
+}
+
 #[pyfunction]
 fn stft<'py>(py: Python<'py>, y: Floats<'py>, params: StftTuple) -> PyResult<Bound<'py, PyAny>> {
     let params = stft_params(&params)?;
-    match y {
-        Floats::F32(y) => {
-            let y = view2(&y)?;
-            into_numpy(py, py.detach(|| dsp_stft(y, &params)).map_err(value_error)?)
-        }
-        Floats::F64(y) => {
-            let y = view2(&y)?;
-            into_numpy(py, py.detach(|| dsp_stft(y, &params)).map_err(value_error)?)
-        }
-    }
+    each_precision!(py, signal(y), dsp_stft(y, &params))
 }
 
 #[pyfunction]
@@ -76,21 +84,12 @@ fn spectrogram<'py>(
     power: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let params = stft_params(&params)?;
-    let result = match y {
-        Floats::F32(y) => {
-            let y = view2(&y)?;
-            Tensor::F32(py.detach(|| dsp_spectrogram(y, &params, power)).map_err(value_error)?)
-        }
-        Floats::F64(y) => {
-            let y = view2(&y)?;
-            Tensor::F64(py.detach(|| dsp_spectrogram(y, &params, power)).map_err(value_error)?)
-        }
-    };
-    result.into_numpy(py)
+    each_precision!(py, signal(y), dsp_spectrogram(y, &params, power))
 }
 
 pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(get_window, m)?)?;
+    m.add_function(wrap_pyfunction!(all_finite, m)?)?;
     m.add_function(wrap_pyfunction!(stft, m)?)?;
     m.add_function(wrap_pyfunction!(spectrogram, m)?)
 }

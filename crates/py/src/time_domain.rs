@@ -6,9 +6,8 @@ use corsmal_dsp::time_domain::{
 };
 use pyo3::prelude::*;
 
-use crate::arrays::{Floats, into_numpy, view2, view3};
+use crate::arrays::{Floats, each_precision, signal, view3};
 use crate::spectrum::pad_mode;
-use crate::value_error;
 
 /// Framing from the front end: (frame_length, hop_length, center).
 type FrameTuple = (usize, usize, bool);
@@ -28,17 +27,7 @@ fn zero_crossing_rate<'py>(
     let frame = frame_params(frame);
     let (threshold, zero_pos, pad) = crossings;
     let params = ZeroCrossingParams { threshold, zero_pos, pad };
-    let result = match y {
-        Floats::F32(y) => {
-            let y = view2(&y)?;
-            py.detach(|| dsp_zero_crossing_rate(y, &frame, &params))
-        }
-        Floats::F64(y) => {
-            let y = view2(&y)?;
-            py.detach(|| dsp_zero_crossing_rate(y, &frame, &params))
-        }
-    };
-    into_numpy(py, result.map_err(value_error)?)
+    each_precision!(py, signal(y), dsp_zero_crossing_rate(y, &frame, &params))
 }
 
 /// Level per frame of a waveform.
@@ -50,17 +39,7 @@ fn rms<'py>(
     padding: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (frame, padding) = (frame_params(frame), pad_mode(padding)?);
-    let result = match y {
-        Floats::F32(y) => {
-            let y = view2(&y)?;
-            py.detach(|| dsp_rms(y, &frame, padding))
-        }
-        Floats::F64(y) => {
-            let y = view2(&y)?;
-            py.detach(|| dsp_rms(y, &frame, padding))
-        }
-    };
-    into_numpy(py, result.map_err(value_error)?)
+    each_precision!(py, signal(y), dsp_rms(y, &frame, padding))
 }
 
 /// Level per frame of a magnitude spectrogram.
@@ -70,11 +49,7 @@ fn rms_of_spectrogram<'py>(
     s: Floats<'py>,
     frame_length: usize,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let result = match s {
-        Floats::F32(s) => dsp_rms_of_spectrogram(view3(&s)?, frame_length),
-        Floats::F64(s) => dsp_rms_of_spectrogram(view3(&s)?, frame_length),
-    };
-    into_numpy(py, result.map_err(value_error)?)
+    each_precision!(py, view3(s), dsp_rms_of_spectrogram(s, frame_length))
 }
 
 pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -1,9 +1,8 @@
 //! Spectral bandwidth (librosa 0.11 `feature.spectral_bandwidth`).
 
-use ndarray::{Array3, ArrayView2, ArrayView3};
+use ndarray::{Array3, ArrayView2};
 
-use super::{Frequencies, centroid, require_magnitudes, require_non_negative};
-use crate::columns::map_columns;
+use super::{Frequencies, Spectra, centroid};
 use crate::error::{DspError, Result};
 use crate::normalize::Norm;
 use crate::real::Real;
@@ -54,27 +53,27 @@ impl Bandwidth {
 ///
 /// # Errors
 /// Negative or non-finite magnitudes, an impossible power, frequencies or centroids that do not fit.
-pub fn spectral_bandwidth<T: Real>(
-    s: ArrayView3<T>,
+pub fn spectral_bandwidth<'a, T: Real>(
+    s: impl Into<Spectra<'a, T>>,
     freqs: Frequencies,
     centroids: Option<ArrayView2<f64>>,
     params: Bandwidth,
 ) -> Result<Array3<f64>> {
+    let s = s.into();
     params.check()?;
     freqs.check(s.dim())?;
     let (channels, _, frames) = s.dim();
     if params.norm || centroids.is_none() {
-        require_magnitudes(s)?;
+        s.require_magnitudes()?;
     } else {
-        require_non_negative(s)?;
+        s.require_non_negative()?;
     }
     if let Some(given) = centroids.filter(|given| given.dim() != (channels, frames)) {
         let expected = format!("[{channels}, {frames}]");
         return Err(DspError::Shape { name: "centroid", expected, actual: given.shape().to_vec() });
     }
-    let mut buffer = Vec::new();
-    Ok(map_columns(s, 1, |c, t, magnitude, out| {
-        let freqs = freqs.column(c, t, &mut buffer);
+    Ok(s.map(1, Vec::new, |buffer, c, t, magnitude, out| {
+        let freqs = freqs.column(c, t, buffer);
         let middle = centroids.map_or_else(|| centroid(magnitude, freqs), |given| given[[c, t]]);
         out[0] = params.of(magnitude, freqs, middle);
     }))

@@ -1,9 +1,8 @@
 //! Spectral centroid (librosa 0.11 `feature.spectral_centroid`).
 
-use ndarray::{Array3, ArrayView3};
+use ndarray::Array3;
 
-use super::{Frequencies, require_magnitudes};
-use crate::columns::map_columns;
+use super::{Frequencies, Spectra};
 use crate::error::Result;
 use crate::normalize::Norm;
 use crate::real::Real;
@@ -21,12 +20,15 @@ pub fn centroid<T: Real>(magnitude: &[T], freqs: &[f64]) -> f64 {
 ///
 /// # Errors
 /// Negative or non-finite magnitudes, or frequencies that do not fit.
-pub fn spectral_centroid<T: Real>(s: ArrayView3<T>, freqs: Frequencies) -> Result<Array3<f64>> {
+pub fn spectral_centroid<'a, T: Real>(
+    s: impl Into<Spectra<'a, T>>,
+    freqs: Frequencies,
+) -> Result<Array3<f64>> {
+    let s = s.into();
     freqs.check(s.dim())?;
-    require_magnitudes(s)?;
-    let mut buffer = Vec::new();
-    Ok(map_columns(s, 1, |c, t, magnitude, out| {
-        out[0] = centroid(magnitude, freqs.column(c, t, &mut buffer));
+    s.require_magnitudes()?;
+    Ok(s.map(1, Vec::new, |buffer, c, t, magnitude, out| {
+        out[0] = centroid(magnitude, freqs.column(c, t, buffer));
     }))
 }
 

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use ndarray::{Array3, ArrayView3};
+use ndarray::{Array3, s};
 
-use crate::columns::for_each_column;
+use super::{Frequencies, Spectra};
 use crate::decibel::Decibel;
 use crate::error::{DspError, Result};
 use crate::frequency::require_rate;
@@ -249,27 +249,23 @@ pub fn contrast_from_extremes(peaks: &mut [f64], valleys: &mut [f64], linear: bo
 ///
 /// # Errors
 /// As [`Contrast::new`], or frequencies that do not fit.
-pub fn spectral_contrast<T: Real>(
-    s: ArrayView3<T>,
+pub fn spectral_contrast<'a, T: Real>(
+    s: impl Into<Spectra<'a, T>>,
     freqs: &[f64],
     sr: f64,
     params: &ContrastParams,
 ) -> Result<Array3<f64>> {
-    super::Frequencies::Bins(freqs).check(s.dim())?;
+    let s = s.into();
+    Frequencies::Bins(freqs).check(s.dim())?;
     let contrast = Contrast::new(freqs, sr, params)?;
-    let (channels, _, frames) = s.dim();
     let rows = contrast.rows();
-    let (mut peaks, mut valleys) =
-        (Array3::zeros((channels, rows, frames)), Array3::zeros((channels, rows, frames)));
-    let mut scratch = vec![T::zero(); contrast.scratch_len()];
-    let (mut peak, mut valley) = (vec![0.0; rows], vec![0.0; rows]);
-    for_each_column(s, |c, t, magnitude| {
-        contrast.peaks_valleys(magnitude, &mut scratch, &mut peak, &mut valley);
-        for k in 0..rows {
-            peaks[[c, k, t]] = peak[k];
-            valleys[[c, k, t]] = valley[k];
-        }
+    let state = || vec![T::zero(); contrast.scratch_len()];
+    let extremes = s.map(2 * rows, state, |scratch, _, _, magnitude, out| {
+        let (peaks, valleys) = out.split_at_mut(rows);
+        contrast.peaks_valleys(magnitude, scratch, peaks, valleys);
     });
+    let half = |range| extremes.slice(s![.., range, ..]).as_standard_layout().into_owned();
+    let (mut peaks, mut valleys) = (half(0..rows), half(rows..2 * rows));
     if let (Some(peaks), Some(valleys)) = (peaks.as_slice_mut(), valleys.as_slice_mut()) {
         contrast_from_extremes(peaks, valleys, params.linear)?;
     }

@@ -1,9 +1,8 @@
 //! Spectral flatness (librosa 0.11 `feature.spectral_flatness`).
 
-use ndarray::{Array3, ArrayView3};
+use ndarray::Array3;
 
-use super::require_non_negative;
-use crate::columns::map_columns;
+use super::Spectra;
 use crate::error::{DspError, Result};
 use crate::real::Real;
 use crate::sums;
@@ -68,14 +67,19 @@ impl Flatness {
 ///
 /// # Errors
 /// `amin <= 0`, negative magnitudes, or no bins.
-pub fn spectral_flatness<T: Real>(s: ArrayView3<T>, params: Flatness) -> Result<Array3<T>> {
+pub fn spectral_flatness<'a, T: Real>(
+    s: impl Into<Spectra<'a, T>>,
+    params: Flatness,
+) -> Result<Array3<T>> {
+    let s = s.into();
     params.check()?;
-    require_non_negative(s)?;
-    if s.dim().1 == 0 {
+    s.require_non_negative()?;
+    let (channels, bins, frames) = s.dim();
+    if bins == 0 {
         let expected = "at least one bin".into();
-        return Err(DspError::Shape { name: "S", expected, actual: s.shape().to_vec() });
+        return Err(DspError::Shape { name: "S", expected, actual: vec![channels, bins, frames] });
     }
-    Ok(map_columns(s, 1, |_, _, magnitude, out| out[0] = params.of(magnitude)))
+    Ok(s.map(1, || (), |(), _, _, magnitude, out| out[0] = params.of(magnitude)))
 }
 
 #[cfg(test)]

@@ -12,10 +12,16 @@ mod flatness;
 mod poly;
 mod rolloff;
 
-use ndarray::{ArrayView3, s};
+use ndarray::{Array3, ArrayView2, ArrayView3, Axis, CowArray, Ix2, s};
+use num_complex::Complex;
 
 use crate::error::{DspError, Result};
+use crate::lanes::LANES;
 use crate::real::{Real, require_finite};
+use crate::simd::vectorized;
+use crate::stft::{StftParams, frames_of, magnitude};
+use crate::tiles::{for_each_tile, planar, read_columns};
+use crate::transform::Forward;
 
 pub use bandwidth::{Bandwidth, spectral_bandwidth};
 pub use centroid::{centroid, spectral_centroid};
@@ -59,25 +65,126 @@ impl Frequencies<'_> {
     }
 }
 
-/// Refuses negative magnitudes.
-fn require_non_negative<T: Real>(spectrogram: ArrayView3<T>) -> Result<()> {
-    match spectrogram.iter().find(|s| **s < T::zero()) {
-        None => Ok(()),
-        Some(s) => Err(DspError::parameter("S", s.wide(), "magnitudes, 0 or more")),
+/// The magnitude spectra that a feature is computed from.
+pub enum Spectra<'a, T: Real> {
+    /// A spectrogram `[channels, bins, frames]`.
+    Given(ArrayView3<'a, T>),
+    /// Those of a signal `[channels, samples]`, by a transform in double precision, one at a time.
+    Of(CowArray<'a, T, Ix2>, Forward<f64>),
+}
+
+impl<'a, T: Real> From<ArrayView3<'a, T>> for Spectra<'a, T> {
+    fn from(spectrogram: ArrayView3<'a, T>) -> Self {
+        Self::Given(spectrogram)
     }
 }
 
-/// Refuses negative and non-finite magnitudes, as the features that normalise a spectrum do.
-fn require_magnitudes<T: Real>(spectrogram: ArrayView3<T>) -> Result<()> {
-    require_finite("S", spectrogram)?;
-    require_non_negative(spectrogram)
+impl<'a, T: Real> Spectra<'a, T> {
+    /// The spectra of the signal `y [channels, samples]`.
+    ///
+    /// # Errors
+    /// Impossible parameters, or a signal too short for one frame.
+    pub fn of(y: ArrayView2<'a, T>, params: &StftParams) -> Result<Self> {
+        frames_of(y, params)?;
+        Ok(Self::Of(planar(y), Forward::new(params)?))
+    }
+
+    /// Channels, bins, frames.
+    pub fn dim(&self) -> (usize, usize, usize) {
+        match self {
+            Self::Given(s) => s.dim(),
+            Self::Of(y, forward) => {
+                let p = forward.params();
+                (y.nrows(), p.n_bins(), p.n_frames(y.ncols()))
+            }
+        }
+    }
+
+    /// Refuses negative magnitudes.
+    fn require_non_negative(&self) -> Result<()> {
+        let Self::Given(s) = self else { return Ok(()) };
+        match s.iter().find(|s| **s < T::zero()) {
+            None => Ok(()),
+            Some(s) => Err(DspError::parameter("S", s.wide(), "magnitudes, 0 or more")),
+        }
+    }
+
+    /// Refuses non-finite magnitudes.
+    fn require_finite(&self) -> Result<()> {
+        let Self::Given(s) = self else { return Ok(()) };
+        require_finite("S", *s)
+    }
+
+    /// Refuses negative and non-finite magnitudes, as the features that normalise a spectrum do.
+    fn require_magnitudes(&self) -> Result<()> {
+        self.require_finite()?;
+        self.require_non_negative()
+    }
+
+    /// `[channels, rows, frames]` made by `each(state, channel, frame, magnitudes, out)`, where
+    /// `out` holds the `rows` values of that frame; on all threads of the pool, each with a `state`.
+    fn map<R: Real, S>(
+        &self,
+        rows: usize,
+        state: impl Fn() -> S + Sync,
+        each: impl Fn(&mut S, usize, usize, &[T], &mut [R]) + Sync,
+    ) -> Array3<R> {
+        let (channels, bins, frames) = self.dim();
+        let mut result = Array3::zeros((channels, rows, frames));
+        let buffers = || (vec![T::zero(); LANES * bins], vec![R::zero(); rows]);
+        match self {
+            Self::Given(s) => for_each_tile(
+                result.view_mut(),
+                || (buffers(), state()),
+                |((columns, out), state), mut tile| {
+                    let (c, first) = (tile.channel, tile.first);
+                    let part = s.slice(s![c, .., first..first + tile.out.ncols()]);
+                    for (b, block) in part.axis_chunks_iter(Axis(1), LANES).enumerate() {
+                        read_columns(block, columns);
+                        for (i, spectrum) in columns.chunks_exact(bins.max(1)).enumerate() {
+                            let t = b * LANES + i;
+                            if i == block.ncols() {
+                                break;
+                            }
+                            each(state, c, first + t, spectrum, out);
+                            tile.out.column_mut(t).iter_mut().zip(&*out).for_each(|(o, x)| *o = *x);
+                        }
+                    }
+                },
+            ),
+            Self::Of(y, forward) => for_each_tile(
+                result.view_mut(),
+                || (buffers(), forward.scratch(), state()),
+                |((columns, out), scratch, state), mut tile| {
+                    let signal = y.row(tile.channel);
+                    let signal = signal.to_slice().expect("contiguous");
+                    let spectrum = &mut columns[..bins];
+                    for (i, mut column) in tile.out.axis_iter_mut(Axis(1)).enumerate() {
+                        let t = tile.first + i;
+                        let values = forward.spectrum(signal, t, scratch);
+                        vectorized(
+                            #[inline(always)]
+                            || {
+                                for (slot, z) in spectrum.iter_mut().zip(values) {
+                                    *slot = magnitude(Complex::new(T::of(z.re), T::of(z.im)));
+                                }
+                            },
+                        );
+                        each(state, tile.channel, t, spectrum, out);
+                        column.iter_mut().zip(&*out).for_each(|(o, x)| *o = *x);
+                    }
+                },
+            ),
+        }
+        result
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::frequency::fft_frequencies;
-    use ndarray::{Array3, Axis};
+    use ndarray::Array2;
 
     const BINS: usize = 513;
 
@@ -102,6 +209,25 @@ mod tests {
             ("contrast", spectral_contrast(s, &freqs, 22050.0, &params).unwrap()),
             ("poly", poly_features(s, f, 2).unwrap().0),
         ]
+    }
+
+    #[test]
+    fn spectra_of_a_signal_are_its_spectrogram() {
+        let y = Array2::from_shape_fn((2, 5000), |(c, i)| ((i * i + c) % 101) as f32 / 50.0 - 1.0);
+        let freqs = fft_frequencies(22050.0, 1024).unwrap();
+        let stft = StftParams::new(1024, 300);
+        let s = crate::stft::spectrogram(y.view(), &stft, 1.0).unwrap();
+        let of = || Spectra::of(y.view(), &stft).unwrap();
+        assert_eq!(of().dim(), s.dim());
+        assert_eq!(
+            spectral_centroid(of(), Frequencies::Bins(&freqs)).unwrap(),
+            spectral_centroid(s.view(), Frequencies::Bins(&freqs)).unwrap()
+        );
+        let params = ContrastParams::default();
+        assert_eq!(
+            spectral_contrast(of(), &freqs, 22050.0, &params).unwrap(),
+            spectral_contrast(s.view(), &freqs, 22050.0, &params).unwrap()
+        );
     }
 
     #[test]

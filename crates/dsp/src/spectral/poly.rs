@@ -1,11 +1,13 @@
 //! Polynomials fitted to spectra (librosa 0.11 `feature.poly_features`, numpy `polyfit`).
 
-use ndarray::{Array3, ArrayView3};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 
-use super::Frequencies;
-use crate::columns::map_columns;
+use ndarray::Array3;
+
+use super::{Frequencies, Spectra};
 use crate::error::{DspError, Result};
-use crate::real::{Real, require_finite};
+use crate::real::Real;
 use crate::sums;
 
 const MAX_ORDER: usize = 256;
@@ -125,30 +127,34 @@ fn orthogonalise(columns: &mut [Vec<f64>]) -> Vec<Vec<f64>> {
 ///
 /// # Errors
 /// As [`Poly::new`], non-finite values, or frequencies that do not fit.
-pub fn poly_features<T: Real>(
-    s: ArrayView3<T>,
+pub fn poly_features<'a, T: Real>(
+    s: impl Into<Spectra<'a, T>>,
     freqs: Frequencies,
     order: usize,
 ) -> Result<(Array3<f64>, bool)> {
+    let s = s.into();
     freqs.check(s.dim())?;
-    require_finite("S", s)?;
+    s.require_finite()?;
     if let Frequencies::Bins(freqs) = freqs {
         let poly = Poly::new(freqs, order)?;
-        let fitted = map_columns(s, poly.rows(), |_, _, spectrum, out| poly.fit(spectrum, out));
+        let fit = |(): &mut (), _, _, spectrum: &[T], out: &mut [f64]| poly.fit(spectrum, out);
+        let fitted = s.map(poly.rows(), || (), fit);
         return Ok((fitted, poly.is_deficient()));
     }
-    let (mut buffer, mut deficient, mut refused) = (Vec::new(), false, None);
+    let deficient = AtomicBool::new(false);
+    let refused = Mutex::new(None);
     let rows = order.min(MAX_ORDER) + 1;
-    let fitted = map_columns(s, rows, |c, t, spectrum, out| {
-        match Poly::new(freqs.column(c, t, &mut buffer), order) {
+    let fitted = s.map(rows, Vec::new, |buffer, c, t, spectrum, out| {
+        match Poly::new(freqs.column(c, t, buffer), order) {
             Ok(poly) => {
-                deficient |= poly.is_deficient();
+                deficient.fetch_or(poly.is_deficient(), Ordering::Relaxed);
                 poly.fit(spectrum, out);
             }
-            Err(error) => refused = Some(error),
+            Err(error) => *refused.lock().unwrap_or_else(PoisonError::into_inner) = Some(error),
         }
     });
-    refused.map_or(Ok((fitted, deficient)), Err)
+    let refused = refused.into_inner().unwrap_or_else(PoisonError::into_inner);
+    refused.map_or(Ok((fitted, deficient.into_inner())), Err)
 }
 
 #[cfg(test)]

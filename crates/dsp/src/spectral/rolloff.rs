@@ -2,10 +2,9 @@
 
 use std::cmp::Ordering;
 
-use ndarray::{Array3, ArrayView3};
+use ndarray::Array3;
 
-use super::{Frequencies, require_non_negative};
-use crate::columns::map_columns;
+use super::{Frequencies, Spectra};
 use crate::error::{DspError, Result};
 use crate::real::Real;
 
@@ -29,19 +28,19 @@ pub fn rolloff<T: Real>(magnitude: &[T], freqs: &[f64], roll_percent: f64) -> f6
 ///
 /// # Errors
 /// A fraction outside (0, 1), negative magnitudes, or frequencies that do not fit.
-pub fn spectral_rolloff<T: Real>(
-    s: ArrayView3<T>,
+pub fn spectral_rolloff<'a, T: Real>(
+    s: impl Into<Spectra<'a, T>>,
     freqs: Frequencies,
     roll_percent: f64,
 ) -> Result<Array3<f64>> {
     if !(roll_percent > 0.0 && roll_percent < 1.0) {
         return Err(DspError::parameter("roll_percent", roll_percent, "between 0 and 1"));
     }
+    let s = s.into();
     freqs.check(s.dim())?;
-    require_non_negative(s)?;
-    let mut buffer = Vec::new();
-    Ok(map_columns(s, 1, |c, t, magnitude, out| {
-        out[0] = rolloff(magnitude, freqs.column(c, t, &mut buffer), roll_percent);
+    s.require_non_negative()?;
+    Ok(s.map(1, Vec::new, |buffer, c, t, magnitude, out| {
+        out[0] = rolloff(magnitude, freqs.column(c, t, buffer), roll_percent);
     }))
 }
 

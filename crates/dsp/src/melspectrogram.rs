@@ -1,0 +1,137 @@
+//! Mel spectrograms of whole signals (librosa 0.11 `feature.melspectrogram`).
+
+use ndarray::{Array3, ArrayView2, Axis};
+use num_complex::Complex;
+
+use crate::error::{DspError, Result};
+use crate::lanes::{LANES, Row};
+use crate::mel::SparseBank;
+use crate::real::Real;
+use crate::stft::{StftParams, frames_of, magnitude, single};
+use crate::sums;
+use crate::tiles::{LanePlan, for_each_tile, neighbours, planar, write_columns};
+use crate::transform::Forward;
+
+/// `bank @ |stft(y)|^power` as `[channels, bands, frames]` of `y [channels, samples]`: the
+/// spectrogram itself is never held. Precision as in [`stft`](crate::stft::stft).
+///
+/// # Errors
+/// As [`stft`](crate::stft::stft), or a bank for another transform length.
+pub fn melspectrogram<T: Real>(
+    y: ArrayView2<T>,
+    stft: &StftParams,
+    power: f64,
+    bank: &SparseBank,
+) -> Result<Array3<T>> {
+    if bank.bins() != stft.n_bins() {
+        let expected = format!("{} bins for n_fft = {}", stft.n_bins(), stft.n_fft);
+        let actual = vec![bank.bands().len(), bank.bins()];
+        return Err(DspError::Shape { name: "bank", expected, actual });
+    }
+    let y = planar(y);
+    let bands = bank.bands().len();
+    let mut out = Array3::zeros((y.nrows(), bands, frames_of(y.view(), stft)?));
+    if T::SINGLE {
+        let plan = LanePlan::new(stft)?;
+        let rows = |n| vec![Row::ZERO; n];
+        let state = || (plan.frames(), rows(stft.n_bins()), rows(bands));
+        for_each_tile(out.view_mut(), state, |(frames, spectrum, mel), mut tile| {
+            let y = single(y.view(), tile.channel);
+            for (b, mut block) in tile.out.axis_chunks_iter_mut(Axis(1), LANES).enumerate() {
+                frames.power(y, tile.first + b * LANES, power, spectrum);
+                bank.apply_rows(spectrum, mel);
+                for (row, mel) in block.outer_iter_mut().zip(&*mel) {
+                    let row = neighbours(row).iter_mut();
+                    row.zip(&mel.0).for_each(|(slot, x)| *slot = T::of(f64::from(*x)));
+                }
+            }
+        });
+        return Ok(out);
+    }
+    let forward = Forward::<f64>::new(stft)?;
+    let zeros = |n| vec![T::zero(); n];
+    let state = || (forward.scratch(), zeros(stft.n_bins()), zeros(LANES * bands));
+    for_each_tile(out.view_mut(), state, |(scratch, spectrum, columns), mut tile| {
+        let y = y.row(tile.channel);
+        let y = y.to_slice().expect("contiguous");
+        for (b, block) in tile.out.axis_chunks_iter_mut(Axis(1), LANES).enumerate() {
+            let first = tile.first + b * LANES;
+            for (t, column) in columns.chunks_exact_mut(bands).take(block.ncols()).enumerate() {
+                let bins = forward.spectrum(y, first + t, scratch);
+                for (slot, z) in spectrum.iter_mut().zip(bins) {
+                    *slot = raised(Complex::new(T::of(z.re), T::of(z.im)), power);
+                }
+                for (slot, (first, weights)) in column.iter_mut().zip(bank.bands()) {
+                    let weighted = |w: f32, x: T| T::of(f64::from(w)) * x;
+                    *slot = sums::sum_pairs(weights, &spectrum[*first..], weighted);
+                }
+            }
+            write_columns(columns, block);
+        }
+    });
+    Ok(out)
+}
+
+/// `|z|^power`.
+#[inline(always)]
+fn raised<T: Real>(z: Complex<T>, power: f64) -> T {
+    if power == 2.0 {
+        z.norm_sqr()
+    } else if power == 1.0 {
+        magnitude(z)
+    } else {
+        magnitude(z).powf(T::of(power))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mel::{MelParams, mel_filter};
+    use crate::stft::{PadMode, spectrogram};
+    use ndarray::Array2;
+
+    fn noise(n: usize) -> Array2<f64> {
+        let mut state = 7_u32;
+        Array2::from_shape_simple_fn((2, n), || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 23) - 1.0
+        })
+    }
+
+    #[test]
+    fn both_precisions_are_the_bank_times_the_spectrogram() {
+        for (n, n_fft, hop, center) in [
+            (1, 64, 16, true),
+            (9000, 512, 128, true),
+            (5000, 300, 77, false),
+            (40, 64, 100, true),
+            (9000, 64, 200, true),
+            (9, 64, usize::MAX / 2, true),
+        ] {
+            for power in [1.0, 2.0, 1.5] {
+                let y = noise(n);
+                let pad_mode = PadMode::Reflect;
+                let stft = StftParams { center, pad_mode, ..StftParams::new(n_fft, hop) };
+                let mel = MelParams { n_mels: 12, ..MelParams::new(16000.0, n_fft) };
+                let bank = SparseBank::new(&mel_filter(&mel).unwrap());
+                let want = bank.apply(spectrogram(y.view(), &stft, power).unwrap().view());
+                let double = melspectrogram(y.view(), &stft, power, &bank).unwrap();
+                let single = y.mapv(|x| x as f32);
+                let single = melspectrogram(single.view(), &stft, power, &bank).unwrap();
+                let largest = want.iter().fold(0.0, |m: f64, x| m.max(*x));
+                for ((want, double), single) in want.iter().zip(&double).zip(&single) {
+                    assert!((want - double).abs() < 1e-12 * largest);
+                    assert!((want - f64::from(*single)).abs() < 1e-6 * largest);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_bank_for_another_length_is_refused() {
+        let bank = SparseBank::new(&mel_filter(&MelParams::new(16000.0, 256)).unwrap());
+        let y = noise(1000);
+        assert!(melspectrogram(y.view(), &StftParams::new(512, 128), 2.0, &bank).is_err());
+    }
+}

@@ -1,0 +1,50 @@
+//! Scores of a CORSMAL submission.
+
+use std::path::PathBuf;
+
+use corsmal_ccm::dataset::Annotations;
+use corsmal_ccm::scores::{RuleSet, evaluate as ccm_evaluate};
+use corsmal_ccm::submission::{Submission, pseudo_random};
+use pyo3::prelude::*;
+
+use crate::pool::compute;
+use crate::value_error;
+
+type Scored = (Vec<(&'static str, f64)>, usize, Vec<String>);
+
+/// Scores by name, recordings scored, notes. Tasks that are not addressed are taken from `baseline`,
+/// or from pseudo-random estimates of `seed`, in the filling mass.
+#[pyfunction]
+fn evaluate(
+    py: Python<'_>,
+    submission: PathBuf,
+    annotations: PathBuf,
+    rules: &str,
+    baseline: Option<PathBuf>,
+    seed: u64,
+    containers: Option<Vec<u8>>,
+) -> PyResult<Scored> {
+    let rules = RuleSet::ALL.into_iter().find(|set| set.name() == rules).ok_or_else(|| {
+        let names = RuleSet::ALL.map(RuleSet::name).join(", ");
+        value_error(format!("rules = {rules} is not possible: one of {names}"))
+    })?;
+    let scores = compute(py, || {
+        let submission = Submission::read(&submission)?;
+        let baseline = baseline.map_or_else(
+            || {
+                let estimates = pseudo_random(&submission.keys, seed);
+                let name = format!("pseudo-random estimates, seed {seed}");
+                Ok(Submission::from_predictions(&name, submission.format, &estimates))
+            },
+            |path| Submission::read(&path),
+        )?;
+        let annotations = Annotations::read(&annotations)?;
+        ccm_evaluate(&submission, &annotations, &baseline, rules, containers.as_deref())
+    })?
+    .map_err(value_error)?;
+    Ok((scores.values, scores.rows, scores.notes))
+}
+
+pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_function(wrap_pyfunction!(evaluate, m)?)
+}

@@ -1,0 +1,172 @@
+"""What all classifiers share."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
+from ._validation import Matrix, features, labels_of, names_of
+from .errors import ModelError, ParameterError
+
+
+class Classifier(ClassifierMixin, BaseEstimator):
+    """What all classifiers share. Parameters are those of the subclass's `__init__`."""
+
+    _name: str
+    #: keyword of the subclass -> parameter of the Rust side, where they differ
+    _renamed: ClassVar[dict[str, str]] = {}
+    _model: _core.TrainedModel
+    classes_: npt.NDArray[Any]
+    n_features_in_: int
+    feature_names_in_: npt.NDArray[np.object_]
+
+    def __sklearn_is_fitted__(self) -> bool:
+        return hasattr(self, "_model")
+
+    def _parameters(self, classes: npt.NDArray[Any] | None) -> dict[str, Any]:
+        """The parameters as the Rust side names them; `None` means its default."""
+        result = {}
+        for name, value in self.get_params().items():
+            if name == "class_weight" and isinstance(value, dict):
+                value = [value.get(c, 1.0) for c in ([] if classes is None else classes.tolist())]
+            elif name == "random_state":
+                value = _seed(value)
+            elif isinstance(value, np.generic):
+                value = value.item()
+            if value is not None:
+                result[self._renamed.get(name, name)] = value
+        return result
+
+    def fit(self, X: Any, y: Any) -> Self:
+        """Learns from `X` [shape=(rows, features)] and `y`, a label for each row."""
+        owner = type(self).__name__
+        names = names_of(X)
+        x = features(X, owner)
+        classes, positions = labels_of(y, len(x), owner)
+        try:
+            spec = _core.classifier_parameters(self._name, json.dumps(self._parameters(classes)))
+        except TypeError as error:
+            raise ParameterError(
+                f"{owner}: a parameter is of an impossible type: {error}"
+            ) from error
+        pipeline = {"classifier": {"name": self._name, "parameters": json.loads(spec)}}
+        counts = np.bincount(positions).tolist()
+        if len(classes) < 2 and self._name in ("svm", "logistic"):
+            raise ParameterError(
+                f"{owner} needs at least 2 classes in y: there is only one class, {classes[0]!r}"
+            )
+        provenance = {"rows": len(x), "rows_per_class": counts, "label_kind": classes.dtype.kind}
+        try:
+            self._model = _core.TrainedModel.fit(
+                json.dumps(pipeline),
+                x,
+                positions.tolist(),
+                [str(c) for c in classes.tolist()],
+                "y",
+                [] if names is None else names.tolist(),
+                json.dumps(provenance),
+            )
+        except ParameterError as error:
+            size = f"n_samples = {x.shape[0]}, n_features = {x.shape[1]}"
+            raise ParameterError(f"{owner}: {error} ({size})") from error
+        self.classes_ = classes
+        self.n_features_in_ = x.shape[1]
+        if names is not None:
+            self.feature_names_in_ = names
+        elif hasattr(self, "feature_names_in_"):
+            del self.feature_names_in_
+        return self
+
+    def _query(self, X: Any) -> Matrix:
+        if not hasattr(self, "_model"):
+            raise not_fitted(self)
+        names = names_of(X)
+        known = getattr(self, "feature_names_in_", None)
+        if names is not None and known is not None and names.tolist() != known.tolist():
+            raise ParameterError(
+                "The feature names should match those that were passed during fit: "
+                f"{list(names)} where {list(known)} are known"
+            )
+        x = features(X, type(self).__name__)
+        if x.shape[1] != self.n_features_in_:
+            raise ParameterError(
+                f"X has {x.shape[1]} features, but {type(self).__name__} is expecting "
+                f"{self.n_features_in_} features as input"
+            )
+        return x
+
+    def predict(self, X: Any) -> npt.NDArray[Any]:
+        """The label of each row of `X` [shape=(rows, features)]."""
+        x = self._query(X)
+        return self.classes_[self._model.predict(x)]
+
+    def predict_proba(self, X: Any) -> Matrix:
+        """Probabilities [shape=(rows, classes)], columns in the order of `classes_`."""
+        x = self._query(X)
+        return self._model.predict_proba(x)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the model file, whole or not at all."""
+        if not hasattr(self, "_model"):
+            raise not_fitted(self)
+        self._model.save(os.fspath(path))
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Reads a model file of this very classifier (see `load_model` for any)."""
+        model = _core.TrainedModel.load(os.fspath(path))
+        header = json.loads(model.header())
+        pipeline = header["pipeline"]
+        spec = pipeline["classifier"]
+        if spec["name"] != cls._name or pipeline["steps"]:
+            steps = "+".join([s["name"] for s in pipeline["steps"]] + [spec["name"]])
+            raise ModelError(f"{path} holds {steps}, not {cls._name}: use load_model")
+        back = {new: old for old, new in cls._renamed.items()}
+        params = {back.get(k, k): v for k, v in spec["parameters"].items()}
+        estimator = cls(**{k: v for k, v in params.items() if k in cls._get_param_names()})
+        estimator._model = model
+        estimator.classes_ = class_labels(header)
+        estimator.n_features_in_ = model.n_features()
+        if header["feature_names"]:
+            estimator.feature_names_in_ = np.asarray(header["feature_names"], dtype=object)
+        return estimator
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = dict(self.__dict__)
+        if "_model" in state:
+            state["_model"] = state["_model"].to_bytes()
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        if isinstance(state.get("_model"), bytes):
+            self._model = _core.TrainedModel.from_bytes(state["_model"])
+
+
+def _seed(value: Any) -> int:
+    """A seed for the Rust side from scikit-learn's `random_state`."""
+    if value is None:
+        return 0
+    if isinstance(value, np.random.RandomState):
+        return int(value.randint(2**31 - 1))
+    return int(value)
+
+
+def class_labels(header: dict[str, Any]) -> npt.NDArray[Any]:
+    """Label names in the type they had in training."""
+    names = np.asarray(header["labels"], dtype=object)
+    provenance = header["provenance"]
+    kind = provenance.get("label_kind", "") if isinstance(provenance, dict) else ""
+    if kind == "b":
+        return np.asarray(names == "True")
+    if kind in ("i", "u"):
+        return names.astype(np.int64)
+    if kind == "f":
+        return names.astype(np.float64)
+    return names.astype(str)

@@ -1,0 +1,78 @@
+"""Scores of CORSMAL submissions."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from . import _core
+
+__all__ = ["Scores", "evaluate"]
+
+StrPath = str | os.PathLike[str]
+
+
+@dataclass(frozen=True)
+class Scores:
+    """What a submission scores under a rule set.
+
+    Attributes
+    ----------
+    values : by name the scores in percent (`s1` to `s10`, `overall`, `JFLT`, `CMD` of the toolkit;
+        `T1`, `T2`, `T3`, `mass` of the paper)
+    rules : name of the rule set
+    recordings : recordings that were scored
+    notes : what a reader of the scores should know
+    """
+
+    values: dict[str, float]
+    rules: str
+    recordings: int
+    notes: list[str]
+
+    def __getitem__(self, name: str) -> float:
+        return self.values[name]
+
+
+def evaluate(
+    submission: StrPath,
+    annotations: StrPath,
+    *,
+    rules: str = "toolkit",
+    baseline: StrPath | None = None,
+    seed: int = 1,
+    containers: Iterable[int] | None = None,
+) -> Scores:
+    """Scores of a CORSMAL submission, as the command `corsmal-feat evaluate` computes them.
+
+    Parameters
+    ----------
+    submission : path
+        CSV in the official format of 2020 or 2022.
+    annotations : path
+        Official annotation file.
+    rules : {"paper", "toolkit-2020-10", "toolkit-2021-11", "toolkit"}
+        Rule set; docs/benchmark.md describes each with its quirks.
+    baseline : path, optional
+        Submission that stands in for tasks that are not addressed, in the filling mass only; by
+        default pseudo-random estimates of `seed`.
+    containers : iterable of int, optional
+        Score only the recordings of these containers.
+
+    Raises
+    ------
+    ParameterError
+        A file cannot be read, or its rows do not fit the annotations.
+
+    Examples
+    --------
+    >>> corsmal_feat.evaluate("team.csv", "ccm_train_annotation.csv")["JFLT"]  # doctest: +SKIP
+    63.2
+    """
+    chosen = None if containers is None else [int(container) for container in containers]
+    reference = None if baseline is None else os.fspath(baseline)
+    values, recordings, notes = _core.evaluate(
+        os.fspath(submission), os.fspath(annotations), rules, reference, int(seed), chosen
+    )
+    return Scores(dict(values), rules, recordings, notes)

@@ -1,0 +1,90 @@
+"""Checks of features and labels, with the words that scikit-learn's own checks look for."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ._sklearn import DataConversionWarning
+from .errors import ParameterError
+
+Matrix = npt.NDArray[np.float64]
+
+
+def names_of(X: Any) -> npt.NDArray[np.object_] | None:
+    """Column names of a data frame, if they are all text."""
+    columns = getattr(X, "columns", None)
+    if columns is None:
+        return None
+    names = np.asarray(list(columns), dtype=object)
+    return names if len(names) and all(isinstance(n, str) for n in names) else None
+
+
+def features(X: Any, owner: str) -> Matrix:
+    """`X` [shape=(rows, features)] as finite, contiguous float64."""
+    if hasattr(X, "toarray") and hasattr(X, "tocsr"):
+        raise TypeError(
+            f"{owner}: sparse data was passed, but dense data is required; use .toarray()"
+        )
+    array = np.asarray(X)
+    if array.dtype.kind == "c":
+        raise ParameterError(f"Complex data not supported by {owner}")
+    if array.ndim != 2:
+        raise ParameterError(
+            f"Expected 2D array, got {array.ndim}D array of shape {array.shape} instead. Reshape "
+            "your data with .reshape(-1, 1) for one feature or .reshape(1, -1) for one row."
+        )
+    if array.dtype.kind in "OSU":
+        try:
+            array = array.astype(np.float64)
+        except (TypeError, ValueError) as error:
+            if "argument must be" in str(error):
+                raise TypeError(f"{owner}: features must be numbers: {error}") from error
+            raise ParameterError(f"{owner}: features must be numbers: {error}") from error
+    array = np.ascontiguousarray(array, dtype=np.float64)
+    for count, what in zip(array.shape, ("sample", "feature"), strict=True):
+        if count == 0:
+            raise ParameterError(
+                f"Found array with 0 {what}(s) (shape={array.shape}) while a minimum of 1 is "
+                f"required by {owner}."
+            )
+    if not _core.all_finite(array):
+        found = "NaN" if np.isnan(array).any() else "infinity"
+        raise ParameterError(f"Input X contains {found}: {owner} accepts finite features only.")
+    return array
+
+
+def labels_of(y: Any, rows: int, owner: str) -> tuple[npt.NDArray[Any], npt.NDArray[np.int64]]:
+    """Sorted different labels, and the position of each row's label among them."""
+    if y is None:
+        raise ParameterError(f"{owner} requires y to be passed, but the target y is None")
+    labels = np.asarray(y)
+    if labels.ndim == 2 and labels.shape[1] == 1:
+        _warn_column(labels)
+        labels = labels.ravel()
+    if labels.ndim != 1:
+        raise ParameterError(
+            f"y should be a 1d array, got an array of shape {labels.shape} instead."
+        )
+    if len(labels) != rows:
+        raise ParameterError(f"X has {rows} rows and y has {len(labels)} labels")
+    if labels.dtype.kind == "f":
+        if not np.isfinite(labels).all():
+            raise ParameterError("Input y contains NaN or infinity.")
+        if (labels != np.floor(labels)).any():
+            raise ParameterError(
+                "Unknown label type: continuous. Classes are needed, not measured values."
+            )
+    classes, positions = np.unique(labels, return_inverse=True)
+    return classes, positions
+
+
+def _warn_column(labels: npt.NDArray[Any]) -> None:
+    warnings.warn(
+        f"A column-vector y was passed when a 1d array was expected: its shape is {labels.shape}.",
+        DataConversionWarning,
+        stacklevel=5,
+    )

@@ -1,0 +1,41 @@
+"""Exceptions: each is a `CorsmalFeatError`, and the built-in error of its kind as well."""
+
+from __future__ import annotations
+
+__all__ = [
+    "ConfigError",
+    "CorsmalFeatError",
+    "DecodeError",
+    "ModelError",
+    "NotFittedError",
+    "ParameterError",
+    "RunError",
+]
+
+
+class CorsmalFeatError(Exception):
+    """Any refusal of this package."""
+
+
+class ParameterError(CorsmalFeatError, ValueError):
+    """A parameter or array was refused."""
+
+
+class ConfigError(ParameterError):
+    """A configuration of `extract` is not possible."""
+
+
+class ModelError(ParameterError):
+    """A model file cannot be read or written, or holds another model."""
+
+
+class NotFittedError(ParameterError, AttributeError):
+    """An estimator was used before `fit`."""
+
+
+class RunError(CorsmalFeatError, RuntimeError):
+    """A run could not start or go on."""
+
+
+class DecodeError(RunError):
+    """A recording has no features where each needs them."""

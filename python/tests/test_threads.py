@@ -1,0 +1,78 @@
+"""Threads, forks and what a number of threads must not change."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import sys
+import threading
+import time
+
+import corsmal_feat
+import numpy as np
+import pytest
+
+Y = np.random.default_rng(0).normal(size=(3, 30000)).astype(np.float32)
+
+
+def features(y: np.ndarray) -> list[np.ndarray]:
+    f = corsmal_feat.feature
+    return [
+        corsmal_feat.stft(y),
+        f.mfcc(y=y),
+        f.spectral_contrast(y=y),
+        f.zero_crossing_rate(y),
+        f.rms(y=y),
+        corsmal_feat.KNN(1).fit(y[:, :50], ["a", "b", "c"]).predict_proba(y[:, :50]),
+    ]
+
+
+@pytest.mark.parametrize("jobs", ["1", "2", "7"])
+def test_the_number_of_threads_changes_nothing(monkeypatch: pytest.MonkeyPatch, jobs: str) -> None:
+    want = features(Y)
+    monkeypatch.setenv("CORSMAL_FEAT_JOBS", jobs)
+    for got, expected in zip(features(Y), want, strict=True):
+        np.testing.assert_array_equal(got, expected)
+
+
+@pytest.mark.parametrize("jobs", ["0", "-1", "many", ""])
+def test_an_impossible_number_of_threads_is_refused(
+    monkeypatch: pytest.MonkeyPatch, jobs: str
+) -> None:
+    monkeypatch.setenv("CORSMAL_FEAT_JOBS", jobs)
+    with pytest.raises(corsmal_feat.ParameterError, match="CORSMAL_FEAT_JOBS"):
+        corsmal_feat.stft(Y)
+
+
+def checksum(_: int) -> float:
+    return float(sum(np.abs(values).sum(dtype=np.float64) for values in features(Y)))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_fork_of_a_used_package_goes_on() -> None:
+    want = checksum(0)
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        assert pool.map_async(checksum, range(4)).get(timeout=60) == [want] * 4
+    assert checksum(0) == want
+
+
+def test_other_threads_run_meanwhile() -> None:
+    y = np.random.default_rng(1).normal(size=(8, 400_000))
+    ticks = []
+    stop = threading.Event()
+
+    def tick() -> None:
+        while not stop.is_set():
+            ticks.append(time.perf_counter())
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    start = time.perf_counter()
+    corsmal_feat.stft(y, hop_length=64, n_fft=4096)
+    end = time.perf_counter()
+    stop.set()
+    thread.join()
+    # With the lock held all the time there would be none but at the edges.
+    assert sum(start + 0.01 < t < end - 0.01 for t in ticks) > 3, (end - start, sys.version)
