@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from . import _core
 from ._sklearn import DataConversionWarning
 from .errors import ParameterError
 
