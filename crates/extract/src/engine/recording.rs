@@ -6,7 +6,6 @@ use std::sync::Arc;
 
 use corsmal_dsp::delta::{DeltaMode, DeltaParams, delta};
 use ndarray::ArrayView2;
-use rayon::prelude::*;
 
 use super::extractor::Span;
 use super::plan::{Plan, PlannedFeature};
@@ -180,7 +179,7 @@ impl Recording {
     /// Finished and kept coefficients of a feature.
     fn finished(
         &self,
-        mut store: Store,
+        store: Store,
         planned: &PlannedFeature,
         peaks: &[f32],
     ) -> Result<Store, FinishError> {
@@ -192,33 +191,28 @@ impl Recording {
         if planned.feature.finish.is_none() && end - first == all {
             return Ok(store);
         }
-        let finish_chunk = |raw: &Vec<f32>| {
-            let frames = raw.len() / (rows * channels);
-            let mut out = vec![0.0; frames * (end - first) * values_per];
-            let mut frame_out = vec![0.0; all * values_per];
-            let width = (end - first) * values_per;
-            for (raw, out) in raw.chunks_exact(rows * channels).zip(out.chunks_exact_mut(width)) {
+        // In the memory of the stored values, which are never fewer than the finished ones.
+        let (stored, kept) = (rows * channels, (end - first) * values_per);
+        let finish_chunk = |mut values: Vec<f32>| {
+            let frames = values.len() / stored;
+            let mut raw = vec![0.0; stored];
+            let mut finished = vec![0.0; all * values_per];
+            for t in 0..frames {
+                raw.copy_from_slice(&values[t * stored..(t + 1) * stored]);
+                let out = &mut values[t * kept..(t + 1) * kept];
                 match &planned.feature.finish {
-                    Some(finish) if end - first == all => finish.frame(raw, peaks, channels, out),
+                    Some(finish) if end - first == all => finish.frame(&raw, peaks, channels, out),
                     Some(finish) => {
-                        finish.frame(raw, peaks, channels, &mut frame_out);
-                        out.copy_from_slice(&frame_out[first * values_per..end * values_per]);
+                        finish.frame(&raw, peaks, channels, &mut finished);
+                        out.copy_from_slice(&finished[first * values_per..end * values_per]);
                     }
                     None => out.copy_from_slice(&raw[first * values_per..end * values_per]),
                 }
             }
-            out
+            values.truncate(frames * kept);
+            values
         };
-        let mut out = Store::new(&self.folder);
-        store.batches(rayon::current_num_threads(), |chunks| {
-            let finished: Vec<Vec<f32>> = if chunks.len() > 1 {
-                chunks.par_iter().map(finish_chunk).collect()
-            } else {
-                chunks.iter().map(finish_chunk).collect()
-            };
-            finished.into_iter().try_for_each(|chunk| out.push(chunk))
-        })?;
-        Ok(out)
+        Ok(store.map(finish_chunk)?)
     }
 
     /// Local derivatives of another feature's frames.

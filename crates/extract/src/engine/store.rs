@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use rayon::prelude::*;
+
 /// Bytes of one series kept in memory before it moves to a file.
 const IN_MEMORY: usize = 24 << 20;
 
@@ -85,6 +87,28 @@ impl Store {
             each(&chunks)?;
         }
         Ok(())
+    }
+
+    /// Puts `f` of every chunk in its place, several at a time by the threads of the pool.
+    ///
+    /// # Errors
+    /// A temporary file fails.
+    pub fn map(mut self, f: impl Fn(Vec<f32>) -> Vec<f32> + Sync) -> io::Result<Self> {
+        let mut out = Self::new(&self.folder);
+        if self.spilled.is_none() {
+            if let [only] = self.chunks.as_mut_slice() {
+                out.push(f(std::mem::take(only)))?;
+                return Ok(out);
+            }
+            let mapped: Vec<_> = self.chunks.into_par_iter().map(&f).collect();
+            mapped.into_iter().try_for_each(|chunk| out.push(chunk))?;
+            return Ok(out);
+        }
+        self.batches(rayon::current_num_threads(), |chunks| {
+            let mapped: Vec<_> = chunks.par_iter().map(|chunk| f(chunk.clone())).collect();
+            mapped.into_iter().try_for_each(|chunk| out.push(chunk))
+        })?;
+        Ok(out)
     }
 
     /// All values, where they are one chunk in memory.

@@ -4,6 +4,7 @@
 //! The writer is our own because resuming an interrupted run means continuing a zip archive behind
 //! its last sound entry, before any central directory exists; no zip library offers that.
 
+mod early;
 mod headers;
 mod packed;
 pub mod reader;

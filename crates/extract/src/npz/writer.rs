@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::NpzError;
+use super::early::EarlySync;
 use super::headers::{self, Zip64};
 use super::packed::Packed;
 use super::sink::Sink;
@@ -60,6 +61,7 @@ pub struct NpzWriter {
     entries: Vec<EntryRecord>,
     end: u64,
     zip64: Zip64,
+    early: EarlySync,
 }
 
 impl NpzWriter {
@@ -108,7 +110,15 @@ impl NpzWriter {
 
     fn over(file: File, path: &Path, compression: Compression, entries: Vec<EntryRecord>) -> Self {
         let end = entries.last().map_or(0, |entry| entry.end);
-        Self { file, path: path.into(), compression, entries, end, zip64: Zip64::default() }
+        Self {
+            file,
+            path: path.into(),
+            compression,
+            entries,
+            end,
+            zip64: Zip64::default(),
+            early: EarlySync::default(),
+        }
     }
 
     /// Lowers the sizes from which zip64 is used, so that small archives exercise it.
@@ -287,7 +297,8 @@ impl NpzWriter {
     pub fn finish(mut self) -> Result<(), NpzError> {
         let directory = headers::central_directory(&self.entries, self.end, self.zip64);
         self.write_at_end(&[&directory])?;
-        self.file.sync_all().map_err(|e| NpzError::io(&self.path, e))
+        let settled = self.early.settle();
+        settled.and(self.file.sync_all()).map_err(|e| NpzError::io(&self.path, e))
     }
 
     /// A record of the coming entry with the sizes that are known, the CRC still zero.
@@ -342,6 +353,7 @@ impl NpzWriter {
 
     fn push(&mut self, entry: EntryRecord) -> EntryRecord {
         self.end = entry.end;
+        self.early.written(&self.file, entry.end - entry.offset);
         self.entries.push(entry.clone());
         entry
     }
