@@ -1,6 +1,7 @@
 //! What every classifier and step asks of a feature table and its labels.
 
-use ndarray::ArrayView2;
+use ndarray::{ArrayView2, Axis};
+use rayon::prelude::*;
 
 use crate::error::{ModelError, Result};
 
@@ -10,7 +11,7 @@ pub(crate) fn check_features(x: ArrayView2<'_, f64>) -> Result<()> {
         return Err(ModelError::Empty { rows: x.nrows(), features: x.ncols() });
     }
     // The sum is finite unless something is not (or the sum itself overflows): a quick first look.
-    if x.sum().is_finite() {
+    if x.axis_iter(Axis(0)).into_par_iter().map(|row| row.sum()).sum::<f64>().is_finite() {
         return Ok(());
     }
     match x.indexed_iter().find(|(_, v)| !v.is_finite()) {

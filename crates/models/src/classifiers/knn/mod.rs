@@ -88,11 +88,14 @@ impl Train for KNearestParams {
                 allowed: format!("there are {} training rows", x.nrows()),
             });
         }
-        let x = match self.metric {
-            Metric::Cosine => unit_rows(x),
+        let (x, norms) = match self.metric {
+            Metric::Cosine => {
+                let x = unit_rows(x);
+                let norms = squared_lengths(x.view());
+                (x, norms)
+            }
             _ => copied(x),
         };
-        let norms = squared_lengths(x.view());
         Ok(KNearest {
             k: self.k,
             weights: self.weights,
@@ -269,14 +272,19 @@ fn squared_lengths(x: ArrayView2<'_, f64>) -> Vec<f64> {
     x.axis_iter(Axis(0)).into_par_iter().map(|row| row.dot(&row)).collect()
 }
 
-/// A copy made by all threads.
-fn copied(x: ArrayView2<'_, f64>) -> Array2<f64> {
+/// A copy made by all threads, and its squared row lengths.
+fn copied(x: ArrayView2<'_, f64>) -> (Array2<f64>, Vec<f64>) {
     let mut copy = Array2::zeros(x.raw_dim());
-    copy.axis_iter_mut(Axis(0))
+    let norms = copy
+        .axis_iter_mut(Axis(0))
         .into_par_iter()
         .zip(x.axis_iter(Axis(0)))
-        .for_each(|(mut to, from)| to.assign(&from));
-    copy
+        .map(|(mut to, from)| {
+            to.assign(&from);
+            to.dot(&to)
+        })
+        .collect();
+    (copy, norms)
 }
 
 fn unit_rows(x: ArrayView2<'_, f64>) -> Array2<f64> {
