@@ -69,39 +69,35 @@ impl Cepstrum {
         Self { db, n_mels, matrix, columns }
     }
 
-    /// Eight channels side by side, four coefficients at a time so that sums do not wait for each
+    /// Eight channels side by side, two coefficients at a time so that sums need not wait for each
     /// other.
     #[inline(always)]
     fn of_eight(&self, log_mel: &[f32], out: &mut [f32]) {
         let log_mel = log_mel.as_chunks::<8>().0;
-        let rows = self.matrix.chunks(4 * self.n_mels);
-        for (rows, out) in rows.zip(out.as_chunks_mut::<8>().0.chunks_mut(4)) {
-            let mut sums = [[0.0_f32; 8]; 4];
-            if let Some(four) = self.four(rows) {
-                for (m, x) in log_mel.iter().enumerate() {
-                    for (sums, weights) in sums.iter_mut().zip(four) {
-                        for (sum, x) in sums.iter_mut().zip(x) {
-                            *sum += weights[m] * x;
-                        }
+        let rows = self.matrix.chunks(2 * self.n_mels);
+        for (rows, out) in rows.zip(out.as_chunks_mut::<8>().0.chunks_mut(2)) {
+            let (first, second) = rows.split_at(self.n_mels);
+            if let [a, b] = out {
+                let (mut sum, mut other) = ([0.0; 8], [0.0; 8]);
+                for ((v, w), x) in first.iter().zip(second).zip(log_mel) {
+                    for c in 0..8 {
+                        sum[c] += v * x[c];
+                    }
+                    for c in 0..8 {
+                        other[c] += w * x[c];
                     }
                 }
-            } else {
-                for (sums, weights) in sums.iter_mut().zip(rows.chunks_exact(self.n_mels)) {
-                    for (w, x) in weights.iter().zip(log_mel) {
-                        for (sum, x) in sums.iter_mut().zip(x) {
-                            *sum += w * x;
-                        }
+                (*a, *b) = (sum, other);
+            } else if let [last] = out {
+                let mut sum = [0.0; 8];
+                for (w, x) in first.iter().zip(log_mel) {
+                    for c in 0..8 {
+                        sum[c] += w * x[c];
                     }
                 }
+                *last = sum;
             }
-            out.copy_from_slice(&sums[..out.len()]);
         }
-    }
-
-    #[inline(always)]
-    fn four<'a>(&self, rows: &'a [f32]) -> Option<[&'a [f32]; 4]> {
-        let n = self.n_mels;
-        (rows.len() == 4 * n).then(|| std::array::from_fn(|k| &rows[k * n..][..n]))
     }
 
     /// Any number of channels, one after the other.
