@@ -98,18 +98,23 @@ impl Finish for DecibelFinish {
     }
 
     fn frame(&self, raw: &[f32], peaks: &[f32], channels: usize, out: &mut [f32]) {
-        clamp(&self.db, raw, peaks, channels, out);
+        corsmal_dsp::simd::vectorized(
+            #[inline(always)]
+            || clamp(&self.db, raw, peaks, channels, out),
+        );
     }
 }
 
 /// `max(x, peak - top_db)`, less the peak where that is the reference.
+#[inline(always)]
 pub fn clamp(db: &DbSpec, raw: &[f32], peaks: &[f32], channels: usize, out: &mut [f32]) {
     if let Ok(peaks) = <&[f32; 8]>::try_from(peaks) {
         let levels = peaks.map(|p| db.level(p));
         let (raw, out) = (raw.as_chunks::<8>().0, out.as_chunks_mut::<8>().0);
         for (raw, out) in raw.iter().zip(out) {
             for c in 0..8 {
-                out[c] = raw[c].max(levels[c].1) - levels[c].0;
+                let floored = if raw[c] > levels[c].1 { raw[c] } else { levels[c].1 };
+                out[c] = floored - levels[c].0;
             }
         }
         return;

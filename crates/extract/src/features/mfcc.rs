@@ -44,12 +44,80 @@ impl Default for Mfcc {
     }
 }
 
+/// Coefficients of a single channel that are summed together.
+const TOGETHER: usize = 16;
+
 /// Clamp, then cosine transform.
 struct Cepstrum {
     db: DbSpec,
     n_mels: usize,
     /// `[n_mfcc][n_mels]`
     matrix: Vec<f32>,
+    /// The same as `[n_mfcc / 16][n_mels][16]`, filled up with zeros.
+    columns: Vec<[f32; TOGETHER]>,
+}
+
+impl Cepstrum {
+    fn new(db: DbSpec, n_mels: usize, matrix: Vec<f32>) -> Self {
+        let columns = matrix
+            .chunks(TOGETHER * n_mels)
+            .flat_map(|rows| {
+                let weight = move |k: usize, m: usize| rows.get(k * n_mels + m).copied();
+                (0..n_mels).map(move |m| std::array::from_fn(|k| weight(k, m).unwrap_or_default()))
+            })
+            .collect();
+        Self { db, n_mels, matrix, columns }
+    }
+
+    /// Eight channels side by side, two coefficients at a time so that sums need not wait for each
+    /// other.
+    #[inline(always)]
+    fn of_eight(&self, log_mel: &[f32], out: &mut [f32]) {
+        let log_mel = log_mel.as_chunks::<8>().0;
+        let rows = self.matrix.chunks(2 * self.n_mels);
+        for (rows, out) in rows.zip(out.as_chunks_mut::<8>().0.chunks_mut(2)) {
+            let (first, second) = rows.split_at(self.n_mels);
+            if let [a, b] = out {
+                let (mut sum, mut other) = ([0.0; 8], [0.0; 8]);
+                for ((v, w), x) in first.iter().zip(second).zip(log_mel) {
+                    for c in 0..8 {
+                        sum[c] += v * x[c];
+                    }
+                    for c in 0..8 {
+                        other[c] += w * x[c];
+                    }
+                }
+                (*a, *b) = (sum, other);
+            } else if let [last] = out {
+                let mut sum = [0.0; 8];
+                for (w, x) in first.iter().zip(log_mel) {
+                    for c in 0..8 {
+                        sum[c] += w * x[c];
+                    }
+                }
+                *last = sum;
+            }
+        }
+    }
+
+    /// Any number of channels, one after the other.
+    #[inline(always)]
+    fn of_each(&self, channels: usize, log_mel: &[f32], out: &mut [f32]) {
+        for c in 0..channels {
+            let columns = self.columns.chunks_exact(self.n_mels);
+            for (columns, out) in columns.zip(out.chunks_mut(TOGETHER * channels)) {
+                let mut sums = [0.0_f32; TOGETHER];
+                for (weights, x) in columns.iter().zip(log_mel[c..].iter().step_by(channels)) {
+                    for (sum, w) in sums.iter_mut().zip(weights) {
+                        *sum += w * x;
+                    }
+                }
+                for (out, sum) in out[c..].iter_mut().step_by(channels).zip(sums) {
+                    *out = sum;
+                }
+            }
+        }
+    }
 }
 
 impl Finish for Cepstrum {
@@ -58,7 +126,7 @@ impl Finish for Cepstrum {
     }
 
     fn frame(&self, raw: &[f32], peaks: &[f32], channels: usize, out: &mut [f32]) {
-        let mut clamped = [0.0_f32; 4096];
+        let mut clamped = [0.0_f32; 1024];
         let mut heap = Vec::new();
         let log_mel = match clamped.get_mut(..raw.len()) {
             Some(stack) => stack,
@@ -67,46 +135,16 @@ impl Finish for Cepstrum {
                 heap.as_mut_slice()
             }
         };
-        clamp(&self.db, raw, peaks, channels, log_mel);
         corsmal_dsp::simd::vectorized(
             #[inline(always)]
-            || match channels {
-                8 => transform::<8>(&self.matrix, self.n_mels, log_mel, out),
-                _ => transform_any(&self.matrix, self.n_mels, channels, log_mel, out),
+            || {
+                clamp(&self.db, raw, peaks, channels, log_mel);
+                match channels {
+                    8 => self.of_eight(log_mel, out),
+                    _ => self.of_each(channels, log_mel, out),
+                }
             },
         );
-    }
-}
-
-/// `matrix @ log_mel` with `CHANNELS` values side by side.
-#[inline(always)]
-fn transform<const CHANNELS: usize>(
-    matrix: &[f32],
-    n_mels: usize,
-    log_mel: &[f32],
-    out: &mut [f32],
-) {
-    let log_mel = log_mel.as_chunks::<CHANNELS>().0;
-    for (weights, out) in matrix.chunks_exact(n_mels).zip(out.as_chunks_mut::<CHANNELS>().0) {
-        let mut sum = [0.0_f32; CHANNELS];
-        for (w, x) in weights.iter().zip(log_mel) {
-            for (sum, x) in sum.iter_mut().zip(x) {
-                *sum += w * x;
-            }
-        }
-        *out = sum;
-    }
-}
-
-#[inline(always)]
-fn transform_any(matrix: &[f32], n_mels: usize, channels: usize, log_mel: &[f32], out: &mut [f32]) {
-    for (weights, out) in matrix.chunks_exact(n_mels).zip(out.chunks_exact_mut(channels)) {
-        out.fill(0.0);
-        for (w, x) in weights.iter().zip(log_mel.chunks_exact(channels)) {
-            for (sum, x) in out.iter_mut().zip(x) {
-                *sum += w * x;
-            }
-        }
     }
 }
 
@@ -127,11 +165,8 @@ impl FeatureKind for Mfcc {
         let kernel = MelKernel::new(&mel, Scale::PowerToDb, self.db.decibel()?)?;
         let matrix = mfcc_matrix(self.mel.n_mels, &params)?;
         let labels = (0..matrix.nrows()).map(|i| i.to_string()).collect();
-        let finish = Cepstrum {
-            db: self.db,
-            n_mels: self.mel.n_mels,
-            matrix: matrix.iter().map(|w| *w as f32).collect(),
-        };
+        let weights = matrix.iter().map(|w| *w as f32).collect();
+        let finish = Cepstrum::new(self.db, self.mel.n_mels, weights);
         Ok(Feature {
             kernel: Kernel::Spectrum(stft, quantity_of(self.power)?, Box::new(kernel)),
             raw_rows: self.mel.n_mels,
