@@ -60,9 +60,17 @@ impl M5A34f136 {
     /// # Errors
     /// A rate that pyAudioAnalysis cannot take, see [`PaaPlan::new`].
     pub fn new(sr: f64) -> Result<Self> {
+        Self::with_peak(sr, Peak::Raw)
+    }
+
+    /// The same by another version of pyAudioAnalysis.
+    ///
+    /// # Errors
+    /// As [`M5A34f136::new`].
+    pub fn with_peak(sr: f64, peak: Peak) -> Result<Self> {
         let samples = |seconds: f64| (seconds * sr).round_ties_even().max(0.0) as usize;
         let (frame, second) = (samples(0.05), samples(1.0));
-        let plan = PaaPlan::new(sr, frame, frame)?.with_peak(Peak::Raw);
+        let plan = PaaPlan::new(sr, frame, frame)?.with_peak(peak);
         Ok(Self { plan, mid: MidTerm::from_samples(second, second, frame, frame)? })
     }
 

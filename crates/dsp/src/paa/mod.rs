@@ -13,6 +13,7 @@ use std::sync::Arc;
 use ndarray::{Array2, ArrayView1};
 use num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
+use serde::{Deserialize, Serialize};
 
 use crate::error::{DspError, Result};
 use crate::frequency::require_rate;
@@ -50,7 +51,8 @@ pub fn short_names() -> Vec<String> {
 }
 
 /// The largest magnitude that a recording is divided by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Peak {
     /// Of the centred recording (version 0.3.14).
     #[default]

@@ -15,7 +15,7 @@ use corsmal_dsp::librosa::LibrosaVersion;
 use corsmal_dsp::mel::{MelParams, SparseBank, mel_filter};
 use corsmal_dsp::normalize::Norm;
 use corsmal_dsp::onset::{OnsetParams, onset_strength};
-use corsmal_dsp::paa::PaaPlan;
+use corsmal_dsp::paa::{PaaPlan, Peak};
 use corsmal_dsp::pitch::{PitchParams, estimate_tuning};
 use corsmal_dsp::spectral::{
     Bandwidth, ContrastParams, Flatness, Frequencies, poly_features, spectral_bandwidth,
@@ -100,7 +100,7 @@ fn chroma_of_cqt(y: ArrayView2<f32>) -> Array3<f32> {
 
 #[test]
 fn whole_recording_features_are_those_of_arrays_channel_by_channel() {
-    let cases: [(&str, &str, Whole); 18] = [
+    let cases: [(&str, &str, Whole); 19] = [
         ("chroma_cqt", "", |y| chroma_of_cqt(y).index_axis_move(Axis(0), 0)),
         ("tonnetz", "", |y| {
             let chroma = chroma_of_cqt(y);
@@ -159,6 +159,9 @@ fn whole_recording_features_are_those_of_arrays_channel_by_channel() {
             plan.short_term(counts.view(), true).unwrap().mapv(|x| x as f32)
         }),
         ("a34f136", "", |y| column(M5A34f136::new(SR).unwrap().run(y).unwrap())),
+        ("a34f136", "peak = 'centred'", |y| {
+            column(M5A34f136::with_peak(SR, Peak::Centred).unwrap().run(y).unwrap())
+        }),
         ("spec9216", "fixed_len = 30000", |y| {
             let plan = Spec9216 { fixed_len: Some(30_000), ..Spec9216::default() };
             column(plan.run(y.row(0)).unwrap())
