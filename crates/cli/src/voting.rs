@@ -9,7 +9,7 @@ use crate::failure::Failure;
 /// How windows are made one decision.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum How {
-    /// The class that most windows have; p_<label> is the share of windows.
+    /// The class that most windows have; `p_<label>` is the share of windows.
     Majority,
     /// The class of the highest mean probability.
     Mean,
@@ -61,9 +61,12 @@ impl VoteArgs {
     }
 }
 
+/// A class and its probabilities (shares of windows for a majority).
+pub type Decision = (usize, Option<Vec<f64>>);
+
 impl Rule {
-    /// Class and probabilities (shares of windows for a majority); `None` without windows.
-    pub fn decide(self, votes: &WindowVotes) -> Result<Option<(usize, Option<Vec<f64>>)>, Failure> {
+    /// The decision of the windows; `None` without any.
+    pub fn decide(self, votes: &WindowVotes) -> Result<Option<Decision>, Failure> {
         match self {
             Self::Majority(background) => {
                 Ok(votes.majority(background).map(|class| (class, Some(votes.shares()))))

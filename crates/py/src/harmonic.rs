@@ -184,8 +184,11 @@ fn tonnetz<'py>(py: Python<'py>, chroma: Floats<'py>) -> PyResult<Bound<'py, PyA
     each_precision!(py, view3(chroma), dsp_tonnetz(chroma))
 }
 
-/// The plan of the last sample rate and librosa.
-static AF193: Mutex<Option<((f64, LibrosaVersion), Arc<Af193>)>> = Mutex::new(None);
+/// A plan with its sample rate and librosa.
+type KeptAf193 = ((f64, LibrosaVersion), Arc<Af193>);
+
+/// The last plan.
+static AF193: Mutex<Option<KeptAf193>> = Mutex::new(None);
 
 /// The vectors `[channels, 193]` of `y [channels, samples]`.
 #[pyfunction]

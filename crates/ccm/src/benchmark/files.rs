@@ -77,12 +77,12 @@ fn slug(part: Subset) -> String {
 /// Writes estimates in every official format that can name the recordings: of 2020 by container and
 /// sequence, of 2022, with class probabilities, by id.
 fn write_submissions(out: &Path, name: &str, pairs: &[(&Target, &Estimate)]) -> Result<()> {
-    let sequence = |t: &Target| matches!(t.key, RowKey::Sequence(..)).then_some(t.key);
-    let id = |t: &Target| t.recording.id.map(RowKey::Id);
-    let formats: [(Format, &str, &dyn Fn(&Target) -> Option<RowKey>); 2] =
-        [(Format::Y2020, "", &sequence), (Format::Y2022, "-2022", &id)];
-    for (format, suffix, key) in formats {
-        let keys: Option<Vec<RowKey>> = pairs.iter().map(|(target, _)| key(target)).collect();
+    let key = |format: Format, t: &Target| match format {
+        Format::Y2020 => matches!(t.key, RowKey::Sequence(..)).then_some(t.key),
+        Format::Y2022 => t.recording.id.map(RowKey::Id),
+    };
+    for (format, suffix) in [(Format::Y2020, ""), (Format::Y2022, "-2022")] {
+        let keys: Option<Vec<RowKey>> = pairs.iter().map(|(t, _)| key(format, t)).collect();
         let Some(keys) = keys else { continue };
         let predictions: Vec<_> =
             keys.iter().zip(pairs).map(|(key, (_, e))| e.prediction(*key)).collect();

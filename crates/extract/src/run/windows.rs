@@ -224,7 +224,7 @@ mod tests {
         for (number, row) in all.iter().enumerate() {
             let start = number as f64 * 0.25;
             let alone: Vec<_> = windows(9.0, (Some(start), Some(start + 1.0))).collect();
-            assert_eq!(alone, [row.clone()]);
+            assert_eq!(alone, std::slice::from_ref(row));
         }
         assert_ne!(all[0], all[1]);
     }

@@ -25,7 +25,7 @@ pub struct SubmissionArgs {
     /// With --feasible: food boxes are never filled with water.
     #[arg(long, requires = "feasible")]
     dry_boxes: bool,
-    /// Capacity estimates: fileName (id10_0000.png) and capacity[mL].
+    /// Capacity estimates: fileName (id10_0000.png) and `capacity[mL]`.
     #[arg(long, value_name = "CSV")]
     capacity: Option<PathBuf>,
     /// Official annotations, to name recordings by id (2022) or container and sequence (2020).
