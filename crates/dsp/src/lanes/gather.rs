@@ -57,8 +57,7 @@ pub fn gather(signal: &[f32], hop: usize, window: &[f32], slots: Slots, rows: &m
     );
 }
 
-/// `FRAMES` whole frames of `CHANNELS` channels fill the lanes: as many samples at a time are read
-/// frame by frame and transposed.
+/// `FRAMES` whole frames of `CHANNELS` channels fill the lanes.
 #[inline(always)]
 fn groups<const CHANNELS: usize, const FRAMES: usize>(
     signal: &[f32],
@@ -68,46 +67,13 @@ fn groups<const CHANNELS: usize, const FRAMES: usize>(
     rows: &mut [Row],
 ) {
     let frames = Aligned::<CHANNELS, FRAMES>::new(signal, hop, window.len(), slots).0;
-    let (tiles, rest) = rows[..window.len()].as_chunks_mut::<FRAMES>();
-    for (t, (tile, window)) in tiles.iter_mut().zip(window.as_chunks::<FRAMES>().0).enumerate() {
-        let mut samples = [[[0.0; CHANNELS]; FRAMES]; FRAMES];
-        for (samples, frame) in samples.iter_mut().zip(&frames) {
-            samples.copy_from_slice(&frame[t * FRAMES..(t + 1) * FRAMES]);
-        }
-        for ((row, samples), w) in tile.iter_mut().zip(&transposed(samples)).zip(window) {
-            for (slot, x) in row.0.iter_mut().zip(samples.as_flattened()) {
-                *slot = x * w;
-            }
-        }
-    }
-    let done = window.len() - rest.len();
-    for (n, (row, w)) in (done..).zip(rest.iter_mut().zip(&window[done..])) {
+    for (n, (row, w)) in rows.iter_mut().zip(window).enumerate() {
         for (group, frame) in row.0.as_chunks_mut::<CHANNELS>().0.iter_mut().zip(&frames) {
             for (slot, x) in group.iter_mut().zip(&frame[n]) {
                 *slot = x * w;
             }
         }
     }
-}
-
-/// The transpose of `N x N` values (a power of two): perfect shuffles of all of them, each of which
-/// a vector unit does by interleaving.
-#[inline(always)]
-fn transposed<T: Copy, const N: usize>(mut tile: [[T; N]; N]) -> [[T; N]; N] {
-    let half = N / 2;
-    for _ in 0..N.ilog2() {
-        let mut next = tile;
-        for i in 0..half {
-            for j in 0..half {
-                next[2 * i][2 * j] = tile[i][j];
-                next[2 * i][2 * j + 1] = tile[i + half][j];
-                next[2 * i + 1][2 * j] = tile[i][j + half];
-                next[2 * i + 1][2 * j + 1] = tile[i + half][j + half];
-            }
-        }
-        tile = next;
-    }
-    tile
 }
 
 /// Rows of samples, read where they lie.
