@@ -210,6 +210,10 @@ impl Recording {
                 }
             }
             values.truncate(frames * kept);
+            if kept < stored {
+                // Chunks wait in memory by their length: what they no longer need goes back.
+                values.shrink_to_fit();
+            }
             values
         };
         Ok(store.map(finish_chunk)?)
