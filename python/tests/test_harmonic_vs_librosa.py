@@ -46,9 +46,20 @@ SPECTROGRAMS = [
 ]
 
 
+def median_filter(s, size, mode):
+    """scipy.ndimage.median_filter by its definition, `mode` reflect.
+
+    Scipy's own once gave a NaN for a filter longer than the array (1.17, (3, 7) by 31)."""
+    assert mode == "reflect"
+    padded = np.pad(s, [(k // 2, k - 1 - k // 2) for k in size], mode="symmetric")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, size).reshape(*s.shape, -1)
+    return np.sort(windows, axis=-1)[..., windows.shape[-1] // 2]
+
+
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize(("shape", "params"), SPECTROGRAMS)
-def test_hpss_of_spectrograms(shape, params, dtype):
+def test_hpss_of_spectrograms(shape, params, dtype, monkeypatch):
+    monkeypatch.setattr(librosa.decompose, "median_filter", median_filter)
     s = np.abs(np.random.default_rng(1).standard_normal(shape)).astype(dtype)
     s[..., : shape[-1] // 3] = np.round(s[..., : shape[-1] // 3])
     for got, want in zip(

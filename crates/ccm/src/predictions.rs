@@ -72,11 +72,14 @@ impl ProbabilityTable {
     /// Reads a table; a recording may have several lines, one for each of its windows.
     ///
     /// # Errors
-    /// [`CcmError`] for missing columns, sequences that are neither numbers nor names of the data
+    /// [`CcmError`] for missing columns, no lines, sequences that are neither numbers nor names of the data
     /// set, negative or non-finite probabilities, and predictions that are no class.
     pub fn read(path: &Path) -> Result<Self> {
         let table = Table::read(path)?;
         let columns = Columns::find(&table)?;
+        if table.rows() == 0 {
+            return Err(CcmError::Request(format!("{}: has no predictions", path.display())));
+        }
         let header = |&at: &usize| table.header()[at].clone();
         let label = |at: &usize| {
             let name = header(at);

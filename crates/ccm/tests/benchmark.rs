@@ -58,7 +58,7 @@ fn vector(set: FeatureSet, wav: &Path) -> Vec<f32> {
 }
 
 fn run(options: &Options) -> corsmal_ccm::Result<Report> {
-    corsmal_ccm::benchmark::run(options, &|_| {}, &AtomicBool::new(false))
+    corsmal_ccm::benchmark::run(options, &|_| {}, &Arc::new(AtomicBool::new(false)))
 }
 
 #[test]

@@ -7,8 +7,9 @@ use clap::ValueEnum;
 use corsmal_models::labels::Labels;
 use serde_json::{Map, Value, json};
 
+use corsmal_extract::draft::Draft;
+
 use crate::failure::Failure;
-use crate::publish::Draft;
 
 /// How lines are written.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -62,7 +63,7 @@ impl Target {
         if path == Path::new("-") {
             Ok(Self::Stdout(std::io::stdout()))
         } else {
-            Draft::create(path).map(Self::File)
+            Ok(Self::File(Draft::create(path)?))
         }
     }
 }
@@ -108,7 +109,7 @@ impl<'a> PredictionLines<'a> {
         self.begin()?;
         match self.target {
             Target::Stdout(_) => Ok(()),
-            Target::File(draft) => draft.publish(),
+            Target::File(draft) => Ok(draft.publish()?),
         }
     }
 

@@ -192,6 +192,39 @@ fn an_interrupted_stream_keeps_its_lines() {
     assert!(table.starts_with("id,path,start,end,status,predicted"));
 }
 
+/// A pipe that stays open and says nothing cannot hold up the end.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_is_heard_while_the_stream_is_silent() {
+    let trained = Trained::new(&["--classifier", "knn"]);
+    let model = trained.path("m");
+    let live = ["classify", "--model", text(&model), "--in", "-", "--window", "1", "--hop", "1"];
+    let mut child = command(&live).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    stdin.write_all(&header()).unwrap();
+    stdin.write_all(&pcm(&second(0))).unwrap();
+    let mut stdout = BufReader::new(child.stdout.take().unwrap());
+    let mut lines = [String::new(), String::new()];
+    lines.iter_mut().for_each(|line| assert!(stdout.read_line(line).unwrap() > 0));
+    assert!(lines[1].contains(",0,1,ok,tone,"), "{lines:?}");
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(killed.success());
+    let mut status = None;
+    for _ in 0..600 {
+        status = child.try_wait().unwrap();
+        if status.is_some() {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    let _ = child.kill();
+    drop(stdin);
+    assert_eq!(status.expect("ended while its input was open").code(), Some(130));
+    let mut rest = String::new();
+    stdout.read_to_string(&mut rest).unwrap();
+    assert_eq!(rest, "", "no window was complete");
+}
+
 /// Eight minutes of eight channels, 339 MB, through a process of less than a third of that.
 #[cfg(target_os = "linux")]
 #[test]
@@ -344,7 +377,9 @@ fn what_is_no_window_is_refused() {
         text(&out),
     ]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("empty: empty: no samples"));
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(message.contains("empty: empty: no samples"));
+    assert!(message.contains("1 predictions of kind, 1 failed"), "{message}");
     let table = std::fs::read_to_string(&out).unwrap();
     assert_eq!(table.lines().count(), 3);
     assert!(table.lines().nth(1).unwrap().ends_with(",,,empty,,,"), "{table}");

@@ -18,6 +18,14 @@ pub enum LibrosaVersion {
 }
 
 impl LibrosaVersion {
+    /// The version that this one differs from.
+    pub fn other(self) -> Self {
+        match self {
+            Self::V08 => Self::V011,
+            Self::V011 => Self::V08,
+        }
+    }
+
     /// Padding of centred frames.
     pub fn pad_mode(self) -> PadMode {
         match self {

@@ -351,7 +351,7 @@ fn is_still(_: &File, path: &Path) -> bool {
 /// Makes a rename survive a power cut.
 #[cfg(unix)]
 fn sync_folder(out: &Path) -> io::Result<()> {
-    let folder = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = crate::draft::folder(out);
     File::open(folder)?.sync_all()
 }
 

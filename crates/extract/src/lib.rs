@@ -6,6 +6,7 @@
 
 pub mod compare;
 pub mod config;
+pub mod draft;
 pub mod engine;
 pub mod features;
 pub mod frontend;

@@ -16,6 +16,7 @@ use serde_json::{Map, Value};
 use thiserror::Error;
 
 use crate::config::{Config, ConfigError, typed};
+use crate::draft::Draft;
 use crate::layout::{self, LayoutError};
 use crate::npy::{DType, Header};
 use crate::npz::{Compression, NpzError, NpzFile, NpzWriter};
@@ -29,14 +30,9 @@ const VERSION: u32 = 1;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ProjectionError {
-    /// The operating system refused.
-    #[error("{path}: {source}")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Its reason.
-        source: std::io::Error,
-    },
+    /// The operating system refused; says which file.
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
     /// An archive cannot be read or written.
     #[error(transparent)]
     Npz(#[from] NpzError),
@@ -96,15 +92,23 @@ impl Projection {
         let (table, provenance): (Table, _) = if is_parquet {
             parquet::read(features)?
         } else {
-            layout::read_table(&mut NpzFile::open(features)?)?
+            let mut npz = NpzFile::open(features)?;
+            if !layout::is_ours(&npz) {
+                return Err(content(features, "is no output of extract"));
+            }
+            layout::read_table(&mut npz)?
         };
         if table.feature_names().is_empty() {
             let reason = "has no statistics: extract with a configuration that has a [summary]";
             return Err(content(features, reason));
         }
+        let config: Value = serde_json::from_str(&provenance.config).unwrap_or_default();
+        if config.get("projection").is_some_and(|p| !p.is_null()) {
+            return Err(content(features, "holds values that are projected already"));
+        }
         let pca = Pca::fit(table.values().mapv(f64::from).view(), n_components)
             .map_err(|source| ProjectionError::Fit { path: features.into(), source })?;
-        let identity = identity::of_file(features).map_err(|e| io(features, e))?;
+        let identity = identity::of_file(features).map_err(|e| NpzError::io(features, e))?;
         let meta = Meta {
             version: VERSION,
             tool_version: env!("CARGO_PKG_VERSION").to_string(),
@@ -120,9 +124,8 @@ impl Projection {
     /// # Errors
     /// The file cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), ProjectionError> {
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let file = tempfile::NamedTempFile::new_in(folder).map_err(|e| io(path, e))?;
-        let mut npz = NpzWriter::create(file.path(), Compression::Stored)?;
+        let draft = Draft::create(path)?;
+        let mut npz = NpzWriter::over(draft.handle()?, path, Compression::Stored, Vec::new());
         let Pca { mean, components, explained_variance } = &self.pca;
         let mut doubles = |name: &str, shape: &[usize], values: Vec<f64>| {
             npz.array(name, &Header::new(DType::F64, shape), bytemuck::cast_slice(&values))
@@ -134,8 +137,7 @@ impl Projection {
         npz.strings("feature_names", &self.feature_names)?;
         npz.text("meta", &serde_json::json!(self.meta).to_string())?;
         npz.finish()?;
-        file.persist(path).map_err(|e| io(path, e.error))?;
-        Ok(())
+        Ok(draft.publish()?)
     }
 
     /// Reads a file, whoever wrote it.
@@ -171,6 +173,11 @@ impl Projection {
         Ok(Self { pca: Pca { mean, components, explained_variance }, feature_names, meta })
     }
 
+    /// Hash of the configuration of the features that it was fitted on, and their number of rows.
+    pub fn fitted_on(&self) -> (&str, usize) {
+        (&self.meta.config_hash, self.meta.rows)
+    }
+
     /// Values that it takes.
     pub fn n_inputs(&self) -> usize {
         self.feature_names.len()
@@ -198,10 +205,6 @@ fn shaped<D: Dimension>(
         let expected = D::NDIM.unwrap_or_default();
         content(path, format!("member {name} has shape {shape:?}, expected {expected} axes"))
     })
-}
-
-fn io(path: &Path, source: std::io::Error) -> ProjectionError {
-    ProjectionError::Io { path: path.into(), source }
 }
 
 fn content(path: &Path, reason: impl Into<String>) -> ProjectionError {

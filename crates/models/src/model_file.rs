@@ -16,7 +16,7 @@
 //! | 32 | BLAKE3 |
 
 use std::fs::File;
-use std::io::{Read, Write};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use ndarray::{Array2, ArrayView2};
@@ -254,22 +254,6 @@ impl Model {
         }
         pipeline.validate().map_err(|e| refuse("payload", e.to_string()))?;
         Self::new(header, pipeline).map_err(|e| refuse("header", e.to_string()))
-    }
-
-    /// Writes the file: under another name first, then renamed, so that no half-written model is
-    /// ever found under this one.
-    ///
-    /// # Errors
-    /// [`ModelFileError::Io`].
-    pub fn save(&self, path: &Path) -> std::result::Result<(), ModelFileError> {
-        let bytes = self.to_bytes()?;
-        let io = |source| ModelFileError::Io { path: path.into(), source };
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut file = tempfile::NamedTempFile::new_in(folder).map_err(io)?;
-        file.write_all(&bytes).map_err(io)?;
-        file.as_file().sync_all().map_err(io)?;
-        file.persist(path).map_err(|e| io(e.error))?;
-        Ok(())
     }
 
     /// Reads a file.

@@ -107,7 +107,8 @@ impl PyModel {
 
     /// Writes the model file, whole or not at all.
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        self.0.save(&path).map_err(model_error)
+        let bytes = self.0.to_bytes().map_err(model_error)?;
+        corsmal_extract::draft::write(&path, &bytes).map_err(model_error)
     }
 
     /// Reads a model file.

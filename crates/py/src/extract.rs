@@ -92,7 +92,7 @@ fn extract(
     let shard = "0/1".parse::<Shard>().map_err(value_error)?;
     let options = Options { out, compression, jobs, shard, resume, overwrite, max_errors: None };
     let warnings = Warnings::default();
-    let work = |stop: &AtomicBool| {
+    let work = |stop: &Arc<AtomicBool>| {
         let found = inputs::collect(&paths).map_err(|e| RunError::new_err(e.to_string()))?;
         run::run(&found, &config, &options, &warnings, stop).map_err(|error| match error {
             run::RunError::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
@@ -115,8 +115,10 @@ fn fit_projection(
 }
 
 /// Does `work` in another thread and raises its flag when Python has an exception for this one.
-fn interruptible<T: Send>(work: impl FnOnce(&AtomicBool) -> PyResult<T> + Send) -> PyResult<T> {
-    let stop = AtomicBool::new(false);
+fn interruptible<T: Send>(
+    work: impl FnOnce(&Arc<AtomicBool>) -> PyResult<T> + Send,
+) -> PyResult<T> {
+    let stop = Arc::new(AtomicBool::new(false));
     std::thread::scope(|scope| {
         let (done, finished) = channel::<()>();
         let stop = &stop;

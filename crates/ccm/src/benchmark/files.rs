@@ -54,7 +54,9 @@ pub(super) fn write_outcome(out: &Path, outcome: &Outcome, rows: &Rows) -> Resul
         tool_version: env!("CARGO_PKG_VERSION").into(),
     };
     let model = Model::new(header, outcome.model.clone()).map_err(|e| fault(&e))?;
-    model.save(&out.join("models").join(format!("{name}.model"))).map_err(|e| fault(&e))
+    let bytes = model.to_bytes().map_err(|e| fault(&e))?;
+    let path = out.join("models").join(format!("{name}.model"));
+    corsmal_extract::draft::write(&path, &bytes).map_err(|e| fault(&e))
 }
 
 /// Writes the pseudo-random estimates of every part as submissions.

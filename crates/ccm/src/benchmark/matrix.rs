@@ -34,7 +34,7 @@ pub(super) struct Matrices {
 pub(super) struct Store<'a> {
     pub(super) folder: PathBuf,
     pub(super) jobs: usize,
-    pub(super) stop: &'a AtomicBool,
+    pub(super) stop: &'a Arc<AtomicBool>,
 }
 
 impl Store<'_> {

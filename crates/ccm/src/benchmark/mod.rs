@@ -11,6 +11,7 @@ mod sections;
 mod tables;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 pub use added::Added;
@@ -49,7 +50,7 @@ pub struct Options {
 /// # Errors
 /// [`crate::CcmError`] when the data set has no labelled training recordings, when a file to add is
 /// unusable, when a recording cannot be read, when something cannot be written, and when stopped.
-pub fn run(options: &Options, progress: &dyn Fn(&str), stop: &AtomicBool) -> Result<Report> {
+pub fn run(options: &Options, progress: &dyn Fn(&str), stop: &Arc<AtomicBool>) -> Result<Report> {
     let added = options
         .added
         .iter()

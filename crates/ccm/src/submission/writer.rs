@@ -159,8 +159,16 @@ fn check<'a>(
             (Format::Y2022, RowKey::Id(_)) | (Format::Y2020, RowKey::Sequence(..))
         );
         if !fits {
-            let text = format!("{}: {} is not how this format names rows", path.display(), p.key);
-            return Err(CcmError::Request(text));
+            let by = match format {
+                Format::Y2020 => "container and sequence",
+                Format::Y2022 => "id",
+            };
+            return Err(CcmError::Request(format!(
+                "{}: {} is not how this format names rows, which is by {by}; annotations tell one \
+                 from the other",
+                path.display(),
+                p.key
+            )));
         }
         if !missing.remove(&p.key) {
             return Err(rows_error("an unexpected or doubled row", p.key.to_string()));

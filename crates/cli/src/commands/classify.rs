@@ -122,7 +122,8 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         End::Done | End::Interrupted => lines.finish()?,
     }
     if !args.quiet {
-        eprintln!("{written} predictions of {}, {failed} failed", model.header().target);
+        let predicted = written - failed;
+        eprintln!("{predicted} predictions of {}, {failed} failed", model.header().target);
     }
     Ok(match (end, failed) {
         (End::Interrupted, _) => ExitCode::from(INTERRUPTED),

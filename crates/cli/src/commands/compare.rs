@@ -136,6 +136,12 @@ fn settings(report: &Report, lines: &mut Vec<String>) {
     lines.extend(settings.differences.iter().map(row));
 }
 
+/// Rounded down: only where all are equal it is 100.
+fn percent(part: u64, of: u64) -> String {
+    let tenths = (1000.0 * part as f64 / of.max(1) as f64).floor();
+    format!("{:.1} %", tenths / 10.0)
+}
+
 fn table(features: &[FeatureReport]) -> Vec<String> {
     let heads =
         ["feature", "arrays", "differ", "equal", "max abs", "max rel", "rms", "correlation"];
@@ -149,7 +155,7 @@ fn table(features: &[FeatureReport]) -> Vec<String> {
             f.feature.clone(),
             f.arrays.to_string(),
             f.differing.to_string(),
-            some(format!("{:.1} %", 100.0 * d.equal as f64 / d.values.max(1) as f64)),
+            some(percent(d.equal, d.values)),
             some(number(d.largest.as_ref().map_or(0.0, |e| e.value))),
             some(number(d.max_relative)),
             some(number(d.rms)),

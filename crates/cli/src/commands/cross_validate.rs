@@ -17,6 +17,7 @@ use crate::failure::Failure;
 use crate::folds::{CvPlan, Folds};
 use crate::pipeline::{self, PipelineArgs};
 use crate::publish;
+use corsmal_extract::draft;
 
 /// Arguments of `cross-validate`.
 #[derive(clap::Args)]
@@ -69,7 +70,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         _ => nested_cross_validate(&data, &folds.outer, &candidates, |rows| folds.inner(rows, &y))?,
     };
     if let Some(path) = &args.predictions {
-        publish::write(path, &predictions(&table, &labels, &y, &result)?)?;
+        draft::write(path, &predictions(&table, &labels, &y, &result)?)?;
     }
     if args.json {
         let report = json!({

@@ -13,6 +13,7 @@ use crate::failure::{FAILED_FILES, Failure};
 use crate::prediction_lines::csv_line;
 use crate::publish;
 use crate::voting::VoteArgs;
+use corsmal_extract::draft;
 
 /// Arguments of `fuse`.
 #[derive(clap::Args)]
@@ -93,7 +94,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         use std::io::Write;
         std::io::stdout().write_all(&bytes)?;
     } else {
-        publish::write(&args.out, &bytes)?;
+        draft::write(&args.out, &bytes)?;
     }
     let failed = fused.rows.iter().filter(|row| row.class.is_none()).count();
     eprintln!("{} recordings, {failed} without a prediction", fused.rows.len());

@@ -22,7 +22,7 @@ pub struct Args {
     /// Training features: an .npz or .parquet of `extract` with summaries.
     #[arg(long, value_name = "FILE")]
     features: PathBuf,
-    /// Components to keep, at most the rows of the file.
+    /// Components to keep, at most the rows and the features of the file.
     #[arg(long, value_name = "N", default_value_t = 128)]
     n_components: usize,
     /// Projection file to write (.npz).
@@ -38,6 +38,9 @@ pub struct Args {
 
 /// Fits and writes the projection.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    if !args.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
+        return Err(Failure::new(format!("{}: must end in .npz", args.out.display())));
+    }
     publish::check(&args.out, args.overwrite)?;
     let projection = Projection::fit(&args.features, args.n_components)?;
     projection.save(&args.out)?;

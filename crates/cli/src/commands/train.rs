@@ -13,6 +13,7 @@ use crate::failure::Failure;
 use crate::folds::Folds;
 use crate::pipeline::{self, PipelineArgs};
 use crate::publish;
+use corsmal_extract::draft;
 
 /// Arguments of `train`.
 #[derive(clap::Args)]
@@ -88,7 +89,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         tool_version: env!("CARGO_PKG_VERSION").to_string(),
     };
     let bytes = Model::new(header, fitted)?.to_bytes()?;
-    publish::write(&args.out, &bytes)?;
+    draft::write(&args.out, &bytes)?;
     if !args.quiet {
         let classes: Vec<_> =
             rows_of.iter().map(|(name, rows)| format!("{name} ({rows})")).collect();

@@ -1,5 +1,6 @@
 //! Interrupted runs lose nothing.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
@@ -94,6 +95,40 @@ fn an_interrupt_ends_with_130_and_can_be_resumed() {
     let run = extract(&audio, &out, &["--resume"]).with(0);
     assert!(run.stderr.contains("resumed"), "{}", run.stderr);
     assert!(std::fs::read(&out).unwrap() == std::fs::read(&whole).unwrap());
+}
+
+/// A pipe that stays open and says nothing cannot hold up the end.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_is_heard_while_the_stream_is_silent() {
+    let folder = folder(1);
+    let one = folder.path().join("audio/00/r0000.wav");
+    // Silent before the header, and in the middle of the samples.
+    for bytes in [0, 4000] {
+        let out = folder.path().join(format!("{bytes}.npz"));
+        let mut child =
+            extraction(Path::new("-"), &out, &["--resume"]).stdin(Stdio::piped()).spawn().unwrap();
+        let mut stdin = child.stdin.take().unwrap();
+        stdin.write_all(&std::fs::read(&one).unwrap()[..bytes]).unwrap();
+        let ledger = folder.path().join(format!("{bytes}.npz.ledger"));
+        while !std::fs::metadata(&ledger).is_ok_and(|m| m.len() > 0) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        let mut status = None;
+        for _ in 0..600 {
+            status = child.try_wait().unwrap();
+            if status.is_some() {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        let _ = child.kill();
+        drop(stdin);
+        assert_eq!(status.expect("ended while its input was open").code(), Some(130));
+        assert_eq!(done(&out), 0, "the stream is no recording that failed");
+    }
 }
 
 #[test]

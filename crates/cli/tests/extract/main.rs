@@ -7,6 +7,7 @@ mod bad_recordings;
 mod crashes;
 mod long;
 mod outputs;
+mod projection;
 mod refusals;
 mod streams;
 mod support;

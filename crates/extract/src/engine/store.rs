@@ -74,19 +74,7 @@ impl Store {
         let Some(spilled) = &mut self.spilled else {
             return self.chunks.chunks(batch.max(1)).try_for_each(each);
         };
-        spilled.file.seek(SeekFrom::Start(0))?;
-        for lengths in spilled.lengths.chunks(batch.max(1)) {
-            let chunks = lengths
-                .iter()
-                .map(|n| {
-                    let mut chunk = vec![0.0_f32; *n];
-                    spilled.file.read_exact(bytemuck::cast_slice_mut(&mut chunk))?;
-                    Ok(chunk)
-                })
-                .collect::<io::Result<Vec<_>>>()?;
-            each(&chunks)?;
-        }
-        Ok(())
+        spilled.batches(batch, |chunks| each(&chunks))
     }
 
     /// Puts `f` of every chunk in its place, several at a time by the threads of the pool.
@@ -95,19 +83,14 @@ impl Store {
     /// A temporary file fails.
     pub fn map(mut self, f: impl Fn(Vec<f32>) -> Vec<f32> + Sync) -> io::Result<Self> {
         let mut out = Self::new(&self.folder);
-        if self.spilled.is_none() {
-            if let [only] = self.chunks.as_mut_slice() {
-                out.push(f(std::mem::take(only)))?;
-                return Ok(out);
-            }
-            let mapped: Vec<_> = self.chunks.into_par_iter().map(&f).collect();
-            mapped.into_iter().try_for_each(|chunk| out.push(chunk))?;
-            return Ok(out);
-        }
-        self.batches(rayon::current_num_threads(), |chunks| {
-            let mapped: Vec<_> = chunks.par_iter().map(|chunk| f(chunk.clone())).collect();
+        let mut each = |chunks: Vec<Vec<f32>>| {
+            let mapped: Vec<_> = chunks.into_par_iter().map(&f).collect();
             mapped.into_iter().try_for_each(|chunk| out.push(chunk))
-        })?;
+        };
+        match &mut self.spilled {
+            Some(spilled) => spilled.batches(rayon::current_num_threads(), each)?,
+            None => each(self.chunks)?,
+        }
         Ok(out)
     }
 
@@ -141,6 +124,23 @@ impl Spilled {
     fn write(&mut self, chunk: &[f32]) -> io::Result<()> {
         self.lengths.push(chunk.len());
         self.file.write_all(bytemuck::cast_slice(chunk))
+    }
+
+    fn batches<E: From<io::Error>>(
+        &mut self,
+        batch: usize,
+        mut each: impl FnMut(Vec<Vec<f32>>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        self.file.seek(SeekFrom::Start(0))?;
+        for lengths in self.lengths.chunks(batch.max(1)) {
+            let mut read = |n: &usize| {
+                let mut chunk = vec![0.0_f32; *n];
+                self.file.read_exact(bytemuck::cast_slice_mut(&mut chunk))?;
+                Ok(chunk)
+            };
+            each(lengths.iter().map(&mut read).collect::<io::Result<_>>()?)?;
+        }
+        Ok(())
     }
 }
 

@@ -3,7 +3,7 @@
 use corsmal_dsp::hpss::{HpssParams, masks};
 use corsmal_dsp::stft::{StftParams, spectrogram};
 use ndarray::{Array2, ArrayView2, Axis};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::{Extent, Feature, FeatureKind, WholeKernel, hertz};
 use crate::config::StftSpec;
@@ -26,11 +26,29 @@ pub struct Hpss {
     #[serde(flatten)]
     stft: StftSpec,
     component: Component,
-    /// Frames of the filter along time, bins of the filter along frequency.
+    /// Frames of the filter along time, bins of the filter along frequency; or one number for both.
+    #[serde(deserialize_with = "one_or_two")]
     kernel_size: [usize; 2],
     power: f64,
-    /// Of the harmonic and of the percussive mask.
+    /// Of the harmonic and of the percussive mask; or one number for both.
+    #[serde(deserialize_with = "one_or_two")]
     margin: [f64; 2],
+}
+
+/// `[a, b]`, or `a` for `[a, a]`, as librosa takes them.
+fn one_or_two<'de, D: Deserializer<'de>, T: Deserialize<'de> + Copy>(
+    value: D,
+) -> Result<[T; 2], D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "expected a number or a list of two")]
+    enum OneOrTwo<T> {
+        One(T),
+        Two([T; 2]),
+    }
+    Ok(match OneOrTwo::deserialize(value)? {
+        OneOrTwo::One(both) => [both, both],
+        OneOrTwo::Two(each) => each,
+    })
 }
 
 impl Default for Hpss {

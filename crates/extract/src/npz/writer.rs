@@ -108,7 +108,13 @@ impl NpzWriter {
         Ok(writer)
     }
 
-    fn over(file: File, path: &Path, compression: Compression, entries: Vec<EntryRecord>) -> Self {
+    /// Continues an archive behind `entries` in an open file; errors call it `path`.
+    pub(crate) fn over(
+        file: File,
+        path: &Path,
+        compression: Compression,
+        entries: Vec<EntryRecord>,
+    ) -> Self {
         let end = entries.last().map_or(0, |entry| entry.end);
         Self {
             file,

@@ -15,10 +15,11 @@ use std::time::Duration;
 use super::plans::{Planned, Plans};
 use super::reader::{self, Failed};
 use super::sink::{Finished, Member, Sink};
-use super::{Options, Progress, RunError, folder_of, identity_of};
+use super::{Options, Progress, RunError, identity_of};
 use crate::config::Config;
+use crate::draft;
 use crate::engine::{Features, Recording, Span};
-use crate::inputs::Input;
+use crate::inputs::{Input, InputSource};
 use crate::outcome::{Outcome, Status};
 
 /// Inputs in work or waiting to be written, per worker.
@@ -29,7 +30,7 @@ pub struct Collector<'a> {
     inputs: &'a [Input],
     options: &'a Options,
     progress: &'a dyn Progress,
-    stop: &'a AtomicBool,
+    stop: &'a Arc<AtomicBool>,
     plans: Plans<'a>,
     /// Folder of temporary files: that of the output.
     folder: PathBuf,
@@ -85,10 +86,10 @@ impl<'a> Collector<'a> {
         config: &Arc<Config>,
         options: &'a Options,
         progress: &'a dyn Progress,
-        stop: &'a AtomicBool,
+        stop: &'a Arc<AtomicBool>,
         sink: Sink,
     ) -> Self {
-        let folder = folder_of(&options.out).to_path_buf();
+        let folder = draft::folder(&options.out).to_path_buf();
         let state = State { next: sink.next, written: sink.next, ..State::default() };
         Self {
             inputs,
@@ -177,7 +178,7 @@ impl<'a> Collector<'a> {
         let input = &self.inputs[index];
         let mut outcome = Outcome::new(&input.id, input.source.to_string(), Status::Ok, "");
         outcome.identity = identity_of(input);
-        let mut source = match reader::open(input) {
+        let mut source = match reader::open(input, self.stop) {
             Ok(source) => source,
             Err(failed) => return self.fail(index, outcome, failed),
         };
@@ -229,7 +230,7 @@ impl<'a> Collector<'a> {
         let mut parts = Vec::new();
         let mut last = None;
         let mut decoded = 0;
-        let computed = reader::open(input).and_then(|source| {
+        let computed = reader::open(input, self.stop).and_then(|source| {
             let signal = &job.planned.plan.config.signal;
             let crop = reader::crop(signal, (input.start, input.end), source.spec().sample_rate);
             let source = last.insert(source).as_mut();
@@ -338,6 +339,10 @@ impl<'a> Collector<'a> {
             let path = self.folder.clone();
             self.lock().error.get_or_insert(RunError::Temporary { path, source });
             return self.changed.notify_all();
+        }
+        if self.inputs[index].source == InputSource::Stdin && self.stop.load(Ordering::Relaxed) {
+            // The stream did not fail: it was no longer listened to.
+            return;
         }
         outcome.status = failed.status;
         outcome.reason = failed.reason;

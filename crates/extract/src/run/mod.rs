@@ -5,6 +5,7 @@ mod plans;
 mod reader;
 mod signal;
 mod sink;
+mod stdin;
 mod windows;
 
 use std::path::{Path, PathBuf};
@@ -14,6 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use thiserror::Error;
 
 use crate::config::Config;
+use crate::draft;
 use crate::identity;
 use crate::inputs::{Input, InputSource, Shard, list_hash};
 use crate::layout::{self, LayoutError};
@@ -178,7 +180,7 @@ pub fn run(
     config: &Arc<Config>,
     options: &Options,
     progress: &dyn Progress,
-    stop: &AtomicBool,
+    stop: &Arc<AtomicBool>,
 ) -> Result<Report, RunError> {
     let parquet = check_output(&options.out, config)?;
     if !(1..=MAX_JOBS).contains(&options.jobs) {
@@ -248,16 +250,11 @@ pub fn check_output(out: &Path, config: &Config) -> Result<bool, RunError> {
     if out.is_dir() {
         return refuse("is a folder".into());
     }
-    let folder = folder_of(out);
+    let folder = draft::folder(out);
     if !folder.is_dir() {
         return refuse(format!("there is no folder {}", folder.display()));
     }
     Ok(parquet)
-}
-
-/// The folder that a file is in.
-fn folder_of(file: &Path) -> &Path {
-    file.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// The report of an output that is already complete; an error where it holds something else.

@@ -2,12 +2,14 @@
 
 use std::io;
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use corsmal_audio::{AudioError, AudioSpec, BlockSource, Repair};
 use corsmal_dsp::DspError;
 
 use super::plans::Planned;
+use super::stdin::Live;
 use crate::config::SignalConfig;
 use crate::engine::{Extractor, Refused, Span};
 use crate::frontend::FrontEnd;
@@ -69,11 +71,13 @@ impl From<Refused> for Failed {
     }
 }
 
-/// Opens an input.
-pub fn open(input: &Input) -> Result<Box<dyn BlockSource>, Failed> {
+/// Opens an input. A stream on standard input fails once `stop` is set, also while nothing comes.
+pub fn open(input: &Input, stop: &Arc<AtomicBool>) -> Result<Box<dyn BlockSource>, Failed> {
     Ok(match &input.source {
         InputSource::File(path) => corsmal_audio::open(path)?,
-        InputSource::Stdin => corsmal_audio::from_reader(std::io::stdin())?,
+        InputSource::Stdin => {
+            corsmal_audio::from_reader(Live::new(std::io::stdin(), stop.clone()))?
+        }
     })
 }
 

@@ -1,5 +1,8 @@
 //! A recording or an endless stream cut into windows, each computed as a recording of its own.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
 use corsmal_audio::{BlockSource, Repair};
 
 use super::reader::{self, Failed};
@@ -58,7 +61,8 @@ pub struct Windows<'a> {
 }
 
 impl<'a> Windows<'a> {
-    /// Opens an input.
+    /// Opens an input. A stream on standard input fails once `stop` is set, also while nothing
+    /// comes.
     ///
     /// # Errors
     /// What is wrong with it.
@@ -66,8 +70,9 @@ impl<'a> Windows<'a> {
         input: &Input,
         signals: &'a Signals,
         windowing: Windowing,
+        stop: &Arc<AtomicBool>,
     ) -> Result<Self, SignalError> {
-        let source = reader::open(input)?;
+        let source = reader::open(input, stop)?;
         let rate = f64::from(source.spec().sample_rate);
         Ok(Self {
             source,
@@ -161,11 +166,13 @@ impl Iterator for Windows<'_> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
     use crate::config::Config;
     use crate::inputs::InputSource;
+
+    fn go_on() -> Arc<AtomicBool> {
+        Arc::new(AtomicBool::new(false))
+    }
 
     fn input(path: &std::path::Path, span: (Option<f64>, Option<f64>)) -> Input {
         let source = InputSource::File(path.into());
@@ -192,7 +199,7 @@ mod tests {
     fn spans(path: &std::path::Path, span: (Option<f64>, Option<f64>)) -> Vec<(f64, f64)> {
         let signals = Signals::new(Arc::new(Config::preset("esc26").unwrap()));
         let windowing = Windowing::new(1.0, 0.25).unwrap();
-        let windows = Windows::open(&input(path, span), &signals, windowing).unwrap();
+        let windows = Windows::open(&input(path, span), &signals, windowing, &go_on()).unwrap();
         windows.map(|w| w.map(|w| (w.start, w.end)).unwrap()).collect()
     }
 
@@ -214,7 +221,8 @@ mod tests {
         let signals = Signals::new(Arc::new(Config::preset("esc26").unwrap()));
         let windows = |hop, span| {
             let windowing = Windowing::new(1.0, hop).unwrap();
-            let windows = Windows::open(&input(&path, span), &signals, windowing).unwrap();
+            let windows =
+                Windows::open(&input(&path, span), &signals, windowing, &go_on()).unwrap();
             windows.map(|w| match w.unwrap().features.unwrap() {
                 Features::Summary(row) => row,
                 Features::Frames(_) => panic!("a summary was configured"),
@@ -235,11 +243,12 @@ mod tests {
         let signals = Signals::new(Arc::new(Config::preset("esc26").unwrap()));
         let empty = recording(folder.path(), 0);
         let windowing = Windowing::new(1.0, 1.0).unwrap();
-        let mut windows = Windows::open(&input(&empty, (None, None)), &signals, windowing).unwrap();
+        let mut windows =
+            Windows::open(&input(&empty, (None, None)), &signals, windowing, &go_on()).unwrap();
         assert_eq!(windows.next().unwrap().err().unwrap().status, Status::Empty);
         assert!(windows.next().is_none());
         let absent = input(&folder.path().join("absent.wav"), (None, None));
-        assert!(Windows::open(&absent, &signals, windowing).is_err());
+        assert!(Windows::open(&absent, &signals, windowing, &go_on()).is_err());
         assert!(Windowing::new(0.0, 1.0).is_none() && Windowing::new(1.0, f64::NAN).is_none());
     }
 }

@@ -100,7 +100,7 @@ fn chroma_of_cqt(y: ArrayView2<f32>) -> Array3<f32> {
 
 #[test]
 fn whole_recording_features_are_those_of_arrays_channel_by_channel() {
-    let cases: [(&str, &str, Whole); 19] = [
+    let cases: [(&str, &str, Whole); 20] = [
         ("chroma_cqt", "", |y| chroma_of_cqt(y).index_axis_move(Axis(0), 0)),
         ("tonnetz", "", |y| {
             let chroma = chroma_of_cqt(y);
@@ -141,6 +141,18 @@ fn whole_recording_features_are_those_of_arrays_channel_by_channel() {
             let params = HpssParams { kernel_harmonic: 17, ..HpssParams::default() };
             let (_, percussive) = masks(magnitude.view(), &params).unwrap();
             (magnitude * percussive).index_axis_move(Axis(0), 0)
+        }),
+        ("hpss", "kernel_size = 9\nmargin = 2", |y| {
+            let magnitude = spectrogram(y, &StftParams::new(2048, 512), 1.0).unwrap();
+            let params = HpssParams {
+                kernel_harmonic: 9,
+                kernel_percussive: 9,
+                margin_harmonic: 2.0,
+                margin_percussive: 2.0,
+                ..HpssParams::default()
+            };
+            let (harmonic, _) = masks(magnitude.view(), &params).unwrap();
+            (magnitude * harmonic).index_axis_move(Axis(0), 0)
         }),
         ("cqt", "tuning = 0.25", |y| {
             let params = CqtParams { tuning: 0.25, ..CqtParams::new(SR) };

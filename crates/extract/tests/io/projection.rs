@@ -49,7 +49,8 @@ fn extract(folder: &Path, config: Config, out: &Path) -> Table {
         overwrite: true,
         max_errors: None,
     };
-    run::run(&found, &Arc::new(config), &options, &Quiet, &AtomicBool::new(false)).unwrap();
+    run::run(&found, &Arc::new(config), &options, &Quiet, &Arc::new(AtomicBool::new(false)))
+        .unwrap();
     layout::read_table(&mut NpzFile::open(out).unwrap()).unwrap().0
 }
 

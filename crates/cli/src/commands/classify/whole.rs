@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use corsmal_extract::draft;
 use corsmal_extract::inputs::Shard;
 use corsmal_extract::npz::Compression;
 use corsmal_extract::outcome::Status;
@@ -15,7 +16,6 @@ use crate::dataset_table::DatasetTable;
 use crate::failure::Failure;
 use crate::prediction_lines::{Line, PredictionLines};
 use crate::progress::{LogFormat, Meter};
-use crate::publish;
 
 /// Extracts into a temporary folder, then predicts.
 pub fn run(args: &Args, model: &Model, lines: &mut PredictionLines<'_>) -> Result<End, Failure> {
@@ -24,7 +24,7 @@ pub fn run(args: &Args, model: &Model, lines: &mut PredictionLines<'_>) -> Resul
     let folder = if args.out == Path::new("-") {
         tempfile::tempdir()
     } else {
-        tempfile::tempdir_in(publish::folder(&args.out))
+        tempfile::tempdir_in(draft::folder(&args.out))
     };
     let folder = folder.map_err(|e| Failure::new(format!("temporary folder: {e}")))?;
     let options = Options {

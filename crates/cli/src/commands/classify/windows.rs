@@ -1,5 +1,6 @@
 //! A prediction for each window of a recording or of an endless stream, or one from all of them.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use corsmal_extract::engine::Features;
@@ -63,7 +64,7 @@ pub fn run(
             });
             each.collect()
         });
-        if predictor.stop.load(Ordering::Relaxed) {
+        if predictor.stopped() {
             break;
         }
         for line in predicted.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten() {
@@ -86,7 +87,7 @@ struct Predictor<'a> {
     signals: Signals,
     windowing: Windowing,
     vote: Option<Rule>,
-    stop: &'static AtomicBool,
+    stop: &'static Arc<AtomicBool>,
 }
 
 /// Class and probabilities.
@@ -94,7 +95,11 @@ type Prediction = (usize, Option<Vec<f64>>);
 
 impl Predictor<'_> {
     fn end(&self) -> End {
-        if self.stop.load(Ordering::Relaxed) { End::Interrupted } else { End::Done }
+        if self.stopped() { End::Interrupted } else { End::Done }
+    }
+
+    fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
 
     /// Hands each line on as it comes, until there are no more or `each` says `false`.
@@ -112,14 +117,16 @@ impl Predictor<'_> {
             line: line(span, 0, error.status, None),
             reason: Some(error.reason),
         };
-        let mut windows = match Windows::open(input, &self.signals, self.windowing) {
+        let opened = Windows::open(input, &self.signals, self.windowing, self.stop);
+        let mut windows = match opened {
             Ok(windows) => windows,
+            Err(_) if self.stopped() => return Ok(()),
             Err(error) => return each(failed(None, error)).map(|_| ()),
         };
         let mut votes = WindowVotes::new(self.model.header().labels.len());
         let mut trouble = None;
         for window in &mut windows {
-            if self.stop.load(Ordering::Relaxed) {
+            if self.stopped() {
                 return Ok(());
             }
             let (span, features) = match window {
@@ -146,7 +153,7 @@ impl Predictor<'_> {
                 }
             }
         }
-        let Some(rule) = self.vote else { return Ok(()) };
+        let Some(rule) = self.vote.filter(|_| !self.stopped()) else { return Ok(()) };
         let found = match (rule.decide(&votes)?, trouble) {
             (None, Some(error)) => failed(None, error),
             (decision, _) => {

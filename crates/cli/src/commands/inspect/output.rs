@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use corsmal_extract::layout;
 use corsmal_extract::npz::NpzFile;
 use corsmal_extract::outcome::Outcome;
+use corsmal_extract::projection::Projection;
 use corsmal_extract::provenance::Provenance;
 use corsmal_extract::table::Table;
 use serde::Serialize;
@@ -28,6 +29,19 @@ pub struct Report {
     /// What only outputs of `extract` have.
     #[serde(flatten)]
     run: Option<Run>,
+    /// What only files of `pca` have.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    projection: Option<Projected>,
+}
+
+/// What a projection does.
+#[derive(Serialize)]
+struct Projected {
+    n_inputs: usize,
+    n_components: usize,
+    /// Of the features that it was fitted on.
+    config_hash: String,
+    rows: usize,
 }
 
 /// An array of an archive or a column of a table.
@@ -66,7 +80,13 @@ pub fn npz(path: &Path) -> Result<Report, Failed> {
         true => Some(Run::new(layout::read_table(&mut file)?)?),
         false => None,
     };
-    Ok(Report { path: path.display().to_string(), format: "npz", members, run })
+    let projection = Projection::load(path).ok().map(|p| Projected {
+        n_inputs: p.n_inputs(),
+        n_components: p.n_components(),
+        config_hash: p.fitted_on().0.to_owned(),
+        rows: p.fitted_on().1,
+    });
+    Ok(Report { path: path.display().to_string(), format: "npz", members, run, projection })
 }
 
 /// A summary table.
@@ -82,7 +102,8 @@ pub fn parquet(path: &Path) -> Result<Report, Failed> {
     let features = table.feature_names().iter().map(|name| column(name, "float32"));
     let members = std::iter::once(column("id", "text")).chain(labels).chain(features).collect();
     let path = path.display().to_string();
-    Ok(Report { path, format: "parquet", members, run: Some(Run::new(found)?) })
+    let run = Some(Run::new(found)?);
+    Ok(Report { path, format: "parquet", members, run, projection: None })
 }
 
 /// Prints what `read` finds in a file.
@@ -160,6 +181,13 @@ impl Report {
         lines.extend(whole.iter().map(row));
         if let Some(run) = &self.run {
             run.text(&mut lines);
+        }
+        if let Some(Projected { n_inputs, n_components, config_hash, rows }) = &self.projection {
+            lines.push(format!(
+                "\n  projection of {n_inputs} features to {n_components} components, fitted on {}\n  \
+                 of configuration {config_hash} (extract --project)",
+                plural(*rows, "row")
+            ));
         }
         lines.join("\n") + "\n"
     }

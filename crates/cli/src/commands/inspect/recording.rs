@@ -13,6 +13,7 @@ use serde::Serialize;
 use super::overview::Overview;
 use super::{Picture, PictureFormat, Refusal, to_json};
 use crate::failure::Failure;
+use corsmal_extract::draft;
 
 /// Frames read at once.
 const BLOCK: usize = 8192;
@@ -70,8 +71,7 @@ pub fn inspect(path: &Path, picture: Option<&Picture>, json: bool) -> Result<Exi
             PictureFormat::Png => to_png(&figure)?,
             PictureFormat::Svg => to_svg(&figure)?.into_bytes(),
         };
-        let failed = |e| Failure::new(format!("cannot write {}: {e}", picture.path.display()));
-        std::fs::write(&picture.path, bytes).map_err(failed)?;
+        draft::write(&picture.path, &bytes)?;
     }
     Ok(ExitCode::SUCCESS)
 }
