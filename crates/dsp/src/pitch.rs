@@ -98,7 +98,11 @@ impl PitchTracker {
         let kept = |s: T| if s > reference { s } else { T::zero() };
         let last = magnitude.len().saturating_sub(1);
         // The first bin is never a peak; the last one only has a left neighbour.
-        for k in self.first.max(1)..self.end.min(magnitude.len()) {
+        let (first, end) = (self.first.max(1), self.end.min(magnitude.len()));
+        // Most bins are far below the reference: many are looked at together.
+        let low = |bins: &[T]| bins.iter().fold(true, |low, s| low & (*s <= reference));
+        let blocks = (first..end).step_by(AT_ONCE).map(|k| k..end.min(k + AT_ONCE));
+        for k in blocks.filter(|bins| !low(&magnitude[bins.clone()])).flatten() {
             let (left, here) = (magnitude[k - 1], magnitude[k]);
             if here <= reference || here <= kept(left) {
                 continue;
@@ -123,6 +127,9 @@ impl PitchTracker {
         }
     }
 }
+
+/// Bins that are compared with the reference together.
+const AT_ONCE: usize = 16;
 
 /// Refuses spectrograms and references whose shapes are not those of the tracker.
 fn check<T>(
