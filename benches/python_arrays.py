@@ -2,7 +2,9 @@
 
     python benches/python_arrays.py [--channels 8] [--seconds 10] [--n-fft 2048] [--only REGEX]
 
-Both run on the same array in one process, in turns; the figures are medians.
+Both run on the same array in one process, each its calls in a row, after a rest: the BLAS threads
+behind librosa spin for a while after a call and would take a core from the next one. The figures
+are medians.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import statistics
 import time
 import warnings
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import corsmal_feat
@@ -64,14 +67,11 @@ def seconds(function: Callable[[], Any]) -> float:
     return time.perf_counter() - start
 
 
-def medians(case: Callable[[Any], Any], repeats: int) -> tuple[float, float]:
-    """Median seconds of corsmal_feat and of librosa, after one call of each that is not counted."""
-    modules = (corsmal_feat, librosa)
-    for module in modules:
-        case(module)
-    runs = [[seconds(lambda m=m: case(m)) for m in modules] for _ in range(repeats)]
-    ours, theirs = (statistics.median(column) for column in zip(*runs, strict=True))
-    return ours, theirs
+def median(function: Callable[[], Any], repeats: int) -> float:
+    """Median seconds after a rest and two calls that are not counted."""
+    time.sleep(0.5)
+    runs = [seconds(function) for _ in range(2 + repeats)]
+    return statistics.median(runs[2:])
 
 
 def main() -> None:
@@ -95,7 +95,8 @@ def main() -> None:
     print("| function | corsmal_feat, ms | librosa, ms | ratio |\n|---|---|---|---|")
     for name, case in cases(y, args.n_fft).items():
         if re.search(args.only, name):
-            ours, theirs = medians(case, args.repeats)
+            modules = (corsmal_feat, librosa)
+            ours, theirs = (median(partial(case, module), args.repeats) for module in modules)
             print(f"| `{name}` | {1e3 * ours:.1f} | {1e3 * theirs:.1f} | {theirs / ours:.1f} |")
 
 
