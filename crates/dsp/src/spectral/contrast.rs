@@ -193,13 +193,16 @@ fn mean_of_first<T: Real>(
     if count <= AT_ONCE {
         // The first of every column: at least `count` values do not follow the `count`-th of these.
         let mut columns = [last; AT_ONCE];
-        for block in values.chunks(AT_ONCE) {
-            for (first, x) in columns.iter_mut().zip(block) {
-                *first = if before(*x, *first) { *x } else { *first };
-            }
+        let (blocks, rest) = values.as_chunks::<AT_ONCE>();
+        let first = |a: T, b: T| if before(b, a) { b } else { a };
+        for block in blocks {
+            columns = std::array::from_fn(|i| first(columns[i], block[i]));
+        }
+        for (column, x) in columns.iter_mut().zip(rest) {
+            *column = first(*column, *x);
         }
         let bound = ranked(&[columns], count, last, &before);
-        for block in values.chunks(AT_ONCE) {
+        for block in blocks.iter().map(<[T; AT_ONCE]>::as_slice).chain([rest]) {
             // Most blocks hold nothing that may be among the first.
             if block.iter().fold(true, |none, x| none & before(bound, *x)) {
                 continue;

@@ -5,7 +5,7 @@ use corsmal_extract::npz::{Compression, NpzWriter};
 use ndarray::{Array3, Axis, s};
 use serde_json::Value;
 
-use crate::support::{Files, levels, npz, powers, text};
+use super::support::{Files, levels, npz, powers, text};
 
 /// The report on one array `x` of two values.
 fn report(a: &Array3<f32>, b: &Array3<f32>) -> Value {

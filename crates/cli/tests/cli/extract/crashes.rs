@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use crate::support::{extract, extraction, folder, names};
+use super::support::{extract, extraction, folder};
+use crate::command::names;
 
 /// Recordings that are done according to the ledger.
 fn done(out: &Path) -> usize {

@@ -6,7 +6,8 @@ use std::process::Stdio;
 
 use corsmal_extract::npz::NpzFile;
 
-use crate::support::{Ended, ended, extract, extraction, folder, names, table, tool, wav};
+use super::support::{Ended, ended, extract, extraction, folder, table, wav};
+use crate::command::{names, tool};
 
 fn bytes(path: &Path) -> Vec<u8> {
     std::fs::read(path).unwrap()

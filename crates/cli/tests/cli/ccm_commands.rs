@@ -1,17 +1,8 @@
 //! `synth`, `dataset check`, `evaluate` and `benchmark` as a user runs them.
 
-#![allow(clippy::unwrap_used, reason = "tests")]
-
 use std::path::Path;
-use std::process::{Command, Output};
 
-fn run(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_corsmal-feat")).args(arguments).output().unwrap()
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
-}
+use crate::command::{run, text};
 
 fn lines(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()

@@ -6,7 +6,8 @@ use std::process::Stdio;
 
 use corsmal_extract::outcome::Status;
 
-use crate::support::{Ended, ended, extract, extraction, folder, table, tool, wav};
+use super::support::{Ended, ended, extract, extraction, folder, table, wav};
+use crate::command::tool;
 
 #[test]
 fn a_reader_that_has_seen_enough_is_no_error() {

@@ -8,7 +8,7 @@ use corsmal_extract::engine::{Extractor, Features, Plan, Recording};
 use corsmal_extract::npz::NpzFile;
 use corsmal_extract::outcome::Status;
 
-use crate::support::{extract, table, wav};
+use super::support::{extract, table, wav};
 
 /// More than three spans (2^20 frames each).
 const FRAMES: usize = 3 * (1 << 20) + 54_321;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use corsmal_extract::outcome::{Outcome, Status};
 
-use crate::support::{extract, spec, table, wav};
+use super::support::{extract, spec, table, wav};
 
 /// Two good recordings and every kind of bad one.
 fn zoo(folder: &Path) -> PathBuf {

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use crate::support::{ended, extract, extraction, names, tool, wav};
+use super::support::{ended, extract, extraction, wav};
+use crate::command::{names, tool};
 
 /// The one message of a refused run, which must have these words.
 #[track_caller]
@@ -161,7 +162,7 @@ fn no_space_is_an_error_and_the_run_can_go_on() {
         println!("skipped: no ulimit");
         return;
     }
-    let folder = crate::support::folder(30);
+    let folder = super::support::folder(30);
     let input = folder.path().join("audio");
     wav(&input.join("long.wav"), 2, 420_000, 1);
     std::fs::create_dir(folder.path().join("full")).unwrap();

@@ -1,51 +1,15 @@
 //! `fuse` and `compare-predictions` as a user runs them.
 
-#![allow(clippy::unwrap_used, reason = "tests")]
-
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
 use serde_json::Value;
 
-fn run(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_corsmal-feat")).args(arguments).output().unwrap()
-}
-
-fn done(arguments: &[&str]) -> String {
-    let output = run(arguments);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {message}");
-    String::from_utf8(output.stdout).unwrap()
-}
-
-fn refused(arguments: &[&str]) -> String {
-    let output = run(arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-    assert!(output.stdout.is_empty());
-    message
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
-}
-
-/// A file of the reference data; `None`, with a message, where they are absent.
-fn shared(name: &str) -> Option<PathBuf> {
-    let root = std::env::var("CORSMAL_SHARED")
-        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared").to_string());
-    let path = Path::new(&root).join("data/ccm").join(name);
-    if !path.exists() {
-        eprintln!("skipped: {} absent", path.display());
-        return None;
-    }
-    Some(path)
-}
+use crate::command::{done, refused, run, shared, text};
 
 /// The command of docs/benchmark.md: type, level and capacity of every row are M5's.
 #[test]
 fn the_winning_submission_is_rebuilt() {
-    let Some(dir) = shared("m5_predictions") else { return };
+    let Some(dir) = shared("data/ccm/m5_predictions") else { return };
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("m5.csv");
     let file = |name: &str| dir.join(name).to_str().unwrap().to_string();

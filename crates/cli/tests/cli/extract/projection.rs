@@ -3,7 +3,8 @@
 use std::ffi::OsStr;
 use std::path::Path;
 
-use crate::support::{Ended, ended, extract, folder, names, table, tool};
+use super::support::{Ended, ended, extract, folder, table};
+use crate::command::{names, tool};
 
 fn pca(features: &Path, components: &str, out: &Path) -> Ended {
     let mut command = tool();

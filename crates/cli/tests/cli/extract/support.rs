@@ -2,11 +2,13 @@
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use corsmal_extract::layout;
 use corsmal_extract::npz::NpzFile;
 use corsmal_extract::table::Table;
+
+use crate::command::tool;
 
 /// How a run ended.
 pub struct Ended {
@@ -23,12 +25,6 @@ impl Ended {
         assert!(!self.stderr.contains("panicked"), "{}", self.stderr);
         self
     }
-}
-
-pub fn tool() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_corsmal-feat"));
-    command.env_remove("CORSMAL_FEAT_JOBS").stdin(Stdio::null());
-    command
 }
 
 pub fn ended(command: &mut Command) -> Ended {
@@ -94,13 +90,4 @@ pub fn folder(count: u32) -> tempfile::TempDir {
 /// The tables of an output.
 pub fn table(out: &Path) -> Table {
     layout::read_table(&mut NpzFile::open(out).unwrap()).unwrap().0
-}
-
-/// Names of the files of a folder.
-pub fn names(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<_> =
-        entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
 }

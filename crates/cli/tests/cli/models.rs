@@ -1,48 +1,11 @@
 //! `train`, `classify` and `cross-validate` as a user runs them.
 
-#![allow(clippy::unwrap_used, reason = "tests")]
-
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 use corsmal_extract::npz::{Compression, NpzWriter};
 use serde_json::Value;
 
-fn run(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_corsmal-feat")).args(arguments).output().unwrap()
-}
-
-fn done(arguments: &[&str]) -> String {
-    let output = run(arguments);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {message}");
-    String::from_utf8(output.stdout).unwrap()
-}
-
-/// The messages of a command that must not run: warnings, then one error.
-fn refused(arguments: &[&str]) -> String {
-    let output = run(arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-    let errors = message.lines().filter(|line| !line.starts_with("warning: "));
-    assert!(
-        errors.eq(message.lines().last().filter(|line| line.starts_with("error: "))),
-        "{message}"
-    );
-    message
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
-}
-
-fn names_in(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<_> =
-        entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.sort();
-    names
-}
+use crate::command::{done, names, refused, run, text};
 
 /// Synthetic recordings, their features and a label file.
 struct Recordings {
@@ -57,7 +20,7 @@ impl Recordings {
         this.extract("esc26", "feats.npz");
         let mut labels = String::from("path,type,level,container\n");
         for container in 1..=9 {
-            for name in names_in(&this.path(&format!("data/train/{container}/audio"))) {
+            for name in names(&this.path(&format!("data/train/{container}/audio"))) {
                 // s0_fi2_fu1_b0_l0_audio.wav: filling type 2, level 1
                 let path = this.path(&format!("data/train/{container}/audio/{name}"));
                 let (kind, level) = (&name[5..6], &name[9..10]);
@@ -101,7 +64,7 @@ fn from_recordings_to_predictions() {
         [&classify[..], &["--in", text(&audio), "--out", text(&out), "-q"]].concat();
     done(&by_recordings);
     assert_eq!(std::fs::read_to_string(&out).unwrap(), expected);
-    let left = names_in(r.folder.path());
+    let left = names(r.folder.path());
     assert_eq!(left, ["data", "feats.npz", "labels.csv", "out.csv", "type.model"]);
 
     std::fs::write(audio.join("1/audio/broken.wav"), "RIFF").unwrap();

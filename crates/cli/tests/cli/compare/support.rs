@@ -1,15 +1,13 @@
 //! Running the command on files made here.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 use corsmal_extract::npz::{Compression, NpzWriter};
 use ndarray::Array3;
 use serde_json::Value;
 
-pub fn tool(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_corsmal-feat")).args(args).output().unwrap()
-}
+use crate::command::run;
 
 pub fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
@@ -57,7 +55,7 @@ impl Files {
         let (a, b) = (self.path(a), self.path(b));
         let mut args = vec!["compare", a.to_str().unwrap(), b.to_str().unwrap()];
         args.extend(more);
-        tool(&args)
+        run(&args)
     }
 
     pub fn json(&self, a: &str, b: &str, more: &[&str]) -> Value {

@@ -1,42 +1,13 @@
 //! `classify` over windows: live streams, files, votes.
 
-#![allow(clippy::unwrap_used, reason = "tests")]
-
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use serde_json::Value;
 
-fn command(arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_corsmal-feat"));
-    command.args(arguments);
-    command
-}
-
-fn run(arguments: &[&str]) -> Output {
-    command(arguments).output().unwrap()
-}
-
-fn done(arguments: &[&str]) -> String {
-    let output = run(arguments);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {message}");
-    String::from_utf8(output.stdout).unwrap()
-}
-
-fn refused(arguments: &[&str]) -> String {
-    let output = run(arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-    assert!(output.stdout.is_empty());
-    message
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
-}
+use crate::command::{done, refused, run, text, tool};
 
 const RATE: usize = 8000;
 
@@ -112,7 +83,8 @@ fn a_line_comes_as_soon_as_its_window_is_complete() {
     let trained = Trained::new(&["--classifier", "knn", "--set", "k=3"]);
     let model = trained.path("m");
     let live = ["classify", "--model", text(&model), "--in", "-", "--window", "1", "--hop", "1"];
-    let mut child = command(&[&live[..], &["--format", "jsonl", "-q"]].concat())
+    let mut child = tool()
+        .args([&live[..], &["--format", "jsonl", "-q"]].concat())
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()
@@ -160,7 +132,8 @@ fn an_interrupted_stream_keeps_its_lines() {
     let trained = Trained::new(&["--classifier", "knn"]);
     let (model, out) = (trained.path("m"), trained.path("live.csv"));
     let live = ["classify", "--model", text(&model), "--in", "-", "--window", "1", "--hop", "1"];
-    let mut child = command(&[&live[..], &["--out", text(&out)]].concat())
+    let mut child = tool()
+        .args([&live[..], &["--out", text(&out)]].concat())
         .stdin(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -199,7 +172,7 @@ fn an_interrupt_is_heard_while_the_stream_is_silent() {
     let trained = Trained::new(&["--classifier", "knn"]);
     let model = trained.path("m");
     let live = ["classify", "--model", text(&model), "--in", "-", "--window", "1", "--hop", "1"];
-    let mut child = command(&live).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let mut child = tool().args(live).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
     let mut stdin = child.stdin.take().unwrap();
     stdin.write_all(&header()).unwrap();
     stdin.write_all(&pcm(&second(0))).unwrap();
@@ -232,7 +205,8 @@ fn memory_does_not_grow_with_the_stream() {
     let trained = Trained::new(&["--classifier", "knn"]);
     let model = trained.path("m");
     let live = ["classify", "--model", text(&model), "--in", "-", "--window", "1", "--hop", "5"];
-    let mut child = command(&[&live[..], &["-q"]].concat())
+    let mut child = tool()
+        .args([&live[..], &["-q"]].concat())
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()

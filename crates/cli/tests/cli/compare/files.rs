@@ -8,7 +8,8 @@ use corsmal_extract::npy::{DType, Header};
 use corsmal_extract::npz::{Compression, NpzWriter};
 use serde_json::{Value, json};
 
-use crate::support::{Files, levels, npz, powers, text, tool};
+use super::support::{Files, levels, npz, powers, text};
+use crate::command::run;
 
 /// Two channels of noise and a chirp, a second at 16 kHz; the second channel is 30 dB lower.
 fn recording(path: &Path, seed: u64) {
@@ -43,8 +44,8 @@ fn extract(files: &Files, out: &str, more: &[&str]) {
     let out = files.path(out);
     let mut args = vec!["extract", "--in", audio.to_str().unwrap(), "--out", out.to_str().unwrap()];
     args.extend(more);
-    let run = tool(&args);
-    assert!(run.status.success(), "{}", text(&run.stderr));
+    let ended = run(&args);
+    assert!(ended.status.success(), "{}", text(&ended.stderr));
 }
 
 fn kinds(report: &Value, feature: &str) -> Vec<String> {

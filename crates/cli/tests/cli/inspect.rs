@@ -1,14 +1,12 @@
 //! `corsmal-feat inspect` from outside.
 
-// Helper functions of tests may unwrap as tests do.
-#![allow(clippy::unwrap_used)]
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use crate::command::tool;
+
 fn inspect(args: &[&Path]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_corsmal-feat"));
-    command.arg("inspect").args(args).output().unwrap()
+    tool().arg("inspect").args(args).output().unwrap()
 }
 
 fn text(bytes: &[u8]) -> String {

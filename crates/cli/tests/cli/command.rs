@@ -1,0 +1,65 @@
+//! Running the command.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+/// The command, without anything of the tests' own environment.
+pub fn tool() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_corsmal-feat"));
+    command.env_remove("CORSMAL_FEAT_JOBS").stdin(Stdio::null());
+    command
+}
+
+pub fn run(arguments: &[&str]) -> Output {
+    tool().args(arguments).output().unwrap()
+}
+
+/// What a command prints that must succeed.
+#[track_caller]
+pub fn done(arguments: &[&str]) -> String {
+    let output = run(arguments);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {message}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The messages of a command that must not run: warnings, then one error.
+#[track_caller]
+pub fn refused(arguments: &[&str]) -> String {
+    let output = run(arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+    assert!(output.stdout.is_empty());
+    let errors = message.lines().filter(|line| !line.starts_with("warning: "));
+    assert!(
+        errors.eq(message.lines().last().filter(|line| line.starts_with("error: "))),
+        "{message}"
+    );
+    message
+}
+
+/// A path as an argument.
+pub fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// Names of the files of a folder.
+pub fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<_> =
+        entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+/// A file of the reference data; `None`, with a message, where they are absent.
+pub fn shared(name: &str) -> Option<PathBuf> {
+    let root = std::env::var("CORSMAL_SHARED")
+        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared").to_string());
+    let path = Path::new(&root).join(name);
+    if !path.exists() {
+        eprintln!("skipped: {} absent", path.display());
+        return None;
+    }
+    Some(path)
+}

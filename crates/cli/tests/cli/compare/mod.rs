@@ -1,0 +1,5 @@
+//! `corsmal-feat compare` from outside.
+
+mod causes;
+mod files;
+mod support;

@@ -1,0 +1,13 @@
+//! `corsmal-feat` from outside, as a user runs it.
+
+// Helper functions of tests may unwrap as tests do.
+#![allow(clippy::unwrap_used)]
+
+mod ccm_commands;
+mod command;
+mod compare;
+mod extract;
+mod fusion;
+mod inspect;
+mod live;
+mod models;
