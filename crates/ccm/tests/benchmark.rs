@@ -155,6 +155,40 @@ fn flat_test_recordings_are_submitted_by_id() {
     assert!(!out.join("submissions/zcr-mfcc-knn-corrected-public-test.csv").exists());
 }
 
+/// The published code fits components to the test recordings: of one recording there are none.
+#[test]
+fn a_test_part_of_one_recording_is_classified() {
+    let dir = tempfile::tempdir().unwrap();
+    let data = dir.path().join("data");
+    synth::generate(&data, Size::Small, 5).unwrap();
+    let test = data.join("test_pub/audio");
+    std::fs::create_dir_all(&test).unwrap();
+    let from = data.join("train/1/audio/s0_fi1_fu1_b1_l0_audio.wav");
+    std::fs::copy(from, test.join("000000.wav")).unwrap();
+    let out = dir.path().join("report");
+    let knn = Baseline::all().into_iter().filter(|b| b.slug() == "spectrogram-pca-knn").collect();
+    let options =
+        Options { data, out: out.clone(), baselines: knn, added: Vec::new(), jobs: 2, seed: 1 };
+    run(&options).unwrap();
+    for variant in ["published", "corrected"] {
+        let name = format!("submissions/spectrogram-pca-knn-{variant}-public-test-2022.csv");
+        assert_eq!(std::fs::read_to_string(out.join(name)).unwrap().lines().count(), 2);
+    }
+}
+
+#[test]
+fn one_name_is_not_added_twice() {
+    let options = Options {
+        data: "nowhere".into(),
+        out: "nowhere".into(),
+        baselines: Vec::new(),
+        added: vec![("x".into(), "a.csv".into()), ("x".into(), "b.csv".into())],
+        jobs: 1,
+        seed: 1,
+    };
+    assert_eq!(run(&options).unwrap_err().to_string(), "x: added twice, names must differ");
+}
+
 #[test]
 fn an_unusable_file_to_add_stops_before_the_work() {
     let dir = tempfile::tempdir().unwrap();

@@ -171,8 +171,12 @@ impl Baseline {
         let components =
             least.chain([matrices.training.nrows()]).min().unwrap_or(1).min(COMPONENTS);
         let reduce = |x: ArrayView2<'_, f64>| -> std::result::Result<Array2<f64>, ModelError> {
-            if !self.pca || x.nrows() <= 1 {
+            if !self.pca {
                 return Ok(x.to_owned());
+            }
+            if x.nrows() <= 1 {
+                // One recording is its own mean: it lies at the origin.
+                return Ok(Array2::zeros((x.nrows(), components)));
             }
             pca(components).fit(x)?.transform(x)
         };

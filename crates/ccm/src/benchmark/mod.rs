@@ -10,6 +10,7 @@ mod results;
 mod sections;
 mod tables;
 
+use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -51,6 +52,10 @@ pub struct Options {
 /// [`crate::CcmError`] when the data set has no labelled training recordings, when a file to add is
 /// unusable, when a recording cannot be read, when something cannot be written, and when stopped.
 pub fn run(options: &Options, progress: &dyn Fn(&str), stop: &Arc<AtomicBool>) -> Result<Report> {
+    let mut names = HashSet::new();
+    if let Some((name, _)) = options.added.iter().find(|(name, _)| !names.insert(name)) {
+        return Err(CcmError::Request(format!("{name}: added twice, names must differ")));
+    }
     let added = options
         .added
         .iter()

@@ -38,6 +38,14 @@ pub fn refused(arguments: &[&str]) -> String {
     message
 }
 
+/// Largest memory of a running process so far, in KiB; `None` once it has ended.
+#[cfg(target_os = "linux")]
+pub fn peak_memory(process: &std::process::Child) -> Option<u64> {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", process.id())).ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    line.split_whitespace().nth(1)?.parse().ok()
+}
+
 /// A path as an argument.
 pub fn text(path: &Path) -> &str {
     path.to_str().unwrap()

@@ -7,6 +7,8 @@ use std::time::Duration;
 
 use serde_json::Value;
 
+#[cfg(target_os = "linux")]
+use crate::command::peak_memory;
 use crate::command::{done, refused, run, text, tool};
 
 const RATE: usize = 8000;
@@ -230,9 +232,7 @@ fn memory_does_not_grow_with_the_stream() {
     let mut peak = 0;
     for _ in 0..480 {
         stdin.write_all(&block).unwrap();
-        let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
-        let line = status.lines().find(|l| l.starts_with("VmHWM:")).unwrap();
-        peak = line.split_whitespace().nth(1).unwrap().parse::<u64>().unwrap().max(peak);
+        peak = peak_memory(&child).unwrap().max(peak);
     }
     drop(stdin);
     assert!(child.wait().unwrap().success());

@@ -84,3 +84,30 @@ fn long_recordings() {
         assert!(std::fs::read(&a).unwrap() == std::fs::read(&b).unwrap(), "{set}");
     }
 }
+
+/// Memory stays flat, finished values included: 512 MiB of eight channels, most of it a hole.
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_does_not_grow_with_the_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let sparse = wav(&at("sparse.wav"), 8, 1000, 3);
+    let length = 512_u32 << 20;
+    let mut bytes = std::fs::read(&sparse).unwrap();
+    let data = bytes.windows(4).position(|name| name == b"data").unwrap() + 8;
+    bytes[data - 4..data].copy_from_slice(&length.to_le_bytes());
+    bytes[4..8].copy_from_slice(&(length + data as u32 - 8).to_le_bytes());
+    std::fs::write(&sparse, bytes).unwrap();
+    let file = std::fs::OpenOptions::new().write(true).open(&sparse).unwrap();
+    file.set_len(data as u64 + u64::from(length)).unwrap();
+    let more = ["--preset", "mfcc-zcr", "--jobs", "2"];
+    let mut run = super::support::extraction(&sparse, &at("out.npz"), &more).spawn().unwrap();
+    let mut peak = 0;
+    while run.try_wait().unwrap().is_none() {
+        peak = crate::command::peak_memory(&run).unwrap_or(0).max(peak);
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    assert!(run.wait().unwrap().success());
+    assert!(table(&at("out.npz")).values().iter().all(|x| x.is_finite()));
+    assert!((1..150 << 10).contains(&peak), "{peak} KiB");
+}
