@@ -29,6 +29,7 @@ from sklearn.neighbors import KNeighborsClassifier
 from sklearn.svm import SVC
 
 SHAPES = ((684, 136), (684, 9216), (10_000, 193))
+STEPS = ("fit", "predict", "both")
 #: name, scikit-learn's, ours
 PAIRS: dict[str, tuple[Callable[[], Any], Callable[[], Any]]] = {
     "knn": (lambda: KNeighborsClassifier(5, n_jobs=2), lambda: ours.KNN(5)),
@@ -81,12 +82,11 @@ def main() -> None:
             for _ in range(arguments.repeats):
                 for side, make in enumerate(PAIRS[name]):
                     model = make()
-                    for step, work in (
-                        ("fit", lambda m=model, x=x, y=y: m.fit(x, y)),
-                        ("predict", lambda m=model, x=x: m.predict(x)),
-                    ):
-                        taken.setdefault((step, side), []).append(seconds(work))
-            for step in ("fit", "predict"):
+                    fit = seconds(lambda m=model, x=x, y=y: m.fit(x, y))
+                    predict = seconds(lambda m=model, x=x: m.predict(x))
+                    for step, value in zip(STEPS, (fit, predict, fit + predict), strict=True):
+                        taken.setdefault((step, side), []).append(value)
+            for step in STEPS:
                 theirs, own = (statistics.median(taken[step, side]) for side in (0, 1))
                 print(
                     f"| {shape[0]:,} x {shape[1]:,} | {name} | {step} | {theirs:.4f} | {own:.4f} |"
