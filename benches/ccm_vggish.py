@@ -1,4 +1,4 @@
-"""Inputs for filling level from VGGish sequences (one vector each 0.96 s) and A34F.
+"""Inputs for filling type and level from VGGish sequences (one vector each 0.96 s) and A34F.
 
 What tells half from full in a recording: how long the filling flows, and how its sound has changed
 when it stops (the resonance of the container rises with the filling). So besides plain pooling
@@ -12,11 +12,12 @@ from __future__ import annotations
 import csv
 import itertools
 import pathlib
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from corsmal_feat.classifiers import ExtraTrees
-from stacking import Labels, Matrix, held_out
+from corsmal_feat.classifiers import SVC, ExtraTrees
+from stacking import Labels, Matrix, Model, Ranked, held_out
 
 PATCH_SECONDS = 0.96
 #: part of the container that is filled at each level
@@ -25,6 +26,10 @@ FILLED = np.array([0.0, 0.5, 0.9])
 SHAKEN = (7, 8, 9)
 #: width of a class of filling, in parts of the container
 STEP = 0.225
+PATCH_MODELS: tuple[Callable[[], Model], ...] = (
+    lambda: ExtraTrees(200, max_features=0.1, min_samples_leaf=2, random_state=0),
+    lambda: Ranked(SVC(C=3, probability=True, random_state=0)),
+)
 
 
 @dataclass
@@ -115,7 +120,7 @@ def patch_inputs(recordings: Recordings) -> Matrix:
 
 
 def patch_probabilities(
-    recordings: Recordings, train: Labels, test: Labels
+    recordings: Recordings, train: Labels, test: Labels, make: Callable[[], Model]
 ) -> tuple[Matrix, Matrix]:
     """Probabilities of `patch_labels` for every patch: of training containers by models of the
     other training containers, of the rest by models of all training containers."""
@@ -127,10 +132,10 @@ def patch_probabilities(
     for y, n_classes in zip(patch_labels(recordings), (4, 5), strict=True):
 
         def fit_predict(a: Labels, b: Labels, y: Labels = y, n: int = n_classes) -> Matrix:
-            model = ExtraTrees(200, max_features=0.1, min_samples_leaf=2, random_state=0)
+            model = make()
             model.fit(x[a], y[a])
             proba = np.zeros((len(b), n))
-            proba[:, model.classes_] = model.predict_proba(x[b])
+            proba[:, np.unique(y[a])] = model.predict_proba(x[b])
             return proba
 
         proba = np.zeros((len(x), n_classes))
@@ -141,7 +146,8 @@ def patch_probabilities(
 
 
 def progress(content: Matrix, filling: Matrix) -> Matrix:
-    """Durations, extremes and trend of what the patch models heard in one recording."""
+    """Evidence for each type, durations, extremes and trend of what the patch models heard in one
+    recording."""
     active = 1 - content[:, 0]
     total = active.sum() + 1e-9
     time = np.arange(len(active)) * PATCH_SECONDS
@@ -157,6 +163,9 @@ def progress(content: Matrix, filling: Matrix) -> Matrix:
         [
             content[:, 1:].sum(axis=0),
             content[:, 1:].max(axis=0),
+            content[:, 1:].sum(axis=0) / total,
+            active @ np.log(content[:, 1:] + 0.01) / total,
+            [active.min(), active.max()],
             filling[:, 1:].sum(axis=0),
             filling[:, 1:].max(axis=0),
             [total, np.log(total + 0.5), np.sqrt((active * (time - centre) ** 2).sum() / total)],
@@ -180,19 +189,16 @@ def over_activity(sequence: Matrix, active: Matrix) -> Matrix:
 def inputs(recordings: Recordings, train: Labels, test: Labels) -> dict[str, Matrix]:
     """Inputs of all recordings by name; patch models are fitted on `train` alone."""
     sequences = recordings.sequences()
-    content, filling = patch_probabilities(recordings, train, test)
     spans = [slice(a, b) for a, b in itertools.pairwise(recordings.offsets)]
-    steps = np.array([progress(content[s], filling[s]) for s in spans])
-    active = np.array(
-        [
-            over_activity(seq, 1 - content[span, 0])
-            for seq, span in zip(sequences, spans, strict=True)
-        ]
-    )
-    thirds, fifths = (np.array([equal_parts(s, n) for s in sequences]) for n in (3, 5))
+    heard = [patch_probabilities(recordings, train, test, make) for make in PATCH_MODELS]
+    steps = [
+        np.array([progress(content[s], filling[s]) for s in spans]) for content, filling in heard
+    ]
+    active = 1 - heard[0][0][:, 0]
+    over = [over_activity(q, active[s]) for q, s in zip(sequences, spans, strict=True)]
+    table = np.hstack([recordings.a34f, *steps])
     return {
-        "thirds": np.hstack([recordings.a34f, thirds]),
-        "fifths": np.hstack([recordings.a34f, fifths]),
-        "progress": np.hstack([recordings.a34f, steps]),
-        "activity": np.hstack([recordings.a34f, steps, active]),
+        "progress": table,
+        "activity": np.hstack([table, over]),
+        "thirds": np.hstack([table, [equal_parts(sequence, 3) for sequence in sequences]]),
     }

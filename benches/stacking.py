@@ -42,6 +42,29 @@ class Standardized:
         return self.classifier.predict_proba((x - self.mean) / self.scale)
 
 
+class Ranked:
+    """A classifier of ranks: each feature is replaced by its place among the training rows, from -1
+    to 1, so that no recording lies far outside in any of them."""
+
+    def __init__(self, classifier: Model) -> None:
+        self.classifier = classifier
+
+    def _ranks(self, x: Matrix) -> Matrix:
+        places = [
+            np.searchsorted(known, column, "left") + np.searchsorted(known, column, "right")
+            for known, column in zip(self.known, x.T, strict=True)
+        ]
+        return np.stack(places, axis=1) / self.known.shape[1] - 1
+
+    def fit(self, x: Matrix, y: Labels) -> Ranked:
+        self.known = np.sort(x, axis=0).T
+        self.classifier.fit(self._ranks(x), y)
+        return self
+
+    def predict_proba(self, x: Matrix) -> Matrix:
+        return self.classifier.predict_proba(self._ranks(x))
+
+
 def weighted_f1(truth: Labels, predicted: Labels) -> float:
     """F1 of each class weighted by its rows."""
     total = 0.0
