@@ -41,6 +41,12 @@ pub trait BlockSource: Send {
     /// The source cannot seek, or the system refuses.
     fn seek(&mut self, frame: u64) -> Result<(), AudioError>;
 
+    /// Frames that are there at most, as far as known without reading them: what the header says,
+    /// and where the format allows it no more than the file has bytes for.
+    fn most_frames(&self) -> Option<u64> {
+        self.spec().declared_frames
+    }
+
     /// The byte of the file at which `frame` begins, where frames lie side by side in it.
     fn byte_of(&self, _frame: u64) -> Option<u64> {
         None

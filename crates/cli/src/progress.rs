@@ -23,6 +23,8 @@ pub enum LogFormat {
 /// Progress of a run on standard error.
 pub struct Meter {
     format: LogFormat,
+    /// Only recordings without features are told.
+    quiet: bool,
     bar: ProgressBar,
     started: Instant,
     /// Seconds of audio read.
@@ -30,18 +32,18 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// Draws a bar only on a terminal.
-    pub fn new(format: LogFormat) -> Self {
+    /// Draws a bar only on a terminal, and only where not `quiet`.
+    pub fn new(format: LogFormat, quiet: bool) -> Self {
         let target = match format {
-            LogFormat::Text => ProgressDrawTarget::stderr_with_hz(8),
-            LogFormat::Json => ProgressDrawTarget::hidden(),
+            LogFormat::Text if !quiet => ProgressDrawTarget::stderr_with_hz(8),
+            _ => ProgressDrawTarget::hidden(),
         };
         let bar = ProgressBar::with_draw_target(None, target);
         let template = "{bar:30} {pos}/{len} files, {per_sec}, {msg}, ETA {eta}";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
-        Self { format, bar, started: Instant::now(), seconds: Mutex::new(0.0) }
+        Self { format, quiet, bar, started: Instant::now(), seconds: Mutex::new(0.0) }
     }
 
     fn line(&self, text: &str) {
@@ -50,6 +52,9 @@ impl Meter {
 
     /// The one line of a run that was only checked.
     pub fn checked(&self, inputs: usize, config_hash: &str) {
+        if self.quiet {
+            return;
+        }
         match self.format {
             LogFormat::Json => {
                 let line = json!({
@@ -76,6 +81,9 @@ impl Meter {
     /// The last lines of a run.
     pub fn finish(&self, report: &Report, out: &Path) {
         self.bar.finish_and_clear();
+        if self.quiet {
+            return;
+        }
         let elapsed = self.started.elapsed();
         let seconds = *self.seconds.lock().unwrap_or_else(|e| e.into_inner());
         let statuses = counts(&report.outcomes);
@@ -118,7 +126,7 @@ impl Progress for Meter {
     fn start(&self, inputs: usize, done: usize) {
         self.bar.set_length(inputs as u64);
         self.bar.set_position(done as u64);
-        if self.format == LogFormat::Json {
+        if self.format == LogFormat::Json && !self.quiet {
             eprintln!("{}", json!({"event": "started", "inputs": inputs, "resumed": done}));
         }
     }
@@ -133,6 +141,9 @@ impl Progress for Meter {
         self.bar.inc(1);
         let speed = total / self.started.elapsed().as_secs_f64().max(1e-9);
         self.bar.set_message(format!("{speed:.0} x real time"));
+        if self.quiet && outcome.status.has_features() {
+            return;
+        }
         match self.format {
             LogFormat::Json => {
                 let value = serde_json::to_value(outcome).unwrap_or_default();
@@ -146,6 +157,9 @@ impl Progress for Meter {
     }
 
     fn warning(&self, message: &str) {
+        if self.quiet {
+            return;
+        }
         match self.format {
             LogFormat::Text => self.line(&format!("warning: {message}")),
             LogFormat::Json => {

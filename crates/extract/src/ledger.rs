@@ -154,12 +154,17 @@ impl Ledger {
     }
 
     /// Continues an interrupted run, or starts one if there is none, and returns what is done: the
-    /// records up to the first that is torn or whose entries [`sound_entries`] does not find.
+    /// records up to the first that is torn, or whose entries [`sound_entries`] does not find, or
+    /// that does not `hold` any more (given its number).
     ///
     /// # Errors
     /// As [`Ledger::create`]; [`LedgerError::Differs`] when the interrupted run is another one;
     /// [`LedgerError::Header`] when the file is no ledger.
-    pub fn resume(out: &Path, header: &Header) -> Result<(Self, Vec<Record>), LedgerError> {
+    pub fn resume(
+        out: &Path,
+        header: &Header,
+        hold: impl Fn(usize, &Record) -> bool,
+    ) -> Result<(Self, Vec<Record>), LedgerError> {
         let mut ledger = Self::lock(out)?;
         let mut lines = Lines::new(&ledger.file);
         let records = match lines.next().map_err(|e| ledger.io(e))? {
@@ -178,6 +183,8 @@ impl Ledger {
                     ends.push(lines.at);
                 }
                 records.truncate(sound_records(&part_path(out), &records)?);
+                let changed = records.iter().enumerate().position(|(i, r)| !hold(i, r));
+                records.truncate(changed.unwrap_or(records.len()));
                 ledger.cut(ends[records.len()])?;
                 return Ok((ledger, records));
             }

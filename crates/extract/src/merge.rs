@@ -160,6 +160,11 @@ fn join<F>(
     for (index, piece) in pieces.into_iter().enumerate() {
         let shard = Shard { index, count }.to_string();
         let expected = Provenance { shard: shard.clone(), ..first.clone() };
+        let of = piece.provenance.shard.parse::<Shard>().map_or(count, |s| s.count);
+        if of != count {
+            let (expected, actual) = (format!("all {of} shards"), format!("{count}"));
+            return Err(not_one_run(&piece.path, expected, actual));
+        }
         if piece.provenance.shard != shard {
             return Err(not_one_run(&piece.path, format!("shard {shard}"), piece.provenance.shard));
         }

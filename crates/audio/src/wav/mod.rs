@@ -150,6 +150,10 @@ impl BlockSource for WavSource {
         Ok(())
     }
 
+    fn most_frames(&self) -> Option<u64> {
+        self.data_len.map(|len| len / self.frame_bytes as u64)
+    }
+
     fn byte_of(&self, frame: u64) -> Option<u64> {
         frame.checked_mul(self.frame_bytes as u64)?.checked_add(self.data_start)
     }

@@ -93,9 +93,7 @@ impl Store<'_> {
         let report = match extract(false) {
             Err(RunError::Interrupted) => return Err(CcmError::Interrupted),
             // Kept features of other recordings, or of an earlier version, are of no use.
-            Err(RunError::Exists { .. } | RunError::Changed { .. } | RunError::Ledger(_)) => {
-                extract(true)
-            }
+            Err(RunError::Exists { .. } | RunError::Ledger(_)) => extract(true),
             done => done,
         };
         let report = match report {

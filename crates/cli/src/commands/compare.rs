@@ -1,6 +1,5 @@
 //! `corsmal-feat compare`: how two feature files differ, and why they probably do.
 
-use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -77,7 +76,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         true => serde_json::to_string_pretty(&report)? + "\n",
         false => text(&report),
     };
-    std::io::stdout().write_all(text.as_bytes())?;
+    print!("{text}");
     for refused in &report.refused {
         eprintln!("not compared: {} ({})", refused.array, refused.reason);
     }

@@ -103,7 +103,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         ),
     ];
     for (about, words) in steps {
-        println!("\n# {about}\n$ corsmal-feat {}", words.join(" "));
+        println!("\n# {about}\n$ corsmal-feat {}", shown(words));
         let words = std::iter::once("corsmal-feat").chain(words.iter().copied());
         let cli = Cli::try_parse_from(words).map_err(|e| Failure::new(e.to_string()))?;
         let code = cli.command.run()?;
@@ -120,4 +120,27 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         started.elapsed().as_secs_f64(),
     );
     Ok(ExitCode::SUCCESS)
+}
+
+/// A command that a shell takes back.
+fn shown(words: &[&str]) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./,=:+@%".contains(c);
+    let quoted = words.iter().map(|word| {
+        if !word.is_empty() && word.chars().all(plain) {
+            (*word).to_owned()
+        } else {
+            format!("'{}'", word.replace('\'', r"'\''"))
+        }
+    });
+    quoted.collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_with_spaces_are_quoted() {
+        assert_eq!(shown(&["inspect", "de mo/it's.npz"]), r"inspect 'de mo/it'\''s.npz'");
+    }
 }

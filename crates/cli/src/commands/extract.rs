@@ -8,7 +8,7 @@ use std::sync::Arc;
 use corsmal_extract::config::Config;
 use corsmal_extract::inputs::{self, Shard};
 use corsmal_extract::npz::Compression;
-use corsmal_extract::run::{self, Options, Progress, Quiet, RunError};
+use corsmal_extract::run::{self, Options, RunError};
 use serde_json::json;
 
 use crate::failure::{COULD_NOT_RUN, FAILED_FILES, Failure, INTERRUPTED};
@@ -43,7 +43,7 @@ pub struct Args {
     #[arg(long, value_name = "I/N", default_value = "0/1")]
     shard: Shard,
     /// Continue an interrupted run.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
     /// Replace an existing output, forget an interrupted run.
     #[arg(long)]
@@ -133,24 +133,19 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
         overwrite: args.overwrite,
         max_errors: if args.strict { Some(0) } else { args.max_errors },
     };
-    let meter = (!args.quiet).then(|| Meter::new(args.log_format));
+    let meter = Meter::new(args.log_format, args.quiet);
     if args.dry_run {
-        run::check_output(&options.out, &config)?;
+        run::check(&found, &config, &options)?;
         let inputs = options.shard.of(&found);
         for input in inputs {
             println!("{}\t{}", input.id, input.source);
         }
-        if let Some(meter) = meter {
-            meter.checked(inputs.len(), &config.hash());
-        }
+        meter.checked(inputs.len(), &config.hash());
         return Ok(ExitCode::SUCCESS);
     }
-    let progress: &dyn Progress = meter.as_ref().map_or(&Quiet, |meter| meter);
-    match run::run(&found, &config, &options, progress, crate::interrupt::flag()) {
+    match run::run(&found, &config, &options, &meter, crate::interrupt::flag()) {
         Ok(report) => {
-            if let Some(meter) = &meter {
-                meter.finish(&report, &options.out);
-            }
+            meter.finish(&report, &options.out);
             Ok(if report.failed() > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
         }
         Err(error @ RunError::Interrupted) => {
@@ -158,7 +153,9 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
             Ok(ExitCode::from(INTERRUPTED))
         }
         Err(error @ RunError::TooManyErrors { .. }) => {
-            let message = format!("{error}; --resume continues the run");
+            let message = format!(
+                "{error}; --resume continues the run, once they are repaired or more are allowed"
+            );
             Meter::stopped(args.log_format, "error", &message);
             Ok(ExitCode::from(FAILED_FILES))
         }

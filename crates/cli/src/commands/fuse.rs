@@ -91,8 +91,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let fused = args.fused(&args.predictions, args.weights.as_deref())?;
     let bytes = table(&fused)?;
     if to_stdout {
-        use std::io::Write;
-        std::io::stdout().write_all(&bytes)?;
+        print!("{}", String::from_utf8_lossy(&bytes));
     } else {
         draft::write(&args.out, &bytes)?;
     }

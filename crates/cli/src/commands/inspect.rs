@@ -16,7 +16,7 @@ use crate::failure::{FAILED_FILES, Failure};
 /// Arguments of `inspect`.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  corsmal-feat inspect recording.wav --picture recording.png\n  corsmal-feat inspect feats.npz --json\n\nOf a recording: format, health, picture. Of an output of `extract`: contents, configuration, outcomes;\nof any other .npz: its members.\n\nClipping: at least three successive samples at the channel's own peak. Silence: share of 20 ms blocks\nbelow -60 dBFS. Exit code 1: the file cannot be read."
+    after_help = "Examples:\n  corsmal-feat inspect recording.wav --picture recording.png\n  corsmal-feat inspect feats.npz --json\n\nOf a recording: format, health, picture. Of an output of `extract`: contents, configuration, outcomes;\nof any other .npz: its members.\n\nClipping: at least three successive samples at the channel's own peak. Silence: share of 20 ms blocks\nbelow -60 dBFS. Exit code 1: its content cannot be read."
 )]
 pub struct Args {
     /// The file; its content decides what it is, not its name.

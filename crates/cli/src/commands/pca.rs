@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use corsmal_extract::draft;
 use corsmal_extract::projection::Projection;
 
 use crate::failure::Failure;
@@ -42,6 +43,9 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         return Err(Failure::new(format!("{}: must end in .npz", args.out.display())));
     }
     publish::check(&args.out, args.overwrite)?;
+    if draft::same(&args.features, &args.out) {
+        return Err(Failure::new(format!("{}: would replace the features", args.out.display())));
+    }
     let projection = Projection::fit(&args.features, args.n_components)?;
     projection.save(&args.out)?;
     if !args.quiet {

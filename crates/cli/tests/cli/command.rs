@@ -30,11 +30,9 @@ pub fn refused(arguments: &[&str]) -> String {
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
     assert!(output.stdout.is_empty());
-    let errors = message.lines().filter(|line| !line.starts_with("warning: "));
-    assert!(
-        errors.eq(message.lines().last().filter(|line| line.starts_with("error: "))),
-        "{message}"
-    );
+    let mut rest = message.lines().skip_while(|line| line.starts_with("warning: "));
+    assert!(rest.next().is_some_and(|line| line.starts_with("error: ")), "{message}");
+    assert!(!rest.any(|line| line.starts_with("error: ")), "{message}");
     message
 }
 

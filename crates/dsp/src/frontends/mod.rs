@@ -24,7 +24,7 @@ use ndarray::{Array1, Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
 use crate::decibel::Decibel;
-use crate::error::Result;
+use crate::error::{DspError, Result};
 pub use crate::librosa::LibrosaVersion;
 use crate::mono::to_mono;
 use crate::real::Real;
@@ -42,8 +42,16 @@ pub enum Variant {
     Paper,
 }
 
+/// Largest ratio of resampling: a header that says 1 Hz would turn a small file into billions of
+/// samples.
+pub const MAX_EXPANSION: f64 = 100.0;
+
 /// Mean over the channels at `target_sr` (librosa `load` with `mono=True`).
 fn mono_at(y: ArrayView2<f32>, sr: f64, target_sr: f64, res_type: ResType) -> Result<Array1<f32>> {
+    if target_sr > sr * MAX_EXPANSION {
+        let allowed = format!("at least {} Hz", target_sr / MAX_EXPANSION);
+        return Err(DspError::parameter("sr", sr, allowed));
+    }
     let mono = to_mono(y)?.insert_axis(Axis(0));
     Ok(resample(mono.view(), sr, target_sr, res_type, true, false)?.remove_axis(Axis(0)))
 }

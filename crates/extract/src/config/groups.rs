@@ -56,11 +56,12 @@ impl StftSpec {
 }
 
 /// Longest transform; bounds the memory of windows and filter banks.
-const MAX_N_FFT: usize = 1 << 18;
+pub(crate) const MAX_N_FFT: usize = 1 << 18;
 /// Longest frame of the waveform.
 const MAX_FRAME: usize = 1 << 24;
 
-fn at_most(name: &'static str, value: usize, limit: usize) -> corsmal_dsp::Result<()> {
+/// Refuses values above `limit`.
+pub(crate) fn at_most(name: &'static str, value: usize, limit: usize) -> corsmal_dsp::Result<()> {
     if value <= limit {
         return Ok(());
     }
@@ -113,6 +114,28 @@ pub enum TopDb {
     None,
 }
 
+/// Unit of the output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Scale {
+    /// As computed.
+    #[default]
+    Linear,
+    /// `10 log10` (librosa.power_to_db).
+    PowerToDb,
+    /// `20 log10` (librosa.amplitude_to_db): values, reference and smallest value are squared first.
+    AmplitudeToDb,
+}
+
+/// Smallest value told apart from zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Amin {
+    /// This one.
+    Value(f64),
+    /// librosa's default for the scale: 1e-10 of a power, 1e-5 of an amplitude.
+    Auto,
+}
+
 /// A number or one word.
 fn number_or_word<'de, D: Deserializer<'de>>(d: D, word: &str) -> Result<Option<f64>, D::Error> {
     #[derive(Deserialize)]
@@ -158,6 +181,21 @@ impl<'de> Deserialize<'de> for TopDb {
     }
 }
 
+impl Serialize for Amin {
+    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Value(v) => s.serialize_f64(*v),
+            Self::Auto => s.serialize_str("auto"),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Amin {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        Ok(number_or_word(d, "auto")?.map_or(Self::Auto, Self::Value))
+    }
+}
+
 /// Conversion to decibels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -165,8 +203,8 @@ pub struct DbSpec {
     /// Value (or `"max"`) that becomes 0 dB.
     #[serde(rename = "ref")]
     pub reference: DbRef,
-    /// Smallest power told apart from zero.
-    pub amin: f64,
+    /// Smallest value told apart from zero, in the unit of the values (power or amplitude).
+    pub amin: Amin,
     /// Range kept below the maximum, in dB, or `"none"`.
     pub top_db: TopDb,
     /// The maximum is that of each channel (false) or of all channels, as librosa 0.11 takes it on
@@ -176,14 +214,19 @@ pub struct DbSpec {
 
 impl Default for DbSpec {
     fn default() -> Self {
-        Self { reference: DbRef::Value(1.0), amin: 1e-10, top_db: TopDb::Range(80.0), joint: false }
+        Self {
+            reference: DbRef::Value(1.0),
+            amin: Amin::Auto,
+            top_db: TopDb::Range(80.0),
+            joint: false,
+        }
     }
 }
 
 impl DbSpec {
-    /// The checked parameters; a reference of `"max"` is left at 1 here and applied by
-    /// [`DbSpec::level`].
-    pub fn decibel(&self) -> corsmal_dsp::Result<Decibel> {
+    /// The checked parameters, for powers: those of an amplitude are squared. A reference of `"max"`
+    /// is left at 1 here and applied by [`DbSpec::level`].
+    pub fn decibel(&self, scale: Scale) -> corsmal_dsp::Result<Decibel> {
         let reference = match self.reference {
             DbRef::Value(v) => v,
             DbRef::Max => 1.0,
@@ -192,13 +235,19 @@ impl DbSpec {
             TopDb::Range(v) => Some(v),
             TopDb::None => None,
         };
-        let decibel = Decibel { reference, amin: self.amin, top_db };
-        decibel.check()?;
-        if self.amin < f64::from(f32::MIN_POSITIVE) {
-            let allowed = "at least 1.2e-38 (features are single precision)";
-            return Err(corsmal_dsp::DspError::parameter("amin", self.amin, allowed));
+        let power = |value: f64| if scale == Scale::AmplitudeToDb { value * value } else { value };
+        let amin = match (self.amin, scale) {
+            (Amin::Value(amin), _) => amin,
+            (Amin::Auto, Scale::AmplitudeToDb) => 1e-5,
+            (Amin::Auto, _) => 1e-10,
+        };
+        Decibel { reference, amin, top_db }.check()?;
+        if power(amin) < f64::from(f32::MIN_POSITIVE) {
+            let allowed = "at least 1.2e-38, its square too where values are amplitudes (features \
+                           are single precision)";
+            return Err(corsmal_dsp::DspError::parameter("amin", amin, allowed));
         }
-        Ok(decibel)
+        Ok(Decibel { reference: power(reference), amin: power(amin), top_db })
     }
 
     /// Whether values depend on the maximum of the recording.

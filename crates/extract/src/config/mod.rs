@@ -9,7 +9,8 @@ mod set;
 
 pub use chain::{Channels, Normalize, SignalConfig};
 pub use corsmal_dsp::resample::ResType;
-pub use groups::{DbRef, DbSpec, FrameSpec, MelSpec, StftSpec, TopDb};
+pub use groups::{Amin, DbRef, DbSpec, FrameSpec, MelSpec, Scale, StftSpec, TopDb};
+pub(crate) use groups::{MAX_N_FFT, at_most};
 pub use preset::{PRESETS, Preset};
 
 use std::path::Path;
@@ -130,7 +131,8 @@ impl Config {
             place: place.to_string(),
             message: e.to_string().trim_end().to_string(),
         };
-        Self::from_tree(toml::from_str(toml).map_err(syntax)?, overrides)
+        let table: toml::Table = toml::from_str(toml).map_err(syntax)?;
+        Self::from_tree(set::to_json(toml::Value::Table(table)), overrides)
     }
 
     /// A tree of tables with `key=value` overrides.

@@ -24,10 +24,10 @@ pub fn apply(tree: &mut Value, assignment: &str) -> Result<(), ConfigError> {
     if !matches!(parts[0], "signal" | "features" | "summary" | "projection" | "librosa") {
         parts.insert(0, "features");
     }
-    let value = toml::from_str::<Map<String, Value>>(&format!("value = {text}"))
+    let value = toml::from_str::<toml::Table>(&format!("value = {text}"))
         .ok()
         .and_then(|mut table| table.remove("value"))
-        .unwrap_or_else(|| Value::String(text.to_string()));
+        .map_or_else(|| Value::String(text.to_string()), to_json);
     let mut place = tree;
     let (last, path) = parts.split_last().expect("one part at least");
     for part in path {
@@ -43,10 +43,36 @@ pub fn apply(tree: &mut Value, assignment: &str) -> Result<(), ConfigError> {
     Ok(())
 }
 
+/// The same tree as JSON. JSON has no number for infinity and NaN: they are the words `inf`, `-inf`
+/// and `nan`, which keys that allow them take and others refuse by name.
+pub fn to_json(value: toml::Value) -> Value {
+    match value {
+        toml::Value::Table(table) => {
+            Value::Object(table.into_iter().map(|(key, value)| (key, to_json(value))).collect())
+        }
+        toml::Value::Array(values) => values.into_iter().map(to_json).collect(),
+        toml::Value::Float(number) => serde_json::Number::from_f64(number)
+            .map_or_else(|| Value::String(number.to_string()), Value::Number),
+        toml::Value::Integer(number) => number.into(),
+        toml::Value::Boolean(flag) => flag.into(),
+        toml::Value::String(text) => text.into(),
+        toml::Value::Datetime(time) => time.to_string().into(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use serde_json::json;
+
+    #[test]
+    fn infinity_is_a_word() {
+        let mut tree = json!({});
+        apply(&mut tree, "melspectrogram.norm=inf").unwrap();
+        assert_eq!(tree["features"]["melspectrogram"]["norm"], "inf");
+        apply(&mut tree, "signal.start=-nan").unwrap();
+        assert_eq!(tree["signal"]["start"].as_str().unwrap().to_lowercase(), "nan");
+    }
 
     #[test]
     fn values_are_toml_and_features_are_the_default_table() {

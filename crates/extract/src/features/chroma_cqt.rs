@@ -8,7 +8,12 @@ use corsmal_dsp::tuned::ByTuning;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
+use super::chroma_stft::MAX_CHROMA;
 use super::{Extent, Feature, FeatureKind, WholeKernel, indices};
+use crate::config::at_most;
+
+/// More lie in no range of hearing.
+const MAX_OCTAVES: usize = 16;
 
 /// Parameters of `chroma_cqt`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -57,6 +62,9 @@ impl WholeKernel for ChromaOfChannel {
 impl ChromaCqt {
     /// The kernel for signals of `sr` Hz.
     pub fn kernel(&self, sr: f64) -> corsmal_dsp::Result<ChromaOfChannel> {
+        at_most("n_chroma", self.n_chroma, MAX_CHROMA)?;
+        at_most("n_octaves", self.n_octaves, MAX_OCTAVES)?;
+        at_most("bins_per_octave", self.bins_per_octave, MAX_CHROMA)?;
         let params = CqtParams {
             hop_length: self.hop_length,
             n_bins: self.bins_per_octave.saturating_mul(self.n_octaves),

@@ -11,7 +11,10 @@ use serde::{Deserialize, Serialize};
 
 use super::melspectrogram::quantity_of;
 use super::{Extent, Feature, FeatureKind, WholeKernel, indices};
-use crate::config::StftSpec;
+use crate::config::{StftSpec, at_most};
+
+/// Most pitch classes.
+pub const MAX_CHROMA: usize = 1024;
 
 /// Cells of the tuning histogram, in bins.
 const RESOLUTION: f64 = 0.01;
@@ -67,6 +70,7 @@ impl FeatureKind for ChromaStft {
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let stft = self.stft.params()?;
         quantity_of(self.power)?;
+        at_most("n_chroma", self.n_chroma, MAX_CHROMA)?;
         let params = ChromaParams { n_chroma: self.n_chroma, ..ChromaParams::new(sr, stft.n_fft) };
         chroma_filter::<f32>(&params)?;
         let labels = indices(self.n_chroma);

@@ -7,9 +7,9 @@ use corsmal_dsp::window::Window;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-use super::mel_bands::{DecibelFinish, Scale};
+use super::mel_bands::DecibelFinish;
 use super::{Extent, Feature, FeatureKind, WholeKernel, hertz};
-use crate::config::DbSpec;
+use crate::config::{DbSpec, Scale};
 
 /// Parameters of `cqt`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -87,7 +87,7 @@ impl FeatureKind for Cqt {
         };
         let transform = CqtPlan::new(&params.of(self.librosa))?;
         // The clamp follows once the maximum of the recording is known.
-        let decibel = Decibel { top_db: None, ..self.db.decibel()? };
+        let decibel = Decibel { top_db: None, ..self.db.decibel(self.scale)? };
         let per_octave = self.bins_per_octave as f64;
         let frequency = |k: usize| self.fmin * ((k as f64 + self.tuning) / per_octave).exp2();
         let labels = (0..self.n_bins).map(|k| hertz(frequency(k))).collect();

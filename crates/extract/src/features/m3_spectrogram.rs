@@ -6,6 +6,7 @@ use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
 use super::{Extent, Feature, FeatureKind, WholeKernel, indices};
+use crate::config::{MAX_N_FFT, at_most};
 
 /// Parameters of `m3_spectrogram`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -39,6 +40,7 @@ impl FeatureKind for M3Spectrogram {
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let params = StftParams::new(self.n_fft, self.hop_length);
         params.check()?;
+        at_most("n_fft", self.n_fft, MAX_N_FFT)?;
         let plan = Plan { n_fft: self.n_fft, hop_length: self.hop_length };
         let extent = Extent::Frames(sr * self.hop_length as f64 / 16_600.0);
         Ok(Feature::whole(extent, Magnitudes(plan, sr), indices(params.n_bins())))

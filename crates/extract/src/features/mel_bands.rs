@@ -3,25 +3,11 @@
 use corsmal_dsp::decibel::Decibel;
 use corsmal_dsp::lanes::{Row, power_to_decibel};
 use corsmal_dsp::mel::{MelParams, SparseBank, empty_filters, mel_filter};
-use serde::{Deserialize, Serialize};
 
 use super::{Finish, SpectrumKernel};
-use crate::config::DbSpec;
+use crate::config::{DbSpec, Scale, at_most};
 
-/// Unit of the output.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Scale {
-    /// As computed.
-    #[default]
-    Linear,
-    /// `10 log10` (librosa.power_to_db).
-    PowerToDb,
-    /// `20 log10` (librosa.amplitude_to_db): the value is squared first.
-    AmplitudeToDb,
-}
-
-/// Values to a unit, before any clamp.
+/// Values to a unit, before any clamp; `db` is for powers.
 pub fn power_rows_to_scale(scale: Scale, db: &Decibel, rows: &mut [Row]) {
     let (amin, offset) = (db.amin, db.offset());
     match scale {
@@ -49,13 +35,15 @@ pub struct MelKernel {
 /// More bands than any use has; bounds the memory of filter bank and cosine transform.
 const MAX_MELS: usize = 4096;
 
+/// Refuses more bands than that.
+pub fn check_n_mels(n_mels: usize) -> corsmal_dsp::Result<()> {
+    at_most("n_mels", n_mels, MAX_MELS)
+}
+
 impl MelKernel {
     /// The kernel for a filter bank.
     pub fn new(params: &MelParams, scale: Scale, db: Decibel) -> corsmal_dsp::Result<Self> {
-        if params.n_mels > MAX_MELS {
-            let allowed = format!("at most {MAX_MELS}");
-            return Err(corsmal_dsp::DspError::parameter("n_mels", params.n_mels, allowed));
-        }
+        check_n_mels(params.n_mels)?;
         let bank = mel_filter(params)?;
         Ok(Self { bank: SparseBank::new(&bank), scale, db, empty: empty_filters(&bank) })
     }

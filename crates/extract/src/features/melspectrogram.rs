@@ -3,9 +3,9 @@
 use corsmal_dsp::mel::MelNorm;
 use serde::{Deserialize, Serialize};
 
-use super::mel_bands::{DecibelFinish, MelKernel, Scale};
+use super::mel_bands::{DecibelFinish, MelKernel};
 use super::{Feature, FeatureKind, Kernel, Quantity};
-use crate::config::{DbSpec, MelSpec, StftSpec};
+use crate::config::{DbSpec, MelSpec, Scale, StftSpec};
 
 /// Parameters of `melspectrogram`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -45,7 +45,7 @@ impl FeatureKind for Melspectrogram {
         let stft = self.stft.params()?;
         let params = self.mel.params(sr, stft.n_fft, self.norm);
         let quantity = quantity_of(self.power)?;
-        let kernel = MelKernel::new(&params, self.scale, self.db.decibel()?)?;
+        let kernel = MelKernel::new(&params, self.scale, self.db.decibel(self.scale)?)?;
         Ok(Feature {
             kernel: Kernel::Spectrum(stft, quantity, Box::new(kernel)),
             raw_rows: self.mel.n_mels,

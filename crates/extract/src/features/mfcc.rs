@@ -4,10 +4,10 @@ use corsmal_dsp::mel::MelNorm;
 use corsmal_dsp::mfcc::{DctNorm, MfccParams, mfcc_matrix};
 use serde::{Deserialize, Serialize};
 
-use super::mel_bands::{MelKernel, Scale, clamp};
+use super::mel_bands::{MelKernel, clamp};
 use super::melspectrogram::quantity_of;
 use super::{Feature, FeatureKind, Finish, Kernel};
-use crate::config::{DbSpec, MelSpec, StftSpec};
+use crate::config::{DbSpec, MelSpec, Scale, StftSpec};
 
 /// Parameters of `mfcc`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -162,7 +162,7 @@ impl FeatureKind for Mfcc {
             lifter: self.lifter,
         };
         let mel = self.mel.params(sr, stft.n_fft, self.mel_norm);
-        let kernel = MelKernel::new(&mel, Scale::PowerToDb, self.db.decibel()?)?;
+        let kernel = MelKernel::new(&mel, Scale::PowerToDb, self.db.decibel(Scale::PowerToDb)?)?;
         let matrix = mfcc_matrix(self.mel.n_mels, &params)?;
         let labels = (0..matrix.nrows()).map(|i| i.to_string()).collect();
         let weights = matrix.iter().map(|w| *w as f32).collect();

@@ -8,6 +8,7 @@ use corsmal_dsp::stft::{StftParams, spectrogram};
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
+use super::mel_bands::check_n_mels;
 use super::{Extent, Feature, FeatureKind, WholeKernel};
 use crate::config::{MelSpec, StftSpec};
 
@@ -56,6 +57,7 @@ impl FeatureKind for OnsetStrength {
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let stft = self.stft.params()?;
+        check_n_mels(self.mel.n_mels)?;
         let bank = SparseBank::new(&mel_filter(&self.mel.params(sr, stft.n_fft, MelNorm::Slaney))?);
         let defaults = OnsetParams::new(stft.n_fft, stft.hop_length)?;
         let params = OnsetParams { lag: self.lag, max_size: self.max_size, ..defaults };

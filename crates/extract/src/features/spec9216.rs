@@ -6,6 +6,10 @@ use ndarray::{Array2, ArrayView1};
 use serde::{Deserialize, Serialize};
 
 use super::{Extent, Feature, FeatureKind, WholeKernel, pixels};
+use crate::config::at_most;
+
+/// Longest signal, half an hour at 44.1 kHz; bounds the memory of the spectrogram.
+const MAX_LENGTH: usize = 1 << 26;
 
 /// Parameters of `spec9216`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -37,6 +41,7 @@ impl FeatureKind for Spec9216 {
         by row from 0 Hz. Silence is refused; holds the whole recording in memory.";
 
     fn plan(&self, _: f64) -> corsmal_dsp::Result<Feature> {
+        at_most("fixed_len", self.fixed_len, MAX_LENGTH)?;
         let fixed_len = (self.fixed_len > 0).then_some(self.fixed_len);
         let image = Image { fixed_len, pad_mode: self.pad_mode };
         Ok(Feature::whole(Extent::Vector, image, pixels()))

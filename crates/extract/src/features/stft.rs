@@ -3,9 +3,9 @@
 use corsmal_dsp::lanes::Row;
 use serde::{Deserialize, Serialize};
 
-use super::mel_bands::{DecibelFinish, Scale, power_rows_to_scale};
+use super::mel_bands::{DecibelFinish, power_rows_to_scale};
 use super::{Feature, FeatureKind, Kernel, Quantity, SpectrumKernel, hertz};
-use crate::config::{DbSpec, StftSpec};
+use crate::config::{DbSpec, Scale, StftSpec};
 
 /// What is kept of a complex bin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -60,7 +60,7 @@ impl FeatureKind for Stft {
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let stft = self.stft.params()?;
-        let decibel = self.db.decibel()?;
+        let decibel = self.db.decibel(self.scale)?;
         let bins = stft.n_bins();
         let quantity = match self.output {
             Output::Complex => Quantity::Complex,

@@ -7,6 +7,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
@@ -90,7 +91,8 @@ impl<'a> Collector<'a> {
         sink: Sink,
     ) -> Self {
         let folder = draft::folder(&options.out).to_path_buf();
-        let state = State { next: sink.next, written: sink.next, ..State::default() };
+        let failed = sink.outcomes().iter().filter(|o| !o.status.has_features()).count();
+        let state = State { next: sink.next, written: sink.next, failed, ..State::default() };
         Self {
             inputs,
             options,
@@ -128,12 +130,35 @@ impl<'a> Collector<'a> {
 
     fn worker(&self) {
         while let Some(work) = self.take() {
-            match work {
+            let (input, span) = match &work {
+                Work::Input(index) => (*index, None),
+                Work::Span(job) => (job.input, Some(job.index)),
+            };
+            let done = catch_unwind(AssertUnwindSafe(|| match work {
                 Work::Input(index) => self.input(index),
                 Work::Span(job) => self.span(job),
+            }));
+            if done.is_err() {
+                self.broken(input, span);
             }
             self.drain();
         }
+    }
+
+    /// A fault of this program costs the recording at which it happened, not the run.
+    fn broken(&self, input: usize, span: Option<usize>) {
+        let failed = Failed::new(Status::Unsupported, "a fault of this program, please report it");
+        let mut state = self.lock();
+        if let (Some(span), Some(partial)) = (span, state.partial.get_mut(&input)) {
+            partial.early.insert(span, Err(failed));
+            drop(state);
+            return self.join(input);
+        }
+        drop(state);
+        let source = &self.inputs[input];
+        let mut outcome = Outcome::new(&source.id, source.source.to_string(), Status::Ok, "");
+        outcome.identity = identity_of(source);
+        self.fail(input, outcome, failed);
     }
 
     /// The next thing to do; waits while too much is unwritten.

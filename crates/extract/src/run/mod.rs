@@ -52,12 +52,6 @@ pub enum RunError {
         /// Its ledger.
         path: PathBuf,
     },
-    /// An input of the interrupted run has changed.
-    #[error("{id} has changed since the interrupted run; --overwrite starts anew")]
-    Changed {
-        /// The input.
-        id: String,
-    },
     /// The output cannot take what the configuration gives.
     #[error("{path}: {why}")]
     Format {
@@ -182,26 +176,11 @@ pub fn run(
     progress: &dyn Progress,
     stop: &Arc<AtomicBool>,
 ) -> Result<Report, RunError> {
-    let parquet = check_output(&options.out, config)?;
-    if !(1..=MAX_JOBS).contains(&options.jobs) {
-        return Err(RunError::Jobs { jobs: options.jobs, why: format!("1 to {MAX_JOBS}") });
+    let Checked { parquet, provenance, done } = check(inputs, config, options)?;
+    if let Some(report) = done {
+        return Ok(report);
     }
-    let provenance = Provenance::new(
-        config.to_value().to_string(),
-        config.hash(),
-        list_hash(inputs),
-        options.shard,
-    );
     let inputs = options.shard.of(inputs);
-    if !options.overwrite {
-        if let Some(report) = finished(inputs, &provenance, &options.out, parquet)? {
-            return Ok(report);
-        }
-        if !options.resume && Ledger::is_pending(&options.out) {
-            Ledger::require_idle(&options.out)?;
-            return Err(RunError::Pending { path: ledger::ledger_path(&options.out) });
-        }
-    }
     let format = match (parquet, options.compression) {
         (true, _) => "parquet",
         (false, Compression::Stored) => "npz stored",
@@ -209,13 +188,25 @@ pub fn run(
     };
     let header = ledger::Header::new(&provenance, format);
     let (ledger, records) = if options.resume && !options.overwrite {
-        Ledger::resume(&options.out, &header)?
+        // A file that has changed, repaired it may be, is read again, and so is what follows it.
+        let hold = |i: usize, record: &ledger::Record| {
+            let same = inputs.get(i).is_some_and(|i| record.outcome.identity == identity_of(i));
+            if !same {
+                let id = &record.outcome.id;
+                progress.warning(&format!("{id} has changed; the run goes on from there"));
+            }
+            same
+        };
+        Ledger::resume(&options.out, &header, hold)?
     } else {
         (Ledger::create(&options.out, &header)?, Vec::new())
     };
-    for (record, input) in records.iter().zip(inputs) {
-        if record.outcome.identity != identity_of(input) {
-            return Err(RunError::Changed { id: input.id.clone() });
+    if let Some(limit) = options.max_errors {
+        let bad: Vec<_> =
+            records.iter().map(|r| &r.outcome).filter(|o| !o.status.has_features()).collect();
+        if let Some(last) = bad.last().filter(|_| bad.len() > limit) {
+            let last = format!("{}: {}", last.path, last.reason);
+            return Err(RunError::TooManyErrors { failed: bad.len(), limit, last });
         }
     }
     let resumed = records.len();
@@ -230,12 +221,47 @@ pub fn run(
     Ok(Report { outcomes, resumed, up_to_date: false })
 }
 
-/// Whether an output is Parquet, else `.npz`, by its extension.
+/// What is known of a run before it starts.
+pub struct Checked {
+    parquet: bool,
+    provenance: Provenance,
+    /// The report of an output that is there already.
+    done: Option<Report>,
+}
+
+/// Everything that a run refuses before it starts.
 ///
 /// # Errors
-/// [`RunError::Format`]: another extension, a format that cannot hold what `config` gives, a folder
-/// of that name, or no folder to put it in.
-pub fn check_output(out: &Path, config: &Config) -> Result<bool, RunError> {
+/// As [`run`], in what concerns the output, the inputs as a whole and the number of jobs.
+pub fn check(inputs: &[Input], config: &Config, options: &Options) -> Result<Checked, RunError> {
+    let out = &options.out;
+    let parquet = check_output(out, config)?;
+    if !(1..=MAX_JOBS).contains(&options.jobs) {
+        return Err(RunError::Jobs { jobs: options.jobs, why: format!("1 to {MAX_JOBS}") });
+    }
+    let is_out = |i: &&Input| match &i.source {
+        InputSource::File(path) => path.file_name() == out.file_name() && draft::same(path, out),
+        InputSource::Stdin => false,
+    };
+    if let Some(input) = inputs.iter().find(is_out) {
+        let why = format!("is the input {} itself", input.id);
+        return Err(RunError::Format { path: out.clone(), why });
+    }
+    let (text, hash) = (config.to_value().to_string(), config.hash());
+    let provenance = Provenance::new(text, hash, list_hash(inputs), options.shard);
+    let mut done = None;
+    if !options.overwrite {
+        done = finished(options.shard.of(inputs), &provenance, options, parquet)?;
+        if done.is_none() && !options.resume && Ledger::is_pending(out) {
+            Ledger::require_idle(out)?;
+            return Err(RunError::Pending { path: ledger::ledger_path(out) });
+        }
+    }
+    Ok(Checked { parquet, provenance, done })
+}
+
+/// Whether an output is Parquet, else `.npz`, by its extension.
+fn check_output(out: &Path, config: &Config) -> Result<bool, RunError> {
     let refuse = |why: String| Err(RunError::Format { path: out.into(), why });
     let parquet = match out.extension() {
         Some(e) if e.eq_ignore_ascii_case("npz") => false,
@@ -261,9 +287,10 @@ pub fn check_output(out: &Path, config: &Config) -> Result<bool, RunError> {
 fn finished(
     inputs: &[Input],
     provenance: &Provenance,
-    out: &Path,
+    options: &Options,
     parquet: bool,
 ) -> Result<Option<Report>, RunError> {
+    let out = options.out.as_path();
     if !out.exists() {
         return Ok(None);
     }
@@ -272,7 +299,15 @@ fn finished(
         parquet::read(out).map_err(|_| refuse("is not an output of this tool"))?
     } else {
         let mut npz = NpzFile::open(out).map_err(|_| refuse("is not an output of this tool"))?;
-        layout::read_table(&mut npz).map_err(|_| refuse("is not an output of this tool"))?
+        let table =
+            layout::read_table(&mut npz).map_err(|_| refuse("is not an output of this tool"))?;
+        if npz.raw(layout::COMPRESSION_WITNESS)?.0.compression != options.compression {
+            return Err(refuse(match options.compression {
+                Compression::Stored => "is deflated",
+                Compression::Deflated => "is not deflated",
+            }));
+        }
+        table
     };
     let (table, theirs) = found;
     if theirs != *provenance {

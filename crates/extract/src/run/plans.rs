@@ -4,16 +4,13 @@ use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex};
 
 use corsmal_audio::AudioSpec;
+use corsmal_dsp::frontends::MAX_EXPANSION;
 use corsmal_dsp::resample::Converter;
 
 use crate::config::Config;
 use crate::engine::Plan;
 use crate::frontend::channels_out;
 use crate::run::Progress;
-
-/// Largest ratio of resampling: a header that says 1 Hz would turn a small file into billions of
-/// samples.
-const MAX_EXPANSION: f64 = 100.0;
 
 /// What a recording is computed with.
 #[derive(Clone)]

@@ -103,10 +103,10 @@ pub fn spans(source: &dyn BlockSource, planned: &Planned, crop: &Range<u64>) -> 
     let separable = source.seekable()
         && !planned.plan.needs_whole()
         && FrontEnd::is_pointwise(&planned.plan.config.signal, planned.resample.is_some());
-    let Some(declared) = source.spec().declared_frames.filter(|_| separable) else {
+    let Some(most) = source.most_frames().filter(|_| separable) else {
         return vec![whole];
     };
-    let frames = declared.min(crop.end).saturating_sub(crop.start);
+    let frames = most.min(crop.end).saturating_sub(crop.start);
     if frames <= 2 * SPAN {
         return vec![whole];
     }

@@ -131,6 +131,11 @@ impl Sink {
         Ok(Self { ledger, writer, table, next })
     }
 
+    /// What became of the recordings written so far.
+    pub fn outcomes(&self) -> &[Outcome] {
+        self.table.outcomes()
+    }
+
     /// Writes the next recording.
     pub fn write(&mut self, input: &Input, mut finished: Finished) -> Result<Outcome, RunError> {
         let mut row = None;

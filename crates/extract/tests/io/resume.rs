@@ -28,7 +28,7 @@ fn header() -> Header {
 /// What an engine does with inputs from the first that is not done until `stop`; the whole run
 /// ends with publishing.
 fn work(out: &Path, compression: Compression, stop: usize) -> usize {
-    let (mut ledger, mut records) = Ledger::resume(out, &header()).unwrap();
+    let (mut ledger, mut records) = Ledger::resume(out, &header(), |_, _| true).unwrap();
     let done = records.len();
     let entries = records.iter().flat_map(|r| r.entries.clone()).collect();
     let mut writer = NpzWriter::resume(&ledger.part(), compression, entries).unwrap();
@@ -86,7 +86,7 @@ fn a_ledger_torn_at_any_byte_gives_its_whole_lines() {
         fs::write(ledger_path(&out), &ledger[..length]).unwrap();
         fs::write(part_path(&out), &part).unwrap();
         let lines = ledger[..length].iter().filter(|&&b| b == b'\n').count();
-        let (_, records) = Ledger::resume(&out, &header()).unwrap();
+        let (_, records) = Ledger::resume(&out, &header(), |_, _| true).unwrap();
         assert_eq!(records.len(), lines.saturating_sub(1), "cut at {length}");
         // Finishing waits for the disk, so not at every byte.
         if length % 101 == 0 {
@@ -105,7 +105,7 @@ fn a_line_of_garbage_ends_what_is_believed() {
     let mut lines: Vec<&str> = text.lines().collect();
     lines[3] = "\0\0\0\0";
     fs::write(ledger_path(&out), lines.join("\n") + "\n").unwrap();
-    let (_, records) = Ledger::resume(&out, &header()).unwrap();
+    let (_, records) = Ledger::resume(&out, &header(), |_, _| true).unwrap();
     assert_eq!(records.len(), 2);
     assert_eq!(fs::read_to_string(ledger_path(&out)).unwrap().lines().count(), 3);
 }
@@ -121,7 +121,7 @@ fn rows_come_back_bit_for_bit() {
         .append(&Record { outcome, entries: vec![], row: Some(row.clone()), names: None })
         .unwrap();
     drop(ledger);
-    let (_, records) = Ledger::resume(&out, &header()).unwrap();
+    let (_, records) = Ledger::resume(&out, &header(), |_, _| true).unwrap();
     let bits = |row: &[f32]| row.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
     assert_eq!(bits(records[0].row.as_ref().unwrap()), bits(&row));
 }
@@ -134,11 +134,14 @@ fn another_run_is_not_continued() {
     work(&out, Compression::Stored, 3);
     assert!(Ledger::is_pending(&out));
     let other = Header { config_hash: "decaf".into(), ..header() };
-    let error = Ledger::resume(&out, &other).unwrap_err();
+    let error = Ledger::resume(&out, &other, |_, _| true).unwrap_err();
     let text = error.to_string();
     assert!(text.contains("had configuration c0ffee, this one has decaf"), "{text}");
     fs::write(ledger_path(&out), "a list of eggs\n").unwrap();
-    assert!(matches!(Ledger::resume(&out, &header()), Err(LedgerError::Header { .. })));
+    assert!(matches!(
+        Ledger::resume(&out, &header(), |_, _| true),
+        Err(LedgerError::Header { .. })
+    ));
     let started = Ledger::create(&out, &header()).unwrap();
     started.discard().unwrap();
     assert!(!Ledger::is_pending(&out) && !part_path(&out).exists());
@@ -150,9 +153,12 @@ fn two_runs_cannot_write_one_output() {
     let out = folder.path().join("feats.npz");
     let first = Ledger::create(&out, &header()).unwrap();
     assert!(matches!(Ledger::create(&out, &header()), Err(LedgerError::Locked { .. })));
-    assert!(matches!(Ledger::resume(&out, &header()), Err(LedgerError::Locked { .. })));
+    assert!(matches!(
+        Ledger::resume(&out, &header(), |_, _| true),
+        Err(LedgerError::Locked { .. })
+    ));
     drop(first);
-    Ledger::resume(&out, &header()).unwrap();
+    Ledger::resume(&out, &header(), |_, _| true).unwrap();
 }
 
 #[test]
@@ -205,7 +211,7 @@ proptest! {
             bytes[at] = byte;
         }
         fs::write(ledger_path(&out), &bytes).unwrap();
-        if let Ok((ledger, records)) = Ledger::resume(&out, &header()) {
+        if let Ok((ledger, records)) = Ledger::resume(&out, &header(), |_, _| true) {
             let entries = records.iter().flat_map(|r| r.entries.clone()).collect();
             NpzWriter::resume(&ledger.part(), Compression::Stored, entries).unwrap();
         }

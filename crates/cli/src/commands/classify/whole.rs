@@ -37,13 +37,8 @@ pub fn run(args: &Args, model: &Model, lines: &mut PredictionLines<'_>) -> Resul
         max_errors: None,
     };
     let stop = crate::interrupt::flag();
-    let meter = Meter::new(LogFormat::Text);
-    let result = if args.quiet {
-        run::run(&found, &config, &options, &run::Quiet, stop)
-    } else {
-        run::run(&found, &config, &options, &meter, stop)
-    };
-    match result {
+    let meter = Meter::new(LogFormat::Text, args.quiet);
+    match run::run(&found, &config, &options, &meter, stop) {
         Ok(_) => predict(model, &DatasetTable::read(&options.out, &args.foreign)?, lines),
         Err(RunError::Interrupted) => Ok(End::Interrupted),
         Err(error) => Err(error.into()),

@@ -51,6 +51,13 @@ fn impossible_values_name_key_value_and_what_is_allowed() {
         ("signal.preemphasis=nan", &["signal.preemphasis"]),
         ("signal.length=1e9", &["signal.length", "1000000000", "seconds"]),
         ("signal.sample_rate=8000 mfcc.fmin=4100.0", &["features.mfcc", "fmax", "4100"]),
+        ("delta.width=9223372036854775807", &["delta", "width", "at most"]),
+        ("x.kind=onset_strength x.n_mels=1000000", &["n_mels", "1000000", "at most"]),
+        ("chroma_stft.n_chroma=1000000000", &["n_chroma", "at most"]),
+        ("chroma_cqt.n_octaves=1000000000", &["n_octaves", "at most"]),
+        ("tonnetz.n_octaves=9223372036854775807", &["n_octaves", "at most"]),
+        ("m3_spectrogram.n_fft=1000000000", &["n_fft", "at most"]),
+        ("spec9216.fixed_len=9223372036854775807", &["fixed_len", "at most"]),
         ("nonsense", &["--set nonsense", "key=value"]),
     ] {
         let mut more = vec!["--preset", "mfcc-zcr"];
@@ -87,6 +94,7 @@ fn wrong_names_are_refused() {
         refused(&input, &at("nowhere/feats.npz"), dry, &["nowhere/feats.npz", "no folder"]);
         refused(&input, &at("folder.npz"), dry, &["folder.npz", "is a folder"]);
     }
+    refused(&input, &input, &["--overwrite"], &["a.wav", ".npz"]);
     refused(&input, &at("folder.npz"), &["--overwrite"], &["folder.npz", "is a folder"]);
     refused(&input, &at("feats.csv"), &[], &["feats.csv", ".npz", ".parquet"]);
     refused(&input, &at("feats"), &[], &["feats", ".npz", ".parquet"]);
