@@ -127,12 +127,12 @@ pub enum Scale {
     AmplitudeToDb,
 }
 
-/// Smallest value told apart from zero.
+/// A number, or the word `auto`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Amin {
+pub enum AutoOr {
     /// This one.
     Value(f64),
-    /// librosa's default for the scale: 1e-10 of a power, 1e-5 of an amplitude.
+    /// What suits.
     Auto,
 }
 
@@ -181,7 +181,7 @@ impl<'de> Deserialize<'de> for TopDb {
     }
 }
 
-impl Serialize for Amin {
+impl Serialize for AutoOr {
     fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Value(v) => s.serialize_f64(*v),
@@ -190,7 +190,7 @@ impl Serialize for Amin {
     }
 }
 
-impl<'de> Deserialize<'de> for Amin {
+impl<'de> Deserialize<'de> for AutoOr {
     fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
         Ok(number_or_word(d, "auto")?.map_or(Self::Auto, Self::Value))
     }
@@ -203,8 +203,9 @@ pub struct DbSpec {
     /// Value (or `"max"`) that becomes 0 dB.
     #[serde(rename = "ref")]
     pub reference: DbRef,
-    /// Smallest value told apart from zero, in the unit of the values (power or amplitude).
-    pub amin: Amin,
+    /// Smallest value told apart from zero, in the unit of the values; `auto` is librosa's default,
+    /// 1e-10 of a power and 1e-5 of an amplitude.
+    pub amin: AutoOr,
     /// Range kept below the maximum, in dB, or `"none"`.
     pub top_db: TopDb,
     /// The maximum is that of each channel (false) or of all channels, as librosa 0.11 takes it on
@@ -216,7 +217,7 @@ impl Default for DbSpec {
     fn default() -> Self {
         Self {
             reference: DbRef::Value(1.0),
-            amin: Amin::Auto,
+            amin: AutoOr::Auto,
             top_db: TopDb::Range(80.0),
             joint: false,
         }
@@ -237,9 +238,9 @@ impl DbSpec {
         };
         let power = |value: f64| if scale == Scale::AmplitudeToDb { value * value } else { value };
         let amin = match (self.amin, scale) {
-            (Amin::Value(amin), _) => amin,
-            (Amin::Auto, Scale::AmplitudeToDb) => 1e-5,
-            (Amin::Auto, _) => 1e-10,
+            (AutoOr::Value(amin), _) => amin,
+            (AutoOr::Auto, Scale::AmplitudeToDb) => 1e-5,
+            (AutoOr::Auto, _) => 1e-10,
         };
         Decibel { reference, amin, top_db }.check()?;
         if power(amin) < f64::from(f32::MIN_POSITIVE) {

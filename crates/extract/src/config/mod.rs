@@ -9,7 +9,7 @@ mod set;
 
 pub use chain::{Channels, Normalize, SignalConfig};
 pub use corsmal_dsp::resample::ResType;
-pub use groups::{Amin, DbRef, DbSpec, FrameSpec, MelSpec, Scale, StftSpec, TopDb};
+pub use groups::{AutoOr, DbRef, DbSpec, FrameSpec, MelSpec, Scale, StftSpec, TopDb};
 pub(crate) use groups::{MAX_N_FFT, at_most};
 pub use preset::{PRESETS, Preset};
 

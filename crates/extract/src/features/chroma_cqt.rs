@@ -8,9 +8,9 @@ use corsmal_dsp::tuned::ByTuning;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-use super::chroma_stft::MAX_CHROMA;
+use super::chroma_stft::{MAX_CHROMA, check_tuning};
 use super::{Extent, Feature, FeatureKind, WholeKernel, indices};
-use crate::config::at_most;
+use crate::config::{AutoOr, at_most};
 
 /// More lie in no range of hearing.
 const MAX_OCTAVES: usize = 16;
@@ -23,6 +23,8 @@ pub struct ChromaCqt {
     n_chroma: usize,
     n_octaves: usize,
     bins_per_octave: usize,
+    /// In fractions of a bin; `auto` estimates it from the channel, as librosa does.
+    tuning: AutoOr,
     librosa: LibrosaVersion,
 }
 
@@ -33,6 +35,7 @@ impl Default for ChromaCqt {
             n_chroma: 12,
             n_octaves: 7,
             bins_per_octave: 36,
+            tuning: AutoOr::Auto,
             librosa: LibrosaVersion::default(),
         }
     }
@@ -41,7 +44,8 @@ impl Default for ChromaCqt {
 /// Chroma of whole channels.
 pub struct ChromaOfChannel {
     params: CqtParams,
-    tuning: SignalTuning,
+    /// Where the tuning is not given.
+    tuning: Option<SignalTuning>,
     transforms: ByTuning<CqtPlan>,
     fold: Fold,
 }
@@ -54,7 +58,10 @@ impl ChromaOfChannel {
 
 impl WholeKernel for ChromaOfChannel {
     fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>> {
-        let tuning = self.tuning.estimate([y], self.params.bins_per_octave)?.unwrap_or(0.0);
+        let tuning = match &self.tuning {
+            None => self.params.tuning,
+            Some(signal) => signal.estimate([y], self.params.bins_per_octave)?.unwrap_or(0.0),
+        };
         self.fold.of_signal(&*self.transform(tuning)?, y)
     }
 }
@@ -62,13 +69,19 @@ impl WholeKernel for ChromaOfChannel {
 impl ChromaCqt {
     /// The kernel for signals of `sr` Hz.
     pub fn kernel(&self, sr: f64) -> corsmal_dsp::Result<ChromaOfChannel> {
+        check_tuning(self.tuning)?;
         at_most("n_chroma", self.n_chroma, MAX_CHROMA)?;
         at_most("n_octaves", self.n_octaves, MAX_OCTAVES)?;
         at_most("bins_per_octave", self.bins_per_octave, MAX_CHROMA)?;
+        let (tuning, estimated) = match self.tuning {
+            AutoOr::Value(tuning) => (tuning, None),
+            AutoOr::Auto => (0.0, Some(SignalTuning::padded(sr, self.librosa.pad_mode())?)),
+        };
         let params = CqtParams {
             hop_length: self.hop_length,
             n_bins: self.bins_per_octave.saturating_mul(self.n_octaves),
             bins_per_octave: self.bins_per_octave,
+            tuning,
             ..CqtParams::new(sr)
         };
         let fold = ChromaCqtParams {
@@ -78,11 +91,11 @@ impl ChromaCqt {
         };
         let kernel = ChromaOfChannel {
             params: params.of(self.librosa),
-            tuning: SignalTuning::padded(sr, self.librosa.pad_mode())?,
+            tuning: estimated,
             transforms: ByTuning::default(),
             fold: Fold::new(params.n_bins, &fold)?,
         };
-        kernel.transform(0.0)?;
+        kernel.transform(tuning)?;
         Ok(kernel)
     }
 
@@ -101,7 +114,7 @@ impl FeatureKind for ChromaCqt {
     const KIND: &'static str = "chroma_cqt";
     const ABOUT: &'static str = "Magnitude of a constant-Q transform in n_chroma pitch classes from C \
         on, each frame divided by its maximum (librosa.feature.chroma_cqt), under the tuning of \
-        the channel. Holds the whole recording in memory.";
+        the channel or the one given. Holds the whole recording in memory.";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let extent = Extent::Frames(self.hop_length as f64);

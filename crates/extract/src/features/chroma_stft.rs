@@ -11,10 +11,20 @@ use serde::{Deserialize, Serialize};
 
 use super::melspectrogram::quantity_of;
 use super::{Extent, Feature, FeatureKind, WholeKernel, indices};
-use crate::config::{StftSpec, at_most};
+use crate::config::{AutoOr, StftSpec, at_most};
 
 /// Most pitch classes.
 pub const MAX_CHROMA: usize = 1024;
+
+/// Refuses a tuning that is none.
+pub fn check_tuning(tuning: AutoOr) -> corsmal_dsp::Result<()> {
+    match tuning {
+        AutoOr::Value(t) if !(-1.0..=1.0).contains(&t) => {
+            Err(corsmal_dsp::DspError::parameter("tuning", t, "-1 to 1, or \"auto\""))
+        }
+        _ => Ok(()),
+    }
+}
 
 /// Cells of the tuning histogram, in bins.
 const RESOLUTION: f64 = 0.01;
@@ -27,11 +37,13 @@ pub struct ChromaStft {
     stft: StftSpec,
     n_chroma: usize,
     power: f64,
+    /// In fractions of a class; `auto` estimates it from the channel, as librosa does.
+    tuning: AutoOr,
 }
 
 impl Default for ChromaStft {
     fn default() -> Self {
-        Self { stft: StftSpec::default(), n_chroma: 12, power: 2.0 }
+        Self { stft: StftSpec::default(), n_chroma: 12, power: 2.0, tuning: AutoOr::Auto }
     }
 }
 
@@ -39,6 +51,7 @@ struct Classes {
     stft: StftParams,
     params: ChromaParams,
     power: f64,
+    tuning: AutoOr,
     banks: ByTuning<Chroma<f32>>,
 }
 
@@ -47,9 +60,14 @@ impl WholeKernel for Classes {
         let y = ArrayView2::from_shape((1, y.len()), y).expect("one row");
         let spectrum = spectrogram(y, &self.stft, self.power)?;
         let ChromaParams { sr, n_fft, n_chroma, .. } = self.params;
-        let pitch = PitchParams::new(sr, n_fft);
-        let tuning = estimate_tuning(spectrum.view(), None, pitch, RESOLUTION, n_chroma)?;
-        let tuning = tuning.unwrap_or(0.0);
+        let tuning = match self.tuning {
+            AutoOr::Value(tuning) => tuning,
+            AutoOr::Auto => {
+                let pitch = PitchParams::new(sr, n_fft);
+                let found = estimate_tuning(spectrum.view(), None, pitch, RESOLUTION, n_chroma)?;
+                found.unwrap_or(0.0)
+            }
+        };
         let bank = self.banks.get(tuning, || {
             let bank = chroma_filter(&ChromaParams { tuning, ..self.params })?;
             Ok(Chroma::new(bank.view(), Some(Norm::Max)))
@@ -65,17 +83,19 @@ impl FeatureKind for ChromaStft {
     const KIND: &'static str = "chroma_stft";
     const ABOUT: &'static str = "Power (power = 2) or magnitude (power = 1) in n_chroma pitch \
         classes from C on, each frame divided by its maximum (librosa.feature.chroma_stft), under \
-        the tuning of the channel. Holds the whole recording in memory.";
+        the tuning of the channel or the one given. Holds the whole recording in memory.";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let stft = self.stft.params()?;
         quantity_of(self.power)?;
         at_most("n_chroma", self.n_chroma, MAX_CHROMA)?;
         let params = ChromaParams { n_chroma: self.n_chroma, ..ChromaParams::new(sr, stft.n_fft) };
+        check_tuning(self.tuning)?;
         chroma_filter::<f32>(&params)?;
         let labels = indices(self.n_chroma);
         let extent = Extent::Frames(stft.hop_length as f64);
-        let classes = Classes { stft, params, power: self.power, banks: ByTuning::default() };
+        let (power, tuning) = (self.power, self.tuning);
+        let classes = Classes { stft, params, power, tuning, banks: ByTuning::default() };
         Ok(Feature::whole(extent, classes, labels))
     }
 }

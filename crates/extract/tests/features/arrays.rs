@@ -100,11 +100,24 @@ fn chroma_of_cqt(y: ArrayView2<f32>) -> Array3<f32> {
 
 #[test]
 fn whole_recording_features_are_those_of_arrays_channel_by_channel() {
-    let cases: [(&str, &str, Whole); 21] = [
+    let cases: [(&str, &str, Whole); 23] = [
         ("chroma_cqt", "", |y| chroma_of_cqt(y).index_axis_move(Axis(0), 0)),
         ("tonnetz", "", |y| {
             let chroma = chroma_of_cqt(y);
             tonnetz(chroma.view()).unwrap().index_axis_move(Axis(0), 0).mapv(|x| x as f32)
+        }),
+        ("chroma_cqt", "tuning = -0.25", |y| {
+            let cqt =
+                CqtParams { n_bins: 252, bins_per_octave: 36, tuning: -0.25, ..CqtParams::new(SR) };
+            let chroma = chroma_cqt(y, &cqt, &ChromaCqtParams::default()).unwrap();
+            chroma.index_axis_move(Axis(0), 0)
+        }),
+        ("chroma_stft", "tuning = 0.4", |y| {
+            let power = spectrogram(y, &StftParams::new(2048, 512), 2.0).unwrap();
+            let params = ChromaParams { tuning: 0.4, ..ChromaParams::new(SR, 2048) };
+            let bank = chroma_filter::<f32>(&params).unwrap();
+            let chroma = chroma(power.view(), bank.view(), Some(Norm::Max)).unwrap();
+            chroma.index_axis_move(Axis(0), 0)
         }),
         ("chroma_stft", "", |y| {
             let power = spectrogram(y, &StftParams::new(2048, 512), 2.0).unwrap();
