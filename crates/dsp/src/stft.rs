@@ -140,18 +140,21 @@ impl StftParams {
         let padded = n + 2 * self.pad();
         if n == 0 || padded < self.n_fft { 0 } else { 1 + (padded - self.n_fft) / self.hop_length }
     }
-}
 
-/// Frames of `y [channels, samples]`, at least one.
-pub(crate) fn frames_of<T>(y: ArrayView2<T>, p: &StftParams) -> Result<usize> {
-    p.check()?;
-    let (channels, n) = y.dim();
-    match p.n_frames(n) {
-        0 if channels > 0 => {
-            let needed = if p.center { 1 } else { p.n_fft };
-            Err(DspError::TooShort { name: "y", actual: n, needed })
+    /// Shape `[channels, n_fft / 2 + 1, frames]` of the transform of `y [channels, samples]`.
+    ///
+    /// # Errors
+    /// Impossible parameters, or a signal too short for one frame.
+    pub fn shape_of<T>(&self, y: ArrayView2<T>) -> Result<(usize, usize, usize)> {
+        self.check()?;
+        let (channels, n) = y.dim();
+        match self.n_frames(n) {
+            0 if channels > 0 => {
+                let needed = if self.center { 1 } else { self.n_fft };
+                Err(DspError::TooShort { name: "y", actual: n, needed })
+            }
+            frames => Ok((channels, self.n_bins(), frames)),
         }
-        frames => Ok(frames),
     }
 }
 
@@ -162,8 +165,26 @@ pub(crate) fn frames_of<T>(y: ArrayView2<T>, p: &StftParams) -> Result<usize> {
 /// # Errors
 /// Impossible parameters, or a signal too short for one frame.
 pub fn stft<T: Real>(y: ArrayView2<T>, p: &StftParams) -> Result<Array3<Complex<T>>> {
+    let mut out = Array3::zeros(p.shape_of(y)?);
+    stft_into(y, p, out.view_mut())?;
+    Ok(out)
+}
+
+/// [`stft`] written into `out`, whose shape is [`StftParams::shape_of`].
+///
+/// # Errors
+/// As [`stft`], or another shape.
+pub fn stft_into<T: Real>(
+    y: ArrayView2<T>,
+    p: &StftParams,
+    mut out: ArrayViewMut3<Complex<T>>,
+) -> Result<()> {
+    let shape = p.shape_of(y)?;
+    if out.dim() != shape || !out.is_standard_layout() {
+        let expected = format!("{shape:?} in C order");
+        return Err(DspError::Shape { name: "out", expected, actual: out.shape().to_vec() });
+    }
     let y = planar(y);
-    let mut out = Array3::zeros((y.nrows(), p.n_bins(), frames_of(y.view(), p)?));
     if T::SINGLE {
         let plan = LanePlan::new(p)?;
         let state = || (plan.frames(), vec![Row::ZERO; 2 * p.n_bins()]);
@@ -186,10 +207,10 @@ pub fn stft<T: Real>(y: ArrayView2<T>, p: &StftParams) -> Result<Array3<Complex<
                 }
             }
         });
+        Ok(())
     } else {
-        each_spectrum(y.view(), p, out.view_mut(), |z| z)?;
+        each_spectrum(y.view(), p, out, |z| z)
     }
-    Ok(out)
 }
 
 /// Channel `c` of a contiguous single-precision signal.
@@ -204,8 +225,8 @@ pub(crate) fn single<'a, T: Real>(y: ArrayView2<'a, T>, c: usize) -> &'a [f32] {
 /// # Errors
 /// As [`stft`].
 pub fn spectrogram<T: Real>(y: ArrayView2<T>, p: &StftParams, power: f64) -> Result<Array3<T>> {
+    let mut out = Array3::zeros(p.shape_of(y)?);
     let y = planar(y);
-    let mut out = Array3::zeros((y.nrows(), p.n_bins(), frames_of(y.view(), p)?));
     let raise = |z: Complex<T>| {
         let magnitude = magnitude(z);
         if power == 1.0 {

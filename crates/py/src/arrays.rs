@@ -4,10 +4,13 @@
 use corsmal_dsp::Real;
 use corsmal_dsp::spectral::Spectra;
 use corsmal_dsp::stft::StftParams;
-use ndarray::{Array2, ArrayView2, ArrayView3, Dimension};
-use numpy::{Element, IntoPyArray, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use ndarray::{Array2, ArrayView2, ArrayView3, ArrayViewMut3, Dimension};
+use numpy::{
+    Element, IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
+use crate::pool::compute;
 use crate::spectrum::{StftTuple, stft_params};
 use crate::value_error;
 
@@ -97,6 +100,21 @@ pub fn into_numpy<'py, T: Element + Clone, D: Dimension>(
         array.as_standard_layout().into_owned().into_raw_vec_and_offset().0
     };
     Ok(data.into_pyarray(py).reshape(shape)?.into_any())
+}
+
+/// A numpy array of this shape, which `fill` writes without the GIL: numpy asks for huge pages for
+/// large arrays of its own, which makes fresh memory several times cheaper than in ours.
+pub fn filled<'py, T: Element>(
+    py: Python<'py>,
+    shape: (usize, usize, usize),
+    fill: impl FnOnce(ArrayViewMut3<T>) -> corsmal_dsp::Result<()> + Send,
+) -> PyResult<Bound<'py, PyAny>> {
+    let array = PyArray3::<T>::zeros(py, shape, false);
+    let mut values = array.readwrite();
+    let out = ArrayViewMut3::from_shape(shape, values.as_slice_mut()?).map_err(value_error)?;
+    compute(py, || fill(out))?.map_err(value_error)?;
+    drop(values);
+    Ok(array.into_any())
 }
 
 /// Either precision of a two-dimensional result.

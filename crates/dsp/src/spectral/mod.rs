@@ -19,7 +19,7 @@ use crate::error::{DspError, Result};
 use crate::lanes::LANES;
 use crate::real::{Real, require_finite};
 use crate::simd::vectorized;
-use crate::stft::{StftParams, frames_of, magnitude};
+use crate::stft::{StftParams, magnitude};
 use crate::tiles::{for_each_tile, planar, read_columns};
 use crate::transform::Forward;
 
@@ -85,7 +85,7 @@ impl<'a, T: Real> Spectra<'a, T> {
     /// # Errors
     /// Impossible parameters, or a signal too short for one frame.
     pub fn of(y: ArrayView2<'a, T>, params: &StftParams) -> Result<Self> {
-        frames_of(y, params)?;
+        params.shape_of(y)?;
         Ok(Self::Of(planar(y), Forward::new(params)?))
     }
 
