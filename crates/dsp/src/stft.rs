@@ -179,11 +179,7 @@ pub fn stft_into<T: Real>(
     p: &StftParams,
     mut out: ArrayViewMut3<Complex<T>>,
 ) -> Result<()> {
-    let shape = p.shape_of(y)?;
-    if out.dim() != shape || !out.is_standard_layout() {
-        let expected = format!("{shape:?} in C order");
-        return Err(DspError::Shape { name: "out", expected, actual: out.shape().to_vec() });
-    }
+    check_out(&out, p.shape_of(y)?)?;
     let y = planar(y);
     if T::SINGLE {
         let plan = LanePlan::new(p)?;
@@ -213,6 +209,14 @@ pub fn stft_into<T: Real>(
     }
 }
 
+fn check_out<R>(out: &ArrayViewMut3<R>, shape: (usize, usize, usize)) -> Result<()> {
+    if out.dim() == shape && out.is_standard_layout() {
+        return Ok(());
+    }
+    let expected = format!("{shape:?} in C order");
+    Err(DspError::Shape { name: "out", expected, actual: out.shape().to_vec() })
+}
+
 /// Channel `c` of a contiguous single-precision signal.
 pub(crate) fn single<'a, T: Real>(y: ArrayView2<'a, T>, c: usize) -> &'a [f32] {
     let row = y.index_axis_move(Axis(0), c).to_slice().and_then(T::as_f32);
@@ -226,19 +230,27 @@ pub(crate) fn single<'a, T: Real>(y: ArrayView2<'a, T>, c: usize) -> &'a [f32] {
 /// As [`stft`].
 pub fn spectrogram<T: Real>(y: ArrayView2<T>, p: &StftParams, power: f64) -> Result<Array3<T>> {
     let mut out = Array3::zeros(p.shape_of(y)?);
-    let y = planar(y);
-    let raise = |z: Complex<T>| {
-        let magnitude = magnitude(z);
-        if power == 1.0 {
-            magnitude
-        } else if power == 2.0 {
-            magnitude * magnitude
-        } else {
-            magnitude.powf(T::of(power))
-        }
-    };
-    each_spectrum(y.view(), p, out.view_mut(), raise)?;
+    spectrogram_into(y, p, power, out.view_mut())?;
     Ok(out)
+}
+
+/// [`spectrogram`] written into `out`, whose shape is [`StftParams::shape_of`].
+///
+/// # Errors
+/// As [`stft`], or another shape.
+pub fn spectrogram_into<T: Real>(
+    y: ArrayView2<T>,
+    p: &StftParams,
+    power: f64,
+    out: ArrayViewMut3<T>,
+) -> Result<()> {
+    check_out(&out, p.shape_of(y)?)?;
+    let y = planar(y);
+    match power {
+        1.0 => each_spectrum(y.view(), p, out, magnitude),
+        2.0 => each_spectrum(y.view(), p, out, |z| magnitude(z) * magnitude(z)),
+        _ => each_spectrum(y.view(), p, out, |z| magnitude(z).powf(T::of(power))),
+    }
 }
 
 /// Magnitude of a bin as librosa has it: of the value rounded to `T`.
@@ -269,9 +281,14 @@ fn each_spectrum<T: Real, R: Copy + Send + Zero>(
             let first = tile.first + b * LANES;
             for (t, column) in columns.chunks_exact_mut(bins).take(block.ncols()).enumerate() {
                 let spectrum = forward.spectrum(y, first + t, scratch);
-                for (slot, z) in column.iter_mut().zip(spectrum) {
-                    *slot = value(Complex::new(T::of(z.re), T::of(z.im)));
-                }
+                vectorized(
+                    #[inline(always)]
+                    || {
+                        for (slot, z) in column.iter_mut().zip(spectrum) {
+                            *slot = value(Complex::new(T::of(z.re), T::of(z.im)));
+                        }
+                    },
+                );
             }
             write_columns(columns, block);
         }

@@ -102,17 +102,19 @@ pub fn into_numpy<'py, T: Element + Clone, D: Dimension>(
     Ok(data.into_pyarray(py).reshape(shape)?.into_any())
 }
 
-/// A numpy array of this shape, which `fill` writes without the GIL: numpy asks for huge pages for
-/// large arrays of its own, which makes fresh memory several times cheaper than in ours.
-pub fn filled<'py, T: Element>(
+/// The spectra of `y` as a numpy array, which `fill` writes without the GIL: numpy asks for huge
+/// pages where its arrays are large, which makes fresh memory several times cheaper than ours is.
+pub fn filled<'py, T: Element, R: Element>(
     py: Python<'py>,
-    shape: (usize, usize, usize),
-    fill: impl FnOnce(ArrayViewMut3<T>) -> corsmal_dsp::Result<()> + Send,
+    y: ArrayView2<T>,
+    params: &StftParams,
+    fill: impl FnOnce(ArrayView2<T>, ArrayViewMut3<R>) -> corsmal_dsp::Result<()> + Send,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let array = PyArray3::<T>::zeros(py, shape, false);
+    let shape = params.shape_of(y).map_err(value_error)?;
+    let array = PyArray3::<R>::zeros(py, shape, false);
     let mut values = array.readwrite();
     let out = ArrayViewMut3::from_shape(shape, values.as_slice_mut()?).map_err(value_error)?;
-    compute(py, || fill(out))?.map_err(value_error)?;
+    compute(py, || fill(y, out))?.map_err(value_error)?;
     drop(values);
     Ok(array.into_any())
 }
