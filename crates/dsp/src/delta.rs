@@ -180,6 +180,30 @@ mod tests {
     }
 
     #[test]
+    fn every_frame_is_the_weighted_sum_around_it() {
+        use DeltaMode::*;
+        for (rows, frames) in [(3, 9), (2, 150), (40, 1000), (1, 64)] {
+            let value = |r: usize, t: usize| ((r * 31 + t * t * 7) % 101) as f32;
+            let data = Array2::from_shape_fn((rows, frames), |(r, t)| value(r, t));
+            let strided = Array2::from_shape_fn((frames, rows), |(t, r)| value(r, t));
+            for mode in [Interp, Nearest, Mirror, Constant, Wrap] {
+                let p = DeltaParams { mode, ..DeltaParams::default() };
+                let weights = delta_weights(&p).unwrap();
+                let got = delta(data.view(), &p).unwrap();
+                assert_eq!(delta(strided.t(), &p).unwrap(), got);
+                for ((r, t), got) in got.indexed_iter() {
+                    let center = if mode == Interp { t.clamp(4, frames - 5) } else { t };
+                    let at = |i: usize| mode.index((center + i) as isize - 4, frames);
+                    let product =
+                        |i: usize| at(i).map_or(0.0, |k| weights[i] * data[[r, k]].wide());
+                    let want = (0..9).map(product).sum::<f64>() as f32;
+                    assert_eq!(*got, want, "{mode:?} {r} {t}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn too_few_frames_only_refuse_in_interp() {
         let data = Array2::<f32>::zeros((1, 4));
         assert!(delta(data.view(), &DeltaParams::default()).is_err());

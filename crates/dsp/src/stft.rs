@@ -320,6 +320,17 @@ mod tests {
     }
 
     #[test]
+    fn results_of_another_shape_or_order_are_refused() {
+        let (y, p) = (Array2::<f32>::zeros((2, 1000)), StftParams::new(256, 64));
+        let (channels, bins, frames) = p.shape_of(y.view()).unwrap();
+        let mut short = Array3::zeros((channels, bins, frames - 1));
+        assert!(stft_into(y.view(), &p, short.view_mut()).is_err());
+        let mut turned = Array3::zeros((frames, bins, channels));
+        let turned = turned.view_mut().reversed_axes();
+        assert!(spectrogram_into(y.view(), &p, 1.0, turned).is_err());
+    }
+
+    #[test]
     fn reflect_indices_repeat() {
         let at = |i| PadMode::Reflect.index(i, 3).unwrap();
         assert_eq!([at(-3), at(-2), at(-1), at(0), at(3), at(4), at(5)], [1, 2, 1, 0, 1, 0, 1]);

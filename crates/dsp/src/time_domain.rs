@@ -262,6 +262,32 @@ mod tests {
     }
 
     #[test]
+    fn crossings_are_counted_within_each_span() {
+        let sample = |i: usize, c: usize| ((i * 37 + c * 11 + i * i * 5) % 7) as f64 - 3.0;
+        for (channels, threshold, zero_pos) in
+            [(1, 0.0, true), (2, 0.0, false), (3, 1.0, true), (8, 1.0, false), (20, 0.5, true)]
+        {
+            let p = ZeroCrossingParams { threshold, zero_pos, pad: false };
+            let samples: Vec<f64> =
+                (0..500 * channels).map(|k| sample(k / channels, k % channels)).collect();
+            let single: Vec<f32> = samples.iter().map(|x| *x as f32).collect();
+            let spans = [(0, 99), (50, 149), (0, 0), (70, 499)];
+            let sign = |i: usize, c: usize| match sample(i, c) {
+                x if x < -threshold => -1,
+                x if x > threshold || zero_pos => 1,
+                _ => 0,
+            };
+            let crossings = |(first, last): (usize, usize), c: usize| {
+                (first..last).filter(|i| sign(*i, c) != sign(i + 1, c)).count() as u32
+            };
+            let want: Vec<u32> =
+                spans.iter().flat_map(|s| (0..channels).map(|c| crossings(*s, c))).collect();
+            assert_eq!(p.count(&samples, channels, spans.into_iter()), want);
+            assert_eq!(p.count(&single, channels, spans.into_iter()), want);
+        }
+    }
+
+    #[test]
     fn constant_level() {
         let y = Array2::<f64>::from_elem((2, 8192), 0.5);
         let r = rms(y.view(), &FrameParams::default(), PadMode::Constant).unwrap();
