@@ -25,6 +25,8 @@ import librosa
 import numpy as np
 
 SR = 44100
+# Seconds between rows of calls, and of calls before and while they count.
+REST, UNCOUNTED, COUNTED = 0.5, 0.3, 0.4
 
 
 def recording(channels: int, seconds: float, dtype: Any) -> Any:
@@ -67,11 +69,16 @@ def seconds(function: Callable[[], Any]) -> float:
     return time.perf_counter() - start
 
 
-def median(function: Callable[[], Any], repeats: int) -> float:
-    """Median seconds after a rest and two calls that are not counted."""
-    time.sleep(0.5)
-    runs = [seconds(function) for _ in range(2 + repeats)]
-    return statistics.median(runs[2:])
+def median(function: Callable[[], Any], least: int) -> float:
+    """Median seconds after a rest and calls that are not counted; of `least` calls or more."""
+    time.sleep(REST)
+    spent, runs = 0.0, []
+    while spent < UNCOUNTED + COUNTED or len(runs) < least:
+        run = seconds(function)
+        if spent >= UNCOUNTED:
+            runs.append(run)
+        spent += run
+    return statistics.median(runs)
 
 
 def main() -> None:
@@ -87,10 +94,10 @@ def main() -> None:
     y = recording(args.channels, args.seconds, args.dtype)
     print(
         f"{args.channels} channels, {args.seconds:g} s at {SR} Hz, {args.dtype}, "
-        f"n_fft {args.n_fft}; median of {args.repeats}, one process, {os.cpu_count()} cores; "
-        f"{platform.machine()}, {platform.system()}; corsmal-feat {corsmal_feat.__version__}, "
-        f"librosa {librosa.__version__}, numpy {np.__version__}, "
-        f"Python {platform.python_version()}\n"
+        f"n_fft {args.n_fft}; median of {args.repeats} or more, one process; "
+        f"{os.cpu_count()} cores, {platform.machine()}, {platform.system()}; "
+        f"corsmal-feat {corsmal_feat.__version__}, librosa {librosa.__version__}, "
+        f"numpy {np.__version__}, Python {platform.python_version()}\n"
     )
     print("| function | corsmal_feat, ms | librosa, ms | ratio |\n|---|---|---|---|")
     for name, case in cases(y, args.n_fft).items():

@@ -2,12 +2,12 @@
 
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis};
 
-use crate::columns::map_columns;
 use crate::error::{DspError, Result};
 use crate::frequency::{hz_to_octs, require_rate};
 use crate::normalize::Norm;
 use crate::real::{Real, require_finite};
 use crate::simd::vectorized;
+use crate::spectral::Spectra;
 use crate::sums;
 
 /// Parameters of a chroma filter bank, in librosa's names.
@@ -159,7 +159,8 @@ pub fn chroma<T: Real>(
         require_finite("S", s)?;
     }
     let chroma = Chroma::new(bank, norm);
-    Ok(map_columns(s, bank.nrows(), |_, _, spectrum, out| chroma.frame(spectrum, out)))
+    let frame = |(): &mut (), _, _, spectrum: &[T], out: &mut [T]| chroma.frame(spectrum, out);
+    Ok(Spectra::from(s).map(bank.nrows(), || (), frame))
 }
 
 #[cfg(test)]

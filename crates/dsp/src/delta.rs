@@ -1,10 +1,14 @@
 //! Local derivatives over frames (librosa 0.11 `feature.delta`, scipy `savgol_filter`).
 
+use std::borrow::Cow;
+
 use ndarray::{Array2, ArrayView2};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{DspError, Result};
 use crate::real::Real;
+use crate::simd::vectorized;
 
 /// What lies beyond the first and the last frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -84,26 +88,59 @@ pub fn delta<T: Real>(data: ArrayView2<T>, p: &DeltaParams) -> Result<Array2<T>>
         return Err(DspError::parameter("width", p.width, allowed));
     }
     let mut out = Array2::zeros((rows, frames));
-    for r in 0..rows {
-        for t in 0..frames {
-            // The highest derivative of the fitted polynomial is constant over its window, so
-            // `interp` repeats the value at the first and last full window.
-            let center = match p.mode {
-                DeltaMode::Interp => t.clamp(half, frames - 1 - half),
-                _ => t,
-            };
-            let sum: f64 = weights
-                .iter()
-                .enumerate()
-                .filter_map(|(i, w)| {
-                    let at = (center + i) as isize - half as isize;
-                    Some(w * data[[r, p.mode.index(at, frames)?]].wide())
-                })
-                .sum();
-            out[[r, t]] = T::of(sum);
-        }
+    if out.is_empty() {
+        return Ok(out);
     }
+    // Frames whose whole window lies inside.
+    let first = half.min(frames);
+    let inside = first..frames.saturating_sub(half).max(first);
+    let shares = out.as_slice_mut().expect("made in C order");
+    shares.par_chunks_mut(frames).with_min_len(PART.div_ceil(frames)).enumerate().for_each(
+        |(r, out)| {
+            let row = data.row(r);
+            let row = row.as_slice().map_or_else(|| Cow::Owned(row.to_vec()), Cow::Borrowed);
+            for t in (0..inside.start).chain(inside.end..frames) {
+                // The highest derivative of the fitted polynomial is constant over its window, so
+                // `interp` repeats the value at the first and last full window.
+                let center = match p.mode {
+                    DeltaMode::Interp => t.clamp(half, frames - 1 - half),
+                    _ => t,
+                };
+                let value = |(i, w): (usize, &f64)| {
+                    let at = (center + i) as isize - half as isize;
+                    Some(w * row[p.mode.index(at, frames)?].wide())
+                };
+                out[t] = T::of(weights.iter().enumerate().filter_map(value).sum());
+            }
+            vectorized(
+                #[inline(always)]
+                || slide(&weights, &row, &mut out[inside.clone()]),
+            );
+        },
+    );
     Ok(out)
+}
+
+/// Values that one thread takes at least.
+const PART: usize = 1 << 14;
+
+/// `out[t]` is the sum of `weights[i] * row[t + i]`.
+#[inline(always)]
+fn slide<T: Real>(weights: &[f64], row: &[T], out: &mut [T]) {
+    const BLOCK: usize = 32;
+    let (blocks, rest) = out.as_chunks_mut::<BLOCK>();
+    let start = blocks.len() * BLOCK;
+    for (b, out) in blocks.iter_mut().enumerate() {
+        let mut sums = [0.0; BLOCK];
+        for (w, row) in weights.iter().zip(row[b * BLOCK..].windows(BLOCK)) {
+            sums.iter_mut().zip(row).for_each(|(sum, x)| *sum += w * x.wide());
+        }
+        *out = sums.map(T::of);
+    }
+    for (t, out) in rest.iter_mut().enumerate() {
+        let products = weights.iter().zip(&row[start + t..]).map(|(w, x)| w * x.wide());
+        *out = T::of(products.sum());
+    }
 }
 
 impl DeltaMode {
@@ -140,6 +177,30 @@ mod tests {
         let p = DeltaParams { order: 2, ..DeltaParams::default() };
         let d = delta(data.view(), &p).unwrap();
         assert!(d.iter().all(|v| (v - 6.0).abs() < 1e-10));
+    }
+
+    #[test]
+    fn every_frame_is_the_weighted_sum_around_it() {
+        use DeltaMode::*;
+        for (rows, frames) in [(3, 9), (2, 150), (40, 1000), (1, 64)] {
+            let value = |r: usize, t: usize| ((r * 31 + t * t * 7) % 101) as f32;
+            let data = Array2::from_shape_fn((rows, frames), |(r, t)| value(r, t));
+            let strided = Array2::from_shape_fn((frames, rows), |(t, r)| value(r, t));
+            for mode in [Interp, Nearest, Mirror, Constant, Wrap] {
+                let p = DeltaParams { mode, ..DeltaParams::default() };
+                let weights = delta_weights(&p).unwrap();
+                let got = delta(data.view(), &p).unwrap();
+                assert_eq!(delta(strided.t(), &p).unwrap(), got);
+                for ((r, t), got) in got.indexed_iter() {
+                    let center = if mode == Interp { t.clamp(4, frames - 5) } else { t };
+                    let at = |i: usize| mode.index((center + i) as isize - 4, frames);
+                    let product =
+                        |i: usize| at(i).map_or(0.0, |k| weights[i] * data[[r, k]].wide());
+                    let want = (0..9).map(product).sum::<f64>() as f32;
+                    assert_eq!(*got, want, "{mode:?} {r} {t}");
+                }
+            }
+        }
     }
 
     #[test]

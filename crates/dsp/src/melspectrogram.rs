@@ -7,7 +7,7 @@ use crate::error::{DspError, Result};
 use crate::lanes::{LANES, Row};
 use crate::mel::SparseBank;
 use crate::real::Real;
-use crate::stft::{StftParams, frames_of, magnitude, single};
+use crate::stft::{StftParams, magnitude, single};
 use crate::sums;
 use crate::tiles::{LanePlan, for_each_tile, neighbours, planar, write_columns};
 use crate::transform::Forward;
@@ -28,9 +28,10 @@ pub fn melspectrogram<T: Real>(
         let actual = vec![bank.bands().len(), bank.bins()];
         return Err(DspError::Shape { name: "bank", expected, actual });
     }
-    let y = planar(y);
     let bands = bank.bands().len();
-    let mut out = Array3::zeros((y.nrows(), bands, frames_of(y.view(), stft)?));
+    let (channels, _, frames) = stft.shape_of(y)?;
+    let mut out = Array3::zeros((channels, bands, frames));
+    let y = planar(y);
     if T::SINGLE {
         let plan = LanePlan::new(stft)?;
         let rows = |n| vec![Row::ZERO; n];

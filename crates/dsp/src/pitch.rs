@@ -1,7 +1,8 @@
 //! Pitch tracking by parabolic interpolation, and tuning (librosa 0.11 `piptrack`,
 //! `estimate_tuning`, `pitch_tuning`).
 
-use ndarray::{Array3, ArrayView2, ArrayView3};
+use ndarray::{Array3, ArrayView2, ArrayView3, s};
+use rayon::prelude::*;
 
 use crate::columns::for_each_column;
 use crate::error::{DspError, Result};
@@ -258,11 +259,17 @@ pub fn estimate_tuning<T: Real>(
 ) -> Result<Option<f64>> {
     let mut estimator = TuningEstimator::new(params)?;
     check(&estimator.tracker, s, reference)?;
-    let mut absolute = vec![T::zero(); estimator.tracker.n_bins()];
-    for_each_column(s, |c, t, spectrum| {
-        absolute.iter_mut().zip(spectrum).for_each(|(a, x)| *a = x.abs());
-        estimator.push(&absolute, reference.map(|given| given[[c, t]]));
-    });
+    let channel = |c: usize| {
+        let mut estimator = TuningEstimator::new(params)?;
+        let mut absolute = vec![T::zero(); estimator.tracker.n_bins()];
+        for_each_column(s.slice(s![c..=c, .., ..]), |_, t, spectrum| {
+            absolute.iter_mut().zip(spectrum).for_each(|(a, x)| *a = x.abs());
+            estimator.push(&absolute, reference.map(|given| given[[c, t]]));
+        });
+        Ok(estimator)
+    };
+    let channels: Result<Vec<_>> = (0..s.dim().0).into_par_iter().map(channel).collect();
+    channels?.into_iter().for_each(|channel| estimator.merge(channel));
     estimator.finish(resolution, bins_per_octave)
 }
 

@@ -140,18 +140,21 @@ impl StftParams {
         let padded = n + 2 * self.pad();
         if n == 0 || padded < self.n_fft { 0 } else { 1 + (padded - self.n_fft) / self.hop_length }
     }
-}
 
-/// Frames of `y [channels, samples]`, at least one.
-pub(crate) fn frames_of<T>(y: ArrayView2<T>, p: &StftParams) -> Result<usize> {
-    p.check()?;
-    let (channels, n) = y.dim();
-    match p.n_frames(n) {
-        0 if channels > 0 => {
-            let needed = if p.center { 1 } else { p.n_fft };
-            Err(DspError::TooShort { name: "y", actual: n, needed })
+    /// Shape `[channels, n_fft / 2 + 1, frames]` of the transform of `y [channels, samples]`.
+    ///
+    /// # Errors
+    /// Impossible parameters, or a signal too short for one frame.
+    pub fn shape_of<T>(&self, y: ArrayView2<T>) -> Result<(usize, usize, usize)> {
+        self.check()?;
+        let (channels, n) = y.dim();
+        match self.n_frames(n) {
+            0 if channels > 0 => {
+                let needed = if self.center { 1 } else { self.n_fft };
+                Err(DspError::TooShort { name: "y", actual: n, needed })
+            }
+            frames => Ok((channels, self.n_bins(), frames)),
         }
-        frames => Ok(frames),
     }
 }
 
@@ -162,8 +165,22 @@ pub(crate) fn frames_of<T>(y: ArrayView2<T>, p: &StftParams) -> Result<usize> {
 /// # Errors
 /// Impossible parameters, or a signal too short for one frame.
 pub fn stft<T: Real>(y: ArrayView2<T>, p: &StftParams) -> Result<Array3<Complex<T>>> {
+    let mut out = Array3::zeros(p.shape_of(y)?);
+    stft_into(y, p, out.view_mut())?;
+    Ok(out)
+}
+
+/// [`stft`] written into `out`, whose shape is [`StftParams::shape_of`].
+///
+/// # Errors
+/// As [`stft`], or another shape.
+pub fn stft_into<T: Real>(
+    y: ArrayView2<T>,
+    p: &StftParams,
+    mut out: ArrayViewMut3<Complex<T>>,
+) -> Result<()> {
+    check_out(&out, p.shape_of(y)?)?;
     let y = planar(y);
-    let mut out = Array3::zeros((y.nrows(), p.n_bins(), frames_of(y.view(), p)?));
     if T::SINGLE {
         let plan = LanePlan::new(p)?;
         let state = || (plan.frames(), vec![Row::ZERO; 2 * p.n_bins()]);
@@ -186,10 +203,18 @@ pub fn stft<T: Real>(y: ArrayView2<T>, p: &StftParams) -> Result<Array3<Complex<
                 }
             }
         });
+        Ok(())
     } else {
-        each_spectrum(y.view(), p, out.view_mut(), |z| z)?;
+        each_spectrum(y.view(), p, out, |z| z)
     }
-    Ok(out)
+}
+
+fn check_out<R>(out: &ArrayViewMut3<R>, shape: (usize, usize, usize)) -> Result<()> {
+    if out.dim() == shape && out.is_standard_layout() {
+        return Ok(());
+    }
+    let expected = format!("{shape:?} in C order");
+    Err(DspError::Shape { name: "out", expected, actual: out.shape().to_vec() })
 }
 
 /// Channel `c` of a contiguous single-precision signal.
@@ -204,20 +229,28 @@ pub(crate) fn single<'a, T: Real>(y: ArrayView2<'a, T>, c: usize) -> &'a [f32] {
 /// # Errors
 /// As [`stft`].
 pub fn spectrogram<T: Real>(y: ArrayView2<T>, p: &StftParams, power: f64) -> Result<Array3<T>> {
-    let y = planar(y);
-    let mut out = Array3::zeros((y.nrows(), p.n_bins(), frames_of(y.view(), p)?));
-    let raise = |z: Complex<T>| {
-        let magnitude = magnitude(z);
-        if power == 1.0 {
-            magnitude
-        } else if power == 2.0 {
-            magnitude * magnitude
-        } else {
-            magnitude.powf(T::of(power))
-        }
-    };
-    each_spectrum(y.view(), p, out.view_mut(), raise)?;
+    let mut out = Array3::zeros(p.shape_of(y)?);
+    spectrogram_into(y, p, power, out.view_mut())?;
     Ok(out)
+}
+
+/// [`spectrogram`] written into `out`, whose shape is [`StftParams::shape_of`].
+///
+/// # Errors
+/// As [`stft`], or another shape.
+pub fn spectrogram_into<T: Real>(
+    y: ArrayView2<T>,
+    p: &StftParams,
+    power: f64,
+    out: ArrayViewMut3<T>,
+) -> Result<()> {
+    check_out(&out, p.shape_of(y)?)?;
+    let y = planar(y);
+    match power {
+        1.0 => each_spectrum(y.view(), p, out, magnitude),
+        2.0 => each_spectrum(y.view(), p, out, |z| magnitude(z) * magnitude(z)),
+        _ => each_spectrum(y.view(), p, out, |z| magnitude(z).powf(T::of(power))),
+    }
 }
 
 /// Magnitude of a bin as librosa has it: of the value rounded to `T`.
@@ -248,9 +281,14 @@ fn each_spectrum<T: Real, R: Copy + Send + Zero>(
             let first = tile.first + b * LANES;
             for (t, column) in columns.chunks_exact_mut(bins).take(block.ncols()).enumerate() {
                 let spectrum = forward.spectrum(y, first + t, scratch);
-                for (slot, z) in column.iter_mut().zip(spectrum) {
-                    *slot = value(Complex::new(T::of(z.re), T::of(z.im)));
-                }
+                vectorized(
+                    #[inline(always)]
+                    || {
+                        for (slot, z) in column.iter_mut().zip(spectrum) {
+                            *slot = value(Complex::new(T::of(z.re), T::of(z.im)));
+                        }
+                    },
+                );
             }
             write_columns(columns, block);
         }
@@ -279,6 +317,17 @@ mod tests {
         let y = Array2::<f64>::ones((1, 4096));
         let d = stft(y.view(), &StftParams::new(1024, 256)).unwrap();
         assert!((d[[0, 0, 8]].re - 512.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn results_of_another_shape_or_order_are_refused() {
+        let (y, p) = (Array2::<f32>::zeros((2, 1000)), StftParams::new(256, 64));
+        let (channels, bins, frames) = p.shape_of(y.view()).unwrap();
+        let mut short = Array3::zeros((channels, bins, frames - 1));
+        assert!(stft_into(y.view(), &p, short.view_mut()).is_err());
+        let mut turned = Array3::zeros((frames, bins, channels));
+        let turned = turned.view_mut().reversed_axes();
+        assert!(spectrogram_into(y.view(), &p, 1.0, turned).is_err());
     }
 
     #[test]

@@ -6,7 +6,7 @@ use ndarray::{
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::lanes::{LANES, Planar, Row, Spectrum};
+use crate::lanes::{LANES, Row, Slots, Spectrum, gather};
 use crate::real::Real;
 use crate::stft::StftParams;
 use crate::window::padded_window;
@@ -104,11 +104,10 @@ impl LanePlan {
     pub fn frames(&self) -> LaneFrames<'_> {
         // Frames that do not overlap are laid side by side.
         let hop = self.params.hop_length.min(self.params.n_fft);
-        let planar = Planar::new(self.window.clone(), hop);
         LaneFrames {
             plan: self,
-            samples: vec![0.0; planar.span()],
-            planar,
+            hop,
+            samples: vec![0.0; (LANES - 1) * hop + self.params.n_fft],
             rows: vec![Row::ZERO; self.params.n_fft],
         }
     }
@@ -117,21 +116,22 @@ impl LanePlan {
 /// Sixteen frames of a channel at a time.
 pub(crate) struct LaneFrames<'p> {
     plan: &'p LanePlan,
-    planar: Planar,
+    hop: usize,
     samples: Vec<f32>,
     rows: Vec<Row>,
 }
 
 impl LaneFrames<'_> {
     fn load(&mut self, y: &[f32], first: usize) {
-        let p = &self.plan.params;
+        let LanePlan { params: p, window, .. } = self.plan;
+        let slots = Slots { first: 0, len: LANES, channels: 1 };
         let start = |t: usize| (t * p.hop_length) as isize - p.pad() as isize;
         if p.hop_length > p.n_fft {
             let frames = first..p.n_frames(y.len());
             for (t, samples) in frames.zip(self.samples.chunks_exact_mut(p.n_fft)) {
                 p.pad_mode.read(y, start(t), samples);
             }
-            return self.planar.gather(&self.samples, &mut self.rows);
+            return gather(&self.samples, self.hop, window, slots, &mut self.rows);
         }
         let start = start(first);
         let inside = usize::try_from(start).ok().and_then(|s| y.get(s..s + self.samples.len()));
@@ -139,7 +139,7 @@ impl LaneFrames<'_> {
             p.pad_mode.read(y, start, &mut self.samples);
             &self.samples
         });
-        self.planar.gather(samples, &mut self.rows);
+        gather(samples, self.hop, window, slots, &mut self.rows);
     }
 
     /// `|X|^power` of the frames from `first` on into `out` (`n_bins` rows).

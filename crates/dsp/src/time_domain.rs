@@ -2,7 +2,6 @@
 //! `feature.zero_crossing_rate`, `feature.rms`).
 
 use ndarray::{Array3, ArrayView2, ArrayView3};
-use rayon::prelude::*;
 
 use crate::error::{DspError, Result};
 use crate::real::Real;
@@ -93,17 +92,63 @@ impl ZeroCrossingParams {
         Ok(())
     }
 
-    /// Sign class of a sample; a crossing is where the class changes. The threshold is compared in
-    /// the precision of the signal, as librosa does.
+    /// Crossings of each channel of interleaved `samples` within each of `spans`, as
+    /// `[spans][channels]`. A span is its first and its last frame; the one before the first does
+    /// not count. The threshold is compared in the precision of the signal, as librosa does.
+    pub fn count<T: Real>(
+        &self,
+        samples: &[T],
+        channels: usize,
+        spans: impl Iterator<Item = (usize, usize)> + Clone,
+    ) -> Vec<u32> {
+        // Spans overlap: what lies between two neighbouring marks is counted once.
+        let mut marks: Vec<usize> = spans.clone().flat_map(|(first, last)| [first, last]).collect();
+        marks.sort_unstable();
+        marks.dedup();
+        let mut until = vec![0; marks.len() * channels];
+        for (m, pair) in marks.windows(2).enumerate() {
+            let (before, after) = until.split_at_mut((m + 1) * channels);
+            let total = &mut after[..channels];
+            total.copy_from_slice(&before[m * channels..]);
+            let samples = &samples[pair[0] * channels..(pair[1] + 1) * channels];
+            vectorized(
+                #[inline(always)]
+                || self.add(samples, channels, total),
+            );
+        }
+        let at = |frame: usize| {
+            let mark = marks.binary_search(&frame).expect("every end of a span is a mark");
+            &until[mark * channels..][..channels]
+        };
+        let within = |(first, last)| at(last).iter().zip(at(first)).map(|(b, a)| b - a);
+        spans.flat_map(within).collect()
+    }
+
+    /// Adds the crossings of each channel between the first and the last frame of `samples`.
     #[inline(always)]
-    pub fn sign<T: Real>(&self, x: T, threshold: T) -> i8 {
-        let x = if x.abs() <= threshold { T::zero() } else { x };
-        if x < T::zero() {
-            -1
-        } else if self.zero_pos || x > T::zero() {
-            1
-        } else {
-            0
+    fn add<T: Real>(&self, samples: &[T], channels: usize, total: &mut [u32]) {
+        const LANES: usize = 16;
+        let high = T::of(self.threshold);
+        let (low, zero_is_a_sign) = (-high, !self.zero_pos);
+        let crossed = |a: T, b: T| {
+            let negative = (a < low) != (b < low);
+            u32::from(negative | (zero_is_a_sign & ((a > high) != (b > high))))
+        };
+        let pairs = samples.len() - channels;
+        let (before, after) = (&samples[..pairs], &samples[channels..]);
+        let whole = if LANES.is_multiple_of(channels) { pairs / LANES * LANES } else { 0 };
+        let mut lanes = [0; LANES];
+        let blocks = before[..whole].as_chunks::<LANES>().0.iter();
+        for (a, b) in blocks.zip(after[..whole].as_chunks::<LANES>().0) {
+            for i in 0..LANES {
+                lanes[i] += crossed(a[i], b[i]);
+            }
+        }
+        if whole > 0 {
+            lanes.iter().enumerate().for_each(|(i, n)| total[i % channels] += n);
+        }
+        for (i, (a, b)) in before[whole..].iter().zip(&after[whole..]).enumerate() {
+            total[i % channels] += crossed(*a, *b);
         }
     }
 }
@@ -121,41 +166,27 @@ pub fn zero_crossing_rate<T: Real>(
     p.check()?;
     let (channels, n) = y.dim();
     let frames = frame.frames_of(n)?;
-    let (threshold, pad) = (T::of(p.threshold), frame.pad() as isize);
-    let first = usize::from(p.pad);
     let y = planar(y);
     let mut out = Array3::zeros((channels, 1, frames));
-    let channels: Vec<_> = out.outer_iter_mut().zip(y.outer_iter()).collect();
-    channels.into_par_iter().for_each(|(mut out, signal)| {
-        let crossings = crossings(signal.to_slice().expect("contiguous"), p, threshold);
-        let until = |i: isize| crossings[i.clamp(0, n as isize - 1) as usize];
-        for (t, slot) in out.iter_mut().enumerate() {
-            let start = (t * frame.hop_length) as isize - pad;
-            let last = start + frame.frame_length as isize - 1;
-            let count = (until(last) - until(start)) as usize + first;
-            *slot = count as f64 / frame.frame_length as f64;
-        }
-    });
-    Ok(out)
-}
-
-/// Changes of sign at samples `1..=i`, by `i`; outside the signal nothing changes.
-fn crossings<T: Real>(signal: &[T], p: &ZeroCrossingParams, threshold: T) -> Vec<u32> {
-    let mut changes = vec![0_u32; signal.len()];
-    vectorized(
-        #[inline(always)]
-        || {
-            for (change, pair) in changes[1..].iter_mut().zip(signal.windows(2)) {
-                *change = u32::from(p.sign(pair[0], threshold) != p.sign(pair[1], threshold));
+    // Outside the signal nothing changes.
+    let inside = |i: usize| i.saturating_sub(frame.pad()).min(n - 1);
+    for_each_tile(
+        out.view_mut(),
+        || (),
+        |(), mut tile| {
+            let signal = y.row(tile.channel);
+            let frames = tile.first..tile.first + tile.out.ncols();
+            let spans = frames.map(|t| {
+                let start = t * frame.hop_length;
+                (inside(start), inside(start + frame.frame_length - 1))
+            });
+            let counts = p.count(signal.to_slice().expect("contiguous"), 1, spans);
+            for (slot, count) in tile.out.iter_mut().zip(counts) {
+                *slot = f64::from(count + u32::from(p.pad)) / frame.frame_length as f64;
             }
         },
     );
-    let mut total = 0;
-    for change in &mut changes {
-        total += *change;
-        *change = total;
-    }
-    changes
+    Ok(out)
 }
 
 /// Root of the mean square of each frame, `[channels, 1, frames]`, always `f32` (librosa 0.11
@@ -228,6 +259,32 @@ mod tests {
         let y = Array2::from_shape_fn((1, 4096), |(_, i)| if i % 2 == 0 { 1.0_f32 } else { -1.0 });
         let z = zero_crossing_rate(y.view(), &FrameParams::default(), &Default::default()).unwrap();
         assert_eq!(z[[0, 0, 4]], 2047.0 / 2048.0);
+    }
+
+    #[test]
+    fn crossings_are_counted_within_each_span() {
+        let sample = |i: usize, c: usize| ((i * 37 + c * 11 + i * i * 5) % 7) as f64 - 3.0;
+        for (channels, threshold, zero_pos) in
+            [(1, 0.0, true), (2, 0.0, false), (3, 1.0, true), (8, 1.0, false), (20, 0.5, true)]
+        {
+            let p = ZeroCrossingParams { threshold, zero_pos, pad: false };
+            let samples: Vec<f64> =
+                (0..500 * channels).map(|k| sample(k / channels, k % channels)).collect();
+            let single: Vec<f32> = samples.iter().map(|x| *x as f32).collect();
+            let spans = [(0, 99), (50, 149), (0, 0), (70, 499)];
+            let sign = |i: usize, c: usize| match sample(i, c) {
+                x if x < -threshold => -1,
+                x if x > threshold || zero_pos => 1,
+                _ => 0,
+            };
+            let crossings = |(first, last): (usize, usize), c: usize| {
+                (first..last).filter(|i| sign(*i, c) != sign(i + 1, c)).count() as u32
+            };
+            let want: Vec<u32> =
+                spans.iter().flat_map(|s| (0..channels).map(|c| crossings(*s, c))).collect();
+            assert_eq!(p.count(&samples, channels, spans.into_iter()), want);
+            assert_eq!(p.count(&single, channels, spans.into_iter()), want);
+        }
     }
 
     #[test]

@@ -4,10 +4,13 @@
 use corsmal_dsp::Real;
 use corsmal_dsp::spectral::Spectra;
 use corsmal_dsp::stft::StftParams;
-use ndarray::{Array2, ArrayView2, ArrayView3, Dimension};
-use numpy::{Element, IntoPyArray, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use ndarray::{Array2, ArrayView2, ArrayView3, ArrayViewMut3, Dimension};
+use numpy::{
+    Element, IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
+use crate::pool::compute;
 use crate::spectrum::{StftTuple, stft_params};
 use crate::value_error;
 
@@ -97,6 +100,23 @@ pub fn into_numpy<'py, T: Element + Clone, D: Dimension>(
         array.as_standard_layout().into_owned().into_raw_vec_and_offset().0
     };
     Ok(data.into_pyarray(py).reshape(shape)?.into_any())
+}
+
+/// The spectra of `y` as a numpy array, which `fill` writes without the GIL: numpy asks for huge
+/// pages where its arrays are large, which makes fresh memory several times cheaper than ours is.
+pub fn filled<'py, T: Element, R: Element>(
+    py: Python<'py>,
+    y: ArrayView2<T>,
+    params: &StftParams,
+    fill: impl FnOnce(ArrayView2<T>, ArrayViewMut3<R>) -> corsmal_dsp::Result<()> + Send,
+) -> PyResult<Bound<'py, PyAny>> {
+    let shape = params.shape_of(y).map_err(value_error)?;
+    let array = PyArray3::<R>::zeros(py, shape, false);
+    let mut values = array.readwrite();
+    let out = ArrayViewMut3::from_shape(shape, values.as_slice_mut()?).map_err(value_error)?;
+    compute(py, || fill(y, out))?.map_err(value_error)?;
+    drop(values);
+    Ok(array.into_any())
 }
 
 /// Either precision of a two-dimensional result.

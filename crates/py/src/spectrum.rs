@@ -1,11 +1,11 @@
 //! Windows and the short-time Fourier transform.
 
 use corsmal_dsp::real::all_finite as dsp_all_finite;
-use corsmal_dsp::stft::{PadMode, StftParams, spectrogram as dsp_spectrogram, stft as dsp_stft};
+use corsmal_dsp::stft::{PadMode, StftParams, spectrogram_into, stft_into};
 use corsmal_dsp::window::{Window, get_window as dsp_get_window};
 use pyo3::prelude::*;
 
-use crate::arrays::{Floats, each_precision, into_numpy, signal, view1};
+use crate::arrays::{Floats, filled, into_numpy, signal, view1};
 use crate::pool::compute;
 use crate::value_error;
 
@@ -73,7 +73,10 @@ fn all_finite<'py>(py: Python<'py>, array: Floats<'py>) -> PyResult<bool> {
 #[pyfunction]
 fn stft<'py>(py: Python<'py>, y: Floats<'py>, params: StftTuple) -> PyResult<Bound<'py, PyAny>> {
     let params = stft_params(&params)?;
-    each_precision!(py, signal(y), dsp_stft(y, &params))
+    match y {
+        Floats::F32(y) => filled(py, signal(&y)?, &params, |y, out| stft_into(y, &params, out)),
+        Floats::F64(y) => filled(py, signal(&y)?, &params, |y, out| stft_into(y, &params, out)),
+    }
 }
 
 #[pyfunction]
@@ -84,7 +87,14 @@ fn spectrogram<'py>(
     power: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let params = stft_params(&params)?;
-    each_precision!(py, signal(y), dsp_spectrogram(y, &params, power))
+    match y {
+        Floats::F32(y) => {
+            filled(py, signal(&y)?, &params, |y, out| spectrogram_into(y, &params, power, out))
+        }
+        Floats::F64(y) => {
+            filled(py, signal(&y)?, &params, |y, out| spectrogram_into(y, &params, power, out))
+        }
+    }
 }
 
 pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {

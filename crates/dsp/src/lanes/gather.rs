@@ -1,6 +1,8 @@
 //! Windowed frames of an interleaved signal into rows.
 
-use super::{LANES, Row};
+use pulp::{Arch, Simd, WithSimd};
+
+use super::{LANES, Row, registers};
 use crate::simd::vectorized;
 
 /// Which (frame, channel) each lane of a block stands for: slot `s` is the `first + s`-th pair in
@@ -44,10 +46,12 @@ impl Slots {
 pub fn gather(signal: &[f32], hop: usize, window: &[f32], slots: Slots, rows: &mut [Row]) {
     debug_assert_eq!(window.len(), rows.len());
     let aligned = slots.aligned();
+    if aligned && slots.channels == 1 {
+        return Arch::new().dispatch(Mono { signal, hop, window, slots, rows });
+    }
     vectorized(
         #[inline(always)]
         || match slots.channels {
-            1 if aligned => groups::<1, 16>(signal, hop, window, slots, rows),
             2 if aligned => groups::<2, 8>(signal, hop, window, slots, rows),
             4 if aligned => groups::<4, 4>(signal, hop, window, slots, rows),
             8 if aligned => groups::<8, 2>(signal, hop, window, slots, rows),
@@ -72,6 +76,57 @@ fn groups<const CHANNELS: usize, const FRAMES: usize>(
             for (slot, x) in group.iter_mut().zip(&frame[n]) {
                 *slot = x * w;
             }
+        }
+    }
+}
+
+/// Sixteen frames of one channel.
+struct Mono<'a> {
+    signal: &'a [f32],
+    hop: usize,
+    window: &'a [f32],
+    slots: Slots,
+    rows: &'a mut [Row],
+}
+
+/// Samples of a frame that are read together: a quarter of the widest register.
+const QUAD: usize = 4;
+
+impl WithSimd for Mono<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { signal, hop, window, slots, rows } = self;
+        let wide = S::F32_LANES.is_multiple_of(QUAD);
+        let whole = if wide { rows.len() / QUAD * QUAD } else { 0 };
+        let (quads, rest) = rows.split_at_mut(whole);
+        let frames = |f| &signal[(slots.first + f) * hop..][..window.len()];
+        // Slot `QUAD * g + j` is in group `g` of the register that frame set `j` fills.
+        let sets: [[&[[f32; QUAD]]; LANES / QUAD]; QUAD] = std::array::from_fn(|j| {
+            std::array::from_fn(|g| frames(QUAD * g + j).as_chunks::<QUAD>().0)
+        });
+        let quads = quads.as_chunks_mut::<QUAD>().0.iter_mut();
+        for (n, (rows, w)) in quads.zip(window.as_chunks::<QUAD>().0).enumerate() {
+            let x: [Row; QUAD] = std::array::from_fn(|j| {
+                let mut row = Row::ZERO;
+                for (group, frame) in row.0.as_chunks_mut::<QUAD>().0.iter_mut().zip(&sets[j]) {
+                    *group = frame[n];
+                }
+                row
+            });
+            for v in 0..registers::<S>() {
+                // Transposes the square that each group of the four registers makes.
+                let x: [S::f32s; QUAD] = std::array::from_fn(|j| x[j].load::<S>(v));
+                let x = simd.deinterleave_shfl_f32s(x);
+                for (row, (x, w)) in rows.iter_mut().zip(x.into_iter().zip(w)) {
+                    row.store::<S>(v, simd.mul_f32s(x, simd.splat_f32s(*w)));
+                }
+            }
+        }
+        for (n, row) in rest.iter_mut().enumerate() {
+            let n = whole + n;
+            row.0 = std::array::from_fn(|f| frames(f)[n] * window[n]);
         }
     }
 }
@@ -139,11 +194,12 @@ mod tests {
 
     #[test]
     fn every_layout_puts_the_same_samples_into_its_slots() {
-        let window: Vec<f32> = (0..32).map(|i| 1.0 + i as f32).collect();
-        for channels in [1, 2, 3, 4, 5, 8, 16, 20] {
-            let signal: Vec<f32> = (0..channels * (32 + 40 * 8)).map(|i| i as f32).collect();
+        let cases = [1, 2, 3, 4, 5, 8, 16, 20].into_iter().flat_map(|c| [(c, 32), (c, 35)]);
+        for (channels, length) in cases {
+            let window: Vec<f32> = (0..length).map(|i| 1.0 + i as f32).collect();
+            let signal: Vec<f32> = (0..channels * (length + 40 * 8)).map(|i| i as f32).collect();
             for slots in Slots::blocks(37, channels) {
-                let mut rows = vec![Row([f32::NAN; LANES]); 32];
+                let mut rows = vec![Row([f32::NAN; LANES]); length];
                 gather(&signal, 8, &window, slots, &mut rows);
                 for s in 0..LANES {
                     let (frame, channel) = slots.pair(s);

@@ -10,14 +10,12 @@ mod complex;
 mod decibel;
 mod fft;
 mod gather;
-mod planar;
 mod spectrum;
 mod weighted;
 
 pub use decibel::power_to_decibel;
 pub use fft::LaneFft;
 pub use gather::{Aligned, Frames, Slots, gather};
-pub use planar::Planar;
 pub use spectrum::{Spectrum, square_roots};
 pub use weighted::weighted_sums;
 

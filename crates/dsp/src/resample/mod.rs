@@ -12,13 +12,16 @@ mod sinc;
 mod stage;
 mod stream;
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use ndarray::{Array2, ArrayView2};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{DspError, Result};
-use crate::real::{Real, require_finite};
+use crate::real::{Real, all_finite, require_finite};
+use crate::tiles::planar;
 use stage::{Frames, Stage};
 
 pub use converter::{Converter, ConverterStream};
@@ -194,15 +197,18 @@ pub fn resample<T: Real>(
     scale: bool,
 ) -> Result<Array2<T>> {
     check_rates(orig_sr, target_sr)?;
-    require_finite("y", y)?;
+    let y = planar(y);
+    if !all_finite(y.as_slice().expect("contiguous")) {
+        require_finite("y", &y)?;
+    }
     if orig_sr == target_sr {
-        return Ok(y.to_owned());
+        return Ok(y.into_owned());
     }
     let ratio = target_sr / orig_sr;
     let mut out = match res_type {
-        ResType::SoxrHq => resample_hq(y, &ResamplePlan::new(orig_sr, target_sr)?),
+        ResType::SoxrHq => resample_hq(y.view(), &ResamplePlan::new(orig_sr, target_sr)?),
         ResType::KaiserBest | ResType::KaiserFast => {
-            resample_windowed_sinc(y, orig_sr, target_sr, res_type == ResType::KaiserFast)?
+            resample_windowed_sinc(y.view(), orig_sr, target_sr, res_type == ResType::KaiserFast)?
         }
     };
     let n_out = (y.ncols() as f64 * ratio).ceil() as usize;
@@ -218,18 +224,30 @@ pub fn resample<T: Real>(
     Ok(out)
 }
 
+/// Outputs of a channel that one thread makes at a time: many times the reach of the filters.
+const SPAN: usize = 1 << 14;
+
+/// `y` has contiguous channels.
 fn resample_hq<T: Real>(y: ArrayView2<T>, plan: &ResamplePlan) -> Array2<T> {
     let (channels, n) = y.dim();
-    let count = plan.filtered_len(n as u64);
-    let mut out = Array2::zeros((channels, count as usize));
-    for (signal, mut row) in y.outer_iter().zip(out.outer_iter_mut()) {
-        let samples: Vec<f32> = signal.iter().map(|v| v.wide() as f32).collect();
-        let converted =
-            plan.segment(1, 0..count, &samples, 0).expect("one channel is whole frames");
-        for (slot, v) in row.iter_mut().zip(converted) {
-            *slot = T::of(f64::from(v));
-        }
-    }
+    let mut out = Array2::zeros((channels, plan.filtered_len(n as u64) as usize));
+    let rows = out.outer_iter_mut().zip(y.outer_iter()).flat_map(|(row, signal)| {
+        let signal = signal.to_slice().expect("contiguous");
+        let spans = row.into_slice().expect("made in C order").chunks_mut(SPAN).enumerate();
+        spans.map(move |(i, out)| (i * SPAN, out, signal))
+    });
+    let spans: Vec<_> = rows.collect();
+    spans.into_par_iter().for_each(|(first, out, signal)| {
+        let range = first as u64..(first + out.len()) as u64;
+        let needed = plan.input_range(range.clone());
+        let start = needed.start.clamp(0, n as i64) as usize;
+        let signal = &signal[start..(needed.end.max(0) as usize).clamp(start, n)];
+        let single = || Cow::Owned(signal.iter().map(|v| v.wide() as f32).collect());
+        let samples = T::as_f32(signal).map_or_else(single, Cow::Borrowed);
+        let converted = plan.segment(1, range, &samples, start as u64);
+        let converted = converted.expect("one channel is whole frames");
+        out.iter_mut().zip(converted).for_each(|(slot, v)| *slot = T::of(f64::from(v)));
+    });
     out
 }
 

@@ -170,9 +170,10 @@ impl Fir {
         if channels == 1 && self.down == 1 {
             return vec![Cow::Borrowed(data)];
         }
+        let stride = self.down * channels;
         let plane = |m: usize| {
-            let samples = data.iter().skip(m * channels + c).step_by(self.down * channels);
-            Cow::Owned(samples.copied().collect())
+            let data = data.get(m * channels + c..).unwrap_or_default();
+            Cow::Owned((0..data.len().div_ceil(stride)).map(|i| data[i * stride]).collect())
         };
         (0..self.down).map(plane).collect()
     }

@@ -46,6 +46,24 @@ fn lengths_follow_librosa() {
 }
 
 #[test]
+fn spans_of_an_array_join_without_a_seam() {
+    for (from, to) in [(44100.0, 22050.0), (44100.0, 16000.0), (44100.0, 25000.5)] {
+        let (plan, samples) = (ResamplePlan::new(from, to).unwrap(), noise(150_000, 3));
+        let whole = 0..plan.filtered_len(samples.len() as u64);
+        assert!(whole.end > 2 * SPAN as u64);
+        let want = plan.segment(1, whole, &samples, 0).unwrap();
+        let single = Array2::from_shape_fn((3, samples.len()), |(_, i)| samples[i]);
+        let got = resample(single.view(), from, to, ResType::SoxrHq, false, false).unwrap();
+        assert!(got.outer_iter().all(|row| row.iter().eq(&want)));
+        let double = single.mapv(f64::from);
+        let got = resample(double.view(), from, to, ResType::SoxrHq, false, false).unwrap();
+        assert!(
+            got.outer_iter().all(|row| row.iter().copied().eq(want.iter().map(|x| f64::from(*x))))
+        );
+    }
+}
+
+#[test]
 fn tones_pass() {
     for (from, to) in RATES {
         let n = 20_000;

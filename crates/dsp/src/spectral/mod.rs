@@ -19,7 +19,7 @@ use crate::error::{DspError, Result};
 use crate::lanes::LANES;
 use crate::real::{Real, require_finite};
 use crate::simd::vectorized;
-use crate::stft::{StftParams, frames_of, magnitude};
+use crate::stft::{StftParams, magnitude};
 use crate::tiles::{for_each_tile, planar, read_columns};
 use crate::transform::Forward;
 
@@ -85,7 +85,7 @@ impl<'a, T: Real> Spectra<'a, T> {
     /// # Errors
     /// Impossible parameters, or a signal too short for one frame.
     pub fn of(y: ArrayView2<'a, T>, params: &StftParams) -> Result<Self> {
-        frames_of(y, params)?;
+        params.shape_of(y)?;
         Ok(Self::Of(planar(y), Forward::new(params)?))
     }
 
@@ -123,7 +123,7 @@ impl<'a, T: Real> Spectra<'a, T> {
 
     /// `[channels, rows, frames]` made by `each(state, channel, frame, magnitudes, out)`, where
     /// `out` holds the `rows` values of that frame; on all threads of the pool, each with a `state`.
-    fn map<R: Real, S>(
+    pub(crate) fn map<R: Real, S>(
         &self,
         rows: usize,
         state: impl Fn() -> S + Sync,

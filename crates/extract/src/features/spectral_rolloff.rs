@@ -30,7 +30,10 @@ struct Rolloff {
 
 impl SlotKernel for Rolloff {
     fn worker(&self) -> SlotFn<'_> {
-        Box::new(|magnitude, out| out[0] = rolloff(magnitude, &self.freqs, self.roll_percent))
+        let mut sums = Vec::new();
+        Box::new(move |magnitude, out| {
+            out[0] = rolloff(magnitude, &self.freqs, self.roll_percent, &mut sums);
+        })
     }
 }
 
