@@ -152,7 +152,7 @@ fn only_the_shards_of_one_run_are_merged() {
     }
     let out = path("merged.npz");
     let error = merge(&[path("1.npz")], &out, false).unwrap_err().to_string();
-    assert!(error.contains("expected shard 0/1, found 1/2"), "{error}");
+    assert!(error.contains("expected all 2 shards, found 1"), "{error}");
     let error = merge(&[path("0.npz"), path("0.npz")], &out, false).unwrap_err().to_string();
     assert!(error.contains("expected shard 1/2, found 0/2"), "{error}");
     assert!(merge(&[], &out, false).is_err());
