@@ -146,3 +146,85 @@ fn what_is_wrong_is_said() {
     }
     assert_eq!(findings.containers[0].missing.len(), 83);
 }
+
+/// Ids that mean other recordings, as in the two annotation files that were published for the flat
+/// release.
+#[test]
+fn annotation_files_must_not_contradict_each_other() {
+    let dir = tempfile::tempdir().unwrap();
+    synth::generate(dir.path(), Size::Small, 2).unwrap();
+    let path = dir.path().join("ccm_train_annotation.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let copy = dir.path().join("ccm_train_annotation_copy.csv");
+    std::fs::write(&copy, &text).unwrap();
+    assert!(check(&DataSet::open(dir.path()).unwrap()).sound(), "the same twice is fine");
+
+    let (header, rows) = text.split_once('\n').unwrap();
+    let mut rows: Vec<String> = rows.lines().map(String::from).collect();
+    let without_id = |row: &str| row.split_once(',').unwrap().1.to_string();
+    let (a, b) = (without_id(&rows[0]), without_id(&rows[1]));
+    (rows[0], rows[1]) = (format!("0,{b}"), format!("1,{a}"));
+    std::fs::write(&copy, format!("{header}\n{}\n", rows.join("\n"))).unwrap();
+    let set = DataSet::open(dir.path()).unwrap();
+    assert_eq!(set.contradictions.len(), 1);
+    let findings = check(&set);
+    let odd = &findings.odd[0];
+    assert!(!findings.sound() && odd.path == copy, "{odd:?}");
+    assert!(odd.what.contains("of id 0 than") && odd.what.contains(path.to_str().unwrap()));
+    let error = corsmal_ccm::benchmark::run(
+        &corsmal_ccm::benchmark::Options {
+            data: dir.path().into(),
+            out: dir.path().join("report"),
+            baselines: Vec::new(),
+            added: Vec::new(),
+            jobs: 1,
+            seed: 1,
+        },
+        &|_| {},
+        &Default::default(),
+    );
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("annotation_copy.csv says something else of id 0 than"), "{error}");
+
+    // A capacity that the file of 2020 gives otherwise.
+    let tree = "Container ID,Sequence,Scenario,Background,Illumination,Container Capacity [mL],\
+                Container mass [g],Filling type,Filling density [g/mL],Filling level,\
+                Filling mass [g]\n1,2,s0,b1,l0,521,10,-1,-1,-1,-1\n";
+    std::fs::write(&copy, tree).unwrap();
+    let sequence = Annotations::read(&path).unwrap().rows[2].sequence.unwrap();
+    std::fs::write(&copy, tree.replace("1,2,", &format!("1,{sequence},"))).unwrap();
+    let what = &DataSet::open(dir.path()).unwrap().contradictions[0].what;
+    assert!(what.contains(&format!("of container 1 sequence {sequence} than")), "{what}");
+}
+
+/// Ids start at 0 in every part.
+#[test]
+fn annotations_of_one_part_do_not_label_another() {
+    let dir = tempfile::tempdir().unwrap();
+    synth::generate(dir.path(), Size::Small, 2).unwrap();
+    let tree = DataSet::open(dir.path()).unwrap();
+    let flat = tempfile::tempdir().unwrap();
+    for part in ["train", "test_pub"] {
+        let audio = flat.path().join(part).join("audio");
+        std::fs::create_dir_all(&audio).unwrap();
+        for recording in &tree.recordings {
+            let name = format!("{:06}.wav", recording.id.unwrap());
+            std::fs::copy(&recording.path, audio.join(name)).unwrap();
+        }
+    }
+    let text = std::fs::read_to_string(dir.path().join("ccm_train_annotation.csv")).unwrap();
+    std::fs::write(flat.path().join("ccm_train_annotation.csv"), &text).unwrap();
+    let header = text.lines().next().unwrap();
+    let public = format!("{header}\n0,10,0,0,0,1,1,1,-1,300,5,1,1,0.3,45,50,-1,-1,-1\n");
+    std::fs::write(flat.path().join("ccm_test_pub_annotation.csv"), public).unwrap();
+    let set = DataSet::open(flat.path()).unwrap();
+    assert!(set.contradictions.is_empty(), "{:?}", set.contradictions);
+    let of = |part| set.recordings.iter().filter(move |r| r.part == part);
+    let training: Vec<_> = of(Subset::Training).map(|r| (r.container, r.name)).collect();
+    let expected: Vec<_> = tree.recordings.iter().map(|r| (r.container, r.name)).collect();
+    assert_eq!(training, expected);
+    let labelled: Vec<_> = of(Subset::Public).filter(|r| r.name.is_some()).collect();
+    assert_eq!(labelled.len(), 1);
+    assert_eq!((labelled[0].id, labelled[0].container), (Some(0), Container::new(10)));
+    assert_eq!(labelled[0].sequence, None, "files of test parts are numbered at random");
+}

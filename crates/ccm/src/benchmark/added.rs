@@ -1,19 +1,36 @@
 //! Prediction files of other methods.
 
 use std::collections::HashMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::results::{Estimate, Target};
-use crate::error::Result;
+use super::results::{Estimate, Rows, Target};
+use crate::dataset::{Container, Subset};
+use crate::error::{CcmError, Result};
 use crate::predictions::read_capacities;
-use crate::submission::{RowKey, Submission};
+use crate::submission::{RowKey, Submission, listed};
 use crate::table::Table;
 
 /// Predictions that join the tables.
 pub struct Added {
-    /// Name in the tables.
-    pub name: String,
+    name: String,
+    path: PathBuf,
     by_key: HashMap<RowKey, Estimate>,
+}
+
+/// Predictions for the parts of a data set that their file covers.
+pub(super) struct Placed {
+    /// Name in the tables.
+    pub(super) name: String,
+    pub(super) training: Option<Vec<Estimate>>,
+    /// For each test part of the data set.
+    pub(super) tests: Vec<Option<Vec<Estimate>>>,
+}
+
+impl Placed {
+    /// Whether any part is covered.
+    pub(super) fn is_any(&self) -> bool {
+        self.training.is_some() || self.tests.iter().any(Option::is_some)
+    }
 }
 
 impl Added {
@@ -21,40 +38,139 @@ impl Added {
     /// (`id10_0000.png`: container and sequence number) and `capacity[mL]`.
     ///
     /// # Errors
-    /// [`crate::CcmError`] as [`Submission::read`].
+    /// [`CcmError`] as [`Submission::read`].
     pub fn read(name: &str, path: &Path) -> Result<Self> {
         let table = Table::read(path)?;
         let by_key = if table.find("fileName").is_some() {
             let capacities = read_capacities(path)?.into_iter();
-            capacities.map(|(k, capacity_ml)| (k, Estimate { capacity_ml, ..blank(k) })).collect()
+            capacities.map(|(k, capacity_ml)| (k, Estimate { capacity_ml, ..Estimate::default() })).collect()
         } else {
             submission(&Submission::from_table(&table)?)
         };
-        Ok(Self { name: name.to_string(), by_key })
+        Ok(Self { name: name.to_string(), path: path.to_path_buf(), by_key })
     }
 
-    /// The estimates of these recordings; `None` unless each has one.
-    pub(super) fn estimates(&self, targets: &[&Target]) -> Option<Vec<Estimate>> {
-        targets
-            .iter()
-            .map(|t| {
-                let by_id = || self.by_key.get(&RowKey::Id(t.annotation.as_ref()?.id?));
-                let found = self.by_key.get(&t.key).or_else(by_id)?;
-                Some(Estimate { key: t.key, ..found.clone() })
-            })
-            .collect()
+    /// The estimates for each part of a data set, where there are any.
+    ///
+    /// # Errors
+    /// [`CcmError::Rows`] where a part is covered only partly, and for rows that a part of the data
+    /// set cannot have; [`CcmError::Request`] where ids may mean either of two parts.
+    pub(super) fn place(&self, rows: &Rows) -> Result<Placed> {
+        let mut parts = vec![Part::new(self, Subset::Training, &rows.training)];
+        parts.extend(rows.tests.iter().map(|t| Part::new(self, t.subset, &t.rows)));
+        if self.by_key.keys().any(|key| matches!(key, RowKey::Id(_))) {
+            self.choose(&mut parts)?;
+        }
+        for part in &parts {
+            self.refuse_unless_whole(part)?;
+        }
+        let mut found = parts.into_iter().map(Part::estimates);
+        Ok(Placed {
+            name: self.name.clone(),
+            training: found.next().flatten(),
+            tests: found.collect(),
+        })
+    }
+
+    /// Ids start at 0 in every part: a file of ids is about the one part that it fits, or fits best
+    /// by its number of rows.
+    fn choose(&self, parts: &mut Vec<Part<'_>>) -> Result<()> {
+        let fits = |part: &Part<'_>| part.is_whole() && part.unknown.is_empty();
+        let mut fitting: Vec<Subset> = parts.iter().filter(|p| fits(p)).map(|p| p.subset).collect();
+        if fitting.len() > 1 {
+            fitting.retain(|&subset| size(subset) == self.by_key.len());
+        }
+        match fitting.as_slice() {
+            [one] => {
+                let others = parts.iter_mut().filter(|p| p.subset != *one);
+                others.for_each(Part::clear);
+                Ok(())
+            }
+            [] if !parts.iter().any(fits) => {
+                // What is said of the part that is covered best says most.
+                let best = parts.iter().map(Part::covered).max().unwrap_or(0);
+                let others = parts.iter_mut().filter(|p| p.covered() < best);
+                others.for_each(Part::clear);
+                Ok(())
+            }
+            _ => Err(CcmError::Request(format!(
+                "{}: its ids fit several parts of the data set; name recordings by container and \
+                 sequence",
+                self.path.display()
+            ))),
+        }
+    }
+
+    fn refuse_unless_whole(&self, part: &Part<'_>) -> Result<()> {
+        let fault = |problem, keys: &[RowKey]| CcmError::Rows {
+            path: self.path.clone(),
+            problem,
+            rows: listed(&keys.iter().collect::<Vec<_>>()),
+            expected: format!("the {} {} recordings", part.targets.len(), part.subset.name()),
+        };
+        if !part.unknown.is_empty() && !part.targets.is_empty() {
+            return Err(fault("rows that the data set does not have", &part.unknown));
+        }
+        if part.covered() > 0 && !part.is_whole() {
+            let pairs = part.targets.iter().zip(&part.found);
+            let missing: Vec<_> = pairs.filter(|(_, f)| f.is_none()).map(|(t, _)| t.key).collect();
+            return Err(fault("missing rows", &missing));
+        }
+        Ok(())
     }
 }
 
-fn blank(key: RowKey) -> Estimate {
-    Estimate {
-        key,
-        kind: None,
-        level: None,
-        kind_probabilities: None,
-        level_probabilities: None,
-        capacity_ml: None,
+/// A part of the data set and what a file has for it.
+struct Part<'a> {
+    subset: Subset,
+    targets: &'a [Target],
+    /// For each target.
+    found: Vec<Option<Estimate>>,
+    /// Rows that name no recording of the part, there or not.
+    unknown: Vec<RowKey>,
+}
+
+impl<'a> Part<'a> {
+    fn new(added: &Added, subset: Subset, targets: &'a [Target]) -> Self {
+        let mut left: HashMap<&RowKey, &Estimate> = added.by_key.iter().collect();
+        let mut take = |target: &Target| {
+            let by_id = target.recording.id.map(RowKey::Id);
+            left.remove(&target.key).or_else(|| left.remove(&by_id?)).cloned()
+        };
+        let found = targets.iter().map(&mut take).collect();
+        let foreign = |key: &RowKey| match *key {
+            RowKey::Id(id) => id as usize >= size(subset),
+            // Containers above 15 are of other data sets, such as ACC's own.
+            RowKey::Sequence(number, sequence) => Container::new(number)
+                .filter(|container| container.subset() == subset)
+                .is_some_and(|container| usize::from(sequence) >= container.recordings()),
+        };
+        let mut unknown: Vec<RowKey> = left.into_keys().copied().filter(foreign).collect();
+        unknown.sort_unstable();
+        Self { subset, targets, found, unknown }
     }
+
+    fn covered(&self) -> usize {
+        self.found.iter().flatten().count()
+    }
+
+    fn is_whole(&self) -> bool {
+        self.covered() == self.targets.len()
+    }
+
+    fn clear(&mut self) {
+        self.found = vec![None; self.targets.len()];
+        self.unknown.clear();
+    }
+
+    fn estimates(self) -> Option<Vec<Estimate>> {
+        self.found.into_iter().collect()
+    }
+}
+
+/// Recordings of a whole part.
+fn size(subset: Subset) -> usize {
+    subset.containers().map(Container::recordings).sum()
 }
 
 fn submission(submission: &Submission) -> HashMap<RowKey, Estimate> {
@@ -70,7 +186,7 @@ fn submission(submission: &Submission) -> HashMap<RowKey, Estimate> {
             kind: class(submission.kind.values[row]),
             level: class(level),
             capacity_ml: (capacity > -1.0).then_some(capacity),
-            ..blank(key)
+            ..Estimate::default()
         };
         (key, estimate)
     });

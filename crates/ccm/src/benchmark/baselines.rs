@@ -183,16 +183,11 @@ impl Baseline {
         let x = reduce(matrices.training.view())?;
         let y: Vec<usize> = fold.train.iter().map(|&row| joint[row]).collect();
         let model = spec.train(x.select(Axis(0), &fold.train).view(), &y, Filling::COUNT)?;
-        let all: Vec<_> = rows.training.iter().collect();
-        let seen = estimates(&model, x.view(), &all)?;
-        let tests = rows
+        let seen = estimates(&model, x.view())?;
+        let tests = matrices
             .tests
             .iter()
-            .zip(&matrices.tests)
-            .map(|(part, x)| {
-                let reduced = reduce(x.view())?;
-                estimates(&model, reduced.view(), &part.rows.iter().collect::<Vec<_>>())
-            })
+            .map(|x| estimates(&model, reduce(x.view())?.view()))
             .collect::<std::result::Result<_, _>>()?;
         Ok(Outcome {
             baseline: *self,
@@ -231,17 +226,15 @@ impl Baseline {
         for fold in &validated.folds {
             for (i, (&row, &class)) in fold.rows.iter().zip(&fold.predicted).enumerate() {
                 let p = fold.proba.as_ref().map(|p| p.row(i).to_vec());
-                let key = rows.training[row].key;
-                held_out.push((row, Estimate::joint(key, class, p.as_deref())));
+                held_out.push((row, Estimate::joint(class, p.as_deref())));
             }
         }
         held_out.sort_by_key(|(row, _)| *row);
         let model = spec.train(matrices.training.view(), &joint, Filling::COUNT)?;
-        let tests = rows
+        let tests = matrices
             .tests
             .iter()
-            .zip(&matrices.tests)
-            .map(|(part, x)| estimates(&model, x.view(), &part.rows.iter().collect::<Vec<_>>()))
+            .map(|x| estimates(&model, x.view()))
             .collect::<std::result::Result<_, _>>()?;
         Ok(Outcome {
             baseline: *self,
@@ -286,7 +279,6 @@ fn container_folds(targets: &[Target]) -> std::result::Result<Vec<Fold>, ModelEr
 fn estimates(
     model: &Pipeline,
     x: ArrayView2<'_, f64>,
-    targets: &[&Target],
 ) -> std::result::Result<Vec<Estimate>, ModelError> {
     let classes = model.predict(x)?;
     let probabilities = match model.predict_proba(x) {
@@ -294,13 +286,7 @@ fn estimates(
         Err(ModelError::NoProbability { .. }) => None,
         Err(e) => return Err(e),
     };
-    Ok(targets
-        .iter()
-        .zip(classes)
-        .enumerate()
-        .map(|(row, (target, class))| {
-            let p = probabilities.as_ref().map(|p| p.row(row).to_vec());
-            Estimate::joint(target.key, class, p.as_deref())
-        })
-        .collect())
+    let row_of = |row| probabilities.as_ref().map(|p| p.row(row).to_vec());
+    let estimate = |(row, class)| Estimate::joint(class, row_of(row).as_deref());
+    Ok(classes.into_iter().enumerate().map(estimate).collect())
 }

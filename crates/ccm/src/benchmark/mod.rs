@@ -50,7 +50,8 @@ pub struct Options {
 ///
 /// # Errors
 /// [`crate::CcmError`] when the data set has no labelled training recordings, when a file to add is
-/// unusable, when a recording cannot be read, when something cannot be written, and when stopped.
+/// unusable or covers a part of the data set only partly, when annotation files contradict each other,
+/// when a recording cannot be read, when something cannot be written, and when stopped.
 pub fn run(options: &Options, progress: &dyn Fn(&str), stop: &Arc<AtomicBool>) -> Result<Report> {
     let mut names = HashSet::new();
     if let Some((name, _)) = options.added.iter().find(|(name, _)| !names.insert(name)) {
@@ -63,6 +64,10 @@ pub fn run(options: &Options, progress: &dyn Fn(&str), stop: &Arc<AtomicBool>) -
         .collect::<Result<Vec<_>>>()?;
     let set = DataSet::open(&options.data)?;
     let rows = results::Rows::of(&set)?;
+    let added = added.iter().map(|a| a.place(&rows)).collect::<Result<Vec<_>>>()?;
+    for nowhere in added.iter().filter(|a| !a.is_any()) {
+        progress(&format!("{}: has no recording of this data set", nowhere.name));
+    }
     files::prepare(&options.out)?;
     let store = Store { folder: options.out.join("features"), jobs: options.jobs, stop };
     let mut outcomes = Vec::new();

@@ -34,6 +34,9 @@ pub(super) struct Rows {
 
 impl Rows {
     pub(super) fn of(set: &DataSet) -> Result<Self> {
+        if let Some(odd) = set.contradictions.first() {
+            return Err(CcmError::Request(format!("{} {}", odd.path.display(), odd.what)));
+        }
         let (mut training, mut public, mut private) = (Vec::new(), Vec::new(), Vec::new());
         for recording in &set.recordings {
             let sequence = recording.container.zip(recording.sequence);
@@ -47,7 +50,7 @@ impl Rows {
                 recording: recording.clone(),
                 key,
                 filling: recording.filling(),
-                annotation: sequence.and_then(|_| set.annotation(recording).cloned()),
+                annotation: set.annotation(recording).cloned(),
             };
             match recording.part {
                 Subset::Training if target.filling.is_some() => training.push(target),
@@ -77,10 +80,9 @@ impl Rows {
     }
 }
 
-/// Estimates for a list of recordings, as class numbers.
-#[derive(Clone)]
+/// Estimates for a recording, as class numbers.
+#[derive(Clone, Default)]
 pub(super) struct Estimate {
-    pub(super) key: RowKey,
     pub(super) kind: Option<usize>,
     pub(super) level: Option<usize>,
     pub(super) kind_probabilities: Option<[f64; 4]>,
@@ -90,7 +92,7 @@ pub(super) struct Estimate {
 
 impl Estimate {
     /// From a joint class and, where the classifier has them, its probabilities.
-    pub(super) fn joint(key: RowKey, class: usize, probabilities: Option<&[f64]>) -> Self {
+    pub(super) fn joint(class: usize, probabilities: Option<&[f64]>) -> Self {
         let filling = Filling::from_joint(class);
         let mut kinds = [0.0; 4];
         let mut levels = [0.0; 3];
@@ -99,7 +101,6 @@ impl Estimate {
             levels[f.level() as usize] += p;
         }
         Self {
-            key,
             kind: filling.map(|f| f.kind() as usize),
             level: filling.map(|f| f.level() as usize),
             kind_probabilities: probabilities.map(|_| kinds),
@@ -124,7 +125,6 @@ impl Estimate {
 impl From<Prediction> for Estimate {
     fn from(p: Prediction) -> Self {
         Self {
-            key: p.key,
             kind: p.kind.map(|k| k as usize),
             level: p.level.map(|l| l as usize),
             kind_probabilities: p.kind_probabilities,
@@ -190,13 +190,15 @@ pub(super) fn score(targets: &[&Target], estimates: &[Estimate], seed: u64) -> O
 
 /// Capacity and mass need annotated capacities, which names do not tell.
 fn by_paper(targets: &[&Target], estimates: &[Estimate], seed: u64) -> Option<scores::Scores> {
-    let rows: Vec<Annotation> =
+    let mut rows: Vec<Annotation> =
         targets.iter().map(|t| t.annotation.clone()).collect::<Option<_>>()?;
-    let keys: Vec<_> = targets.iter().map(|t| t.key).collect();
+    // Named by place: ids of several parts may be the same.
+    let keys: Vec<RowKey> = (0..rows.len() as u32).map(RowKey::Id).collect();
+    rows.iter_mut().zip(0..).for_each(|(row, place)| row.id = Some(place));
     let annotations = Annotations { path: "annotations".into(), rows, levels_in_percent: false };
-    let predictions: Vec<_> = estimates.iter().map(|e| e.prediction(e.key)).collect();
-    let submission = Submission::from_predictions("estimates", Format::Y2020, &predictions);
+    let predictions: Vec<_> = estimates.iter().zip(&keys).map(|(e, &k)| e.prediction(k)).collect();
+    let submission = Submission::from_predictions("estimates", Format::Y2022, &predictions);
     let random = pseudo_random(&keys, seed);
-    let baseline = Submission::from_predictions("random", Format::Y2020, &random);
+    let baseline = Submission::from_predictions("random", Format::Y2022, &random);
     scores::evaluate(&submission, &annotations, &baseline, RuleSet::Paper, None).ok()
 }

@@ -334,11 +334,14 @@ pub(super) fn confusions(rows: &Rows, methods: &[Method], seed: u64) -> Option<S
     })
 }
 
-pub(super) fn notes() -> Section {
+/// `nowhere`: methods whose files have no recording of the data set.
+pub(super) fn notes<'a>(nowhere: impl Iterator<Item = &'a str>) -> Section {
+    let absent = nowhere
+        .map(|name| format!("The predictions of {name} are for no recording of this data set."));
     Section {
         id: "notes".into(),
         title: "Reading these figures".into(),
-        text: vec![
+        text: [
             "The labels of the real test parts are withheld by the organisers: the submissions \
              folder holds estimates for them in the official format. Where test figures of this \
              run appear, labels were found in the data folder."
@@ -351,7 +354,10 @@ pub(super) fn notes() -> Section {
             "The near-random figures of the paper's PCA baselines go with principal components \
              fitted anew on each test part, which the published protocol here repeats."
                 .into(),
-        ],
+        ]
+        .into_iter()
+        .chain(absent)
+        .collect(),
         tables: Vec::new(),
         figures: Vec::new(),
     }

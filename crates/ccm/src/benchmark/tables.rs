@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::added::Added;
+use super::added::Placed;
 use super::baselines::{Outcome, Variant};
 use super::files;
 use super::results::{Estimate, PartScores, Rows, Target, score};
@@ -74,7 +74,7 @@ pub(super) fn report(
     set: &DataSet,
     rows: &Rows,
     outcomes: &[Outcome],
-    added: &[Added],
+    added: &[Placed],
     seed: u64,
 ) -> Result<Report> {
     let methods = methods(rows, outcomes, added, seed);
@@ -83,7 +83,8 @@ pub(super) fn report(
     sections.push(corrections(rows, outcomes, seed));
     sections.push(breakdown(rows, &methods, seed));
     sections.extend(confusions(rows, &methods, seed));
-    sections.push(notes());
+    let nowhere = added.iter().filter(|a| !a.is_any()).map(|a| a.name.as_str());
+    sections.push(notes(nowhere));
     Ok(Report {
         title: "CORSMAL benchmark: audio baselines".into(),
         summary: "Filling level, filling type, capacity and filling mass of containers, estimated \
@@ -123,7 +124,7 @@ pub(super) fn write_pictures(
     Ok(())
 }
 
-fn methods(rows: &Rows, outcomes: &[Outcome], added: &[Added], seed: u64) -> Vec<Method> {
+fn methods(rows: &Rows, outcomes: &[Outcome], added: &[Placed], seed: u64) -> Vec<Method> {
     let mut list: Vec<Method> = outcomes
         .iter()
         .map(|o| Method {
@@ -150,21 +151,13 @@ fn methods(rows: &Rows, outcomes: &[Outcome], added: &[Added], seed: u64) -> Vec
         training: random(&rows.training).into_iter().enumerate().collect(),
         tests: rows.tests.iter().map(|t| Some(random(&t.rows))).collect(),
     });
-    list.extend(added.iter().map(|a| {
-        Method {
-            name: a.name.clone(),
-            inputs: String::new(),
-            protocol: "given".into(),
-            source: Source::Added,
-            training: a
-                .estimates(&rows.training.iter().collect::<Vec<_>>())
-                .map_or_else(Vec::new, |e| e.into_iter().enumerate().collect()),
-            tests: rows
-                .tests
-                .iter()
-                .map(|t| a.estimates(&t.rows.iter().collect::<Vec<_>>()))
-                .collect(),
-        }
+    list.extend(added.iter().filter(|a| a.is_any()).map(|a| Method {
+        name: a.name.clone(),
+        inputs: String::new(),
+        protocol: "given".into(),
+        source: Source::Added,
+        training: a.training.iter().flatten().cloned().enumerate().collect(),
+        tests: a.tests.clone(),
     }));
     list
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::container::Container;
+use super::container::{Container, Subset};
 use super::filling::{Filling, FillingLevel, FillingType};
 use super::name::SequenceName;
 use crate::error::{CcmError, Result};
@@ -26,7 +26,8 @@ pub struct Annotation {
     pub id: Option<u32>,
     /// Container number as written (ACC's file goes up to 19).
     pub container: u8,
-    /// Sequence number within the container, in the order of the 2020 release.
+    /// Sequence number within the container, in the order of the 2020 release; `None` in flat files
+    /// of test parts, whose numbers were given at random.
     pub sequence: Option<u16>,
     /// 0, 1 or 2; `None` where withheld, as the other settings.
     pub scenario: Option<u8>,
@@ -144,6 +145,7 @@ impl Annotations {
             if flat {
                 annotation.id = Some(key_value);
                 annotation.sequence = Container::new(number)
+                    .filter(|container| container.subset() == Subset::Training)
                     .zip(annotation.name())
                     .and_then(|(container, name)| name.number(container));
             } else {

@@ -68,7 +68,7 @@ impl Findings {
 
 /// Looks at every recording's place and header; samples are not read.
 pub fn check(set: &DataSet) -> Findings {
-    let mut odd = set.odd.clone();
+    let mut odd = [set.odd.clone(), set.contradictions.clone()].concat();
     let mut formats = BTreeMap::new();
     let mut seconds = 0.0;
     for recording in &set.recordings {

@@ -5,12 +5,13 @@
 //! as one of them is the container's number. The flat release of 2021: `train/audio/000000.wav`,
 //! where the annotation file tells what a number is.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use super::annotation::{Annotation, Annotations};
 use super::container::{Container, Subset};
 use super::filling::Filling;
+use super::index::Index;
 use super::name::SequenceName;
 use crate::error::{CcmError, Result};
 use crate::submission::RowKey;
@@ -66,6 +67,8 @@ pub struct DataSet {
     pub synthetic: bool,
     /// Files that could not be placed.
     pub odd: Vec<Oddity>,
+    /// Annotation files that say different things about one recording.
+    pub contradictions: Vec<Oddity>,
 }
 
 impl DataSet {
@@ -84,6 +87,7 @@ impl DataSet {
             actions: None,
             synthetic: root.join(crate::synth::NOTICE).exists(),
             odd: Vec::new(),
+            contradictions: Vec::new(),
         };
         for path in tables {
             let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
@@ -113,6 +117,8 @@ impl DataSet {
                 Err(what) => set.odd.push(Oddity { path, what }),
             }
         }
+        let contradictions = index.contradictions;
+        set.contradictions = contradictions;
         if set.recordings.is_empty() {
             return Err(CcmError::Request(format!(
                 "{}: no recording of the data set in here; expected files such as \
@@ -136,30 +142,6 @@ impl DataSet {
     /// Ground truth of a recording, from whichever annotation file has it.
     pub fn annotation(&self, recording: &Recording) -> Option<&Annotation> {
         Index::new(&self.annotations).find(recording)
-    }
-}
-
-/// Annotated rows by id and by container and sequence.
-struct Index<'a> {
-    by_id: HashMap<u32, &'a Annotation>,
-    by_sequence: HashMap<(u8, u16), &'a Annotation>,
-}
-
-impl<'a> Index<'a> {
-    fn new(files: &'a [Annotations]) -> Self {
-        let rows = || files.iter().flat_map(|f| &f.rows);
-        Self {
-            by_id: rows().filter_map(|r| Some((r.id?, r))).collect(),
-            by_sequence: rows().filter_map(|r| Some(((r.container, r.sequence?), r))).collect(),
-        }
-    }
-
-    fn find(&self, recording: &Recording) -> Option<&'a Annotation> {
-        let by_sequence = recording
-            .container
-            .zip(recording.sequence)
-            .and_then(|(c, s)| self.by_sequence.get(&(c.number(), s)));
-        by_sequence.or_else(|| self.by_id.get(&recording.id?)).copied()
     }
 }
 
@@ -263,17 +245,13 @@ fn place(root: &Path, path: &Path, index: &Index<'_>) -> std::result::Result<Rec
             Ok(Recording { name, ..recording })
         }
         (None, None, Some(id)) => {
-            // The numbers of test files start again at 0, so only training files use the ids of
-            // the training annotations.
-            let part = parts.flat_part();
-            let annotated = index.by_id.get(&id).filter(|_| part == Subset::Training);
+            let recording = Recording { part: parts.flat_part(), id: Some(id), ..blank };
+            let annotated = index.find(&recording);
             Ok(Recording {
-                part,
-                id: Some(id),
                 container: annotated.and_then(|a| Container::new(a.container)),
                 sequence: annotated.and_then(|a| a.sequence),
-                name: annotated.and_then(|a| a.name()),
-                ..blank
+                name: annotated.and_then(Annotation::name),
+                ..recording
             })
         }
         (None, Some(_), _) => Err("no folder above it is a container number".into()),

@@ -5,6 +5,7 @@ mod annotation;
 mod check;
 mod container;
 mod filling;
+mod index;
 mod layout;
 mod name;
 mod splits;

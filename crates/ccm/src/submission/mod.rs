@@ -5,6 +5,7 @@ mod reader;
 mod writer;
 
 pub use baseline::pseudo_random;
+pub(crate) use reader::listed;
 pub use writer::Prediction;
 
 use std::fmt;

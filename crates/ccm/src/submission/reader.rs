@@ -134,7 +134,7 @@ impl Submission {
 }
 
 /// The first five and how many more there are.
-fn listed(keys: &[&RowKey]) -> String {
+pub(crate) fn listed(keys: &[&RowKey]) -> String {
     let mut text: Vec<String> = keys.iter().take(5).map(|k| k.to_string()).collect();
     if keys.len() > 5 {
         text.push(format!("and {} more", keys.len() - 5));
