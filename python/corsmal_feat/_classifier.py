@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from typing import Any, ClassVar, Self
 
@@ -39,6 +40,11 @@ class Classifier(ClassifierMixin, BaseEstimator):
                 value = _seed(value)
             elif isinstance(value, np.generic):
                 value = value.item()
+            for number in value if isinstance(value, list) else [value]:
+                if isinstance(number, float) and not math.isfinite(number):
+                    raise ParameterError(
+                        f"{type(self).__name__}: {name} = {number} is not possible: a finite number"
+                    )
             if value is not None:
                 result[self._renamed.get(name, name)] = value
         return result

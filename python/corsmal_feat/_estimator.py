@@ -143,6 +143,8 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
 
     def _of_signals(self, signals: list[Any], by: _core.Signals) -> tuple[list[str], Matrix]:
         rate = whole_rate(self.sr)
+        if self.jobs is not None and self.jobs < 1:
+            raise ParameterError(f"jobs = {self.jobs} is not possible: at least 1")
 
         def row(position: int) -> tuple[list[str], Any]:
             samples = _signal(signals[position], position)

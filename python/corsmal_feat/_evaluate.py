@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from . import _core
+from .errors import ParameterError
 
 __all__ = ["Scores", "evaluate"]
 
@@ -63,7 +64,7 @@ def evaluate(
     Raises
     ------
     ParameterError
-        A file cannot be read, or its rows do not fit the annotations.
+        A file cannot be read, its rows do not fit the annotations, or a number is out of range.
 
     Examples
     --------
@@ -71,6 +72,11 @@ def evaluate(
     63.2
     """
     chosen = None if containers is None else [int(container) for container in containers]
+    if not 0 <= int(seed) < 2**64:
+        raise ParameterError(f"seed = {seed} is not possible: a whole number from 0 to 2**64 - 1")
+    for container in chosen or ():
+        if not 0 <= container <= 255:
+            raise ParameterError(f"containers: {container} is no container: 0 to 255")
     reference = None if baseline is None else os.fspath(baseline)
     values, recordings, notes = _core.evaluate(
         os.fspath(submission), os.fspath(annotations), rules, reference, int(seed), chosen

@@ -79,6 +79,10 @@ def labels_of(y: Any, rows: int, owner: str) -> tuple[npt.NDArray[Any], npt.NDAr
             raise ParameterError(
                 "Unknown label type: continuous. Classes are needed, not measured values."
             )
+    if labels.dtype.kind == "S" or (
+        labels.dtype == object and any(isinstance(label, bytes) for label in labels)
+    ):
+        raise ParameterError(f"{owner}: y holds bytes, labels are text: decode them first")
     classes, positions = np.unique(labels, return_inverse=True)
     return classes, positions
 

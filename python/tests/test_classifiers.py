@@ -116,3 +116,19 @@ def test_seeds_decide_and_class_weights_count():
 def test_no_scikit_learn_is_imported():
     code = "import sys, corsmal_feat; sys.exit('sklearn' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_bytes_are_no_labels() -> None:
+    x, _ = clouds(4)
+    for y in (np.array([b"a", b"b"] * 2), np.array([b"a", b"b"] * 2, dtype=object)):
+        with pytest.raises(ParameterError, match="y holds bytes, labels are text"):
+            classifiers.KNN(1).fit(x, y)
+
+
+def test_parameters_must_be_finite() -> None:
+    x, y = clouds()
+    with pytest.raises(ParameterError, match="SVC: C = nan is not possible: a finite number"):
+        classifiers.SVC(C=float("nan")).fit(x, y)
+    weights = {"full": float("inf")}
+    with pytest.raises(ParameterError, match="class_weight = inf is not possible"):
+        classifiers.SVC(class_weight=weights).fit(x, y)

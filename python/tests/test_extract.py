@@ -243,6 +243,8 @@ def test_transformer_refuses(folder: Path):
         cf.FeatureExtractor("logmel").fit([signal])
     with pytest.raises(cf.ParameterError, match="sr"):
         cf.FeatureExtractor().transform([signal])
+    with pytest.raises(cf.ParameterError, match="jobs = 0 is not possible"):
+        cf.FeatureExtractor(sr=RATE, jobs=0).transform([signal])
     with pytest.raises(cf.ParameterError, match="mixes"):
         cf.FeatureExtractor(sr=RATE).transform([signal, "x.wav"])
     with pytest.raises(cf.ParameterError, match="another number of channels"):
