@@ -132,6 +132,9 @@ fn blank(table: &ProbabilityTable) -> Result<Vec<Prediction>> {
         RowName::Other(id) => {
             Err(fault("a row that names no recording of the data set", id.clone()))
         }
+        RowName::Recording(RowKey::Sequence(number, _)) if Container::new(*number).is_none() => {
+            Err(fault("a row of no container of the data set", number.to_string()))
+        }
         RowName::Recording(key) if !seen.insert(*key) => {
             Err(fault("more than one row", key.to_string()))
         }

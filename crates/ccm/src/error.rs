@@ -17,6 +17,9 @@ pub enum CcmError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A file could not be written; the text names it.
+    #[error(transparent)]
+    Write(std::io::Error),
     /// The file is not a table of comma-separated values.
     #[error("{path}: not a readable table: {reason}")]
     Table {

@@ -7,12 +7,12 @@ use std::collections::{HashMap, HashSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use corsmal_models::fusion;
+use corsmal_models::{argmax, fusion};
 use ndarray::{Array2, ArrayView2};
 
 use crate::dataset::{Container, PathParts, SequenceName};
 use crate::error::{CcmError, Result};
-use crate::submission::RowKey;
+use crate::submission::{RowKey, SUM_TOLERANCE};
 use crate::table::Table;
 
 /// What tells recordings apart.
@@ -73,7 +73,7 @@ impl ProbabilityTable {
     ///
     /// # Errors
     /// [`CcmError`] for missing columns, no lines, sequences that are neither numbers nor names of the data
-    /// set, negative or non-finite probabilities, and predictions that are no class.
+    /// set, probabilities that are not 0 to 1 with sum 1, and predictions that are no class.
     pub fn read(path: &Path) -> Result<Self> {
         let table = Table::read(path)?;
         let columns = Columns::find(&table)?;
@@ -153,10 +153,22 @@ impl ProbabilityTable {
         let rows = first.rows.iter().enumerate().map(|(row, of)| {
             let known = aligned.iter().all(|(_, known)| known[row]);
             let proba = known.then(|| mean.row(row).to_vec());
-            let class = proba.as_deref().map(top);
+            let class = proba.as_deref().map(argmax);
             ProbabilityRow { class, proba, ..of.clone() }
         });
         Ok(Self { rows: rows.collect(), ..first.clone() })
+    }
+
+    /// Refuses a recording with several lines.
+    ///
+    /// # Errors
+    /// [`CcmError::Rows`] naming it.
+    pub fn check_once_each(&self) -> Result<()> {
+        let mut seen = HashSet::new();
+        match self.rows.iter().find(|row| !seen.insert(&row.name)) {
+            Some(row) => Err(self.rows_fault("more than one row", &row.name, self)),
+            None => Ok(()),
+        }
     }
 
     /// The rows and classes in the order of another table, which must have the same ones; rows
@@ -240,11 +252,6 @@ impl ProbabilityTable {
     }
 }
 
-/// The most probable class, the lowest where several are equal.
-pub fn top(proba: &[f64]) -> usize {
-    (0..proba.len()).fold(0, |best, c| if proba[c] > proba[best] { c } else { best })
-}
-
 impl Columns {
     fn find(table: &Table) -> Result<Self> {
         let any = |names: &[&str]| names.iter().find_map(|n| table.find(n));
@@ -309,15 +316,23 @@ fn read_row(
     if !columns.classes.iter().all(blank) {
         for &class in &columns.classes {
             let p = table.number(row, class)?;
-            if p < 0.0 {
-                return Err(table.fault(row, class, "a probability"));
+            if !(0.0..=1.0 + SUM_TOLERANCE).contains(&p) {
+                return Err(table.fault(row, class, "a probability (0 to 1)"));
             }
             proba.push(p);
+        }
+        let sum: f64 = proba.iter().sum();
+        if (sum - 1.0).abs() > SUM_TOLERANCE {
+            return Err(CcmError::Request(format!(
+                "{}, line {}: the probabilities have the sum {sum}, not 1",
+                table.path().display(),
+                table.line(row)
+            )));
         }
     }
     let proba = (!proba.is_empty()).then_some(proba);
     let class = match columns.predicted.filter(|&at| !table.text(row, at).is_empty()) {
-        None => proba.as_deref().map(top),
+        None => proba.as_deref().map(argmax),
         Some(at) => {
             let found = labels.iter().position(|l| l == table.text(row, at));
             Some(found.ok_or_else(|| table.fault(row, at, "one of the classes of the header"))?)

@@ -104,11 +104,16 @@ impl Table {
         Ok(value as i64)
     }
 
+    /// Line in the file of a row, the header being line 1.
+    pub(crate) fn line(&self, row: usize) -> usize {
+        self.rows[row].0
+    }
+
     /// The error for a cell with a value that is not allowed.
     pub(crate) fn fault(&self, row: usize, column: usize, expected: &'static str) -> CcmError {
         CcmError::Value {
             path: self.path.clone(),
-            line: self.rows[row].0,
+            line: self.line(row),
             column: self.header[column].clone(),
             value: self.text(row, column).to_string(),
             expected,

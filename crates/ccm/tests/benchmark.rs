@@ -95,7 +95,7 @@ fn the_report_is_complete_and_features_are_kept() {
     assert_eq!(json["sections"][1]["id"], "level");
     let submission = read("submissions/zcr-mfcc-rf-corrected-public-test.csv");
     assert_eq!(submission.lines().count(), 1 + 19);
-    assert!(out.join("figures/zcr-mfccs-rf-corrected-joint-confusion.svg").exists());
+    assert!(out.join("figures/zcr-mfcc-rf-corrected-joint-confusion.svg").exists());
     let with_ids = read("submissions/zcr-mfcc-rf-corrected-held-out-2022.csv");
     assert!(with_ids.starts_with("Configuration ID,") && with_ids.lines().count() == 1 + 114);
     assert!(read("submissions/random-training.csv").lines().count() == 1 + 114);

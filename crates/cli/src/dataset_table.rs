@@ -4,8 +4,8 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use corsmal_extract::layout;
-use corsmal_extract::npy::Kind;
-use corsmal_extract::npz::NpzFile;
+use corsmal_extract::npy::{Kind, NpyError};
+use corsmal_extract::npz::{NpzError, NpzFile};
 use corsmal_extract::outcome::Outcome;
 use corsmal_extract::provenance::Provenance;
 use corsmal_extract::{identity, parquet, table};
@@ -162,11 +162,21 @@ impl DatasetTable {
         })?;
         let mut columns = Vec::new();
         for name in npz.names().to_vec() {
-            let header = npz.header(&name)?;
+            let header = match npz.header(&name) {
+                // Objects and dates are of no use here, and nobody asked for them.
+                Err(NpzError::Npy {
+                    source: NpyError::DType { .. } | NpyError::Pickled, ..
+                }) if args.ids.as_ref() != Some(&name) => {
+                    continue;
+                }
+                header => header?,
+            };
             if header.shape == [x.nrows() as u64] && header.dtype.kind != Kind::Complex {
                 let values = match header.dtype.kind {
-                    Kind::Text => npz.strings(&name)?,
-                    _ => npz.f64(&name)?.iter().map(|&v| number(v, header.dtype.kind)).collect(),
+                    Kind::Text | Kind::Bytes => npz.strings(&name)?,
+                    // With a point: 1.0 is no class.
+                    Kind::Float => npz.f64(&name)?.iter().map(|v| format!("{v:?}")).collect(),
+                    _ => npz.integers(&name)?.iter().map(i128::to_string).collect(),
                 };
                 columns.push((name, values));
             }
@@ -241,7 +251,7 @@ impl DatasetTable {
         for (id, value) in self.ids.iter().zip(&values) {
             let why = if value.is_empty() {
                 "is empty"
-            } else if value.parse::<f64>().is_ok() && value.parse::<i64>().is_err() {
+            } else if value.parse::<f64>().is_ok() && value.parse::<i128>().is_err() {
                 "is a decimal number; classes are whole numbers or names"
             } else {
                 continue;
@@ -273,9 +283,4 @@ impl DatasetTable {
         let columns = self.x.columns().into_iter().enumerate();
         columns.filter(|(_, c)| c.iter().all(|v| *v == c[0])).map(|(i, _)| i).collect()
     }
-}
-
-/// Integers without a point and floats with one: 1.0 is no class.
-fn number(value: f64, kind: Kind) -> String {
-    if kind == Kind::Float { format!("{value:?}") } else { format!("{value:.0}") }
 }

@@ -1,8 +1,10 @@
 //! Which rows are held out together, from `--cv`.
 
+use std::collections::HashMap;
 use std::fmt;
 use std::str::FromStr;
 
+use corsmal_models::ModelError;
 use corsmal_models::labels::Labels;
 use corsmal_models::splits::{self, Fold};
 
@@ -71,6 +73,8 @@ pub struct Folds {
     pub outer: Vec<Fold>,
     /// what is never split, one name per row
     groups: Option<Vec<String>>,
+    /// of the classes
+    names: Vec<String>,
     seed: u32,
 }
 
@@ -94,8 +98,8 @@ impl Folds {
             CvPlan::Group(column) | CvPlan::Fold(column) => Some(column.as_str()),
             CvPlan::K(_) | CvPlan::Lists(_) => groups,
         };
-        let groups = column.map(|c| table.column(c)).transpose()?;
-        let outer = match (plan, &groups) {
+        let parts = column.map(|c| table.column(c)).transpose()?;
+        let outer = match (plan, &parts) {
             (CvPlan::Group(_) | CvPlan::Fold(_), Some(g)) => splits::leave_one_group_out(g)?,
             (CvPlan::K(k), Some(g)) => splits::group_k_fold(g, *k)?,
             (CvPlan::Lists(lists), Some(g)) => splits::group_lists(g, lists)?,
@@ -107,19 +111,34 @@ impl Folds {
             (CvPlan::K(_) | CvPlan::Lists(_), Some(column)) => format!("{plan} ({column})"),
             _ => plan.to_string(),
         };
-        Ok(Self { description, outer, groups, seed })
+        let kept = match groups {
+            Some(groups) if column != Some(groups) => {
+                let values = table.column(groups)?;
+                refuse_split(&outer, &values, (plan, groups))?;
+                Some(values)
+            }
+            _ => parts,
+        };
+        Ok(Self { description, outer, groups: kept, names: labels.names().to_vec(), seed })
     }
 
     /// Folds inside these rows, of whole groups where there are groups. Row numbers are positions
     /// in `rows`.
-    pub fn inner(
-        &self,
-        rows: &[usize],
-        y: &[usize],
-    ) -> Result<Vec<Fold>, corsmal_models::ModelError> {
+    pub fn inner(&self, rows: &[usize], y: &[usize]) -> Result<Vec<Fold>, ModelError> {
         let Some(groups) = &self.groups else {
             let inside: Vec<usize> = rows.iter().map(|&row| y[row]).collect();
-            return splits::stratified_k_fold(&inside, FOLDS, Some(self.seed));
+            let count = |class| inside.iter().filter(|&&c| c == class).count();
+            let counts = (0..self.names.len()).map(|class| (count(class), class));
+            let Some((fewest, class)) = counts.filter(|(n, _)| *n > 0).min() else {
+                return splits::stratified_k_fold(&inside, FOLDS, Some(self.seed));
+            };
+            if fewest < 2 {
+                let name = &self.names[class];
+                let reason =
+                    format!("class {name} has 1 row to choose parameters by, 2 are needed");
+                return Err(ModelError::Folds { reason });
+            }
+            return splits::stratified_k_fold(&inside, fewest.min(FOLDS), Some(self.seed));
         };
         let inside: Vec<&str> = rows.iter().map(|&row| groups[row].as_str()).collect();
         let different = Labels::of(&inside).0.len();
@@ -139,6 +158,27 @@ impl Folds {
         }
         found
     }
+}
+
+/// Refuses folds that hold out a part of a group.
+fn refuse_split(
+    folds: &[Fold],
+    groups: &[String],
+    (plan, column): (&CvPlan, &str),
+) -> Result<(), Failure> {
+    let mut fold_of: HashMap<&str, &str> = HashMap::new();
+    for fold in folds {
+        for &row in &fold.test {
+            let other = *fold_of.entry(&groups[row]).or_insert(&fold.name);
+            if other != fold.name {
+                return Err(Failure::new(format!(
+                    "{plan}: {column} {} is in the folds {other} and {}; --groups must not be split",
+                    groups[row], fold.name
+                )));
+            }
+        }
+    }
+    Ok(())
 }
 
 fn has_groups(table: &DatasetTable, column: &str) -> bool {

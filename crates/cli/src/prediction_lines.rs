@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use clap::ValueEnum;
+use corsmal_extract::outcome::Status;
 use corsmal_models::labels::Labels;
 use serde_json::{Map, Value, json};
 
@@ -42,7 +43,7 @@ pub struct Line<'a> {
     /// Number of windows.
     pub windows: usize,
     /// As in the outcomes of `extract`.
-    pub status: &'static str,
+    pub status: Status,
     /// The class.
     pub class: Option<usize>,
     /// Of every class.
@@ -77,7 +78,7 @@ pub struct PredictionLines<'a> {
     begun: bool,
     /// Lines written.
     pub written: usize,
-    /// Lines without a prediction.
+    /// Lines without a prediction, or with one from a part of the windows only.
     pub failed: usize,
 }
 
@@ -91,7 +92,7 @@ impl<'a> PredictionLines<'a> {
     pub fn write(&mut self, line: &Line<'_>) -> std::io::Result<()> {
         self.begin()?;
         self.written += 1;
-        self.failed += usize::from(line.class.is_none());
+        self.failed += usize::from(line.class.is_none() || !line.status.has_features());
         match self.form {
             Form::Csv => {
                 let fields = self.fields(line);
@@ -132,9 +133,9 @@ impl<'a> PredictionLines<'a> {
         let second =
             |of: fn((f64, f64)) -> f64| line.span.map_or(String::new(), |s| seconds(of(s)));
         let unit = match self.unit {
-            Unit::Recording => vec![line.status.to_string()],
-            Unit::Window => vec![second(|s| s.0), second(|s| s.1), line.status.to_string()],
-            Unit::Vote => vec![line.status.to_string(), line.windows.to_string()],
+            Unit::Recording => vec![line.status.name().to_string()],
+            Unit::Window => vec![second(|s| s.0), second(|s| s.1), line.status.name().to_string()],
+            Unit::Vote => vec![line.status.name().to_string(), line.windows.to_string()],
         };
         let predicted = line.class.map_or(String::new(), |c| self.labels.names()[c].clone());
         let classes = (0..self.labels.len()).map(|class| match &line.proba {
@@ -152,7 +153,7 @@ impl<'a> PredictionLines<'a> {
             object["start"] = rounded(start).into();
             object["end"] = rounded(end).into();
         }
-        object["status"] = line.status.into();
+        object["status"] = line.status.name().into();
         if self.unit == Unit::Vote {
             object["windows"] = line.windows.into();
         }
@@ -177,9 +178,9 @@ impl<'a> PredictionLines<'a> {
     }
 }
 
-/// To the microsecond.
+/// To the nanosecond, so that a manifest with these times takes the same frames.
 fn rounded(seconds: f64) -> f64 {
-    (seconds * 1e6).round() / 1e6
+    (seconds * 1e9).round() / 1e9
 }
 
 fn seconds(value: f64) -> String {

@@ -1,6 +1,7 @@
 //! One decision from the windows of a recording.
 
 use clap::ValueEnum;
+use corsmal_models::argmax;
 use corsmal_models::fusion::{Background, WindowVotes};
 use corsmal_models::labels::Labels;
 
@@ -26,8 +27,8 @@ pub struct VoteArgs {
     #[arg(long, value_name = "LABEL", requires = "vote")]
     background: Option<String>,
     /// Windows that a class other than --background needs.
-    #[arg(long, value_name = "N", requires = "background", default_value_t = 1)]
-    least: usize,
+    #[arg(long, value_name = "N", requires = "background", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    least: u32,
 }
 
 /// A checked way to decide.
@@ -40,6 +41,17 @@ pub enum Rule {
 }
 
 impl VoteArgs {
+    /// A vote with a background is more than shares of windows: it is lost where only these are
+    /// gone on with.
+    pub fn refuse_background(&self, with: &str) -> Result<(), Failure> {
+        match self.background {
+            Some(_) => Err(Failure::new(format!(
+                "--background decides over the windows of one file, not together with {with}"
+            ))),
+            None => Ok(()),
+        }
+    }
+
     /// The rule for these classes; `None` without `--vote`.
     pub fn rule(&self, labels: &Labels) -> Result<Option<Rule>, Failure> {
         let background = self.background.as_ref().map(|label| labels.encode(&[label]));
@@ -50,7 +62,8 @@ impl VoteArgs {
         match self.vote {
             None => Ok(None),
             Some(How::Majority) => {
-                let background = class.map(|class| Background { class, least: self.least });
+                let background =
+                    class.map(|class| Background { class, least: self.least as usize });
                 Ok(Some(Rule::Majority(background)))
             }
             Some(How::Mean) if class.is_some() => {
@@ -76,9 +89,7 @@ impl Rule {
                 let mean = votes.mean().ok_or_else(|| {
                     Failure::new("--vote mean needs probabilities, which this classifier lacks")
                 })?;
-                let top =
-                    (1..mean.len()).fold(0, |best, c| if mean[c] > mean[best] { c } else { best });
-                Ok(Some((top, Some(mean))))
+                Ok(Some((argmax(&mean), Some(mean))))
             }
         }
     }

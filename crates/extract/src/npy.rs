@@ -49,7 +49,7 @@ pub enum NpyError {
     },
     /// The element type is not one that is read here.
     #[error(
-        "element type {descr:?} is not read; expected one of b1, i1-i8, u1-u8, f2-f8, c8, c16, U"
+        "element type {descr:?} is not read; expected one of b1, i1-i8, u1-u8, f2-f8, c8, c16, U, S"
     )]
     DType {
         /// The `descr` of the header.
@@ -83,6 +83,8 @@ pub enum Kind {
     Complex,
     /// `U`: UTF-32 text of fixed width, padded with zeros.
     Text,
+    /// `S`: bytes of fixed width, padded with zeros.
+    Bytes,
 }
 
 /// Element type of an array.
@@ -141,6 +143,7 @@ impl DType {
             ('f', 2 | 4 | 8) => (Kind::Float, size),
             ('c', 8 | 16) => (Kind::Complex, size),
             ('U', 0..=MAX_STRING) => (Kind::Text, 4 * size),
+            ('S', 0..=MAX_STRING) => (Kind::Bytes, size),
             _ => return Err(unknown()),
         };
         Ok(Self { kind, itemsize, big_endian })
@@ -151,7 +154,7 @@ impl fmt::Display for DType {
     /// numpy's type string, as `<f4`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let order = match (self.kind, self.itemsize, self.big_endian) {
-            (Kind::Bool | Kind::Int | Kind::UInt, 1, _) => '|',
+            (Kind::Bool | Kind::Int | Kind::UInt, 1, _) | (Kind::Bytes, ..) => '|',
             (_, _, true) => '>',
             (_, _, false) => '<',
         };
@@ -162,6 +165,7 @@ impl fmt::Display for DType {
             Kind::Float => ('f', self.itemsize),
             Kind::Complex => ('c', self.itemsize),
             Kind::Text => ('U', self.itemsize / 4),
+            Kind::Bytes => ('S', self.itemsize),
         };
         write!(f, "{order}{kind}{size}")
     }

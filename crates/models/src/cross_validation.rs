@@ -106,15 +106,6 @@ pub struct CrossValidation {
 }
 
 impl CrossValidation {
-    /// Out-of-fold class of every row; `None` for rows that were in no test fold.
-    pub fn predicted(&self, rows: usize) -> Vec<Option<usize>> {
-        let mut all = vec![None; rows];
-        for fold in &self.folds {
-            fold.rows.iter().zip(&fold.predicted).for_each(|(&row, &class)| all[row] = Some(class));
-        }
-        all
-    }
-
     fn of(folds: Vec<FoldOutcome>, data: &Data<'_>) -> Result<Self> {
         let rows: Vec<usize> = folds.iter().flat_map(|f| f.rows.iter().copied()).collect();
         let predicted: Vec<usize> =

@@ -12,6 +12,7 @@ pub mod params;
 mod table;
 
 pub use error::{ModelError, Result};
+pub use table::argmax;
 pub mod comparison;
 pub mod cross_validation;
 pub mod fusion;

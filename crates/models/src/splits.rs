@@ -155,14 +155,6 @@ pub fn group_lists<S: AsRef<str>>(groups: &[S], lists: &[Vec<String>]) -> Result
     Ok(from_assignment(&fold_of, lists.iter().map(|l| l.join(",")).collect()))
 }
 
-/// Folds from a column that names the fold of each row.
-///
-/// # Errors
-/// Fewer than two different values.
-pub fn fold_column<S: AsRef<str>>(column: &[S]) -> Result<Vec<Fold>> {
-    leave_one_group_out(column)
-}
-
 /// One random split (`train_test_split(test_size, random_state, stratify)`), rows in scikit-learn's
 /// order.
 ///

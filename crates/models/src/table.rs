@@ -20,6 +20,15 @@ pub(crate) fn check_features(x: ArrayView2<'_, f64>) -> Result<()> {
     }
 }
 
+/// Refuses rows that are all the same: there is nothing to tell classes apart by.
+pub(crate) fn check_varied(x: ArrayView2<'_, f64>) -> Result<()> {
+    let (rows, features) = x.dim();
+    if rows < 2 || x.outer_iter().skip(1).any(|row| row != x.row(0)) {
+        return Ok(());
+    }
+    Err(ModelError::ConstantFeature { feature: 0, rows, count: features, features })
+}
+
 /// Refuses features that are not those the model was trained on, by number, and non-finite ones.
 pub(crate) fn check_query(x: ArrayView2<'_, f64>, n_features: usize) -> Result<()> {
     if x.ncols() != n_features {
@@ -51,7 +60,7 @@ pub(crate) fn class_counts(y: &[usize], n_classes: usize) -> Vec<usize> {
 }
 
 /// Index of the largest value, the first one among equals.
-pub(crate) fn argmax<'a>(values: impl IntoIterator<Item = &'a f64>) -> usize {
+pub fn argmax<'a>(values: impl IntoIterator<Item = &'a f64>) -> usize {
     let mut best = (0, f64::NEG_INFINITY);
     for (i, &v) in values.into_iter().enumerate() {
         if v > best.1 {

@@ -152,6 +152,21 @@ fn constant_features_do_no_harm() {
     }
 }
 
+/// Rows that are all the same cannot be told apart, one row alone is no such table.
+#[test]
+fn tables_without_any_variation_are_refused() {
+    for spec in all() {
+        let x = ndarray::Array2::from_elem((6, 3), 0.5);
+        let error = spec.train(x.view(), &[0, 1, 0, 1, 0, 1], 2).unwrap_err().to_string();
+        assert!(error.contains("same value in all 6 rows (3 features of 3"), "{error}");
+    }
+    for name in ["rf", "et"] {
+        let table = corsmal_models::params::key_values(&["trees=1000000000000"]).unwrap();
+        let error = ClassifierSpec::new(name, &table).unwrap_err().to_string();
+        assert!(error.contains("1 to 100000"), "{error}");
+    }
+}
+
 #[test]
 fn linfa_users_are_at_home() {
     let (x, y) = clouds(90, 4, 3, 8);

@@ -63,6 +63,29 @@ fn every_classifier_survives_the_disk() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), CLASSIFIERS.len());
 }
 
+/// Squared lengths beyond the range of numbers made a file that could not be read back.
+#[test]
+fn neighbours_with_huge_features_are_refused_or_survive_the_disk() {
+    let y = [0, 1, 0, 1, 0, 1];
+    for metric in ["euclidean", "manhattan", "cosine", "chebyshev"] {
+        let spec = PipelineSpec::plain(
+            ClassifierSpec::new("knn", &key_values(&[&format!("metric={metric}"), "k=1"]).unwrap())
+                .unwrap(),
+        );
+        let x = |scale: f64| Array2::from_shape_fn((6, 2), |(r, c)| (r + c) as f64 * scale);
+        let fitted = spec.train(x(1e150).view(), &y, 2).unwrap();
+        let labels = Labels::new(vec!["a".into(), "b".into()]).unwrap();
+        let header =
+            ModelHeader { pipeline: spec.clone(), labels, ..small("knn").0.header().clone() };
+        let header = ModelHeader { feature_names: Vec::new(), ..header };
+        let bytes = Model::new(header, fitted.clone()).unwrap().to_bytes().unwrap();
+        assert_eq!(Model::from_bytes(&bytes).unwrap().n_features(), 2, "{metric}");
+        let error = spec.train(x(1e200).view(), &y, 2).unwrap_err().to_string();
+        assert!(error.contains("row 0") && error.contains("too large"), "{metric}: {error}");
+        assert!(fitted.predict(x(1e200).view()).is_err(), "{metric}");
+    }
+}
+
 #[test]
 fn every_truncation_and_every_flipped_byte_is_noticed() {
     for (name, _) in CLASSIFIERS {

@@ -43,7 +43,9 @@ impl Added {
         let table = Table::read(path)?;
         let by_key = if table.find("fileName").is_some() {
             let capacities = read_capacities(path)?.into_iter();
-            capacities.map(|(k, capacity_ml)| (k, Estimate { capacity_ml, ..Estimate::default() })).collect()
+            capacities
+                .map(|(k, capacity_ml)| (k, Estimate { capacity_ml, ..Estimate::default() }))
+                .collect()
         } else {
             submission(&Submission::from_table(&table)?)
         };

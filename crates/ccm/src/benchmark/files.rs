@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use corsmal_extract::draft;
 use corsmal_models::labels::Labels;
 use corsmal_models::model_file::{Model, ModelHeader};
 use corsmal_plot::{BarChart, ConfusionMatrix as MatrixPicture, Series, to_svg};
@@ -56,7 +57,7 @@ pub(super) fn write_outcome(out: &Path, outcome: &Outcome, rows: &Rows) -> Resul
     let model = Model::new(header, outcome.model.clone()).map_err(|e| fault(&e))?;
     let bytes = model.to_bytes().map_err(|e| fault(&e))?;
     let path = out.join("models").join(format!("{name}.model"));
-    corsmal_extract::draft::write(&path, &bytes).map_err(|e| fault(&e))
+    draft::write(&path, &bytes).map_err(CcmError::Write)
 }
 
 /// Writes the pseudo-random estimates of every part as submissions.
@@ -105,7 +106,7 @@ pub(super) fn write_pictures(
     let put = |file: String, svg: std::result::Result<String, corsmal_plot::PlotError>| {
         let path = out.join("figures").join(file);
         let svg = svg.map_err(|e| CcmError::Request(format!("{}: {e}", path.display())))?;
-        std::fs::write(&path, svg).map_err(|e| CcmError::io(&path, e))
+        draft::write(&path, svg.as_bytes()).map_err(CcmError::Write)
     };
     let n = labels.len();
     let picture = MatrixPicture {

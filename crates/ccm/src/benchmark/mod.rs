@@ -57,6 +57,10 @@ pub fn run(options: &Options, progress: &dyn Fn(&str), stop: &Arc<AtomicBool>) -
     if let Some((name, _)) = options.added.iter().find(|(name, _)| !names.insert(name)) {
         return Err(CcmError::Request(format!("{name}: added twice, names must differ")));
     }
+    let mut slugs = HashSet::new();
+    if let Some(twice) = options.baselines.iter().find(|b| !slugs.insert(b.slug())) {
+        return Err(CcmError::Request(format!("baseline {} is given twice", twice.slug())));
+    }
     let added = options
         .added
         .iter()

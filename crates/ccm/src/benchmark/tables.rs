@@ -103,9 +103,9 @@ pub(super) fn write_pictures(
     outcomes: &[Outcome],
     seed: u64,
 ) -> Result<()> {
-    for method in methods(rows, outcomes, &[], seed).iter().take(outcomes.len()) {
+    for (method, outcome) in methods(rows, outcomes, &[], seed).iter().zip(outcomes) {
         let Some(scores) = method.scores(rows, Part::Training, seed, &|_| true) else { continue };
-        let slug = method.name.to_lowercase().replace(" + ", "-").replace(['.', ' '], "");
+        let slug = outcome.baseline.slug();
         for (task, labels, matrix) in [
             ("level", level_names(), &scores.level_matrix),
             ("type", kind_names(), &scores.kind_matrix),

@@ -24,15 +24,12 @@ impl<'a> Index<'a> {
     /// Where several files have a recording the first one counts, of those with ids before those
     /// without.
     pub(super) fn new(files: &'a [Annotations]) -> Self {
-        let mut index = Self {
-            by_id: HashMap::new(),
-            by_sequence: HashMap::new(),
-            contradictions: Vec::new(),
-        };
+        let mut index =
+            Self { by_id: HashMap::new(), by_sequence: HashMap::new(), contradictions: Vec::new() };
         let with_ids = |file: &&Annotations| file.rows.iter().any(|row| row.id.is_some());
         let (flat, tree): (Vec<_>, Vec<_>) = files.iter().partition(with_ids);
         for file in flat.into_iter().chain(tree) {
-            let mut odd: Vec<Oddity> = Vec::new();
+            let mut told: Vec<&Path> = Vec::new();
             for row in &file.rows {
                 let Some(container) = Container::new(row.container) else { continue };
                 let found = (file.path.as_path(), row);
@@ -49,15 +46,14 @@ impl<'a> Index<'a> {
                     let text = || format!("container {} sequence {sequence}", row.container);
                     contradict(row, other.1).then(|| (other.0, text()))
                 });
-                if let Some((other, which)) = by_id.or(by_sequence) {
+                if let Some((other, which)) = by_id.or(by_sequence)
+                    && !told.contains(&other)
+                {
+                    told.push(other);
                     let what = format!("says something else of {which} than {}", other.display());
-                    let known = |o: &Oddity| o.what.ends_with(&format!("than {}", other.display()));
-                    if !odd.iter().any(known) {
-                        odd.push(Oddity { path: file.path.clone(), what });
-                    }
+                    index.contradictions.push(Oddity { path: file.path.clone(), what });
                 }
             }
-            index.contradictions.append(&mut odd);
         }
         index
     }

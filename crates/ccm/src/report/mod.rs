@@ -5,6 +5,7 @@ mod html;
 
 use std::path::Path;
 
+use corsmal_extract::draft;
 use serde::{Serialize, Serializer};
 
 use crate::error::{CcmError, Result};
@@ -140,9 +141,7 @@ impl Report {
     pub fn write(&self, dir: &Path) -> Result<()> {
         let tables = dir.join("tables");
         std::fs::create_dir_all(&tables).map_err(|e| CcmError::io(&tables, e))?;
-        let put = |path: &Path, bytes: &[u8]| {
-            std::fs::write(path, bytes).map_err(|e| CcmError::io(path, e))
-        };
+        let put = |path: &Path, bytes: &[u8]| draft::write(path, bytes).map_err(CcmError::Write);
         for table in self.sections.iter().flat_map(|s| &s.tables) {
             put(&tables.join(format!("{}.csv", table.name)), table.csv()?.as_bytes())?;
         }

@@ -1,5 +1,6 @@
 //! The pseudo-random baseline.
 
+use corsmal_models::argmax;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -29,9 +30,9 @@ pub fn pseudo_random(keys: &[RowKey], seed: u64) -> Vec<Prediction> {
             };
             Prediction {
                 key,
-                kind: FillingType::from_number(first_maximum(&kind) as i64),
+                kind: FillingType::from_number(argmax(&kind) as i64),
                 kind_probabilities: Some(kind),
-                level: FillingLevel::from_number(first_maximum(&level) as i64),
+                level: FillingLevel::from_number(argmax(&level) as i64),
                 level_probabilities: Some(level),
                 capacity_ml: Some(capacity),
                 container_mass_g: Some(mass),
@@ -50,16 +51,6 @@ fn class_scores<const N: usize>(rng: &mut impl Rng) -> [f64; N] {
             return scores.map(|s| s / sum);
         }
     }
-}
-
-fn first_maximum(scores: &[f64]) -> usize {
-    let mut best = 0;
-    for (i, &score) in scores.iter().enumerate() {
-        if score > scores[best] {
-            best = i;
-        }
-    }
-    best
 }
 
 #[cfg(test)]

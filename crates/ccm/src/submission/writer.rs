@@ -1,15 +1,16 @@
 //! Writing submissions, checked first.
 
 use std::collections::{HashMap, HashSet};
-use std::io::Write;
 use std::path::Path;
+
+use corsmal_extract::draft;
 
 use super::{Estimates, Format, RowKey, Submission};
 use crate::dataset::{Dimensions, FillingLevel, FillingType};
 use crate::error::{CcmError, Result};
 
 /// Probabilities of a row must add up to one within this.
-const SUM_TOLERANCE: f64 = 1e-3;
+pub(crate) const SUM_TOLERANCE: f64 = 1e-3;
 
 const HEADER_2022: &str = "Configuration ID,Container capacity,Container mass,Filling mass,None,\
 Pasta,Rice,Water,Filling type,Empty,Half-full,Full,Filling level,Width at the top,\
@@ -132,11 +133,7 @@ impl Submission {
             text.push_str(&row(p));
         }
         text.push('\n');
-        let part = path.with_extension("csv.part");
-        let written = std::fs::File::create(&part)
-            .and_then(|mut f| f.write_all(text.as_bytes()).and_then(|()| f.sync_all()))
-            .and_then(|()| std::fs::rename(&part, path));
-        written.map_err(|e| CcmError::io(path, e))
+        draft::write(path, text.as_bytes()).map_err(CcmError::Write)
     }
 }
 
@@ -270,5 +267,11 @@ mod tests {
             assert!(error.contains(message), "{error}");
             assert!(!path.exists());
         }
+        // What cannot take the name leaves nothing behind.
+        std::fs::create_dir(&path).unwrap();
+        let written = Submission::write(&path, Format::Y2022, &[example(a)], &[a]);
+        let error = written.unwrap_err().to_string();
+        assert_eq!(error.matches(path.to_str().unwrap()).count(), 1, "{error}");
+        assert_eq!(std::fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
     }
 }

@@ -148,11 +148,6 @@ fn actions<'a>(takes: impl Iterator<Item = &'a Take>) -> String {
     text
 }
 
-/// Writes beside and renames.
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    let mut part = path.as_os_str().to_owned();
-    part.push(".part");
-    std::fs::write(&part, bytes)
-        .and_then(|()| std::fs::rename(&part, path))
-        .map_err(|e| CcmError::io(path, e))
+    corsmal_extract::draft::write(path, bytes).map_err(CcmError::Write)
 }

@@ -10,6 +10,7 @@ use corsmal_ccm::submission::{Submission, pseudo_random};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use crate::failure::Failure;
+use crate::prediction_lines::csv_line;
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Rules {
@@ -73,9 +74,12 @@ fn containers(text: &str) -> Result<Containers, String> {
         let (first, last) = part.split_once('-').unwrap_or((part, part));
         let first: u8 = first.trim().parse().map_err(|_| fault())?;
         let last: u8 = last.trim().parse().map_err(|_| fault())?;
+        if first > last {
+            return Err(fault());
+        }
         list.extend(first..=last);
     }
-    if list.is_empty() { Err(fault()) } else { Ok(Containers(list)) }
+    Ok(Containers(list))
 }
 
 /// Prints the scores; notes go to standard error except in JSON, which holds them.
@@ -112,6 +116,13 @@ fn print(results: &[(String, Scores)], format: Format) -> Result<(), Failure> {
             }
         }
     }
+    // Some scores are only of submissions that address their task.
+    let mut columns: Vec<&str> = Vec::new();
+    for (column, _) in results.iter().flat_map(|(_, scores)| &scores.values) {
+        if !columns.contains(column) {
+            columns.push(column);
+        }
+    }
     match format {
         Format::Json => {
             let objects: Vec<_> = results.iter().map(|(name, s)| Flat(name, s)).collect();
@@ -122,31 +133,38 @@ fn print(results: &[(String, Scores)], format: Format) -> Result<(), Failure> {
             println!("{text}");
         }
         Format::Csv => {
-            for (i, (name, scores)) in results.iter().enumerate() {
-                if i == 0 {
-                    let names: Vec<_> = scores.values.iter().map(|(n, _)| *n).collect();
-                    println!("submission,{}", names.join(","));
-                }
-                let values: Vec<_> = scores.values.iter().map(|(_, v)| format!("{v:.2}")).collect();
-                println!("{name},{}", values.join(","));
+            let mut bytes = csv_line(&[&["submission"], &columns[..]].concat())?;
+            for (name, scores) in results {
+                let value =
+                    |column: &&str| scores.get(column).map_or_else(String::new, two_decimals);
+                let line = std::iter::once(name.clone()).chain(columns.iter().map(value));
+                bytes.extend(csv_line(&line.collect::<Vec<_>>())?);
             }
+            print!("{}", String::from_utf8_lossy(&bytes));
         }
         Format::Table => {
             let width = results.iter().map(|(n, _)| n.chars().count()).max().unwrap_or(0).max(10);
-            for (i, (name, scores)) in results.iter().enumerate() {
-                if i == 0 {
-                    println!("rules {}, {} recordings, percent", scores.rules.name(), scores.rows);
-                    print!("{:width$}", "submission");
-                    scores.values.iter().for_each(|(n, _)| print!(" {n:>7}"));
-                    println!();
-                }
+            if let Some((_, scores)) = results.first() {
+                println!("rules {}, {} recordings, percent", scores.rules.name(), scores.rows);
+            }
+            print!("{:width$}", "submission");
+            columns.iter().for_each(|n| print!(" {n:>7}"));
+            println!();
+            for (name, scores) in results {
                 print!("{name:width$}");
-                scores.values.iter().for_each(|(n, v)| print!(" {v:>w$.2}", w = n.len().max(7)));
+                for column in &columns {
+                    let value = scores.get(column).map_or_else(String::new, two_decimals);
+                    print!(" {value:>w$}", w = column.len().max(7));
+                }
                 println!();
             }
         }
     }
     Ok(())
+}
+
+fn two_decimals(value: f64) -> String {
+    format!("{value:.2}")
 }
 
 /// A result as one flat object, keys in the order of the scores.

@@ -107,6 +107,9 @@ impl Args {
         paths: &[PathBuf],
         weights: Option<&[f64]>,
     ) -> Result<ProbabilityTable, Failure> {
+        if paths.len() > 1 || weights.is_some() {
+            self.vote.refuse_background("an average of files")?;
+        }
         let mut tables = Vec::with_capacity(paths.len());
         for path in paths {
             let mut table = ProbabilityTable::read(path)?;
@@ -117,7 +120,11 @@ impl Args {
         }
         match (tables.len(), weights) {
             // Votes stand as they are: their shares may have another maximum.
-            (1, None) => Ok(tables.remove(0)),
+            (1, None) => {
+                let table = tables.remove(0);
+                table.check_once_each()?;
+                Ok(table)
+            }
             _ => Ok(ProbabilityTable::average(&tables, weights)?),
         }
     }

@@ -93,6 +93,8 @@ fn unusable_input_is_one_message_and_exit_code_2() {
         vec!["dataset", "check", text(dir.path())],
         vec!["benchmark", "--data", text(&none), "--out", text(&none)],
         vec!["synth", "--out", text(dir.path())],
+        [&["benchmark", "--data", "x", "--out", "y"], &["--baselines", "af193-rf", "af193-rf"][..]]
+            .concat(),
     ] {
         let output = run(&arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
@@ -151,6 +153,27 @@ fn submissions_with_faults_are_refused_and_quirks_are_noted() {
         assert_eq!(output.status.code(), Some(2), "{found}");
         assert!(found.contains(&message) && output.stdout.is_empty(), "{message}: {found}");
     }
+    // Only what addresses the container's mass has an error of the weight.
+    let weighed: Vec<_> = rows.iter().map(|r| r.replacen(",100,-1", ",100,10", 1)).collect();
+    let other = dir.path().join("with, mass.csv");
+    std::fs::write(&other, format!("{header}\n{}\n", weighed.join("\n"))).unwrap();
+    std::fs::write(&file, format!("{header}\n{}\n", rows.join("\n"))).unwrap();
+    let both = ["evaluate", "--rules", "paper", "--submission", text(&file), text(&other)];
+    let both = [&both[..], &["--annotations", text(&annotations)]].concat();
+    let csv = lines(&run(&[&both[..], &["--format", "csv"]].concat()).stdout);
+    let mut reader = csv::Reader::from_reader(csv.as_bytes());
+    let columns = reader.headers().unwrap().clone();
+    let found: Vec<_> = reader.records().map(|record| record.unwrap()).collect();
+    assert_eq!(&columns[columns.len() - 1], "weight_error_N");
+    assert_eq!((&found[0][0], &found[0][columns.len() - 1]), ("s", ""));
+    assert_eq!(&found[1][0], "with, mass");
+    assert!(found[1][columns.len() - 1].parse::<f64>().unwrap() > 0.0);
+    let table = lines(&run(&both).stdout);
+    let width = |line: &str| line.split_whitespace().count();
+    let shown: Vec<_> = table.lines().collect();
+    assert_eq!(width(shown[1]), width(shown[2]) + 1, "{table}");
+    let reversed = run(&[&both[..], &["--containers", "5-2"]].concat());
+    assert_eq!(reversed.status.code(), Some(2));
     // A float label is a quirk of the official evaluators: scored as they do, and said.
     let output = evaluate(&changed(2, rows[2].replace(",-1,1,-1", ",-1,1.0,-1")));
     let scores: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();

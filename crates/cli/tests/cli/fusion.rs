@@ -107,6 +107,11 @@ fn submissions_are_checked_before_they_are_written() {
         (&["--type-weights=-1"], "positive"),
         (&["--joint", text(&kind)], "--joint"),
         (&["--vote", "majority", "--background", "tea"], "tea"),
+        (
+            &["--vote", "majority", "--background", "none", "--feasible"],
+            "--background decides over the windows of one file, not together with --feasible",
+        ),
+        (&["--vote", "majority", "--background", "none", "--least", "0"], "--least"),
     ] {
         let found = refused(&[&fuse[..], extra].concat());
         assert!(found.contains(message), "{found}");
@@ -117,6 +122,27 @@ fn submissions_are_checked_before_they_are_written() {
     let misused = ["fuse", "--predictions", text(&kind), "--feasible", "--out", text(&out)];
     assert!(refused(&misused).contains("--feasible is for submissions"));
     assert!(refused(&["fuse", "--out", text(&out)]).contains("nothing to fuse"));
+    // A vote with a background is not averaged: its decision would be lost.
+    let vote = ["--vote", "majority", "--background", "none"];
+    for files in [&[text(&kind), text(&kind)][..], &[text(&kind), "--weights", "2"]] {
+        let fuse = ["fuse", "--out", text(&out), "--predictions"];
+        let found = refused(&[&fuse[..], files, &vote].concat());
+        assert!(found.contains("not together with an average of files"), "{found}");
+    }
+    for (lines, message) in [
+        ("id,p_none,p_rice\nx,5,3\n", "line 2, column 'p_none': '5' is not a probability"),
+        ("id,p_none,p_rice\nx,0.5,0.6\n", "line 2: the probabilities have the sum 1.1, not 1"),
+        ("id,p_none,p_rice\nx,0,1\nx,1,0\n", "more than one row: id x"),
+    ] {
+        put("one.csv", lines);
+        let one = at("one.csv");
+        let found = refused(&["fuse", "--predictions", text(&one), "--out", text(&out)]);
+        assert!(found.contains(message), "{found}");
+    }
+    put("far.csv", "Object,Sequence,p0,p1\n99,0,1,0\n");
+    let far = at("far.csv");
+    let found = refused(&["fuse", "--type", text(&far), "--out", text(&out)]);
+    assert!(found.contains("no container of the data set: 99"), "{found}");
     put("odd.csv", "id,predicted,p_none,p_rice\nx,tea,1,0\n");
     let odd = at("odd.csv");
     let odd = ["fuse", "--predictions", text(&odd), "--out", text(&out)];

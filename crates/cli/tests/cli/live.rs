@@ -312,6 +312,35 @@ fn windows_are_voted_on() {
     assert_eq!(rows(&fused)[0][0], "noise");
 }
 
+/// A vote over what is left of a recording is told from one over all of it.
+#[test]
+fn failed_windows_of_a_vote_are_said() {
+    let trained = Trained::new(&["--classifier", "knn", "--set", "k=1"]);
+    let (model, wav) = (trained.path("m"), trained.path("nan.wav"));
+    let spec = hound::WavSpec {
+        channels: 1,
+        sample_rate: RATE as u32,
+        bits_per_sample: 32,
+        sample_format: hound::SampleFormat::Float,
+    };
+    let mut writer = hound::WavWriter::create(&wav, spec).unwrap();
+    let samples = [0, 0, 0, 1].into_iter().flat_map(second);
+    for (i, sample) in samples.enumerate() {
+        let value = if i == RATE + 5 { f32::NAN } else { f32::from(sample) / 32768.0 };
+        writer.write_sample(value).unwrap();
+    }
+    writer.finalize().unwrap();
+    let windows = ["--window", "1", "--hop", "1", "--vote", "majority"];
+    let classify = ["classify", "--model", text(&model), "--in", text(&wav)];
+    let output = run(&[&classify[..], &windows].concat());
+    assert_eq!(output.status.code(), Some(1));
+    let table = String::from_utf8(output.stdout).unwrap();
+    let line: Vec<_> = table.lines().nth(1).unwrap().split(',').skip(2).collect();
+    assert_eq!(line[..3], ["non_finite", "3", "tone"], "{table}");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(message.contains("1 windows failed, the first: NaN"), "{message}");
+}
+
 #[test]
 fn what_is_no_window_is_refused() {
     let trained = Trained::new(&["--classifier", "knn"]);

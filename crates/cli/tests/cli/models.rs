@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use corsmal_extract::npy::{DType, Header};
 use corsmal_extract::npz::{Compression, NpzWriter};
 use serde_json::Value;
 
@@ -229,6 +230,102 @@ fn what_cannot_be_learned_from_is_refused() {
     let train = ["train", "--features", text(&odd), "--target", "type", "--classifier", "svm"];
     refused(&[&train[..], &["--standardize", "--out", text(&out)]].concat());
     assert!(!out.exists());
+}
+
+/// Columns beside those of [`small_table`], as a label file.
+fn label_columns(path: &Path, header: &str, line: impl Fn(usize) -> String) {
+    let lines: String = (0..40).map(|row| format!("{row},{}\n", line(row))).collect();
+    std::fs::write(path, format!("id,{header}\n{lines}")).unwrap();
+}
+
+#[test]
+fn groups_are_not_split_by_other_folds() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, csv) = (folder.path().join("x.npz"), folder.path().join("l.csv"));
+    small_table(&file, |_, _| {});
+    label_columns(&csv, "kind,half,cup", |row| format!("{},{},{}", row % 2, row / 20, row / 10));
+    let validate = ["cross-validate", "--features", text(&file), "--labels", text(&csv)];
+    let learn = ["--target", "kind", "--classifier", "knn", "--groups", "cup"];
+    let by = |cv: &'static str| [&validate[..], &learn[..], &["--cv", cv]].concat();
+    for plan in ["fold=kind", "group=kind"] {
+        let found = refused(&by(plan));
+        assert!(found.contains("cup 0 is in the folds 0 and 1; --groups"), "{found}");
+    }
+    // Training rows are of one half and two cups: only cups can make inner folds.
+    let tuned = done(&[&by("fold=half")[..], &["--tune", "k=1,3", "--json"]].concat());
+    let report: Value = serde_json::from_str(&tuned).unwrap();
+    assert_eq!(report["result"]["folds"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn inner_folds_are_as_many_as_the_smallest_class_allows() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, csv) = (folder.path().join("x.npz"), folder.path().join("l.csv"));
+    small_table(&file, |_, _| {});
+    let arguments = ["cross-validate", "--features", text(&file), "--labels", text(&csv)];
+    let learn = ["--target", "kind", "--classifier", "knn", "--cv", "k=2", "--tune", "k=1,3"];
+    let validate = [&arguments[..], &learn[..]].concat();
+    let rare = |rows: usize| {
+        label_columns(&csv, "kind", |row| if row < rows { "rare" } else { "other" }.into());
+    };
+    rare(4);
+    done(&validate);
+    rare(2);
+    let found = refused(&validate);
+    assert!(found.contains("class rare has 1 row to choose parameters by"), "{found}");
+}
+
+/// Labels that are one 64-bit float, text in bytes, dates that nobody asked for.
+#[test]
+fn members_of_other_programs_are_read_as_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("x.npz");
+    let x: Vec<f32> = (0..40).map(|row| row as f32).collect();
+    let mut npz = NpzWriter::create(&file, Compression::Stored).unwrap();
+    npz.floats("X", &[40, 1], &x).unwrap();
+    let mut put = |name: &str, descr: &str, value: &dyn Fn(usize) -> Vec<u8>| {
+        let header = Header::new(DType::parse(descr).unwrap(), &[40]);
+        npz.array(name, &header, &(0..40).flat_map(value).collect::<Vec<_>>()).unwrap();
+    };
+    let large = |row: usize| (1u64 << 53) + (row % 2) as u64;
+    put("large", "<i8", &|row| large(row).to_le_bytes().to_vec());
+    put("larger", "<u8", &|row| ((1u64 << 63) + (row % 2) as u64).to_le_bytes().to_vec());
+    put("bytes", "|S1", &|row| vec![b"ab"[row % 2]]);
+    put("when", "<f8", &|_| vec![0; 8]);
+    npz.finish().unwrap();
+    let mut bytes = std::fs::read(&file).unwrap();
+    let at = bytes.windows(5).position(|w| w == b"'<f8'").unwrap();
+    bytes[at + 2] = b'M';
+    std::fs::write(&file, bytes).unwrap();
+    let validate = |target: &str| {
+        let target = ["--target", target, "--classifier", "knn", "--cv", "k=2", "--json"];
+        let report = done(&[&["cross-validate", "--features", text(&file)], &target[..]].concat());
+        serde_json::from_str::<Value>(&report).unwrap()["labels"].clone()
+    };
+    let names = [9_007_199_254_740_992u64, 9_007_199_254_740_993].map(|n| n.to_string());
+    assert_eq!(validate("large"), serde_json::json!(names));
+    let names = [1u64 << 63, (1 << 63) + 1].map(|n| n.to_string());
+    assert_eq!(validate("larger"), serde_json::json!(names));
+    assert_eq!(validate("bytes"), serde_json::json!(["a", "b"]));
+}
+
+/// A pipe or a device would be replaced by a file.
+#[cfg(unix)]
+#[test]
+fn what_is_no_regular_file_is_not_replaced() {
+    use std::os::unix::fs::FileTypeExt;
+    let folder = tempfile::tempdir().unwrap();
+    let (file, pipe) = (folder.path().join("x.npz"), folder.path().join("pipe.npz"));
+    small_table(&file, |_, _| {});
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let train = ["train", "--features", text(&file), "--target", "type", "--classifier", "knn"];
+    let out = ["--out", text(&pipe), "--overwrite"];
+    assert!(refused(&[&train[..], &out].concat()).contains("pipe.npz exists and is no regular"));
+    let wav = folder.path().join("a.wav");
+    std::fs::write(&wav, "RIFF").unwrap();
+    let extract = ["extract", "--in", text(&wav), "--preset", "esc26"];
+    assert!(refused(&[&extract[..], &out].concat()).contains("pipe.npz: is no regular file"));
+    assert!(std::fs::metadata(&pipe).unwrap().file_type().is_fifo());
 }
 
 #[test]

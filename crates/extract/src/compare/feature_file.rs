@@ -83,7 +83,7 @@ impl FeatureFile {
                 }
                 Err(error) => return Err(error.into()),
             };
-            if header.dtype.kind == Kind::Text {
+            if matches!(header.dtype.kind, Kind::Text | Kind::Bytes) {
                 continue;
             }
             let ours = provenance.as_ref().and_then(|_| owner(&name, &features));

@@ -39,38 +39,49 @@ pub(crate) trait Element: Copy + Sized + 'static {
     fn converter(dtype: DType) -> Option<Convert<Self>>;
 }
 
+macro_rules! from {
+    ($source:ty, $target:ty, $big_endian:expr) => {{
+        let big_endian = $big_endian;
+        Box::new(move |bytes: &[u8], out: &mut Vec<$target>| {
+            let (items, _) = bytes.as_chunks::<{ size_of::<$source>() }>();
+            out.extend(items.iter().map(|&b| <$source>::of(b, big_endian) as $target));
+        })
+    }};
+}
+
+macro_rules! whole {
+    ($target:ty, $dtype:expr) => {
+        (|| -> Option<Convert<$target>> {
+            let big_endian = $dtype.big_endian;
+            Some(match ($dtype.kind, $dtype.itemsize) {
+                (Kind::Bool | Kind::UInt, 1) => from!(u8, $target, big_endian),
+                (Kind::UInt, 2) => from!(u16, $target, big_endian),
+                (Kind::UInt, 4) => from!(u32, $target, big_endian),
+                (Kind::UInt, 8) => from!(u64, $target, big_endian),
+                (Kind::Int, 1) => from!(i8, $target, big_endian),
+                (Kind::Int, 2) => from!(i16, $target, big_endian),
+                (Kind::Int, 4) => from!(i32, $target, big_endian),
+                (Kind::Int, 8) => from!(i64, $target, big_endian),
+                _ => return None,
+            })
+        })()
+    };
+}
+
 macro_rules! element {
     ($target:ty) => {
         impl Element for $target {
             fn converter(dtype: DType) -> Option<Convert<Self>> {
                 let big_endian = dtype.big_endian;
-                macro_rules! from {
-                    ($source:ty) => {
-                        Box::new(move |bytes: &[u8], out: &mut Vec<$target>| {
-                            let (items, _) = bytes.as_chunks::<{ size_of::<$source>() }>();
-                            out.extend(
-                                items.iter().map(|&b| <$source>::of(b, big_endian) as $target),
-                            );
-                        })
-                    };
-                }
                 let half = move |bytes: &[u8], out: &mut Vec<$target>| {
                     let (items, _) = bytes.as_chunks::<2>();
                     out.extend(items.iter().map(|&b| <$target>::from(f16::of(b, big_endian))));
                 };
                 Some(match (dtype.kind, dtype.itemsize) {
-                    (Kind::Bool | Kind::UInt, 1) => from!(u8),
-                    (Kind::UInt, 2) => from!(u16),
-                    (Kind::UInt, 4) => from!(u32),
-                    (Kind::UInt, 8) => from!(u64),
-                    (Kind::Int, 1) => from!(i8),
-                    (Kind::Int, 2) => from!(i16),
-                    (Kind::Int, 4) => from!(i32),
-                    (Kind::Int, 8) => from!(i64),
                     (Kind::Float, 2) => Box::new(half),
-                    (Kind::Float, 4) => from!(f32),
-                    (Kind::Float, 8) => from!(f64),
-                    _ => return None,
+                    (Kind::Float, 4) => from!(f32, $target, big_endian),
+                    (Kind::Float, 8) => from!(f64, $target, big_endian),
+                    _ => return whole!($target, dtype),
                 })
             }
         }
@@ -78,6 +89,13 @@ macro_rules! element {
 }
 element!(f32);
 element!(f64);
+
+/// Whole numbers only, each as it is.
+impl Element for i128 {
+    fn converter(dtype: DType) -> Option<Convert<Self>> {
+        whole!(i128, dtype)
+    }
+}
 
 /// Reads the elements that `header` announces; the caller has compared its shape with the bytes there.
 ///

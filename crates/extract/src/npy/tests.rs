@@ -65,7 +65,7 @@ proptest! {
         shape in prop::collection::vec(0u64..1000, 0..6),
         descr in prop::sample::select(vec![
             "|b1", "|i1", "<i2", ">i4", "<i8", "|u1", "<u2", "<u4", ">u8", "<f4", ">f8", "<c8",
-            "<c16", "<U7", ">U0",
+            "<c16", "<U7", ">U0", "|S5",
         ]),
         order in prop::sample::select(vec![Order::C, Order::Fortran]),
     ) {

@@ -99,6 +99,14 @@ impl NpzFile {
         self.read(name, |body, header, wrong| npy::array(body, header).map_err(|e| wrong.npy(e)))
     }
 
+    /// A member of whole numbers or truth values, exactly.
+    ///
+    /// # Errors
+    /// As [`NpzFile::f32`]; floats are refused, too.
+    pub fn integers(&mut self, name: &str) -> Result<ArrayD<i128>, NpzError> {
+        self.read(name, |body, header, wrong| npy::array(body, header).map_err(|e| wrong.npy(e)))
+    }
+
     /// A numeric member as 64-bit floats, complex numbers as an additional first axis of real and
     /// imaginary parts.
     ///
@@ -110,14 +118,15 @@ impl NpzFile {
         })
     }
 
-    /// A one-dimensional text member (`U`); padding is removed.
+    /// A one-dimensional text member (`U`, or `S` in UTF-8); padding is removed.
     ///
     /// # Errors
     /// [`NpzError`] names the member and what is wrong with it.
     pub fn strings(&mut self, name: &str) -> Result<Vec<String>, NpzError> {
         self.read(name, |body, header, wrong| {
-            let (Kind::Text, &[count]) = (header.dtype.kind, header.shape.as_slice()) else {
-                return Err(wrong.kind("a list of strings (U)", header));
+            let (Kind::Text | Kind::Bytes, &[count]) = (header.dtype.kind, header.shape.as_slice())
+            else {
+                return Err(wrong.kind("a list of strings (U or S)", header));
             };
             let width = header.dtype.itemsize;
             // Only with bytes behind them are width and count more than a header's word.
@@ -130,13 +139,15 @@ impl NpzFile {
             let mut strings = Vec::new();
             for _ in 0..count {
                 body.read_exact(&mut item).map_err(|e| wrong.npy(e.into()))?;
-                let text: Option<String> = item
-                    .as_chunks::<4>()
-                    .0
-                    .iter()
-                    .map(|&unit| char::from_u32(u32::of(unit, header.dtype.big_endian)))
-                    .collect();
-                let text = text.ok_or_else(|| wrong.expected("Unicode", "other code points"))?;
+                let units = item.as_chunks::<4>().0.iter();
+                let text: Option<String> = match header.dtype.kind {
+                    Kind::Bytes => std::str::from_utf8(&item).ok().map(String::from),
+                    _ => units
+                        .map(|&unit| char::from_u32(u32::of(unit, header.dtype.big_endian)))
+                        .collect(),
+                };
+                let text =
+                    text.ok_or_else(|| wrong.expected("Unicode or UTF-8", "other code points"))?;
                 strings.push(text.trim_end_matches('\0').to_string());
             }
             Ok(strings)

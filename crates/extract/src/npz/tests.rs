@@ -59,6 +59,30 @@ fn what_is_written_is_read_back() {
 }
 
 #[test]
+fn whole_numbers_and_bytes_are_read_as_they_are() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("a.npz");
+    let mut writer = NpzWriter::create(&path, Compression::Stored).unwrap();
+    let mut put = |name: &str, descr: &str, data: &[u8]| {
+        let header = Header::new(DType::parse(descr).unwrap(), &[2]);
+        writer.array(name, &header, data).unwrap();
+    };
+    // Neighbours that are one 64-bit float.
+    let large = [1u64 << 63, (1 << 63) + 1];
+    put("large", "<u8", &large.map(u64::to_le_bytes).concat());
+    put("small", ">i4", &[-7i32, 7].map(i32::to_be_bytes).concat());
+    put("bytes", "|S3", "ab\0ü\0".as_bytes());
+    put("latin", "|S1", b"a\xfc");
+    writer.finish().unwrap();
+    let mut npz = NpzFile::open(&path).unwrap();
+    assert_eq!(npz.integers("large").unwrap().as_slice(), Some(&large.map(i128::from)[..]));
+    assert_eq!(npz.integers("small").unwrap().as_slice(), Some(&[-7, 7][..]));
+    assert_eq!(npz.strings("bytes").unwrap(), ["ab", "ü"]);
+    assert!(npz.strings("latin").unwrap_err().to_string().contains("UTF-8"));
+    assert!(npz.integers("bytes").is_err());
+}
+
+#[test]
 fn text_is_read_back() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("a.npz");

@@ -276,6 +276,9 @@ fn check_output(out: &Path, config: &Config) -> Result<bool, RunError> {
     if out.is_dir() {
         return refuse("is a folder".into());
     }
+    if out.exists() && !out.is_file() {
+        return refuse("is no regular file".into());
+    }
     let folder = draft::folder(out);
     if !folder.is_dir() {
         return refuse(format!("there is no folder {}", folder.display()));

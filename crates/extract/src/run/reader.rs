@@ -81,13 +81,19 @@ pub fn open(input: &Input, stop: &Arc<AtomicBool>) -> Result<Box<dyn BlockSource
     })
 }
 
+/// The frame at a time: the last one that does not begin later. Times written with nine decimals
+/// name the frame they were made from.
+pub fn frame_at(seconds: f64, sample_rate: u32) -> u64 {
+    (seconds * f64::from(sample_rate) + 1e-3) as u64
+}
+
 /// Frames of the recording that are taken, by the configuration and the manifest's start and end.
 pub fn crop(
     signal: &SignalConfig,
     (start, end): (Option<f64>, Option<f64>),
     sample_rate: u32,
 ) -> Range<u64> {
-    let frame = |seconds: f64| (seconds * f64::from(sample_rate)) as u64;
+    let frame = |seconds: f64| frame_at(seconds, sample_rate);
     let offset = start.unwrap_or(0.0);
     let first = frame(offset + signal.start);
     let mut last = end.map_or(u64::MAX, frame);

@@ -44,14 +44,17 @@ pub struct Window {
 /// window are held.
 ///
 /// Windows begin at multiples of the hop and are whole: what remains at the end is left out, but a
-/// recording shorter than a window is one window. The samples of a window are those of an input with
+/// recording shorter than a window is one window. Window and hop are whole numbers of frames, rounded
+/// once. The samples of a window are those of an input with
 /// its start and end. A failure to read is the last item.
 pub struct Windows<'a> {
     source: Box<dyn BlockSource>,
     signals: &'a Signals,
-    windowing: Windowing,
-    /// Second in the recording where the first window begins, and frame where the input ends.
-    base: f64,
+    /// Frames of a window, and from one to the next.
+    window: u64,
+    hop: u64,
+    /// Frames of the recording where the first window begins and where the input ends.
+    base: u64,
     limit: u64,
     /// Interleaved samples from frame `first` on.
     held: Vec<f32>,
@@ -73,13 +76,15 @@ impl<'a> Windows<'a> {
         stop: &Arc<AtomicBool>,
     ) -> Result<Self, SignalError> {
         let source = reader::open(input, stop)?;
-        let rate = f64::from(source.spec().sample_rate);
+        let rate = source.spec().sample_rate;
+        let frames = |seconds: f64| ((seconds * f64::from(rate)).round() as u64).max(1);
         Ok(Self {
             source,
             signals,
-            windowing,
-            base: input.start.unwrap_or(0.0),
-            limit: input.end.map_or(u64::MAX, |end| (end * rate) as u64),
+            window: frames(windowing.window),
+            hop: frames(windowing.hop),
+            base: input.start.map_or(0, |start| reader::frame_at(start, rate)),
+            limit: input.end.map_or(u64::MAX, |end| reader::frame_at(end, rate)),
             held: Vec::new(),
             first: 0,
             number: 0,
@@ -126,10 +131,9 @@ impl<'a> Windows<'a> {
     fn cut(&mut self) -> Result<Option<Window>, Failed> {
         let spec = self.source.spec();
         let (sample_rate, channels) = (spec.sample_rate, spec.channels);
-        let rate = f64::from(sample_rate);
-        let start = self.base + self.number as f64 * self.windowing.hop;
-        let end = ((start + self.windowing.window) * rate) as u64;
-        self.forget((start * rate) as u64)?;
+        let start = self.base + self.number * self.hop;
+        let end = start + self.window;
+        self.forget(start)?;
         let wanted = end.min(self.limit);
         while self.reached() < wanted && self.read(wanted - self.reached())? {}
         if self.held.is_empty() && self.number == 0 {
@@ -145,7 +149,7 @@ impl<'a> Windows<'a> {
             signal.push(samples)?;
             signal.finish()
         });
-        let seconds = |frame: u64| frame as f64 / rate;
+        let seconds = |frame: u64| frame as f64 / f64::from(sample_rate);
         let (start, end) = (seconds(self.first), seconds(self.first + frames as u64));
         Ok(Some(Window { start, end, features }))
     }
@@ -181,10 +185,14 @@ mod tests {
 
     /// Two channels of noise at 8 kHz.
     fn recording(folder: &std::path::Path, frames: u32) -> std::path::PathBuf {
+        recording_at(8000, folder, frames)
+    }
+
+    fn recording_at(rate: u32, folder: &std::path::Path, frames: u32) -> std::path::PathBuf {
         let path = folder.join(format!("{frames}.wav"));
         let spec = hound::WavSpec {
             channels: 2,
-            sample_rate: 8000,
+            sample_rate: rate,
             bits_per_sample: 16,
             sample_format: hound::SampleFormat::Int,
         };
@@ -212,6 +220,35 @@ mod tests {
         assert_eq!(spans(&long, (Some(0.5), Some(0.75))), [(0.5, 0.75)]);
         let short = recording(folder.path(), 4000);
         assert_eq!(spans(&short, (None, None)), [(0.0, 0.5)]);
+    }
+
+    /// Times that binary fractions cannot hold, cut by truncation, gave 44,099 frames here and there.
+    #[test]
+    fn windows_are_equally_long_and_their_times_name_their_frames() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = recording_at(44_100, folder.path(), 5 * 44_100);
+        let signals = Signals::new(Arc::new(Config::preset("esc26").unwrap()));
+        let windowing = Windowing::new(1.0, 0.1).unwrap();
+        let all = Windows::open(&input(&path, (None, None)), &signals, windowing, &go_on());
+        let crop = |start: f64, end: f64| {
+            reader::crop(&Default::default(), (Some(start), Some(end)), 44_100)
+        };
+        let mut number = 0;
+        for window in all.unwrap() {
+            let window = window.unwrap();
+            let expected = number * 4410..number * 4410 + 44_100;
+            assert_eq!(crop(window.start, window.end), expected);
+            // As they are printed.
+            let printed = |seconds: f64| format!("{seconds:.9}").parse().unwrap();
+            assert_eq!(crop(printed(window.start), printed(window.end)), expected);
+            number += 1;
+        }
+        assert_eq!(number, 41);
+        // A third of a second is no whole number of nanoseconds.
+        for frame in [14_700, 14_701, 123_457] {
+            let seconds: f64 = format!("{:.9}", f64::from(frame) / 44_100.0).parse().unwrap();
+            assert_eq!(reader::frame_at(seconds, 44_100), frame as u64);
+        }
     }
 
     #[test]

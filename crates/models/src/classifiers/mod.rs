@@ -12,7 +12,7 @@ use serde_json::{Map, Value};
 
 use crate::error::{ModelError, Result};
 use crate::params::{Parameter, Parameters};
-use crate::table::{argmax, check_features, check_labels, check_query, class_counts};
+use crate::table::{argmax, check_features, check_labels, check_query, check_varied, class_counts};
 
 /// A classifier that can be fitted.
 pub(crate) trait Train: Parameters {
@@ -178,6 +178,7 @@ impl ClassifierSpec {
     ) -> Result<Classifier> {
         check_features(x)?;
         check_labels(x.nrows(), y, n_classes)?;
+        check_varied(x)?;
         let counts = class_counts(y, n_classes);
         let present: Vec<usize> = (0..n_classes).filter(|&c| counts[c] > 0).collect();
         let mut position = vec![0; n_classes];

@@ -5,14 +5,14 @@ use ndarray::ArrayView2;
 
 use super::Train;
 use super::cart::{Criterion, FeatureRule, Growth, MaxFeatures};
-use super::trees::{Plan, Trees};
+use super::trees::{MAX_TREES, Plan, Trees};
 use crate::error::Result;
 use crate::params::{ClassWeight, parameters};
 
 parameters! {
     /// Parameters of a random forest.
     RandomForestParams, "rf" {
-        trees: usize = 100, "a whole number of at least 1", "number of trees";
+        trees: usize = 100, "a whole number from 1 to 100000", "number of trees";
         criterion: Criterion = Criterion::Gini, "gini or entropy", "measure of impurity";
         max_depth: Option<usize> = None, "a whole number of at least 1, or null", "deepest level";
         min_samples_split: usize = 2, "a whole number of at least 2", "fewest rows to split";
@@ -26,7 +26,7 @@ parameters! {
         seed: u64 = 0, "a whole number", "seed of all draws";
     }
     check(this) {
-        Self::require(this.trees >= 1, "trees", this.trees)?;
+        Self::require((1..=MAX_TREES).contains(&this.trees), "trees", this.trees)?;
         Self::require(this.max_depth != Some(0), "max_depth", 0)?;
         Self::require(this.min_samples_split >= 2, "min_samples_split", this.min_samples_split)?;
         Self::require(this.min_samples_leaf >= 1, "min_samples_leaf", this.min_samples_leaf)?;

@@ -19,6 +19,9 @@ pub struct Trees {
     trees: Vec<Tree>,
 }
 
+/// Most trees of an ensemble.
+pub(super) const MAX_TREES: usize = 100_000;
+
 /// How an ensemble is grown.
 pub(super) struct Plan<'a> {
     pub growth: Growth,

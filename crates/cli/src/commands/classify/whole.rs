@@ -70,7 +70,7 @@ pub fn predict(
             path,
             span: None,
             windows: 0,
-            status: status.name(),
+            status,
             class: at.map(|at| classes[at]),
             proba: at.zip(proba.as_ref()).map(|(at, proba)| proba.row(at).to_vec()),
         }))

@@ -38,7 +38,7 @@ pub fn run(
     let predictor = Predictor { model, signals, windowing, vote, stop: crate::interrupt::flag() };
     let mut write = |found: Found<'_>| {
         if let Some(reason) = found.reason.filter(|_| !args.quiet) {
-            eprintln!("{}: {}: {reason}", found.line.id, found.line.status);
+            eprintln!("{}: {}: {reason}", found.line.id, found.line.status.name());
         }
         delivered(lines.write(&found.line))
     };
@@ -76,7 +76,7 @@ pub fn run(
     Ok(predictor.end())
 }
 
-/// A line, and in words why it has no prediction.
+/// A line, and in words why it has no prediction or one from a part of the windows only.
 struct Found<'a> {
     line: Line<'a>,
     reason: Option<String>,
@@ -111,7 +111,7 @@ impl Predictor<'_> {
         let path = Self::path(input);
         let line = |span, windows, status: Status, found: Option<Prediction>| {
             let (class, proba) = found.map_or((None, None), |(c, p)| (Some(c), p));
-            Line { id: &input.id, path, span, windows, status: status.name(), class, proba }
+            Line { id: &input.id, path, span, windows, status, class, proba }
         };
         let failed = |span, error: SignalError| Found {
             line: line(span, 0, error.status, None),
@@ -124,7 +124,8 @@ impl Predictor<'_> {
             Err(error) => return each(failed(None, error)).map(|_| ()),
         };
         let mut votes = WindowVotes::new(self.model.header().labels.len());
-        let mut trouble = None;
+        let mut trouble: Option<SignalError> = None;
+        let mut failures = 0;
         for window in &mut windows {
             if self.stopped() {
                 return Ok(());
@@ -134,7 +135,10 @@ impl Predictor<'_> {
                 Err(error) => (None, Err(error)),
             };
             match (features.and_then(|f| self.row(f)), self.vote) {
-                (Err(error), Some(_)) => trouble = Some(error),
+                (Err(error), Some(_)) => {
+                    failures += 1;
+                    trouble.get_or_insert(error);
+                }
                 (Err(error), None) => {
                     if !each(failed(span, error))? {
                         return Ok(());
@@ -156,7 +160,12 @@ impl Predictor<'_> {
         let Some(rule) = self.vote.filter(|_| !self.stopped()) else { return Ok(()) };
         let found = match (rule.decide(&votes)?, trouble) {
             (None, Some(error)) => failed(None, error),
-            (decision, _) => {
+            (decision, Some(error)) => {
+                let reason = format!("{failures} windows failed, the first: {}", error.reason);
+                let line = line(None, votes.windows(), error.status, decision);
+                Found { line, reason: Some(reason) }
+            }
+            (decision, None) => {
                 let truncated = windows.is_truncated();
                 let status = if truncated { Status::Truncated } else { Status::Ok };
                 Found { line: line(None, votes.windows(), status, decision), reason: None }

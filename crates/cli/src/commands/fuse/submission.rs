@@ -76,6 +76,9 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
         let some = !paths.is_empty();
         some.then(|| args.fused(paths, weights.as_deref())).transpose()
     };
+    if options.feasible {
+        args.vote.refuse_background("--feasible")?;
+    }
     let joint = fused(&args.joint, &args.weights)?;
     let kind = fused(&args.kind, &args.type_weights)?;
     let level = fused(&args.level, &args.level_weights)?;

@@ -88,6 +88,7 @@ impl Train for KNearestParams {
                 allowed: format!("there are {} training rows", x.nrows()),
             });
         }
+        check_lengths(x)?;
         let (x, norms) = match self.metric {
             Metric::Cosine => {
                 let x = unit_rows(x);
@@ -126,6 +127,7 @@ impl Classify for KNearest {
     }
 
     fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
+        check_lengths(x)?;
         let by_products = matches!(self.metric, Metric::Euclidean | Metric::Cosine);
         let screen = (by_products && x.nrows() >= SCREEN_FROM)
             .then(|| Screen::new(self.x.view(), self.metric == Metric::Euclidean));
@@ -266,6 +268,17 @@ fn lanes(a: &[f64], b: &[f64], step: impl Fn(f64, f64) -> f64, join: impl Fn(f64
         }
     }
     join(join(join(acc[0], acc[1]), join(acc[2], acc[3])), tail)
+}
+
+/// Refuses rows whose squared length is beyond the range of numbers.
+fn check_lengths(x: ArrayView2<'_, f64>) -> Result<()> {
+    match squared_lengths(x).iter().position(|norm| !norm.is_finite()) {
+        None => Ok(()),
+        Some(row) => Err(ModelError::Numerical {
+            owner: KNearestParams::OWNER,
+            reason: format!("the features of row {row} are too large for distances: standardize them"),
+        }),
+    }
 }
 
 fn squared_lengths(x: ArrayView2<'_, f64>) -> Vec<f64> {
