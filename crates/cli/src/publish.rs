@@ -6,7 +6,8 @@ use corsmal_extract::draft::folder;
 
 use crate::failure::Failure;
 
-/// Refuses a name that is taken, unless it is of a file that may be replaced, and a folder that is not there.
+/// Refuses a name that is taken, unless it is of a file that may be replaced, and a folder that is
+/// not there.
 pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
     if path.exists() && !path.is_file() {
         return Err(Failure::new(format!("{} exists and is no regular file", path.display())));
