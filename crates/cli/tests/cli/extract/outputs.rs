@@ -170,7 +170,9 @@ fn a_log_for_machines_is_json_lines() {
     assert_eq!(json(&["--preset", "esc26"]), (Some(2), "error".into()));
     assert_eq!(json(&["--dry-run"]), (Some(0), "checked".into()));
     let quiet = extract(&audio, &out, &["--quiet", "--overwrite"]).with(1);
-    assert!(quiet.stderr.is_empty() && quiet.stdout.is_empty());
+    let lines: Vec<_> = quiet.stderr.lines().collect();
+    assert!(matches!(lines[..], [line] if line.contains("bad.wav")), "errors only: {lines:?}");
+    assert!(quiet.stdout.is_empty());
 }
 
 #[test]
