@@ -19,6 +19,7 @@ impl Draft {
     /// # Errors
     /// Its folder cannot be written.
     pub fn create(path: &Path) -> io::Result<Self> {
+        #[cfg_attr(not(unix), expect(unused_mut, reason = "nothing is set there"))]
         let mut builder = tempfile::Builder::new();
         #[cfg(unix)]
         {

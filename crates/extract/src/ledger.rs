@@ -206,16 +206,25 @@ impl Ledger {
         Self::lock(out).map(drop)
     }
 
-    /// Removes what a run has left beside the complete `out`, unless another run is at work there.
+    /// Removes what the run of `header` has left beside the complete `out`, unless another run is at
+    /// work there; what another run has left stays.
     ///
     /// # Errors
     /// [`LedgerError::Io`].
-    pub fn forget(out: &Path) -> Result<(), LedgerError> {
+    pub fn forget(out: &Path, header: &Header) -> Result<(), LedgerError> {
         if !Self::is_pending(out) {
             return Ok(());
         }
         match Self::lock(out) {
-            Ok(ledger) => ledger.discard(),
+            Ok(ledger) => {
+                let mut lines = Lines::new(&ledger.file);
+                let first = lines.next().map_err(|e| ledger.io(e))?;
+                let found = first.and_then(|line| serde_json::from_slice::<Header>(line).ok());
+                if found.is_some_and(|found| header.check(&found, &ledger.path).is_ok()) {
+                    return ledger.discard();
+                }
+                Ok(())
+            }
             Err(LedgerError::Locked { .. }) => Ok(()),
             Err(error) => Err(error),
         }

@@ -241,8 +241,9 @@ fn place(root: &Path, path: &Path, index: &Index<'_>) -> std::result::Result<Rec
                 sequence: Some(sequence),
                 ..blank
             };
-            let name = index.find(&recording).and_then(Annotation::name);
-            Ok(Recording { name, ..recording })
+            let annotated = index.find(&recording);
+            let (id, name) = (annotated.and_then(|a| a.id), annotated.and_then(Annotation::name));
+            Ok(Recording { id, name, ..recording })
         }
         (None, None, Some(id)) => {
             let recording = Recording { part: parts.flat_part(), id: Some(id), ..blank };

@@ -167,11 +167,12 @@ const AT_ONCE: usize = 16;
 /// Candidates whose ranks are counted, each against all; more are partitioned.
 const RANKED: usize = 4 * AT_ONCE;
 
-/// Means of the `count` smallest and the `count` largest values; NaN where there are none. `scratch`
+/// Means of the `count` smallest and the `count` largest values; NaN where there are none, or one is. `scratch`
 /// holds as many values, rounded up to whole blocks of [`AT_ONCE`].
 #[inline(always)]
 fn extremes<T: Real>(values: &[T], count: usize, scratch: &mut [T]) -> (f64, f64) {
-    if values.is_empty() {
+    // Contrast with a NaN is NaN, however the others are ordered.
+    if values.is_empty() || values.iter().fold(false, |any, x| any | x.is_nan()) {
         return (f64::NAN, f64::NAN);
     }
     let infinity = T::infinity();
@@ -224,7 +225,7 @@ fn mean_of_first<T: Real>(
         let order = |a: &T, b: &T| match (before(*a, *b), before(*b, *a)) {
             (true, _) => Ordering::Less,
             (_, true) => Ordering::Greater,
-            _ => a.is_nan().cmp(&b.is_nan()),
+            _ => Ordering::Equal,
         };
         *scratch[..found].select_nth_unstable_by(count - 1, order).1
     };
@@ -338,6 +339,19 @@ mod tests {
             let (low, high) = extremes(&values, count, &mut scratch);
             prop_assert!((low - mean(&sorted[..count])).abs() < 1e-12);
             prop_assert!((high - mean(&sorted[values.len() - count..])).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn one_nan_makes_both_ends_nan() {
+        for n in [5_usize, 40, 900] {
+            let mut values: Vec<f32> = (0..n).map(|i| i as f32).collect();
+            values[n / 2] = f32::NAN;
+            let mut scratch = vec![0.0; n.next_multiple_of(AT_ONCE)];
+            for count in [1, 3, n / 3 + 1] {
+                let (low, high) = extremes(&values, count, &mut scratch);
+                assert!(low.is_nan() && high.is_nan());
+            }
         }
     }
 

@@ -44,7 +44,7 @@ pub fn apply(tree: &mut Value, assignment: &str) -> Result<(), ConfigError> {
 }
 
 /// The same tree as JSON. JSON has no number for infinity and NaN: they are the words `inf`, `-inf`
-/// and `nan`, which keys that allow them take and others refuse by name.
+/// and `NaN`, which keys that allow them take and others refuse by name.
 pub fn to_json(value: toml::Value) -> Value {
     match value {
         toml::Value::Table(table) => {

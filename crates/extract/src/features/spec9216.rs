@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{Extent, Feature, FeatureKind, WholeKernel, pixels};
 use crate::config::at_most;
 
-/// Longest signal, half an hour at 44.1 kHz; bounds the memory of the spectrogram.
+/// Longest signal, 25 minutes at 44.1 kHz; bounds the memory of the spectrogram.
 const MAX_LENGTH: usize = 1 << 26;
 
 /// Parameters of `spec9216`.

@@ -10,7 +10,7 @@ use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, TryLockError};
 use std::time::Duration;
 
 use super::plans::{Planned, Plans};
@@ -141,13 +141,17 @@ impl<'a> Collector<'a> {
             if done.is_err() {
                 self.broken(input, span);
             }
-            self.drain();
+            // A fault while writing leaves the output in doubt: the run ends, its ledger intact.
+            if catch_unwind(AssertUnwindSafe(|| self.drain())).is_err() {
+                self.lock().error.get_or_insert(RunError::Broken);
+                self.changed.notify_all();
+            }
         }
     }
 
     /// A fault of this program costs the recording at which it happened, not the run.
     fn broken(&self, input: usize, span: Option<usize>) {
-        let failed = Failed::new(Status::Unsupported, "a fault of this program, please report it");
+        let failed = broken();
         let mut state = self.lock();
         if let (Some(span), Some(partial)) = (span, state.partial.get_mut(&input)) {
             partial.early.insert(span, Err(failed));
@@ -301,7 +305,7 @@ impl<'a> Collector<'a> {
             };
             // Adding writes to a temporary file: not under the lock.
             drop(state);
-            let recording = match (recording, span) {
+            let add = || match (recording, span) {
                 (Ok(mut recording), Ok(parts)) => parts
                     .into_iter()
                     .try_for_each(|part| recording.add(part))
@@ -309,6 +313,7 @@ impl<'a> Collector<'a> {
                     .map(|()| recording),
                 (Ok(_), Err(failed)) | (Err(failed), _) => Err(failed),
             };
+            let recording = catch_unwind(AssertUnwindSafe(add)).unwrap_or_else(|_| Err(broken()));
             state = self.lock();
             if let Some(partial) = state.partial.get_mut(&index) {
                 partial.recording = Some(recording);
@@ -382,7 +387,14 @@ impl<'a> Collector<'a> {
     /// Writes what is ready, unless another worker is at it.
     fn drain(&self) {
         loop {
-            let Ok(mut sink) = self.sink.try_lock() else { return };
+            let mut sink = match self.sink.try_lock() {
+                Ok(sink) => sink,
+                Err(TryLockError::WouldBlock) => return,
+                Err(TryLockError::Poisoned(_)) => {
+                    self.lock().error.get_or_insert(RunError::Broken);
+                    return self.changed.notify_all();
+                }
+            };
             loop {
                 let index = sink.next;
                 let mut state = self.lock();
@@ -425,4 +437,8 @@ impl<'a> Collector<'a> {
         }
         self.changed.notify_all();
     }
+}
+
+fn broken() -> Failed {
+    Failed::new(Status::Unsupported, "a fault of this program, please report it")
 }

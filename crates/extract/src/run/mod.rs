@@ -8,6 +8,7 @@ mod sink;
 mod stdin;
 mod windows;
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -52,6 +53,12 @@ pub enum RunError {
         /// Its ledger.
         path: PathBuf,
     },
+    /// An input of the interrupted run cannot be read any more.
+    #[error("{path} cannot be read, which the interrupted run could; --resume once it can")]
+    Unreadable {
+        /// The input.
+        path: String,
+    },
     /// The output cannot take what the configuration gives.
     #[error("{path}: {why}")]
     Format {
@@ -88,6 +95,9 @@ pub enum RunError {
     /// The existing output cannot be read.
     #[error(transparent)]
     Layout(#[from] LayoutError),
+    /// A fault of this program while writing the output.
+    #[error("a fault of this program, please report it; --resume continues the run")]
+    Broken,
     /// A temporary file beside the output failed.
     #[error("{path}: temporary file: {source}")]
     Temporary {
@@ -177,9 +187,6 @@ pub fn run(
     stop: &Arc<AtomicBool>,
 ) -> Result<Report, RunError> {
     let Checked { parquet, provenance, done } = check(inputs, config, options)?;
-    if let Some(report) = done {
-        return Ok(report);
-    }
     let inputs = options.shard.of(inputs);
     let format = match (parquet, options.compression) {
         (true, _) => "parquet",
@@ -187,17 +194,34 @@ pub fn run(
         (false, Compression::Deflated) => "npz deflated",
     };
     let header = ledger::Header::new(&provenance, format);
+    if let Some(report) = done {
+        // What a kill between the last two steps of that run has left.
+        Ledger::forget(&options.out, &header)?;
+        return Ok(report);
+    }
     let (ledger, records) = if options.resume && !options.overwrite {
         // A file that has changed, repaired it may be, is read again, and so is what follows it.
+        // What cannot be read just now may be the same: nothing done is given up for it.
+        let unreadable = RefCell::new(None);
         let hold = |i: usize, record: &ledger::Record| {
-            let same = inputs.get(i).is_some_and(|i| record.outcome.identity == identity_of(i));
+            let Some(input) = inputs.get(i) else { return false };
+            let now = identity_of(input);
+            if now.is_empty() && !record.outcome.identity.is_empty() {
+                unreadable.replace(Some(input.source.to_string()));
+                return true;
+            }
+            let same = record.outcome.identity == now;
             if !same {
                 let id = &record.outcome.id;
                 progress.warning(&format!("{id} has changed; the run goes on from there"));
             }
             same
         };
-        Ledger::resume(&options.out, &header, hold)?
+        let resumed = Ledger::resume(&options.out, &header, hold)?;
+        if let Some(path) = unreadable.into_inner() {
+            return Err(RunError::Unreadable { path });
+        }
+        resumed
     } else {
         (Ledger::create(&options.out, &header)?, Vec::new())
     };
@@ -334,8 +358,6 @@ fn finished(
     if !same {
         return Err(refuse("holds features of files that have changed since"));
     }
-    // What a kill between the last two steps of that run has left.
-    Ledger::forget(out)?;
     Ok(Some(Report { resumed: outcomes.len(), outcomes, up_to_date: true }))
 }
 

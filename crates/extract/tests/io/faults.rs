@@ -79,6 +79,44 @@ fn a_panic_is_an_outcome() {
     assert!(report.outcomes[1].reason.contains("fault of this program"));
 }
 
+/// Stands for a fault while the output is written.
+struct FaultyAtTheEnd;
+
+impl Progress for FaultyAtTheEnd {
+    fn start(&self, _: usize, _: usize) {}
+    fn done(&self, outcome: &Outcome) {
+        assert_ne!(outcome.id, "05", "a fault made for a test");
+    }
+    fn warning(&self, _: &str) {}
+}
+
+#[test]
+fn a_panic_while_writing_ends_the_run_and_it_can_go_on() {
+    let folder = folder();
+    for i in 0..40 {
+        wav(&folder.path().join(format!("audio/{i:02}.wav")), 8000, 8000);
+    }
+    let ended = run(folder.path(), "logmel", &FaultyAtTheEnd, |_| {});
+    assert!(matches!(ended, Err(RunError::Broken)), "{:?}", ended.err());
+    let report = run(folder.path(), "logmel", &Quiet, |o| o.resume = true).unwrap();
+    assert!((5..40).contains(&report.resumed), "{}", report.resumed);
+    assert_eq!(statuses(&report), vec![Status::Ok; 40]);
+}
+
+#[test]
+fn an_interrupted_run_outlives_a_look_at_the_finished_one() {
+    let folder = folder();
+    for i in 0..40 {
+        wav(&folder.path().join(format!("audio/{i:02}.wav")), 8000, 8000);
+    }
+    run(folder.path(), "logmel", &Quiet, |_| {}).unwrap();
+    assert!(run(folder.path(), "m4-code", &FaultyAtTheEnd, |o| o.overwrite = true).is_err());
+    assert!(run(folder.path(), "logmel", &Quiet, |_| {}).unwrap().up_to_date);
+    std::fs::remove_file(folder.path().join("out.npz")).unwrap();
+    let report = run(folder.path(), "m4-code", &Quiet, |o| o.resume = true).unwrap();
+    assert!(report.resumed >= 5, "{}", report.resumed);
+}
+
 /// Headers that promise 2^63 bytes, or one sample a second.
 #[test]
 fn hostile_headers_take_neither_memory_nor_time() {
