@@ -36,6 +36,22 @@ pub fn refused(arguments: &[&str]) -> String {
     message
 }
 
+/// Sends SIGINT and gives the exit code; `None` where a minute later the process still runs, which
+/// then is ended.
+#[cfg(unix)]
+pub fn interrupt(process: &mut std::process::Child) -> Option<i32> {
+    let sent = Command::new("kill").args(["-INT", &process.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    for _ in 0..600 {
+        if let Some(status) = process.try_wait().unwrap() {
+            return status.code();
+        }
+        std::thread::sleep(std::time::Duration::from_millis(100));
+    }
+    process.kill().unwrap();
+    None
+}
+
 /// Largest memory of a running process so far, in KiB; `None` once it has ended.
 #[cfg(target_os = "linux")]
 pub fn peak_memory(process: &std::process::Child) -> Option<u64> {

@@ -115,19 +115,8 @@ fn an_interrupt_is_heard_while_the_stream_is_silent() {
         while !std::fs::metadata(&ledger).is_ok_and(|m| m.len() > 0) {
             std::thread::sleep(Duration::from_millis(1));
         }
-        let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-        assert!(sent.success());
-        let mut status = None;
-        for _ in 0..600 {
-            status = child.try_wait().unwrap();
-            if status.is_some() {
-                break;
-            }
-            std::thread::sleep(Duration::from_millis(100));
-        }
-        let _ = child.kill();
+        assert_eq!(crate::command::interrupt(&mut child), Some(130), "its input is still open");
         drop(stdin);
-        assert_eq!(status.expect("ended while its input was open").code(), Some(130));
         assert_eq!(done(&out), 0, "the stream is no recording that failed");
     }
 }
