@@ -151,50 +151,29 @@ fn number_or_word<'de, D: Deserializer<'de>>(d: D, word: &str) -> Result<Option<
     }
 }
 
-impl Serialize for DbRef {
-    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Value(v) => s.serialize_f64(*v),
-            Self::Max => s.serialize_str("max"),
+/// A variant with a number is that number, the other one its word.
+macro_rules! number_or_word {
+    ($type:ident, $number:ident, $other:ident, $word:literal) => {
+        impl Serialize for $type {
+            fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+                match self {
+                    Self::$number(v) => s.serialize_f64(*v),
+                    Self::$other => s.serialize_str($word),
+                }
+            }
         }
-    }
-}
 
-impl<'de> Deserialize<'de> for DbRef {
-    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-        Ok(number_or_word(d, "max")?.map_or(Self::Max, Self::Value))
-    }
-}
-
-impl Serialize for TopDb {
-    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Range(v) => s.serialize_f64(*v),
-            Self::None => s.serialize_str("none"),
+        impl<'de> Deserialize<'de> for $type {
+            fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+                Ok(number_or_word(d, $word)?.map_or(Self::$other, Self::$number))
+            }
         }
-    }
+    };
 }
 
-impl<'de> Deserialize<'de> for TopDb {
-    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-        Ok(number_or_word(d, "none")?.map_or(Self::None, Self::Range))
-    }
-}
-
-impl Serialize for AutoOr {
-    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Value(v) => s.serialize_f64(*v),
-            Self::Auto => s.serialize_str("auto"),
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for AutoOr {
-    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-        Ok(number_or_word(d, "auto")?.map_or(Self::Auto, Self::Value))
-    }
-}
+number_or_word!(DbRef, Value, Max, "max");
+number_or_word!(TopDb, Range, None, "none");
+number_or_word!(AutoOr, Value, Auto, "auto");
 
 /// Conversion to decibels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
