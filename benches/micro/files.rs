@@ -3,8 +3,8 @@
 use std::io::Cursor;
 
 use corsmal_benches::{RATE, signal};
-use corsmal_extract::npy::{DType, Header};
-use corsmal_extract::npz::{Compression, NpzWriter};
+use corsmal_files::npy::{DType, Header};
+use corsmal_files::npz::{Compression, NpzWriter};
 use divan::{Bencher, counter::BytesCount};
 use hound::{SampleFormat, WavSpec, WavWriter};
 

@@ -12,8 +12,8 @@ use corsmal_ccm::benchmark::{Baseline, FeatureSet, Options};
 use corsmal_ccm::report::Report;
 use corsmal_ccm::synth::{self, Size};
 use corsmal_extract::engine::Features;
-use corsmal_extract::npz::NpzFile;
 use corsmal_extract::run::Signals;
+use corsmal_files::npz::NpzFile;
 use ndarray::Axis;
 use shared_data::ccm;
 

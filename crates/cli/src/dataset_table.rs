@@ -3,12 +3,12 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use corsmal_extract::layout;
-use corsmal_extract::npy::{Kind, NpyError};
-use corsmal_extract::npz::{NpzError, NpzFile};
-use corsmal_extract::outcome::Outcome;
-use corsmal_extract::provenance::Provenance;
-use corsmal_extract::{identity, parquet, table};
+use corsmal_files::layout;
+use corsmal_files::npy::{Kind, NpyError};
+use corsmal_files::npz::{NpzError, NpzFile};
+use corsmal_files::outcome::Outcome;
+use corsmal_files::provenance::Provenance;
+use corsmal_files::{identity, parquet, table};
 use corsmal_models::labels::Labels;
 use ndarray::{Array2, Ix2};
 use serde_json::{Value, json};

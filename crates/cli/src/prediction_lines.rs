@@ -4,11 +4,11 @@ use std::io::Write;
 use std::path::Path;
 
 use clap::ValueEnum;
-use corsmal_extract::outcome::Status;
+use corsmal_files::outcome::Status;
 use corsmal_models::labels::Labels;
 use serde_json::{Map, Value, json};
 
-use corsmal_extract::draft::Draft;
+use corsmal_files::draft::Draft;
 
 use crate::failure::Failure;
 

@@ -6,8 +6,8 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
-use corsmal_extract::outcome::Outcome;
-use corsmal_extract::run::{Progress, Report};
+use corsmal_extract::run::{Progress, RunReport};
+use corsmal_files::outcome::Outcome;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::json;
 
@@ -79,7 +79,7 @@ impl Meter {
     }
 
     /// The last lines of a run.
-    pub fn finish(&self, report: &Report, out: &Path) {
+    pub fn finish(&self, report: &RunReport, out: &Path) {
         self.bar.finish_and_clear();
         if self.quiet {
             return;

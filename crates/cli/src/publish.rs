@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use corsmal_extract::draft::folder;
+use corsmal_files::draft::folder;
 
 use crate::failure::Failure;
 

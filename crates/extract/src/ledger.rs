@@ -14,9 +14,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::npz::{EntryRecord, sound_entries};
-use crate::outcome::Outcome;
-use crate::provenance::Provenance;
+use corsmal_files::npz::{EntryRecord, intact_entries};
+use corsmal_files::outcome::Outcome;
+use corsmal_files::provenance::Provenance;
 
 /// Layout of the ledger; a run continues only ledgers of its own.
 pub const VERSION: u32 = 1;
@@ -154,7 +154,7 @@ impl Ledger {
     }
 
     /// Continues an interrupted run, or starts one if there is none, and returns what is done: the
-    /// records up to the first that is torn, or whose entries [`sound_entries`] does not find, or
+    /// records up to the first that is torn, or whose entries [`intact_entries`] does not find, or
     /// that does not `hold` any more (given its number).
     ///
     /// # Errors
@@ -182,7 +182,7 @@ impl Ledger {
                     records.push(record);
                     ends.push(lines.at);
                 }
-                records.truncate(sound_records(&part_path(out), &records)?);
+                records.truncate(intact_records(&part_path(out), &records)?);
                 let changed = records.iter().enumerate().position(|(i, r)| !hold(i, r));
                 records.truncate(changed.unwrap_or(records.len()));
                 ledger.cut(ends[records.len()])?;
@@ -335,9 +335,9 @@ fn beside(out: &Path, suffix: &str) -> PathBuf {
 }
 
 /// How many records, from the first on, have all their entries in the archive.
-fn sound_records(part: &Path, records: &[Record]) -> Result<usize, LedgerError> {
+fn intact_records(part: &Path, records: &[Record]) -> Result<usize, LedgerError> {
     let entries: Vec<EntryRecord> = records.iter().flat_map(|r| r.entries.clone()).collect();
-    let sound = sound_entries(part, &entries)
+    let sound = intact_entries(part, &entries)
         .map_err(|source| LedgerError::Io { path: part.into(), source })?;
     let mut end = 0;
     Ok(records
@@ -367,7 +367,7 @@ fn is_still(_: &File, path: &Path) -> bool {
 /// Makes a rename survive a power cut.
 #[cfg(unix)]
 fn sync_folder(out: &Path) -> io::Result<()> {
-    let folder = crate::draft::folder(out);
+    let folder = corsmal_files::draft::folder(out);
     File::open(folder)?.sync_all()
 }
 

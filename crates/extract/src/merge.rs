@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use crate::inputs::Shard;
-use crate::layout::{self, LayoutError};
 use crate::ledger::{Header, Ledger, LedgerError, ledger_path};
-use crate::npz::{NpzError, NpzFile, NpzWriter};
-use crate::parquet::{self, ParquetTableError};
-use crate::provenance::Provenance;
-use crate::table::{Table, TableError};
+use corsmal_files::layout::{self, LayoutError};
+use corsmal_files::npz::{NpzError, NpzFile, NpzWriter};
+use corsmal_files::parquet::{self, ParquetTableError};
+use corsmal_files::provenance::Provenance;
+use corsmal_files::shard::Shard;
+use corsmal_files::table::{Table, TableError};
 
 /// What can go wrong with merging.
 #[derive(Debug, Error)]

@@ -16,12 +16,12 @@ use serde_json::{Map, Value};
 use thiserror::Error;
 
 use crate::config::{Config, ConfigError, typed};
-use crate::draft::Draft;
-use crate::layout::{self, LayoutError};
-use crate::npy::{DType, Header};
-use crate::npz::{Compression, NpzError, NpzFile, NpzWriter};
-use crate::parquet::{self, ParquetTableError};
-use crate::{identity, table::Table};
+use corsmal_files::draft::Draft;
+use corsmal_files::layout::{self, LayoutError};
+use corsmal_files::npy::{DType, Header};
+use corsmal_files::npz::{Compression, NpzError, NpzFile, NpzWriter};
+use corsmal_files::parquet::{self, ParquetTableError};
+use corsmal_files::{identity, table::Table};
 
 /// Version of the file's members.
 const VERSION: u32 = 1;

@@ -108,7 +108,7 @@ impl PyModel {
     /// Writes the model file, whole or not at all.
     fn save(&self, path: PathBuf) -> PyResult<()> {
         let bytes = self.0.to_bytes().map_err(model_error)?;
-        corsmal_extract::draft::write(&path, &bytes).map_err(model_error)
+        corsmal_files::draft::write(&path, &bytes).map_err(model_error)
     }
 
     /// Reads a model file.

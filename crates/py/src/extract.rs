@@ -8,11 +8,12 @@ use std::time::Duration;
 
 use corsmal_extract::config::{Config, Preset};
 use corsmal_extract::engine::{FeatureArray, Features};
-use corsmal_extract::inputs::{self, Shard};
-use corsmal_extract::npz::Compression;
-use corsmal_extract::outcome::Outcome;
+use corsmal_extract::inputs;
 use corsmal_extract::projection::Projection;
-use corsmal_extract::run::{self, Options, Progress, Signals};
+use corsmal_extract::run::{self, Progress, RunOptions, Signals};
+use corsmal_files::npz::Compression;
+use corsmal_files::outcome::Outcome;
+use corsmal_files::shard::Shard;
 use ndarray::{Array1, Array3};
 use numpy::PyReadonlyArrayDyn;
 use pyo3::exceptions::PyKeyboardInterrupt;
@@ -90,7 +91,7 @@ fn extract(
     };
     let compression = Compression::Stored;
     let shard = "0/1".parse::<Shard>().map_err(value_error)?;
-    let options = Options { out, compression, jobs, shard, resume, overwrite, max_errors: None };
+    let options = RunOptions { out, compression, jobs, shard, resume, overwrite, max_errors: None };
     let warnings = Warnings::default();
     let work = |stop: &Arc<AtomicBool>| {
         let found = inputs::collect(&paths).map_err(|e| RunError::new_err(e.to_string()))?;

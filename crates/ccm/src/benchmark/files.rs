@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use corsmal_extract::draft;
+use corsmal_files::draft;
 use corsmal_models::labels::Labels;
 use corsmal_models::model_file::{Model, ModelHeader};
 use corsmal_plot::{BarChart, ConfusionMatrix as MatrixPicture, Series, to_svg};

@@ -9,10 +9,11 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use corsmal_extract::config::Config;
-use corsmal_extract::inputs::{Input, InputSource, Shard};
-use corsmal_extract::layout;
-use corsmal_extract::npz::{Compression, NpzFile};
+use corsmal_extract::inputs::{Input, InputSource};
 use corsmal_extract::run::{self, Quiet, RunError};
+use corsmal_files::layout;
+use corsmal_files::npz::{Compression, NpzFile};
+use corsmal_files::shard::Shard;
 use ndarray::Array2;
 
 use super::features::FeatureSet;
@@ -79,7 +80,7 @@ impl Store<'_> {
         let path = self.folder.join(name);
         let fault = |e: &dyn std::fmt::Display| CcmError::Request(e.to_string());
         let extract = |overwrite: bool| {
-            let options = run::Options {
+            let options = run::RunOptions {
                 out: path.clone(),
                 compression: Compression::Stored,
                 jobs: self.jobs,

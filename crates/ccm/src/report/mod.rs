@@ -5,7 +5,7 @@ mod html;
 
 use std::path::Path;
 
-use corsmal_extract::draft;
+use corsmal_files::draft;
 use serde::{Serialize, Serializer};
 
 use crate::error::{CcmError, Result};

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use corsmal_extract::draft;
+use corsmal_files::draft;
 
 use super::{Estimates, Format, RowKey, Submission};
 use crate::dataset::{Dimensions, FillingLevel, FillingType};

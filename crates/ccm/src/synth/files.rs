@@ -149,5 +149,5 @@ fn actions<'a>(takes: impl Iterator<Item = &'a Take>) -> String {
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    corsmal_extract::draft::write(path, bytes).map_err(CcmError::Write)
+    corsmal_files::draft::write(path, bytes).map_err(CcmError::Write)
 }

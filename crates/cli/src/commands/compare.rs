@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use corsmal_extract::compare::{self, FeatureReport, Options, Report, Setting, Tolerance};
+use corsmal_compare::{Comparison, Criteria, FeatureReport, Setting, Tolerance};
 use serde_json::Value;
 
 use crate::failure::Failure;
@@ -71,7 +71,8 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         (None, None) => Tolerance::OfLargest(args.tolerance),
         (atol, rtol) => Tolerance::Each { atol: atol.unwrap_or(0.0), rtol: rtol.unwrap_or(0.0) },
     };
-    let report = compare::compare(&args.a, &args.b, &Options { tolerance, map: args.map })?;
+    let report =
+        corsmal_compare::compare(&args.a, &args.b, &Criteria { tolerance, map: args.map })?;
     let text = match args.json {
         true => serde_json::to_string_pretty(&report)? + "\n",
         false => text(&report),
@@ -83,7 +84,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     Ok(if report.within { ExitCode::SUCCESS } else { ExitCode::from(DIFFER) })
 }
 
-fn text(report: &Report) -> String {
+fn text(report: &Comparison) -> String {
     let mut lines = Vec::new();
     for (side, file) in [("a", &report.a), ("b", &report.b)] {
         let version = file.tool_version.as_ref().map(|v| format!(", corsmal-feat {v}"));
@@ -118,7 +119,7 @@ fn text(report: &Report) -> String {
     lines.join("\n") + "\n"
 }
 
-fn settings(report: &Report, lines: &mut Vec<String>) {
+fn settings(report: &Comparison, lines: &mut Vec<String>) {
     let Some(settings) = &report.settings else { return };
     let same = settings.hash_a == settings.hash_b;
     lines.push(format!(

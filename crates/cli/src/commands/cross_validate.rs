@@ -17,7 +17,7 @@ use crate::failure::Failure;
 use crate::folds::{CvPlan, Folds};
 use crate::pipeline::{self, PipelineArgs};
 use crate::publish;
-use corsmal_extract::draft;
+use corsmal_files::draft;
 
 /// Arguments of `cross-validate`.
 #[derive(clap::Args)]

@@ -6,9 +6,10 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use corsmal_extract::config::Config;
-use corsmal_extract::inputs::{self, Shard};
-use corsmal_extract::npz::Compression;
-use corsmal_extract::run::{self, Options, RunError};
+use corsmal_extract::inputs;
+use corsmal_extract::run::{self, RunError, RunOptions};
+use corsmal_files::npz::Compression;
+use corsmal_files::shard::Shard;
 use serde_json::json;
 
 use crate::failure::{COULD_NOT_RUN, FAILED_FILES, Failure, INTERRUPTED};
@@ -124,7 +125,7 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
         let names: Vec<_> = args.inputs.iter().map(|name| name.to_string_lossy()).collect();
         return Err(Failure::new(format!("--in {}: no recordings found", names.join(" "))));
     }
-    let options = Options {
+    let options = RunOptions {
         out: args.out,
         compression: if args.compress { Compression::Deflated } else { Compression::Stored },
         jobs: args.jobs.map_or_else(cores, usize::from),

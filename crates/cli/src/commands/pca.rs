@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use corsmal_extract::draft;
 use corsmal_extract::projection::Projection;
+use corsmal_files::draft;
 
 use crate::failure::Failure;
 use crate::publish;

@@ -13,7 +13,7 @@ use crate::failure::Failure;
 use crate::folds::Folds;
 use crate::pipeline::{self, PipelineArgs};
 use crate::publish;
-use corsmal_extract::draft;
+use corsmal_files::draft;
 
 /// Arguments of `train`.
 #[derive(clap::Args)]

@@ -153,7 +153,7 @@ fn outputs_show_contents_configuration_and_outcomes() {
 
 #[test]
 fn of_other_archives_only_the_members() {
-    use corsmal_extract::npz::{Compression, NpzWriter};
+    use corsmal_files::npz::{Compression, NpzWriter};
     let folder = tempfile::tempdir().unwrap();
     let foreign = folder.path().join("foreign.npz");
     let mut writer = NpzWriter::create(&foreign, Compression::Deflated).unwrap();

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use corsmal_extract::npy::{DType, Header};
-use corsmal_extract::npz::{Compression, NpzWriter};
+use corsmal_files::npy::{DType, Header};
+use corsmal_files::npz::{Compression, NpzWriter};
 use serde_json::Value;
 
 use crate::command::{done, names, refused, run, text};

@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 use std::path::{Component, Path};
 
 use super::{Found, InputError, InputSource, Naming};
-use crate::table::RESERVED;
+use corsmal_files::table::RESERVED;
 
 /// Longest id in bytes, far below what a zip archive can name.
 const LONGEST: usize = 4096;

@@ -13,15 +13,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, TryLockError};
 use std::time::Duration;
 
+use super::output::{Finished, Member, Output};
 use super::plans::{Planned, Plans};
 use super::reader::{self, Failed};
-use super::sink::{Finished, Member, Sink};
-use super::{Options, Progress, RunError, identity_of};
+use super::{Progress, RunError, RunOptions, identity_of};
 use crate::config::Config;
-use crate::draft;
 use crate::engine::{Features, Recording, Span};
 use crate::inputs::{Input, InputSource};
-use crate::outcome::{Outcome, Status};
+use corsmal_files::draft;
+use corsmal_files::outcome::{Outcome, Status};
 
 /// Inputs in work or waiting to be written, per worker.
 const AHEAD: usize = 4;
@@ -29,7 +29,7 @@ const AHEAD: usize = 4;
 /// A run in progress.
 pub struct Collector<'a> {
     inputs: &'a [Input],
-    options: &'a Options,
+    options: &'a RunOptions,
     progress: &'a dyn Progress,
     stop: &'a Arc<AtomicBool>,
     plans: Plans<'a>,
@@ -37,7 +37,7 @@ pub struct Collector<'a> {
     folder: PathBuf,
     state: Mutex<State>,
     changed: Condvar,
-    sink: Mutex<Sink>,
+    output: Mutex<Output>,
 }
 
 #[derive(Default)]
@@ -81,18 +81,18 @@ enum Work {
 }
 
 impl<'a> Collector<'a> {
-    /// A run whose first inputs the sink already has.
+    /// A run whose first inputs the output already has.
     pub fn new(
         inputs: &'a [Input],
         config: &Arc<Config>,
-        options: &'a Options,
+        options: &'a RunOptions,
         progress: &'a dyn Progress,
         stop: &'a Arc<AtomicBool>,
-        sink: Sink,
+        output: Output,
     ) -> Self {
         let folder = draft::folder(&options.out).to_path_buf();
-        let failed = sink.outcomes().iter().filter(|o| !o.status.has_features()).count();
-        let state = State { next: sink.next, written: sink.next, failed, ..State::default() };
+        let failed = output.outcomes().iter().filter(|o| !o.status.has_features()).count();
+        let state = State { next: output.next, written: output.next, failed, ..State::default() };
         Self {
             inputs,
             options,
@@ -102,12 +102,12 @@ impl<'a> Collector<'a> {
             folder,
             state: Mutex::new(state),
             changed: Condvar::new(),
-            sink: Mutex::new(sink),
+            output: Mutex::new(output),
         }
     }
 
     /// Runs every worker to the end.
-    pub fn work(self) -> Result<Sink, RunError> {
+    pub fn work(self) -> Result<Output, RunError> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.options.jobs)
             .build()
@@ -120,7 +120,7 @@ impl<'a> Collector<'a> {
         let state = self.state.into_inner().unwrap_or_else(|e| e.into_inner());
         match state.error {
             Some(error) => Err(error),
-            None => Ok(self.sink.into_inner().unwrap_or_else(|e| e.into_inner())),
+            None => Ok(self.output.into_inner().unwrap_or_else(|e| e.into_inner())),
         }
     }
 
@@ -387,8 +387,8 @@ impl<'a> Collector<'a> {
     /// Writes what is ready, unless another worker is at it.
     fn drain(&self) {
         loop {
-            let mut sink = match self.sink.try_lock() {
-                Ok(sink) => sink,
+            let mut output = match self.output.try_lock() {
+                Ok(output) => output,
                 Err(TryLockError::WouldBlock) => return,
                 Err(TryLockError::Poisoned(_)) => {
                     self.lock().error.get_or_insert(RunError::Broken);
@@ -396,14 +396,14 @@ impl<'a> Collector<'a> {
                 }
             };
             loop {
-                let index = sink.next;
+                let index = output.next;
                 let mut state = self.lock();
                 if state.error.is_some() {
                     return;
                 }
                 let Some(finished) = state.ready.remove(&index) else { break };
                 drop(state);
-                match sink.write(&self.inputs[index], finished) {
+                match output.write(&self.inputs[index], finished) {
                     Ok(outcome) => self.written(&outcome),
                     Err(error) => {
                         self.lock().error.get_or_insert(error);
@@ -412,8 +412,8 @@ impl<'a> Collector<'a> {
                     }
                 }
             }
-            let next = sink.next;
-            drop(sink);
+            let next = output.next;
+            drop(output);
             // Another worker may have handed over the next one while we held the lock.
             if !self.lock().ready.contains_key(&next) {
                 return;

@@ -1,10 +1,10 @@
 //! A run: inputs through the engine into one output, in parallel, in order, resumable.
 
 mod collector;
+mod output;
 mod plans;
 mod reader;
 mod signal;
-mod sink;
 mod stdin;
 mod windows;
 
@@ -16,19 +16,20 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use thiserror::Error;
 
 use crate::config::Config;
-use crate::draft;
-use crate::identity;
-use crate::inputs::{Input, InputSource, Shard, list_hash};
-use crate::layout::{self, LayoutError};
+use crate::inputs::{Input, InputSource, list_hash};
 use crate::ledger::{self, Ledger, LedgerError};
-use crate::npz::{Compression, NpzError, NpzFile};
-use crate::outcome::Outcome;
-use crate::parquet::{self, ParquetTableError};
-use crate::provenance::Provenance;
-use crate::table::TableError;
+use corsmal_files::draft;
+use corsmal_files::identity;
+use corsmal_files::layout::{self, LayoutError};
+use corsmal_files::npz::{Compression, NpzError, NpzFile};
+use corsmal_files::outcome::Outcome;
+use corsmal_files::parquet::{self, ParquetTableError};
+use corsmal_files::provenance::Provenance;
+use corsmal_files::shard::Shard;
+use corsmal_files::table::TableError;
 
 use collector::Collector;
-use sink::Sink;
+use output::Output;
 
 pub use signal::{Signal, SignalError, Signals};
 pub use windows::{Window, Windowing, Windows};
@@ -121,7 +122,7 @@ pub const MAX_JOBS: usize = 1024;
 
 /// How to run.
 #[derive(Debug, Clone)]
-pub struct Options {
+pub struct RunOptions {
     /// The output, `.npz` or `.parquet`.
     pub out: PathBuf,
     /// Compression of `.npz` members.
@@ -140,7 +141,7 @@ pub struct Options {
 
 /// What happened to the inputs.
 #[derive(Debug, Clone, Default)]
-pub struct Report {
+pub struct RunReport {
     /// One row per input, in order.
     pub outcomes: Vec<Outcome>,
     /// Inputs taken over from an interrupted run.
@@ -149,7 +150,7 @@ pub struct Report {
     pub up_to_date: bool,
 }
 
-impl Report {
+impl RunReport {
     /// Inputs without features.
     pub fn failed(&self) -> usize {
         self.outcomes.iter().filter(|o| !o.status.has_features()).count()
@@ -182,10 +183,10 @@ impl Progress for Quiet {
 pub fn run(
     inputs: &[Input],
     config: &Arc<Config>,
-    options: &Options,
+    options: &RunOptions,
     progress: &dyn Progress,
     stop: &Arc<AtomicBool>,
-) -> Result<Report, RunError> {
+) -> Result<RunReport, RunError> {
     let Checked { parquet, provenance, done } = check(inputs, config, options)?;
     let inputs = options.shard.of(inputs);
     let format = match (parquet, options.compression) {
@@ -234,15 +235,15 @@ pub fn run(
         }
     }
     let resumed = records.len();
-    let sink = Sink::new(ledger, records, inputs, options, parquet)?;
+    let output = Output::new(ledger, records, inputs, options, parquet)?;
     progress.start(inputs.len(), resumed);
-    let collector = Collector::new(inputs, config, options, progress, stop, sink);
-    let sink = collector.work()?;
+    let collector = Collector::new(inputs, config, options, progress, stop, output);
+    let output = collector.work()?;
     if stop.load(Ordering::Relaxed) {
         return Err(RunError::Interrupted);
     }
-    let outcomes = sink.publish(&provenance)?;
-    Ok(Report { outcomes, resumed, up_to_date: false })
+    let outcomes = output.publish(&provenance)?;
+    Ok(RunReport { outcomes, resumed, up_to_date: false })
 }
 
 /// What is known of a run before it starts.
@@ -250,14 +251,14 @@ pub struct Checked {
     parquet: bool,
     provenance: Provenance,
     /// The report of an output that is there already.
-    done: Option<Report>,
+    done: Option<RunReport>,
 }
 
 /// Everything that a run refuses before it starts.
 ///
 /// # Errors
 /// As [`run`], in what concerns the output, the inputs as a whole and the number of jobs.
-pub fn check(inputs: &[Input], config: &Config, options: &Options) -> Result<Checked, RunError> {
+pub fn check(inputs: &[Input], config: &Config, options: &RunOptions) -> Result<Checked, RunError> {
     let out = &options.out;
     let parquet = check_output(out, config)?;
     if !(1..=MAX_JOBS).contains(&options.jobs) {
@@ -314,9 +315,9 @@ fn check_output(out: &Path, config: &Config) -> Result<bool, RunError> {
 fn finished(
     inputs: &[Input],
     provenance: &Provenance,
-    options: &Options,
+    options: &RunOptions,
     parquet: bool,
-) -> Result<Option<Report>, RunError> {
+) -> Result<Option<RunReport>, RunError> {
     let out = options.out.as_path();
     if !out.exists() {
         return Ok(None);
@@ -358,7 +359,7 @@ fn finished(
     if !same {
         return Err(refuse("holds features of files that have changed since"));
     }
-    Ok(Some(Report { resumed: outcomes.len(), outcomes, up_to_date: true }))
+    Ok(Some(RunReport { resumed: outcomes.len(), outcomes, up_to_date: true }))
 }
 
 /// Identity of an input as it is now; empty where it cannot be read.

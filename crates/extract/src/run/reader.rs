@@ -14,7 +14,7 @@ use crate::config::SignalConfig;
 use crate::engine::{Extractor, Refused, Span};
 use crate::frontend::FrontEnd;
 use crate::inputs::{Input, InputSource};
-use crate::outcome::{Outcome, Status};
+use corsmal_files::outcome::{Outcome, Status};
 
 /// Samples read at a time, all channels together.
 const BLOCK: usize = 1 << 16;

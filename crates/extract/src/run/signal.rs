@@ -13,7 +13,7 @@ use super::reader::{self, Failed};
 use crate::config::Config;
 use crate::engine::{Extractor, Features, FinishError, Plan, Recording};
 use crate::frontend::FrontEnd;
-use crate::outcome::Status;
+use corsmal_files::outcome::Status;
 
 /// Frames that come out of the front end at a time.
 const BLOCK: usize = 1 << 14;

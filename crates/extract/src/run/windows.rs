@@ -9,7 +9,7 @@ use super::reader::{self, Failed};
 use super::signal::{SignalError, Signals};
 use crate::engine::Features;
 use crate::inputs::Input;
-use crate::outcome::Status;
+use corsmal_files::outcome::Status;
 
 /// Frames read at a time.
 const BLOCK: u64 = 1 << 14;

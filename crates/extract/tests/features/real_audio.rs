@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use corsmal_extract::config::{Config, Preset};
 use corsmal_extract::engine::Features;
-use corsmal_extract::npz::NpzFile;
 use corsmal_extract::run::Signals;
+use corsmal_files::npz::NpzFile;
 use ndarray::{ArrayD, ArrayView1, Axis};
 
 use crate::support::shared;

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use corsmal_extract::config::Config;
-use corsmal_extract::inputs::{self, Shard};
-use corsmal_extract::npz::Compression;
-use corsmal_extract::outcome::{Outcome, Status};
-use corsmal_extract::run::{self, Options, Progress, Quiet, Report, RunError};
+use corsmal_extract::inputs;
+use corsmal_extract::run::{self, Progress, Quiet, RunError, RunOptions, RunReport};
+use corsmal_files::npz::Compression;
+use corsmal_files::outcome::{Outcome, Status};
+use corsmal_files::shard::Shard;
 
 use crate::support::text;
 
@@ -29,11 +30,11 @@ fn run(
     folder: &Path,
     preset: &str,
     progress: &dyn Progress,
-    change: impl Fn(&mut Options),
-) -> Result<Report, RunError> {
+    change: impl Fn(&mut RunOptions),
+) -> Result<RunReport, RunError> {
     let found = inputs::collect(&[text(&folder.join("audio")).to_string()]).unwrap();
     let config = Arc::new(Config::preset(preset).unwrap());
-    let mut options = Options {
+    let mut options = RunOptions {
         out: folder.join("out.npz"),
         compression: Compression::Stored,
         jobs: 2,
@@ -46,7 +47,7 @@ fn run(
     run::run(&found, &config, &options, progress, &Arc::new(AtomicBool::new(false)))
 }
 
-fn statuses(report: &Report) -> Vec<Status> {
+fn statuses(report: &RunReport) -> Vec<Status> {
     report.outcomes.iter().map(|o| o.status).collect()
 }
 

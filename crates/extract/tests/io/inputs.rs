@@ -4,7 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use crate::support::{folder, text};
-use corsmal_extract::inputs::{self, Input, InputSource, Shard};
+use corsmal_extract::inputs::{self, Input, InputSource};
+use corsmal_files::shard::Shard;
 use proptest::prelude::*;
 
 fn ids(names: &[&str]) -> Result<Vec<String>, String> {

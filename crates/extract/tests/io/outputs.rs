@@ -4,15 +4,15 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::support::{python, text};
-use corsmal_extract::inputs::Shard;
-use corsmal_extract::layout;
 use corsmal_extract::merge::merge;
-use corsmal_extract::npy::{DType, Header};
-use corsmal_extract::npz::{Compression, NpzFile, NpzWriter};
-use corsmal_extract::outcome::{Outcome, Status};
-use corsmal_extract::parquet;
-use corsmal_extract::provenance::Provenance;
-use corsmal_extract::table::{Table, TableError};
+use corsmal_files::layout;
+use corsmal_files::npy::{DType, Header};
+use corsmal_files::npz::{Compression, NpzFile, NpzWriter};
+use corsmal_files::outcome::{Outcome, Status};
+use corsmal_files::parquet;
+use corsmal_files::provenance::Provenance;
+use corsmal_files::shard::Shard;
+use corsmal_files::table::{Table, TableError};
 use proptest::prelude::*;
 use tempfile::TempDir;
 

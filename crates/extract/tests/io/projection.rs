@@ -6,12 +6,13 @@ use std::sync::atomic::AtomicBool;
 
 use corsmal_dsp::pca::Pca;
 use corsmal_extract::config::Config;
-use corsmal_extract::inputs::{self, Shard};
-use corsmal_extract::layout;
-use corsmal_extract::npz::{Compression, NpzFile};
+use corsmal_extract::inputs;
 use corsmal_extract::projection::Projection;
-use corsmal_extract::run::{self, Options, Quiet};
-use corsmal_extract::table::Table;
+use corsmal_extract::run::{self, Quiet, RunOptions};
+use corsmal_files::layout;
+use corsmal_files::npz::{Compression, NpzFile};
+use corsmal_files::shard::Shard;
+use corsmal_files::table::Table;
 use tempfile::TempDir;
 
 use crate::support::text;
@@ -40,7 +41,7 @@ fn recordings(folder: &Path, channels: &[u16]) {
 
 fn extract(folder: &Path, config: Config, out: &Path) -> Table {
     let found = inputs::collect(&[text(folder).to_string()]).unwrap();
-    let options = Options {
+    let options = RunOptions {
         out: out.to_path_buf(),
         compression: Compression::Stored,
         jobs: 2,

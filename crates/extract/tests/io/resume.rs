@@ -3,12 +3,12 @@
 use std::fs;
 use std::path::Path;
 
-use corsmal_extract::layout;
 use corsmal_extract::ledger::{self, Header, Ledger, LedgerError, Record, ledger_path, part_path};
-use corsmal_extract::npz::{Compression, NpzWriter};
-use corsmal_extract::outcome::{Outcome, Status};
-use corsmal_extract::provenance::Provenance;
-use corsmal_extract::table::Table;
+use corsmal_files::layout;
+use corsmal_files::npz::{Compression, NpzWriter};
+use corsmal_files::outcome::{Outcome, Status};
+use corsmal_files::provenance::Provenance;
+use corsmal_files::table::Table;
 use proptest::prelude::*;
 use tempfile::TempDir;
 

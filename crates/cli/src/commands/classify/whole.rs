@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use corsmal_extract::draft;
-use corsmal_extract::inputs::Shard;
-use corsmal_extract::npz::Compression;
-use corsmal_extract::outcome::Status;
-use corsmal_extract::run::{self, Options, RunError};
+use corsmal_extract::run::{self, RunError, RunOptions};
+use corsmal_files::draft;
+use corsmal_files::npz::Compression;
+use corsmal_files::outcome::Status;
+use corsmal_files::shard::Shard;
 use corsmal_models::ModelError;
 use corsmal_models::model_file::Model;
 use ndarray::Axis;
@@ -27,7 +27,7 @@ pub fn run(args: &Args, model: &Model, lines: &mut PredictionLines<'_>) -> Resul
         tempfile::tempdir_in(draft::folder(&args.out))
     };
     let folder = folder.map_err(|e| Failure::new(format!("temporary folder: {e}")))?;
-    let options = Options {
+    let options = RunOptions {
         out: folder.path().join("features.npz"),
         compression: Compression::Stored,
         jobs: args.jobs(),

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::ExitCode;
 
-use corsmal_extract::layout;
-use corsmal_extract::npz::NpzFile;
-use corsmal_extract::outcome::Outcome;
 use corsmal_extract::projection::Projection;
-use corsmal_extract::provenance::Provenance;
-use corsmal_extract::table::Table;
+use corsmal_files::layout;
+use corsmal_files::npz::NpzFile;
+use corsmal_files::outcome::Outcome;
+use corsmal_files::provenance::Provenance;
+use corsmal_files::table::Table;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -22,7 +22,7 @@ const SHOWN: usize = 20;
 
 /// Everything that is printed; its JSON form is the output of `--json`.
 #[derive(Serialize)]
-pub struct Report {
+pub struct Contents {
     path: String,
     format: &'static str,
     members: Vec<Member>,
@@ -65,7 +65,7 @@ struct Run {
 type Failed = Box<dyn std::error::Error>;
 
 /// An `.npz`: all of it where it is one of ours, else its members.
-pub fn npz(path: &Path) -> Result<Report, Failed> {
+pub fn npz(path: &Path) -> Result<Contents, Failed> {
     let mut file = NpzFile::open(path)?;
     let names = file.names().to_vec();
     let mut members = Vec::with_capacity(names.len());
@@ -86,12 +86,12 @@ pub fn npz(path: &Path) -> Result<Report, Failed> {
         config_hash: p.fitted_on().0.to_owned(),
         rows: p.fitted_on().1,
     });
-    Ok(Report { path: path.display().to_string(), format: "npz", members, run, projection })
+    Ok(Contents { path: path.display().to_string(), format: "npz", members, run, projection })
 }
 
 /// A summary table.
-pub fn parquet(path: &Path) -> Result<Report, Failed> {
-    let found = corsmal_extract::parquet::read(path)?;
+pub fn parquet(path: &Path) -> Result<Contents, Failed> {
+    let found = corsmal_files::parquet::read(path)?;
     let table = &found.0;
     let column = |name: &str, kind: &str| Member {
         name: name.to_owned(),
@@ -103,13 +103,13 @@ pub fn parquet(path: &Path) -> Result<Report, Failed> {
     let members = std::iter::once(column("id", "text")).chain(labels).chain(features).collect();
     let path = path.display().to_string();
     let run = Some(Run::new(found)?);
-    Ok(Report { path, format: "parquet", members, run, projection: None })
+    Ok(Contents { path, format: "parquet", members, run, projection: None })
 }
 
 /// Prints what `read` finds in a file.
 pub fn inspect(
     path: &Path,
-    read: fn(&Path) -> Result<Report, Failed>,
+    read: fn(&Path) -> Result<Contents, Failed>,
     json: bool,
 ) -> Result<ExitCode, Failure> {
     match read(path) {
@@ -143,7 +143,7 @@ impl Run {
     }
 }
 
-impl Report {
+impl Contents {
     fn text(&self) -> String {
         let mut lines = vec![self.path.clone()];
         let arrays = format!("{} · {}", self.format, plural(self.members.len(), "member"));

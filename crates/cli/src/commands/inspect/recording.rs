@@ -13,14 +13,14 @@ use serde::Serialize;
 use super::overview::Overview;
 use super::{Picture, PictureFormat, Refusal, to_json};
 use crate::failure::Failure;
-use corsmal_extract::draft;
+use corsmal_files::draft;
 
 /// Frames read at once.
 const BLOCK: usize = 8192;
 
 /// Everything that is printed; its JSON form is the output of `--json`.
 #[derive(Serialize)]
-struct Report<'a> {
+struct Inspection<'a> {
     path: String,
     status: &'static str,
     #[serde(flatten)]
@@ -61,7 +61,7 @@ pub fn inspect(path: &Path, picture: Option<&Picture>, json: bool) -> Result<Exi
     let seconds = health.frames as f64 / f64::from(spec.sample_rate);
     let reading = source.health();
     let report =
-        Report { path: name, status: "ok", spec: &spec, seconds, reading, health: &health };
+        Inspection { path: name, status: "ok", spec: &spec, seconds, reading, health: &health };
     print!("{}", if json { to_json(&report)? } else { report.text() });
 
     if let (Some(overview), Some(picture)) = (overview, picture) {
@@ -87,7 +87,7 @@ fn refuse(path: &str, error: &AudioError, json: bool) -> Result<ExitCode, Failur
     Refusal { path, status, byte: error.offset(), reason }.print(json)
 }
 
-impl Report<'_> {
+impl Inspection<'_> {
     /// Format, size and length in one line.
     fn facts(&self) -> String {
         let AudioSpec { sample_rate, channels, format, .. } = self.spec;

@@ -1,7 +1,7 @@
 //! Every likely cause.
 
-use corsmal_extract::npy::{DType, Header, Kind};
-use corsmal_extract::npz::{Compression, NpzWriter};
+use corsmal_files::npy::{DType, Header, Kind};
+use corsmal_files::npz::{Compression, NpzWriter};
 use ndarray::{Array3, Axis, s};
 use serde_json::Value;
 

@@ -4,8 +4,8 @@ use std::io::Write;
 use std::path::Path;
 use std::process::Output;
 
-use corsmal_extract::npy::{DType, Header};
-use corsmal_extract::npz::{Compression, NpzWriter};
+use corsmal_files::npy::{DType, Header};
+use corsmal_files::npz::{Compression, NpzWriter};
 use serde_json::{Value, json};
 
 use super::support::{Files, levels, npz, powers, text};

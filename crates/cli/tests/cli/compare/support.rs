@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use corsmal_extract::npz::{Compression, NpzWriter};
+use corsmal_files::npz::{Compression, NpzWriter};
 use ndarray::Array3;
 use serde_json::Value;
 

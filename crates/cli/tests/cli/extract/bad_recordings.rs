@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use corsmal_extract::outcome::{Outcome, Status};
+use corsmal_files::outcome::{Outcome, Status};
 
 use super::support::{extract, spec, table, wav};
 
@@ -113,7 +113,7 @@ fn a_run_of_bad_recordings_only_still_has_its_outcomes() {
     }
     let parquet = folder.path().join("feats.parquet");
     extract(&bad, &parquet, &["--preset", "mfcc-zcr"]).with(1);
-    assert_eq!(corsmal_extract::parquet::read(&parquet).unwrap().0.outcomes().len(), 1);
+    assert_eq!(corsmal_files::parquet::read(&parquet).unwrap().0.outcomes().len(), 1);
     // Nothing new: the same answer.
     extract(&bad, &parquet, &["--preset", "mfcc-zcr"]).with(1);
 }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use corsmal_extract::config::Config;
 use corsmal_extract::engine::{Extractor, Features, Plan, Recording};
-use corsmal_extract::npz::NpzFile;
-use corsmal_extract::outcome::Status;
+use corsmal_files::npz::NpzFile;
+use corsmal_files::outcome::Status;
 
 use super::support::{extract, table, wav};
 

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::Stdio;
 
-use corsmal_extract::npz::NpzFile;
+use corsmal_files::npz::NpzFile;
 
 use super::support::{Ended, ended, extract, extraction, folder, table, wav};
 use crate::command::{names, tool};
@@ -59,7 +59,7 @@ fn every_kind_of_input_gives_the_same_numbers() {
 
     // Parquet holds the same table.
     extract(&at("list.csv"), &at("feats.parquet"), SUMMARY).with(0);
-    let (parquet, _) = corsmal_extract::parquet::read(&at("feats.parquet")).unwrap();
+    let (parquet, _) = corsmal_files::parquet::read(&at("feats.parquet")).unwrap();
     assert_eq!(parquet, by_list);
 }
 

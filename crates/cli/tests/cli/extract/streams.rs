@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::Stdio;
 
-use corsmal_extract::outcome::Status;
+use corsmal_files::outcome::Status;
 
 use super::support::{Ended, ended, extract, extraction, folder, table, wav};
 use crate::command::tool;

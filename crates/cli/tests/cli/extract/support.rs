@@ -4,9 +4,9 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use corsmal_extract::layout;
-use corsmal_extract::npz::NpzFile;
-use corsmal_extract::table::Table;
+use corsmal_files::layout;
+use corsmal_files::npz::NpzFile;
+use corsmal_files::table::Table;
 
 use crate::command::tool;
 

@@ -1,0 +1,275 @@
+//! What a comparison found.
+
+use std::collections::HashMap;
+
+use ndarray::{Array3, ArrayD};
+use serde::Serialize;
+
+use super::causes::{self, Cause};
+use super::difference::{Difference, Tolerance};
+use super::feature_file::{ArrayEntry, FeatureFile};
+use super::matching::{ArrayMatch, Matching, TableMatch};
+use super::pair::{Axes, Pair, index_of};
+use super::settings::Settings;
+use corsmal_files::parquet::Columns;
+
+/// The differences between two files.
+#[derive(Debug, Serialize)]
+pub struct Comparison {
+    /// The first file.
+    pub a: FileReport,
+    /// The second file.
+    pub b: FileReport,
+    /// Whether everything that could be compared is equal under the tolerance and nothing in common
+    /// was left out.
+    pub within: bool,
+    /// Configurations, where both files are outputs of ours.
+    pub settings: Option<Settings>,
+    /// One entry per feature, or per array of files that are not ours.
+    pub features: Vec<FeatureReport>,
+    /// Arrays, columns and rows of the first file only.
+    pub only_a: Vec<String>,
+    /// Arrays, columns and rows of the second file only.
+    pub only_b: Vec<String>,
+    /// Arrays of both files that could not be read in one of them.
+    pub refused: Vec<Refused>,
+}
+
+/// One of the files.
+#[derive(Debug, Serialize)]
+pub struct FileReport {
+    /// Where it is.
+    pub path: String,
+    /// `npz`, `npy` or `parquet`.
+    pub format: &'static str,
+    /// Version of the tool that wrote it, where it is ours.
+    pub tool_version: Option<String>,
+}
+
+/// An array that is there but not read.
+#[derive(Debug, Clone, Serialize)]
+pub struct Refused {
+    /// Its name.
+    pub array: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// Two arrays of different shapes.
+#[derive(Debug, Serialize)]
+pub struct Shapes {
+    /// Recording or array.
+    pub array: String,
+    /// Shape in the first file.
+    pub a: Vec<usize>,
+    /// Shape in the second.
+    pub b: Vec<usize>,
+}
+
+/// A likely cause, in how many arrays it was found, and its evidence in the first of them.
+#[derive(Debug, Serialize)]
+pub struct Finding {
+    /// Arrays in which it was found.
+    pub arrays: usize,
+    /// The first of them.
+    pub array: String,
+    /// The cause there.
+    #[serde(flatten)]
+    pub cause: Cause,
+}
+
+/// Differences of one feature over all recordings.
+#[derive(Debug, Serialize)]
+pub struct FeatureReport {
+    /// The feature, or the array.
+    pub feature: String,
+    /// Arrays in common; of tables, rows.
+    pub arrays: usize,
+    /// Those in which a value differs by more than the tolerance, or the shape.
+    pub differing: usize,
+    /// Element types of the first arrays met.
+    pub dtypes: [String; 2],
+    /// Arrays whose shapes differ; their values are not compared.
+    pub shapes: Vec<Shapes>,
+    /// Over the arrays whose shapes agree.
+    #[serde(flatten)]
+    pub difference: Difference,
+    /// What probably caused the differences.
+    pub causes: Vec<Finding>,
+}
+
+/// Puts a report together, a pair at a time.
+pub(super) struct Collector {
+    tolerance: Tolerance,
+    features: Vec<FeatureReport>,
+    places: HashMap<String, usize>,
+}
+
+impl Collector {
+    pub(super) fn new(tolerance: Tolerance) -> Self {
+        Self { tolerance, features: Vec::new(), places: HashMap::new() }
+    }
+
+    /// Compares two arrays.
+    pub(super) fn arrays(
+        &mut self,
+        found: &ArrayMatch,
+        a: &ArrayEntry,
+        b: &ArrayEntry,
+        (x, y): (ArrayD<f64>, ArrayD<f64>),
+    ) {
+        let dtypes = [a.dtype.as_str(), b.dtype.as_str()];
+        let tolerance = self.tolerance;
+        let feature = self.feature(&found.feature, dtypes);
+        feature.arrays += 1;
+        let shape = x.shape().to_vec();
+        let pair = match Pair::new(x, y) {
+            Ok(pair) => pair,
+            Err(arrays) => {
+                let [x, y] = *arrays;
+                let array = found.place.clone();
+                feature.shapes.push(Shapes { array, a: shape, b: y.shape().to_vec() });
+                feature.differing += 1;
+                feature.causes(causes::of_shapes(x, y), &found.place);
+                return;
+            }
+        };
+        let ours = a.ours.is_some() || b.ours.is_some();
+        let locate = |ordinal| {
+            let index = index_of(ordinal, &shape);
+            (found.place.clone(), position(&index, ours), index)
+        };
+        let limit = tolerance.limit(pair.largest());
+        let before = feature.difference.values - feature.difference.within;
+        let equal = feature.difference.values - feature.difference.equal;
+        feature.difference.add(pair.values(), limit, locate);
+        let apart = feature.difference.values - feature.difference.within;
+        feature.differing += usize::from(apart > before);
+        if feature.difference.values - feature.difference.equal > equal {
+            feature.causes(causes::of_values(&pair, dtypes), &found.place);
+        }
+    }
+
+    /// Compares the common rows and columns of two tables. Without tables nothing was found.
+    pub(super) fn table(&mut self, found: &TableMatch, a: Option<&Columns>, b: Option<&Columns>) {
+        let (Some(a), Some(b)) = (a, b) else { return };
+        let shape = (1, found.columns.len(), found.rows.len());
+        let pair = Pair {
+            a: Array3::from_shape_fn(shape, |(_, column, row)| {
+                a.values[(found.rows[row].0, found.columns[column].0)]
+            }),
+            b: Array3::from_shape_fn(shape, |(_, column, row)| {
+                b.values[(found.rows[row].1, found.columns[column].1)]
+            }),
+            axes: Axes::Table,
+        };
+        let limit = self.tolerance.limit(pair.largest());
+        let rows = found.row_names(a);
+        let feature = self.feature(&found.feature, ["table", "table"]);
+        feature.arrays += rows.len();
+        let differs = |row: usize| {
+            let column = |side: &Array3<f64>| side.slice(ndarray::s![0, .., row]).to_owned();
+            column(&pair.a).iter().zip(&column(&pair.b)).any(|(x, y)| !limit.holds(*x, *y))
+        };
+        feature.differing += (0..rows.len()).filter(|&row| differs(row)).count();
+        let locate = |ordinal| {
+            let index = index_of(ordinal, &[shape.1, shape.2]);
+            let column = &a.names[found.columns[index[0]].0];
+            (rows[index[1]].clone(), column.clone(), vec![index[1], index[0]])
+        };
+        feature.difference.add(pair.values(), limit, locate);
+        if feature.difference.equal < feature.difference.values {
+            feature.causes(causes::of_values(&pair, ["table", "table"]), "the table");
+        }
+    }
+
+    /// The report, with what the files hold beside.
+    pub(super) fn finish(self, a: &FeatureFile, b: &FeatureFile, matching: Matching) -> Comparison {
+        let named = |file: &FeatureFile, name: &str| file.arrays().iter().any(|e| e.name == name);
+        let refused_in = |file: &FeatureFile, name: &str| {
+            file.refused().iter().any(|refused| refused.array == name)
+        };
+        let both = |of: &FeatureFile, other: &FeatureFile| -> Vec<Refused> {
+            let common = |r: &&Refused| named(other, &r.array) || refused_in(other, &r.array);
+            let name = of.path().display();
+            of.refused()
+                .iter()
+                .filter(common)
+                .map(|r| Refused {
+                    array: r.array.clone(),
+                    reason: format!("{name}: {}", r.reason),
+                })
+                .collect()
+        };
+        let mut refused = both(a, b);
+        refused.extend(both(b, a).into_iter().filter(|r| !refused_in(a, &r.array)));
+        let settings = match (a.provenance(), b.provenance()) {
+            (Some(a), Some(b)) => Some(Settings::new(a, b)),
+            _ => None,
+        };
+        let equal = |f: &FeatureReport| f.differing == 0;
+        Comparison {
+            a: FileReport::new(a),
+            b: FileReport::new(b),
+            within: self.features.iter().all(equal)
+                && matching.only_a.is_empty()
+                && matching.only_b.is_empty()
+                && refused.is_empty(),
+            settings,
+            features: self.features,
+            only_a: matching.only_a,
+            only_b: matching.only_b,
+            refused,
+        }
+    }
+
+    fn feature(&mut self, name: &str, dtypes: [&str; 2]) -> &mut FeatureReport {
+        let next = self.features.len();
+        let place = *self.places.entry(name.to_string()).or_insert(next);
+        if place == next {
+            self.features.push(FeatureReport {
+                feature: name.into(),
+                arrays: 0,
+                differing: 0,
+                dtypes: dtypes.map(str::to_string),
+                shapes: Vec::new(),
+                difference: Difference::default(),
+                causes: Vec::new(),
+            });
+        }
+        &mut self.features[place]
+    }
+}
+
+impl FeatureReport {
+    /// Counts causes; of each kind the first one's words are kept.
+    fn causes(&mut self, causes: Vec<Cause>, place: &str) {
+        for cause in causes {
+            match self.causes.iter_mut().find(|found| found.cause.kind == cause.kind) {
+                Some(found) => found.arrays += 1,
+                None => self.causes.push(Finding { arrays: 1, array: place.into(), cause }),
+            }
+        }
+    }
+}
+
+impl FileReport {
+    fn new(file: &FeatureFile) -> Self {
+        Self {
+            path: file.path().display().to_string(),
+            format: file.format(),
+            tool_version: file.provenance().map(|p| p.tool_version.clone()),
+        }
+    }
+}
+
+/// A place in words: by the names of our axes, else the index.
+fn position(index: &[usize], ours: bool) -> String {
+    match (ours, index) {
+        (true, [channel, coefficient, frame]) => {
+            format!("channel {channel}, coefficient {coefficient}, frame {frame}")
+        }
+        (true, [frame]) => format!("frame {frame}"),
+        _ => format!("{index:?}"),
+    }
+}

@@ -1,0 +1,331 @@
+//! From what the user names to the list of recordings of a run.
+//!
+//! A name is, in this order of interpretation: `-` (a WAV stream on standard input), an existing
+//! file (a manifest if its extension is one of [`manifest::EXTENSIONS`], else a recording), an
+//! existing folder, or a glob. Folders and globs give files with an audio extension only, follow
+//! symbolic links, skip names that begin with a dot, and are sorted by the bytes of the path
+//! relative to their root; names keep the order in which they are given.
+//!
+//! **Ids.** A recording's id is its path relative to its root, without extension, with `/` between
+//! the parts. The root is the folder named, the part of a glob before its first wildcard, or the
+//! folder of a file named; paths in a manifest are taken as written. Where ids collide, all those
+//! that do keep their extension; where that does not help, they take the path as given on the
+//! command line. What still collides is refused. Ids from a manifest stand as they are. Ids that
+//! would begin with `__`, the prefix of an output's own arrays, get `./` in front.
+
+mod ids;
+mod wildcard;
+
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+use walkdir::WalkDir;
+
+use crate::manifest;
+
+/// What can be wrong with the inputs of a run.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum InputError {
+    /// Nothing has this name.
+    #[error("{path}: no such file or folder")]
+    Missing {
+        /// The name given.
+        path: PathBuf,
+    },
+    /// The operating system refused.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// Its reason.
+        source: io::Error,
+    },
+    /// A folder or glob without recordings.
+    #[error("{path}: no file with an audio extension ({extensions})")]
+    NoAudio {
+        /// The folder or glob.
+        path: PathBuf,
+        /// The extensions looked for.
+        extensions: String,
+    },
+    /// A glob that cannot be understood.
+    #[error("{pattern}: not a glob: {reason}")]
+    Glob {
+        /// The glob.
+        pattern: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A row of a manifest that cannot be used.
+    #[error("{path}, line {line}: {reason}")]
+    Manifest {
+        /// The manifest.
+        path: PathBuf,
+        /// Line, from 1.
+        line: u64,
+        /// What is wrong, and what is allowed.
+        reason: String,
+    },
+    /// Two inputs cannot be told apart.
+    #[error(
+        "{first} and {second} both have the id {id:?}; name each once, or give ids in a manifest"
+    )]
+    Duplicate {
+        /// The id.
+        id: String,
+        /// One input.
+        first: String,
+        /// The other.
+        second: String,
+    },
+}
+
+impl InputError {
+    pub(crate) fn io(path: &Path, source: io::Error) -> Self {
+        Self::Io { path: path.into(), source }
+    }
+}
+
+/// Where the bytes of a recording come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum InputSource {
+    /// A file.
+    File(PathBuf),
+    /// Standard input.
+    Stdin,
+}
+
+impl fmt::Display for InputSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(path) => path.display().fmt(f),
+            Self::Stdin => f.write_str("-"),
+        }
+    }
+}
+
+/// One recording, or a stretch of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Input {
+    /// Unique in the run.
+    pub id: String,
+    /// Where its bytes come from.
+    pub source: InputSource,
+    /// Start of the stretch in seconds.
+    pub start: Option<f64>,
+    /// End of the stretch in seconds.
+    pub end: Option<f64>,
+    /// Label columns as (name, value); every input of a run has the same names in the same order.
+    pub labels: Vec<(String, String)>,
+}
+
+/// Finds the recordings that `names` stand for, in a stable order, with unique ids.
+///
+/// # Errors
+/// [`InputError`] names the path, and in a manifest the line.
+pub fn collect<S: AsRef<OsStr>>(names: &[S]) -> Result<Vec<Input>, InputError> {
+    let mut found = Vec::new();
+    for name in names {
+        find(name.as_ref(), &mut found)?;
+    }
+    let ids = ids::assign(&found)?;
+    let mut columns: Vec<String> = Vec::new();
+    for (column, _) in found.iter().flat_map(|f| &f.labels) {
+        if !columns.contains(column) {
+            columns.push(column.clone());
+        }
+    }
+    let inputs = found.into_iter().zip(ids).map(|(found, id)| {
+        let mut values: BTreeMap<String, String> = found.labels.into_iter().collect();
+        let labels = columns.iter().map(|c| (c.clone(), values.remove(c).unwrap_or_default()));
+        Input {
+            id,
+            source: found.source,
+            start: found.start,
+            end: found.end,
+            labels: labels.collect(),
+        }
+    });
+    Ok(inputs.collect())
+}
+
+/// BLAKE3 (hex) over ids, paths, stretches and labels of all inputs: equal for equal lists only.
+pub fn list_hash(inputs: &[Input]) -> String {
+    let mut hasher = blake3::Hasher::new();
+    let mut put = |text: &str| {
+        hasher.update(&(text.len() as u64).to_le_bytes());
+        hasher.update(text.as_bytes());
+    };
+    for input in inputs {
+        put(&input.id);
+        put(&input.source.to_string());
+        for time in [input.start, input.end] {
+            put(&time.map(|t| t.to_string()).unwrap_or_default());
+        }
+        put(&input.labels.len().to_string());
+        for (column, value) in &input.labels {
+            put(column);
+            put(value);
+        }
+    }
+    hasher.finalize().to_hex().to_string()
+}
+
+/// An input before it has its final id.
+struct Found {
+    source: InputSource,
+    naming: Naming,
+    start: Option<f64>,
+    end: Option<f64>,
+    labels: Vec<(String, String)>,
+}
+
+/// What the id is made of.
+enum Naming {
+    Given(String),
+    /// Path relative to the root.
+    Derived(PathBuf),
+}
+
+impl Found {
+    fn file(path: PathBuf, relative: PathBuf) -> Self {
+        Self {
+            source: InputSource::File(path),
+            naming: Naming::Derived(relative),
+            start: None,
+            end: None,
+            labels: Vec::new(),
+        }
+    }
+}
+
+fn find(name: &OsStr, found: &mut Vec<Found>) -> Result<(), InputError> {
+    if name == "-" {
+        let naming = Naming::Given("stdin".into());
+        let (start, end, labels) = (None, None, Vec::new());
+        found.push(Found { source: InputSource::Stdin, naming, start, end, labels });
+        return Ok(());
+    }
+    let path = Path::new(name);
+    match std::fs::metadata(path) {
+        Ok(meta) if meta.is_dir() => {
+            let mut files = Vec::new();
+            walk(path, &mut files)?;
+            push_sorted(path, path, files, found)
+        }
+        Ok(_) if has_extension(path, &manifest::EXTENSIONS) => find_manifest(path, found),
+        Ok(_) => {
+            let relative = path.file_name().map_or_else(|| path.into(), PathBuf::from);
+            found.push(Found::file(path.into(), relative));
+            Ok(())
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            match name.to_str().filter(|name| wildcard::is_glob(name)) {
+                Some(pattern) => find_glob(pattern, found),
+                None => Err(InputError::Missing { path: path.into() }),
+            }
+        }
+        Err(error) => Err(InputError::io(path, error)),
+    }
+}
+
+fn find_manifest(path: &Path, found: &mut Vec<Found>) -> Result<(), InputError> {
+    for entry in manifest::read(path)? {
+        let wrong = |reason| InputError::Manifest { path: path.into(), line: entry.line, reason };
+        match std::fs::metadata(&entry.path) {
+            Ok(meta) if meta.is_dir() => {
+                return Err(wrong(format!("{} is a folder", entry.path.display())));
+            }
+            Ok(_) => {}
+            Err(error) => return Err(wrong(format!("{}: {error}", entry.path.display()))),
+        }
+        if let Some(reason) = entry.id.as_deref().and_then(ids::refusal) {
+            return Err(wrong(reason));
+        }
+        let naming = match entry.id {
+            Some(id) => Naming::Given(id),
+            None => Naming::Derived(entry.written.into()),
+        };
+        let source = InputSource::File(entry.path);
+        let (start, end, labels) = (entry.start, entry.end, entry.labels);
+        found.push(Found { source, naming, start, end, labels });
+    }
+    Ok(())
+}
+
+fn find_glob(pattern: &str, found: &mut Vec<Found>) -> Result<(), InputError> {
+    let mut files = Vec::new();
+    for path in wildcard::expand(pattern)? {
+        walk(&path, &mut files)?;
+    }
+    push_sorted(Path::new(pattern), &wildcard::root(pattern), files, found)
+}
+
+/// Appends the audio files at or below `path`.
+fn walk(path: &Path, files: &mut Vec<PathBuf>) -> Result<(), InputError> {
+    let is_audio = |path: &Path| has_extension(path, &corsmal_audio::EXTENSIONS);
+    let visible = |entry: &walkdir::DirEntry| !is_hidden(entry);
+    for entry in WalkDir::new(path).follow_links(true).into_iter().filter_entry(visible) {
+        match entry {
+            Ok(entry) if entry.file_type().is_file() && is_audio(entry.path()) => {
+                files.push(entry.into_path());
+            }
+            Ok(_) => {}
+            Err(error) => {
+                let at = error.path().filter(|at| is_audio(at)).map(Path::to_path_buf);
+                let is_loop = error.loop_ancestor().is_some();
+                unless_harmless(path, error)?;
+                // A dangling link to a recording, which will fail on its own.
+                files.extend(at.filter(|_| !is_loop));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether an entry below a folder that was named is skipped.
+fn is_hidden(entry: &walkdir::DirEntry) -> bool {
+    entry.depth() > 0 && entry.file_name().as_encoded_bytes().starts_with(b".")
+}
+
+/// Passes over links back to a folder that is being searched, and links to nothing.
+fn unless_harmless(folder: &Path, error: walkdir::Error) -> Result<(), InputError> {
+    let at = error.path().unwrap_or(folder).to_path_buf();
+    let is_loop = error.loop_ancestor().is_some();
+    match io::Error::from(error) {
+        _ if is_loop => Ok(()),
+        error if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        error => Err(InputError::io(&at, error)),
+    }
+}
+
+fn push_sorted(
+    name: &Path,
+    root: &Path,
+    mut files: Vec<PathBuf>,
+    found: &mut Vec<Found>,
+) -> Result<(), InputError> {
+    if files.is_empty() {
+        let extensions = corsmal_audio::EXTENSIONS.join(", ");
+        return Err(InputError::NoAudio { path: name.into(), extensions });
+    }
+    files.sort_unstable_by(|a, b| {
+        a.as_os_str().as_encoded_bytes().cmp(b.as_os_str().as_encoded_bytes())
+    });
+    // A glob with ** matches a folder and what is in it.
+    files.dedup();
+    for path in files {
+        let relative = path.strip_prefix(root).unwrap_or(&path).to_path_buf();
+        found.push(Found::file(path, relative));
+    }
+    Ok(())
+}
+
+fn has_extension(path: &Path, extensions: &[&str]) -> bool {
+    path.extension().is_some_and(|e| extensions.iter().any(|x| e.eq_ignore_ascii_case(x)))
+}

@@ -1,0 +1,188 @@
+//! The output of a run: recordings go in in the order of the inputs.
+
+use std::path::Path;
+
+use crate::engine::{FeatureArray, Plan};
+use crate::inputs::Input;
+use crate::ledger::{Ledger, Record};
+use crate::run::{RunError, RunOptions};
+use corsmal_files::layout;
+use corsmal_files::npy::{DType, Header};
+use corsmal_files::npz::{Compression, EntryRecord, NpzWriter, Packed};
+use corsmal_files::outcome::{Outcome, Status};
+use corsmal_files::parquet;
+use corsmal_files::provenance::Provenance;
+use corsmal_files::table::{Table, TableError};
+
+/// What a worker hands over for one input.
+pub struct Finished {
+    /// What became of it.
+    pub outcome: Outcome,
+    /// Its features, already in the form in which they are written.
+    pub arrays: Vec<Member>,
+    /// Its summary row and the names of the columns.
+    pub row: Option<(Vec<f32>, Vec<String>)>,
+}
+
+/// One array of a recording.
+pub struct Member {
+    name: String,
+    header: Header,
+    data: Data,
+}
+
+enum Data {
+    Stored(crate::engine::Store),
+    Packed(Packed),
+    Times(Vec<f64>),
+}
+
+impl Member {
+    /// The members of a recording's frame-level features: arrays and the times of their frames.
+    ///
+    /// # Errors
+    /// A temporary file fails.
+    pub fn of(
+        id: &str,
+        plan: &Plan,
+        arrays: Vec<FeatureArray>,
+        compression: Compression,
+    ) -> std::io::Result<Vec<Self>> {
+        let several = arrays.len() > 1;
+        let mut members = Vec::with_capacity(2 * arrays.len());
+        for array in arrays {
+            let feature = several.then_some(array.name.as_str());
+            let dtype = if array.complex { DType::C64 } else { DType::F32 };
+            let shape = [plan.channels, array.coefficients, array.frames];
+            let header = Header::new(dtype, &shape).fortran();
+            let hop = plan.hop(&array.name);
+            let times: Vec<f64> =
+                (0..array.frames).map(|t| t as f64 * hop / plan.sample_rate).collect();
+            let data = match compression {
+                Compression::Stored => Data::Stored(array.values),
+                Compression::Deflated => {
+                    let values = array.values.into_vec()?;
+                    Data::Packed(Packed::deflate(&header, bytemuck::cast_slice(&values)))
+                }
+            };
+            members.push(Self { name: layout::frames_name(id, feature), header, data });
+            members.push(Self {
+                name: layout::times_name(id, feature),
+                header: Header::new(DType::F64, &[times.len()]),
+                data: Data::Times(times),
+            });
+        }
+        Ok(members)
+    }
+
+    fn write(self, writer: &mut NpzWriter) -> Result<EntryRecord, RunError> {
+        Ok(match self.data {
+            Data::Packed(packed) => writer.packed(&self.name, &packed)?,
+            Data::Times(times) => {
+                writer.array(&self.name, &self.header, bytemuck::cast_slice(&times))?
+            }
+            Data::Stored(mut store) => match store.single() {
+                Some(values) => {
+                    writer.array(&self.name, &self.header, bytemuck::cast_slice(values))?
+                }
+                None => writer.array_with(&self.name, &self.header, |out| {
+                    store.batches(1, |chunks| {
+                        chunks.iter().try_for_each(|c| out.write_all(bytemuck::cast_slice(c)))
+                    })
+                })?,
+            },
+        })
+    }
+}
+
+/// The open output.
+pub struct Output {
+    ledger: Ledger,
+    writer: Option<NpzWriter>,
+    table: Table,
+    /// Inputs written so far.
+    pub next: usize,
+}
+
+impl Output {
+    /// Opens the output behind the records of an interrupted run.
+    pub fn new(
+        ledger: Ledger,
+        records: Vec<Record>,
+        inputs: &[Input],
+
+        options: &RunOptions,
+        parquet: bool,
+    ) -> Result<Self, RunError> {
+        let columns = inputs.first().map(|i| i.labels.iter().map(|(c, _)| c.clone()).collect());
+        let mut table = Table::new(columns.unwrap_or_default())?;
+        let mut entries = Vec::new();
+        let next = records.len();
+        for (record, input) in records.into_iter().zip(inputs) {
+            entries.extend(record.entries);
+            if let Some(names) = record.names {
+                table.name_features(&names)?;
+            }
+            table.push(record.outcome, &input.labels, record.row.as_deref().unwrap_or(&[]))?;
+        }
+        let writer = (!parquet)
+            .then(|| NpzWriter::resume(&ledger.part(), options.compression, entries))
+            .transpose()?;
+        Ok(Self { ledger, writer, table, next })
+    }
+
+    /// What became of the recordings written so far.
+    pub fn outcomes(&self) -> &[Outcome] {
+        self.table.outcomes()
+    }
+
+    /// Writes the next recording.
+    pub fn write(&mut self, input: &Input, mut finished: Finished) -> Result<Outcome, RunError> {
+        let mut row = None;
+        let mut names = None;
+        if let Some((values, columns)) = finished.row.take() {
+            let first = self.table.feature_names().is_empty();
+            match self.table.name_features(&columns) {
+                Ok(()) => {
+                    row = Some(values);
+                    names = first.then_some(columns);
+                }
+                Err(TableError::Renamed { expected, actual, .. }) => {
+                    finished.outcome.status = Status::Mismatch;
+                    finished.outcome.reason = format!(
+                        "gives {actual} numbers, the recordings before it {expected}: \
+                         another number of channels"
+                    );
+                }
+                Err(other) => return Err(other.into()),
+            }
+        }
+        let mut entries = Vec::new();
+        if let Some(writer) = &mut self.writer {
+            for member in finished.arrays {
+                entries.push(member.write(writer)?);
+            }
+        }
+        let outcome = finished.outcome;
+        self.table.push(outcome.clone(), &input.labels, row.as_deref().unwrap_or(&[]))?;
+        self.ledger.append(&Record { outcome: outcome.clone(), entries, row, names })?;
+        self.next += 1;
+        Ok(outcome)
+    }
+
+    /// Completes the output and gives it its name.
+    pub fn publish(self, provenance: &Provenance) -> Result<Vec<Outcome>, RunError> {
+        match self.writer {
+            Some(mut writer) => {
+                layout::write_table(&mut writer, &self.table, provenance)?;
+                writer.finish()?;
+            }
+            None => {
+                let part: &Path = &self.ledger.part();
+                parquet::write(part, &self.table, provenance)?;
+            }
+        }
+        self.ledger.publish()?;
+        Ok(self.table.outcomes().to_vec())
+    }
+}

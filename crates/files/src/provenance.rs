@@ -1,0 +1,40 @@
+//! What an output says about how it was made.
+
+use serde::{Deserialize, Serialize};
+
+use crate::shard::Shard;
+
+/// Version of the layout in `docs/file-formats.md`.
+pub const LAYOUT_VERSION: u32 = 1;
+
+/// Stored in every output; equal runs have equal provenance.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// [`LAYOUT_VERSION`] of the writer.
+    pub layout_version: u32,
+    /// Version of the tool.
+    pub tool_version: String,
+    /// Hash of the effective configuration.
+    pub config_hash: String,
+    /// A hash of the list of all inputs, before sharding.
+    pub inputs_hash: String,
+    /// Which part of the inputs the output covers, `0/1` being all.
+    pub shard: String,
+    /// The effective configuration as canonical JSON; kept in a place of its own.
+    #[serde(skip)]
+    pub config: String,
+}
+
+impl Provenance {
+    /// Provenance of a run with this version of the tool.
+    pub fn new(config: String, config_hash: String, inputs_hash: String, shard: Shard) -> Self {
+        Self {
+            layout_version: LAYOUT_VERSION,
+            tool_version: env!("CARGO_PKG_VERSION").to_string(),
+            config_hash,
+            inputs_hash,
+            shard: shard.to_string(),
+            config,
+        }
+    }
+}
