@@ -55,12 +55,12 @@ pub enum ConfigError {
         message: String,
     },
     /// No preset has this name.
-    #[error("preset \"{name}\" is unknown: {known}")]
+    #[error("preset \"{name}\" is unknown: {choices}")]
     Preset {
         /// The name that was given.
         name: String,
-        /// The known names.
-        known: String,
+        /// The one that was probably meant, and the known ones.
+        choices: String,
     },
 }
 
@@ -238,12 +238,13 @@ pub(crate) fn typed<T>(prefix: &str, table: &Map<String, Value>) -> Result<T, Co
 where
     T: for<'de> Deserialize<'de> + Serialize + Default,
 {
-    let known = match serde_json::to_value(T::default()) {
+    let known: Vec<String> = match serde_json::to_value(T::default()) {
         Ok(Value::Object(map)) => map.keys().cloned().collect(),
         _ => Vec::new(),
     };
     if let Some(key) = table.keys().find(|k| !known.contains(k)) {
-        let message = format!("is unknown here; known are {}", known.join(", "));
+        let choices = corsmal_names::choices(key, known.iter().map(String::as_str));
+        let message = format!("is unknown here: {choices}");
         return Err(ConfigError::key(format!("{prefix}.{key}"), message));
     }
     let parse = |table: Map<String, Value>| serde_json::from_value::<T>(Value::Object(table));

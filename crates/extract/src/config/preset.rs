@@ -45,7 +45,7 @@ impl Preset {
     pub fn find(name: &str) -> Result<&'static Self, ConfigError> {
         PRESETS.iter().find(|p| p.name == name).ok_or_else(|| ConfigError::Preset {
             name: name.to_string(),
-            known: PRESETS.iter().map(|p| p.name).collect::<Vec<_>>().join(", "),
+            choices: corsmal_names::choices(name, PRESETS.iter().map(|p| p.name)),
         })
     }
 }

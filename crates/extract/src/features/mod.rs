@@ -316,7 +316,8 @@ impl FeatureConfig {
             }
         };
         let Some(entry) = REGISTRY.iter().find(|e| e.kind == kind) else {
-            let message = format!("= \"{kind}\" is unknown: one of {}", kinds().join(", "));
+            let message =
+                format!("= \"{kind}\" is unknown: {}", corsmal_names::choices(&kind, kinds()));
             return Err(ConfigError::key(format!("{prefix}.kind"), message));
         };
         let coefficients = match table.remove("coefficients") {
