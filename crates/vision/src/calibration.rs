@@ -1,0 +1,248 @@
+//! Calibration files of the data set: pickles of `[intrinsic, extrinsic, …]`, or the same as JSON.
+
+use std::path::Path;
+
+use serde::Serialize;
+use serde_json::Value as Json;
+
+use crate::error::{Result, VisionError, read};
+use crate::matrix::{self, Matrix3, Matrix34};
+use crate::pickle::{Id, Pickle, Value};
+
+/// Largest file that is read; real ones have under 4 kB.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// A camera without lens distortion, as the data set gives it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Camera {
+    /// Focal lengths and principal point in px.
+    pub intrinsic: Matrix3,
+    /// World to camera (the data set calls it `rvec`).
+    pub rotation: Matrix3,
+    /// World to camera, in m.
+    pub translation: [f64; 3],
+    /// World to pixels, homogeneous.
+    pub projection: Matrix34,
+}
+
+/// The cameras of one view.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Calibration {
+    /// Colour camera; aligned depth images are seen from here.
+    pub rgb: Camera,
+    /// First infrared camera.
+    pub ir1: Option<Camera>,
+    /// Second infrared camera.
+    pub ir2: Option<Camera>,
+}
+
+impl Camera {
+    /// A camera from its parts; the projection follows.
+    pub fn new(intrinsic: Matrix3, rotation: Matrix3, translation: [f64; 3]) -> Self {
+        let projection = std::array::from_fn(|r| {
+            std::array::from_fn(|c| {
+                let column = |k: usize| if c < 3 { rotation[k][c] } else { translation[k] };
+                (0..3).map(|k| intrinsic[r][k] * column(k)).sum()
+            })
+        });
+        Self { intrinsic, rotation, translation, projection }
+    }
+
+    /// Pixel (column, row) of a point in m; computed as OpenCV's `projectPoints` does.
+    pub fn project(&self, point: [f64; 3]) -> [f64; 2] {
+        let turned = matrix::times(&self.rotation, point);
+        let [x, y, z] = std::array::from_fn(|i| turned[i] + self.translation[i]);
+        let over = if z == 0.0 { 1.0 } else { 1.0 / z };
+        let k = &self.intrinsic;
+        [x * over * k[0][0] + k[0][2], y * over * k[1][1] + k[1][2]]
+    }
+
+    /// Turns pixels with depth into points of the world; `None` for a singular camera.
+    pub fn back_projection(&self) -> Option<BackProjection<'_>> {
+        let pixel = matrix::inverse(&self.intrinsic)?;
+        let turn = matrix::inverse(&self.rotation)?;
+        Some(BackProjection { camera: self, pixel, turn })
+    }
+}
+
+/// Pixels and depths to points of the world.
+pub struct BackProjection<'a> {
+    camera: &'a Camera,
+    pixel: Matrix3,
+    turn: Matrix3,
+}
+
+impl BackProjection<'_> {
+    /// The point in m seen at a pixel (column, row) at a depth in m.
+    pub fn point(&self, column: f64, row: f64, depth: f64) -> [f64; 3] {
+        let seen = matrix::times(&self.pixel, [column, row, 1.0]).map(|v| v * depth);
+        let shifted = std::array::from_fn(|i| seen[i] - self.camera.translation[i]);
+        matrix::times(&self.turn, shifted)
+    }
+}
+
+impl Calibration {
+    /// Reads a calibration pickle of the data set (protocol 0) or a JSON file with the keys
+    /// `intrinsic` and `extrinsic`, or a list of these two; each maps `rgb`, `ir1` and `ir2` to a
+    /// matrix, or to `rvec`, `tvec` and `projMatrix`.
+    ///
+    /// # Errors
+    /// [`VisionError`] when the file cannot be read, is a pickle that does more than make arrays,
+    /// or lacks the colour camera.
+    pub fn load(path: &Path) -> Result<Self> {
+        Self::parse(&read(path, MAX_BYTES)?, path)
+    }
+
+    /// Parses the content of a file; `path` is named in errors.
+    ///
+    /// # Errors
+    /// As [`Calibration::load`].
+    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
+        // A text pickle begins with "(" or an opcode letter, JSON with a bracket.
+        let json = matches!(bytes.iter().find(|b| !b.is_ascii_whitespace()), Some(b'{' | b'['));
+        let calibration = if json {
+            let value: Json = serde_json::from_slice(bytes)
+                .map_err(|e| VisionError::file(path, format!("not readable as JSON: {e}")))?;
+            Self::from_source(&JsonSource(value))
+        } else {
+            let pickle = Pickle::parse(bytes).map_err(|reason| {
+                VisionError::file(path, format!("not a readable calibration pickle: {reason}"))
+            })?;
+            Self::from_source(&PickleSource(pickle))
+        };
+        calibration.map_err(|reason| VisionError::file(path, reason))
+    }
+
+    fn from_source(source: &impl Source) -> std::result::Result<Self, String> {
+        let camera = |name: &str| -> std::result::Result<Option<Camera>, String> {
+            let Some(k) = source.numbers(&["intrinsic", name]) else { return Ok(None) };
+            let intrinsic = matrix3(&k).ok_or_else(|| wrong("intrinsic", name, "3 by 3", &k))?;
+            let part = |key| {
+                source.numbers(&["extrinsic", name, key]).ok_or_else(|| {
+                    format!("no '{key}' of numbers for camera '{name}' in the extrinsic part")
+                })
+            };
+            let r = part("rvec")?;
+            let rotation = match r[..] {
+                [x, y, z] if [x, y, z].iter().all(|v| v.is_finite()) => matrix::rotation([x, y, z]),
+                _ => matrix3(&r).ok_or_else(|| wrong("rvec", name, "3 by 3, or 3", &r))?,
+            };
+            let t = part("tvec")?;
+            let translation = finite(&t).ok_or_else(|| wrong("tvec", name, "3", &t))?;
+            let mut camera = Camera::new(intrinsic, rotation, translation);
+            if let Some(p) = source.numbers(&["extrinsic", name, "projMatrix"]) {
+                let flat: [f64; 12] =
+                    finite(&p).ok_or_else(|| wrong("projMatrix", name, "3 by 4", &p))?;
+                camera.projection =
+                    std::array::from_fn(|r| std::array::from_fn(|c| flat[4 * r + c]));
+            }
+            Ok(Some(camera))
+        };
+        let rgb = camera("rgb")?.ok_or(
+            "no colour camera; expected an intrinsic and an extrinsic part with an entry 'rgb' each",
+        )?;
+        Ok(Self { rgb, ir1: camera("ir1")?, ir2: camera("ir2")? })
+    }
+}
+
+fn wrong(what: &str, camera: &str, expected: &str, found: &[f64]) -> String {
+    format!(
+        "'{what}' of camera '{camera}' is not {expected} finite numbers but {} numbers",
+        found.len()
+    )
+}
+
+fn finite<const N: usize>(numbers: &[f64]) -> Option<[f64; N]> {
+    numbers.try_into().ok().filter(|n: &[f64; N]| n.iter().all(|v| v.is_finite()))
+}
+
+fn matrix3(numbers: &[f64]) -> Option<Matrix3> {
+    let flat: [f64; 9] = finite(numbers)?;
+    Some(std::array::from_fn(|r| std::array::from_fn(|c| flat[3 * r + c])))
+}
+
+/// Where the numbers come from.
+trait Source {
+    /// All numbers under the keys, row by row; the first key is the part.
+    fn numbers(&self, keys: &[&str]) -> Option<Vec<f64>>;
+}
+
+struct JsonSource(Json);
+
+impl Source for JsonSource {
+    fn numbers(&self, keys: &[&str]) -> Option<Vec<f64>> {
+        let (part, inner) = keys.split_first()?;
+        let top = match &self.0 {
+            Json::Array(parts) => parts.get(usize::from(*part == "extrinsic"))?,
+            object => object.get(part)?,
+        };
+        let value = inner.iter().try_fold(top, |value, key| value.get(key))?;
+        let mut numbers = Vec::new();
+        flatten(value, &mut numbers).then_some(numbers)
+    }
+}
+
+fn flatten(value: &Json, out: &mut Vec<f64>) -> bool {
+    match value {
+        Json::Array(items) => items.iter().all(|item| flatten(item, out)),
+        other => other.as_f64().is_some_and(|number| {
+            out.push(number);
+            true
+        }),
+    }
+}
+
+struct PickleSource(Pickle);
+
+impl Source for PickleSource {
+    fn numbers(&self, keys: &[&str]) -> Option<Vec<f64>> {
+        let (part, inner) = keys.split_first()?;
+        let top: Id = match self.0.get(self.0.root) {
+            Value::List(parts) => *parts.get(usize::from(*part == "extrinsic"))?,
+            _ => self.0.entry(self.0.root, part)?,
+        };
+        let id = inner.iter().try_fold(top, |id, key| self.0.entry(id, key))?;
+        match self.0.get(id) {
+            Value::Array(array) => Some(array.data.clone()),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAMERA: &str = r#"{"intrinsic":{"rgb":[[900,0,640],[0,900,360],[0,0,1]]},
+        "extrinsic":{"rgb":{"rvec":[0,0,0],"tvec":[[0],[0],[2]]}}}"#;
+
+    fn parse(text: &str) -> Result<Calibration> {
+        Calibration::parse(text.as_bytes(), Path::new("c.json"))
+    }
+
+    #[test]
+    fn json_gives_a_camera_that_projects_and_back() {
+        let camera = parse(CAMERA).unwrap().rgb;
+        assert_eq!(camera.project([0.0, 0.0, 0.0]), [640.0, 360.0]);
+        assert_eq!(camera.project([0.2, -0.1, 0.0]), [730.0, 315.0]);
+        assert_eq!(camera.projection[0], [900.0, 0.0, 640.0, 1280.0]);
+        let point = camera.back_projection().unwrap().point(730.0, 315.0, 2.0);
+        for (a, b) in point.iter().zip([0.2, -0.1, 0.0]) {
+            assert!((a - b).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn what_is_missing_or_wrong_is_named() {
+        for (text, part) in [
+            ("{}", "no colour camera"),
+            ("[1, 2", "not readable as JSON"),
+            (&CAMERA.replace("\"tvec\"", "\"t\""), "no 'tvec'"),
+            (&CAMERA.replace("900,0,640", "900,0"), "'intrinsic' of camera 'rgb' is not 3 by 3"),
+            ("no pickle", "byte 1: operation 'n'"),
+        ] {
+            let error = parse(text).unwrap_err().to_string();
+            assert!(error.starts_with("c.json: ") && error.contains(part), "{error}");
+        }
+    }
+}

@@ -1,0 +1,299 @@
+//! Masks and categories as COCO writes them.
+
+use serde_json::Value as Json;
+
+use crate::image::{MAX_PIXELS, MAX_SIDE};
+use crate::mask::Mask;
+
+/// Category numbers and names of the detectors trained on COCO (91 numbers, of which 80 are used).
+const CATEGORIES: [(u8, &str); 80] = [
+    (1, "person"),
+    (2, "bicycle"),
+    (3, "car"),
+    (4, "motorcycle"),
+    (5, "airplane"),
+    (6, "bus"),
+    (7, "train"),
+    (8, "truck"),
+    (9, "boat"),
+    (10, "traffic light"),
+    (11, "fire hydrant"),
+    (13, "stop sign"),
+    (14, "parking meter"),
+    (15, "bench"),
+    (16, "bird"),
+    (17, "cat"),
+    (18, "dog"),
+    (19, "horse"),
+    (20, "sheep"),
+    (21, "cow"),
+    (22, "elephant"),
+    (23, "bear"),
+    (24, "zebra"),
+    (25, "giraffe"),
+    (27, "backpack"),
+    (28, "umbrella"),
+    (31, "handbag"),
+    (32, "tie"),
+    (33, "suitcase"),
+    (34, "frisbee"),
+    (35, "skis"),
+    (36, "snowboard"),
+    (37, "sports ball"),
+    (38, "kite"),
+    (39, "baseball bat"),
+    (40, "baseball glove"),
+    (41, "skateboard"),
+    (42, "surfboard"),
+    (43, "tennis racket"),
+    (44, "bottle"),
+    (46, "wine glass"),
+    (47, "cup"),
+    (48, "fork"),
+    (49, "knife"),
+    (50, "spoon"),
+    (51, "bowl"),
+    (52, "banana"),
+    (53, "apple"),
+    (54, "sandwich"),
+    (55, "orange"),
+    (56, "broccoli"),
+    (57, "carrot"),
+    (58, "hot dog"),
+    (59, "pizza"),
+    (60, "donut"),
+    (61, "cake"),
+    (62, "chair"),
+    (63, "couch"),
+    (64, "potted plant"),
+    (65, "bed"),
+    (67, "dining table"),
+    (70, "toilet"),
+    (72, "tv"),
+    (73, "laptop"),
+    (74, "mouse"),
+    (75, "remote"),
+    (76, "keyboard"),
+    (77, "cell phone"),
+    (78, "microwave"),
+    (79, "oven"),
+    (80, "toaster"),
+    (81, "sink"),
+    (82, "refrigerator"),
+    (84, "book"),
+    (85, "clock"),
+    (86, "vase"),
+    (87, "scissors"),
+    (88, "teddy bear"),
+    (89, "hair drier"),
+    (90, "toothbrush"),
+];
+
+/// The name of a category number.
+pub fn category_name(number: u8) -> Option<&'static str> {
+    CATEGORIES.iter().find(|(n, _)| *n == number).map(|(_, name)| *name)
+}
+
+/// A mask from a COCO segmentation: `{"size": [height, width], "counts": …}` with counts as numbers
+/// or as COCO's compressed text, or polygons `[[x, y, x, y, …], …]`, which need the size of the image.
+pub(crate) fn mask(json: &Json, size: Option<(usize, usize)>) -> Result<Mask, String> {
+    match json {
+        Json::Object(rle) => {
+            let side = |i: usize| {
+                let side = rle.get("size").and_then(|s| s.get(i)).and_then(Json::as_u64);
+                side.filter(|&s| (1..=MAX_SIDE as u64).contains(&s)).map(|s| s as usize)
+            };
+            let (Some(height), Some(width)) = (side(0), side(1)) else {
+                return Err("a mask without \"size\": [height, width]".into());
+            };
+            let counts = match rle.get("counts") {
+                Some(Json::String(text)) => decompress(text)?,
+                Some(Json::Array(counts)) => counts
+                    .iter()
+                    .map(|c| c.as_u64().ok_or("a run length that is no whole number"))
+                    .collect::<Result<_, _>>()?,
+                _ => return Err("a mask without \"counts\"".into()),
+            };
+            runs(&counts, width, height)
+        }
+        Json::Array(polygons) => {
+            let (width, height) = size.ok_or("polygons need the size of the image")?;
+            let mut out = Mask::empty(width, height);
+            for polygon in polygons {
+                let numbers: Option<Vec<f64>> = polygon
+                    .as_array()
+                    .map(|p| p.iter().map_while(Json::as_f64).collect::<Vec<_>>())
+                    .filter(|p| p.len() >= 6 && p.len() % 2 == 0);
+                let numbers = numbers.filter(|n| polygon.as_array().map(Vec::len) == Some(n.len()));
+                let numbers = numbers
+                    .ok_or("a polygon is no list of x, y, x, y, … with three points or more")?;
+                fill(&numbers, &mut out);
+            }
+            Ok(out)
+        }
+        _ => Err("a mask that is neither run lengths nor polygons".into()),
+    }
+}
+
+/// Run lengths down the columns, outside first.
+fn runs(counts: &[u64], width: usize, height: usize) -> Result<Mask, String> {
+    let total = (width * height) as u64;
+    if width * height > MAX_PIXELS {
+        return Err(format!("a mask of {width} by {height} px; the limit is {MAX_PIXELS} px"));
+    }
+    let sum = counts.iter().try_fold(0u64, |sum, &c| sum.checked_add(c));
+    if sum != Some(total) {
+        return Err(format!("run lengths that do not add up to the {total} px of the mask"));
+    }
+    let mut mask = Mask::empty(width, height);
+    let mut at = 0;
+    for (i, &count) in counts.iter().enumerate() {
+        let end = at + count as usize;
+        if i % 2 == 1 {
+            for pixel in at..end {
+                mask.data[pixel % height * width + pixel / height] = true;
+            }
+        }
+        at = end;
+    }
+    Ok(mask)
+}
+
+/// COCO's text: numbers of five bits a character, from the third on as differences to the last but
+/// one.
+fn decompress(text: &str) -> Result<Vec<u64>, String> {
+    const FAULT: &str = "compressed run lengths that are damaged";
+    let mut counts: Vec<i64> = Vec::new();
+    let mut bytes = text.bytes();
+    while let Some(mut byte) = bytes.next() {
+        let (mut value, mut shift) = (0i64, 0);
+        loop {
+            let bits = i64::from(byte.checked_sub(48).filter(|b| *b < 64).ok_or(FAULT)?);
+            if shift > 50 {
+                return Err(FAULT.into());
+            }
+            value |= (bits & 31) << shift;
+            shift += 5;
+            if bits & 32 == 0 {
+                if bits & 16 != 0 {
+                    value |= -1 << shift;
+                }
+                break;
+            }
+            byte = bytes.next().ok_or(FAULT)?;
+        }
+        if counts.len() > 2 {
+            value = value.checked_add(counts[counts.len() - 2]).ok_or(FAULT)?;
+        }
+        counts.push(value);
+    }
+    counts.into_iter().map(|c| u64::try_from(c).map_err(|_| FAULT.to_string())).collect()
+}
+
+/// COCO's text of a mask.
+pub fn compress(mask: &Mask) -> String {
+    let mut counts = vec![0i64];
+    let mut inside = false;
+    for column in 0..mask.width {
+        for row in 0..mask.height {
+            if mask.data[row * mask.width + column] != inside {
+                inside = !inside;
+                counts.push(0);
+            }
+            if let Some(last) = counts.last_mut() {
+                *last += 1;
+            }
+        }
+    }
+    let mut text = String::new();
+    for (i, &count) in counts.iter().enumerate() {
+        let mut value = if i > 2 { count - counts[i - 2] } else { count };
+        loop {
+            let bits = (value & 31) as u8;
+            value >>= 5;
+            let done = value == if bits & 16 != 0 { -1 } else { 0 };
+            text.push(char::from(48 + (bits | if done { 0 } else { 32 })));
+            if done {
+                break;
+            }
+        }
+    }
+    text
+}
+
+/// Adds the pixels whose centres lie in a polygon (even-odd); a pixel covers 0 to 1.
+fn fill(polygon: &[f64], mask: &mut Mask) {
+    let points: Vec<(f64, f64)> = polygon.chunks_exact(2).map(|p| (p[0], p[1])).collect();
+    let width = mask.width;
+    let mut cuts = Vec::new();
+    for (row, pixels) in mask.data.chunks_exact_mut(width).enumerate() {
+        let y = row as f64 + 0.5;
+        cuts.clear();
+        for (i, &(x0, y0)) in points.iter().enumerate() {
+            let (x1, y1) = points[(i + 1) % points.len()];
+            if (y0 <= y) != (y1 <= y) {
+                cuts.push(x0 + (y - y0) / (y1 - y0) * (x1 - x0));
+            }
+        }
+        cuts.sort_by(f64::total_cmp);
+        for pair in cuts.chunks_exact(2) {
+            let edge = |x: f64| (x - 0.5).ceil().clamp(0.0, width as f64) as usize;
+            let (from, to) = (edge(pair[0]), edge(pair[1]));
+            pixels[from..to.max(from)].fill(true);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mask::tests::drawn;
+    use serde_json::json;
+
+    #[test]
+    fn runs_go_down_the_columns() {
+        let expected = drawn(&["..#.", ".##.", ".#.."]);
+        let plain = json!({"size": [3, 4], "counts": [4, 4, 4]});
+        assert_eq!(mask(&plain, None).unwrap(), expected);
+        // The text that pycocotools gives for these counts.
+        let text = json!({"size": [3, 4], "counts": "444"});
+        assert_eq!(mask(&text, None).unwrap(), expected);
+        assert_eq!(compress(&expected), "444");
+    }
+
+    #[test]
+    fn polygons_cover_pixel_centres() {
+        let square = json!([[1.0, 1.0, 3.0, 1.0, 3.0, 2.0, 1.0, 2.0]]);
+        let expected = drawn(&["....", ".##.", "...."]);
+        assert_eq!(mask(&square, Some((4, 3))).unwrap(), expected);
+        assert!(mask(&square, None).unwrap_err().contains("size of the image"));
+    }
+
+    #[test]
+    fn hostile_masks_are_refused() {
+        for (json, part) in [
+            (json!({"size": [1_000_000, 1_000_000], "counts": [1]}), "size"),
+            (json!({"size": [8192, 8192], "counts": [67_108_864]}), "limit"),
+            (json!({"size": [3, 4], "counts": [4, u64::MAX, 9]}), "add up"),
+            (json!({"size": [3, 4], "counts": [4, -4, 12]}), "whole number"),
+            (json!({"size": [3, 4], "counts": "oooooooooooooo"}), "damaged"),
+            (json!({"size": [3, 4], "counts": "\u{7f}"}), "damaged"),
+            (json!({"size": [3, 4]}), "counts"),
+            (json!([[1, 2, 3, 4]]), "three points"),
+            (json!([[1, 2, 3, 4, 5, "x"]]), "three points"),
+            (json!(7), "neither"),
+        ] {
+            let error = mask(&json, Some((4, 3))).unwrap_err();
+            assert!(error.contains(part), "{json}: {error}");
+        }
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn compressed_masks_come_back(bits in proptest::collection::vec(proptest::bool::weighted(0.9), 20 * 31)) {
+            let original = Mask { width: 20, height: 31, data: bits };
+            let json = json!({"size": [31, 20], "counts": compress(&original)});
+            proptest::prop_assert_eq!(mask(&json, None).unwrap(), original);
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! What can be wrong with images, calibrations, masks and tables of detections.
+
+use std::path::{Path, PathBuf};
+
+/// Result with this crate's error.
+pub type Result<T> = std::result::Result<T, VisionError>;
+
+/// Errors name the file, the place, what was found and what is expected.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum VisionError {
+    /// A file could not be read.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A file is not what it should be.
+    #[error("{path}: {reason}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The place in it, what was found and what is expected.
+        reason: String,
+    },
+    /// A limit on what is read from outside.
+    #[error("{path}: {what} is {actual}; the limit is {limit}")]
+    Limit {
+        /// The file.
+        path: PathBuf,
+        /// What is too large.
+        what: &'static str,
+        /// Its size.
+        actual: u64,
+        /// The largest size that is read.
+        limit: u64,
+    },
+    /// Arguments that do not fit together.
+    #[error("{0}")]
+    Request(String),
+}
+
+impl VisionError {
+    /// An input error at `path`.
+    pub fn io(path: &Path, source: std::io::Error) -> Self {
+        Self::Io { path: path.into(), source }
+    }
+
+    /// A fault in the content of the file at `path`.
+    pub fn file(path: &Path, reason: impl Into<String>) -> Self {
+        Self::File { path: path.into(), reason: reason.into() }
+    }
+}
+
+/// Reads a whole file of at most `limit` bytes.
+pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
+    use std::io::Read;
+    let file = std::fs::File::open(path).map_err(|e| VisionError::io(path, e))?;
+    let mut bytes = Vec::new();
+    let length =
+        file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| VisionError::io(path, e))?;
+    if length as u64 > limit {
+        let actual = std::fs::metadata(path).map_or(length as u64, |m| m.len());
+        return Err(VisionError::Limit { path: path.into(), what: "size in bytes", actual, limit });
+    }
+    Ok(bytes)
+}

@@ -1,0 +1,174 @@
+//! An estimate from what there is: several methods and the category's prior, weighted by how well
+//! each did on known containers.
+//!
+//! This is beyond the paper. Every method's estimates are compared with known capacities, category by
+//! category, in logarithms: the mean of the differences is its bias, their spread its uncertainty. An
+//! estimate is the mean of the corrected estimates at hand, weighted by the inverse of their variances.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::category::Category;
+
+/// Smallest standard deviation of a method, in logarithms: no method is that exact on a new container.
+const FLOOR: f64 = 0.03;
+
+/// Bias and spread of a method in one category, in logarithms.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reliability {
+    /// Mean of the logarithm of estimate over truth.
+    pub bias: f64,
+    /// Their root mean square about the bias, between containers and within.
+    pub deviation: f64,
+    /// Containers it was seen on.
+    pub containers: usize,
+}
+
+/// What is known of the methods and of the containers of a category.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fusion {
+    /// By category and method.
+    pub methods: BTreeMap<Category, BTreeMap<String, Reliability>>,
+    /// Mean and standard deviation of the logarithm of the capacity in mL, by category.
+    pub priors: BTreeMap<Category, [f64; 2]>,
+}
+
+/// One example to learn from.
+#[derive(Clone, Debug)]
+pub struct Example {
+    /// Which container it is: examples of one container are not independent.
+    pub container: u8,
+    /// Its kind.
+    pub category: Category,
+    /// Its capacity in mL.
+    pub capacity: f64,
+    /// Estimates in mL by method.
+    pub estimates: BTreeMap<String, f64>,
+}
+
+/// An estimate and its uncertainty.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fused {
+    /// Capacity in mL.
+    pub capacity: f64,
+    /// Standard deviation of its logarithm.
+    pub deviation: f64,
+    /// Methods that had a part in it, the prior included.
+    pub methods: Vec<String>,
+}
+
+impl Fusion {
+    /// Learns biases and spreads.
+    pub fn fit(examples: &[Example]) -> Self {
+        let mut fusion = Self::default();
+        for category in Category::ALL {
+            let of_category: Vec<_> = examples.iter().filter(|e| e.category == category).collect();
+            let mut capacities: BTreeMap<u8, f64> = BTreeMap::new();
+            let mut errors: BTreeMap<&str, BTreeMap<u8, Vec<f64>>> = BTreeMap::new();
+            for example in of_category {
+                let truth = example.capacity.ln();
+                capacities.insert(example.container, truth);
+                for (method, estimate) in &example.estimates {
+                    let error = estimate.ln() - truth;
+                    if error.is_finite() {
+                        let of_method = errors.entry(method).or_default();
+                        of_method.entry(example.container).or_default().push(error);
+                    }
+                }
+            }
+            if capacities.is_empty() {
+                continue;
+            }
+            let logs: Vec<f64> = capacities.into_values().collect();
+            let mean = mean(&logs);
+            // A handful of containers says little about the next: the spread of their mean is added.
+            let spread = variance(&logs).map_or(1.0, |v| v * (1.0 + 1.0 / logs.len() as f64));
+            fusion.priors.insert(category, [mean, spread.sqrt().max(FLOOR)]);
+            let methods =
+                errors.into_iter().map(|(method, of)| (method.to_string(), reliability(&of)));
+            fusion.methods.insert(category, methods.collect());
+        }
+        fusion
+    }
+
+    /// The estimate for a container of a category; `None` where nothing is known of it.
+    pub fn estimate(&self, category: Category, estimates: &BTreeMap<String, f64>) -> Option<Fused> {
+        let known = self.methods.get(&category);
+        let mut parts: Vec<(String, f64, f64)> = estimates
+            .iter()
+            .filter_map(|(method, estimate)| {
+                let reliability = known?.get(method)?;
+                let value = estimate.ln() - reliability.bias;
+                value.is_finite().then(|| (method.clone(), value, reliability.deviation))
+            })
+            .collect();
+        if let Some(&[mean, deviation]) = self.priors.get(&category) {
+            parts.push(("prior".into(), mean, deviation));
+        }
+        let weight: f64 = parts.iter().map(|(_, _, d)| d.powi(-2)).sum();
+        let sum: f64 = parts.iter().map(|(_, value, d)| value * d.powi(-2)).sum();
+        (weight > 0.0).then(|| Fused {
+            capacity: (sum / weight).exp(),
+            deviation: weight.sqrt().recip(),
+            methods: parts.into_iter().map(|(method, ..)| method).collect(),
+        })
+    }
+}
+
+/// Every container counts once: the bias is the mean of their means.
+fn reliability(errors: &BTreeMap<u8, Vec<f64>>) -> Reliability {
+    let means: Vec<f64> = errors.values().map(|e| mean(e)).collect();
+    let bias = mean(&means);
+    let n = means.len() as f64;
+    let within = errors.values().map(|e| {
+        let own = mean(e);
+        e.iter().map(|v| (v - own).powi(2)).sum::<f64>() / e.len() as f64
+    });
+    let within = within.sum::<f64>() / n;
+    // One container tells nothing about the spread between containers.
+    let between = variance(&means).map_or(0.25, |v| v * (1.0 + 1.0 / n));
+    Reliability { bias, deviation: (within + between).sqrt().max(FLOOR), containers: means.len() }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Unbiased; `None` for fewer than two values.
+fn variance(values: &[f64]) -> Option<f64> {
+    let mean = mean(values);
+    let sum: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    (values.len() > 1).then(|| sum / (values.len() - 1) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn example(container: u8, capacity: f64, good: f64, bad: f64) -> Example {
+        let estimates = [("good".to_string(), good), ("bad".to_string(), bad)].into();
+        Example { container, category: Category::Cup, capacity, estimates }
+    }
+
+    #[test]
+    fn the_reliable_method_decides_and_its_bias_is_removed() {
+        let fusion = Fusion::fit(&[
+            example(1, 500.0, 600.0, 300.0),
+            example(2, 200.0, 240.0, 400.0),
+            example(3, 300.0, 360.0, 100.0),
+        ]);
+        let both = [("good".to_string(), 120.0), ("bad".to_string(), 900.0)].into();
+        let found = fusion.estimate(Category::Cup, &both).unwrap();
+        assert!((found.capacity - 100.0).abs() < 3.0, "{found:?}");
+        assert_eq!(found.methods, ["bad", "good", "prior"]);
+        let none = fusion.estimate(Category::Cup, &BTreeMap::new()).unwrap();
+        assert!((none.capacity - (500.0f64 * 200.0 * 300.0).cbrt()).abs() < 1e-9);
+        assert!(none.deviation > 5.0 * found.deviation);
+        assert_eq!(fusion.estimate(Category::Box, &both), None);
+        let unusable = [("good".to_string(), 0.0), ("bad".to_string(), -1.0)].into();
+        assert_eq!(fusion.estimate(Category::Cup, &unusable), Some(none));
+    }
+}

@@ -1,0 +1,34 @@
+//! The vision side of the CORSMAL containers benchmark: calibrations, images, masks, and the
+//! capacity of a container from them. Everything runs from files, without any network.
+//!
+//! Lengths are in m or mm and capacities in mL, as each item says; pixels are (column, row) from the
+//! upper left, whole numbers at their centres. `docs/vision.md` says what is published, what is
+//! corrected and what is our reading.
+
+mod calibration;
+pub mod category;
+mod coco;
+mod contour;
+pub mod cuboid;
+mod detections;
+mod error;
+mod forest;
+pub mod fused;
+mod gaussian_process;
+mod image;
+pub mod lode;
+mod mask;
+mod matrix;
+mod pickle;
+pub mod region;
+
+pub use calibration::{BackProjection, Calibration, Camera};
+pub use category::Category;
+pub use coco::{category_name, compress};
+pub use contour::{Contour, contours, largest};
+pub use detections::{Detection, read_detections};
+pub use error::{Result, VisionError};
+pub use gaussian_process::{GaussianProcess, Normal};
+pub use image::{Depth, Rgb};
+pub use mask::Mask;
+pub use matrix::{Matrix3, Matrix34};

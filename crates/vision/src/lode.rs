@@ -1,0 +1,329 @@
+//! M5's capacity: localisation and dimensions of an object from masks in two views (LoDE).
+//!
+//! A circle around the vertical axis through the object's centre, at a height, belongs to the object
+//! where its projections lie on the masks of both views. The largest such circle at every height is
+//! the profile of the object.
+
+use std::f64::consts::PI;
+
+use linfa_linalg::svd::SVD;
+use ndarray::Array2;
+use serde::Serialize;
+
+use crate::calibration::Camera;
+use crate::contour;
+use crate::error::{Result, VisionError};
+use crate::mask::Mask;
+
+/// Radii that are tried, in m, from the first to the last.
+pub const RADII: Grid = Grid { first: 0.075, last: 0.0025, count: 145 };
+/// Heights that are tried, in m above the world's origin.
+pub const HEIGHTS: Grid = Grid { first: -0.1, last: 0.4, count: 500 };
+/// Angles of the points on a circle, in degrees; the last is almost the first again.
+pub const ANGLES: Grid = Grid { first: 0.0, last: 359.0, count: 19 };
+
+/// Evenly spaced values, as numpy's `linspace` makes them.
+#[derive(Clone, Copy, Debug)]
+pub struct Grid {
+    /// First value.
+    pub first: f64,
+    /// Last value.
+    pub last: f64,
+    /// How many.
+    pub count: usize,
+}
+
+impl Grid {
+    /// Distance between neighbours.
+    pub fn step(&self) -> f64 {
+        (self.last - self.first) / (self.count - 1) as f64
+    }
+
+    /// The value with a number from 0.
+    pub fn get(&self, i: usize) -> f64 {
+        if i + 1 == self.count { self.last } else { i as f64 * self.step() + self.first }
+    }
+}
+
+/// How faithfully the published program is followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Variant {
+    /// As published: indices left of or above an image wrap to its other side, a circle that
+    /// reaches beyond the other sides ends the estimate, gaps in the profile count as height.
+    Published,
+    /// Pixels outside an image are not on the mask; only heights that belong to the object count.
+    Corrected,
+}
+
+/// The size of an object.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Dimensions {
+    /// Centre in m, in the coordinates of the world.
+    pub centre: [f64; 3],
+    /// Height in mm.
+    pub height: f64,
+    /// Largest width in mm.
+    pub width: f64,
+    /// Capacity in mL.
+    pub capacity: f64,
+    /// Height above the world's origin and radius of every accepted circle, in m, from below.
+    pub profile: Vec<[f64; 2]>,
+}
+
+/// Capacity and what one pixel more or less on both masks makes of it, in mL.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Band {
+    /// With masks eroded by a pixel; `None` where nothing is left.
+    pub low: Option<f64>,
+    /// With masks dilated by a pixel.
+    pub high: Option<f64>,
+}
+
+/// M5's estimate where there is none: close to the mean capacity of the training containers, in mL.
+pub const PRIOR_ML: f64 = 734.94;
+
+/// M5's estimate of a recording from its first frame and the 20th from the end: their mean, the one
+/// that there is, or `None`, where M5 takes [`PRIOR_ML`].
+pub fn combine(first: Option<f64>, late: Option<f64>) -> Option<f64> {
+    match (first, late) {
+        (Some(a), Some(b)) => Some((a + b) / 2.0),
+        (one, other) => one.or(other),
+    }
+}
+
+/// What one view gives.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// Pixels of the object.
+    pub mask: &'a Mask,
+    /// Colour camera of the view.
+    pub camera: &'a Camera,
+}
+
+/// Measures the object that two masks show.
+///
+/// # Errors
+/// [`VisionError::Request`] with the reason when there is no estimate: an empty mask, a circle
+/// outside an image (published variant), no circle on both masks.
+pub fn dimensions(views: [View<'_>; 2], variant: Variant) -> Result<Dimensions> {
+    let mut centres = [[0.0; 2]; 2];
+    for (i, view) in views.iter().enumerate() {
+        let border = contour::largest(view.mask)
+            .ok_or_else(|| VisionError::Request(format!("the mask of view {} is empty", i + 1)))?;
+        centres[i] = border.centroid().ok_or_else(|| {
+            VisionError::Request(format!("the mask of view {} has no area", i + 1))
+        })?;
+    }
+    let centre = triangulate(views.map(|v| v.camera), centres)
+        .ok_or_else(|| VisionError::Request("the two lines of sight do not meet".into()))?;
+    let (width, accepted) = profile(views, centre, variant)?;
+    let (Some(&(first, _)), Some(&(last, _))) = (accepted.first(), accepted.last()) else {
+        return Err(VisionError::Request("no circle lies on both masks".into()));
+    };
+    let count = accepted.len() as f64;
+    let radius = accepted.iter().map(|&(_, r)| RADII.get(r)).sum::<f64>() / count * 1000.0;
+    let height = match variant {
+        Variant::Published => (HEIGHTS.get(last) - HEIGHTS.get(first)) * 1000.0,
+        // Each circle stands for a slice of the grid's step.
+        Variant::Corrected => count * HEIGHTS.step() * 1000.0,
+    };
+    Ok(Dimensions {
+        centre,
+        height,
+        width,
+        capacity: radius.powi(2) * height * PI / 1000.0,
+        profile: accepted.iter().map(|&(h, r)| [HEIGHTS.get(h), RADII.get(r)]).collect(),
+    })
+}
+
+/// The same with masks one pixel smaller and larger: how much the masks decide.
+pub fn band(views: [View<'_>; 2], variant: Variant) -> Band {
+    let capacity = |change: fn(&Mask) -> Mask| {
+        let masks = views.map(|view| change(view.mask));
+        let changed = [0, 1].map(|i| View { mask: &masks[i], camera: views[i].camera });
+        dimensions(changed, variant).ok().map(|d| d.capacity)
+    };
+    Band { low: capacity(Mask::eroded), high: capacity(Mask::dilated) }
+}
+
+/// The point in m seen at two pixels: least squares on the homogeneous equations of both cameras.
+fn triangulate(cameras: [&Camera; 2], pixels: [[f64; 2]; 2]) -> Option<[f64; 3]> {
+    let mut equations = Array2::zeros((4, 4));
+    for (view, (camera, pixel)) in cameras.iter().zip(pixels).enumerate() {
+        for axis in 0..2 {
+            for column in 0..4 {
+                equations[[2 * view + axis, column]] =
+                    pixel[axis] * camera.projection[2][column] - camera.projection[axis][column];
+            }
+        }
+    }
+    let (_, values, vectors) = equations.svd(false, true).ok()?;
+    let smallest = (0..4).min_by(|&a, &b| values[a].total_cmp(&values[b]))?;
+    let v = vectors?.row(smallest).to_owned();
+    let point = [v[0] / v[3], v[1] / v[3], v[2] / v[3]];
+    point.iter().all(|x| x.is_finite()).then_some(point)
+}
+
+/// Projections of circles around a centre: a pixel is `(a + radius * b) / (c + radius * d)`.
+struct Circles {
+    /// Cosine and sine of the angles.
+    turns: [(f64, f64); ANGLES.count],
+    centre: [f64; 3],
+}
+
+/// Width in mm, and numbers of height and radius of the accepted circles.
+type Profile = (f64, Vec<(usize, usize)>);
+
+fn profile(views: [View<'_>; 2], centre: [f64; 3], variant: Variant) -> Result<Profile> {
+    let circles = Circles {
+        turns: std::array::from_fn(|i| {
+            let angle = ANGLES.get(i).to_radians();
+            (angle.cos(), angle.sin())
+        }),
+        centre,
+    };
+    let mut widest = 0.0f64;
+    let mut accepted = Vec::new();
+    for h in 0..HEIGHTS.count {
+        let mut radius = RADII.count - 1;
+        for r in 0..RADII.count {
+            let mut inside = true;
+            for view in &views {
+                match circles.seen(view, RADII.get(r), HEIGHTS.get(h), variant) {
+                    Seen::Inside => {}
+                    Seen::Partly => inside = false,
+                    Seen::Beyond => {
+                        return Err(VisionError::Request(format!(
+                            "a circle of {:.1} mm at height {:.0} mm reaches beyond an image, \
+                             where the published program ends",
+                            RADII.get(r) * 1000.0,
+                            HEIGHTS.get(h) * 1000.0
+                        )));
+                    }
+                }
+                // The published program looks at both images before it decides.
+                if !inside && variant == Variant::Corrected {
+                    break;
+                }
+            }
+            if inside {
+                accepted.push((h, r));
+                radius = r;
+                break;
+            }
+        }
+        widest = widest.max(RADII.get(radius) * 2.0 * 1000.0);
+    }
+    if variant == Variant::Corrected {
+        widest = accepted.iter().map(|&(_, r)| RADII.get(r) * 2000.0).fold(0.0, f64::max);
+    }
+    Ok((widest, accepted))
+}
+
+/// Where the points of a circle lie.
+#[derive(PartialEq)]
+enum Seen {
+    Inside,
+    Partly,
+    Beyond,
+}
+
+impl Circles {
+    fn seen(&self, view: &View<'_>, radius: f64, height: f64, variant: Variant) -> Seen {
+        let (width, rows) = (view.mask.width as i64, view.mask.height as i64);
+        let mut seen = Seen::Inside;
+        for &(cos, sin) in &self.turns {
+            let point = [self.centre[0] + radius * cos, self.centre[1] + radius * sin, height];
+            let pixel = view.camera.project(point);
+            let [x, y] = match variant {
+                // Truncated towards zero and wrapped, as numpy does.
+                Variant::Published => {
+                    let [x, y] = pixel.map(|v| v as i64);
+                    [x + if x < 0 { width } else { 0 }, y + if y < 0 { rows } else { 0 }]
+                }
+                Variant::Corrected => pixel.map(|v| v.floor() as i64),
+            };
+            let in_image = (0..width).contains(&x) && (0..rows).contains(&y);
+            if !in_image && variant == Variant::Published {
+                return Seen::Beyond;
+            }
+            if !in_image || !view.mask.data[(y * width + x) as usize] {
+                if variant == Variant::Corrected {
+                    return Seen::Partly;
+                }
+                seen = Seen::Partly;
+            }
+        }
+        seen
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grids_are_those_of_the_published_program() {
+        assert_eq!((RADII.get(0), RADII.get(144)), (0.075, 0.0025));
+        assert!((RADII.step() + 0.0725 / 144.0).abs() < 1e-18);
+        assert_eq!((HEIGHTS.get(0), HEIGHTS.get(499)), (-0.1, 0.4));
+        assert_eq!(ANGLES.get(18), 359.0);
+    }
+
+    /// Cameras 1 m from the origin, 90 degrees apart, looking down by 20 degrees.
+    fn camera(around: f64) -> Camera {
+        let (s, c) = around.sin_cos();
+        let (ts, tc) = 20f64.to_radians().sin_cos();
+        let rotation = [[-s, c, 0.0], [c * ts, s * ts, -tc], [-c * tc, -s * tc, -ts]];
+        let k = [[900.0, 0.0, 320.0], [0.0, 900.0, 240.0], [0.0, 0.0, 1.0]];
+        Camera::new(k, rotation, [0.0, 0.05, 1.0])
+    }
+
+    /// The mask of an upright cylinder of 60 mm width and 120 mm height at the origin.
+    fn cylinder(camera: &Camera) -> Mask {
+        let mut mask = Mask::empty(640, 480);
+        for h in 0..=120 {
+            for ring in 0..=15 {
+                for a in 0..180 {
+                    let (s, c) = (f64::from(a) * 2.0).to_radians().sin_cos();
+                    let r = 0.03 * f64::from(ring) / 15.0;
+                    let [x, y] = camera.project([r * c, r * s, 0.001 * f64::from(h)]);
+                    mask.data[y as usize * 640 + x as usize] = true;
+                }
+            }
+        }
+        mask.closed(2)
+    }
+
+    #[test]
+    fn a_cylinder_is_measured() {
+        let cameras = [camera(0.3), camera(0.3 + PI / 2.0)];
+        let masks = [0, 1].map(|i| cylinder(&cameras[i]));
+        let views = [0, 1].map(|i| View { mask: &masks[i], camera: &cameras[i] });
+        let d = dimensions(views, Variant::Corrected).unwrap();
+        assert!(d.centre[0].abs() < 2e-3 && d.centre[1].abs() < 2e-3, "{:?}", d.centre);
+        assert!((d.width - 60.0).abs() < 3.0, "{}", d.width);
+        // Circles seen from above fit on the mask beyond both ends: the known bias of the method.
+        assert!((120.0..150.0).contains(&d.height), "{}", d.height);
+        let band = band(views, Variant::Corrected);
+        assert!(band.low.unwrap() < d.capacity && d.capacity < band.high.unwrap(), "{band:?}");
+        let published = dimensions(views, Variant::Published).unwrap();
+        assert_eq!(published.width, d.width);
+        // Without the rows below the object, circles reach beyond the image.
+        let cut = masks.map(|m| Mask { width: 640, height: 340, data: m.data[..340 * 640].into() });
+        let views = [0, 1].map(|i| View { mask: &cut[i], camera: &cameras[i] });
+        let error = dimensions(views, Variant::Published).unwrap_err().to_string();
+        assert!(error.contains("beyond an image"), "{error}");
+        assert_eq!(dimensions(views, Variant::Corrected).unwrap().capacity, d.capacity);
+    }
+
+    #[test]
+    fn no_estimate_has_a_reason() {
+        let camera = camera(0.0);
+        let empty = Mask::empty(640, 480);
+        let view = View { mask: &empty, camera: &camera };
+        let error = dimensions([view, view], Variant::Published).unwrap_err().to_string();
+        assert_eq!(error, "the mask of view 1 is empty");
+    }
+}
