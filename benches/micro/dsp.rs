@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use corsmal_benches::{RATE, signal};
+use corsmal_dsp::corsmal::paa::PaaPlan;
 use corsmal_dsp::cqt::{CqtParams, CqtPlan};
 use corsmal_dsp::hpss::{HpssParams, Part, Separator, Work};
 use corsmal_dsp::median;
-use corsmal_dsp::paa::PaaPlan;
 use corsmal_dsp::resample::{ResamplePlan, ResampleStream};
 use corsmal_dsp::stft::StftParams;
 use divan::Bencher;

@@ -107,6 +107,7 @@ pub fn chroma_filter<T: Real>(p: &ChromaParams) -> Result<Array2<T>> {
 pub struct Chroma<T> {
     /// `[n_chroma, bins]`, row after row.
     weights: Vec<T>,
+    n_chroma: usize,
     bins: usize,
     norm: Option<Norm>,
 }
@@ -114,7 +115,8 @@ pub struct Chroma<T> {
 impl<T: Real> Chroma<T> {
     /// Applies `bank [n_chroma, bins]` and normalises each frame by `norm`.
     pub fn new(bank: ArrayView2<T>, norm: Option<Norm>) -> Self {
-        Self { weights: bank.iter().copied().collect(), bins: bank.ncols(), norm }
+        let (n_chroma, bins) = bank.dim();
+        Self { weights: bank.iter().copied().collect(), n_chroma, bins, norm }
     }
 
     /// Pitch classes of one spectrum of `bins` powers (or magnitudes) into `out`; silence is 0.
@@ -140,27 +142,34 @@ impl<T: Real> Chroma<T> {
             norm.normalize(out);
         }
     }
+
+    /// Chromagram `[channels, n_chroma, frames]` of a spectrogram.
+    ///
+    /// # Errors
+    /// A spectrogram of other bins, or (when normalised) non-finite values.
+    pub fn chromagram(&self, s: ArrayView3<T>) -> Result<Array3<T>> {
+        if s.dim().1 != self.bins {
+            let expected = format!("{} bins", self.bins);
+            return Err(DspError::Shape { name: "S", expected, actual: s.shape().to_vec() });
+        }
+        if self.norm.is_some() {
+            require_finite("S", s)?;
+        }
+        let frame = |(): &mut (), _, _, spectrum: &[T], out: &mut [T]| self.frame(spectrum, out);
+        Ok(Spectra::from(s).map(self.n_chroma, || (), frame))
+    }
 }
 
 /// Chromagram `[channels, n_chroma, frames]` of a spectrogram under a filter bank.
 ///
 /// # Errors
-/// A bank for other bins, or (when normalised) non-finite values.
+/// As [`Chroma::chromagram`].
 pub fn chroma<T: Real>(
     s: ArrayView3<T>,
     bank: ArrayView2<T>,
     norm: Option<Norm>,
 ) -> Result<Array3<T>> {
-    if s.dim().1 != bank.ncols() {
-        let expected = format!("{} bins", bank.ncols());
-        return Err(DspError::Shape { name: "S", expected, actual: s.shape().to_vec() });
-    }
-    if norm.is_some() {
-        require_finite("S", s)?;
-    }
-    let chroma = Chroma::new(bank, norm);
-    let frame = |(): &mut (), _, _, spectrum: &[T], out: &mut [T]| chroma.frame(spectrum, out);
-    Ok(Spectra::from(s).map(bank.nrows(), || (), frame))
+    Chroma::new(bank, norm).chromagram(s)
 }
 
 #[cfg(test)]

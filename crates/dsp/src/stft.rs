@@ -80,7 +80,7 @@ impl PadMode {
 }
 
 /// Parameters of the transform, in librosa's names.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct StftParams {
     /// Length of the transform in samples.
     pub n_fft: usize,
@@ -164,6 +164,16 @@ impl StftParams {
 ///
 /// # Errors
 /// Impossible parameters, or a signal too short for one frame.
+///
+/// ```
+/// use corsmal_dsp::stft::{StftParams, stft};
+///
+/// let y = ndarray::Array2::<f64>::ones((1, 4096));
+/// let spectrum = stft(y.view(), &StftParams::new(1024, 256))?;
+/// assert_eq!(spectrum.dim(), (1, 513, 17));
+/// assert!((spectrum[[0, 0, 8]].re - 512.0).abs() < 1e-9); // the sum of the window
+/// # Ok::<(), corsmal_dsp::DspError>(())
+/// ```
 pub fn stft<T: Real>(y: ArrayView2<T>, p: &StftParams) -> Result<Array3<Complex<T>>> {
     let mut out = Array3::zeros(p.shape_of(y)?);
     stft_into(y, p, out.view_mut())?;

@@ -95,9 +95,9 @@ impl LanePlan {
     /// Impossible parameters.
     pub fn new(params: &StftParams) -> Result<Self> {
         params.check()?;
-        let window = padded_window(params.window, params.win_length, params.n_fft)?;
+        let window = padded_window(&params.window, params.win_length, params.n_fft)?;
         let window = window.into_iter().map(|w| w as f32).collect();
-        Ok(Self { params: *params, window, spectrum: Spectrum::new(params.n_fft)? })
+        Ok(Self { params: params.clone(), window, spectrum: Spectrum::new(params.n_fft)? })
     }
 
     /// What one thread works with.

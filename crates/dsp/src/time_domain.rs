@@ -189,6 +189,35 @@ pub fn zero_crossing_rate<T: Real>(
     Ok(out)
 }
 
+/// Root of the mean square of each channel of one interleaved frame `[samples][channels]`, into
+/// `out`; `sums` holds as many values.
+///
+/// One channel is added up in lanes, several each in its own: either way no addition waits for the
+/// one before.
+pub fn level<T: Real>(frame: &[T], sums: &mut [f64], out: &mut [f32]) {
+    let channels = sums.len();
+    let square = |x: T| x.wide() * x.wide();
+    vectorized(
+        #[inline(always)]
+        || {
+            if let [sum] = sums {
+                *sum = sums::sum(frame, square);
+                return;
+            }
+            sums.fill(0.0);
+            for samples in frame.chunks_exact(channels) {
+                for (sum, x) in sums.iter_mut().zip(samples) {
+                    *sum += square(*x);
+                }
+            }
+        },
+    );
+    let samples = (frame.len() / channels) as f64;
+    for (out, sum) in out.iter_mut().zip(sums) {
+        *out = (*sum / samples).sqrt() as f32;
+    }
+}
+
 /// Root of the mean square of each frame, `[channels, 1, frames]`, always `f32` (librosa 0.11
 /// `feature.rms` given `y`).
 ///
@@ -215,11 +244,7 @@ pub fn rms<T: Real>(
                 pad_mode.read(signal, start, padded);
                 padded
             });
-            let sum = vectorized(
-                #[inline(always)]
-                || sums::sum(samples, |x| x.wide() * x.wide()),
-            );
-            *slot = (sum / frame.frame_length as f64).sqrt() as f32;
+            level(samples, &mut [0.0], std::slice::from_mut(slot));
         }
     });
     Ok(out)

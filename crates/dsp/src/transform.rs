@@ -43,11 +43,11 @@ impl<F: Real> Forward<F> {
         let window = if flat {
             None
         } else {
-            let window = padded_window(params.window, params.win_length, params.n_fft)?;
+            let window = padded_window(&params.window, params.win_length, params.n_fft)?;
             Some(window.into_iter().map(F::of).collect())
         };
         let fft = RealFftPlanner::new().plan_fft_forward(params.n_fft);
-        Ok(Self { params: *params, window, fft })
+        Ok(Self { params: params.clone(), window, fft })
     }
 
     /// The parameters of the transform.
@@ -110,13 +110,13 @@ impl<F: Real> Inverse<F> {
     /// Impossible parameters.
     pub fn new(params: &StftParams) -> Result<Self> {
         params.check()?;
-        let window = padded_window(params.window, params.win_length, params.n_fft)?;
+        let window = padded_window(&params.window, params.win_length, params.n_fft)?;
         let squares = window.iter().map(|w| w * w).collect();
         // The inverse transform is not normalised; its 1 / n_fft goes with the window.
         let scale = 1.0 / params.n_fft as f64;
         let window = window.into_iter().map(|w| F::of(w * scale)).collect();
         let fft = RealFftPlanner::new().plan_fft_inverse(params.n_fft);
-        Ok(Self { params: *params, window, squares, fft })
+        Ok(Self { params: params.clone(), window, squares, fft })
     }
 
     /// Working memory for [`add`](Self::add).

@@ -1,7 +1,7 @@
 //! The front end: decoded blocks to the signal that features see, in the order of
 //! [`SignalConfig`].
 
-use corsmal_dsp::frontends::downmix_71_weights;
+use corsmal_dsp::corsmal::downmix_71_weights;
 use corsmal_dsp::resample::{Converter, ConverterStream};
 use corsmal_dsp::simd::vectorized;
 

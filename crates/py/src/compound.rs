@@ -1,7 +1,7 @@
 //! Compound inputs of the benchmark's systems: pyAudioAnalysis features, resized spectrograms,
 //! principal components.
 
-use corsmal_dsp::paa::{MidTerm, PaaPlan, paa_fbank as dsp_paa_fbank};
+use corsmal_dsp::corsmal::paa::{MidTerm, PaaPlan, paa_fbank as dsp_paa_fbank};
 use corsmal_dsp::pca::Pca;
 use corsmal_dsp::resize::{ResizeParams, resize};
 use corsmal_dsp::stft::PadMode;

@@ -1,9 +1,10 @@
 //! Inputs of the compared systems M1 to M6 and of the spectrogram baselines.
 
-use corsmal_dsp::frontends::{
-    LibrosaVersion, M1Stft, M2Mfcc, M3Spectrogram, M4LogMel, M5A34f136, M5VggishPatches, M6Crop,
-    M6Spectrogram, Spec9216, Variant, m4_windows as dsp_m4_windows,
+use corsmal_dsp::corsmal::{
+    M1Stft, M2Mfcc, M3Spectrogram, M4LogMel, M5A34f136, M5VggishPatches, M6Crop, M6Spectrogram,
+    Spec9216, Variant, m4_windows as dsp_m4_windows,
 };
+use corsmal_dsp::librosa::LibrosaVersion;
 use numpy::PyReadonlyArrayDyn;
 use pyo3::prelude::*;
 

@@ -2,7 +2,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use corsmal_dsp::af193::{Af193, LENGTH};
+use corsmal_dsp::Lane;
+use corsmal_dsp::corsmal::af193::{Af193, LENGTH};
 use corsmal_dsp::cqt::{
     ChromaCqt, ChromaCqtParams, CqtParams, chroma_cqt as dsp_chroma_cqt, cqt as dsp_cqt,
 };
@@ -10,7 +11,6 @@ use corsmal_dsp::hpss::{HpssParams, Part, masks as dsp_masks, separate as dsp_se
 use corsmal_dsp::istft::istft as dsp_istft;
 use corsmal_dsp::librosa::LibrosaVersion;
 use corsmal_dsp::tonnetz::tonnetz as dsp_tonnetz;
-use corsmal_dsp::vector::Lane;
 use corsmal_dsp::window::Window;
 use ndarray::{Array2, ArrayView2, ArrayView3};
 use num_complex::Complex;

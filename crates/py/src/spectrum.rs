@@ -52,7 +52,10 @@ fn get_window<'py>(
     fftbins: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     let window: Window = window.parse().map_err(value_error)?;
-    into_numpy(py, ndarray::Array1::from_vec(dsp_get_window(window, nx, fftbins)))
+    into_numpy(
+        py,
+        ndarray::Array1::from_vec(dsp_get_window(&window, nx, fftbins).map_err(value_error)?),
+    )
 }
 
 /// Whether all values are finite.

@@ -56,25 +56,39 @@ impl Wavelets {
     }
 
     /// Frequency in Hz up to which the filters reach (to half their height).
-    pub fn cutoff(&self, window: Window) -> f64 {
-        let bandwidth = noise_bandwidth(window);
+    ///
+    /// # Errors
+    /// A window that has no such length.
+    pub fn cutoff(&self, window: &Window) -> Result<f64> {
+        let bandwidth = noise_bandwidth(window)?;
         let reach = |(f, q): (&f64, &f64)| f * (1.0 + 0.5 * bandwidth / q);
-        self.frequencies.iter().zip(&self.q).map(reach).fold(0.0, f64::max)
+        Ok(self.frequencies.iter().zip(&self.q).map(reach).fold(0.0, f64::max))
     }
 }
 
 /// Equivalent noise bandwidth in bins, on the symmetric 8193-point window that librosa's table was
-/// made with. That table's entry for the flat top is not its bandwidth; the Kaiser window is not in
-/// it and is measured on 1000 periodic points.
-fn noise_bandwidth(window: Window) -> f64 {
+/// made with. That table's entry for the flat top is not its bandwidth; windows that are not in it
+/// are measured on 1000 periodic points.
+fn noise_bandwidth(window: &Window) -> Result<f64> {
     let (n, periodic) = match window {
-        Window::FlatTop => return 2.776_225_504_648_414,
-        Window::Kaiser(_) => (1000, true),
-        _ => (8193, false),
+        Window::FlatTop => return Ok(2.776_225_504_648_414),
+        Window::Hann
+        | Window::Hamming
+        | Window::Blackman
+        | Window::BlackmanHarris
+        | Window::Nuttall
+        | Window::Bartlett
+        | Window::Triang
+        | Window::Cosine
+        | Window::Boxcar
+        | Window::Parzen
+        | Window::Bohman
+        | Window::BartHann => (8193, false),
+        _ => (1000, true),
     };
-    let values = get_window(window, n, periodic);
+    let values = get_window(window, n, periodic)?;
     let sum: f64 = values.iter().sum();
-    n as f64 * values.iter().map(|w| w * w).sum::<f64>() / (sum * sum)
+    Ok(n as f64 * values.iter().map(|w| w * w).sum::<f64>() / (sum * sum))
 }
 
 /// Filters of one octave: for each bin the weights of consecutive spectrum bins.
@@ -110,21 +124,21 @@ impl Basis {
         let mut scratch = vec![Complex::default(); fft.get_inplace_scratch_len()];
         let rows = range.map(|k| {
             let length = wavelets.length(k, sr);
-            let mut filter = wavelet(wavelets.frequencies[k] / sr, length, n_fft, p);
+            let mut filter = wavelet(wavelets.frequencies[k] / sr, length, n_fft, p)?;
             fft.process_with_scratch(&mut filter, &mut scratch);
             filter.truncate(n_fft / 2 + 1);
-            sparse(&filter, p.sparsity)
+            Ok(sparse(&filter, p.sparsity))
         });
-        Ok(Self { n_fft, rows: rows.collect() })
+        Ok(Self { n_fft, rows: rows.collect::<Result<_>>()? })
     }
 }
 
 /// The windowed complex tone of `length` samples at `frequency` (in cycles per sample), centred in
 /// `n_fft` samples and scaled by `length / n_fft`. Rounded to single precision, as librosa's is.
-fn wavelet(frequency: f64, length: f64, n_fft: usize, p: &CqtParams) -> Vec<Complex<f64>> {
+fn wavelet(frequency: f64, length: f64, n_fft: usize, p: &CqtParams) -> Result<Vec<Complex<f64>>> {
     let start = (-length / 2.0).floor();
     let n = ((length / 2.0).floor() - start) as usize;
-    let window = get_window(p.window, n, true);
+    let window = get_window(&p.window, n, true)?;
     let mut tone: Vec<Complex<f64>> = (0..n)
         .map(|i| {
             let angle = (start + i as f64) * 2.0 * std::f64::consts::PI * frequency;
@@ -143,7 +157,7 @@ fn wavelet(frequency: f64, length: f64, n_fft: usize, p: &CqtParams) -> Vec<Comp
     for (slot, z) in padded[left..].iter_mut().zip(tone) {
         *slot = Complex::new(single(single(z.re) * scale), single(single(z.im) * scale));
     }
-    padded
+    Ok(padded)
 }
 
 /// The values without the smallest magnitudes that together make up `quantile` of the sum of all:
@@ -175,10 +189,13 @@ mod tests {
 
     #[test]
     fn noise_bandwidths_are_those_of_the_table() {
-        let close = |w, want: f64| (noise_bandwidth(w) - want).abs() < 1e-9;
+        let close = |w, want: f64| (noise_bandwidth(&w).unwrap() - want).abs() < 1e-9;
         assert!(close(Window::Hann, 1.50018310546875));
         assert!(close(Window::Hamming, 1.3629455320350348));
         assert!(close(Window::Boxcar, 1.0));
+        assert!(close(Window::Parzen, 1.9174603174603191));
+        assert!(close(Window::Bohman, 1.7859588613860062));
+        assert!(close(Window::BartHann, 1.4560255965133932));
     }
 
     #[test]

@@ -35,7 +35,7 @@ use decimate::Decimator;
 pub const C1: f64 = 32.703_195_662_574_83;
 
 /// Parameters of the transform, in librosa's names.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct CqtParams {
     /// Sample rate in Hz.
     pub sr: f64,
@@ -164,7 +164,7 @@ impl CqtPlan {
     pub fn new(p: &CqtParams) -> Result<Self> {
         p.check()?;
         let wavelets = Wavelets::new(p);
-        let (cutoff, nyquist) = (wavelets.cutoff(p.window), p.sr / 2.0);
+        let (cutoff, nyquist) = (wavelets.cutoff(&p.window)?, p.sr / 2.0);
         if !(cutoff <= nyquist && wavelets.frequencies[0] > 0.0) {
             let allowed = format!(
                 "filters up to sr / 2 = {nyquist} Hz, but the highest reaches {cutoff:.1} Hz"
@@ -219,7 +219,7 @@ impl CqtPlan {
             ResType::KaiserBest => Decimator::windowed_sinc(false),
             ResType::KaiserFast => Decimator::windowed_sinc(true),
         };
-        Ok(Self { params: *p, early, early_decimators, decimator, octaves })
+        Ok(Self { params: p.clone(), early, early_decimators, decimator, octaves })
     }
 
     /// The parameters of the transform.

@@ -37,7 +37,7 @@ impl SignalTuning {
     /// `sr` that is not positive.
     pub fn padded(sr: f64, pad_mode: PadMode) -> Result<Self> {
         let stft = StftParams { pad_mode, ..StftParams::new(N_FFT, HOP) };
-        let window = get_window(stft.window, N_FFT, true);
+        let window = get_window(&stft.window, N_FFT, true)?;
         let params = PitchParams::new(sr, N_FFT);
         TuningEstimator::<f32>::new(params)?;
         Ok(Self {

@@ -42,6 +42,10 @@ pub enum ResType {
     KaiserFast,
 }
 
+/// Largest growth of a recording whose rate comes from its file: a header that says 1 Hz would turn
+/// a small file into billions of samples.
+pub const MAX_EXPANSION: f64 = 100.0;
+
 /// The largest ratio of two rates in either direction.
 const MAX_RATIO: f64 = 65536.0;
 

@@ -9,6 +9,21 @@ use crate::error::Result;
 
 /// Converts interleaved frames as they come; the outputs do not depend on how the input is cut into
 /// blocks. Output lags by the filters' reach (194 input frames at 2:1).
+///
+/// ```
+/// use std::sync::Arc;
+/// use corsmal_dsp::resample::{ResamplePlan, ResampleStream};
+///
+/// let plan = Arc::new(ResamplePlan::new(44100.0, 16000.0)?);
+/// let mut stream = ResampleStream::new(plan, 2)?;
+/// let mut out = Vec::new();
+/// for block in [[0.25; 8820]; 10] {
+///     stream.push(&block, &mut out)?; // stereo frames, as they arrive
+/// }
+/// stream.finish(&mut out);
+/// assert_eq!(out.len(), 2 * 16000);
+/// # Ok::<(), corsmal_dsp::DspError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct ResampleStream {
     plan: Arc<ResamplePlan>,

@@ -8,7 +8,7 @@ use corsmal_dsp::window::Window;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Short-time transform. Features with equal groups share one transform.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct StftSpec {
     /// Length of the transform in samples.
@@ -45,7 +45,7 @@ impl StftSpec {
             n_fft: self.n_fft,
             hop_length: self.hop_length,
             win_length: if self.win_length == 0 { self.n_fft } else { self.win_length },
-            window: self.window,
+            window: self.window.clone(),
             center: self.center,
             pad_mode: self.pad_mode,
         };

@@ -264,11 +264,11 @@ fn join_spectrum(
         }
     }
     let window =
-        corsmal_dsp::window::padded_window(wanted.window, wanted.win_length, wanted.n_fft)?;
+        corsmal_dsp::window::padded_window(&wanted.window, wanted.win_length, wanted.n_fft)?;
     streams.push(StreamPlan {
         framing: transform_framing(wanted),
         kind: StreamKind::Spectrum {
-            params: *wanted,
+            params: wanted.clone(),
             spectrum: Spectrum::new(wanted.n_fft)?,
             window: window.iter().map(|w| *w as f32).collect(),
             members: vec![member],
@@ -292,10 +292,10 @@ fn join_exact(
         }
     }
     // Padding is the stream's: the transform sees whole frames.
-    let forward = Forward::new(&StftParams { center: false, ..*wanted })?;
+    let forward = Forward::new(&StftParams { center: false, ..wanted.clone() })?;
     streams.push(StreamPlan {
         framing: transform_framing(wanted),
-        kind: StreamKind::Exact { params: *wanted, forward, members: vec![member] },
+        kind: StreamKind::Exact { params: wanted.clone(), forward, members: vec![member] },
     });
     Ok(())
 }

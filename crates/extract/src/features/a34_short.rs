@@ -1,7 +1,7 @@
 //! `a34_short`: pyAudioAnalysis' features frame by frame.
 
 use corsmal_dsp::DspError;
-use corsmal_dsp::paa::{PaaPlan, short_names};
+use corsmal_dsp::corsmal::paa::{PaaPlan, short_names};
 use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
 

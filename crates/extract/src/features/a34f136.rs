@@ -1,7 +1,7 @@
 //! `a34f136`: pyAudioAnalysis statistics of a recording (M5's random forests).
 
-use corsmal_dsp::frontends::M5A34f136;
-use corsmal_dsp::paa::{Peak, short_names};
+use corsmal_dsp::corsmal::M5A34f136;
+use corsmal_dsp::corsmal::paa::{Peak, short_names};
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 

@@ -1,6 +1,6 @@
 //! `af193`: the feature vector of the CORSMAL audio baseline.
 
-use corsmal_dsp::af193::{Af193 as Vector, names};
+use corsmal_dsp::corsmal::af193::{Af193 as Vector, names};
 use corsmal_dsp::librosa::LibrosaVersion;
 use ndarray::{Array1, Array2, Axis};
 use serde::{Deserialize, Serialize};

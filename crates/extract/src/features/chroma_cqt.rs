@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use corsmal_dsp::ByTuning;
 use corsmal_dsp::cqt::{ChromaCqt as Fold, ChromaCqtParams, CqtParams, CqtPlan, SignalTuning};
 use corsmal_dsp::librosa::LibrosaVersion;
-use corsmal_dsp::tuned::ByTuning;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
@@ -52,7 +52,7 @@ pub struct ChromaOfChannel {
 
 impl ChromaOfChannel {
     fn transform(&self, tuning: f64) -> corsmal_dsp::Result<Arc<CqtPlan>> {
-        self.transforms.get(tuning, || CqtPlan::new(&CqtParams { tuning, ..self.params }))
+        self.transforms.get(tuning, || CqtPlan::new(&CqtParams { tuning, ..self.params.clone() }))
     }
 }
 
@@ -90,10 +90,10 @@ impl ChromaCqt {
             ..ChromaCqtParams::default()
         };
         let kernel = ChromaOfChannel {
+            fold: Fold::new(params.n_bins, &fold)?,
             params: params.of(self.librosa),
             tuning: estimated,
             transforms: ByTuning::default(),
-            fold: Fold::new(params.n_bins, &fold)?,
         };
         kernel.transform(tuning)?;
         Ok(kernel)

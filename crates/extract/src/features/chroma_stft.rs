@@ -1,11 +1,10 @@
 //! `chroma_stft`: energy in pitch classes.
 
+use corsmal_dsp::ByTuning;
 use corsmal_dsp::chroma::{Chroma, ChromaParams, chroma_filter};
-use corsmal_dsp::columns::map_columns;
 use corsmal_dsp::normalize::Norm;
 use corsmal_dsp::pitch::{PitchParams, estimate_tuning};
 use corsmal_dsp::stft::{StftParams, spectrogram};
-use corsmal_dsp::tuned::ByTuning;
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
@@ -72,9 +71,7 @@ impl WholeKernel for Classes {
             let bank = chroma_filter(&ChromaParams { tuning, ..self.params })?;
             Ok(Chroma::new(bank.view(), Some(Norm::Max)))
         })?;
-        let chroma = map_columns(spectrum.view(), n_chroma, |_, _, spectrum, out| {
-            bank.frame(spectrum, out);
-        });
+        let chroma = bank.chromagram(spectrum.view())?;
         Ok(chroma.index_axis_move(Axis(0), 0))
     }
 }

@@ -82,7 +82,7 @@ impl FeatureKind for Cqt {
             tuning: self.tuning,
             filter_scale: self.filter_scale,
             sparsity: self.sparsity,
-            window: self.window,
+            window: self.window.clone(),
             ..CqtParams::new(sr)
         };
         let transform = CqtPlan::new(&params.of(self.librosa))?;

@@ -99,9 +99,10 @@ impl FeatureKind for Hpss {
             margin_percussive: self.margin[1],
         };
         params.check()?;
-        let labels = (0..stft.n_bins()).map(|k| hertz(k as f64 * sr / stft.n_fft as f64));
+        let n_fft = stft.n_fft as f64;
+        let labels = (0..stft.n_bins()).map(|k| hertz(k as f64 * sr / n_fft)).collect();
         let extent = Extent::Frames(stft.hop_length as f64);
         let kernel = Magnitudes { stft, params, component: self.component };
-        Ok(Feature::whole(extent, kernel, labels.collect()))
+        Ok(Feature::whole(extent, kernel, labels))
     }
 }

@@ -1,6 +1,7 @@
 //! `m2_mfcc`: the input of M2 (NTNU-ERC).
 
-use corsmal_dsp::frontends::{LibrosaVersion, M2Mfcc as Plan};
+use corsmal_dsp::corsmal::M2Mfcc as Plan;
+use corsmal_dsp::librosa::LibrosaVersion;
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 

@@ -1,6 +1,6 @@
 //! `m3_spectrogram`: the input of M3 (Concatenation).
 
-use corsmal_dsp::frontends::M3Spectrogram as Plan;
+use corsmal_dsp::corsmal::M3Spectrogram as Plan;
 use corsmal_dsp::stft::StftParams;
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! `m4_logmel`: the input of M4 (HVRL).
 
 use corsmal_dsp::DspError;
-use corsmal_dsp::frontends::{M4LogMel as Plan, Variant};
+use corsmal_dsp::corsmal::{M4LogMel as Plan, Variant};
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 

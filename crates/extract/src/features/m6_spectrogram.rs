@@ -1,6 +1,7 @@
 //! `m6_spectrogram`: the input of M6 (ACC).
 
-use corsmal_dsp::frontends::{LibrosaVersion, M6Crop, M6Spectrogram as Plan};
+use corsmal_dsp::corsmal::{M6Crop, M6Spectrogram as Plan};
+use corsmal_dsp::librosa::LibrosaVersion;
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 

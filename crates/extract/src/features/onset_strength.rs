@@ -67,8 +67,8 @@ impl FeatureKind for OnsetStrength {
         if params.max_size == 0 {
             return Err(DspError::parameter("max_size", 0, "at least 1"));
         }
-        let kernel = Envelope { stft, bank, params };
         let extent = Extent::Frames(stft.hop_length as f64);
+        let kernel = Envelope { stft, bank, params };
         Ok(Feature::whole(extent, kernel, vec![String::new()]))
     }
 }

@@ -1,7 +1,7 @@
 //! `rms`: root-mean-square level of the waveform.
 
 use corsmal_dsp::stft::PadMode;
-use corsmal_dsp::time_domain::FrameParams;
+use corsmal_dsp::time_domain::{FrameParams, level};
 use serde::{Deserialize, Serialize};
 
 use super::{Feature, FeatureKind, Kernel, WaveKernel};
@@ -21,16 +21,12 @@ struct Level(FrameParams);
 impl WaveKernel for Level {
     fn frames(&self, samples: &[f32], channels: usize, frames: usize, out: &mut Vec<f32>) {
         let FrameParams { frame_length, hop_length, .. } = self.0;
-        let mut sums = vec![0.0_f64; channels];
+        let (mut sums, mut levels) = (vec![0.0; channels], vec![0.0; channels]);
         for t in 0..frames {
             let start = t * hop_length * channels;
-            sums.fill(0.0);
-            for frame in samples[start..start + frame_length * channels].chunks_exact(channels) {
-                for (sum, x) in sums.iter_mut().zip(frame) {
-                    *sum += f64::from(*x) * f64::from(*x);
-                }
-            }
-            out.extend(sums.iter().map(|s| (s / frame_length as f64).sqrt() as f32));
+            let frame = &samples[start..start + frame_length * channels];
+            level(frame, &mut sums, &mut levels);
+            out.extend_from_slice(&levels);
         }
     }
 }

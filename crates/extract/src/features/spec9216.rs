@@ -1,6 +1,6 @@
 //! `spec9216`: the spectrogram image of the CORSMAL baselines.
 
-use corsmal_dsp::frontends::Spec9216 as Image;
+use corsmal_dsp::corsmal::Spec9216 as Image;
 use corsmal_dsp::stft::PadMode;
 use ndarray::{Array2, ArrayView1};
 use serde::{Deserialize, Serialize};

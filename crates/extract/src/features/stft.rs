@@ -76,7 +76,8 @@ impl FeatureKind for Stft {
             Scale::Linear => Box::new(Copy),
             scale => Box::new(Scaled { scale, db: decibel }),
         };
-        let hz = |k: usize| hertz(k as f64 * sr / stft.n_fft as f64);
+        let n_fft = stft.n_fft as f64;
+        let hz = |k: usize| hertz(k as f64 * sr / n_fft);
         let finish = DecibelFinish::of(self.scale, &self.db, bins);
         Ok(Feature {
             kernel: Kernel::Spectrum(stft, quantity, kernel),

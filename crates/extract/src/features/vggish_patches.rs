@@ -1,7 +1,7 @@
 //! `vggish_patches`: the log-mel patches that VGGish takes (M5).
 
 use corsmal_dsp::DspError;
-use corsmal_dsp::frontends::M5VggishPatches as Plan;
+use corsmal_dsp::corsmal::M5VggishPatches as Plan;
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 

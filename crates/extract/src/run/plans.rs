@@ -4,8 +4,8 @@ use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex};
 
 use corsmal_audio::AudioSpec;
-use corsmal_dsp::frontends::MAX_EXPANSION;
 use corsmal_dsp::resample::Converter;
+use corsmal_dsp::resample::MAX_EXPANSION;
 
 use crate::config::Config;
 use crate::engine::Plan;

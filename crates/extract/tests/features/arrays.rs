@@ -2,20 +2,20 @@
 
 use std::sync::Arc;
 
-use corsmal_dsp::af193::Af193;
 use corsmal_dsp::chroma::{ChromaParams, chroma, chroma_filter};
+use corsmal_dsp::corsmal::af193::Af193;
+use corsmal_dsp::corsmal::paa::{PaaPlan, Peak};
+use corsmal_dsp::corsmal::{
+    M2Mfcc, M3Spectrogram, M4LogMel, M5A34f136, M5VggishPatches, M6Spectrogram, Spec9216, Variant,
+};
 use corsmal_dsp::cqt::{ChromaCqtParams, CqtParams, SignalTuning, chroma_cqt, cqt};
 use corsmal_dsp::decibel::Decibel;
 use corsmal_dsp::frequency::fft_frequencies;
-use corsmal_dsp::frontends::{
-    M2Mfcc, M3Spectrogram, M4LogMel, M5A34f136, M5VggishPatches, M6Spectrogram, Spec9216, Variant,
-};
 use corsmal_dsp::hpss::{HarmonicPart, HpssParams, Work, masks};
 use corsmal_dsp::librosa::LibrosaVersion;
 use corsmal_dsp::mel::{MelParams, SparseBank, mel_filter};
 use corsmal_dsp::normalize::Norm;
 use corsmal_dsp::onset::{OnsetParams, onset_strength};
-use corsmal_dsp::paa::{PaaPlan, Peak};
 use corsmal_dsp::pitch::{PitchParams, estimate_tuning};
 use corsmal_dsp::spectral::{
     Bandwidth, ContrastParams, Flatness, Frequencies, poly_features, spectral_bandwidth,

@@ -2,9 +2,10 @@
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, s};
 
-use super::{LibrosaVersion, amplitude_db, cut_or_pad, mono_at};
+use super::{amplitude_db, cut_or_pad, mono_at};
 use crate::decibel::Decibel;
 use crate::error::Result;
+use crate::librosa::LibrosaVersion;
 use crate::mel::{MelParams, SparseBank, mel_filter};
 use crate::onset::{OnsetParams, PeakPick, onset_detect, onset_strength};
 use crate::resize::{ResizeParams, resize};

@@ -4,9 +4,9 @@ use ndarray::{Array1, Array2, Array3, ArrayView1, ArrayView2, s};
 use realfft::RealFftPlanner;
 
 use super::mono_at;
+use super::paa::{MidTerm, PaaPlan, Peak, file_vector};
 use crate::error::{DspError, Result};
 use crate::mono::to_mono;
-use crate::paa::{MidTerm, PaaPlan, Peak, file_vector};
 use crate::resample::ResType;
 use crate::window::{Window, get_window};
 
@@ -117,7 +117,7 @@ impl M5VggishPatches {
     /// Impossible rates, non-finite samples.
     pub fn run(&self, y: ArrayView2<f32>, sr: f64) -> Result<Array3<f32>> {
         let mono = mono_at(y, sr, VGGISH_SR, self.res_type)?;
-        let log_mel = vggish_log_mel(mono.view());
+        let log_mel = vggish_log_mel(mono.view())?;
         let patches = log_mel.nrows() / PATCH;
         let whole = log_mel.slice(s![..patches * PATCH, ..]).to_owned();
         Ok(whole.into_shape_with_order((patches, PATCH, BANDS)).expect("whole patches"))
@@ -125,9 +125,9 @@ impl M5VggishPatches {
 }
 
 /// `[frames, 64]`, no padding.
-fn vggish_log_mel(y: ArrayView1<f32>) -> Array2<f32> {
+fn vggish_log_mel(y: ArrayView1<f32>) -> Result<Array2<f32>> {
     let frames = if y.len() < FRAME { 0 } else { 1 + (y.len() - FRAME) / HOP };
-    let window = get_window(Window::Hann, FRAME, true);
+    let window = get_window(&Window::Hann, FRAME, true)?;
     let bank = vggish_bank();
     let fft = RealFftPlanner::<f64>::new().plan_fft_forward(N_FFT);
     let (mut frame, mut spectrum) = (fft.make_input_vec(), fft.make_output_vec());
@@ -144,7 +144,7 @@ fn vggish_log_mel(y: ArrayView1<f32>) -> Array2<f32> {
         let mel = bank.dot(&magnitude);
         out.row_mut(t).assign(&mel.mapv(|m| (m + 0.01).ln() as f32));
     }
-    out
+    Ok(out)
 }
 
 /// `[64, 257]`: triangles on the mel axis (not in hertz) of peak 1, without the DC bin.

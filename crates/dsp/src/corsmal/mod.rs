@@ -1,15 +1,18 @@
-//! The inputs of the systems compared in the CORSMAL benchmark, M1 to M6, and the baselines' 9216
-//! values. One plan structure per system; `run` takes `[channels, samples]` in -1..1 at any rate.
+//! The compound systems of the CORSMAL benchmark: the inputs of M1 to M6, the baselines' 9216 and
+//! 193 values, and pyAudioAnalysis. One plan per system; `run` takes `[channels, samples]` in -1..1
+//! at any rate.
 //!
 //! Where a paper and its code differ the plan has a `Variant`; what neither says is a choice
 //! of ours that the plan's documentation names as such.
 
+pub mod af193;
 mod m1;
 mod m2;
 mod m3;
 mod m4;
 mod m5;
 mod m6;
+pub mod paa;
 mod spec9216;
 
 pub use m1::M1Stft;
@@ -25,10 +28,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::decibel::Decibel;
 use crate::error::{DspError, Result};
-pub use crate::librosa::LibrosaVersion;
 use crate::mono::to_mono;
 use crate::real::Real;
-use crate::resample::{ResType, resample};
+use crate::resample::{MAX_EXPANSION, ResType, resample};
 use crate::stft::{StftParams, spectrogram};
 
 /// What a system's paper says or what its published code does.
@@ -41,10 +43,6 @@ pub enum Variant {
     /// The paper's words.
     Paper,
 }
-
-/// Largest ratio of resampling: a header that says 1 Hz would turn a small file into billions of
-/// samples.
-pub const MAX_EXPANSION: f64 = 100.0;
 
 /// Mean over the channels at `target_sr` (librosa `load` with `mono=True`).
 fn mono_at(y: ArrayView2<f32>, sr: f64, target_sr: f64, res_type: ResType) -> Result<Array1<f32>> {

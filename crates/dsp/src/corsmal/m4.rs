@@ -50,7 +50,7 @@ impl M4LogMel {
         };
         let frames = n.abs_diff(length).div_ceil(step);
         let used = length.min(n_fft);
-        let window = get_window(Window::Hamming, length, false);
+        let window = get_window(&Window::Hamming, length, false)?;
         let bank = triangles(sr, n_fft);
         let fft = RealFftPlanner::<f64>::new().plan_fft_forward(n_fft);
         let (mut frame, mut spectrum) = (fft.make_input_vec(), fft.make_output_vec());

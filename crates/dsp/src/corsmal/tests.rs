@@ -1,6 +1,7 @@
 use ndarray::Array2;
 
 use super::*;
+use crate::librosa::LibrosaVersion;
 
 /// Eight channels of a decaying tone with clicks.
 fn recording(n: usize) -> Array2<f32> {

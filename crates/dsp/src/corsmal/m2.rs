@@ -2,9 +2,10 @@
 
 use ndarray::{Array2, ArrayView2, Axis, s};
 
-use super::{LibrosaVersion, mono_at};
+use super::mono_at;
 use crate::decibel::Decibel;
 use crate::error::Result;
+use crate::librosa::LibrosaVersion;
 use crate::mel::{MelParams, SparseBank, mel_filter};
 use crate::mfcc::{MfccParams, mfcc};
 use crate::stft::{StftParams, spectrogram};
