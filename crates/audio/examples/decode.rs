@@ -42,7 +42,7 @@ fn main() -> std::io::Result<()> {
     for file in files {
         match decode(Path::new(file), &mut out) {
             Ok(line) => println!("{file}: {line}"),
-            Err(error) => println!("{file}: {}: {error}", error.status()),
+            Err(error) => println!("{file}: {}: {error}", error.verdict().name()),
         }
     }
     out.flush()

@@ -61,15 +61,43 @@ pub enum AudioError {
     NotSeekable,
 }
 
-impl AudioError {
+/// What kind of refusal an [`AudioError`] is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Verdict {
+    /// The system could not open or deliver the bytes.
+    Io,
+    /// There is not a single byte.
+    Empty,
+    /// No known audio format.
+    NotAudio,
+    /// A known format or codec that is not read.
+    Unsupported,
+    /// The bytes contradict their format.
+    Corrupt,
+}
+
+impl Verdict {
     /// Stable short code for outcome tables: `io`, `empty`, `not_audio`, `unsupported` or `corrupt`.
-    pub fn status(&self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
-            Self::Open { .. } | Self::Io { .. } | Self::NotSeekable => "io",
+            Self::Io => "io",
             Self::Empty => "empty",
-            Self::NotAudio { .. } => "not_audio",
-            Self::Unsupported { .. } => "unsupported",
-            Self::Corrupt { .. } => "corrupt",
+            Self::NotAudio => "not_audio",
+            Self::Unsupported => "unsupported",
+            Self::Corrupt => "corrupt",
+        }
+    }
+}
+
+impl AudioError {
+    /// The kind of refusal.
+    pub fn verdict(&self) -> Verdict {
+        match self {
+            Self::Open { .. } | Self::Io { .. } | Self::NotSeekable => Verdict::Io,
+            Self::Empty => Verdict::Empty,
+            Self::NotAudio { .. } => Verdict::NotAudio,
+            Self::Unsupported { .. } => Verdict::Unsupported,
+            Self::Corrupt { .. } => Verdict::Corrupt,
         }
     }
 

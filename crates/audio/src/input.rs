@@ -70,7 +70,7 @@ impl<R: Read + Send> Medium for Stream<R> {
 /// Buffered bytes with the absolute position of the next one.
 pub(crate) struct Input {
     medium: Box<dyn Medium>,
-    buffer: Box<[u8]>,
+    buffer: Vec<u8>,
     start: usize,
     end: usize,
     position: u64,
@@ -80,7 +80,7 @@ impl Input {
     pub(crate) fn new(medium: Box<dyn Medium>) -> Self {
         let whole = medium.byte_len().and_then(|len| usize::try_from(len).ok());
         let size = whole.map_or(BUFFER, |len| len.clamp(MIN_BUFFER, BUFFER));
-        let buffer = vec![0; size].into_boxed_slice();
+        let buffer = vec![0; size];
         Self { medium, buffer, start: 0, end: 0, position: 0 }
     }
 
@@ -94,13 +94,16 @@ impl Input {
         self.medium.byte_len()
     }
 
-    /// The buffered bytes, at least `least` of them (at most the buffer's size) unless the end
-    /// comes first.
+    /// The buffered bytes, at least `least` of them unless the end comes first. The buffer grows
+    /// where `least` asks for more than it holds: the caller's constants bound it.
     pub(crate) fn peek(&mut self, least: usize) -> Result<&[u8], AudioError> {
         if self.end - self.start < least {
             self.buffer.copy_within(self.start..self.end, 0);
             self.end -= self.start;
             self.start = 0;
+            if self.buffer.len() < least {
+                self.buffer.resize(least, 0);
+            }
             while self.end < least {
                 match self.medium.read(&mut self.buffer[self.end..]) {
                     Ok(0) => break,
@@ -156,15 +159,5 @@ impl Input {
         self.medium.jump(offset).map_err(|source| AudioError::Io { offset, source })?;
         (self.start, self.end, self.position) = (0, 0, offset);
         Ok(())
-    }
-
-    /// The bytes that were buffered but not consumed, and the medium that continues after them;
-    /// a seekable one is put back to the start instead, with nothing buffered.
-    #[cfg(feature = "symphonia")]
-    pub(crate) fn into_unread(mut self) -> Result<(Vec<u8>, Box<dyn Medium>), AudioError> {
-        if self.len().is_some() {
-            self.seek(0)?;
-        }
-        Ok((self.buffer[self.start..self.end].to_vec(), self.medium))
     }
 }

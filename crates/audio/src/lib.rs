@@ -24,17 +24,27 @@
 //! ```
 
 #[cfg(feature = "symphonia")]
-mod compressed;
+mod codec;
 mod error;
+#[cfg(feature = "symphonia")]
+mod flac;
 mod health;
 mod input;
+#[cfg(feature = "symphonia")]
+mod mpeg;
+#[cfg(feature = "symphonia")]
+mod ogg;
 mod open;
 mod report;
 mod source;
+mod start;
+#[cfg(feature = "symphonia")]
+mod stream;
+mod tags;
 mod wav;
 
-pub use error::AudioError;
+pub use error::{AudioError, Verdict};
 pub use health::{ChannelHealth, Health, HealthMeter};
 pub use open::{EXTENSIONS, from_reader, from_seekable, open};
 pub use report::{ReadReport, Repair};
-pub use source::{AudioSpec, BlockSource};
+pub use source::{AudioSpec, BlockSource, SampleEncoding};

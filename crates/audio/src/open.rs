@@ -7,7 +7,8 @@ use std::path::Path;
 use crate::error::AudioError;
 use crate::input::{Input, Medium, Seekable, Stream};
 use crate::source::BlockSource;
-use crate::wav::{WavSource, is_wav};
+use crate::start::{self, Format};
+use crate::wav::WavSource;
 
 /// File name extensions (lower case) that a walk through folders should pick up. Files are still
 /// opened by content, whatever they are called.
@@ -63,13 +64,15 @@ fn from_medium(medium: Box<dyn Medium>) -> Result<Box<dyn BlockSource>, AudioErr
     if start.is_empty() {
         return Err(AudioError::Empty);
     }
-    if is_wav(start) {
-        return Ok(Box::new(WavSource::new(input)?));
-    }
     let found = format!("\"{}\"", start[..start.len().min(12)].escape_ascii());
-    #[cfg(feature = "symphonia")]
-    if crate::compressed::is_known(start) {
-        return Ok(Box::new(crate::compressed::CompressedSource::new(input)?));
+    match start::find(&mut input)? {
+        Some(Format::Wav) => Ok(Box::new(WavSource::new(input)?)),
+        #[cfg(feature = "symphonia")]
+        Some(Format::Flac) => crate::flac::open(input),
+        #[cfg(feature = "symphonia")]
+        Some(Format::Mpeg) => crate::mpeg::open(input),
+        #[cfg(feature = "symphonia")]
+        Some(Format::Ogg) => crate::ogg::open(input),
+        None => Err(AudioError::NotAudio { found, expected: FORMATS }),
     }
-    Err(AudioError::NotAudio { found, expected: FORMATS })
 }

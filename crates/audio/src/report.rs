@@ -45,10 +45,39 @@ pub enum Repair {
         /// Where the padding byte should be.
         offset: u64,
     },
-    /// Frames inside a compressed stream that are damaged or missing were left out.
+    /// Frames inside a compressed stream that are damaged or missing became silence of the same
+    /// length.
     LostFrames {
-        /// How many, according to the time stamps.
+        /// The first of them, counted from the start of the recording.
+        first: u64,
+        /// How many there are in all, according to the time stamps.
         count: u64,
+    },
+    /// The data go on after the length that the header states: read to the end.
+    LongerThanDeclared {
+        /// Frames that the header states.
+        declared: u64,
+        /// Frames that are there.
+        actual: u64,
+    },
+    /// Another recording of the same format follows in the file: it was read as well.
+    Concatenated {
+        /// The first frame of the second recording.
+        at: u64,
+    },
+    /// The time stamps jump although nothing is missing in between: the samples were joined.
+    TimeJump {
+        /// The frame at which they do.
+        at: u64,
+        /// By how many frames.
+        frames: u64,
+    },
+    /// Bytes inside the audio that belong to no frame were left out.
+    ForeignBytes {
+        /// Where the first of them are.
+        offset: u64,
+        /// How many there are in all.
+        bytes: u64,
     },
 }
 
@@ -64,6 +93,10 @@ impl Repair {
             Self::BlockAlign { .. } => "block_align",
             Self::MissingPadding { .. } => "missing_padding",
             Self::LostFrames { .. } => "lost_frames",
+            Self::LongerThanDeclared { .. } => "longer_than_declared",
+            Self::Concatenated { .. } => "concatenated",
+            Self::TimeJump { .. } => "time_jump",
+            Self::ForeignBytes { .. } => "foreign_bytes",
         }
     }
 }
@@ -91,7 +124,21 @@ impl fmt::Display for Repair {
             Self::MissingPadding { offset } => {
                 write!(f, "odd-sized chunk without padding at byte {offset}")
             }
-            Self::LostFrames { count } => write!(f, "{count} damaged or missing frames left out"),
+            Self::LostFrames { first, count } => {
+                write!(f, "{count} damaged or missing frames, from frame {first} on, are silence")
+            }
+            Self::LongerThanDeclared { declared, actual } => {
+                write!(f, "the header states {declared} frames, {actual} are there and were read")
+            }
+            Self::Concatenated { at } => {
+                write!(f, "another recording follows in the file, read from frame {at} on")
+            }
+            Self::TimeJump { at, frames } => {
+                write!(f, "the time stamps jump by {frames} frames at frame {at}, joined there")
+            }
+            Self::ForeignBytes { offset, bytes } => {
+                write!(f, "{bytes} bytes between frames, from byte {offset} on, left out")
+            }
         }
     }
 }
@@ -105,4 +152,33 @@ pub struct ReadReport {
     pub truncated: bool,
     /// Deviations worked around, in the order met, each kind of cause once.
     pub repairs: Vec<Repair>,
+}
+
+impl ReadReport {
+    /// Notes a deviation; of its kind the first place and the sum of frames or bytes are kept.
+    pub(crate) fn note(&mut self, repair: Repair) {
+        let kind = std::mem::discriminant(&repair);
+        let old = self.repairs.iter_mut().find(|old| std::mem::discriminant(*old) == kind);
+        match (old, repair) {
+            (None, repair) => self.repairs.push(repair),
+            (Some(Repair::LostFrames { count, .. }), Repair::LostFrames { count: more, .. })
+            | (
+                Some(Repair::ForeignBytes { bytes: count, .. }),
+                Repair::ForeignBytes { bytes: more, .. },
+            )
+            | (
+                Some(Repair::TimeJump { frames: count, .. }),
+                Repair::TimeJump { frames: more, .. },
+            ) => {
+                *count = count.saturating_add(more);
+            }
+            (Some(_), _) => {}
+        }
+    }
+
+    /// Notes that the recording stops early.
+    pub(crate) fn note_truncated(&mut self, declared: Option<u64>, actual: u64) {
+        self.truncated = true;
+        self.note(Repair::Truncated { declared, actual });
+    }
 }

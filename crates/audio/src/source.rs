@@ -5,6 +5,40 @@ use serde::Serialize;
 use crate::error::AudioError;
 use crate::report::ReadReport;
 
+/// How the samples of a recording are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum SampleEncoding {
+    /// Unsigned integers of 8 bits.
+    Unsigned8,
+    /// Signed integers.
+    Signed {
+        /// Bytes per sample, 1 to 8.
+        bytes: u8,
+    },
+    /// IEEE floating point.
+    Float {
+        /// Bytes per sample, 4 or 8.
+        bytes: u8,
+    },
+    /// ITU-T G.711 A-law.
+    ALaw,
+    /// ITU-T G.711 µ-law.
+    MuLaw,
+    /// Compressed without loss, to integers.
+    Lossless,
+    /// Compressed with loss.
+    Lossy,
+}
+
+impl SampleEncoding {
+    /// Whether NaN and infinities can come out of the reader.
+    pub fn may_be_non_finite(self) -> bool {
+        matches!(self, Self::Float { .. } | Self::Lossy)
+    }
+}
+
 /// What a recording is, known before its samples are read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct AudioSpec {
@@ -14,6 +48,8 @@ pub struct AudioSpec {
     pub channels: u16,
     /// Container and encoding, such as `wav pcm_s16le` or `ogg vorbis`.
     pub format: String,
+    /// How the samples are stored.
+    pub encoding: SampleEncoding,
     /// Frames according to the header (after repair of a wrapped size), where it says so.
     pub declared_frames: Option<u64>,
 }

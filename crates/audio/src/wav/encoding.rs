@@ -2,6 +2,7 @@
 
 use crate::error::AudioError;
 use crate::report::Repair;
+use crate::source::SampleEncoding;
 
 /// Most channels that are read.
 pub(crate) const MAX_CHANNELS: u16 = 64;
@@ -46,6 +47,18 @@ impl Encoding {
             Self::Int(n) => u16::from(n),
             Self::F32 => 4,
             Self::F64 => 8,
+        }
+    }
+
+    /// What a caller is told.
+    pub(crate) fn samples(self) -> SampleEncoding {
+        match self {
+            Self::U8 => SampleEncoding::Unsigned8,
+            Self::Int(bytes) => SampleEncoding::Signed { bytes },
+            Self::F32 => SampleEncoding::Float { bytes: 4 },
+            Self::F64 => SampleEncoding::Float { bytes: 8 },
+            Self::ALaw => SampleEncoding::ALaw,
+            Self::MuLaw => SampleEncoding::MuLaw,
         }
     }
 

@@ -50,6 +50,7 @@ impl WavSource {
             sample_rate: format.sample_rate,
             channels: format.channels,
             format: format!("{container} {}", format.encoding.name(big)),
+            encoding: format.encoding.samples(),
             declared_frames: header.declared_len.map(|n| n / frame_bytes as u64),
         };
         let truncated = header.repairs.iter().any(|r| matches!(r, Repair::Truncated { .. }));

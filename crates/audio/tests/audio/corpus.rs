@@ -40,7 +40,11 @@ fn outcome(path: &Path) -> String {
         ))
     };
     read().unwrap_or_else(|e| {
-        format!("{},,,,,,,{}", e.status(), e.offset().map_or(String::new(), |n| n.to_string()))
+        format!(
+            "{},,,,,,,{}",
+            e.verdict().name(),
+            e.offset().map_or(String::new(), |n| n.to_string())
+        )
     })
 }
 

@@ -59,7 +59,7 @@ fn extensible_sub_formats() {
         assert_eq!(got.format, format!("wav {name}"));
     }
     let error = refusal(&Wav { sub_format: Some(2), ..wav() });
-    assert_eq!((error.status(), error.offset()), ("unsupported", Some(20)));
+    assert_eq!((error.verdict().name(), error.offset()), ("unsupported", Some(20)));
 }
 
 #[test]
@@ -154,7 +154,7 @@ fn significant_bits_are_left_justified_in_their_container() {
     let got = read_both(&Wav { sub_format: Some(tag::PCM), ..wide.clone() });
     assert_eq!(got.samples, [0x543210 as f32 / 8_388_608.0, -16.0 / 8_388_608.0]);
     // The plain chunk does not, and readers disagree.
-    assert_eq!(refusal(&wide).status(), "unsupported");
+    assert_eq!(refusal(&wide).verdict().name(), "unsupported");
 }
 
 #[test]
@@ -173,7 +173,7 @@ fn refusals_name_status_and_byte() {
     ];
     for (wav, status, offset) in cases {
         let error = refusal(&wav);
-        assert_eq!((error.status(), error.offset()), (status, Some(offset)), "{error}");
+        assert_eq!((error.verdict().name(), error.offset()), (status, Some(offset)), "{error}");
     }
     for (bytes, status) in [
         (&b""[..], "empty"),
@@ -181,19 +181,19 @@ fn refusals_name_status_and_byte() {
         (b"RIFF\0\0\0\0AVI LIST", "not_audio"),
         (b"hello, world", "not_audio"),
     ] {
-        assert_eq!(read_file(bytes.to_vec()).unwrap_err().status(), status);
-        assert_eq!(read_pipe(bytes.to_vec()).unwrap_err().status(), status);
+        assert_eq!(read_file(bytes.to_vec()).unwrap_err().verdict().name(), status);
+        assert_eq!(read_pipe(bytes.to_vec()).unwrap_err().verdict().name(), status);
     }
-    assert_eq!(open("/nonexistent/file.wav".as_ref()).err().unwrap().status(), "io");
-    assert_eq!(open("/".as_ref()).err().unwrap().status(), "io");
+    assert_eq!(open("/nonexistent/file.wav".as_ref()).err().unwrap().verdict().name(), "io");
+    assert_eq!(open("/".as_ref()).err().unwrap().verdict().name(), "io");
 }
 
 #[test]
 fn endless_tiny_chunks_are_refused() {
     let mut bytes = b"RIFF\0\0\0\0WAVE".to_vec();
     bytes.resize(1 << 20, 0);
-    assert_eq!(read_file(bytes.clone()).unwrap_err().status(), "corrupt");
-    assert_eq!(read_pipe(bytes).unwrap_err().status(), "corrupt");
+    assert_eq!(read_file(bytes.clone()).unwrap_err().verdict().name(), "corrupt");
+    assert_eq!(read_pipe(bytes).unwrap_err().verdict().name(), "corrupt");
 }
 
 #[test]

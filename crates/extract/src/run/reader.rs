@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use corsmal_audio::{AudioError, AudioSpec, BlockSource, Repair};
+use corsmal_audio::{AudioError, BlockSource, Repair, Verdict};
 use corsmal_dsp::DspError;
 
 use super::plans::Planned;
@@ -50,12 +50,12 @@ impl Failed {
 
 impl From<AudioError> for Failed {
     fn from(error: AudioError) -> Self {
-        let status = match error.status() {
-            "empty" => Status::Empty,
-            "not_audio" => Status::NotAudio,
-            "corrupt" => Status::Corrupt,
-            "io" => Status::Io,
-            _ => Status::Unsupported,
+        let status = match error.verdict() {
+            Verdict::Io => Status::Io,
+            Verdict::Empty => Status::Empty,
+            Verdict::NotAudio => Status::NotAudio,
+            Verdict::Unsupported => Status::Unsupported,
+            Verdict::Corrupt => Status::Corrupt,
         };
         Self { byte_offset: error.offset(), ..Self::new(status, error.to_string()) }
     }
@@ -147,7 +147,7 @@ pub fn compute(
     let end = crop.end.min(crop.start.saturating_add(span.end.saturating_add(after as u64)));
     skip_to(source, begin)?;
     let own = crop.start.saturating_add(span.start)..crop.start.saturating_add(span.end);
-    let checked = may_be_non_finite(source.spec());
+    let checked = source.spec().encoding.may_be_non_finite();
     let mut extractor = Extractor::new(plan.clone(), span.clone(), first);
     let identity = front.is_identity();
     let (mut block, mut signal) = (Vec::new(), Vec::new());
@@ -239,11 +239,6 @@ fn skip_to(source: &mut dyn BlockSource, frame: u64) -> Result<(), Failed> {
         }
     }
     Ok(())
-}
-
-/// Integer encodings cannot hold NaN.
-fn may_be_non_finite(spec: &AudioSpec) -> bool {
-    !(spec.format.contains("pcm_s") || spec.format.contains("pcm_u"))
 }
 
 /// Refuses samples that features cannot be computed of; `position` is that of the first frame, and

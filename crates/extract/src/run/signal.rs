@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use corsmal_audio::AudioSpec;
+use corsmal_audio::{AudioSpec, SampleEncoding};
 use thiserror::Error;
 
 use super::Quiet;
@@ -57,8 +57,13 @@ impl Signals {
             let reason = format!("{channels} channels at {sample_rate} Hz: 1 to 64, above 0 Hz");
             return Err(refuse(reason).into());
         }
-        let format = "memory".into();
-        let spec = AudioSpec { sample_rate, channels, format, declared_frames: None };
+        let spec = AudioSpec {
+            sample_rate,
+            channels,
+            format: "memory".into(),
+            encoding: SampleEncoding::Float { bytes: 4 },
+            declared_frames: None,
+        };
         let planned = self.plans.of(&spec).map_err(refuse)?;
         let step = planned.step(BLOCK, sample_rate);
         let Planned { plan, resample } = planned;

@@ -83,7 +83,7 @@ fn next<'a>(source: &mut dyn BlockSource, block: &'a mut [f32]) -> Result<&'a [f
 }
 
 fn refuse(path: &str, error: &AudioError, json: bool) -> Result<ExitCode, Failure> {
-    let (status, reason) = (error.status(), &error.to_string());
+    let (status, reason) = (error.verdict().name(), &error.to_string());
     Refusal { path, status, byte: error.offset(), reason }.print(json)
 }
 

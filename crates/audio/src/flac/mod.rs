@@ -1,0 +1,309 @@
+//! FLAC: frames are found and checked here and decoded by symphonia.
+//!
+//! A frame counts if its checksums are right. What lies between two such frames is damage, whose
+//! length in time the numbers of the frames tell, or does not belong to the audio.
+
+mod frame;
+mod info;
+
+use symphonia::core::checksum::Crc16Ansi;
+use symphonia::core::io::Monitor;
+
+use crate::codec::{Codec, Decoded, PacketDecoder, Refusal};
+use crate::error::AudioError;
+use crate::input::Input;
+use crate::report::{ReadReport, Repair};
+use crate::source::{AudioSpec, BlockSource, SampleEncoding};
+use crate::stream::{Next, Stream, StreamSource};
+use frame::{Header, Number};
+use info::Info;
+
+const EXPECTED: &str = "FLAC frames with right checksums";
+/// Longest gap, in seconds, that is filled with silence.
+const LONGEST_GAP: u64 = 3600;
+/// Ends of a frame that are tried where no frame follows.
+const MAX_ENDS: usize = 16;
+/// Bytes that may be searched in vain for each byte of the file.
+const PATIENCE: u64 = 64;
+/// Shortest frame: header of 6 bytes, a constant of 2, checksum of 2.
+const MIN_FRAME: usize = 10;
+/// Bytes of a frame that are looked at first; most frames fit.
+const FIRST_LOOK: usize = 24 << 10;
+/// Bytes searched for the next frame at a time.
+const SEARCH: usize = 16 << 10;
+
+/// One file of FLAC.
+struct FlacStream {
+    input: Input,
+    info: Info,
+    codec: Codec,
+    /// A frame that comes after the silence before it.
+    waiting: Vec<f32>,
+    /// Samples per channel so far.
+    given: u64,
+    part: Part,
+    /// Bytes searched in vain.
+    searched: u64,
+}
+
+/// One of the recordings in a file; there is more than one where files were concatenated.
+#[derive(Default)]
+struct Part {
+    /// Samples per channel of all frames but the last, where frames are counted.
+    block: Option<u32>,
+    /// The sample that comes next by the recording's own count; `None` before the first frame.
+    next: Option<u64>,
+    /// What looked like a frame and could not be read was met last.
+    is_broken: bool,
+}
+
+/// What the search for a frame came to.
+enum Found {
+    /// A frame, now decoded, of so many bytes.
+    Frame(Header, usize),
+    /// The magic number of another recording.
+    Part,
+    End,
+}
+
+/// Opens FLAC at the position of `input`, where its magic number is.
+pub(crate) fn open(mut input: Input) -> Result<Box<dyn BlockSource>, AudioError> {
+    let at = input.position();
+    let info = info::read(&mut input)?;
+    let spec = AudioSpec {
+        sample_rate: info.sample_rate,
+        channels: info.channels,
+        format: "flac".into(),
+        encoding: SampleEncoding::Lossless,
+        declared_frames: info.declared,
+    };
+    let codec = Codec::flac(&info.repaired(), info.channels.into(), info.sample_rate)
+        .map_err(|refusal| refusal.at(at, EXPECTED))?;
+    let stream = FlacStream {
+        input,
+        info,
+        codec,
+        waiting: Vec::new(),
+        given: 0,
+        part: Part::default(),
+        searched: 0,
+    };
+    Ok(Box::new(StreamSource::new(stream, spec, ReadReport::default())))
+}
+
+/// Whether FLAC starts here.
+pub(crate) fn is_flac(bytes: &[u8]) -> bool {
+    info::starts(bytes)
+}
+
+/// Samples per channel of a frame; `None` where there is none.
+pub(crate) fn block_of(frame: &[u8]) -> Option<u32> {
+    Header::parse(frame).map(|header| header.block)
+}
+
+/// A decoder for the stream that starts here, with its channels and its sample rate.
+pub(crate) fn codec_of(start: &[u8]) -> Option<Result<(Codec, u16, u32), Refusal>> {
+    let info = Info::parse(start.strip_prefix(b"fLaC")?.get(4..)?)?;
+    let codec = Codec::flac(&info.repaired(), info.channels.into(), info.sample_rate);
+    Some(codec.map(|codec| (codec, info.channels, info.sample_rate)))
+}
+
+impl FlacStream {
+    /// Goes to the next frame and decodes it into `samples`.
+    fn find(&mut self, samples: &mut Vec<f32>) -> Result<Found, AudioError> {
+        loop {
+            let shown = self.input.peek(info::SHOWN)?;
+            if info::continues(shown) {
+                return Ok(Found::Part);
+            }
+            if let Some(header) = Header::parse(shown).filter(|h| self.info.admits(h)) {
+                if let Some(length) = self.measure(&header, samples)? {
+                    self.part.is_broken = false;
+                    return Ok(Found::Frame(header, length));
+                }
+                self.part.is_broken = true;
+            }
+            let shown = self.input.peek(SEARCH)?;
+            if shown.len() <= info::SHOWN {
+                return Ok(Found::End);
+            }
+            let mut places = 1..shown.len() - 1;
+            let is_start = |at: usize| frame::may_start(&shown[at..]) || info::starts(&shown[at..]);
+            let step = places.find(|&at| is_start(at)).unwrap_or(shown.len() - info::SHOWN);
+            self.input.consume(step);
+        }
+    }
+
+    /// Decodes the frame that the input shows and returns its length in bytes, or `None` if it is
+    /// damaged or no frame. It ends where its checksum is right and another frame begins; before
+    /// anything else, where its checksum is right and it can be decoded.
+    fn measure(
+        &mut self,
+        header: &Header,
+        samples: &mut Vec<f32>,
+    ) -> Result<Option<usize>, AudioError> {
+        let at = self.input.position();
+        let limit = self.info.max_frame(header.block);
+        let most = limit + info::SHOWN;
+        let mut wanted = FIRST_LOOK.min(most);
+        let mut crc = Crc16Ansi::new(0);
+        let (mut checked, mut from) = (0, MIN_FRAME);
+        loop {
+            let shown = self.input.peek(wanted)?;
+            let is_end = shown.len() < wanted;
+            // A mark is judged once all of it is shown.
+            let last = if is_end { shown.len() } else { shown.len() - info::SHOWN };
+            let last = last.min(limit);
+            while from <= last {
+                let rest = &shown[from..];
+                if rest.is_empty() || frame::may_start(rest) || info::starts(rest) {
+                    crc.process_buf_bytes(&shown[checked..from]);
+                    checked = from;
+                    let follows = rest.is_empty()
+                        || info::continues(rest)
+                        || Header::parse(rest).is_some_and(|h| self.info.admits(&h));
+                    if crc.crc() == 0 && follows {
+                        let decoded = self.codec.decode(&shown[..from], samples);
+                        let decoded = decoded.map_err(|refusal| refusal.at(at, EXPECTED))?;
+                        let is_whole = decoded == Decoded::Frames(header.block as usize);
+                        return Ok(is_whole.then_some(from));
+                    }
+                }
+                from += 1;
+            }
+            if is_end || wanted == most {
+                break;
+            }
+            wanted = (4 * wanted).min(most);
+        }
+        self.last_frame(header, limit, samples)
+    }
+
+    /// As `measure`, where no other frame follows.
+    fn last_frame(
+        &mut self,
+        header: &Header,
+        limit: usize,
+        samples: &mut Vec<f32>,
+    ) -> Result<Option<usize>, AudioError> {
+        let at = self.input.position();
+        let shown = self.input.peek(1)?;
+        let shown = &shown[..shown.len().min(limit)];
+        self.searched += 2 * shown.len() as u64;
+        if self.searched > PATIENCE * (at + (1 << 20)) {
+            return Err(AudioError::corrupt(at, "hardly any intact frame", EXPECTED));
+        }
+        let mut crc = Crc16Ansi::new(0);
+        let mut tried = 0;
+        for (index, &byte) in shown.iter().enumerate() {
+            crc.process_byte(byte);
+            let length = index + 1;
+            if crc.crc() != 0 || length < MIN_FRAME {
+                continue;
+            }
+            let decoded = self.codec.decode(&shown[..length], samples);
+            let decoded = decoded.map_err(|refusal| refusal.at(at, EXPECTED))?;
+            if decoded == Decoded::Frames(header.block as usize) {
+                return Ok(Some(length));
+            }
+            tried += 1;
+            if tried == MAX_ENDS {
+                break;
+            }
+        }
+        samples.clear();
+        Ok(None)
+    }
+
+    /// Samples per channel that are missing before a frame.
+    fn gap(&mut self, header: &Header, report: &mut ReadReport) -> u64 {
+        let regular = if self.info.block >= 16 { self.info.block } else { header.block };
+        let block = u64::from(*self.part.block.get_or_insert(regular));
+        let start = match header.number {
+            Number::Frame(n) => n * block,
+            Number::Sample(n) => n,
+        };
+        let expected = self.part.next.replace(start + u64::from(header.block)).unwrap_or(0);
+        let gap = start.saturating_sub(expected);
+        let is_first = expected == 0;
+        let longest = LONGEST_GAP * u64::from(self.info.sample_rate);
+        if gap > 0 && (is_first || gap > longest) || start < expected {
+            let frames = start.abs_diff(expected);
+            report.note(Repair::TimeJump { at: self.given, frames });
+            return 0;
+        }
+        if gap > 0 {
+            report.note(Repair::LostFrames { first: self.given, count: gap });
+        }
+        gap
+    }
+
+    /// Goes on with another recording, whose magic number the input shows.
+    fn next_part(&mut self, report: &mut ReadReport) -> Result<(), AudioError> {
+        let at = self.input.position();
+        self.finish(report)?;
+        let info = info::read(&mut self.input)?;
+        if (info.sample_rate, info.channels) != (self.info.sample_rate, self.info.channels) {
+            let actual = format!("change to {} channels at {} Hz", info.channels, info.sample_rate);
+            let expected = "one channel count and rate in a recording";
+            return Err(AudioError::unsupported(at, actual, expected));
+        }
+        self.codec = Codec::flac(&info.repaired(), info.channels.into(), info.sample_rate)
+            .map_err(|refusal| refusal.at(at, EXPECTED))?;
+        self.info = info;
+        self.part = Part::default();
+        report.note(Repair::Concatenated { at: self.given });
+        Ok(())
+    }
+
+    /// Notes where a part has not the length declared.
+    fn finish(&self, report: &mut ReadReport) -> Result<(), AudioError> {
+        let actual = self.part.next.unwrap_or(0);
+        match self.info.declared {
+            _ if self.part.next.is_none() && self.part.is_broken => {
+                let at = self.input.position();
+                return Err(AudioError::corrupt(at, "no intact frame", EXPECTED));
+            }
+            Some(declared) if actual < declared => {
+                report.note_truncated(Some(declared), self.given);
+            }
+            Some(declared) if actual > declared => {
+                report.note(Repair::LongerThanDeclared { declared, actual });
+            }
+            None if self.part.is_broken => report.note_truncated(None, self.given),
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+impl Stream for FlacStream {
+    fn next(
+        &mut self,
+        samples: &mut Vec<f32>,
+        report: &mut ReadReport,
+    ) -> Result<Next, AudioError> {
+        if !self.waiting.is_empty() {
+            std::mem::swap(samples, &mut self.waiting);
+            self.waiting.clear();
+            return Ok(Next::Samples);
+        }
+        match self.find(samples)? {
+            Found::Frame(header, length) => {
+                self.input.consume(length);
+                let gap = self.gap(&header, report);
+                self.given += gap + u64::from(header.block);
+                if gap > 0 {
+                    std::mem::swap(samples, &mut self.waiting);
+                    return Ok(Next::Silence(gap));
+                }
+            }
+            Found::Part => self.next_part(report)?,
+            Found::End => {
+                self.finish(report)?;
+                return Ok(Next::End);
+            }
+        }
+        Ok(Next::Samples)
+    }
+}

@@ -1,0 +1,306 @@
+//! MPEG audio, layers 1 to 3: frames are found here and decoded by symphonia.
+//!
+//! The recording ends where the data do, whatever a header says of its length. LAME's tag says how
+//! many samples to drop at both ends.
+
+mod header;
+mod sync;
+mod tag;
+
+use crate::codec::{Codec, Decoded, PacketDecoder};
+use crate::error::AudioError;
+use crate::input::Input;
+use crate::report::{ReadReport, Repair};
+use crate::source::{AudioSpec, BlockSource, SampleEncoding};
+use crate::stream::{Next, Stream, StreamSource};
+use crate::tags;
+use header::{HEADER, Header};
+use tag::Tag;
+
+pub(crate) use sync::{WINDOW, find, is_free_format};
+
+const EXPECTED: &str = "MPEG audio of layers 1 to 3 with frames of stated size";
+
+/// Whether the bytes are those of a frame header.
+pub(crate) fn is_header(bytes: &[u8]) -> bool {
+    Header::parse(bytes).is_some()
+}
+
+/// Frames as they follow each other.
+struct Frames {
+    input: Input,
+    /// The header of the first frame with audio.
+    first: Option<Header>,
+    /// The frame that ends where the input stands.
+    before: Option<Header>,
+    /// Frames that went missing before the one found last.
+    missing: u64,
+}
+
+impl Frames {
+    /// Goes to the next whole frame, which the input then shows; `None` at the end.
+    fn next(&mut self, report: &mut ReadReport) -> Result<Option<Header>, AudioError> {
+        let offset = self.input.position();
+        let mut foreign = 0;
+        loop {
+            tags::skip(&mut self.input)?;
+            let header = Header::parse(self.input.peek(HEADER)?).filter(|h| h.size > HEADER);
+            let first = self.first;
+            if let Some(header) = header.filter(|h| first.is_none_or(|first| h.continues(&first))) {
+                let shown = self.input.peek(header.size)?.len();
+                if shown < header.size {
+                    report.note(Repair::PartialFrame { bytes: shown as u64 });
+                    return Ok(None);
+                }
+                self.missing = self.missing_in(foreign, &header);
+                if foreign > 0 && first.is_some() && self.missing == 0 {
+                    report.note(Repair::ForeignBytes { offset, bytes: foreign });
+                }
+                self.before = Some(header);
+                return Ok(Some(header));
+            }
+            let shown = self.input.peek(WINDOW)?;
+            let is_end = shown.len() < WINDOW;
+            let step = match (find(shown, is_end), first) {
+                (Some(at), Some(first)) if !continues_at(shown, at, &first) => {
+                    let position = self.input.position() + at as u64;
+                    return Err(changed(position, &self.input.peek(WINDOW)?[at..]));
+                }
+                (Some(at), _) => at,
+                (None, _) if is_end => return Ok(None),
+                (None, _) => shown.len() - WINDOW / 2,
+            };
+            self.input.consume(step);
+            foreign += step as u64;
+        }
+    }
+
+    /// How many frames the `foreign` bytes before a frame were: damaged headers hide frames, of which
+    /// those of constant bit rate have a known size. Other bytes were put between the frames.
+    fn missing_in(&self, foreign: u64, header: &Header) -> u64 {
+        let Some(before) = self.before.filter(|b| foreign > 0 && b.bit_rate == header.bit_rate)
+        else {
+            return 0;
+        };
+        // A frame is so many bytes on average, times 8 times the sample rate.
+        let scale = 8 * u64::from(before.sample_rate);
+        let average = before.samples as u64 * u64::from(before.bit_rate);
+        let frames = (foreign * scale + average / 2) / average;
+        let rest = (foreign * scale).abs_diff(frames * average);
+        if rest <= scale { frames } else { 0 }
+    }
+}
+
+fn continues_at(shown: &[u8], at: usize, first: &Header) -> bool {
+    shown.get(at..).and_then(Header::parse).is_some_and(|h| h.continues(first))
+}
+
+fn changed(offset: u64, frame: &[u8]) -> AudioError {
+    let actual = Header::parse(frame).map_or_else(String::new, |h| {
+        format!("change to layer {}, {} channels at {} Hz", h.layer, h.channels, h.sample_rate)
+    });
+    AudioError::unsupported(offset, actual, "one layer, channel count and rate in a recording")
+}
+
+/// One of the recordings in a file; there is more than one where files were concatenated.
+struct Part {
+    tag: Option<Tag>,
+    /// Samples per channel still to be dropped at its start.
+    skip: usize,
+    /// Its frames so far, missing ones included.
+    frames: u64,
+}
+
+impl Part {
+    fn new(tag: Option<Tag>) -> Self {
+        Self { tag, skip: tag.map_or(0, |t| t.trim.0 as usize), frames: 0 }
+    }
+
+    fn declared(&self) -> Option<u64> {
+        self.tag?.frames.map(u64::from)
+    }
+
+    /// Samples per channel to drop at its end.
+    fn padding(&self) -> usize {
+        self.tag.map_or(0, |t| t.trim.1 as usize)
+    }
+
+    /// Whether frames are missing at its end, where samples then are no padding.
+    fn is_cut(&self) -> bool {
+        self.declared().is_some_and(|n| self.frames < n)
+    }
+
+    /// Samples per channel in so many frames, without delay and padding.
+    fn length(&self, frames: u64, header: &Header) -> u64 {
+        let trim = self.tag.map_or(0, |t| u64::from(t.trim.0) + u64::from(t.trim.1));
+        frames.saturating_mul(header.samples as u64).saturating_sub(trim)
+    }
+}
+
+/// One file of MPEG audio.
+struct MpegStream {
+    frames: Frames,
+    first: Header,
+    codec: Codec,
+    part: Part,
+    /// Decoded samples that are dropped if the part ends with them.
+    held: Vec<f32>,
+    scratch: Vec<f32>,
+    /// Samples per channel handed out so far.
+    given: u64,
+    /// Samples per channel of silence that come next.
+    silence: u64,
+    /// Whether any frame could be decoded.
+    sounds: bool,
+    ended: bool,
+}
+
+/// Opens MPEG audio at the position of `input`, where a frame begins.
+pub(crate) fn open(mut input: Input) -> Result<Box<dyn BlockSource>, AudioError> {
+    let at = input.position();
+    if is_free_format(input.peek(WINDOW)?) {
+        return Err(AudioError::unsupported(at, "MPEG audio in free format", EXPECTED));
+    }
+    let mut report = ReadReport::default();
+    let no_frame = || AudioError::corrupt(at, "no whole frame of MPEG audio", EXPECTED);
+    let mut frames = Frames { input, first: None, before: None, missing: 0 };
+    let mut first = frames.next(&mut report)?.ok_or_else(no_frame)?;
+    let tag = Tag::parse(&frames.input.peek(first.size)?[..first.size], &first);
+    if tag.is_some() {
+        frames.input.consume(first.size);
+        first = frames.next(&mut report)?.ok_or_else(no_frame)?;
+    }
+    frames.first = Some(first);
+    let codec = Codec::mpeg(first.layer, first.channels.into(), first.sample_rate)
+        .map_err(|refusal| refusal.at(at, EXPECTED))?;
+    let part = Part::new(tag);
+    let declared = part.declared().filter(|frames| *frames > 0);
+    let spec = AudioSpec {
+        sample_rate: first.sample_rate,
+        channels: first.channels,
+        format: format!("mp{}", first.layer),
+        encoding: SampleEncoding::Lossy,
+        declared_frames: declared.map(|frames| part.length(frames, &first)),
+    };
+    let stream = MpegStream {
+        frames,
+        first,
+        codec,
+        part,
+        held: Vec::new(),
+        scratch: Vec::new(),
+        given: 0,
+        silence: 0,
+        sounds: false,
+        ended: false,
+    };
+    Ok(Box::new(StreamSource::new(stream, spec, report)))
+}
+
+impl MpegStream {
+    fn channels(&self) -> usize {
+        usize::from(self.first.channels)
+    }
+
+    /// The sample per channel that comes next.
+    fn position(&self) -> u64 {
+        self.given + (self.held.len() / self.channels()) as u64
+    }
+
+    /// Hands out what is held but for the last `kept` samples per channel.
+    fn give(&mut self, kept: usize, samples: &mut Vec<f32>) {
+        let n = self.held.len().saturating_sub(kept * self.channels());
+        samples.extend(self.held.drain(..n));
+        self.given += (n / self.channels()) as u64;
+    }
+
+    /// Adds decoded samples to those held.
+    fn hold(&mut self) {
+        let skip = self.part.skip.min(self.scratch.len() / self.channels());
+        self.part.skip -= skip;
+        self.held.extend_from_slice(&self.scratch[skip * self.channels()..]);
+    }
+
+    /// Ends a part: drops its padding, and notes where its length is not the one declared.
+    fn finish(&mut self, samples: &mut Vec<f32>, report: &mut ReadReport) {
+        let padding = if self.part.is_cut() { 0 } else { self.part.padding() };
+        self.give(padding, samples);
+        self.held.clear();
+        let Some(frames) = self.part.declared() else { return };
+        let declared = self.part.length(frames, &self.first);
+        if self.part.is_cut() {
+            report.note_truncated(Some(declared), self.given);
+        } else if frames < self.part.frames {
+            let declared = if frames == 0 { 0 } else { declared };
+            let actual = self.part.length(self.part.frames, &self.first);
+            report.note(Repair::LongerThanDeclared { declared, actual });
+        }
+    }
+
+    /// Adds the next frame to what is held, unless it is the tag of another part.
+    fn decode(
+        &mut self,
+        header: &Header,
+        samples: &mut Vec<f32>,
+        report: &mut ReadReport,
+    ) -> Result<(), AudioError> {
+        let at = self.frames.input.position();
+        let frame = &self.frames.input.peek(header.size)?[..header.size];
+        if let Some(tag) = Tag::parse(frame, header) {
+            self.frames.input.consume(header.size);
+            self.finish(samples, report);
+            report.note(Repair::Concatenated { at: self.given });
+            self.codec.reset();
+            self.part = Part::new(Some(tag));
+            return Ok(());
+        }
+        let decoded = self.codec.decode(frame, &mut self.scratch);
+        self.frames.input.consume(header.size);
+        self.part.frames += 1;
+        if decoded.map_err(|refusal| refusal.at(at, EXPECTED))? == Decoded::Damaged {
+            self.scratch.resize(header.samples * self.channels(), 0.0);
+            let count = header.samples as u64;
+            report.note(Repair::LostFrames { first: self.position(), count });
+        } else {
+            self.sounds = true;
+        }
+        self.hold();
+        self.give(self.part.padding(), samples);
+        Ok(())
+    }
+}
+
+impl Stream for MpegStream {
+    fn next(
+        &mut self,
+        samples: &mut Vec<f32>,
+        report: &mut ReadReport,
+    ) -> Result<Next, AudioError> {
+        if self.silence > 0 {
+            self.given += self.silence;
+            return Ok(Next::Silence(std::mem::take(&mut self.silence)));
+        }
+        if self.ended {
+            return Ok(Next::End);
+        }
+        match self.frames.next(report)? {
+            Some(_) if self.frames.missing > 0 => {
+                let missing = std::mem::take(&mut self.frames.missing);
+                self.part.frames += missing;
+                self.silence = missing * self.first.samples as u64;
+                self.give(0, samples);
+                report.note(Repair::LostFrames { first: self.given, count: self.silence });
+            }
+            Some(header) => self.decode(&header, samples, report)?,
+            None => {
+                self.ended = true;
+                self.finish(samples, report);
+                if !self.sounds {
+                    let at = self.frames.input.position();
+                    return Err(AudioError::corrupt(at, "no decodable frame", EXPECTED));
+                }
+            }
+        }
+        Ok(Next::Samples)
+    }
+}
