@@ -77,7 +77,7 @@ fn surely(bytes: &[u8]) -> Option<Format> {
 #[cfg(feature = "symphonia")]
 fn frames(shown: &[u8], is_end: bool) -> Option<(usize, Format)> {
     let free = crate::mpeg::is_free_format(shown).then_some(0);
-    crate::mpeg::find(shown, is_end).or(free).map(|at| (at, Format::Mpeg))
+    crate::mpeg::find(shown, is_end, 2).or(free).map(|at| (at, Format::Mpeg))
 }
 
 #[cfg(not(feature = "symphonia"))]

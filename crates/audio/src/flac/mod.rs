@@ -55,6 +55,8 @@ struct Part {
     next: Option<u64>,
     /// What looked like a frame and could not be read was met last.
     is_broken: bool,
+    /// It may be a frame that the end of the file cuts off.
+    is_cut: bool,
 }
 
 /// What the search for a frame came to.
@@ -211,6 +213,7 @@ impl FlacStream {
                 break;
             }
         }
+        self.part.is_cut = shown.len() < limit;
         samples.clear();
         Ok(None)
     }
@@ -260,7 +263,7 @@ impl FlacStream {
     fn finish(&self, report: &mut ReadReport) -> Result<(), AudioError> {
         let actual = self.part.next.unwrap_or(0);
         match self.info.declared {
-            _ if self.part.next.is_none() && self.part.is_broken => {
+            _ if self.part.next.is_none() && self.part.is_broken && !self.part.is_cut => {
                 let at = self.input.position();
                 return Err(AudioError::corrupt(at, "no intact frame", EXPECTED));
             }

@@ -61,7 +61,7 @@ impl Frames {
             }
             let shown = self.input.peek(WINDOW)?;
             let is_end = shown.len() < WINDOW;
-            let step = match (find(shown, is_end), first) {
+            let step = match (find(shown, is_end, 1), first) {
                 (Some(at), Some(first)) if !continues_at(shown, at, &first) => {
                     let position = self.input.position() + at as u64;
                     return Err(changed(position, &self.input.peek(WINDOW)?[at..]));

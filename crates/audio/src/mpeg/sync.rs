@@ -8,9 +8,9 @@ const CHAIN: usize = 3;
 /// Bytes that show such a chain wherever it begins in the first half of them.
 pub(crate) const WINDOW: usize = 2 * (CHAIN + 1) * MAX_FRAME;
 
-/// Whether frames follow each other from byte `at` on: [`CHAIN`] of them, or fewer up to the end of
-/// the file (`is_end`: the buffer holds it) or to a tag.
-pub(crate) fn is_chain(buffer: &[u8], at: usize, is_end: bool) -> bool {
+/// Whether frames follow each other from byte `at` on: [`CHAIN`] of them, or at least `least` up to
+/// the end of the file (`is_end`: the buffer holds it) or to a tag.
+fn is_chain(buffer: &[u8], at: usize, is_end: bool, least: usize) -> bool {
     let Some(first) = buffer.get(at..).and_then(Header::parse).filter(|h| h.size > HEADER) else {
         return false;
     };
@@ -18,13 +18,10 @@ pub(crate) fn is_chain(buffer: &[u8], at: usize, is_end: bool) -> bool {
     while count < CHAIN {
         let Some(rest) = buffer.get(at..) else {
             // Cut off inside the last frame.
-            return is_end && count > 1;
+            return is_end && count > least;
         };
-        if rest.len() < HEADER {
-            return is_end;
-        }
-        if tags::starts(rest) {
-            return true;
+        if rest.len() < HEADER || tags::starts(rest) {
+            return (is_end || rest.len() >= HEADER) && count >= least;
         }
         match Header::parse(rest).filter(|h| h.continues(&first)) {
             Some(header) => at += header.size,
@@ -35,10 +32,11 @@ pub(crate) fn is_chain(buffer: &[u8], at: usize, is_end: bool) -> bool {
     true
 }
 
-/// The first byte of `buffer` at which a chain of frames begins.
-pub(crate) fn find(buffer: &[u8], is_end: bool) -> Option<usize> {
+/// The first byte of `buffer` at which a chain of frames begins, of at least `least` frames where it
+/// ends with the file.
+pub(crate) fn find(buffer: &[u8], is_end: bool, least: usize) -> Option<usize> {
     let last = if is_end { buffer.len() } else { buffer.len().saturating_sub(WINDOW / 2) };
-    (0..last).find(|&at| buffer[at] == 0xff && is_chain(buffer, at, is_end))
+    (0..last).find(|&at| buffer[at] == 0xff && is_chain(buffer, at, is_end, least))
 }
 
 /// Whether frames of free format follow each other from the start of `buffer` on: their headers are
