@@ -110,7 +110,8 @@ pub fn delta<T: Real>(data: ArrayView2<T>, p: &DeltaParams) -> Result<Array2<T>>
                     let at = (center + i) as isize - half as isize;
                     Some(w * row[p.mode.index(at, frames)?].wide())
                 };
-                out[t] = T::of(weights.iter().enumerate().filter_map(value).sum());
+                let products = weights.iter().enumerate().filter_map(value);
+                out[t] = T::of(products.fold(0.0, |sum, x| sum + x));
             }
             vectorized(
                 #[inline(always)]
@@ -139,7 +140,8 @@ fn slide<T: Real>(weights: &[f64], row: &[T], out: &mut [T]) {
     }
     for (t, out) in rest.iter_mut().enumerate() {
         let products = weights.iter().zip(&row[start + t..]).map(|(w, x)| w * x.wide());
-        *out = T::of(products.sum());
+        // From zero, as the blocks: a sum has the same bits wherever it stands.
+        *out = T::of(products.fold(0.0, |sum, x| sum + x));
     }
 }
 

@@ -55,6 +55,7 @@ pub mod mono;
 pub mod normalize;
 pub mod onset;
 pub mod pca;
+pub mod pcen;
 pub mod pitch;
 mod pool;
 pub mod real;

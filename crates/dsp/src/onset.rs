@@ -30,7 +30,11 @@ impl OnsetParams {
         Ok(Self { lag: 1, max_size: 1, center: Some(center) })
     }
 
-    fn check(&self) -> Result<()> {
+    /// Refuses an impossible lag or size.
+    ///
+    /// # Errors
+    /// `lag` or `max_size` 0, or a lag beyond 2^24.
+    pub fn check(&self) -> Result<()> {
         if !(1..=MAX_LAG).contains(&self.lag) {
             return Err(DspError::parameter("lag", self.lag, format!("1 to {MAX_LAG}")));
         }

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use thiserror::Error;
 
-use crate::config::{Config, ConfigError, typed};
+use crate::params::{ConfigError, typed};
 use corsmal_files::draft::Draft;
 use corsmal_files::layout::{self, LayoutError};
 use corsmal_files::npy::{DType, Header};
@@ -231,7 +231,9 @@ pub struct ProjectionConfig {
 impl ProjectionConfig {
     /// Reads the table and its file. A configuration out of an output names the content as well, and
     /// then the file must still be that one.
-    pub(crate) fn parse(base: &Config, value: Value) -> Result<Self, ConfigError> {
+    ///
+    /// `summarised` says whether the rest of the configuration has a summary, `hash` is its hash.
+    pub(crate) fn parse(summarised: bool, hash: &str, value: Value) -> Result<Self, ConfigError> {
         let table: Map<String, Value> = match value {
             Value::Object(table) => table,
             other => {
@@ -241,23 +243,23 @@ impl ProjectionConfig {
         };
         let mut keys: Keys = typed("projection", &table)?;
         let refuse = |message: String| ConfigError::key("projection.file", message);
-        if base.summary.is_none() {
+        if !summarised {
             let message = "projects statistics, but the configuration has no [summary]";
             return Err(ConfigError::key("projection", message));
         }
         let path = Path::new(&keys.file);
         let bytes = std::fs::read(path).map_err(|e| refuse(format!("= {}: {e}", keys.file)))?;
-        let hash = blake3::hash(&bytes).to_hex().to_string();
-        if !keys.hash.is_empty() && keys.hash != hash {
-            let message = format!("= {}: is {hash}, expected {}", keys.file, keys.hash);
+        let content = blake3::hash(&bytes).to_hex().to_string();
+        if !keys.hash.is_empty() && keys.hash != content {
+            let message = format!("= {}: is {content}, expected {}", keys.file, keys.hash);
             return Err(refuse(message));
         }
-        keys.hash = hash;
+        keys.hash = content;
         let projection = Projection::load(path).map_err(|e| refuse(format!("= {e}")))?;
-        let (fitted, these) = (&projection.meta.config_hash, base.hash());
-        if *fitted != these {
+        let fitted = &projection.meta.config_hash;
+        if fitted != hash {
             return Err(refuse(format!(
-                "= {}: was fitted on features of configuration {fitted}, these have {these}",
+                "= {}: was fitted on features of configuration {fitted}, these have {hash}",
                 keys.file
             )));
         }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::config::ConfigError;
+use crate::params::ConfigError;
 
 /// One statistic over the frames of a coefficient.
 #[derive(Debug, Clone, Copy, PartialEq)]

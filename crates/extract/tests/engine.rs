@@ -225,7 +225,7 @@ proptest! {
                 plan.features.iter().zip(together.raw.iter().zip(&alone.raw))
             {
                 // Complex values are stored in pairs.
-                let width = if planned.feature.complex { 2 } else { 1 };
+                let width = if planned.complex { 2 } else { 1 };
                 let channel: Vec<f32> = all
                     .chunks(width)
                     .skip(c)
@@ -360,7 +360,7 @@ fn a_signal_one_hop_later_has_the_same_frames_one_later() {
         }
         for (index, planned) in plan.features.iter().enumerate() {
             let hop = plan.hop(&planned.name) as usize;
-            let width = planned.feature.raw_rows * CHANNELS;
+            let width = planned.raw_rows * CHANNELS;
             if width == 0 {
                 continue;
             }

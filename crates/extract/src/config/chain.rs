@@ -4,7 +4,7 @@ use corsmal_dsp::resample::ResType;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
-use super::ConfigError;
+use crate::params::ConfigError;
 
 /// Which channels, or how they are combined.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

@@ -2,74 +2,29 @@
 //! with its hash, in every output.
 
 mod chain;
-mod groups;
 mod librosa;
 mod preset;
 mod set;
+#[cfg(test)]
+mod tests;
 
+pub use crate::params::ConfigError;
 pub use chain::{Channels, Normalize, SignalConfig};
 pub use corsmal_dsp::resample::ResType;
-pub use groups::{AutoOr, DbRef, DbSpec, FrameSpec, MelSpec, Scale, StftSpec, TopDb};
-pub(crate) use groups::{MAX_N_FFT, at_most};
 pub use preset::{PRESETS, Preset};
 
 use std::path::Path;
 
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use serde_json::{Map, Value};
-use thiserror::Error;
 
 use crate::features::{self, FeatureConfig};
+use crate::params::typed;
 use crate::projection::ProjectionConfig;
 use crate::summary::SummaryConfig;
 
 /// Version of the configuration's meaning; part of its hash.
 pub const SCHEMA: u32 = 1;
-
-/// Why a configuration was refused: names the key, the value, and what is allowed.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum ConfigError {
-    /// The file cannot be read.
-    #[error("configuration {path}: {source}")]
-    Read {
-        /// Path of the file.
-        path: String,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The text is not TOML.
-    #[error("configuration {place}: {message}")]
-    Syntax {
-        /// Path or option.
-        place: String,
-        /// What the parser says.
-        message: String,
-    },
-    /// A key is unknown or its value impossible.
-    #[error("configuration key {key}: {message}")]
-    Key {
-        /// Dotted path of the key.
-        key: String,
-        /// The value and what is allowed.
-        message: String,
-    },
-    /// No preset has this name.
-    #[error("preset \"{name}\" is unknown: {choices}")]
-    Preset {
-        /// The name that was given.
-        name: String,
-        /// The one that was probably meant, and the known ones.
-        choices: String,
-    },
-}
-
-impl ConfigError {
-    /// A refusal of `key`.
-    pub fn key(key: impl Into<String>, message: impl std::fmt::Display) -> Self {
-        Self::Key { key: key.into(), message: message.to_string() }
-    }
-}
 
 /// A checked configuration.
 #[derive(Debug, Clone)]
@@ -193,7 +148,8 @@ impl Config {
         let description = raw.description;
         let mut config = Self { signal, features, summary, projection: None, description };
         if let Some(value) = raw.projection {
-            config.projection = Some(ProjectionConfig::parse(&config, value)?);
+            config.projection =
+                Some(ProjectionConfig::parse(config.summary.is_some(), &config.hash(), value)?);
         }
         Ok(config)
     }
@@ -230,35 +186,4 @@ fn top_level(error: &serde_json::Error) -> ConfigError {
     let message = error.to_string();
     let key = message.split('`').nth(1).unwrap_or("configuration").to_string();
     ConfigError::key(key, message)
-}
-
-/// A table of plain values as its typed struct. Unknown keys are refused by comparison with the
-/// keys of the default value, since serde cannot do so across flattened groups.
-pub(crate) fn typed<T>(prefix: &str, table: &Map<String, Value>) -> Result<T, ConfigError>
-where
-    T: for<'de> Deserialize<'de> + Serialize + Default,
-{
-    let known: Vec<String> = match serde_json::to_value(T::default()) {
-        Ok(Value::Object(map)) => map.keys().cloned().collect(),
-        _ => Vec::new(),
-    };
-    if let Some(key) = table.keys().find(|k| !known.contains(k)) {
-        let choices = corsmal_names::choices(key, known.iter().map(String::as_str));
-        let message = format!("is unknown here: {choices}");
-        return Err(ConfigError::key(format!("{prefix}.{key}"), message));
-    }
-    let parse = |table: Map<String, Value>| serde_json::from_value::<T>(Value::Object(table));
-    parse(table.clone()).map_err(|error| {
-        // Serde does not name the key of a wrong value: find it by trying keys one at a time.
-        let wrong = table.iter().find_map(|(key, value)| {
-            let one = Map::from_iter([(key.clone(), value.clone())]);
-            parse(one).err().map(|e| (key, value, e))
-        });
-        match wrong {
-            Some((key, value, e)) => {
-                ConfigError::key(format!("{prefix}.{key}"), format!("= {value}: {e}"))
-            }
-            None => ConfigError::key(prefix, error),
-        }
-    })
 }

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value};
 
-use super::ConfigError;
+use crate::params::ConfigError;
 
 /// Applies one assignment to a configuration tree. A key that starts with none of the other tables
 /// is a feature's (`mfcc.n_mels` is `features.mfcc.n_mels`); the value is TOML, or else a plain

@@ -8,9 +8,8 @@ use ndarray::Array2;
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::plan::{Plan, Scratch};
-use super::stream::{Cursor, Window};
-use crate::features::Kernel;
+use super::plan::{Plan, WholeFeature};
+use super::stream::{Cursor, Scratch, Window};
 
 /// What the features of one span of a recording, or of a part of it, have stored.
 #[derive(Debug, Default)]
@@ -50,7 +49,7 @@ impl Extractor {
     /// An extractor of frames anchored (`t * hop_length`) in `span`, whose first pushed sample is
     /// number `first` of the signal. A whole recording is `0..u64::MAX` from 0.
     pub fn new(plan: Arc<Plan>, span: Range<u64>, first: u64) -> Self {
-        let cursors = plan.streams.iter().map(|s| Cursor::new(&s.framing, &span)).collect();
+        let cursors = plan.streams.iter().map(|s| Cursor::new(&s.framing(), &span)).collect();
         let raw = vec![Vec::new(); plan.features.len()];
         Self { plan, cursors, raw, buffer: Vec::new(), head: 0, first, scratch: Scratch::default() }
     }
@@ -110,8 +109,8 @@ impl Extractor {
     /// Computes the features of the whole recording, which the buffer holds.
     fn whole(&mut self) -> Result<(), Refused> {
         let channels = self.plan.channels;
-        for (planned, raw) in self.plan.features.iter().zip(&mut self.raw) {
-            let Kernel::Whole(_, kernel) = &planned.feature.kernel else { continue };
+        for WholeFeature { feature, kernel } in &self.plan.whole {
+            let (planned, raw) = (&self.plan.features[*feature], &mut self.raw[*feature]);
             let each: Vec<Array2<f32>> = (0..channels)
                 .into_par_iter()
                 .map(|c| {
@@ -133,8 +132,9 @@ impl Extractor {
 
     fn advance(&mut self, total: Option<u64>) {
         let window = Window { samples: &self.buffer[self.head..], first: self.first, total };
-        for (stream, cursor) in self.cursors.iter_mut().enumerate() {
-            cursor.advance(&self.plan, stream, &window, &mut self.raw, &mut self.scratch);
+        for (stream, cursor) in self.plan.streams.iter().zip(&mut self.cursors) {
+            let (raw, scratch) = (&mut self.raw, &mut self.scratch);
+            cursor.advance(stream.as_ref(), self.plan.channels, &window, raw, scratch);
         }
     }
 
@@ -147,7 +147,7 @@ impl Extractor {
             .cursors
             .iter()
             .zip(&self.plan.streams)
-            .map(|(cursor, stream)| cursor.keep_from(&stream.framing))
+            .map(|(cursor, stream)| cursor.keep_from(&stream.framing()))
             .min()
             .unwrap_or(u64::MAX);
         let held = ((self.buffer.len() - self.head) / self.plan.channels) as u64;

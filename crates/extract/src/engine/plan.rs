@@ -3,95 +3,51 @@
 
 use std::sync::Arc;
 
-use corsmal_dsp::lanes::{Row, Spectrum};
-use corsmal_dsp::stft::{PadMode, StftParams};
-use corsmal_dsp::time_domain::FrameParams;
-use corsmal_dsp::transform::Forward;
+use corsmal_dsp::DspError;
 
+use super::stream::{ExactMember, Framing, SharedStreams, SpectrumMember, Stream};
 use crate::config::Config;
-use crate::features::{Extent, Feature, Kernel, Quantity};
+use crate::features::{Derived, Extent, Feature, Finish, Kernel, WholeKernel};
 
-/// A feature with its place in the output.
+/// A feature with its place in the output. Its kernel is in the stream that it reads.
 pub struct PlannedFeature {
     /// Name in outputs.
     pub name: String,
-    /// Kernel and finish.
-    pub feature: Feature,
-    /// Names of the coefficients kept.
-    pub labels: Vec<String>,
+    /// Values stored per frame and channel before finishing; 0 where it reads another feature.
+    pub raw_rows: usize,
+    /// Whether pairs of values are real and imaginary parts.
+    pub complex: bool,
+    /// Coefficients of a finished frame, its own or those of its source.
+    pub finished: usize,
+    /// Finishing, where values depend on the maximum of the recording.
+    pub finish: Option<Box<dyn Finish>>,
+    /// What is computed of finished frames in their order of time.
+    pub derived: Option<Box<dyn Derived>>,
+    /// Index of the feature whose finished frames it reads.
+    pub source: Option<usize>,
+    /// Coefficients before some are kept.
+    pub coefficients: usize,
     /// Coefficients kept, `[first, end)`.
     pub kept: [usize; 2],
-    /// Index of the feature that a derived one is computed from.
-    pub source: Option<usize>,
+    /// Names of the coefficients kept.
+    pub labels: Vec<String>,
+    /// Where its frames lie.
+    pub extent: Extent,
 }
 
 impl PlannedFeature {
     /// Whether it is one vector a recording, which statistics leave as it is.
     pub fn is_vector(&self) -> bool {
-        matches!(self.feature.kernel, Kernel::Whole(Extent::Vector, _))
+        self.extent == Extent::Vector && self.source.is_none()
     }
 }
 
-/// Frames of the waveform as a stream cuts them.
-#[derive(Debug, Clone, Copy)]
-pub struct Framing {
-    /// Samples in a frame.
-    pub length: usize,
-    /// Samples between frames.
-    pub hop: usize,
-    /// Samples before the first sample of the signal in frame 0.
-    pub pad: usize,
-    /// What lies outside the signal.
-    pub mode: PadMode,
-}
-
-impl Framing {
-    /// Frames of `n` samples.
-    pub fn n_frames(&self, n: u64) -> u64 {
-        let padded = n + 2 * self.pad as u64;
-        if n == 0 || padded < self.length as u64 {
-            0
-        } else {
-            1 + (padded - self.length as u64) / self.hop as u64
-        }
-    }
-}
-
-/// One pass over the frames of the signal, shared by every feature with the same framing.
-pub struct StreamPlan {
-    /// How frames are cut.
-    pub framing: Framing,
-    /// What is computed of them.
-    pub kind: StreamKind,
-}
-
-/// What a stream computes.
-pub enum StreamKind {
-    /// Spectra, shared by the features that read them.
-    Spectrum {
-        /// Transform parameters.
-        params: StftParams,
-        /// The transform.
-        spectrum: Spectrum,
-        /// The window in single precision.
-        window: Vec<f32>,
-        /// Features and what they read.
-        members: Vec<(usize, Quantity)>,
-    },
-    /// Magnitudes of a transform in double precision, shared by the features that read them.
-    Exact {
-        /// Transform parameters.
-        params: StftParams,
-        /// The transform of a frame that starts with its first sample.
-        forward: Forward<f64>,
-        /// Features.
-        members: Vec<usize>,
-    },
-    /// A waveform feature.
-    Wave {
-        /// Index of the feature.
-        member: usize,
-    },
+/// A feature of the whole recording.
+pub struct WholeFeature {
+    /// Its index.
+    pub feature: usize,
+    /// What it computes.
+    pub kernel: Box<dyn WholeKernel>,
 }
 
 /// Everything that is computed for signals of one rate and number of channels.
@@ -103,9 +59,12 @@ pub struct Plan {
     /// Features in their order of output.
     pub features: Vec<PlannedFeature>,
     /// Passes over the signal.
-    pub streams: Vec<StreamPlan>,
+    pub streams: Vec<Box<dyn Stream>>,
+    /// Features that are computed at the end of the signal.
+    pub whole: Vec<WholeFeature>,
     /// The configuration.
     pub config: Arc<Config>,
+    warnings: Vec<String>,
 }
 
 impl Plan {
@@ -120,88 +79,92 @@ impl Plan {
         channels: usize,
     ) -> corsmal_dsp::Result<Self> {
         let mut features: Vec<PlannedFeature> = Vec::new();
-        let mut streams: Vec<StreamPlan> = Vec::new();
+        let mut streams = SharedStreams::default();
+        let (mut whole, mut warnings) = (Vec::new(), Vec::new());
         for (index, configured) in config.features.iter().enumerate() {
             let feature = configured.plan(sample_rate)?;
-            let mut source = None;
-            let mut labels = feature.labels.clone();
-            match &feature.kernel {
-                Kernel::Spectrum(params, quantity, _) => {
-                    join_spectrum(&mut streams, params, (index, *quantity))?;
+            let name = configured.name().to_string();
+            let source = match feature.source() {
+                None => None,
+                Some(of) => {
+                    let real = |f: &PlannedFeature| f.name == of && !f.complex;
+                    let refuse =
+                        || DspError::parameter("of", of, "an earlier feature of real values");
+                    Some(features.iter().position(real).ok_or_else(refuse)?)
                 }
-                Kernel::Exact(params, _) => join_exact(&mut streams, params, index)?,
-                Kernel::Wave(frame, pad, _) => streams.push(wave(frame, *pad, index)),
-                Kernel::Whole(..) => {}
-                Kernel::Derived(of, _) => {
-                    source = features.iter().position(|f| f.name == *of);
-                    labels = source.map(|s| features[s].labels.clone()).unwrap_or_default();
-                }
-            }
+            };
+            let earlier = source.map_or(&[][..], |s| &features[s].labels);
+            let finished = if source.is_some() { earlier.len() } else { feature.labels.len() };
+            let labels = feature.output_labels(earlier);
             let kept = match configured.coefficients() {
                 None => [0, labels.len()],
                 Some([_, end]) if end > labels.len() => {
-                    let allowed = format!("at most {} for {}", labels.len(), configured.name());
-                    return Err(corsmal_dsp::DspError::parameter("coefficients", end, allowed));
+                    let allowed = format!("at most {} for {name}", labels.len());
+                    return Err(DspError::parameter("coefficients", end, allowed));
                 }
                 Some(range) => range,
             };
-            let labels = labels[kept[0]..kept[1]].to_vec();
-            let name = configured.name().to_string();
-            features.push(PlannedFeature { name, feature, labels, kept, source });
+            let Feature { kernel, raw_rows: rows, complex, finish, derived, .. } = feature;
+            let extent = match kernel {
+                Kernel::Spectrum(params, quantity, kernel) => {
+                    warnings.extend(kernel.warning().map(|warning| format!("{name}: {warning}")));
+                    let member = SpectrumMember { feature: index, rows, complex, quantity, kernel };
+                    streams.spectrum(&params, member)?;
+                    Extent::Frames(params.hop_length as f64)
+                }
+                Kernel::Exact(params, kernel) => {
+                    streams.exact(&params, ExactMember { feature: index, rows, kernel })?;
+                    Extent::Frames(params.hop_length as f64)
+                }
+                Kernel::Wave(frame, mode, kernel) => {
+                    streams.wave(&frame, mode, index, kernel);
+                    Extent::Frames(frame.hop_length as f64)
+                }
+                Kernel::Whole(extent, kernel) => {
+                    whole.push(WholeFeature { feature: index, kernel });
+                    extent
+                }
+                Kernel::Earlier(_) => source.map_or(Extent::Vector, |s| features[s].extent),
+            };
+            features.push(PlannedFeature {
+                name,
+                raw_rows: rows,
+                complex,
+                finished,
+                finish,
+                derived,
+                source,
+                coefficients: labels.len(),
+                kept,
+                labels: labels[kept[0]..kept[1]].to_vec(),
+                extent,
+            });
         }
-        Ok(Self { sample_rate, channels, features, streams, config: config.clone() })
+        let (streams, config) = (streams.into_streams(), config.clone());
+        Ok(Self { sample_rate, channels, features, streams, whole, config, warnings })
     }
 
     /// Whether a feature needs the whole recording, which can then not be cut into spans.
     pub fn needs_whole(&self) -> bool {
-        self.features.iter().any(|f| matches!(f.feature.kernel, Kernel::Whole(..)))
+        !self.whole.is_empty()
     }
 
     /// Samples between the frames of a feature; 0 for a vector.
     pub fn hop(&self, name: &str) -> f64 {
-        let Some(mut index) = self.features.iter().position(|f| f.name == name) else {
-            return 0.0;
-        };
-        while let Some(source) = self.features[index].source {
-            index = source;
+        match self.features.iter().find(|f| f.name == name).map(|f| f.extent) {
+            Some(Extent::Frames(hop)) => hop,
+            Some(Extent::Vector) | None => 0.0,
         }
-        if let Kernel::Whole(extent, _) = &self.features[index].feature.kernel {
-            return match extent {
-                Extent::Frames(hop) => *hop,
-                Extent::Vector => 0.0,
-            };
-        }
-        let hop = |s: &StreamPlan| {
-            let member = match &s.kind {
-                StreamKind::Wave { member } => *member == index,
-                StreamKind::Exact { members, .. } => members.contains(&index),
-                StreamKind::Spectrum { members, .. } => members.iter().any(|(m, _)| *m == index),
-            };
-            member.then_some(s.framing.hop as f64)
-        };
-        self.streams.iter().find_map(hop).unwrap_or(0.0)
     }
 
     /// What the user should know of parameters that are possible but odd.
-    pub fn warnings(&self) -> Vec<String> {
-        let warning = |f: &PlannedFeature| match &f.feature.kernel {
-            Kernel::Spectrum(_, _, kernel) => {
-                kernel.warning().map(|warning| format!("{}: {warning}", f.name))
-            }
-            _ => None,
-        };
-        self.features.iter().filter_map(warning).collect()
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// The longest transform, where there is one.
     pub fn longest_transform(&self) -> Option<usize> {
-        let n_fft = |s: &StreamPlan| match &s.kind {
-            StreamKind::Spectrum { params, .. } | StreamKind::Exact { params, .. } => {
-                Some(params.n_fft)
-            }
-            StreamKind::Wave { .. } => None,
-        };
-        self.streams.iter().filter_map(n_fft).max()
+        self.streams.iter().filter_map(|stream| stream.n_fft()).max()
     }
 
     /// Names of the statistics of a recording: `feature[coefficient].statistic`, with `chN/` before
@@ -234,96 +197,17 @@ impl Plan {
 
     /// Samples before and after a position that frames anchored there may need.
     pub fn context(&self) -> (usize, usize) {
-        let before = self.streams.iter().map(|s| s.framing.pad).max().unwrap_or(0);
-        let after = self.streams.iter().map(|s| s.framing.length).max().unwrap_or(0);
+        let before = self.streams.iter().map(|s| s.framing().pad).max().unwrap_or(0);
+        let after = self.streams.iter().map(|s| s.framing().length).max().unwrap_or(0);
         (before, after)
     }
 
     /// Samples that the first frame of every feature needs.
     pub fn shortest(&self) -> u64 {
-        let needed = |s: &StreamPlan| {
-            let Framing { length, pad, .. } = s.framing;
+        let needed = |s: &Box<dyn Stream>| {
+            let Framing { length, pad, .. } = s.framing();
             length.saturating_sub(2 * pad).max(1) as u64
         };
         self.streams.iter().map(needed).max().unwrap_or(1)
     }
-}
-
-/// Adds a feature to the spectrum stream with these parameters, made where there is none.
-fn join_spectrum(
-    streams: &mut Vec<StreamPlan>,
-    wanted: &StftParams,
-    member: (usize, Quantity),
-) -> corsmal_dsp::Result<()> {
-    for stream in streams.iter_mut() {
-        if let StreamKind::Spectrum { params, members, .. } = &mut stream.kind
-            && params == wanted
-        {
-            members.push(member);
-            return Ok(());
-        }
-    }
-    let window =
-        corsmal_dsp::window::padded_window(&wanted.window, wanted.win_length, wanted.n_fft)?;
-    streams.push(StreamPlan {
-        framing: transform_framing(wanted),
-        kind: StreamKind::Spectrum {
-            params: wanted.clone(),
-            spectrum: Spectrum::new(wanted.n_fft)?,
-            window: window.iter().map(|w| *w as f32).collect(),
-            members: vec![member],
-        },
-    });
-    Ok(())
-}
-
-/// Adds a feature to the exact transform with these parameters, made where there is none.
-fn join_exact(
-    streams: &mut Vec<StreamPlan>,
-    wanted: &StftParams,
-    member: usize,
-) -> corsmal_dsp::Result<()> {
-    for stream in streams.iter_mut() {
-        if let StreamKind::Exact { params, members, .. } = &mut stream.kind
-            && params == wanted
-        {
-            members.push(member);
-            return Ok(());
-        }
-    }
-    // Padding is the stream's: the transform sees whole frames.
-    let forward = Forward::new(&StftParams { center: false, ..wanted.clone() })?;
-    streams.push(StreamPlan {
-        framing: transform_framing(wanted),
-        kind: StreamKind::Exact { params: wanted.clone(), forward, members: vec![member] },
-    });
-    Ok(())
-}
-
-fn transform_framing(params: &StftParams) -> Framing {
-    Framing {
-        length: params.n_fft,
-        hop: params.hop_length,
-        pad: params.pad(),
-        mode: params.pad_mode,
-    }
-}
-
-fn wave(frame: &FrameParams, mode: PadMode, member: usize) -> StreamPlan {
-    let framing =
-        Framing { length: frame.frame_length, hop: frame.hop_length, pad: frame.pad(), mode };
-    StreamPlan { framing, kind: StreamKind::Wave { member } }
-}
-
-/// Rows of a block and of its spectra, reused for every block of a worker.
-#[derive(Default)]
-pub struct Scratch {
-    /// Windowed samples.
-    pub frames: Vec<Row>,
-    /// Power, magnitude or complex rows.
-    pub spectrum: Vec<Row>,
-    /// The rows of one feature.
-    pub rows: Vec<Row>,
-    /// Samples of frames that reach beyond the signal.
-    pub edge: Vec<f32>,
 }

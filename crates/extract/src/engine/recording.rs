@@ -4,13 +4,10 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
-use corsmal_dsp::delta::{DeltaMode, DeltaParams, delta};
-use ndarray::ArrayView2;
-
 use super::extractor::Span;
 use super::plan::{Plan, PlannedFeature};
 use super::store::Store;
-use crate::features::Kernel;
+use crate::features::{Derived, FrameShape, TooFewFrames};
 use crate::summary::{Accumulator, Stat};
 
 /// Finished frames of one feature.
@@ -53,7 +50,7 @@ impl Recording {
             .features
             .iter()
             .map(|f| {
-                let peaks = f.feature.finish.as_ref().map_or(0, |finish| finish.peaks().len());
+                let peaks = f.finish.as_ref().map_or(0, |finish| finish.peaks().len());
                 vec![f32::NEG_INFINITY; peaks * plan.channels]
             })
             .collect();
@@ -70,8 +67,8 @@ impl Recording {
         self.total = self.total.or(span.total);
         for (i, values) in span.raw.into_iter().enumerate() {
             let planned = &self.plan.features[i];
-            if let Some(finish) = &planned.feature.finish {
-                let width = planned.feature.raw_rows * self.plan.channels;
+            if let Some(finish) = &planned.finish {
+                let width = planned.raw_rows * self.plan.channels;
                 for (p, (rows, _)) in finish.peaks().into_iter().enumerate() {
                     let channels = self.plan.channels;
                     let peaks = &mut self.peaks[i][p * channels..(p + 1) * channels];
@@ -92,7 +89,7 @@ impl Recording {
     /// Frames of the feature with the fewest.
     pub fn fewest_frames(&self) -> usize {
         let frames = |(store, f): (&Store, &PlannedFeature)| {
-            let width = f.feature.raw_rows * self.plan.channels;
+            let width = f.raw_rows * self.plan.channels;
             (width > 0).then(|| store.len() / width)
         };
         self.raw.iter().zip(&self.plan.features).filter_map(frames).min().unwrap_or(0)
@@ -104,7 +101,7 @@ impl Recording {
     /// A temporary file fails, or a derived feature has too few frames.
     pub fn finish(mut self) -> Result<Features, FinishError> {
         for (peaks, f) in self.peaks.iter_mut().zip(&self.plan.features) {
-            let Some(finish) = &f.feature.finish else { continue };
+            let Some(finish) = &f.finish else { continue };
             for (p, (_, joint)) in finish.peaks().into_iter().enumerate() {
                 let peaks = &mut peaks[p * self.plan.channels..(p + 1) * self.plan.channels];
                 if joint {
@@ -115,23 +112,26 @@ impl Recording {
         }
         let mut arrays: Vec<FeatureArray> = Vec::new();
         let raw = std::mem::take(&mut self.raw);
-        // Derived features need all coefficients of their source: what is kept is cut out last.
         for (i, store) in raw.into_iter().enumerate() {
             let planned = &self.plan.features[i];
-            let values = match (&planned.feature.kernel, planned.source) {
-                (Kernel::Derived(_, params), Some(source)) => {
-                    self.derive(&mut arrays[source], params)?
+            let values = match (planned.source, &planned.derived) {
+                (Some(source), Some(derived)) => {
+                    let FeatureArray { name, values, .. } = &mut arrays[source];
+                    self.in_time(values, name, planned, derived.as_ref())?
                 }
-                _ => self.finished(store, planned, &self.peaks[i])?,
+                (None, Some(derived)) => {
+                    let mut finished = self.finished(store, planned, &self.peaks[i])?;
+                    self.in_time(&mut finished, &planned.name, planned, derived.as_ref())?
+                }
+                (_, None) => self.finished(store, planned, &self.peaks[i])?,
             };
             let coefficients = planned.labels.len();
-            let per_frame =
-                coefficients * self.plan.channels * if planned.feature.complex { 2 } else { 1 };
+            let per_frame = coefficients * self.plan.channels * if planned.complex { 2 } else { 1 };
             arrays.push(FeatureArray {
                 name: planned.name.clone(),
                 coefficients,
                 frames: values.len() / per_frame.max(1),
-                complex: planned.feature.complex,
+                complex: planned.complex,
                 values,
             });
         }
@@ -184,11 +184,12 @@ impl Recording {
         peaks: &[f32],
     ) -> Result<Store, FinishError> {
         let channels = self.plan.channels;
-        let rows = planned.feature.raw_rows;
-        let values_per = if planned.feature.complex { 2 * channels } else { channels };
-        let all = planned.feature.labels.len();
-        let [first, end] = planned.kept;
-        if planned.feature.finish.is_none() && end - first == all {
+        let rows = planned.raw_rows;
+        let values_per = if planned.complex { 2 * channels } else { channels };
+        let all = planned.finished;
+        // What is derived needs all coefficients.
+        let [first, end] = if planned.derived.is_some() { [0, all] } else { planned.kept };
+        if planned.finish.is_none() && end - first == all {
             return Ok(store);
         }
         // In the memory of the stored values, which are never fewer than the finished ones.
@@ -200,7 +201,7 @@ impl Recording {
             for t in 0..frames {
                 raw.copy_from_slice(&values[t * stored..(t + 1) * stored]);
                 let out = &mut values[t * kept..(t + 1) * kept];
-                match &planned.feature.finish {
+                match &planned.finish {
                     Some(finish) if end - first == all => finish.frame(&raw, peaks, channels, out),
                     Some(finish) => {
                         finish.frame(&raw, peaks, channels, &mut finished);
@@ -219,34 +220,44 @@ impl Recording {
         Ok(store.map(finish_chunk)?)
     }
 
-    /// Local derivatives of another feature's frames.
-    fn derive(
+    /// The kept coefficients of what is computed of finished frames in their order of time; `of`
+    /// is the name of the feature that has made them.
+    fn in_time(
         &self,
-        source: &mut FeatureArray,
-        params: &DeltaParams,
+        finished: &mut Store,
+        of: &str,
+        planned: &PlannedFeature,
+        derived: &dyn Derived,
     ) -> Result<Store, FinishError> {
-        if params.mode == DeltaMode::Interp && source.frames < params.width {
-            return Err(FinishError::TooFewFrames {
-                feature: source.name.clone(),
-                frames: source.frames,
-                needed: params.width,
-            });
-        }
-        let series = source.coefficients * self.plan.channels;
-        let mut values = Vec::with_capacity(source.values.len());
-        source.values.batches(1, |chunks| {
-            chunks.iter().for_each(|c| values.extend_from_slice(c));
-            io::Result::Ok(())
-        })?;
-        let view = ArrayView2::from_shape((source.frames, series), &values)
-            .expect("frames of equal length");
-        let derived = delta(view.t(), params).map_err(|_| FinishError::TooFewFrames {
-            feature: source.name.clone(),
-            frames: source.frames,
-            needed: params.width,
-        })?;
+        let channels = self.plan.channels;
+        let mut state = derived.start(FrameShape { coefficients: planned.finished, channels });
+        let (all, [first, end]) = (planned.coefficients, planned.kept);
         let mut out = Store::new(&self.folder);
-        out.push(derived.t().as_standard_layout().into_owned().into_raw_vec_and_offset().0)?;
+        let mut keep = |mut values: Vec<f32>| {
+            if end - first < all {
+                let frames = values.len() / (all * channels);
+                let kept = (end - first) * channels;
+                for t in 0..frames {
+                    let from = (t * all + first) * channels;
+                    values.copy_within(from..from + kept, t * kept);
+                }
+                values.truncate(frames * kept);
+            }
+            out.push(values)
+        };
+        finished.batches(1, |chunks| {
+            chunks.iter().try_for_each(|chunk| {
+                let mut values = Vec::new();
+                state.push(chunk, &mut values);
+                keep(values)
+            })
+        })?;
+        let mut rest = Vec::new();
+        state.finish(&mut rest).map_err(|TooFewFrames { frames, needed }| {
+            let (feature, of) = (planned.name.clone(), of.to_string());
+            FinishError::TooFewFrames { feature, of, frames, needed }
+        })?;
+        keep(rest)?;
         Ok(out)
     }
 }
@@ -257,12 +268,14 @@ pub enum FinishError {
     /// The temporary file failed.
     #[error("temporary file: {0}")]
     Temporary(#[from] io::Error),
-    /// A derivative needs more frames.
-    #[error("{feature} has {frames} frames, delta needs at least {needed}")]
+    /// A feature needs more frames.
+    #[error("{of} has {frames} frames, {feature} needs at least {needed}")]
     TooFewFrames {
-        /// The source of the derivative.
+        /// The feature.
         feature: String,
-        /// Its frames.
+        /// The feature whose frames it reads; itself where these are its own.
+        of: String,
+        /// Frames that there are.
         frames: usize,
         /// Frames needed.
         needed: usize,

@@ -5,7 +5,10 @@ use corsmal_dsp::corsmal::paa::{PaaPlan, short_names};
 use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, Feature, FeatureKind, WholeKernel};
+use super::kernel::{Extent, Feature, WholeKernel};
+use super::kind::FeatureKind;
+
+use crate::params::{Keys, USUAL_RATE};
 
 /// Parameters of `a34_short`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -43,6 +46,11 @@ impl FeatureKind for A34Short {
     const ABOUT: &'static str = "The 34 pyAudioAnalysis features of frames of window seconds every \
         step seconds; deltas = true adds their differences from frame to frame, 68 in all. The \
         recording is centred and divided by its peak first, hence held whole in memory.";
+    const KEYS: &'static [Keys] = &[&[
+        ("window", "Length of a frame in seconds."),
+        ("step", "Seconds from one frame to the next."),
+        ("deltas", "true: the differences from frame to frame as well, 68 values in all."),
+    ]];
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let samples = |name, seconds: f64| {
@@ -63,6 +71,6 @@ impl FeatureKind for A34Short {
 
     /// Made for a common rate: the filters do not exist at every one.
     fn check(&self) -> corsmal_dsp::Result<()> {
-        self.plan(super::USUAL_RATE).map(drop)
+        self.plan(USUAL_RATE).map(drop)
     }
 }

@@ -5,7 +5,9 @@ use corsmal_dsp::corsmal::paa::{Peak, short_names};
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, Feature, FeatureKind, WholeKernel};
+use super::kernel::{Extent, Feature, WholeKernel};
+use super::kind::FeatureKind;
+use crate::params::Keys;
 
 /// Parameters of `a34f136`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -33,6 +35,11 @@ impl FeatureKind for A34f136 {
         mean and deviation over each second, mean over the seconds: one vector a channel. A \
         recording is divided by its peak, taken before centring as M5's pyAudioAnalysis did (peak = \
         raw) or after it as version 0.3.14 does (centred). Holds the whole recording in memory.";
+    const KEYS: &'static [Keys] = &[&[(
+        "peak",
+        "What a recording is divided by: raw (its peak before centring) or centred (after it).",
+    )]];
+    const PYTHON: &'static str = "corsmal.a34f136";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let short = short_names();

@@ -5,7 +5,9 @@ use corsmal_dsp::librosa::LibrosaVersion;
 use ndarray::{Array1, Array2, Axis};
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, Feature, FeatureKind, WholeKernel};
+use super::kernel::{Extent, Feature, WholeKernel};
+use super::kind::FeatureKind;
+use crate::params::{Keys, LIBROSA};
 
 /// Parameters of `af193`.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -25,6 +27,8 @@ impl FeatureKind for Af193 {
     const ABOUT: &'static str = "193 means over frames: 40 MFCC, 12 chroma, 128 mel powers, 7 \
         spectral contrast, 6 tonnetz of the harmonic part (defaults of librosa 0.11, or of 0.8). One vector a \
         channel; holds the whole recording in memory.";
+    const KEYS: &'static [Keys] = &[LIBROSA];
+    const PYTHON: &'static str = "corsmal.af193";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         Ok(Feature::whole(Extent::Vector, Vector::of(sr, self.librosa)?, names()))

@@ -9,8 +9,10 @@ use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
 use super::chroma_stft::{MAX_CHROMA, check_tuning};
-use super::{Extent, Feature, FeatureKind, WholeKernel, indices};
-use crate::config::{AutoOr, at_most};
+use super::kernel::{Extent, Feature, WholeKernel};
+use super::kind::FeatureKind;
+use super::labels::indices;
+use crate::params::{AutoOr, Keys, LIBROSA, at_most};
 
 /// More lie in no range of hearing.
 const MAX_OCTAVES: usize = 16;
@@ -115,6 +117,20 @@ impl FeatureKind for ChromaCqt {
     const ABOUT: &'static str = "Magnitude of a constant-Q transform in n_chroma pitch classes from C \
         on, each frame divided by its maximum (librosa.feature.chroma_cqt), under the tuning of \
         the channel or the one given. Holds the whole recording in memory.";
+    const KEYS: &'static [Keys] = &[
+        LIBROSA,
+        &[
+            ("hop_length", "Samples from one frame to the next."),
+            ("n_chroma", "Number of pitch classes."),
+            ("n_octaves", "Octaves of the constant-Q transform, from C1 on."),
+            ("bins_per_octave", "Bins of the constant-Q transform to the octave."),
+            (
+                "tuning",
+                "Deviation from A = 440 Hz in fractions of a bin; \"auto\": estimated from each channel.",
+            ),
+        ],
+    ];
+    const PYTHON: &'static str = "feature.chroma_cqt";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let extent = Extent::Frames(self.hop_length as f64);

@@ -8,9 +8,11 @@ use corsmal_dsp::stft::{StftParams, spectrogram};
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
+use super::kernel::{Extent, Feature, WholeKernel};
+use super::kind::FeatureKind;
+use super::labels::indices;
 use super::melspectrogram::quantity_of;
-use super::{Extent, Feature, FeatureKind, WholeKernel, indices};
-use crate::config::{AutoOr, StftSpec, at_most};
+use crate::params::{AutoOr, Keys, StftSpec, at_most};
 
 /// Most pitch classes.
 pub const MAX_CHROMA: usize = 1024;
@@ -81,6 +83,18 @@ impl FeatureKind for ChromaStft {
     const ABOUT: &'static str = "Power (power = 2) or magnitude (power = 1) in n_chroma pitch \
         classes from C on, each frame divided by its maximum (librosa.feature.chroma_stft), under \
         the tuning of the channel or the one given. Holds the whole recording in memory.";
+    const KEYS: &'static [Keys] = &[
+        StftSpec::KEYS,
+        &[
+            ("n_chroma", "Number of pitch classes."),
+            ("power", "Exponent of the magnitudes: 2 is power, 1 magnitude."),
+            (
+                "tuning",
+                "Deviation from A = 440 Hz in fractions of a class; \"auto\": estimated from each channel.",
+            ),
+        ],
+    ];
+    const PYTHON: &'static str = "feature.chroma_stft";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let stft = self.stft.params()?;

@@ -7,9 +7,11 @@ use corsmal_dsp::window::Window;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
+use super::kernel::{Extent, Feature, WholeKernel};
+use super::kind::FeatureKind;
+use super::labels::hertz;
 use super::mel_bands::DecibelFinish;
-use super::{Extent, Feature, FeatureKind, WholeKernel, hertz};
-use crate::config::{DbSpec, Scale};
+use crate::params::{DbSpec, Keys, LIBROSA, Scale, USUAL_RATE};
 
 /// Parameters of `cqt`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -31,7 +33,7 @@ pub struct Cqt {
 
 impl Default for Cqt {
     fn default() -> Self {
-        let p = CqtParams::new(super::USUAL_RATE);
+        let p = CqtParams::new(USUAL_RATE);
         Self {
             hop_length: p.hop_length,
             fmin: C1,
@@ -72,6 +74,22 @@ impl FeatureKind for Cqt {
     const ABOUT: &'static str = "Magnitudes of a constant-Q transform (|librosa.cqt|): n_bins bins, \
         bins_per_octave of them to the octave, from fmin on; scale turns them into decibels. Holds \
         the whole recording in memory.";
+    const KEYS: &'static [Keys] = &[
+        LIBROSA,
+        Scale::KEYS,
+        DbSpec::KEYS,
+        &[
+            ("hop_length", "Samples from one frame to the next."),
+            ("fmin", "Frequency of the lowest bin in Hz; the default is C1."),
+            ("n_bins", "Number of bins."),
+            ("bins_per_octave", "Bins to the octave."),
+            ("tuning", "Deviation from A = 440 Hz in fractions of a bin."),
+            ("filter_scale", "Length of the filters; below 1 they are shorter, and times sharper."),
+            ("sparsity", "Part of the energy of a filter that may be left out."),
+            ("window", "Window function of the filters, by scipy's name."),
+        ],
+    ];
+    const PYTHON: &'static str = "cqt";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let params = CqtParams {
@@ -99,6 +117,6 @@ impl FeatureKind for Cqt {
 
     /// Made for a common rate: the transform costs milliseconds, and more at higher ones.
     fn check(&self) -> corsmal_dsp::Result<()> {
-        self.plan(super::USUAL_RATE).map(drop)
+        self.plan(USUAL_RATE).map(drop)
     }
 }

@@ -5,8 +5,10 @@ use corsmal_dsp::stft::{StftParams, spectrogram};
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::{Extent, Feature, FeatureKind, WholeKernel, hertz};
-use crate::config::StftSpec;
+use super::kernel::{Extent, Feature, WholeKernel};
+use super::kind::FeatureKind;
+use super::labels::hertz;
+use crate::params::{Keys, StftSpec};
 
 /// A part of the sound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -88,6 +90,22 @@ impl FeatureKind for Hpss {
     const ABOUT: &'static str = "Magnitudes of the component (harmonic or percussive) of the sound, \
         parted by medians over kernel_size frames and bins (librosa.decompose.hpss of |stft|): one \
         value per frequency bin. Holds the whole recording in memory.";
+    const KEYS: &'static [Keys] = &[
+        StftSpec::KEYS,
+        &[
+            ("component", "The part to keep: harmonic (steady in time) or percussive."),
+            (
+                "kernel_size",
+                "Frames of the median along time, bins of the median along frequency; one number for both.",
+            ),
+            ("power", "Exponent of the masks; \"inf\" is a hard mask."),
+            (
+                "margin",
+                "Factors by which a part must exceed the other, harmonic and percussive; one number for both.",
+            ),
+        ],
+    ];
+    const PYTHON: &'static str = "decompose.hpss";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let stft = self.stft.params()?;

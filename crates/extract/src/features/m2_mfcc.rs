@@ -5,7 +5,10 @@ use corsmal_dsp::librosa::LibrosaVersion;
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, Feature, FeatureKind, WholeKernel, indices};
+use super::kernel::{Extent, Feature, WholeKernel};
+use super::kind::FeatureKind;
+use super::labels::indices;
+use crate::params::{Keys, LIBROSA};
 
 /// Parameters of `m2_mfcc`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -37,6 +40,8 @@ impl FeatureKind for M2Mfcc {
     const ABOUT: &'static str = "40 MFCC of the first 30 s at 22,050 Hz every 20 ms, standardised \
         over the recording, with zero frames up to 1501 (M2's input; resamples by itself). Holds \
         the whole recording in memory.";
+    const KEYS: &'static [Keys] =
+        &[LIBROSA, &[("padded", "true: zero frames up to the 1501 of the network.")]];
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let plan = Plan { librosa: self.librosa, padded: self.padded };

@@ -5,8 +5,10 @@ use corsmal_dsp::stft::StftParams;
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, Feature, FeatureKind, WholeKernel, indices};
-use crate::config::{MAX_N_FFT, at_most};
+use super::kernel::{Extent, Feature, WholeKernel};
+use super::kind::FeatureKind;
+use super::labels::indices;
+use crate::params::{Keys, MAX_N_FFT, at_most};
 
 /// Parameters of `m3_spectrogram`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -36,6 +38,10 @@ impl FeatureKind for M3Spectrogram {
     const ABOUT: &'static str = "Magnitude spectrogram of the last 32,000 samples at 16,600 Hz (M3's \
         input; resamples by itself); times count from the first of these samples. Holds the whole \
         recording in memory.";
+    const KEYS: &'static [Keys] = &[&[
+        ("n_fft", "Samples of a frame that the transform sees."),
+        ("hop_length", "Samples from one frame to the next, at 16,600 Hz."),
+    ]];
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let params = StftParams::new(self.n_fft, self.hop_length);

@@ -5,7 +5,10 @@ use corsmal_dsp::corsmal::{M4LogMel as Plan, Variant};
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, Feature, FeatureKind, WholeKernel, indices};
+use super::kernel::{Extent, Feature, WholeKernel};
+use super::kind::FeatureKind;
+use super::labels::indices;
+use crate::params::Keys;
 
 /// Parameters of `m4_logmel`.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -28,6 +31,10 @@ impl FeatureKind for M4LogMel {
     const ABOUT: &'static str = "64 mel bands in dB of 25 ms frames every 10 ms on 16-bit counts (M4's \
         input): variant = code truncates frames to 512 samples and doubles the decibels, variant = \
         paper does not. Holds the whole recording in memory.";
+    const KEYS: &'static [Keys] = &[&[(
+        "variant",
+        "code: as the released program computes it; paper: as the paper describes it.",
+    )]];
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let step = (0.01 * sr).round_ties_even();

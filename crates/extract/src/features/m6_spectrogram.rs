@@ -5,7 +5,10 @@ use corsmal_dsp::librosa::LibrosaVersion;
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, Feature, FeatureKind, WholeKernel, pixels};
+use super::kernel::{Extent, Feature, WholeKernel};
+use super::kind::FeatureKind;
+use super::labels::pixels;
+use crate::params::{Keys, LIBROSA};
 
 /// Parameters of `m6_spectrogram`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -48,6 +51,10 @@ impl FeatureKind for M6Spectrogram {
     const ABOUT: &'static str = "Decibel spectrogram of ten seconds at 22,050 Hz from the second \
         detected onset (or the start) on, peak-normalised, as an image of 96 x 96, row by row from 0 Hz (M6's \
         input; resamples by itself). Holds the whole recording in memory.";
+    const KEYS: &'static [Keys] = &[
+        LIBROSA,
+        &[("begin", "Where the ten seconds begin: onset (the second detected one) or start.")],
+    ];
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let crop = match self.begin {

@@ -4,8 +4,8 @@ use corsmal_dsp::decibel::Decibel;
 use corsmal_dsp::lanes::{Row, power_to_decibel};
 use corsmal_dsp::mel::{MelParams, SparseBank, empty_filters, mel_filter};
 
-use super::{Finish, SpectrumKernel};
-use crate::config::{DbSpec, Scale, at_most};
+use super::kernel::{Finish, SpectrumKernel};
+use crate::params::{DbSpec, Scale, at_most};
 
 /// Values to a unit, before any clamp; `db` is for powers.
 pub fn power_rows_to_scale(scale: Scale, db: &Decibel, rows: &mut [Row]) {

@@ -4,10 +4,11 @@ use corsmal_dsp::mel::MelNorm;
 use corsmal_dsp::mfcc::{DctNorm, MfccParams, mfcc_matrix};
 use serde::{Deserialize, Serialize};
 
+use super::kernel::{Feature, Finish, Kernel};
+use super::kind::FeatureKind;
 use super::mel_bands::{MelKernel, clamp};
 use super::melspectrogram::quantity_of;
-use super::{Feature, FeatureKind, Finish, Kernel};
-use crate::config::{DbSpec, MelSpec, Scale, StftSpec};
+use crate::params::{DbSpec, Keys, MelSpec, Scale, StftSpec};
 
 /// Parameters of `mfcc`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -152,6 +153,26 @@ impl FeatureKind for Mfcc {
     const KIND: &'static str = "mfcc";
     const ABOUT: &'static str = "Mel-frequency cepstral coefficients (librosa.feature.mfcc): the \
         first n_mfcc cosine coefficients of the log-mel spectrum in dB; coefficient 0 is the level.";
+    const KEYS: &'static [Keys] = &[
+        StftSpec::KEYS,
+        MelSpec::KEYS,
+        DbSpec::KEYS,
+        &[
+            ("n_mfcc", "Number of coefficients, from 0 (the level) on."),
+            ("dct_type", "Type of the cosine transform: 1, 2 or 3."),
+            ("norm", "Norm of the cosine transform: ortho or none."),
+            (
+                "lifter",
+                "Coefficient n is weighted by 1 + lifter / 2 * sin(pi * (n + 1) / lifter); 0: no weights.",
+            ),
+            ("power", "Exponent of the magnitudes before the bands: 2 is power, 1 magnitude."),
+            (
+                "mel_norm",
+                "Weight of the bands: slaney (equal area), none, or a number p for the p-norm.",
+            ),
+        ],
+    ];
+    const PYTHON: &'static str = "feature.mfcc";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let stft = self.stft.params()?;
@@ -167,12 +188,11 @@ impl FeatureKind for Mfcc {
         let labels = (0..matrix.nrows()).map(|i| i.to_string()).collect();
         let weights = matrix.iter().map(|w| *w as f32).collect();
         let finish = Cepstrum::new(self.db, self.mel.n_mels, weights);
+        let kernel = Kernel::Spectrum(stft, quantity_of(self.power)?, Box::new(kernel));
         Ok(Feature {
-            kernel: Kernel::Spectrum(stft, quantity_of(self.power)?, Box::new(kernel)),
             raw_rows: self.mel.n_mels,
-            labels,
-            complex: false,
             finish: Some(Box::new(finish)),
+            ..Feature::new(kernel, labels)
         })
     }
 }

@@ -8,9 +8,10 @@ use corsmal_dsp::stft::{StftParams, spectrogram};
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
+use super::kernel::{Extent, Feature, WholeKernel};
+use super::kind::FeatureKind;
 use super::mel_bands::check_n_mels;
-use super::{Extent, Feature, FeatureKind, WholeKernel};
-use crate::config::{MelSpec, StftSpec};
+use crate::params::{Keys, MelSpec, StftSpec};
 
 /// Parameters of `onset_strength`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -54,6 +55,15 @@ impl FeatureKind for OnsetStrength {
     const ABOUT: &'static str = "Mean rise over lag frames of the mel bands in dB \
         (librosa.onset.onset_strength), 80 dB below the maximum of each channel. Holds the whole \
         recording in memory.";
+    const KEYS: &'static [Keys] = &[
+        StftSpec::KEYS,
+        MelSpec::KEYS,
+        &[
+            ("lag", "Frames to look back."),
+            ("max_size", "Bands of the maximum filter over the earlier frame; 1: no filter."),
+        ],
+    ];
+    const PYTHON: &'static str = "onset.onset_strength";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let stft = self.stft.params()?;

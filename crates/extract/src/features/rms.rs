@@ -4,8 +4,9 @@ use corsmal_dsp::stft::PadMode;
 use corsmal_dsp::time_domain::{FrameParams, level};
 use serde::{Deserialize, Serialize};
 
-use super::{Feature, FeatureKind, Kernel, WaveKernel};
-use crate::config::FrameSpec;
+use super::kernel::{Feature, Kernel, WaveKernel};
+use super::kind::FeatureKind;
+use crate::params::{FrameSpec, Keys};
 
 /// Parameters of `rms`.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -35,15 +36,18 @@ impl FeatureKind for Rms {
     const KIND: &'static str = "rms";
     const ABOUT: &'static str = "Root of the mean square of each frame (librosa.feature.rms), full \
         scale being 1.";
+    const KEYS: &'static [Keys] = &[
+        FrameSpec::KEYS,
+        &[(
+            "pad_mode",
+            "What lies beyond the ends when centred: constant (zeros), edge, reflect or symmetric.",
+        )],
+    ];
+    const PYTHON: &'static str = "feature.rms";
 
     fn plan(&self, _: f64) -> corsmal_dsp::Result<Feature> {
         let frame = self.frame.params()?;
-        Ok(Feature {
-            kernel: Kernel::Wave(frame, self.pad_mode, Box::new(Level(frame))),
-            raw_rows: 1,
-            labels: vec![String::new()],
-            complex: false,
-            finish: None,
-        })
+        let kernel = Kernel::Wave(frame, self.pad_mode, Box::new(Level(frame)));
+        Ok(Feature::new(kernel, vec![String::new()]))
     }
 }

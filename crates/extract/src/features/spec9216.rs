@@ -5,8 +5,10 @@ use corsmal_dsp::stft::PadMode;
 use ndarray::{Array2, ArrayView1};
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, Feature, FeatureKind, WholeKernel, pixels};
-use crate::config::at_most;
+use super::kernel::{Extent, Feature, WholeKernel};
+use super::kind::FeatureKind;
+use super::labels::pixels;
+use crate::params::{Keys, at_most};
 
 /// Longest signal, 25 minutes at 44.1 kHz; bounds the memory of the spectrogram.
 const MAX_LENGTH: usize = 1 << 26;
@@ -39,6 +41,11 @@ impl FeatureKind for Spec9216 {
     const ABOUT: &'static str = "Decibel spectrogram (512-point transform, hop 128) of the channel \
         divided by its RMS and cut or zero-padded to fixed_len samples, as an image of 96 x 96, row \
         by row from 0 Hz. Silence is refused; holds the whole recording in memory.";
+    const KEYS: &'static [Keys] = &[&[
+        ("fixed_len", "Samples to cut or zero-pad to; 0: as long as the recording is."),
+        ("pad_mode", "What lies beyond the ends: constant (zeros), edge, reflect or symmetric."),
+    ]];
+    const PYTHON: &'static str = "corsmal.spec9216";
 
     fn plan(&self, _: f64) -> corsmal_dsp::Result<Feature> {
         at_most("fixed_len", self.fixed_len, MAX_LENGTH)?;

@@ -4,8 +4,9 @@ use corsmal_dsp::frequency::fft_frequencies;
 use corsmal_dsp::spectral::centroid;
 use serde::{Deserialize, Serialize};
 
-use super::{Feature, FeatureKind, SlotFn, SlotKernel};
-use crate::config::StftSpec;
+use super::kernel::{Feature, SlotFn, SlotKernel};
+use super::kind::FeatureKind;
+use crate::params::{Keys, StftSpec};
 
 /// Parameters of `spectral_centroid`.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -27,10 +28,12 @@ impl FeatureKind for SpectralCentroid {
     const KIND: &'static str = "spectral_centroid";
     const ABOUT: &'static str = "Mean frequency in Hz weighted by magnitudes \
         (librosa.feature.spectral_centroid); 0 for silence.";
+    const KEYS: &'static [Keys] = &[StftSpec::KEYS];
+    const PYTHON: &'static str = "feature.spectral_centroid";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let stft = self.stft.params()?;
         let kernel = Centroid(fft_frequencies(sr, stft.n_fft)?);
-        Ok(Feature::exact(stft, Box::new(kernel), vec![String::new()]))
+        Ok(Feature::exact(stft, kernel, vec![String::new()]))
     }
 }

@@ -6,8 +6,9 @@ use corsmal_dsp::frequency::fft_frequencies;
 use corsmal_dsp::spectral::{Contrast, ContrastParams};
 use serde::{Deserialize, Serialize};
 
-use super::{Feature, FeatureKind, Finish, SlotFn, SlotKernel};
-use crate::config::StftSpec;
+use super::kernel::{Feature, Finish, SlotFn, SlotKernel};
+use super::kind::FeatureKind;
+use crate::params::{Keys, StftSpec};
 
 /// Parameters of `spectral_contrast`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -88,6 +89,16 @@ impl FeatureKind for SpectralContrast {
     const ABOUT: &'static str = "Mean of the strongest less mean of the weakest bins in dB (linear = \
         true: in magnitudes) of the band below fmin Hz and of n_bands octaves above \
         (librosa.feature.spectral_contrast); the 80 dB range is that of each channel.";
+    const KEYS: &'static [Keys] = &[
+        StftSpec::KEYS,
+        &[
+            ("fmin", "Upper end of the lowest band in Hz; the others are octaves above it."),
+            ("n_bands", "Octaves above the lowest band."),
+            ("quantile", "Fraction of the bins of a band that make its peak and its valley."),
+            ("linear", "true: difference of magnitudes; false: of decibels."),
+        ],
+    ];
+    const PYTHON: &'static str = "feature.spectral_contrast";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let stft = self.stft.params()?;
@@ -102,7 +113,7 @@ impl FeatureKind for SpectralContrast {
         Ok(Feature {
             raw_rows: 2 * rows,
             finish: Some(Box::new(Difference { rows, linear: self.linear })),
-            ..Feature::exact(stft, Box::new(kernel), labels)
+            ..Feature::exact(stft, kernel, labels)
         })
     }
 

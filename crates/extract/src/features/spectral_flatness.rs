@@ -3,8 +3,9 @@
 use corsmal_dsp::spectral::Flatness;
 use serde::{Deserialize, Serialize};
 
-use super::{Feature, FeatureKind, SlotFn, SlotKernel};
-use crate::config::StftSpec;
+use super::kernel::{Feature, SlotFn, SlotKernel};
+use super::kind::FeatureKind;
+use crate::params::{Keys, StftSpec};
 
 /// Parameters of `spectral_flatness`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -35,11 +36,19 @@ impl FeatureKind for SpectralFlatness {
     const KIND: &'static str = "spectral_flatness";
     const ABOUT: &'static str = "Geometric over arithmetic mean of the powers \
         (librosa.feature.spectral_flatness): 1 for white noise and silence, towards 0 for tones.";
+    const KEYS: &'static [Keys] = &[
+        StftSpec::KEYS,
+        &[
+            ("amin", "Smallest power told apart from zero."),
+            ("power", "Exponent of the magnitudes; 2 is power."),
+        ],
+    ];
+    const PYTHON: &'static str = "feature.spectral_flatness";
 
     fn plan(&self, _: f64) -> corsmal_dsp::Result<Feature> {
         let stft = self.stft.params()?;
         let params = Flatness { amin: self.amin, power: self.power };
         params.check()?;
-        Ok(Feature::exact(stft, Box::new(Means(params)), vec![String::new()]))
+        Ok(Feature::exact(stft, Means(params), vec![String::new()]))
     }
 }

@@ -5,8 +5,9 @@ use corsmal_dsp::frequency::fft_frequencies;
 use corsmal_dsp::spectral::rolloff;
 use serde::{Deserialize, Serialize};
 
-use super::{Feature, FeatureKind, SlotFn, SlotKernel};
-use crate::config::StftSpec;
+use super::kernel::{Feature, SlotFn, SlotKernel};
+use super::kind::FeatureKind;
+use crate::params::{Keys, StftSpec};
 
 /// Parameters of `spectral_rolloff`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -41,6 +42,14 @@ impl FeatureKind for SpectralRolloff {
     const KIND: &'static str = "spectral_rolloff";
     const ABOUT: &'static str = "Lowest bin frequency in Hz at or below which the fraction \
         roll_percent of the magnitudes lies (librosa.feature.spectral_rolloff).";
+    const KEYS: &'static [Keys] = &[
+        StftSpec::KEYS,
+        &[(
+            "roll_percent",
+            "Fraction of the sum of magnitudes that lies at or below the result, between 0 and 1.",
+        )],
+    ];
+    const PYTHON: &'static str = "feature.spectral_rolloff";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let stft = self.stft.params()?;
@@ -49,6 +58,6 @@ impl FeatureKind for SpectralRolloff {
             return Err(DspError::parameter("roll_percent", roll_percent, "between 0 and 1"));
         }
         let kernel = Rolloff { freqs: fft_frequencies(sr, stft.n_fft)?, roll_percent };
-        Ok(Feature::exact(stft, Box::new(kernel), vec![String::new()]))
+        Ok(Feature::exact(stft, kernel, vec![String::new()]))
     }
 }

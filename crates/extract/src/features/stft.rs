@@ -3,9 +3,11 @@
 use corsmal_dsp::lanes::Row;
 use serde::{Deserialize, Serialize};
 
+use super::kernel::{Feature, Kernel, Quantity, SpectrumKernel};
+use super::kind::FeatureKind;
+use super::labels::hertz;
 use super::mel_bands::{DecibelFinish, power_rows_to_scale};
-use super::{Feature, FeatureKind, Kernel, Quantity, SpectrumKernel, hertz};
-use crate::config::{DbSpec, Scale, StftSpec};
+use crate::params::{DbSpec, Keys, Scale, StftSpec};
 
 /// What is kept of a complex bin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -57,6 +59,13 @@ impl FeatureKind for Stft {
     const ABOUT: &'static str = "Short-time Fourier transform (librosa.stft): one value per \
         frequency bin k at k * sr / n_fft Hz. output = complex, magnitude or power; scale turns \
         magnitude or power into decibels.";
+    const KEYS: &'static [Keys] = &[
+        StftSpec::KEYS,
+        Scale::KEYS,
+        DbSpec::KEYS,
+        &[("output", "What is kept of a complex bin: complex, magnitude or power.")],
+    ];
+    const PYTHON: &'static str = "stft";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let stft = self.stft.params()?;
@@ -79,12 +88,12 @@ impl FeatureKind for Stft {
         let n_fft = stft.n_fft as f64;
         let hz = |k: usize| hertz(k as f64 * sr / n_fft);
         let finish = DecibelFinish::of(self.scale, &self.db, bins);
+        let kernel = Kernel::Spectrum(stft, quantity, kernel);
         Ok(Feature {
-            kernel: Kernel::Spectrum(stft, quantity, kernel),
             raw_rows: if complex { 2 * bins } else { bins },
-            labels: (0..bins).map(hz).collect(),
             complex,
             finish,
+            ..Feature::new(kernel, (0..bins).map(hz).collect())
         })
     }
 }

@@ -6,7 +6,10 @@ use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
 
 use super::chroma_cqt::{ChromaCqt, ChromaOfChannel};
-use super::{Extent, Feature, FeatureKind, WholeKernel, indices};
+use super::kernel::{Extent, Feature, WholeKernel};
+use super::kind::FeatureKind;
+use super::labels::indices;
+use crate::params::Keys;
 
 /// Parameters of `tonnetz`: those of the chroma behind it.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -43,6 +46,12 @@ impl FeatureKind for Tonnetz {
     const ABOUT: &'static str = "Six tonal centroids (fifths, minor and major thirds) of the \
         constant-Q chroma (librosa.feature.tonnetz), with harmonic = true of the harmonic part of \
         the sound. Holds the whole recording in memory.";
+    const KEYS: &'static [Keys] = &[
+        ChromaCqt::KEYS[0],
+        ChromaCqt::KEYS[1],
+        &[("harmonic", "true: of the harmonic part of the sound; false: of the sound as it is.")],
+    ];
+    const PYTHON: &'static str = "feature.tonnetz";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let extent = Extent::Frames(self.chroma.hop_length() as f64);

@@ -5,7 +5,10 @@ use corsmal_dsp::corsmal::M5VggishPatches as Plan;
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
-use super::{Extent, Feature, FeatureKind, WholeKernel, indices};
+use super::kernel::{Extent, Feature, WholeKernel};
+use super::kind::FeatureKind;
+use super::labels::indices;
+use crate::params::Keys;
 
 /// `vggish_patches` has no parameters.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -33,6 +36,7 @@ impl FeatureKind for VggishPatches {
     const ABOUT: &'static str = "64 log-mel bands at 16 kHz every 10 ms, ln(mel + 0.01) of magnitudes \
         from 125 to 7500 Hz; every 96 frames are a patch of VGGish, a shorter rest is dropped \
         (resamples by itself). Holds the whole recording in memory.";
+    const KEYS: &'static [Keys] = &[];
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         Ok(Feature::whole(Extent::Frames(0.01 * sr), Patches(sr), indices(64)))

@@ -4,8 +4,9 @@ use corsmal_dsp::stft::PadMode;
 use corsmal_dsp::time_domain::{FrameParams, ZeroCrossingParams};
 use serde::{Deserialize, Serialize};
 
-use super::{Feature, FeatureKind, Kernel, WaveKernel};
-use crate::config::FrameSpec;
+use super::kernel::{Feature, Kernel, WaveKernel};
+use super::kind::FeatureKind;
+use crate::params::{FrameSpec, Keys};
 
 /// Parameters of `zero_crossing_rate`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -44,6 +45,15 @@ impl FeatureKind for ZeroCrossingRate {
     const KIND: &'static str = "zero_crossing_rate";
     const ABOUT: &'static str = "Share of the samples of a frame at which the signal changes sign \
         (librosa.feature.zero_crossing_rate), between 0 and 1.";
+    const KEYS: &'static [Keys] = &[
+        FrameSpec::KEYS,
+        &[
+            ("threshold", "Samples of at most this magnitude count as zero."),
+            ("zero_pos", "true: zero is positive; false: it has a sign of its own."),
+            ("pad", "true: the first sample of a frame counts as a crossing."),
+        ],
+    ];
+    const PYTHON: &'static str = "feature.zero_crossing_rate";
 
     fn plan(&self, _: f64) -> corsmal_dsp::Result<Feature> {
         let frame = self.frame.params()?;
@@ -53,12 +63,7 @@ impl FeatureKind for ZeroCrossingRate {
             pad: self.pad,
         };
         params.check()?;
-        Ok(Feature {
-            kernel: Kernel::Wave(frame, PadMode::Edge, Box::new(Crossings { frame, params })),
-            raw_rows: 1,
-            labels: vec![String::new()],
-            complex: false,
-            finish: None,
-        })
+        let kernel = Kernel::Wave(frame, PadMode::Edge, Box::new(Crossings { frame, params }));
+        Ok(Feature::new(kernel, vec![String::new()]))
     }
 }

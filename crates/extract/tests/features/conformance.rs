@@ -1,8 +1,8 @@
 //! What holds for every registered feature, whatever it computes: registration alone enrols it.
 
 use corsmal_extract::config::Config;
-use corsmal_extract::engine::Plan;
-use corsmal_extract::features::{Entry, Kernel, registry};
+use corsmal_extract::engine::{Extractor, Features, Plan, Recording};
+use corsmal_extract::features::{Entry, registry};
 use ndarray::{Array2, Array3, Axis, concatenate, s};
 use std::sync::Arc;
 
@@ -16,9 +16,12 @@ fn configuration(feature: &Entry) -> String {
 
 /// Whether the feature holds the whole recording.
 fn is_whole(feature: &Entry) -> bool {
+    plan(feature, 1).needs_whole()
+}
+
+fn plan(feature: &Entry, channels: usize) -> Arc<Plan> {
     let config = Config::with_overrides(&configuration(feature), "test", &[]).unwrap();
-    let plan = Plan::new(&Arc::new(config), SR, 1).unwrap();
-    matches!(plan.features.last().unwrap().feature.kernel, Kernel::Whole(..))
+    Arc::new(Plan::new(&Arc::new(config), SR, channels).unwrap())
 }
 
 fn is_finite(values: &Array3<f32>) -> bool {
@@ -67,6 +70,71 @@ fn any_split_into_blocks_gives_the_same_bits() {
         for block in blocks {
             let split = frames(&toml, y.view(), *block);
             assert_eq!(split, whole, "{} in blocks of {block}", feature.kind());
+        }
+    }
+}
+
+/// The values of a recording of two channels that is cut into spans of time at `cuts`, each of them
+/// read in blocks and handed on in parts, with the context that a run gives it.
+fn in_spans(plan: &Arc<Plan>, y: &Array2<f32>, cuts: &[u64], block: usize) -> Vec<f32> {
+    let samples: Vec<f32> = y.t().iter().copied().collect();
+    let (channels, total) = (y.nrows(), y.ncols() as u64);
+    let starts = std::iter::once(0).chain(cuts.iter().copied());
+    let ends = cuts.iter().copied().chain([u64::MAX]);
+    let (before, after) = plan.context();
+    let mut recording = Recording::new(plan.clone(), &std::env::temp_dir());
+    for (start, end) in starts.zip(ends) {
+        let first = start.saturating_sub(2 * before as u64 + 1);
+        let last = end.saturating_add(after as u64);
+        let part = first as usize * channels..last.min(total) as usize * channels;
+        let mut extractor = Extractor::new(plan.clone(), start..end, first);
+        for block in samples[part].chunks(block * channels) {
+            extractor.push(block);
+            recording.add(extractor.take()).unwrap();
+        }
+        recording.add(extractor.finish(last > total).unwrap()).unwrap();
+    }
+    let Features::Frames(mut arrays) = recording.finish().unwrap() else {
+        panic!("no summary was asked for")
+    };
+    arrays.pop().unwrap().values.into_vec().unwrap()
+}
+
+#[test]
+fn any_cut_into_spans_gives_the_same_bits() {
+    let y = signal(2, SAMPLES);
+    for feature in registry() {
+        let plan = plan(feature, 2);
+        if plan.needs_whole() {
+            // Never cut.
+            continue;
+        }
+        let bits = |values: Vec<f32>| values.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        let whole = bits(in_spans(&plan, &y, &[], SAMPLES));
+        assert!(!whole.is_empty());
+        for (cuts, block) in [
+            (&[SAMPLES as u64 / 2][..], SAMPLES),
+            (&[1, 700, 9_001, 20_000][..], 977),
+            (&[512, 1024, 1536, 30_000][..], 64),
+        ] {
+            let cut = bits(in_spans(&plan, &y, cuts, block));
+            assert!(cut == whole, "{} cut at {cuts:?}", feature.kind());
+        }
+    }
+}
+
+#[test]
+fn every_key_is_explained_and_every_explanation_has_its_key() {
+    for feature in registry() {
+        let defaults = feature.defaults();
+        let keys = defaults.as_object().unwrap();
+        for key in keys.keys() {
+            let about = feature.explain(key).unwrap_or_default();
+            let sentence = about.len() > 10 && about.ends_with('.');
+            assert!(sentence, "{}: KEYS lack {key}: \"{about}\"", feature.kind());
+        }
+        for key in feature.keys() {
+            assert!(keys.contains_key(key), "{}: KEYS has {key}, which is no key", feature.kind());
         }
     }
 }

@@ -4,5 +4,6 @@
 
 mod arrays;
 mod conformance;
+mod neighbours;
 mod real_audio;
 mod support;

@@ -6,6 +6,7 @@
 mod faults;
 mod inputs;
 mod outputs;
+mod own_feature;
 mod projection;
 mod resume;
 mod support;

@@ -1,0 +1,121 @@
+//! Configurations as users write them.
+
+use proptest::prelude::*;
+
+use super::{Config, PRESETS, Preset};
+
+const KEYS: &[&str] = &[
+    "signal.start",
+    "signal.sample_rate",
+    "signal.length",
+    "signal.channels",
+    "mfcc.n_fft",
+    "mfcc.hop_length",
+    "mfcc.lifter",
+    "mfcc.top_db",
+    "mfcc.ref",
+    "mfcc.amin",
+    "mfcc.fmin",
+    "mfcc.fmax",
+    "melspectrogram.top_db",
+    "zero_crossing_rate.threshold",
+    "summary.stats",
+];
+const VALUES: &[&str] = &[
+    "0",
+    "1",
+    "-1",
+    "nan",
+    "inf",
+    "-inf",
+    "1e999",
+    "9223372036854775807",
+    "true",
+    "\"mean\"",
+    "[]",
+    "[0, 1]",
+    "{ a = 1 }",
+    "[[[[[[[[1]]]]]]]]",
+    "1979-05-27",
+    "\"\"",
+];
+
+#[test]
+fn every_preset_is_valid_and_described() {
+    for preset in PRESETS {
+        let config = Config::preset(preset.name).unwrap();
+        assert!(!config.description.is_empty());
+        // What is stored in outputs is a configuration again, with the same hash.
+        let again = Config::from_value(config.to_value()).unwrap();
+        assert_eq!(again.hash(), config.hash());
+    }
+}
+
+proptest! {
+    #[test]
+    fn any_edit_of_a_preset_gives_an_answer(
+        preset in prop::sample::select(PRESETS),
+        edits in prop::collection::vec((any::<prop::sample::Index>(), "[ -~]{0,3}"), 1..4),
+        key in "(signal|mfcc|summary|melspectrogram)\\.[a-z_]{0,12}",
+        value in prop::sample::select(VALUES),
+        known in prop::sample::select(KEYS),
+    ) {
+        let mut text = preset.toml.to_string();
+        for (at, edit) in edits {
+            let at = at.index(text.len());
+            if text.is_char_boundary(at) && text.is_char_boundary(at + 1) {
+                text.replace_range(at..=at, &edit);
+            }
+        }
+        let sets = [vec![], vec![format!("{key}={value}")], vec![format!("{known}={value}")]];
+        for overrides in &sets {
+            if let Ok(config) = Config::with_overrides(&text, "edited", overrides) {
+                prop_assert_eq!(Config::from_value(config.to_value()).unwrap().hash(), config.hash());
+            }
+        }
+    }
+}
+
+fn config(text: &str, overrides: &[&str]) -> Result<Config, String> {
+    let overrides: Vec<String> = overrides.iter().map(|s| s.to_string()).collect();
+    Config::with_overrides(text, "test", &overrides).map_err(|e| e.to_string())
+}
+
+#[test]
+fn the_switch_is_what_it_spells_out() {
+    let plain = "[features.mfcc]\n[features.rms]\n[features.af193]";
+    let spelled = "[signal]\nres_type = 'kaiser_best'\n[features.mfcc]\npad_mode = 'reflect'\n\
+        [features.rms]\npad_mode = 'reflect'\n[features.af193]\nlibrosa = '0.8'";
+    let switched = config(plain, &["librosa=0.8"]).unwrap();
+    assert_eq!(switched.to_value(), config(spelled, &[]).unwrap().to_value());
+    let text = format!("librosa = '0.8'\n{plain}");
+    assert_eq!(switched.hash(), config(&text, &[]).unwrap().hash());
+    let modern = config(plain, &["librosa=0.11"]).unwrap();
+    assert_eq!(modern.hash(), config(plain, &[]).unwrap().hash());
+    assert_ne!(modern.hash(), switched.hash());
+}
+
+#[test]
+fn what_a_configuration_says_itself_stays() {
+    let text = "librosa = '0.8'\n[features.m]\nkind = 'mfcc'\npad_mode = 'edge'";
+    assert_eq!(config(text, &[]).unwrap().to_value()["features"]["m"]["pad_mode"], "edge");
+}
+
+#[test]
+fn what_is_spelled_out_as_the_other_versions_is_refused() {
+    let preset = Preset::find("spec9216-code").unwrap();
+    let refused = config(preset.toml, &["librosa=0.11"]).unwrap_err();
+    let expected = "configuration key signal.res_type: = \"kaiser_best\" is librosa \"0.8\"'s";
+    assert!(refused.starts_with(expected), "{refused}");
+    let own = "librosa = '0.8'\n[features.rms]\npad_mode = 'constant'";
+    let refused = config(own, &[]).unwrap_err();
+    assert!(refused.contains("features.rms.pad_mode"), "{refused}");
+    let own = "librosa = '0.8'\n[features.af193]\nlibrosa = '0.11'";
+    assert!(config(own, &[]).unwrap_err().contains("features.af193.librosa"));
+}
+
+#[test]
+fn other_versions_are_refused() {
+    let refused = config("[features.mfcc]", &["librosa=0.9"]).unwrap_err();
+    assert_eq!(refused, "configuration key librosa: = 0.9: expected \"0.8\" or \"0.11\"");
+}

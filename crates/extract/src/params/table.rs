@@ -1,0 +1,40 @@
+//! Tables of plain values as typed parameters.
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use super::error::ConfigError;
+
+/// A table of plain values as its typed struct. Unknown keys are refused by comparison with the
+/// keys of the default value, since serde cannot do so across flattened groups.
+///
+/// # Errors
+/// An unknown key, or the first value that is impossible.
+pub fn typed<T>(prefix: &str, table: &Map<String, Value>) -> Result<T, ConfigError>
+where
+    T: for<'de> Deserialize<'de> + Serialize + Default,
+{
+    let known: Vec<String> = match serde_json::to_value(T::default()) {
+        Ok(Value::Object(map)) => map.keys().cloned().collect(),
+        _ => Vec::new(),
+    };
+    if let Some(key) = table.keys().find(|k| !known.contains(k)) {
+        let choices = corsmal_names::choices(key, known.iter().map(String::as_str));
+        let message = format!("is unknown here: {choices}");
+        return Err(ConfigError::key(format!("{prefix}.{key}"), message));
+    }
+    let parse = |table: Map<String, Value>| serde_json::from_value::<T>(Value::Object(table));
+    parse(table.clone()).map_err(|error| {
+        // Serde does not name the key of a wrong value: find it by trying keys one at a time.
+        let wrong = table.iter().find_map(|(key, value)| {
+            let one = Map::from_iter([(key.clone(), value.clone())]);
+            parse(one).err().map(|e| (key, value, e))
+        });
+        match wrong {
+            Some((key, value, e)) => {
+                ConfigError::key(format!("{prefix}.{key}"), format!("= {value}: {e}"))
+            }
+            None => ConfigError::key(prefix, error),
+        }
+    })
+}
