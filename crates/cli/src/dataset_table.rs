@@ -3,12 +3,12 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
+use corsmal_files::feature_file::{FeatureFile, FeatureTable};
+use corsmal_files::identity;
 use corsmal_files::layout;
 use corsmal_files::npy::{Kind, NpyError};
 use corsmal_files::npz::{NpzError, NpzFile};
 use corsmal_files::outcome::Outcome;
-use corsmal_files::provenance::Provenance;
-use corsmal_files::{identity, parquet, table};
 use corsmal_models::labels::Labels;
 use ndarray::{Array2, Ix2};
 use serde_json::{Value, json};
@@ -115,20 +115,17 @@ pub struct DatasetTable {
 impl DatasetTable {
     /// Reads an `.npz` or `.parquet` of `extract`, or an `.npz` of another program.
     pub fn read(path: &Path, foreign: &ForeignArgs) -> Result<Self, Failure> {
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet")) {
-            return Self::of_extraction(path, parquet::read(path)?);
-        }
-        let mut npz = NpzFile::open(path)?;
-        if layout::is_ours(&npz) {
-            Self::of_extraction(path, layout::read_table(&mut npz)?)
-        } else {
-            Self::of_foreign(path, &mut npz, foreign)
+        match FeatureFile::open(path)? {
+            FeatureFile::Npz(mut npz) if !layout::is_ours(&npz) => {
+                Self::of_foreign(path, &mut npz, foreign)
+            }
+            mut ours => Self::of_extraction(path, ours.table()?),
         }
     }
 
     fn of_extraction(
         path: &Path,
-        (table, provenance): (table::Table, Provenance),
+        FeatureTable { table, provenance, .. }: FeatureTable,
     ) -> Result<Self, Failure> {
         if table.feature_names().is_empty() && !table.ids().is_empty() {
             return Err(Failure::new(format!(

@@ -6,12 +6,12 @@ use ndarray::{Array3, ArrayD};
 use serde::Serialize;
 
 use super::causes::{self, Cause};
+use super::compared_file::{ArrayEntry, ComparedFile};
 use super::difference::{Difference, Tolerance};
-use super::feature_file::{ArrayEntry, FeatureFile};
 use super::matching::{ArrayMatch, Matching, TableMatch};
 use super::pair::{Axes, Pair, index_of};
 use super::settings::Settings;
-use corsmal_files::parquet::Columns;
+use corsmal_files::parquet::NumericTable;
 
 /// The differences between two files.
 #[derive(Debug, Serialize)]
@@ -151,7 +151,12 @@ impl Collector {
     }
 
     /// Compares the common rows and columns of two tables. Without tables nothing was found.
-    pub(super) fn table(&mut self, found: &TableMatch, a: Option<&Columns>, b: Option<&Columns>) {
+    pub(super) fn table(
+        &mut self,
+        found: &TableMatch,
+        a: Option<&NumericTable>,
+        b: Option<&NumericTable>,
+    ) {
         let (Some(a), Some(b)) = (a, b) else { return };
         let shape = (1, found.columns.len(), found.rows.len());
         let pair = Pair {
@@ -184,12 +189,17 @@ impl Collector {
     }
 
     /// The report, with what the files hold beside.
-    pub(super) fn finish(self, a: &FeatureFile, b: &FeatureFile, matching: Matching) -> Comparison {
-        let named = |file: &FeatureFile, name: &str| file.arrays().iter().any(|e| e.name == name);
-        let refused_in = |file: &FeatureFile, name: &str| {
+    pub(super) fn finish(
+        self,
+        a: &ComparedFile,
+        b: &ComparedFile,
+        matching: Matching,
+    ) -> Comparison {
+        let named = |file: &ComparedFile, name: &str| file.arrays().iter().any(|e| e.name == name);
+        let refused_in = |file: &ComparedFile, name: &str| {
             file.refused().iter().any(|refused| refused.array == name)
         };
-        let both = |of: &FeatureFile, other: &FeatureFile| -> Vec<Refused> {
+        let both = |of: &ComparedFile, other: &ComparedFile| -> Vec<Refused> {
             let common = |r: &&Refused| named(other, &r.array) || refused_in(other, &r.array);
             let name = of.path().display();
             of.refused()
@@ -254,7 +264,7 @@ impl FeatureReport {
 }
 
 impl FileReport {
-    fn new(file: &FeatureFile) -> Self {
+    fn new(file: &ComparedFile) -> Self {
         Self {
             path: file.path().display().to_string(),
             format: file.format(),

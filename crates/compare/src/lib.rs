@@ -5,9 +5,9 @@
 //! summaries as `[1, column, row]`.
 
 mod causes;
+mod compared_file;
 mod comparison;
 mod difference;
-mod feature_file;
 mod matching;
 mod pair;
 mod settings;
@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use corsmal_files::feature_file::FeatureFileError;
 use corsmal_files::layout::LayoutError;
-use corsmal_files::npy::NpyError;
 use corsmal_files::npz::NpzError;
 use corsmal_files::parquet::ParquetTableError;
 
@@ -26,23 +26,18 @@ pub use comparison::{Comparison, FeatureReport, FileReport, Finding, Refused, Sh
 pub use difference::{Difference, Extreme, Tolerance};
 pub use settings::{Setting, Settings};
 
+use compared_file::ComparedFile;
 use comparison::Collector;
-use feature_file::FeatureFile;
 use matching::Matching;
 
 /// Why two files could not be compared.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum CompareError {
-    /// The operating system refused.
-    #[error("{path}: {source}")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Its reason.
-        source: std::io::Error,
-    },
-    /// An archive or a member cannot be read.
+    /// A file cannot be read.
+    #[error(transparent)]
+    File(#[from] FeatureFileError),
+    /// A member cannot be read.
     #[error(transparent)]
     Npz(#[from] NpzError),
     /// An output of ours contradicts itself.
@@ -51,20 +46,6 @@ pub enum CompareError {
     /// A Parquet table cannot be read.
     #[error(transparent)]
     Parquet(#[from] ParquetTableError),
-    /// A `.npy` file cannot be read.
-    #[error("{path}: {source}")]
-    Npy {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: NpyError,
-    },
-    /// The first bytes are those of no format that is read.
-    #[error("{path}: expected a .npz archive, a .npy array or a Parquet table, found neither")]
-    Format {
-        /// The file.
-        path: PathBuf,
-    },
     /// A name of `--map` that is not in its file.
     #[error("{path}: no array {name:?} to map; there are {known}")]
     Unmapped {
@@ -105,7 +86,7 @@ pub struct Criteria {
 /// # Errors
 /// [`CompareError`]: a file cannot be read, or they have nothing in common.
 pub fn compare(a: &Path, b: &Path, criteria: &Criteria) -> Result<Comparison, CompareError> {
-    let (mut a, mut b) = (FeatureFile::open(a)?, FeatureFile::open(b)?);
+    let (mut a, mut b) = (ComparedFile::open(a)?, ComparedFile::open(b)?);
     let matching = Matching::new(&a, &b, &criteria.map)?;
     let mut collector = Collector::new(criteria.tolerance);
     for found in &matching.arrays {

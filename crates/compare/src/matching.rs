@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::CompareError;
-use super::feature_file::{ArrayEntry, FeatureFile};
-use corsmal_files::parquet::Columns;
+use super::compared_file::{ArrayEntry, ComparedFile};
+use corsmal_files::parquet::NumericTable;
 
 /// Two arrays.
 #[derive(Debug)]
@@ -19,7 +19,7 @@ pub(super) struct ArrayMatch {
     pub place: String,
 }
 
-/// Columns and rows of two tables, of one feature.
+/// NumericTable and rows of two tables, of one feature.
 #[derive(Debug)]
 pub(super) struct TableMatch {
     /// What they are compared as.
@@ -45,15 +45,15 @@ impl Matching {
     /// Finds pairs: those of `map`, then equal names, then the same recording and feature of two
     /// outputs of ours, at last the only array of each.
     pub(super) fn new(
-        a: &FeatureFile,
-        b: &FeatureFile,
+        a: &ComparedFile,
+        b: &ComparedFile,
         map: &[(String, String)],
     ) -> Result<Self, CompareError> {
         let mut pairs: Vec<(usize, usize)> = Vec::new();
         for (name_a, name_b) in map {
             pairs.push((position(a, name_a)?, position(b, name_b)?));
         }
-        let free = |file: &FeatureFile, taken: &[usize]| -> Vec<usize> {
+        let free = |file: &ComparedFile, taken: &[usize]| -> Vec<usize> {
             let ours = file.provenance().is_some();
             // What covers a whole run of ours is compared otherwise.
             let covers_run = |e: &ArrayEntry| ours && e.ours.is_none();
@@ -104,7 +104,7 @@ impl Matching {
         Ok(matching)
     }
 
-    fn tables(&mut self, a: &FeatureFile, b: &FeatureFile) {
+    fn tables(&mut self, a: &ComparedFile, b: &ComparedFile) {
         let (x, y) = match (a.table(), b.table()) {
             (Some(x), Some(y)) => (x, y),
             (Some(x), None) => return self.only_a.extend(x.names.iter().cloned()),
@@ -144,7 +144,7 @@ impl Matching {
     }
 }
 
-fn position(file: &FeatureFile, name: &str) -> Result<usize, CompareError> {
+fn position(file: &ComparedFile, name: &str) -> Result<usize, CompareError> {
     file.arrays().iter().position(|entry| entry.name == name).ok_or_else(|| {
         let (path, known) = (file.path().into(), file.listing());
         CompareError::Unmapped { path, name: name.into(), known }
@@ -204,7 +204,7 @@ fn feature_of(column: &str) -> &str {
 
 impl TableMatch {
     /// The ids of the rows, or their numbers.
-    pub(super) fn row_names(&self, a: &Columns) -> Vec<String> {
+    pub(super) fn row_names(&self, a: &NumericTable) -> Vec<String> {
         let name = |&(row, _): &(usize, usize)| match &a.ids {
             Some(ids) => ids[row].clone(),
             None => format!("row {row}"),

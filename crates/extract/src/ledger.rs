@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use corsmal_files::format::OutputFormat;
 use corsmal_files::npz::{EntryRecord, intact_entries};
 use corsmal_files::outcome::Outcome;
 use corsmal_files::provenance::Provenance;
@@ -86,14 +87,14 @@ pub struct Header {
 
 impl Header {
     /// The run that makes an output of this provenance in this format.
-    pub fn new(provenance: &Provenance, format: &str) -> Self {
+    pub fn new(provenance: &Provenance, format: OutputFormat) -> Self {
         Self {
             ledger_version: VERSION,
             tool_version: provenance.tool_version.clone(),
             config_hash: provenance.config_hash.clone(),
             inputs_hash: provenance.inputs_hash.clone(),
             shard: provenance.shard.clone(),
-            format: format.into(),
+            format: format.to_string(),
         }
     }
 

@@ -3,15 +3,17 @@
 
 use std::path::{Path, PathBuf};
 
-use thiserror::Error;
-
-use crate::ledger::{Header, Ledger, LedgerError, ledger_path};
-use corsmal_files::layout::{self, LayoutError};
-use corsmal_files::npz::{NpzError, NpzFile, NpzWriter};
+use corsmal_files::feature_file::{FeatureFile, FeatureFileError};
+use corsmal_files::format::{FormatError, OutputFormat};
+use corsmal_files::layout;
+use corsmal_files::npz::{Compression, NpzError, NpzWriter};
 use corsmal_files::parquet::{self, ParquetTableError};
 use corsmal_files::provenance::Provenance;
 use corsmal_files::shard::Shard;
 use corsmal_files::table::{Table, TableError};
+use thiserror::Error;
+
+use crate::ledger::{Header, Ledger, LedgerError, ledger_path};
 
 /// What can go wrong with merging.
 #[derive(Debug, Error)]
@@ -19,11 +21,11 @@ use corsmal_files::table::{Table, TableError};
 pub enum MergeError {
     /// A shard cannot be read.
     #[error(transparent)]
-    Layout(#[from] LayoutError),
-    /// An archive cannot be read or written.
+    Shard(#[from] FeatureFileError),
+    /// A member of a shard cannot be read, or the result not be written.
     #[error(transparent)]
     Npz(#[from] NpzError),
-    /// A Parquet file cannot be read or written.
+    /// The Parquet result cannot be written.
     #[error(transparent)]
     Parquet(#[from] ParquetTableError),
     /// The result cannot be put in its place.
@@ -36,11 +38,8 @@ pub enum MergeError {
         path: PathBuf,
     },
     /// The result must have another name.
-    #[error("{path}: must end in .npz or .parquet")]
-    Extension {
-        /// The output.
-        path: PathBuf,
-    },
+    #[error(transparent)]
+    Name(#[from] FormatError),
     /// The files are not the shards of one run.
     #[error("{path}: expected {expected}, found {actual}")]
     NotOneRun {
@@ -61,68 +60,26 @@ pub enum MergeError {
     },
 }
 
-/// Merges all shards of a run, given in any order. The kind of output follows from the extension of
-/// `out`. As in a run, `out` appears only when it is complete, and nothing else writes it meanwhile.
+/// Merges all shards of a run, given in any order, one after the other. As in a run, `out` appears
+/// only when it is complete, and nothing else writes it meanwhile.
 ///
 /// # Errors
 /// [`MergeError`] names the shard that does not fit.
 pub fn merge(shards: &[PathBuf], out: &Path, overwrite: bool) -> Result<(), MergeError> {
-    let parquet = match out.extension() {
-        Some(e) if e.eq_ignore_ascii_case("parquet") => true,
-        Some(e) if e.eq_ignore_ascii_case("npz") => false,
-        _ => return Err(MergeError::Extension { path: out.into() }),
-    };
+    let mut format = OutputFormat::of_name(out, Compression::Stored)?;
     let pending = Ledger::is_pending(out).then(|| ledger_path(out));
     let taken = if out.exists() { Some(out.into()) } else { pending };
     if let Some(path) = taken.filter(|_| !overwrite) {
         return Err(MergeError::Exists { path });
     }
-    if parquet { merge_parquet(shards, out) } else { merge_npz(shards, out) }
-}
-
-fn merge_parquet(shards: &[PathBuf], out: &Path) -> Result<(), MergeError> {
-    let mut read = Vec::new();
-    for path in shards {
-        let (table, provenance) = parquet::read(path)?;
-        read.push(Piece { path: path.clone(), table, provenance, file: () });
+    let (shards, provenance) = in_order(shards, out)?;
+    if let (OutputFormat::Npz(compression), Some(FeatureFile::Npz(first))) =
+        (&mut format, shards.first().map(|path| FeatureFile::open(path)).transpose()?.as_mut())
+    {
+        *compression = layout::compression(first)?;
     }
-    let (_, table, provenance) = join(read, out)?;
-    publish(out, &provenance, "parquet", |part| Ok(parquet::write(part, &table, &provenance)?))
-}
-
-fn merge_npz(shards: &[PathBuf], out: &Path) -> Result<(), MergeError> {
-    let mut read = Vec::new();
-    for path in shards {
-        let mut file = NpzFile::open(path)?;
-        let (table, provenance) = layout::read_table(&mut file)?;
-        read.push(Piece { path: path.clone(), table, provenance, file });
-    }
-    let (mut files, table, provenance) = join(read, out)?;
-    let (witness, _) = files[0].raw(layout::COMPRESSION_WITNESS)?;
-    publish(out, &provenance, "npz", |part| {
-        let mut writer = NpzWriter::create(part, witness.compression)?;
-        for file in &mut files {
-            let names: Vec<String> =
-                file.names().iter().filter(|name| layout::is_frame_level(name)).cloned().collect();
-            for name in names {
-                let (entry, raw) = file.raw(&name)?;
-                writer.copy(&entry, raw)?;
-            }
-        }
-        layout::write_table(&mut writer, &table, &provenance)?;
-        Ok(writer.finish()?)
-    })
-}
-
-/// Has the partial output written under the lock of a ledger, and gives it its name.
-fn publish(
-    out: &Path,
-    provenance: &Provenance,
-    format: &str,
-    write: impl FnOnce(&Path) -> Result<(), MergeError>,
-) -> Result<(), MergeError> {
-    let ledger = Ledger::create(out, &Header::new(provenance, format))?;
-    match write(&ledger.part()) {
+    let ledger = Ledger::create(out, &Header::new(&provenance, format))?;
+    match write(&shards, &provenance, format, &ledger.part()) {
         Ok(()) => Ok(ledger.publish()?),
         Err(error) => {
             // The first error is the one that matters.
@@ -132,54 +89,88 @@ fn publish(
     }
 }
 
-/// One shard.
-struct Piece<F> {
-    path: PathBuf,
-    table: Table,
-    provenance: Provenance,
-    file: F,
+/// Writes what the shards hold together.
+fn write(
+    shards: &[PathBuf],
+    provenance: &Provenance,
+    format: OutputFormat,
+    part: &Path,
+) -> Result<(), MergeError> {
+    let mut writer = match format {
+        OutputFormat::Npz(compression) => Some(NpzWriter::create(part, compression)?),
+        OutputFormat::Parquet => None,
+    };
+    let mut joined: Option<Table> = None;
+    for path in shards {
+        let mut file = FeatureFile::open(path)?;
+        let shard = file.table()?;
+        if shard.format != format {
+            return Err(not_one_run(path, format.to_string(), shard.format.to_string()));
+        }
+        match &mut joined {
+            None => joined = Some(shard.table),
+            Some(joined) => joined
+                .extend(&shard.table)
+                .map_err(|source| MergeError::Table { path: path.clone(), source })?,
+        }
+        if let (Some(writer), FeatureFile::Npz(npz)) = (&mut writer, &mut file) {
+            let names: Vec<String> =
+                npz.names().iter().filter(|name| layout::is_frame_level(name)).cloned().collect();
+            for name in names {
+                let (entry, raw) = npz.raw(&name)?;
+                writer.copy(&entry, raw)?;
+            }
+        }
+    }
+    let table = joined.unwrap_or_default();
+    match writer {
+        Some(mut writer) => {
+            layout::write_table(&mut writer, &table, provenance)?;
+            Ok(writer.finish()?)
+        }
+        None => Ok(parquet::write(part, &table, provenance)?),
+    }
 }
 
-/// Orders the shards, checks that they are all of one run, and joins their tables.
-fn join<F>(
-    mut pieces: Vec<Piece<F>>,
-    out: &Path,
-) -> Result<(Vec<F>, Table, Provenance), MergeError> {
-    let not_one_run = |path: &Path, expected: String, actual: String| MergeError::NotOneRun {
-        path: path.into(),
-        expected,
-        actual,
-    };
-    pieces.sort_by_key(|piece| piece.provenance.shard.parse::<Shard>().map_or(0, |s| s.index));
+/// Brings the shards into order, checks that they are all of one run, and says how that was made.
+fn in_order(shards: &[PathBuf], out: &Path) -> Result<(Vec<PathBuf>, Provenance), MergeError> {
+    let mut pieces = Vec::with_capacity(shards.len());
+    for path in shards {
+        pieces.push((path.clone(), FeatureFile::open(path)?.provenance()?));
+    }
+    pieces.sort_by_key(|(_, made)| made.shard.parse::<Shard>().map_or(0, |s| s.index));
     let count = pieces.len();
-    let Some(first) = pieces.first().map(|piece| piece.provenance.clone()) else {
+    let Some((_, first)) = pieces.first().cloned() else {
         return Err(not_one_run(out, "at least one shard".into(), "none".into()));
     };
-    let mut table: Option<Table> = None;
-    let mut files = Vec::new();
-    for (index, piece) in pieces.into_iter().enumerate() {
+    let mut paths = Vec::with_capacity(count);
+    for (index, (path, made)) in pieces.into_iter().enumerate() {
         let shard = Shard { index, count }.to_string();
-        let expected = Provenance { shard: shard.clone(), ..first.clone() };
-        let of = piece.provenance.shard.parse::<Shard>().map_or(count, |s| s.count);
+        let of = made.shard.parse::<Shard>().map_or(count, |s| s.count);
         if of != count {
-            let (expected, actual) = (format!("all {of} shards"), format!("{count}"));
-            return Err(not_one_run(&piece.path, expected, actual));
+            return Err(not_one_run(&path, format!("all {of} shards"), format!("{count}")));
         }
-        if piece.provenance.shard != shard {
-            return Err(not_one_run(&piece.path, format!("shard {shard}"), piece.provenance.shard));
+        if made.shard != shard {
+            return Err(not_one_run(&path, format!("shard {shard}"), made.shard));
         }
-        if piece.provenance != expected {
-            let expected = "tool version, configuration and input list of the other shards";
-            return Err(not_one_run(&piece.path, expected.into(), "others".into()));
+        let fields = |p: &Provenance| {
+            [
+                ("layout version", p.layout_version.to_string()),
+                ("tool version", p.tool_version.clone()),
+                ("configuration", p.config_hash.clone()),
+                ("input list", p.inputs_hash.clone()),
+                ("configuration text", p.config.clone()),
+            ]
+        };
+        let both = fields(&first).into_iter().zip(fields(&made));
+        if let Some(((field, expected), (_, found))) = both.into_iter().find(|(a, b)| a != b) {
+            return Err(not_one_run(&path, format!("{field} {expected}"), found));
         }
-        match &mut table {
-            None => table = Some(piece.table),
-            Some(table) => table
-                .extend(&piece.table)
-                .map_err(|source| MergeError::Table { path: piece.path, source })?,
-        }
-        files.push(piece.file);
+        paths.push(path);
     }
-    let whole = Provenance { shard: Shard::default().to_string(), ..first };
-    Ok((files, table.unwrap_or_default(), whole))
+    Ok((paths, Provenance { shard: Shard::default().to_string(), ..first }))
+}
+
+fn not_one_run(path: &Path, expected: String, actual: String) -> MergeError {
+    MergeError::NotOneRun { path: path.into(), expected, actual }
 }

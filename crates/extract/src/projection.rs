@@ -17,11 +17,10 @@ use thiserror::Error;
 
 use crate::params::{ConfigError, typed};
 use corsmal_files::draft::Draft;
-use corsmal_files::layout::{self, LayoutError};
+use corsmal_files::feature_file::{FeatureFileError, FeatureTable};
+use corsmal_files::identity;
 use corsmal_files::npy::{DType, Header};
 use corsmal_files::npz::{Compression, NpzError, NpzFile, NpzWriter};
-use corsmal_files::parquet::{self, ParquetTableError};
-use corsmal_files::{identity, table::Table};
 
 /// Version of the file's members.
 const VERSION: u32 = 1;
@@ -36,12 +35,9 @@ pub enum ProjectionError {
     /// An archive cannot be read or written.
     #[error(transparent)]
     Npz(#[from] NpzError),
-    /// The `.npz` of features cannot be read.
+    /// The file of features cannot be read.
     #[error(transparent)]
-    Layout(#[from] LayoutError),
-    /// The Parquet file of features cannot be read.
-    #[error(transparent)]
-    Parquet(#[from] ParquetTableError),
+    Features(#[from] FeatureFileError),
     /// These features cannot be fitted.
     #[error("{path}: {source}")]
     Fit {
@@ -88,16 +84,7 @@ impl Projection {
     /// A file that is none of `extract`'s or has no statistics, more components than rows or
     /// columns, values that are not finite.
     pub fn fit(features: &Path, n_components: usize) -> Result<Self, ProjectionError> {
-        let is_parquet = features.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
-        let (table, provenance): (Table, _) = if is_parquet {
-            parquet::read(features)?
-        } else {
-            let mut npz = NpzFile::open(features)?;
-            if !layout::is_ours(&npz) {
-                return Err(content(features, "is no output of extract"));
-            }
-            layout::read_table(&mut npz)?
-        };
+        let FeatureTable { table, provenance, .. } = FeatureTable::open(features)?;
         if table.feature_names().is_empty() {
             let reason = "has no statistics: extract with a configuration that has a [summary]";
             return Err(content(features, reason));

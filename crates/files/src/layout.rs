@@ -6,7 +6,7 @@
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::npz::{NpzError, NpzFile, NpzWriter};
+use crate::npz::{Compression, NpzError, NpzFile, NpzWriter};
 use crate::outcome::Outcome;
 use crate::provenance::{LAYOUT_VERSION, Provenance};
 use crate::table::{RESERVED, Table, TableError};
@@ -136,8 +136,13 @@ pub fn is_ours(npz: &NpzFile) -> bool {
     npz.contains(META)
 }
 
-/// How the members of an output are compressed: as its `__meta__` is.
-pub const COMPRESSION_WITNESS: &str = META;
+/// How the members of an output are compressed.
+///
+/// # Errors
+/// [`NpzError`] where it is none of ours.
+pub fn compression(npz: &mut NpzFile) -> Result<Compression, NpzError> {
+    Ok(npz.raw(META)?.0.compression)
+}
 
 /// One JSON document per line.
 pub(crate) fn json_lines<T: Serialize>(items: &[T]) -> String {

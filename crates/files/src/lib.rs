@@ -6,6 +6,8 @@
 //! tells whether an input is still the one that was read.
 
 pub mod draft;
+pub mod feature_file;
+pub mod format;
 pub mod identity;
 pub mod layout;
 pub mod npy;

@@ -19,11 +19,12 @@ use crate::config::Config;
 use crate::inputs::{Input, InputSource, list_hash};
 use crate::ledger::{self, Ledger, LedgerError};
 use corsmal_files::draft;
+use corsmal_files::feature_file::{FeatureFileError, FeatureTable};
+use corsmal_files::format::{FormatError, OutputFormat};
 use corsmal_files::identity;
-use corsmal_files::layout::{self, LayoutError};
-use corsmal_files::npz::{Compression, NpzError, NpzFile};
+use corsmal_files::npz::{Compression, NpzError};
 use corsmal_files::outcome::Outcome;
-use corsmal_files::parquet::{self, ParquetTableError};
+use corsmal_files::parquet::ParquetTableError;
 use corsmal_files::provenance::Provenance;
 use corsmal_files::shard::Shard;
 use corsmal_files::table::TableError;
@@ -93,9 +94,9 @@ pub enum RunError {
     /// The Parquet output failed.
     #[error(transparent)]
     Parquet(#[from] ParquetTableError),
-    /// The existing output cannot be read.
+    /// The output has a name that none can have.
     #[error(transparent)]
-    Layout(#[from] LayoutError),
+    Name(#[from] FormatError),
     /// A fault of this program while writing the output.
     #[error("a fault of this program, please report it; --resume continues the run")]
     Broken,
@@ -187,13 +188,8 @@ pub fn run(
     progress: &dyn Progress,
     stop: &Arc<AtomicBool>,
 ) -> Result<RunReport, RunError> {
-    let Checked { parquet, provenance, done } = check(inputs, config, options)?;
+    let Checked { format, provenance, done } = check(inputs, config, options)?;
     let inputs = options.shard.of(inputs);
-    let format = match (parquet, options.compression) {
-        (true, _) => "parquet",
-        (false, Compression::Stored) => "npz stored",
-        (false, Compression::Deflated) => "npz deflated",
-    };
     let header = ledger::Header::new(&provenance, format);
     if let Some(report) = done {
         // What a kill between the last two steps of that run has left.
@@ -235,7 +231,7 @@ pub fn run(
         }
     }
     let resumed = records.len();
-    let output = Output::new(ledger, records, inputs, options, parquet)?;
+    let output = Output::new(ledger, records, inputs, format)?;
     progress.start(inputs.len(), resumed);
     let collector = Collector::new(inputs, config, options, progress, stop, output);
     let output = collector.work()?;
@@ -248,7 +244,7 @@ pub fn run(
 
 /// What is known of a run before it starts.
 pub struct Checked {
-    parquet: bool,
+    format: OutputFormat,
     provenance: Provenance,
     /// The report of an output that is there already.
     done: Option<RunReport>,
@@ -260,7 +256,7 @@ pub struct Checked {
 /// As [`run`], in what concerns the output, the inputs as a whole and the number of jobs.
 pub fn check(inputs: &[Input], config: &Config, options: &RunOptions) -> Result<Checked, RunError> {
     let out = &options.out;
-    let parquet = check_output(out, config)?;
+    let format = check_output(options, config)?;
     if !(1..=MAX_JOBS).contains(&options.jobs) {
         return Err(RunError::Jobs { jobs: options.jobs, why: format!("1 to {MAX_JOBS}") });
     }
@@ -276,24 +272,21 @@ pub fn check(inputs: &[Input], config: &Config, options: &RunOptions) -> Result<
     let provenance = Provenance::new(text, hash, list_hash(inputs), options.shard);
     let mut done = None;
     if !options.overwrite {
-        done = finished(options.shard.of(inputs), &provenance, options, parquet)?;
+        done = finished(options.shard.of(inputs), &provenance, out, format)?;
         if done.is_none() && !options.resume && Ledger::is_pending(out) {
             Ledger::require_idle(out)?;
             return Err(RunError::Pending { path: ledger::ledger_path(out) });
         }
     }
-    Ok(Checked { parquet, provenance, done })
+    Ok(Checked { format, provenance, done })
 }
 
-/// Whether an output is Parquet, else `.npz`, by its extension.
-fn check_output(out: &Path, config: &Config) -> Result<bool, RunError> {
+/// The format of the output, if it can be written.
+fn check_output(options: &RunOptions, config: &Config) -> Result<OutputFormat, RunError> {
+    let out = options.out.as_path();
     let refuse = |why: String| Err(RunError::Format { path: out.into(), why });
-    let parquet = match out.extension() {
-        Some(e) if e.eq_ignore_ascii_case("npz") => false,
-        Some(e) if e.eq_ignore_ascii_case("parquet") => true,
-        _ => return refuse("must end in .npz or .parquet".into()),
-    };
-    if parquet && config.summary.is_none() {
+    let format = OutputFormat::of_name(out, options.compression)?;
+    if format == OutputFormat::Parquet && config.summary.is_none() {
         let why = "Parquet holds summary tables: the configuration needs a [summary], \
                    or write .npz";
         return refuse(why.into());
@@ -308,36 +301,28 @@ fn check_output(out: &Path, config: &Config) -> Result<bool, RunError> {
     if !folder.is_dir() {
         return refuse(format!("there is no folder {}", folder.display()));
     }
-    Ok(parquet)
+    Ok(format)
 }
 
 /// The report of an output that is already complete; an error where it holds something else.
 fn finished(
     inputs: &[Input],
     provenance: &Provenance,
-    options: &RunOptions,
-    parquet: bool,
+    out: &Path,
+    format: OutputFormat,
 ) -> Result<Option<RunReport>, RunError> {
-    let out = options.out.as_path();
     if !out.exists() {
         return Ok(None);
     }
     let refuse = |why: &str| RunError::Exists { path: out.to_path_buf(), why: why.into() };
-    let found = if parquet {
-        parquet::read(out).map_err(|_| refuse("is not an output of this tool"))?
-    } else {
-        let mut npz = NpzFile::open(out).map_err(|_| refuse("is not an output of this tool"))?;
-        let table =
-            layout::read_table(&mut npz).map_err(|_| refuse("is not an output of this tool"))?;
-        if npz.raw(layout::COMPRESSION_WITNESS)?.0.compression != options.compression {
-            return Err(refuse(match options.compression {
-                Compression::Stored => "is deflated",
-                Compression::Deflated => "is not deflated",
-            }));
-        }
-        table
-    };
-    let (table, theirs) = found;
+    let FeatureTable { table, provenance: theirs, format: found, .. } = FeatureTable::open(out)
+        .map_err(|error| match error {
+            FeatureFileError::Io { source, .. } => refuse(&format!("cannot be read: {source}")),
+            _ => refuse("is not an output of this tool"),
+        })?;
+    if found != format {
+        return Err(refuse(&format!("is {found}, not {format}")));
+    }
     if theirs != *provenance {
         let why = if theirs.config_hash != provenance.config_hash {
             "holds features of another configuration"

@@ -5,7 +5,8 @@ use std::path::Path;
 use crate::engine::{FeatureArray, Plan};
 use crate::inputs::Input;
 use crate::ledger::{Ledger, Record};
-use crate::run::{RunError, RunOptions};
+use crate::run::RunError;
+use corsmal_files::format::OutputFormat;
 use corsmal_files::layout;
 use corsmal_files::npy::{DType, Header};
 use corsmal_files::npz::{Compression, EntryRecord, NpzWriter, Packed};
@@ -110,9 +111,7 @@ impl Output {
         ledger: Ledger,
         records: Vec<Record>,
         inputs: &[Input],
-
-        options: &RunOptions,
-        parquet: bool,
+        format: OutputFormat,
     ) -> Result<Self, RunError> {
         let columns = inputs.first().map(|i| i.labels.iter().map(|(c, _)| c.clone()).collect());
         let mut table = Table::new(columns.unwrap_or_default())?;
@@ -125,9 +124,12 @@ impl Output {
             }
             table.push(record.outcome, &input.labels, record.row.as_deref().unwrap_or(&[]))?;
         }
-        let writer = (!parquet)
-            .then(|| NpzWriter::resume(&ledger.part(), options.compression, entries))
-            .transpose()?;
+        let writer = match format {
+            OutputFormat::Npz(compression) => {
+                Some(NpzWriter::resume(&ledger.part(), compression, entries)?)
+            }
+            OutputFormat::Parquet => None,
+        };
         Ok(Self { ledger, writer, table, next })
     }
 

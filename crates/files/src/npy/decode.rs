@@ -132,7 +132,7 @@ pub(crate) fn array<T: Element>(
 ///
 /// # Errors
 /// [`NpyError::Kind`] for text, [`NpyError::TooLarge`], [`NpyError::Io`].
-pub fn components(body: &mut dyn Read, header: &Header) -> Result<ArrayD<f64>, NpyError> {
+pub(crate) fn components(body: &mut dyn Read, header: &Header) -> Result<ArrayD<f64>, NpyError> {
     if header.dtype.kind != Kind::Complex {
         return array(body, header);
     }

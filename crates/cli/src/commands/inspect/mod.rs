@@ -4,11 +4,10 @@ mod output;
 mod overview;
 mod recording;
 
-use std::fs::File;
-use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
+use corsmal_files::format::Content;
 use serde::Serialize;
 
 use crate::failure::{FAILED_FILES, Failure};
@@ -63,27 +62,6 @@ impl Picture {
     }
 }
 
-/// Kinds of files, by their first bytes.
-enum Kind {
-    /// A zip archive, as `.npz` files are.
-    Npz,
-    /// A Parquet table.
-    Parquet,
-    /// Anything else is left to the audio readers, which say what is wrong with it.
-    Recording,
-}
-
-fn kind(path: &Path) -> Result<Kind, Failure> {
-    let unreadable = |e| Failure::new(format!("{}: {e}", path.display()));
-    let mut start = Vec::new();
-    File::open(path).and_then(|f| f.take(4).read_to_end(&mut start)).map_err(unreadable)?;
-    Ok(match start.as_slice() {
-        b"PK\x03\x04" | b"PK\x05\x06" => Kind::Npz,
-        b"PAR1" => Kind::Parquet,
-        _ => Kind::Recording,
-    })
-}
-
 /// The JSON form of a refusal.
 #[derive(Serialize)]
 struct Refusal<'a> {
@@ -113,14 +91,15 @@ fn to_json(value: &impl Serialize) -> Result<String, Failure> {
 /// Prints what the file is.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let picture = args.picture.map(Picture::check).transpose()?;
-    let output = match kind(&args.file)? {
-        Kind::Recording => return recording::inspect(&args.file, picture.as_ref(), args.json),
-        Kind::Npz => output::npz,
-        Kind::Parquet => output::parquet,
-    };
+    let content = Content::of(&args.file)
+        .map_err(|e| Failure::new(format!("{}: {e}", args.file.display())))?;
+    if content == Content::Other {
+        // The audio readers say what is wrong with anything else.
+        return recording::inspect(&args.file, picture.as_ref(), args.json);
+    }
     if picture.is_some() {
         let name = args.file.display();
         return Err(Failure::new(format!("--picture: {name} is no recording")));
     }
-    output::inspect(&args.file, output, args.json)
+    output::inspect(&args.file, args.json)
 }

@@ -5,9 +5,11 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use corsmal_extract::projection::Projection;
+use corsmal_files::feature_file::FeatureFile;
 use corsmal_files::layout;
 use corsmal_files::npz::NpzFile;
 use corsmal_files::outcome::Outcome;
+use corsmal_files::parquet::ParquetFile;
 use corsmal_files::provenance::Provenance;
 use corsmal_files::table::Table;
 use serde::Serialize;
@@ -22,7 +24,7 @@ const SHOWN: usize = 20;
 
 /// Everything that is printed; its JSON form is the output of `--json`.
 #[derive(Serialize)]
-pub struct Contents {
+struct Contents {
     path: String,
     format: &'static str,
     members: Vec<Member>,
@@ -64,9 +66,24 @@ struct Run {
 
 type Failed = Box<dyn std::error::Error>;
 
-/// An `.npz`: all of it where it is one of ours, else its members.
-pub fn npz(path: &Path) -> Result<Contents, Failed> {
-    let mut file = NpzFile::open(path)?;
+/// A feature file: all of it where it is one of ours, else its members.
+fn read(path: &Path) -> Result<Contents, Failed> {
+    match FeatureFile::open(path)? {
+        FeatureFile::Npz(file) => npz(file),
+        FeatureFile::Npy(file) => {
+            let member = Member {
+                name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+                kind: file.header().dtype.to_string(),
+                shape: file.header().shape.clone(),
+            };
+            let (path, members) = (path.display().to_string(), vec![member]);
+            Ok(Contents { path, format: "npy", members, run: None, projection: None })
+        }
+        FeatureFile::Parquet(file) => parquet(&file),
+    }
+}
+
+fn npz(mut file: NpzFile) -> Result<Contents, Failed> {
     let names = file.names().to_vec();
     let mut members = Vec::with_capacity(names.len());
     for name in names {
@@ -80,18 +97,24 @@ pub fn npz(path: &Path) -> Result<Contents, Failed> {
         true => Some(Run::new(layout::read_table(&mut file)?)?),
         false => None,
     };
-    let projection = Projection::load(path).ok().map(|p| Projected {
+    let projection = Projection::load(file.path()).ok().map(|p| Projected {
         n_inputs: p.n_inputs(),
         n_components: p.n_components(),
         config_hash: p.fitted_on().0.to_owned(),
         rows: p.fitted_on().1,
     });
-    Ok(Contents { path: path.display().to_string(), format: "npz", members, run, projection })
+    Ok(Contents {
+        path: file.path().display().to_string(),
+        format: "npz",
+        members,
+        run,
+        projection,
+    })
 }
 
 /// A summary table.
-pub fn parquet(path: &Path) -> Result<Contents, Failed> {
-    let found = corsmal_files::parquet::read(path)?;
+fn parquet(file: &ParquetFile) -> Result<Contents, Failed> {
+    let found = file.table()?;
     let table = &found.0;
     let column = |name: &str, kind: &str| Member {
         name: name.to_owned(),
@@ -101,17 +124,13 @@ pub fn parquet(path: &Path) -> Result<Contents, Failed> {
     let labels = table.labels().map(|(name, _)| column(name, "text"));
     let features = table.feature_names().iter().map(|name| column(name, "float32"));
     let members = std::iter::once(column("id", "text")).chain(labels).chain(features).collect();
-    let path = path.display().to_string();
+    let path = file.path().display().to_string();
     let run = Some(Run::new(found)?);
     Ok(Contents { path, format: "parquet", members, run, projection: None })
 }
 
-/// Prints what `read` finds in a file.
-pub fn inspect(
-    path: &Path,
-    read: fn(&Path) -> Result<Contents, Failed>,
-    json: bool,
-) -> Result<ExitCode, Failure> {
+/// Prints what is found in a file.
+pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
     match read(path) {
         Ok(report) => {
             print!("{}", if json { to_json(&report)? } else { report.text() });

@@ -59,7 +59,8 @@ fn every_kind_of_input_gives_the_same_numbers() {
 
     // Parquet holds the same table.
     extract(&at("list.csv"), &at("feats.parquet"), SUMMARY).with(0);
-    let (parquet, _) = corsmal_files::parquet::read(&at("feats.parquet")).unwrap();
+    let parquet =
+        corsmal_files::feature_file::FeatureTable::open(&at("feats.parquet")).unwrap().table;
     assert_eq!(parquet, by_list);
 }
 

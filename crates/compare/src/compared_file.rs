@@ -1,20 +1,19 @@
 //! A file of features, whatever its format.
 
-use std::fs::File;
-use std::io::{BufReader, Read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use corsmal_files::feature_file::{FeatureFile, FeatureFileError};
+use corsmal_files::layout;
+use corsmal_files::npy::{Kind, NpyError, NpyFile};
+use corsmal_files::npz::{NpzError, NpzFile};
+use corsmal_files::parquet::{NumericTable, ParquetFile};
+use corsmal_files::provenance::Provenance;
+use corsmal_files::table::{RESERVED, Table};
 use ndarray::ArrayD;
 use serde_json::Value;
 
 use super::CompareError;
 use super::comparison::Refused;
-use corsmal_files::layout;
-use corsmal_files::npy::{self, Header, Kind, NpyError};
-use corsmal_files::npz::{NpzError, NpzFile};
-use corsmal_files::parquet::{self, Columns};
-use corsmal_files::provenance::Provenance;
-use corsmal_files::table::{RESERVED, Table};
 
 /// Name under which frame times are compared.
 const TIMES: &str = "frame times";
@@ -30,40 +29,27 @@ pub(super) struct ArrayEntry {
     pub dtype: String,
 }
 
-#[derive(Debug)]
-enum Source {
-    Npz(NpzFile),
-    Npy(Header),
-    Parquet,
-}
-
 /// An open file.
 #[derive(Debug)]
-pub(super) struct FeatureFile {
-    path: PathBuf,
-    source: Source,
+pub(super) struct ComparedFile {
+    source: FeatureFile,
     arrays: Vec<ArrayEntry>,
-    table: Option<Columns>,
+    table: Option<NumericTable>,
     provenance: Option<Provenance>,
     refused: Vec<Refused>,
 }
 
-impl FeatureFile {
+impl ComparedFile {
     /// Opens a file by its content and lists what it holds.
     pub(super) fn open(path: &Path) -> Result<Self, CompareError> {
-        let io = |source| CompareError::Io { path: path.into(), source };
-        let mut start = Vec::new();
-        File::open(path).and_then(|f| f.take(6).read_to_end(&mut start)).map_err(io)?;
-        match start.as_slice() {
-            [b'P', b'K', 3 | 5, 4 | 6, ..] => Self::npz(path),
-            [b'P', b'A', b'R', b'1', ..] => Self::parquet(path),
-            b"\x93NUMPY" => Self::npy(path),
-            _ => Err(CompareError::Format { path: path.into() }),
+        match FeatureFile::open(path)? {
+            FeatureFile::Npz(npz) => Self::npz(npz),
+            FeatureFile::Npy(npy) => Ok(Self::npy(npy)),
+            FeatureFile::Parquet(parquet) => Self::parquet(parquet),
         }
     }
 
-    fn npz(path: &Path) -> Result<Self, CompareError> {
-        let mut npz = NpzFile::open(path)?;
+    fn npz(mut npz: NpzFile) -> Result<Self, CompareError> {
         let (mut table, mut provenance, mut features) = (None, None, Vec::new());
         if layout::is_ours(&npz) {
             let (found, made) = layout::read_table(&mut npz)?;
@@ -89,55 +75,39 @@ impl FeatureFile {
             let ours = provenance.as_ref().and_then(|_| owner(&name, &features));
             arrays.push(ArrayEntry { name, ours, dtype: header.dtype.to_string() });
         }
-        let source = Source::Npz(npz);
-        Ok(Self { path: path.into(), source, arrays, table, provenance, refused })
+        Ok(Self { source: FeatureFile::Npz(npz), arrays, table, provenance, refused })
     }
 
-    fn npy(path: &Path) -> Result<Self, CompareError> {
-        let wrong = |source| CompareError::Npy { path: path.into(), source };
-        let file = File::open(path).map_err(|e| wrong(e.into()))?;
-        let length = file.metadata().map_err(|e| wrong(e.into()))?.len();
-        let (header, start) = Header::read(&mut BufReader::new(file)).map_err(wrong)?;
-        let data = header.data_len().map_err(wrong)?;
-        if start + data != length {
-            let expected = format!("{data} bytes of data for shape {:?}", header.shape);
-            let actual = length.saturating_sub(start).to_string();
-            return Err(wrong(NpyError::Malformed { offset: start, expected, actual }));
-        }
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let arrays = vec![ArrayEntry { name, ours: None, dtype: header.dtype.to_string() }];
-        let (path, source) = (path.into(), Source::Npy(header));
-        Ok(Self { path, source, arrays, table: None, provenance: None, refused: vec![] })
+    fn npy(npy: NpyFile) -> Self {
+        let name = npy.path().file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let dtype = npy.header().dtype.to_string();
+        let arrays = vec![ArrayEntry { name, ours: None, dtype }];
+        let source = FeatureFile::Npy(npy);
+        Self { source, arrays, table: None, provenance: None, refused: vec![] }
     }
 
-    fn parquet(path: &Path) -> Result<Self, CompareError> {
-        let table = parquet::columns(path)?;
+    fn parquet(parquet: ParquetFile) -> Result<Self, CompareError> {
+        let table = parquet.numbers()?;
         let reason = "a nested column, or not of numbers";
         let refused =
             table.skipped.iter().map(|name| Refused { array: name.clone(), reason: reason.into() });
         let refused = refused.collect();
         // Tables of other tools have no provenance.
-        let provenance = parquet::read_provenance(path).ok();
-        Ok(Self {
-            path: path.into(),
-            source: Source::Parquet,
-            arrays: vec![],
-            table: Some(table),
-            provenance,
-            refused,
-        })
+        let provenance = parquet.provenance().ok();
+        let source = FeatureFile::Parquet(parquet);
+        Ok(Self { source, arrays: vec![], table: Some(table), provenance, refused })
     }
 
     pub(super) fn path(&self) -> &Path {
-        &self.path
+        self.source.path()
     }
 
     /// The format in a word.
     pub(super) fn format(&self) -> &'static str {
         match self.source {
-            Source::Npz(_) => "npz",
-            Source::Npy(_) => "npy",
-            Source::Parquet => "parquet",
+            FeatureFile::Npz(_) => "npz",
+            FeatureFile::Npy(_) => "npy",
+            FeatureFile::Parquet(_) => "parquet",
         }
     }
 
@@ -146,7 +116,7 @@ impl FeatureFile {
     }
 
     /// The summary table, or the columns of a Parquet file.
-    pub(super) fn table(&self) -> Option<&Columns> {
+    pub(super) fn table(&self) -> Option<&NumericTable> {
         self.table.as_ref()
     }
 
@@ -162,15 +132,11 @@ impl FeatureFile {
     /// The values of an array; complex ones with a first axis of real and imaginary parts.
     pub(super) fn load(&mut self, index: usize) -> Result<ArrayD<f64>, CompareError> {
         match &mut self.source {
-            Source::Npz(npz) => Ok(npz.components(&self.arrays[index].name)?),
-            Source::Npy(header) => {
-                let wrong = |source| CompareError::Npy { path: self.path.clone(), source };
-                let file = File::open(&self.path).map_err(|e| wrong(e.into()))?;
-                let mut body = BufReader::new(file);
-                Header::read(&mut body).map_err(wrong)?;
-                npy::components(&mut body, header).map_err(wrong)
-            }
-            Source::Parquet => unreachable!("a Parquet file lists no arrays"),
+            FeatureFile::Npz(npz) => Ok(npz.components(&self.arrays[index].name)?),
+            FeatureFile::Npy(npy) => npy
+                .components()
+                .map_err(|source| FeatureFileError::Npy { path: npy.path().into(), source }.into()),
+            FeatureFile::Parquet(_) => unreachable!("a Parquet file lists no arrays"),
         }
     }
 
@@ -210,8 +176,8 @@ fn owner(name: &str, features: &[String]) -> Option<(String, String)> {
     }
 }
 
-fn columns(table: &Table) -> Columns {
-    Columns {
+fn columns(table: &Table) -> NumericTable {
+    NumericTable {
         ids: Some(table.ids().to_vec()),
         names: table.feature_names().to_vec(),
         values: table.values().mapv(f64::from),

@@ -1,5 +1,6 @@
-//! Numeric columns of any Parquet table, ours or another tool's.
+//! The numeric columns of any Parquet table, ours or another tool's.
 
+use std::fs::File;
 use std::path::Path;
 
 use ndarray::Array2;
@@ -9,33 +10,27 @@ use parquet::data_type::{ByteArray, DataType};
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
-use super::{ParquetTableError, ROWS, io, layer, layout, shielded};
+use super::{ParquetTableError, ROWS, layer, layout};
 use crate::table::ID;
 
 /// The numbers of a table.
 #[derive(Debug)]
-pub struct Columns {
+pub struct NumericTable {
     /// The text column `id`, where there is one.
     pub ids: Option<Vec<String>>,
     /// Names of the numeric columns.
     pub names: Vec<String>,
     /// `[rows, columns]`; nulls are NaN.
     pub values: Array2<f64>,
-    /// Columns that are neither numbers nor text.
+    /// NumericTable that are neither numbers nor text.
     pub skipped: Vec<String>,
 }
 
-/// Reads the numeric columns of a table: floats, integers and booleans that are not nested.
-///
-/// # Errors
-/// [`ParquetTableError`].
-pub fn columns(path: &Path) -> Result<Columns, ParquetTableError> {
-    shielded(path, || read(path))
-}
-
-fn read(path: &Path) -> Result<Columns, ParquetTableError> {
-    let file = std::fs::File::open(path).map_err(|e| io(path, e))?;
-    let reader = SerializedFileReader::new(file).map_err(|e| layer(path, e))?;
+/// Reads the numeric columns of a table.
+pub(super) fn read(
+    path: &Path,
+    reader: &SerializedFileReader<File>,
+) -> Result<NumericTable, ParquetTableError> {
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let (mut ids, mut names, mut skipped) = (None, Vec::new(), Vec::new());
     let mut series: Vec<Vec<f64>> = Vec::new();
@@ -74,7 +69,7 @@ fn read(path: &Path) -> Result<Columns, ParquetTableError> {
         return Err(layout(path, format!("{rows} rows in each column"), other.len()));
     }
     let values = Array2::from_shape_fn((rows, series.len()), |(row, column)| series[column][row]);
-    Ok(Columns { ids, names, values, skipped })
+    Ok(NumericTable { ids, names, values, skipped })
 }
 
 fn numbers(
@@ -181,7 +176,7 @@ mod tests {
         group.close().unwrap();
         writer.close().unwrap();
 
-        let found = columns(&path).unwrap();
+        let found = crate::parquet::ParquetFile::open(&path).unwrap().numbers().unwrap();
         assert_eq!(found.ids.unwrap(), ["a", "b", "c"]);
         assert_eq!(found.names, ["x", "n"]);
         assert_eq!(found.values.column(1).to_vec(), [7.0, 8.0, 9.0]);

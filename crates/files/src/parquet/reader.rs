@@ -1,0 +1,184 @@
+//! Reads tables, ours and those of other tools.
+
+use std::fs::File;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+use parquet::basic::Type as Physical;
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::DataType;
+use parquet::errors::ParquetError;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+
+use super::numeric::{self, NumericTable};
+use super::{CONFIG, META, OUTCOMES, ParquetTableError, ROWS, io, layer, layout};
+use crate::layout::parse_outcomes;
+use crate::provenance::{LAYOUT_VERSION, Provenance};
+use crate::table::{ID, Table};
+
+/// An open Parquet file.
+pub struct ParquetFile {
+    path: PathBuf,
+    reader: SerializedFileReader<File>,
+}
+
+impl std::fmt::Debug for ParquetFile {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("ParquetFile").field("path", &self.path).finish_non_exhaustive()
+    }
+}
+
+impl ParquetFile {
+    /// Opens a file and reads its metadata.
+    ///
+    /// # Errors
+    /// [`ParquetTableError`].
+    pub fn open(path: &Path) -> Result<Self, ParquetTableError> {
+        shielded(path, || {
+            let file = File::open(path).map_err(|e| io(path, e))?;
+            let reader = SerializedFileReader::new(file).map_err(|e| layer(path, e))?;
+            Ok(Self { path: path.into(), reader })
+        })
+    }
+
+    /// The file that was opened.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether this tool wrote it.
+    pub fn is_ours(&self) -> bool {
+        self.find(META).is_some()
+    }
+
+    /// How an output of ours was made.
+    ///
+    /// # Errors
+    /// [`ParquetTableError`]; files of other tools are refused.
+    pub fn provenance(&self) -> Result<Provenance, ParquetTableError> {
+        let path = self.path.as_path();
+        let mut provenance: Provenance = serde_json::from_str(self.metadata(META)?)
+            .map_err(|e| layout(path, "provenance as JSON", e))?;
+        if provenance.layout_version > LAYOUT_VERSION {
+            let expected = format!("layout version {LAYOUT_VERSION} or lower");
+            return Err(layout(path, expected, provenance.layout_version));
+        }
+        provenance.config = self.metadata(CONFIG)?.to_string();
+        Ok(provenance)
+    }
+
+    /// Reads back what [`super::write()`] wrote.
+    ///
+    /// # Errors
+    /// [`ParquetTableError`]; files of other tools are refused.
+    pub fn table(&self) -> Result<(Table, Provenance), ParquetTableError> {
+        shielded(&self.path, || self.read_table())
+    }
+
+    /// The numeric columns of any table: floats, integers and booleans that are not nested.
+    ///
+    /// # Errors
+    /// [`ParquetTableError`].
+    pub fn numbers(&self) -> Result<NumericTable, ParquetTableError> {
+        shielded(&self.path, || numeric::read(&self.path, &self.reader))
+    }
+
+    fn read_table(&self) -> Result<(Table, Provenance), ParquetTableError> {
+        let (path, reader) = (self.path.as_path(), &self.reader);
+        let provenance = self.provenance()?;
+        let outcomes = parse_outcomes(self.metadata(OUTCOMES)?)
+            .map_err(|e| layout(path, "outcomes as JSON lines", e))?;
+        let schema = reader.metadata().file_metadata().schema_descr_ptr();
+        let (mut ids, mut labels, mut names, mut columns) =
+            (None, Vec::new(), Vec::new(), Vec::new());
+        for (index, column) in schema.columns().iter().enumerate() {
+            let name = column.name().to_string();
+            let parts = (0..reader.num_row_groups())
+                .map(|group| reader.get_row_group(group)?.get_column_reader(index));
+            match column.physical_type() {
+                _ if column.max_def_level() > 0 || column.max_rep_level() > 0 => {
+                    return Err(layout(path, "required columns", format!("{name:?} is optional")));
+                }
+                Physical::BYTE_ARRAY => {
+                    let values = texts(parts).map_err(|e| layer(path, e))?;
+                    if name == ID { ids = Some(values) } else { labels.push((name, values)) }
+                }
+                Physical::FLOAT => {
+                    names.push(name);
+                    columns.push(floats(parts).map_err(|e| layer(path, e))?);
+                }
+                other => {
+                    return Err(layout(
+                        path,
+                        "text and float columns",
+                        format!("{name:?}: {other}"),
+                    ));
+                }
+            }
+        }
+        let ids = ids.ok_or_else(|| layout(path, "a column id", "none"))?;
+        if let Some(column) = columns.iter().find(|column| column.len() != ids.len()) {
+            return Err(layout(path, format!("{} rows in each column", ids.len()), column.len()));
+        }
+        let rows = 0..ids.len();
+        let values = rows.flat_map(|row| columns.iter().map(move |column| column[row])).collect();
+        let table = Table::from_parts(ids, names, values, labels, outcomes)
+            .map_err(|source| ParquetTableError::Table { path: path.into(), source })?;
+        Ok((table, provenance))
+    }
+
+    fn find(&self, key: &str) -> Option<&str> {
+        let pairs = self.reader.metadata().file_metadata().key_value_metadata()?;
+        pairs.iter().find(|pair| pair.key == key)?.value.as_deref()
+    }
+
+    fn metadata(&self, key: &str) -> Result<&str, ParquetTableError> {
+        let missing =
+            || layout(&self.path, format!("metadata {key}"), "none: not written by this tool");
+        self.find(key).ok_or_else(missing)
+    }
+}
+
+/// The decoders of the parquet crate (60.1) assert what damaged pages do not keep, so their panics
+/// end here as errors.
+fn shielded<T>(
+    path: &Path,
+    read: impl FnOnce() -> Result<T, ParquetTableError>,
+) -> Result<T, ParquetTableError> {
+    catch_unwind(AssertUnwindSafe(read))
+        .unwrap_or_else(|_| Err(layout(path, "sound Parquet pages", "damaged ones")))
+}
+
+fn texts(
+    parts: impl Iterator<Item = Result<ColumnReader, ParquetError>>,
+) -> Result<Vec<String>, ParquetError> {
+    let mut texts = Vec::new();
+    for part in parts {
+        let ColumnReader::ByteArrayColumnReader(reader) = part? else {
+            return Err(ParquetError::General("a text column holds another type".into()));
+        };
+        for value in values(reader)? {
+            texts.push(value.as_utf8()?.to_string());
+        }
+    }
+    Ok(texts)
+}
+
+fn floats(
+    parts: impl Iterator<Item = Result<ColumnReader, ParquetError>>,
+) -> Result<Vec<f32>, ParquetError> {
+    let mut floats = Vec::new();
+    for part in parts {
+        let ColumnReader::FloatColumnReader(reader) = part? else {
+            return Err(ParquetError::General("a float column holds another type".into()));
+        };
+        floats.extend(values(reader)?);
+    }
+    Ok(floats)
+}
+
+fn values<T: DataType>(mut reader: ColumnReaderImpl<T>) -> Result<Vec<T::T>, ParquetError> {
+    let mut values = Vec::new();
+    while reader.read_records(ROWS, None, None, &mut values)?.0 > 0 {}
+    Ok(values)
+}
