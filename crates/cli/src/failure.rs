@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use corsmal_files::quote::printable;
+
 /// Exit code of a run that finished but had failed files.
 pub const FAILED_FILES: u8 = 1;
 /// Exit code of a command that could not run or go on.
@@ -22,7 +24,7 @@ impl Failure {
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
+        f.write_str(&printable(&self.0))
     }
 }
 

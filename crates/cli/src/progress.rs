@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use clap::ValueEnum;
 use corsmal_extract::run::{Progress, RunReport};
 use corsmal_files::outcome::Outcome;
+use corsmal_files::quote::printable;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::json;
 
@@ -47,7 +48,7 @@ impl Meter {
     }
 
     fn line(&self, text: &str) {
-        self.bar.suspend(|| eprintln!("{text}"));
+        self.bar.suspend(|| eprintln!("{}", printable(text)));
     }
 
     /// The one line of a run that was only checked.
@@ -73,8 +74,8 @@ impl Meter {
     pub fn stopped(format: LogFormat, event: &str, message: &str) {
         match format {
             LogFormat::Json => eprintln!("{}", json!({"event": event, "message": message})),
-            LogFormat::Text if event == "error" => eprintln!("error: {message}"),
-            LogFormat::Text => eprintln!("{message}"),
+            LogFormat::Text if event == "error" => eprintln!("error: {}", printable(message)),
+            LogFormat::Text => eprintln!("{}", printable(message)),
         }
     }
 

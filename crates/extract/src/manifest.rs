@@ -2,11 +2,16 @@
 //!
 //! Columns (CSV header) or keys (JSON) are `path` (required), `id`, `start` and `end` in seconds; any
 //! other one is a label that travels to the output. Relative paths are relative to the manifest.
+//!
+//! Time and memory grow with the size of the file, within [`MAX_LINE`], [`MAX_COLUMNS`] and
+//! [`MAX_CELLS`].
 
+use std::collections::{HashMap, HashSet};
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use corsmal_files::quote::{printable, quoted, shown};
 use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor};
 use serde_json::Value;
 
@@ -14,6 +19,13 @@ use crate::inputs::InputError;
 
 /// File name extensions of manifests, lower case.
 pub const EXTENSIONS: [&str; 3] = ["csv", "jsonl", "ndjson"];
+
+/// Longest line in bytes (1 MiB).
+pub const MAX_LINE: usize = 1 << 20;
+/// Most columns of a CSV, and most different keys of JSON lines.
+pub const MAX_COLUMNS: usize = 4096;
+/// Most label values, rows times label columns: every row has a value, empty it may be, for each.
+pub const MAX_CELLS: usize = 1 << 24;
 
 const PATH: &str = "path";
 const ID: &str = "id";
@@ -38,28 +50,50 @@ pub(crate) struct Entry {
 /// appear; a value that a JSON row lacks is empty.
 pub(crate) fn read(path: &Path) -> Result<Vec<Entry>, InputError> {
     let is_csv = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"));
-    let rows = if is_csv { csv_rows(path)? } else { json_rows(path)? };
-    let mut columns: Vec<String> = Vec::new();
-    let mut known = std::collections::HashSet::new();
-    for (_, cells) in &rows {
-        for (name, _) in cells {
-            if ![PATH, ID, START, END].contains(&name.as_str()) && known.insert(name.clone()) {
-                columns.push(name.clone());
+    if is_csv { csv_rows(path) } else { json_rows(path) }
+}
+
+fn wrong(path: &Path, line: u64, reason: impl AsRef<str>) -> InputError {
+    InputError::Manifest { path: path.into(), line, reason: printable(reason.as_ref()) }
+}
+
+/// Refuses tables that would not fit in memory.
+pub(crate) fn require_cells(rows: usize, columns: usize) -> Result<(), String> {
+    match rows.checked_mul(columns) {
+        Some(cells) if cells <= MAX_CELLS => Ok(()),
+        _ => Err(format!(
+            "{rows} rows with {columns} label columns are too much: at most {MAX_CELLS} label values"
+        )),
+    }
+}
+
+/// Passes bytes through, up to a line that is too long.
+struct Short<R> {
+    inner: R,
+    line: u64,
+    length: usize,
+}
+
+impl<R: Read> Read for Short<R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let read = self.inner.read(out)?;
+        for part in out[..read].split_inclusive(|byte| *byte == b'\n') {
+            self.length += part.len();
+            if self.length > MAX_LINE {
+                let reason = format!("longer than {MAX_LINE} bytes");
+                return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
+            }
+            if part.last() == Some(&b'\n') {
+                (self.line, self.length) = (self.line + 1, 0);
             }
         }
+        Ok(read)
     }
-    rows.into_iter().map(|(line, cells)| entry(path, line, cells, &columns)).collect()
 }
 
-type Row = (u64, Vec<(String, String)>);
-
-fn wrong(path: &Path, line: u64, reason: impl Into<String>) -> InputError {
-    InputError::Manifest { path: path.into(), line, reason: reason.into() }
-}
-
-fn open(path: &Path) -> Result<BufReader<File>, InputError> {
-    let file = File::open(path).map_err(|e| InputError::io(path, e))?;
-    let mut reader = BufReader::new(file);
+fn open(path: &Path) -> Result<BufReader<Short<File>>, InputError> {
+    let inner = File::open(path).map_err(|e| InputError::io(path, e))?;
+    let mut reader = BufReader::new(Short { inner, line: 1, length: 0 });
     // Spreadsheets put a byte order mark in front of UTF-8.
     if reader.fill_buf().map_err(|e| InputError::io(path, e))?.starts_with(b"\xef\xbb\xbf") {
         reader.consume(3);
@@ -67,38 +101,108 @@ fn open(path: &Path) -> Result<BufReader<File>, InputError> {
     Ok(reader)
 }
 
-fn csv_rows(path: &Path) -> Result<Vec<Row>, InputError> {
-    let csv_error = |error: csv::Error| {
-        let line = error.position().map_or(1, csv::Position::line);
+/// The columns of a manifest: which are labels, in order, and where the others are.
+#[derive(Default)]
+struct Columns {
+    places: HashMap<String, usize>,
+    labels: Vec<(usize, String)>,
+}
+
+impl Columns {
+    /// Takes note of a column, unless it is there already.
+    fn place(&mut self, name: &str) -> Result<usize, String> {
+        if let Some(place) = self.places.get(name) {
+            return Ok(*place);
+        }
+        let place = self.places.len();
+        if place == MAX_COLUMNS {
+            return Err(format!("more than {MAX_COLUMNS} different columns"));
+        }
+        self.places.insert(name.into(), place);
+        if ![PATH, ID, START, END].contains(&name) {
+            self.labels.push((place, name.into()));
+        }
+        Ok(place)
+    }
+
+    fn entry(
+        &self,
+        manifest: &Path,
+        line: u64,
+        mut take: impl FnMut(usize) -> String,
+    ) -> Result<Entry, InputError> {
+        let labels = self.labels.iter().map(|(i, name)| (name.clone(), take(*i))).collect();
+        let mut given = |name: &str| {
+            let value = self.places.get(name).map(|place| take(*place));
+            value.filter(|value| !value.is_empty())
+        };
+        let seconds = |name: &str, text: Option<String>| match text {
+            None => Ok(None),
+            Some(text) => match text.parse::<f64>() {
+                Ok(value) if value.is_finite() && value >= 0.0 => Ok(Some(value)),
+                _ => {
+                    let reason = format!("{name} = {} is not a time in seconds", quoted(&text));
+                    Err(wrong(manifest, line, reason))
+                }
+            },
+        };
+        let start = seconds(START, given(START))?;
+        let end = seconds(END, given(END))?;
+        if let Some(end) = end.filter(|&end| end <= start.unwrap_or(0.0)) {
+            let reason = format!("end = {end} is not behind start = {}", start.unwrap_or(0.0));
+            return Err(wrong(manifest, line, reason));
+        }
+        let id = given(ID);
+        let written = given(PATH).ok_or_else(|| wrong(manifest, line, "no path"))?;
+        let path = manifest.parent().unwrap_or(Path::new("")).join(&written);
+        Ok(Entry { line, written, path, id, start, end, labels })
+    }
+}
+
+fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
+    let failed = |error: csv::Error, reader: &csv::Reader<BufReader<Short<File>>>| {
+        // The reader is ahead of the position, but a line that is too long stops it.
+        let line = match (error.position(), error.kind()) {
+            (Some(position), _) => position.line(),
+            (None, csv::ErrorKind::Io(_)) => reader.get_ref().get_ref().line,
+            (None, _) => 1,
+        };
         wrong(path, line, error.to_string())
     };
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(open(path)?);
-    let columns: Vec<String> =
-        reader.headers().map_err(csv_error)?.iter().map(str::to_owned).collect();
-    if !columns.iter().any(|name| name == PATH) {
-        let reason = format!("the first line names no column `path`: {}", columns.join(", "));
-        return Err(wrong(path, 1, reason));
-    }
-    for (index, name) in columns.iter().enumerate() {
-        if name.is_empty() || columns[..index].contains(name) {
-            return Err(wrong(
-                path,
-                1,
-                format!("column {} ({name:?}) has no name of its own", index + 1),
-            ));
+    let mut columns = Columns::default();
+    let names = match reader.headers().cloned() {
+        Ok(names) => names,
+        Err(error) => return Err(failed(error, &reader)),
+    };
+    for (index, name) in names.iter().enumerate() {
+        let place = columns.place(name).map_err(|reason| wrong(path, 1, reason))?;
+        if name.is_empty() || place != index {
+            let reason = format!("column {} ({}) has no name of its own", index + 1, quoted(name));
+            return Err(wrong(path, 1, reason));
         }
     }
-    let mut rows = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(csv_error)?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let cells = columns.iter().cloned().zip(record.iter().map(str::to_owned));
-        rows.push((line, cells.collect()));
+    if !columns.places.contains_key(PATH) {
+        let names: Vec<&str> = columns.labels.iter().map(|(_, name)| name.as_str()).collect();
+        let names = shown(&names.join(", "));
+        return Err(wrong(path, 1, format!("the first line names no column `path`: {names}")));
     }
-    Ok(rows)
+    let mut rows = Vec::new();
+    let mut record = csv::StringRecord::new();
+    loop {
+        match reader.read_record(&mut record) {
+            Ok(true) => {}
+            Ok(false) => return Ok(rows),
+            Err(error) => return Err(failed(error, &reader)),
+        }
+        let line = record.position().map_or(0, csv::Position::line);
+        rows.push(columns.entry(path, line, |i| record.get(i).unwrap_or_default().to_owned())?);
+        require_cells(rows.len(), columns.labels.len()).map_err(|e| wrong(path, line, e))?;
+    }
 }
 
-fn json_rows(path: &Path) -> Result<Vec<Row>, InputError> {
+fn json_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
+    let mut columns = Columns::default();
     let mut rows = Vec::new();
     for (line, text) in (1..).zip(open(path)?.lines()) {
         let text = text.map_err(|e| wrong(path, line, e.to_string()))?;
@@ -107,53 +211,31 @@ fn json_rows(path: &Path) -> Result<Vec<Row>, InputError> {
         }
         let Object(fields) =
             serde_json::from_str(&text).map_err(|e| wrong(path, line, e.to_string()))?;
-        let mut cells = Vec::new();
+        let mut cells = Vec::with_capacity(fields.len());
         for (name, value) in fields {
             let value = match value {
                 Value::Null => String::new(),
                 Value::String(text) => text,
                 Value::Bool(_) | Value::Number(_) => value.to_string(),
                 Value::Array(_) | Value::Object(_) => {
-                    let reason = format!("{name:?} must be a string, a number or a boolean");
+                    let name = quoted(&name);
+                    let reason = format!("{name} must be a string, a number or a boolean");
                     return Err(wrong(path, line, reason));
                 }
             };
-            cells.push((name, value));
+            let place = columns.place(&name).map_err(|reason| wrong(path, line, reason))?;
+            cells.push((place, value));
         }
         rows.push((line, cells));
+        require_cells(rows.len(), columns.labels.len()).map_err(|e| wrong(path, line, e))?;
     }
-    Ok(rows)
-}
-
-fn entry(
-    manifest: &Path,
-    line: u64,
-    mut cells: Vec<(String, String)>,
-    columns: &[String],
-) -> Result<Entry, InputError> {
-    let mut take = |name: &str| {
-        let index = cells.iter().position(|(column, _)| column == name)?;
-        Some(cells.swap_remove(index).1)
-    };
-    let labels = columns.iter().map(|c| (c.clone(), take(c).unwrap_or_default())).collect();
-    let seconds = |name: &str, text: Option<String>| match text.filter(|t| !t.is_empty()) {
-        None => Ok(None),
-        Some(text) => match text.parse::<f64>() {
-            Ok(value) if value.is_finite() && value >= 0.0 => Ok(Some(value)),
-            _ => Err(wrong(manifest, line, format!("{name} = {text:?} is not a time in seconds"))),
-        },
-    };
-    let start = seconds(START, take(START))?;
-    let end = seconds(END, take(END))?;
-    if let Some(end) = end.filter(|&end| end <= start.unwrap_or(0.0)) {
-        let reason = format!("end = {end} is not behind start = {}", start.unwrap_or(0.0));
-        return Err(wrong(manifest, line, reason));
-    }
-    let id = take(ID).filter(|id| !id.is_empty());
-    let written = take(PATH).filter(|path| !path.is_empty());
-    let written = written.ok_or_else(|| wrong(manifest, line, "no path"))?;
-    let path = manifest.parent().unwrap_or(Path::new("")).join(&written);
-    Ok(Entry { line, written, path, id, start, end, labels })
+    let mut values = vec![String::new(); columns.places.len()];
+    let entries = rows.into_iter().map(|(line, cells)| {
+        values.iter_mut().for_each(String::clear);
+        cells.into_iter().for_each(|(place, value)| values[place] = value);
+        columns.entry(path, line, |place| std::mem::take(&mut values[place]))
+    });
+    entries.collect()
 }
 
 /// A JSON object with its keys in the order written, each once.
@@ -171,11 +253,11 @@ impl<'de> Deserialize<'de> for Object {
 
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Object, A::Error> {
                 let mut fields: Vec<(String, Value)> = Vec::new();
+                let mut names = HashSet::new();
                 while let Some((name, value)) = map.next_entry::<String, Value>()? {
-                    if name.is_empty() || fields.iter().any(|(other, _)| *other == name) {
-                        return Err(A::Error::custom(format!(
-                            "key {name:?} has no name of its own"
-                        )));
+                    if name.is_empty() || !names.insert(name.clone()) {
+                        let name = quoted(&name);
+                        return Err(A::Error::custom(format!("key {name} has no name of its own")));
                     }
                     fields.push((name, value));
                 }

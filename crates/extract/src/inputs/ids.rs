@@ -5,6 +5,7 @@ use std::ffi::OsStr;
 use std::path::{Component, Path};
 
 use super::{Found, InputError, InputSource, Naming};
+use corsmal_files::quote::quoted;
 use corsmal_files::table::RESERVED;
 
 /// Longest id in bytes, far below what a zip archive can name.
@@ -28,7 +29,7 @@ pub(super) fn refusal(id: &str) -> Option<String> {
     } else {
         return None;
     };
-    Some(format!("id {id:?} {reason}"))
+    Some(format!("id {} {reason}", quoted(id)))
 }
 
 /// The id of each input: given ones as they are, others from the shortest form of their path that

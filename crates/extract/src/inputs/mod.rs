@@ -16,7 +16,7 @@
 mod ids;
 mod wildcard;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::ffi::OsStr;
 use std::fmt;
 use std::io;
@@ -69,6 +69,12 @@ pub enum InputError {
         /// Line, from 1.
         line: u64,
         /// What is wrong, and what is allowed.
+        reason: String,
+    },
+    /// The manifests together have too many labels.
+    #[error("{reason}")]
+    Labels {
+        /// How many, and how many are allowed.
         reason: String,
     },
     /// Two inputs cannot be told apart.
@@ -135,11 +141,15 @@ pub fn collect<S: AsRef<OsStr>>(names: &[S]) -> Result<Vec<Input>, InputError> {
     }
     let ids = ids::assign(&found)?;
     let mut columns: Vec<String> = Vec::new();
+    let mut known = HashSet::new();
     for (column, _) in found.iter().flat_map(|f| &f.labels) {
-        if !columns.contains(column) {
+        if !known.contains(column.as_str()) {
+            known.insert(column.as_str());
             columns.push(column.clone());
         }
     }
+    manifest::require_cells(found.len(), columns.len())
+        .map_err(|reason| InputError::Labels { reason })?;
     let inputs = found.into_iter().zip(ids).map(|(found, id)| {
         let mut values: BTreeMap<String, String> = found.labels.into_iter().collect();
         let labels = columns.iter().map(|c| (c.clone(), values.remove(c).unwrap_or_default()));

@@ -200,6 +200,47 @@ fn manifest_errors_name_the_line() {
     }
 }
 
+/// Each took minutes, gigabytes or both: a manifest is read in time and memory that grow with its size.
+#[test]
+fn manifests_have_limits_that_are_named() {
+    let dir = folder(&["a.wav"]);
+    let columns = |n: usize| (0..n).map(|i| format!("c{i}")).collect::<Vec<_>>().join(",");
+    let keys = |n: usize| (0..n).map(|i| format!(",\"k{i}\":1")).collect::<String>();
+    let sparse = |n: usize| {
+        let row = |i| format!("{{\"path\":\"a.wav\",\"id\":\"{i}\",\"k{i}\":1}}\n");
+        (0..n).map(row).collect::<String>()
+    };
+    let long = "x".repeat(2 << 20);
+    let tall = format!(
+        "path,{}\n{}",
+        columns(4000),
+        "a.wav\n".repeat(4200).replace('\n', &format!("{}\n", ",".repeat(4000)))
+    );
+    let cases = [
+        (
+            "m.csv",
+            format!("path,{}\na.wav\n", columns(100_000)),
+            "more than 4096 different columns",
+        ),
+        ("m.jsonl", format!("{{\"path\":\"a.wav\"{}}}\n", keys(60_000)), "more than 4096"),
+        ("m.jsonl", sparse(20_000), "line 4095: more than 4096 different columns"),
+        ("m.csv", tall, "4195 rows with 4000 label columns are too much: at most 16777216"),
+        ("m.csv", format!("path,id\na.wav,1\n{long}\n"), "line 3: longer than 1048576 bytes"),
+        ("m.jsonl", format!("{{\"path\":\"a.wav\"}}\n{long}"), "line 2: longer than 1048576 bytes"),
+        ("m.csv", format!("path,start\na.wav,{}\n", &long[..1 << 19]), "is not a time"),
+        ("m.csv", format!("{}\na.wav\n", &long[..1 << 19]), "names no column `path`"),
+        ("m.csv", format!("path,id\na.wav,__{}\n", &long[..1 << 19]), "must not begin with __"),
+        ("m.csv", "path,id\na.wav,\u{1b}[2J\n".into(), "must not hold control characters"),
+    ];
+    for (name, content, message) in cases {
+        let path = dir.path().join(name);
+        fs::write(&path, content).unwrap();
+        let error = ids(&[text(&path)]).unwrap_err();
+        assert!(error.contains(message), "{message}: {error:.500}");
+        assert!(error.len() < 5000 && !error.contains('\u{1b}'), "{error:.500}");
+    }
+}
+
 #[test]
 fn the_list_hash_sees_every_field() {
     let base = Input {

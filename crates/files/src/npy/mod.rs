@@ -22,6 +22,8 @@ const ALIGNMENT: usize = 64;
 const MAX_HEADER: usize = 65_536;
 /// numpy's limit on the number of axes.
 const MAX_AXES: usize = 64;
+/// Longest axes, multiplied, of an array without data.
+const MAX_EMPTY: u64 = 1 << 20;
 /// Longest fixed-width string read, in bytes.
 const MAX_STRING: usize = 1 << 26;
 
@@ -277,7 +279,12 @@ impl Header {
         let mut text = vec![0u8; length];
         read_exact(reader, &mut text, start)?;
         let header = literal::header(&text, start)?;
-        header.data_len()?;
+        // Without bytes behind it, a length is no more than the header's word.
+        let axes = header.shape.iter().try_fold(1u64, |n, &axis| n.checked_mul(axis.max(1)));
+        if header.data_len()? == 0 && axes.is_none_or(|n| n > MAX_EMPTY) {
+            let (shape, itemsize) = (header.shape, header.dtype.itemsize);
+            return Err(NpyError::TooLarge { shape, itemsize });
+        }
         Ok((header, start + length as u64))
     }
 }

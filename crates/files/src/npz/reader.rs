@@ -1,8 +1,9 @@
 //! Reads `.npz` archives: ours, numpy's and any other.
 //!
-//! Archives are not trusted. Nothing is allocated on the word of a header alone: the shape must
-//! agree with the member's size, a stored member cannot be larger than the file, and a deflated one
-//! not more than [`MAX_INFLATED`] bytes or [`MAX_RATIO`] times its compressed size.
+//! Archives are not trusted. Members must not share bytes. Nothing is allocated on the word of a
+//! header alone: the shape must agree with the member's size, a stored member cannot be larger than
+//! the file, and what is made of a deflated one takes at most [`MAX_INFLATED`] bytes or
+//! [`MAX_RATIO`] times its compressed size. Members are decoded in pieces.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read};
@@ -16,11 +17,15 @@ use zip::{CompressionMethod, ZipArchive};
 use super::NpzError;
 use super::writer::{Compression, EntryRecord};
 use crate::npy::{self, DType, Endian, Header, Kind, NpyError};
+use crate::quote::quoted;
 
-/// A deflated member may always grow to this many bytes (1 GiB).
-pub const MAX_INFLATED: u64 = 1 << 30;
-/// A larger deflated member may grow to this many times its compressed size.
+/// What is made of a deflated member may always take this many bytes (128 MiB), and so may all text
+/// of an archive together.
+pub const MAX_INFLATED: u64 = 128 << 20;
+/// Beyond that it may take this many times the compressed size.
 pub const MAX_RATIO: u64 = 200;
+/// Most strings of a member.
+pub const MAX_STRINGS: u64 = 1 << 26;
 
 const EXTENSION: &str = ".npy";
 
@@ -31,6 +36,8 @@ pub struct NpzFile {
     archive: ZipArchive<BufReader<File>>,
     length: u64,
     names: Vec<String>,
+    /// Bytes that strings have taken so far.
+    text: u64,
 }
 
 impl NpzFile {
@@ -47,6 +54,13 @@ impl NpzFile {
         if archive.has_duplicate_names() {
             return Err(refused("two members have the same name".into()));
         }
+        if let Some((a, b)) = overlap(&archive).map_err(|e| refused(e.to_string()))? {
+            return Err(refused(format!(
+                "the members {} and {} share bytes",
+                quoted(&a),
+                quoted(&b)
+            )));
+        }
         let names = archive
             .file_names()
             .map(|name| name.map(|name| name.into_owned()))
@@ -56,7 +70,7 @@ impl NpzFile {
             .into_iter()
             .filter_map(|name| name.strip_suffix(EXTENSION).map(str::to_owned))
             .collect();
-        Ok(Self { path: path.into(), archive, length, names })
+        Ok(Self { path: path.into(), archive, length, names, text: 0 })
     }
 
     /// The file that was opened.
@@ -79,7 +93,7 @@ impl NpzFile {
     /// # Errors
     /// [`NpzError`] names the member and what is wrong with it.
     pub fn header(&mut self, name: &str) -> Result<Header, NpzError> {
-        self.read(name, |_, header, _| Ok(header.clone()))
+        self.read(name, 0, |_, header, _| Ok(header.clone()))
     }
 
     /// A numeric member as 32-bit floats; wider numbers are rounded.
@@ -88,7 +102,7 @@ impl NpzFile {
     /// [`NpzError`] names the member and what is wrong with it; complex numbers and text are
     /// refused.
     pub fn f32(&mut self, name: &str) -> Result<ArrayD<f32>, NpzError> {
-        self.read(name, |body, header, wrong| npy::array(body, header).map_err(|e| wrong.npy(e)))
+        self.read(name, 4, |body, header, wrong| npy::array(body, header).map_err(|e| wrong.npy(e)))
     }
 
     /// A numeric member as 64-bit floats.
@@ -96,7 +110,7 @@ impl NpzFile {
     /// # Errors
     /// As [`NpzFile::f32`].
     pub fn f64(&mut self, name: &str) -> Result<ArrayD<f64>, NpzError> {
-        self.read(name, |body, header, wrong| npy::array(body, header).map_err(|e| wrong.npy(e)))
+        self.read(name, 8, |body, header, wrong| npy::array(body, header).map_err(|e| wrong.npy(e)))
     }
 
     /// A member of whole numbers or truth values, exactly.
@@ -104,7 +118,9 @@ impl NpzFile {
     /// # Errors
     /// As [`NpzFile::f32`]; floats are refused, too.
     pub fn integers(&mut self, name: &str) -> Result<ArrayD<i128>, NpzError> {
-        self.read(name, |body, header, wrong| npy::array(body, header).map_err(|e| wrong.npy(e)))
+        self.read(name, 16, |body, header, wrong| {
+            npy::array(body, header).map_err(|e| wrong.npy(e))
+        })
     }
 
     /// A numeric member as 64-bit floats, complex numbers as an additional first axis of real and
@@ -113,7 +129,7 @@ impl NpzFile {
     /// # Errors
     /// [`NpzError`] names the member and what is wrong with it; text is refused.
     pub fn components(&mut self, name: &str) -> Result<ArrayD<f64>, NpzError> {
-        self.read(name, |body, header, wrong| {
+        self.read(name, 16, |body, header, wrong| {
             npy::components(body, header).map_err(|e| wrong.npy(e))
         })
     }
@@ -123,7 +139,8 @@ impl NpzFile {
     /// # Errors
     /// [`NpzError`] names the member and what is wrong with it.
     pub fn strings(&mut self, name: &str) -> Result<Vec<String>, NpzError> {
-        self.read(name, |body, header, wrong| {
+        let most = MAX_INFLATED.max(self.length.saturating_mul(MAX_RATIO)) - self.text;
+        let strings = self.read(name, size_of::<String>(), |body, header, wrong| {
             let (Kind::Text | Kind::Bytes, &[count]) = (header.dtype.kind, header.shape.as_slice())
             else {
                 return Err(wrong.kind("a list of strings (U or S)", header));
@@ -134,6 +151,10 @@ impl NpzFile {
                 (0, _) => return Ok(Vec::new()),
                 (_, 0) => return Err(wrong.kind("text of at least one character", header)),
                 _ => {}
+            }
+            if count > MAX_STRINGS.min(most / size_of::<String>() as u64) {
+                let limit = MAX_STRINGS.min(most / size_of::<String>() as u64);
+                return Err(wrong.expected(format!("at most {limit} strings"), count));
             }
             let mut item = vec![0u8; width];
             let mut strings = Vec::new();
@@ -151,7 +172,14 @@ impl NpzFile {
                 strings.push(text.trim_end_matches('\0').to_string());
             }
             Ok(strings)
-        })
+        })?;
+        let taken: usize = strings.iter().map(|s| size_of::<String>() + s.len()).sum();
+        self.text += taken as u64;
+        if taken as u64 > most {
+            let expected = format!("at most {most} more bytes of text");
+            return Err(NpzError::member(&self.path, name, expected, taken));
+        }
+        Ok(strings)
     }
 
     /// A member of bytes (`u1`), as [`super::NpzWriter::text`] writes them, as text.
@@ -159,7 +187,7 @@ impl NpzFile {
     /// # Errors
     /// [`NpzError`] names the member and what is wrong with it.
     pub fn text(&mut self, name: &str) -> Result<String, NpzError> {
-        self.read(name, |body, header, wrong| {
+        self.read(name, 1, |body, header, wrong| {
             if header.dtype != DType::U8 {
                 return Err(wrong.kind("bytes (u1)", header));
             }
@@ -178,7 +206,8 @@ impl NpzFile {
         serde_json::from_str(&text).map_err(|e| NpzError::member(&self.path, name, "JSON", e))
     }
 
-    /// The undecoded bytes of a member and what a writer needs to know to append them elsewhere.
+    /// The undecoded bytes of a member and what a writer needs to know to append them elsewhere
+    /// (where the record has no place yet, and no check sum of the stored bytes).
     ///
     /// # Errors
     /// [`NpzError`]: no such member, or one that is neither stored nor deflated.
@@ -196,6 +225,7 @@ impl NpzFile {
             offset: 0,
             end: 0,
             crc32: member.crc32(),
+            stored_crc32: 0,
             size: member.size(),
             compressed: member.compressed_size(),
             compression,
@@ -207,11 +237,13 @@ impl NpzFile {
         self.archive.index_for_name(&format!("{name}{EXTENSION}"))
     }
 
-    /// Opens a member, checks its sizes against each other and hands its data to `take`, which must
-    /// read none or all of it; in the latter case the CRC is checked.
+    /// Opens a member, checks its sizes against each other and hands its data to `take`, which makes
+    /// `width` bytes of each element and must read none or all of it; in the latter case the CRC is
+    /// checked.
     fn read<T>(
         &mut self,
         name: &str,
+        width: usize,
         take: impl FnOnce(&mut dyn Read, &Header, &Wrong<'_>) -> Result<T, NpzError>,
     ) -> Result<T, NpzError> {
         let index = self.index(name).ok_or_else(|| missing(&self.path, name))?;
@@ -223,6 +255,11 @@ impl NpzFile {
         if start.checked_add(data) != Some(member.size()) {
             let expected = format!("{data} bytes of data for shape {:?}", header.shape);
             return Err(wrong.expected(expected, member.size().saturating_sub(start)));
+        }
+        let made = header.elements().map_err(|e| wrong.npy(e))?.saturating_mul(width as u64);
+        if made > most_of(&member) {
+            let expected = format!("at most {} bytes in memory", most_of(&member));
+            return Err(wrong.expected(expected, made));
         }
         let mut body = (&mut member).take(data);
         let value = take(&mut body, &header, &wrong)?;
@@ -245,12 +282,41 @@ fn check_sizes<R: Read>(
     }
     let most = match member.compression() {
         CompressionMethod::Stored => compressed,
-        _ => MAX_INFLATED.max(compressed.saturating_mul(MAX_RATIO)),
+        _ => most_of(member),
     };
     if size > most {
         return Err(wrong.expected(format!("at most {most} bytes uncompressed"), size));
     }
     Ok(())
+}
+
+/// Bytes that may be made of a member. Stored ones are there to be counted.
+fn most_of<R: Read>(member: &ZipFile<'_, R>) -> u64 {
+    match member.compression() {
+        CompressionMethod::Stored => u64::MAX,
+        _ => MAX_INFLATED.max(member.compressed_size().saturating_mul(MAX_RATIO)),
+    }
+}
+
+/// Two members that share bytes, as far as the directory tells.
+fn overlap(
+    archive: &ZipArchive<BufReader<File>>,
+) -> zip::result::ZipResult<Option<(String, String)>> {
+    /// A local header without name and extra fields.
+    const LOCAL: u64 = 30;
+    let mut spans = Vec::with_capacity(archive.len());
+    for index in 0..archive.len() {
+        let entry = archive.by_index_data(index)?;
+        let end =
+            entry.header_start().saturating_add(LOCAL).saturating_add(entry.compressed_size());
+        spans.push((entry.header_start(), end, index));
+    }
+    spans.sort_unstable();
+    let Some(pair) = spans.windows(2).find(|pair| pair[0].1 > pair[1].0) else { return Ok(None) };
+    let name = |index: usize| -> zip::result::ZipResult<String> {
+        Ok(archive.name_for_index(index).transpose()?.unwrap_or_default().into_owned())
+    };
+    Ok(Some((name(pair[0].2)?, name(pair[1].2)?)))
 }
 
 fn missing(path: &Path, name: &str) -> NpzError {

@@ -1,8 +1,10 @@
 //! The summary table as a Parquet file: column `id`, the label columns (text), one 32-bit float
 //! column per feature. Configuration, provenance and outcomes are in the file's key-value metadata.
 
+mod limits;
 mod numeric;
 mod reader;
+mod thrift;
 mod writer;
 
 use std::path::{Path, PathBuf};
@@ -12,9 +14,10 @@ use thiserror::Error;
 
 use crate::table::TableError;
 
+pub use limits::{MAX_PAGE, MAX_TEXT, MAX_VALUES, MAX_VALUES_A_BYTE};
 pub use numeric::NumericTable;
 pub use reader::ParquetFile;
-pub use writer::write;
+pub use writer::{write, write_over};
 
 const META: &str = "corsmal.meta";
 const CONFIG: &str = "corsmal.config";

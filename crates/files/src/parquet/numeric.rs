@@ -10,6 +10,7 @@ use parquet::data_type::{ByteArray, DataType};
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
+use super::reader::{require_rows, spend};
 use super::{ParquetTableError, ROWS, layer, layout};
 use crate::table::ID;
 
@@ -30,6 +31,8 @@ pub struct NumericTable {
 pub(super) fn read(
     path: &Path,
     reader: &SerializedFileReader<File>,
+    rows: usize,
+    mut text: u64,
 ) -> Result<NumericTable, ParquetTableError> {
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let (mut ids, mut names, mut skipped) = (None, Vec::new(), Vec::new());
@@ -49,14 +52,16 @@ pub(super) fn read(
         );
         if numeric && column.max_rep_level() == 0 {
             let values = parts
-                .try_fold(Vec::new(), |values, part| numbers(part?, levels, values))
+                .try_fold(Vec::new(), |values, part| numbers(part?, levels, rows, values))
                 .map_err(|e| layer(path, e))?;
             names.push(name);
             series.push(values);
         } else if column.physical_type() == Physical::BYTE_ARRAY && column.max_rep_level() == 0 {
             if name == ID {
                 let values = parts
-                    .try_fold(Vec::new(), |values, part| texts(part?, levels, values))
+                    .try_fold(Vec::new(), |values, part| {
+                        texts(part?, levels, (rows, &mut text), values)
+                    })
                     .map_err(|e| layer(path, e))?;
                 ids = Some(values);
             }
@@ -75,16 +80,23 @@ pub(super) fn read(
 fn numbers(
     reader: ColumnReader,
     levels: i16,
+    rows: usize,
     mut into: Vec<f64>,
 ) -> Result<Vec<f64>, ParquetError> {
     let missing = f64::NAN;
     match reader {
-        ColumnReader::FloatColumnReader(r) => append(r, levels, &mut into, f64::from, missing),
-        ColumnReader::DoubleColumnReader(r) => append(r, levels, &mut into, |v| v, missing),
-        ColumnReader::Int32ColumnReader(r) => append(r, levels, &mut into, f64::from, missing),
-        ColumnReader::Int64ColumnReader(r) => append(r, levels, &mut into, |v| v as f64, missing),
+        ColumnReader::FloatColumnReader(r) => {
+            append(r, (levels, rows), &mut into, |v| Ok(f64::from(v)), missing)
+        }
+        ColumnReader::DoubleColumnReader(r) => append(r, (levels, rows), &mut into, Ok, missing),
+        ColumnReader::Int32ColumnReader(r) => {
+            append(r, (levels, rows), &mut into, |v| Ok(f64::from(v)), missing)
+        }
+        ColumnReader::Int64ColumnReader(r) => {
+            append(r, (levels, rows), &mut into, |v| Ok(v as f64), missing)
+        }
         ColumnReader::BoolColumnReader(r) => {
-            append(r, levels, &mut into, |v| f64::from(u8::from(v)), missing)
+            append(r, (levels, rows), &mut into, |v| Ok(f64::from(u8::from(v))), missing)
         }
         _ => Err(ParquetError::General("a numeric column holds another type".into())),
     }?;
@@ -94,22 +106,27 @@ fn numbers(
 fn texts(
     reader: ColumnReader,
     levels: i16,
+    (rows, left): (usize, &mut u64),
     mut into: Vec<String>,
 ) -> Result<Vec<String>, ParquetError> {
     let ColumnReader::ByteArrayColumnReader(reader) = reader else {
         return Err(ParquetError::General("a text column holds another type".into()));
     };
-    let text = |v: ByteArray| String::from_utf8_lossy(v.data()).into_owned();
-    append(reader, levels, &mut into, text, String::new())?;
+    let text = |v: ByteArray| {
+        let text = String::from_utf8_lossy(v.data()).into_owned();
+        spend(left, &text)?;
+        Ok(text)
+    };
+    append(reader, (levels, rows), &mut into, text, String::new())?;
     Ok(into)
 }
 
 /// Appends the rows of a column, `missing` where the definition level says that there is no value.
 fn append<T: DataType, V: Clone>(
     mut reader: ColumnReaderImpl<T>,
-    levels: i16,
+    (levels, rows): (i16, usize),
     into: &mut Vec<V>,
-    convert: impl Fn(T::T) -> V,
+    mut convert: impl FnMut(T::T) -> Result<V, ParquetError>,
     missing: V,
 ) -> Result<(), ParquetError> {
     loop {
@@ -118,15 +135,18 @@ fn append<T: DataType, V: Clone>(
         if reader.read_records(ROWS, wanted, None, &mut values)?.0 == 0 {
             return Ok(());
         }
-        let mut values = values.into_iter().map(&convert);
+        let mut values = values.into_iter().map(&mut convert);
         if levels == 0 {
-            into.extend(values);
+            for value in values {
+                into.push(value?);
+            }
         } else {
-            into.extend(defined.iter().map(|&level| match level == levels {
-                true => values.next().unwrap_or_else(|| missing.clone()),
-                false => missing.clone(),
-            }));
+            for level in defined {
+                let value = if level == levels { values.next().transpose()? } else { None };
+                into.push(value.unwrap_or_else(|| missing.clone()));
+            }
         }
+        require_rows(into.len(), rows)?;
     }
 }
 

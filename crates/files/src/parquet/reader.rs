@@ -1,7 +1,6 @@
 //! Reads tables, ours and those of other tools.
 
 use std::fs::File;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use parquet::basic::Type as Physical;
@@ -10,6 +9,7 @@ use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
+use super::limits::{self, shielded};
 use super::numeric::{self, NumericTable};
 use super::{CONFIG, META, OUTCOMES, ParquetTableError, ROWS, io, layer, layout};
 use crate::layout::parse_outcomes;
@@ -19,6 +19,8 @@ use crate::table::{ID, Table};
 /// An open Parquet file.
 pub struct ParquetFile {
     path: PathBuf,
+    file: File,
+    length: u64,
     reader: SerializedFileReader<File>,
 }
 
@@ -29,15 +31,19 @@ impl std::fmt::Debug for ParquetFile {
 }
 
 impl ParquetFile {
-    /// Opens a file and reads its metadata.
+    /// Opens a file and reads its metadata. Columns are read within [`super::MAX_VALUES`],
+    /// [`super::MAX_TEXT`] and [`super::MAX_PAGE`].
     ///
     /// # Errors
     /// [`ParquetTableError`].
     pub fn open(path: &Path) -> Result<Self, ParquetTableError> {
         shielded(path, || {
             let file = File::open(path).map_err(|e| io(path, e))?;
-            let reader = SerializedFileReader::new(file).map_err(|e| layer(path, e))?;
-            Ok(Self { path: path.into(), reader })
+            let length = file.metadata().map_err(|e| io(path, e))?.len();
+            limits::check_footer(path, &file)?;
+            let other = file.try_clone().map_err(|e| io(path, e))?;
+            let reader = SerializedFileReader::new(other).map_err(|e| layer(path, e))?;
+            Ok(Self { path: path.into(), file, length, reader })
         })
     }
 
@@ -80,12 +86,17 @@ impl ParquetFile {
     /// # Errors
     /// [`ParquetTableError`].
     pub fn numbers(&self) -> Result<NumericTable, ParquetTableError> {
-        shielded(&self.path, || numeric::read(&self.path, &self.reader))
+        shielded(&self.path, || {
+            let rows = limits::check_pages(&self.path, &self.file, self.reader.metadata())?;
+            numeric::read(&self.path, &self.reader, rows, limits::most_text(self.length))
+        })
     }
 
     fn read_table(&self) -> Result<(Table, Provenance), ParquetTableError> {
         let (path, reader) = (self.path.as_path(), &self.reader);
         let provenance = self.provenance()?;
+        let rows = limits::check_pages(path, &self.file, reader.metadata())?;
+        let mut text = limits::most_text(self.length);
         let outcomes = parse_outcomes(self.metadata(OUTCOMES)?)
             .map_err(|e| layout(path, "outcomes as JSON lines", e))?;
         let schema = reader.metadata().file_metadata().schema_descr_ptr();
@@ -100,12 +111,12 @@ impl ParquetFile {
                     return Err(layout(path, "required columns", format!("{name:?} is optional")));
                 }
                 Physical::BYTE_ARRAY => {
-                    let values = texts(parts).map_err(|e| layer(path, e))?;
+                    let values = texts(parts, rows, &mut text).map_err(|e| layer(path, e))?;
                     if name == ID { ids = Some(values) } else { labels.push((name, values)) }
                 }
                 Physical::FLOAT => {
                     names.push(name);
-                    columns.push(floats(parts).map_err(|e| layer(path, e))?);
+                    columns.push(floats(parts, rows).map_err(|e| layer(path, e))?);
                 }
                 other => {
                     return Err(layout(
@@ -139,46 +150,72 @@ impl ParquetFile {
     }
 }
 
-/// The decoders of the parquet crate (60.1) assert what damaged pages do not keep, so their panics
-/// end here as errors.
-fn shielded<T>(
-    path: &Path,
-    read: impl FnOnce() -> Result<T, ParquetTableError>,
-) -> Result<T, ParquetTableError> {
-    catch_unwind(AssertUnwindSafe(read))
-        .unwrap_or_else(|_| Err(layout(path, "sound Parquet pages", "damaged ones")))
-}
-
+/// Texts of at most `rows` rows, and of `left` bytes of memory.
 fn texts(
     parts: impl Iterator<Item = Result<ColumnReader, ParquetError>>,
+    rows: usize,
+    left: &mut u64,
 ) -> Result<Vec<String>, ParquetError> {
     let mut texts = Vec::new();
     for part in parts {
         let ColumnReader::ByteArrayColumnReader(reader) = part? else {
             return Err(ParquetError::General("a text column holds another type".into()));
         };
-        for value in values(reader)? {
-            texts.push(value.as_utf8()?.to_string());
-        }
+        batches(reader, rows, |values| {
+            for value in values {
+                texts.push(spend(left, value.as_utf8()?)?.to_string());
+            }
+            Ok(texts.len())
+        })?;
     }
     Ok(texts)
 }
 
+/// Takes the memory of a string from what is left.
+pub(super) fn spend<'a>(left: &mut u64, text: &'a str) -> Result<&'a str, ParquetError> {
+    let bytes = (size_of::<String>() + text.len()) as u64;
+    *left = left.checked_sub(bytes).ok_or_else(|| {
+        ParquetError::General("more text than a file of this size may hold".into())
+    })?;
+    Ok(text)
+}
+
 fn floats(
     parts: impl Iterator<Item = Result<ColumnReader, ParquetError>>,
+    rows: usize,
 ) -> Result<Vec<f32>, ParquetError> {
     let mut floats = Vec::new();
     for part in parts {
         let ColumnReader::FloatColumnReader(reader) = part? else {
             return Err(ParquetError::General("a float column holds another type".into()));
         };
-        floats.extend(values(reader)?);
+        batches(reader, rows, |values| {
+            floats.extend(values);
+            Ok(floats.len())
+        })?;
     }
     Ok(floats)
 }
 
-fn values<T: DataType>(mut reader: ColumnReaderImpl<T>) -> Result<Vec<T::T>, ParquetError> {
-    let mut values = Vec::new();
-    while reader.read_records(ROWS, None, None, &mut values)?.0 > 0 {}
-    Ok(values)
+/// Hands a column on in batches; `take` says how many values there are by then.
+fn batches<T: DataType>(
+    mut reader: ColumnReaderImpl<T>,
+    rows: usize,
+    mut take: impl FnMut(Vec<T::T>) -> Result<usize, ParquetError>,
+) -> Result<(), ParquetError> {
+    loop {
+        let mut values = Vec::new();
+        if reader.read_records(ROWS, None, None, &mut values)?.0 == 0 {
+            return Ok(());
+        }
+        require_rows(take(values)?, rows)?;
+    }
+}
+
+/// Pages may hold more than the metadata say.
+pub(super) fn require_rows(found: usize, rows: usize) -> Result<(), ParquetError> {
+    match found > rows {
+        true => Err(ParquetError::General(format!("a column has more than the {rows} rows"))),
+        false => Ok(()),
+    }
 }

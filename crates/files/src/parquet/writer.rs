@@ -1,7 +1,7 @@
 //! Writes a table.
 
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufWriter, Seek};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -23,8 +23,21 @@ use crate::table::{ID, Table};
 /// # Errors
 /// [`ParquetTableError::Io`] or [`ParquetTableError::Parquet`].
 pub fn write(path: &Path, table: &Table, provenance: &Provenance) -> Result<(), ParquetTableError> {
-    let file = File::create(path).map_err(|e| io(path, e))?;
+    write_over(File::create(path).map_err(|e| io(path, e))?, path, table, provenance)
+}
+
+/// As [`write()`], in place of what an open file holds; errors call it `path`.
+///
+/// # Errors
+/// As those of [`write()`].
+pub fn write_over(
+    mut file: File,
+    path: &Path,
+    table: &Table,
+    provenance: &Provenance,
+) -> Result<(), ParquetTableError> {
     let disk = file.try_clone().map_err(|e| io(path, e))?;
+    file.set_len(0).and_then(|()| file.rewind()).map_err(|e| io(path, e))?;
     write_to(file, table, provenance).map_err(|e| layer(path, e))?;
     disk.sync_all().map_err(|e| io(path, e))
 }

@@ -1,0 +1,77 @@
+//! What messages repeat of an input.
+
+use std::fmt::Write;
+
+/// Characters of an input that a message repeats at most.
+pub const LONGEST: usize = 120;
+
+/// A piece of an input for a message: in quotation marks, control characters and what is invisible
+/// escaped, cut to a length that a terminal shows.
+pub fn quoted(text: &str) -> String {
+    format!("\"{}\"", shown(text))
+}
+
+/// As [`quoted`], without quotation marks.
+pub fn shown(text: &str) -> String {
+    let mut out = String::new();
+    let mut left = text.chars();
+    for character in left.by_ref().take(LONGEST) {
+        match character {
+            // What a debug format escapes for its own sake.
+            '\'' | '"' => out.push(character),
+            _ => out.extend(character.escape_debug()),
+        }
+    }
+    let more = left.count();
+    if more > 0 {
+        // Writing to a string cannot fail.
+        let _ = write!(out, "… ({more} more characters)");
+    }
+    out
+}
+
+/// Characters of a whole message that are shown at most.
+const LONGEST_MESSAGE: usize = 4000;
+
+/// A whole message as a terminal may have it, whatever it repeats: control characters but line feeds
+/// and tabs escaped, and not endless.
+pub fn printable(message: &str) -> String {
+    let mut out = String::with_capacity(message.len().min(LONGEST_MESSAGE));
+    let mut left = message.chars();
+    for character in left.by_ref().take(LONGEST_MESSAGE) {
+        match character {
+            '\n' | '\t' => out.push(character),
+            _ if character.is_control() || is_direction(character) => {
+                out.extend(character.escape_unicode());
+            }
+            _ => out.push(character),
+        }
+    }
+    let more = left.count();
+    if more > 0 {
+        // Writing to a string cannot fail.
+        let _ = write!(out, "… ({more} more characters)");
+    }
+    out
+}
+
+/// Whether a character changes the order in which those around it are shown.
+fn is_direction(character: char) -> bool {
+    matches!(character, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_long_is_cut_and_what_is_invisible_escaped() {
+        assert_eq!(quoted("träning/1"), "\"träning/1\"");
+        assert_eq!(shown("a\u{1b}[2Jb\n\u{202e}"), "a\\u{1b}[2Jb\\n\\u{202e}");
+        assert_eq!(shown("it's"), "it's");
+        assert_eq!(printable("a: b\n\tc\u{7}\u{2066}ü"), "a: b\n\tc\\u{7}\\u{2066}ü");
+        assert!(printable(&"x".repeat(1_000_000)).len() < 4100);
+        let long = shown(&"x".repeat(1_000_000));
+        assert!(long.len() < 200 && long.ends_with("x… (999880 more characters)"), "{long}");
+    }
+}
