@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use corsmal_benches::{RATE, signal};
 use corsmal_extract::config::Config;
-use corsmal_extract::run::Signals;
+use corsmal_extract::engine::Signals;
 use divan::{Bencher, counter::ItemsCount};
 
 fn main() {

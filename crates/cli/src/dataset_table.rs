@@ -9,6 +9,8 @@ use corsmal_files::layout;
 use corsmal_files::npy::{Kind, NpyError};
 use corsmal_files::npz::{NpzError, NpzFile};
 use corsmal_files::outcome::Outcome;
+use corsmal_files::provenance::Provenance;
+use corsmal_files::table::Table;
 use corsmal_models::labels::Labels;
 use ndarray::{Array2, Ix2};
 use serde_json::{Value, json};
@@ -119,13 +121,18 @@ impl DatasetTable {
             FeatureFile::Npz(mut npz) if !layout::is_ours(&npz) => {
                 Self::of_foreign(path, &mut npz, foreign)
             }
-            mut ours => Self::of_extraction(path, ours.table()?),
+            mut ours => {
+                let FeatureTable { table, provenance, .. } = ours.table()?;
+                Self::of_extraction(path, &table, provenance)
+            }
         }
     }
 
-    fn of_extraction(
+    /// The table of an extraction.
+    pub fn of_extraction(
         path: &Path,
-        FeatureTable { table, provenance, .. }: FeatureTable,
+        table: &Table,
+        provenance: Provenance,
     ) -> Result<Self, Failure> {
         if table.feature_names().is_empty() && !table.ids().is_empty() {
             return Err(Failure::new(format!(

@@ -13,11 +13,11 @@ use corsmal_dsp::DspError;
 use corsmal_dsp::stft::PadMode;
 use corsmal_dsp::time_domain::FrameParams;
 use corsmal_extract::config::Config;
-use corsmal_extract::engine::Features;
+use corsmal_extract::engine::{Features, Signals};
 use corsmal_extract::features::{self, Feature, FeatureKind, Kernel, WaveKernel};
 use corsmal_extract::inputs;
 use corsmal_extract::params::{FrameSpec, Keys};
-use corsmal_extract::run::{self, Quiet, RunOptions, Signals};
+use corsmal_extract::run::{self, Quiet, RunOptions};
 use corsmal_files::npz::Compression;
 use serde::{Deserialize, Serialize};
 

@@ -8,7 +8,6 @@
 pub mod config;
 pub mod engine;
 pub mod features;
-pub mod frontend;
 pub mod inputs;
 pub mod ledger;
 pub mod manifest;

@@ -3,17 +3,20 @@
 
 use std::path::{Path, PathBuf};
 
+use corsmal_files::draft;
 use corsmal_files::feature_file::{FeatureFile, FeatureFileError};
 use corsmal_files::format::{FormatError, OutputFormat};
+use corsmal_files::identity;
 use corsmal_files::layout;
-use corsmal_files::npz::{Compression, NpzError, NpzWriter};
+use corsmal_files::npz::{Compression, EntryRecord, NpzError, NpzWriter};
 use corsmal_files::parquet::{self, ParquetTableError};
 use corsmal_files::provenance::Provenance;
 use corsmal_files::shard::Shard;
 use corsmal_files::table::{Table, TableError};
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::ledger::{Header, Ledger, LedgerError, ledger_path};
+use crate::ledger::{Done, Header, Ledger, LedgerError, ledger_path};
 
 /// What can go wrong with merging.
 #[derive(Debug, Error)]
@@ -32,7 +35,7 @@ pub enum MergeError {
     #[error(transparent)]
     Ledger(#[from] LedgerError),
     /// The result is there already, or an interrupted run that was to write it.
-    #[error("{path} exists; --overwrite replaces it")]
+    #[error("{path} exists; --overwrite replaces it, --resume goes on with an interrupted merge")]
     Exists {
         /// The output or its ledger.
         path: PathBuf,
@@ -60,75 +63,136 @@ pub enum MergeError {
     },
 }
 
+/// What to do with what stands where the result is to be.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Existing {
+    /// Leave it and refuse.
+    #[default]
+    Keep,
+    /// Go on with an interrupted merge, if there is one.
+    Resume,
+    /// Replace it.
+    Overwrite,
+}
+
+/// A shard whose arrays are in the result.
+#[derive(Debug, Serialize, Deserialize)]
+struct Merged {
+    shard: PathBuf,
+    identity: String,
+    entries: Vec<EntryRecord>,
+}
+
+impl Done for Merged {
+    fn entries(&self) -> &[EntryRecord] {
+        &self.entries
+    }
+}
+
 /// Merges all shards of a run, given in any order, one after the other. As in a run, `out` appears
-/// only when it is complete, and nothing else writes it meanwhile.
+/// only when it is complete, nothing else writes it meanwhile, and what was interrupted can go on.
 ///
 /// # Errors
 /// [`MergeError`] names the shard that does not fit.
-pub fn merge(shards: &[PathBuf], out: &Path, overwrite: bool) -> Result<(), MergeError> {
+pub fn merge(shards: &[PathBuf], out: &Path, existing: Existing) -> Result<(), MergeError> {
     let mut format = OutputFormat::of_name(out, Compression::Stored)?;
+    let out = &draft::destination(out);
     let pending = Ledger::is_pending(out).then(|| ledger_path(out));
-    let taken = if out.exists() { Some(out.into()) } else { pending };
-    if let Some(path) = taken.filter(|_| !overwrite) {
-        return Err(MergeError::Exists { path });
+    let taken = if out.exists() { Some(out.clone()) } else { pending };
+    match (taken, existing) {
+        (Some(path), Existing::Keep) => return Err(MergeError::Exists { path }),
+        (Some(path), Existing::Resume) if path == *out => return Err(MergeError::Exists { path }),
+        _ => {}
     }
     let (shards, provenance) = in_order(shards, out)?;
-    if let (OutputFormat::Npz(compression), Some(FeatureFile::Npz(first))) =
-        (&mut format, shards.first().map(|path| FeatureFile::open(path)).transpose()?.as_mut())
+    if let (OutputFormat::Npz(compression), Some(first)) = (&mut format, shards.first())
+        && let FeatureFile::Npz(npz) = &mut FeatureFile::open(first)?
     {
-        *compression = layout::compression(first)?;
+        *compression = layout::compression(npz)?;
     }
-    let ledger = Ledger::create(out, &Header::new(&provenance, format))?;
-    match write(&shards, &provenance, format, &ledger.part()) {
-        Ok(()) => Ok(ledger.publish()?),
+    let header = Header::new(&provenance, format_args!("merge of {}, {format}", shards.len()));
+    let (ledger, done) = if existing == Existing::Resume {
+        let same = |i: usize, done: &Merged| {
+            let now =
+                shards.get(i).filter(|path| **path == done.shard).map(|p| identity::of_file(p));
+            now.is_some_and(|now| now.is_ok_and(|now| now == done.identity))
+        };
+        let (ledger, resumed) = Ledger::resume(out, &header, same)?;
+        (ledger, resumed.records)
+    } else {
+        (Ledger::create(out, &header)?, Vec::new())
+    };
+    let mut merge = Merge { ledger, shards: &shards, provenance: &provenance, format };
+    match merge.write(done) {
+        Ok(()) => Ok(merge.ledger.publish()?),
         Err(error) => {
-            // The first error is the one that matters.
-            let _ = ledger.discard();
+            // The first error is the one that matters. A shard that does not fit never will.
+            let _ = merge.ledger.discard();
             Err(error)
         }
     }
 }
 
-/// Writes what the shards hold together.
-fn write(
-    shards: &[PathBuf],
-    provenance: &Provenance,
+/// A merge at work.
+struct Merge<'a> {
+    ledger: Ledger,
+    shards: &'a [PathBuf],
+    provenance: &'a Provenance,
     format: OutputFormat,
-    part: &Path,
-) -> Result<(), MergeError> {
-    let mut writer = match format {
-        OutputFormat::Npz(compression) => Some(NpzWriter::create(part, compression)?),
-        OutputFormat::Parquet => None,
-    };
-    let mut joined: Option<Table> = None;
-    for path in shards {
-        let mut file = FeatureFile::open(path)?;
-        let shard = file.table()?;
-        if shard.format != format {
-            return Err(not_one_run(path, format.to_string(), shard.format.to_string()));
-        }
-        match &mut joined {
-            None => joined = Some(shard.table),
-            Some(joined) => joined
-                .extend(&shard.table)
-                .map_err(|source| MergeError::Table { path: path.clone(), source })?,
-        }
-        if let (Some(writer), FeatureFile::Npz(npz)) = (&mut writer, &mut file) {
-            let names: Vec<String> =
-                npz.names().iter().filter(|name| layout::is_frame_level(name)).cloned().collect();
-            for name in names {
-                let (entry, raw) = npz.raw(&name)?;
-                writer.copy(&entry, raw)?;
+}
+
+impl Merge<'_> {
+    /// Writes what the shards hold together; the arrays of those that are `done` are there.
+    fn write(&mut self, done: Vec<Merged>) -> Result<(), MergeError> {
+        let (part, path) = self.ledger.part()?;
+        let ready = done.len();
+        let mut writer = match self.format {
+            OutputFormat::Npz(compression) => {
+                let entries = done.into_iter().flat_map(|done| done.entries).collect();
+                Some(NpzWriter::resume(
+                    part.try_clone().map_err(|e| NpzError::io(&path, e))?,
+                    &path,
+                    compression,
+                    entries,
+                )?)
             }
+            OutputFormat::Parquet => None,
+        };
+        let mut joined: Option<Table> = None;
+        for (index, shard) in self.shards.iter().enumerate() {
+            let identity = identity::of_file(shard).map_err(|e| NpzError::io(shard, e))?;
+            let mut file = FeatureFile::open(shard)?;
+            let read = file.table()?;
+            if read.format != self.format {
+                return Err(not_one_run(shard, self.format.to_string(), read.format.to_string()));
+            }
+            match &mut joined {
+                None => joined = Some(read.table),
+                Some(joined) => joined
+                    .extend(&read.table)
+                    .map_err(|source| MergeError::Table { path: shard.clone(), source })?,
+            }
+            if index < ready {
+                continue;
+            }
+            let mut entries = Vec::new();
+            if let (Some(writer), FeatureFile::Npz(npz)) = (&mut writer, &mut file) {
+                let frames = npz.names().iter().filter(|name| layout::is_frame_level(name));
+                for name in frames.cloned().collect::<Vec<_>>() {
+                    let (entry, raw) = npz.raw(&name)?;
+                    entries.push(writer.copy(&entry, raw)?);
+                }
+            }
+            self.ledger.append(&Merged { shard: shard.clone(), identity, entries })?;
         }
-    }
-    let table = joined.unwrap_or_default();
-    match writer {
-        Some(mut writer) => {
-            layout::write_table(&mut writer, &table, provenance)?;
-            Ok(writer.finish()?)
+        let table = joined.unwrap_or_default();
+        match writer {
+            Some(mut writer) => {
+                layout::write_table(&mut writer, &table, self.provenance)?;
+                Ok(writer.finish()?)
+            }
+            None => Ok(parquet::write_over(part, &path, &table, self.provenance)?),
         }
-        None => Ok(parquet::write(part, &table, provenance)?),
     }
 }
 
@@ -173,4 +237,70 @@ fn in_order(shards: &[PathBuf], out: &Path) -> Result<(Vec<PathBuf>, Provenance)
 
 fn not_one_run(path: &Path, expected: String, actual: String) -> MergeError {
     MergeError::NotOneRun { path: path.into(), expected, actual }
+}
+
+#[cfg(test)]
+mod tests {
+    use corsmal_files::outcome::{Outcome, Status};
+
+    use super::*;
+
+    /// A shard of two recordings.
+    fn shard(path: &Path, compression: Compression, shard: Shard) -> Provenance {
+        let provenance = Provenance::new("{}".into(), "c0ffee".into(), "beef".into(), shard);
+        let mut writer = NpzWriter::create(path, compression).unwrap();
+        let mut table = Table::new(Vec::new()).unwrap();
+        for i in 0..2 {
+            let id = format!("{}/{i}", shard.index);
+            writer.floats(&id, &[30], &[(shard.index + i) as f32; 30]).unwrap();
+            table.push(Outcome::new(id, "x.wav", Status::Ok, ""), &[], &[]).unwrap();
+        }
+        layout::write_table(&mut writer, &table, &provenance).unwrap();
+        writer.finish().unwrap();
+        provenance
+    }
+
+    #[test]
+    fn an_interrupted_merge_goes_on_to_the_same_bytes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        for compression in [Compression::Stored, Compression::Deflated] {
+            let shards: Vec<PathBuf> = (0..3).map(|i| path(&format!("{i}.npz"))).collect();
+            let mut provenance = None;
+            for (index, file) in shards.iter().enumerate() {
+                provenance = Some(shard(file, compression, Shard { index, count: 3 }));
+            }
+            let whole = path("whole.npz");
+            merge(&shards, &whole, Existing::Overwrite).unwrap();
+            let expected = std::fs::read(&whole).unwrap();
+
+            let provenance =
+                Provenance { shard: Shard::default().to_string(), ..provenance.unwrap() };
+            let out = path("out.npz");
+            let _ = std::fs::remove_file(&out);
+            for changed in [false, true] {
+                let format = OutputFormat::Npz(compression);
+                let header = Header::new(&provenance, format_args!("merge of 3, {format}"));
+                let ledger = Ledger::create(&out, &header).unwrap();
+                let mut two =
+                    Merge { ledger, shards: &shards[..2], provenance: &provenance, format };
+                two.write(Vec::new()).unwrap();
+                // As a kill would leave it.
+                drop(two);
+                if changed {
+                    let part = corsmal_files::draft::folder(&out).join("out.npz.part");
+                    let mut bytes = std::fs::read(&part).unwrap();
+                    bytes[200] ^= 1;
+                    std::fs::write(&part, bytes).unwrap();
+                }
+                let refused = merge(&shards, &out, Existing::Keep).unwrap_err();
+                assert!(refused.to_string().contains("out.npz.ledger exists"), "{refused}");
+                merge(&shards, &out, Existing::Resume).unwrap();
+                assert!(std::fs::read(&out).unwrap() == expected, "{compression:?}");
+                let there = merge(&shards, &out, Existing::Resume).unwrap_err();
+                assert!(there.to_string().contains("out.npz exists"), "{there}");
+                std::fs::remove_file(&out).unwrap();
+            }
+        }
+    }
 }

@@ -27,8 +27,9 @@ impl Draft {
             // As any new file: the process's umask applies, where temporary files are private.
             builder.permissions(std::fs::Permissions::from_mode(0o666));
         }
-        let file = builder.tempfile_in(folder(path)).map_err(|e| named(path, &e))?;
-        Ok(Self { path: path.into(), file })
+        let path = destination(path);
+        let file = builder.tempfile_in(folder(&path)).map_err(|e| named(&path, &e))?;
+        Ok(Self { path, file })
     }
 
     /// Another handle on the file.
@@ -71,6 +72,20 @@ pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     draft.publish()
 }
 
+/// Where a file is written that is called `path`: what a symbolic link leads to, there or not, so
+/// that the link stays.
+pub fn destination(path: &Path) -> PathBuf {
+    // As many links as Linux follows.
+    let mut path = path.to_path_buf();
+    for _ in 0..40 {
+        match std::fs::read_link(&path) {
+            Ok(target) => path = folder(&path).join(target),
+            Err(_) => break,
+        }
+    }
+    path
+}
+
 /// The folder that a file is in.
 pub fn folder(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
@@ -108,6 +123,15 @@ mod tests {
             std::fs::write(&plain, b"").unwrap();
             let mode = |p: &Path| std::fs::metadata(p).unwrap().permissions().mode();
             assert_eq!(mode(&path), mode(&plain), "readable by whom any new file is");
+        }
+        #[cfg(unix)]
+        for target in ["there", "not yet"] {
+            let link = folder.path().join(format!("link to {target}"));
+            std::os::unix::fs::symlink(target, &link).unwrap();
+            std::fs::write(folder.path().join("there"), b"old").unwrap();
+            write(&link, b"new").unwrap();
+            assert_eq!(std::fs::read(folder.path().join(target)).unwrap(), b"new");
+            assert!(link.is_symlink(), "the link stays");
         }
         let error = write(&folder.path().join("absent/out"), b"").unwrap_err();
         assert!(error.to_string().contains("absent/out: "), "{error}");

@@ -5,9 +5,10 @@
 //! that a recording of any length costs nine short reads. Files up to [`WHOLE`] bytes are hashed
 //! whole. An edit that keeps the size and touches none of the sampled blocks goes unseen.
 
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
+use std::time::{Duration, SystemTime};
 
 /// Identity of standard input, pipes and devices, which cannot be sampled without being consumed.
 pub const STREAM: &str = "stream";
@@ -41,6 +42,55 @@ pub fn of_file(path: &Path) -> io::Result<String> {
     Ok(format!("{size}:{}", hasher.finalize().to_hex()))
 }
 
+/// What the file system says of a file. Of equal stamps the later one is of the same file, which
+/// nobody has rewritten, made longer or cut in between; except within [`Stamp::is_fresh`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stamp {
+    /// Device and number of the file there; zero where the system has none.
+    pub file: (u64, u64),
+    /// Length in bytes.
+    pub size: u64,
+    /// Last change of the content.
+    pub modified: Option<SystemTime>,
+}
+
+/// Within this time of a change, another one may give the same time stamp.
+const CLOCK: Duration = Duration::from_secs(2);
+
+impl Stamp {
+    /// The stamp of a file; `None` for pipes and devices.
+    ///
+    /// # Errors
+    /// Whatever the system reports.
+    pub fn of_path(path: &Path) -> io::Result<Option<Self>> {
+        let meta = std::fs::metadata(path)?;
+        Ok(meta.is_file().then(|| Self {
+            file: number(&meta),
+            size: meta.len(),
+            modified: meta.modified().ok(),
+        }))
+    }
+
+    /// Whether the file has changed so lately that a further change might keep the stamp: the clock
+    /// of a file system is coarse.
+    pub fn is_fresh(&self) -> bool {
+        let age = self.modified.map(|modified| modified.elapsed());
+        // A time in the future is as good as none.
+        !matches!(age, Some(Ok(age)) if age > CLOCK)
+    }
+}
+
+#[cfg(unix)]
+fn number(meta: &Metadata) -> (u64, u64) {
+    use std::os::unix::fs::MetadataExt;
+    (meta.dev(), meta.ino())
+}
+
+#[cfg(not(unix))]
+fn number(_: &Metadata) -> (u64, u64) {
+    (0, 0)
+}
+
 /// The sampled stretches as (offset, length), in ascending order and without overlap.
 fn blocks(size: u64) -> Vec<(u64, u64)> {
     if size <= WHOLE {
@@ -62,6 +112,27 @@ mod tests {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         file.write_all(bytes).unwrap();
         of_file(file.path()).unwrap()
+    }
+
+    #[test]
+    fn a_stamp_tells_what_happened_to_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        let stamp = || Stamp::of_path(&path).unwrap().unwrap();
+        std::fs::write(&path, b"one").unwrap();
+        let first = stamp();
+        assert!(first == stamp() && first.is_fresh());
+        let long_ago = SystemTime::now() - Duration::from_secs(60);
+        File::options().write(true).open(&path).unwrap().set_modified(long_ago).unwrap();
+        let old = stamp();
+        assert!(old != first && !old.is_fresh());
+        std::fs::write(&path, b"two").unwrap();
+        assert!(stamp().modified != old.modified && stamp().file == old.file);
+        std::fs::write(folder.path().join("b"), b"two").unwrap();
+        std::fs::rename(folder.path().join("b"), &path).unwrap();
+        #[cfg(unix)]
+        assert_ne!(stamp().file, old.file);
+        assert!(Stamp::of_path(folder.path()).unwrap().is_none(), "no file");
     }
 
     #[test]

@@ -15,5 +15,6 @@ pub mod npz;
 pub mod outcome;
 pub mod parquet;
 pub mod provenance;
+pub mod quote;
 pub mod shard;
 pub mod table;

@@ -25,6 +25,8 @@ pub enum Status {
     TooShort,
     /// Its features do not fit the summary table (another channel count than the recordings before).
     Mismatch,
+    /// Replaced, rewritten, grown or cut while it was read: the samples may be of two recordings.
+    Changed,
     /// The operating system failed to deliver the bytes; worth another try.
     Io,
 }
@@ -47,6 +49,7 @@ impl Status {
             Self::NonFinite => "non_finite",
             Self::TooShort => "too_short",
             Self::Mismatch => "mismatch",
+            Self::Changed => "changed",
             Self::Io => "io",
         }
     }
@@ -122,7 +125,7 @@ impl Outcome {
 mod tests {
     use super::*;
 
-    const ALL: [Status; 10] = [
+    const ALL: [Status; 11] = [
         Status::Ok,
         Status::Truncated,
         Status::Empty,
@@ -132,6 +135,7 @@ mod tests {
         Status::NonFinite,
         Status::TooShort,
         Status::Mismatch,
+        Status::Changed,
         Status::Io,
     ];
 

@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use corsmal_extract::config::{Config, Preset};
-use corsmal_extract::engine::{FeatureArray, Features};
+use corsmal_extract::engine::{FeatureArray, Features, Signal, Signals};
 use corsmal_extract::inputs;
 use corsmal_extract::projection::Projection;
-use corsmal_extract::run::{self, Progress, RunOptions, Signals};
+use corsmal_extract::run::{self, Progress, RunOptions};
 use corsmal_files::npz::Compression;
 use corsmal_files::outcome::Outcome;
 use corsmal_files::shard::Shard;
@@ -163,10 +163,10 @@ impl PySignals {
 
 /// One signal, pushed block by block.
 #[pyclass(name = "Signal", module = "corsmal_feat._core")]
-struct PySignal(Option<run::Signal>);
+struct PySignal(Option<Signal>);
 
 impl PySignal {
-    fn open(&mut self) -> PyResult<&mut run::Signal> {
+    fn open(&mut self) -> PyResult<&mut Signal> {
         self.0.as_mut().ok_or_else(|| value_error(FINISHED))
     }
 }

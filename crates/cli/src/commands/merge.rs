@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use corsmal_extract::merge::Existing;
+
 use crate::failure::Failure;
 
 /// Arguments of `merge`.
@@ -25,10 +27,18 @@ pub struct Args {
     /// Replace an existing output.
     #[arg(long)]
     overwrite: bool,
+    /// Go on with an interrupted merge.
+    #[arg(long, conflicts_with = "overwrite")]
+    resume: bool,
 }
 
 /// Merges shards.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
-    corsmal_extract::merge::merge(&args.shards, &args.out, args.overwrite)?;
+    let existing = match (args.overwrite, args.resume) {
+        (true, _) => Existing::Overwrite,
+        (_, true) => Existing::Resume,
+        _ => Existing::Keep,
+    };
+    corsmal_extract::merge::merge(&args.shards, &args.out, existing)?;
     Ok(ExitCode::SUCCESS)
 }

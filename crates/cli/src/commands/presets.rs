@@ -4,8 +4,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use corsmal_extract::config::{Config, PRESETS, Preset, SignalConfig};
-use corsmal_extract::engine::Plan;
-use corsmal_extract::frontend::channels_out;
+use corsmal_extract::engine::{Plan, channels_out};
 
 use crate::failure::Failure;
 

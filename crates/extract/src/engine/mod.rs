@@ -1,18 +1,33 @@
-//! From samples to finished features.
+//! From recordings to finished features.
 //!
-//! A recording is cut into spans of time. Each span is computed by itself ([`Extractor`], fed block
-//! by block, with the few samples of context that its first and last frames need), so that spans of
-//! one long file can run in parallel; [`Recording`] joins them, finishes values that depend on the
-//! maximum of the whole recording, and takes the statistics. No number depends on where blocks or
-//! spans begin.
+//! A recording is cut into spans of time. Each span is read and computed by itself ([`Extractor`],
+//! fed block by block, with the few samples of context that its first and last frames need), so that
+//! spans of one long file can run in parallel; [`Recording`] joins them, finishes values that depend
+//! on the maximum of the whole recording, and takes the statistics. No number depends on where blocks
+//! or spans begin. [`Signals`] computes what is pushed from memory, [`Windows`] stretches of a
+//! recording or of an endless stream.
 
 mod extractor;
+mod failed;
+mod front_end;
+mod live;
 mod plan;
+mod plans;
+pub(crate) mod reading;
 mod recording;
+mod signal;
 mod store;
 mod stream;
+mod watch;
+mod windows;
 
 pub use extractor::{Extractor, Refused, Span};
+pub use failed::Failed;
+pub use front_end::{FrontEnd, channels_out};
 pub use plan::Plan;
+pub use plans::{Planned, Plans};
 pub use recording::{FeatureArray, Features, FinishError, Recording};
+pub use signal::{Signal, SignalError, Signals};
 pub use store::Store;
+pub use watch::Watch;
+pub use windows::{Window, Windowing, Windows};

@@ -4,7 +4,10 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
+use corsmal_files::outcome::Status;
+
 use super::extractor::Span;
+use super::failed::Failed;
 use super::plan::{Plan, PlannedFeature};
 use super::store::Store;
 use crate::features::{Derived, FrameShape, TooFewFrames};
@@ -93,6 +96,30 @@ impl Recording {
             (width > 0).then(|| store.len() / width)
         };
         self.raw.iter().zip(&self.plan.features).filter_map(frames).min().unwrap_or(0)
+    }
+
+    /// The features of a recording of which every span is there.
+    ///
+    /// # Errors
+    /// No samples, too few for one frame, or a temporary file that fails.
+    pub fn complete(self) -> Result<Features, Failed> {
+        let total = self.total();
+        if total == 0 {
+            return Err(Failed::new(Status::Empty, "no samples"));
+        }
+        if self.fewest_frames() == 0 {
+            let needed = self.plan.shortest();
+            let reason = format!("{total} samples, at least {needed} make one frame");
+            return Err(Failed::new(Status::TooShort, reason));
+        }
+        let plan = self.plan.clone();
+        match (&plan.config.projection, self.finish()?) {
+            (Some(projection), Features::Summary(row)) => projection
+                .apply(&row)
+                .map(Features::Summary)
+                .map_err(|reason| Failed::new(Status::Unsupported, reason)),
+            (_, features) => Ok(features),
+        }
     }
 
     /// Finishes every value.

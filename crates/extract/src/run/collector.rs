@@ -1,47 +1,59 @@
-//! Workers, and the order in which their results reach the output.
+//! The order of work, and the order in which results reach the output.
 //!
-//! A worker takes the next span of a recording that was cut, or else the next input. Whoever
-//! completes a recording finishes it and hands it over; results are written in the order of the
-//! inputs by whichever worker finds the next one ready. Inputs are taken only a few ahead of the
-//! one being written, so memory stays bounded.
+//! A job computes one span of a recording that was cut, or else the next input. Whoever completes a
+//! recording finishes it and hands it over; results are written in the order of the inputs by
+//! whichever job finds the next one ready. Each job starts those that can go on after it, so nobody
+//! waits: threads without a job lend a hand to the jobs that split their work, or sleep. Inputs are
+//! taken only a few ahead of the one being written, so memory stays bounded.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, TryLockError};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
+
+use corsmal_files::npz::Compression;
+use corsmal_files::outcome::{Outcome, Status};
+use rayon::Scope;
 
 use super::output::{Finished, Member, Output};
-use super::plans::{Planned, Plans};
-use super::reader::{self, Failed};
-use super::{Progress, RunError, RunOptions, identity_of};
+use super::{Progress, RunError, identity_of};
 use crate::config::Config;
-use crate::engine::{Features, Recording, Span};
+use crate::engine::{Failed, Features, Planned, Plans, Recording, Span, Watch, reading};
 use crate::inputs::{Input, InputSource};
-use corsmal_files::draft;
-use corsmal_files::outcome::{Outcome, Status};
 
-/// Inputs in work or waiting to be written, per worker.
+/// Inputs in work or waiting to be written, per thread.
 const AHEAD: usize = 4;
+
+/// How much is done at a time, and how much may fail.
+#[derive(Clone, Copy)]
+pub struct Limits {
+    /// Threads.
+    pub jobs: usize,
+    /// Failed files after which to stop.
+    pub max_errors: Option<usize>,
+    /// How arrays are stored.
+    pub compression: Compression,
+}
 
 /// A run in progress.
 pub struct Collector<'a> {
     inputs: &'a [Input],
-    options: &'a RunOptions,
+    limits: Limits,
     progress: &'a dyn Progress,
     stop: &'a Arc<AtomicBool>,
     plans: Plans<'a>,
     /// Folder of temporary files: that of the output.
     folder: PathBuf,
     state: Mutex<State>,
-    changed: Condvar,
     output: Mutex<Output>,
 }
 
 #[derive(Default)]
 struct State {
+    /// Jobs at work.
+    running: usize,
     next: usize,
     written: usize,
     spans: VecDeque<SpanJob>,
@@ -57,6 +69,7 @@ struct SpanJob {
     index: usize,
     span: Range<u64>,
     planned: Planned,
+    watch: Watch,
 }
 
 /// What a recording gives: arrays, or a row of the table; and its samples.
@@ -66,12 +79,13 @@ type Parts = (Vec<Member>, Option<Vec<f32>>, u64);
 struct Partial {
     outcome: Outcome,
     planned: Planned,
+    watch: Watch,
     /// Number of spans, and of those that are added.
     spans: usize,
     added: usize,
     /// Spans computed before their turn, each in parts.
     early: BTreeMap<usize, Result<Vec<Span>, Failed>>,
-    /// `None` while a worker adds to it.
+    /// `None` while a job adds to it.
     recording: Option<Result<Recording, Failed>>,
 }
 
@@ -81,42 +95,38 @@ enum Work {
 }
 
 impl<'a> Collector<'a> {
-    /// A run whose first inputs the output already has.
+    /// A run whose first inputs the output already has. Long recordings put temporary files into
+    /// `folder`.
     pub fn new(
         inputs: &'a [Input],
         config: &Arc<Config>,
-        options: &'a RunOptions,
-        progress: &'a dyn Progress,
-        stop: &'a Arc<AtomicBool>,
+        limits: Limits,
+        folder: PathBuf,
+        (progress, stop): (&'a dyn Progress, &'a Arc<AtomicBool>),
         output: Output,
     ) -> Self {
-        let folder = draft::folder(&options.out).to_path_buf();
         let failed = output.outcomes().iter().filter(|o| !o.status.has_features()).count();
         let state = State { next: output.next, written: output.next, failed, ..State::default() };
         Self {
             inputs,
-            options,
+            limits,
             progress,
             stop,
-            plans: Plans::new(config.clone(), progress),
+            plans: Plans::new(config.clone(), |warning| progress.warning(warning)),
             folder,
             state: Mutex::new(state),
-            changed: Condvar::new(),
             output: Mutex::new(output),
         }
     }
 
-    /// Runs every worker to the end.
+    /// Runs every job to the end.
     pub fn work(self) -> Result<Output, RunError> {
+        let jobs = self.limits.jobs;
         let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(self.options.jobs)
+            .num_threads(jobs)
             .build()
-            .map_err(|e| RunError::Jobs { jobs: self.options.jobs, why: e.to_string() })?;
-        pool.scope(|scope| {
-            for _ in 0..self.options.jobs {
-                scope.spawn(|_| self.worker());
-            }
-        });
+            .map_err(|e| RunError::Jobs { jobs, why: e.to_string() })?;
+        pool.scope(|scope| self.start(scope));
         let state = self.state.into_inner().unwrap_or_else(|e| e.into_inner());
         match state.error {
             Some(error) => Err(error),
@@ -128,35 +138,45 @@ impl<'a> Collector<'a> {
         self.state.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    fn worker(&self) {
-        while let Some(work) = self.take() {
-            let (input, span) = match &work {
-                Work::Input(index) => (*index, None),
-                Work::Span(job) => (job.input, Some(job.index)),
-            };
-            let done = catch_unwind(AssertUnwindSafe(|| match work {
-                Work::Input(index) => self.input(index),
-                Work::Span(job) => self.span(job),
-            }));
-            if done.is_err() {
-                self.broken(input, span);
-            }
-            // A fault while writing leaves the output in doubt: the run ends, its ledger intact.
-            if catch_unwind(AssertUnwindSafe(|| self.drain())).is_err() {
-                self.lock().error.get_or_insert(RunError::Broken);
-                self.changed.notify_all();
-            }
+    /// Starts as many jobs as can be at work now.
+    fn start<'s>(&'s self, scope: &Scope<'s>) {
+        let mut state = self.lock();
+        while let Some(work) = self.next(&mut state) {
+            state.running += 1;
+            scope.spawn(move |scope| {
+                self.job(work, scope);
+                self.lock().running -= 1;
+                self.start(scope);
+            });
+        }
+    }
+
+    fn job<'s>(&'s self, work: Work, scope: &Scope<'s>) {
+        let (input, span) = match &work {
+            Work::Input(index) => (*index, None),
+            Work::Span(job) => (job.input, Some(job.index)),
+        };
+        let done = catch_unwind(AssertUnwindSafe(|| match work {
+            Work::Input(index) => self.input(index),
+            Work::Span(job) => self.span(job, scope),
+        }));
+        if done.is_err() {
+            self.broken(input, span, scope);
+        }
+        // A fault while writing leaves the output in doubt: the run ends, its ledger intact.
+        if catch_unwind(AssertUnwindSafe(|| self.drain(scope))).is_err() {
+            self.lock().error.get_or_insert(RunError::Broken);
         }
     }
 
     /// A fault of this program costs the recording at which it happened, not the run.
-    fn broken(&self, input: usize, span: Option<usize>) {
+    fn broken<'s>(&'s self, input: usize, span: Option<usize>, scope: &Scope<'s>) {
         let failed = broken();
         let mut state = self.lock();
         if let (Some(span), Some(partial)) = (span, state.partial.get_mut(&input)) {
             partial.early.insert(span, Err(failed));
             drop(state);
-            return self.join(input);
+            return self.join(input, scope);
         }
         drop(state);
         let source = &self.inputs[input];
@@ -165,78 +185,65 @@ impl<'a> Collector<'a> {
         self.fail(input, outcome, failed);
     }
 
-    /// The next thing to do; waits while too much is unwritten.
-    fn take(&self) -> Option<Work> {
-        let mut state = self.lock();
-        loop {
-            if self.stop.load(Ordering::Relaxed) || state.error.is_some() {
-                return None;
-            }
-            // Spans wait for those before them, so they are not computed far ahead either.
-            let ahead = state.spans.front().is_some_and(|job| {
-                let added = state.partial.get(&job.input).map_or(0, |partial| partial.added);
-                job.index >= added + AHEAD * self.options.jobs
-            });
-            if !ahead && let Some(job) = state.spans.pop_front() {
-                return Some(Work::Span(job));
-            }
-            if state.next < self.inputs.len() {
-                if state.next < state.written + AHEAD * self.options.jobs {
-                    state.next += 1;
-                    return Some(Work::Input(state.next - 1));
-                }
-            } else if state.written + state.ready.len() + state.partial.len() >= self.inputs.len()
-                && state.partial.is_empty()
-            {
-                return None;
-            }
-            // Channels of a recording that another worker has may need a hand meanwhile.
-            drop(state);
-            let helped = rayon::yield_now() == Some(rayon::Yield::Executed);
-            state = self.lock();
-            if !helped {
-                // A timeout, since neither such channels nor a stop from outside notify anybody.
-                let wait = self.changed.wait_timeout(state, Duration::from_millis(5));
-                state = wait.unwrap_or_else(|e| e.into_inner()).0;
-            }
+    /// The next thing to do; none while enough are at work or too much is unwritten.
+    fn next(&self, state: &mut State) -> Option<Work> {
+        let full = state.running >= self.limits.jobs;
+        if full || self.stop.load(Ordering::Relaxed) || state.error.is_some() {
+            return None;
         }
+        // Spans wait for those before them, so they are not computed far ahead either.
+        let ahead = state.spans.front().is_some_and(|job| {
+            let added = state.partial.get(&job.input).map_or(0, |partial| partial.added);
+            job.index >= added + AHEAD * self.limits.jobs
+        });
+        if !ahead && let Some(job) = state.spans.pop_front() {
+            return Some(Work::Span(job));
+        }
+        let room = state.next < state.written + AHEAD * self.limits.jobs;
+        if state.next >= self.inputs.len() || !room {
+            return None;
+        }
+        state.next += 1;
+        Some(Work::Input(state.next - 1))
     }
 
     /// Opens an input; computes it, or cuts it and computes its first span.
     fn input(&self, index: usize) {
         let input = &self.inputs[index];
         let mut outcome = Outcome::new(&input.id, input.source.to_string(), Status::Ok, "");
+        let watch = Watch::begin(input);
         outcome.identity = identity_of(input);
-        let mut source = match reader::open(input, self.stop) {
+        let mut source = match watch.settle(reading::open(input, self.stop)) {
             Ok(source) => source,
             Err(failed) => return self.fail(index, outcome, failed),
         };
-        reader::describe(&mut outcome, source.as_ref());
+        reading::describe(&mut outcome, source.as_ref());
         let planned = match self.plans.of(source.spec()) {
             Ok(planned) => planned,
             Err(e) => return self.fail(index, outcome, Failed::new(Status::Unsupported, e)),
         };
         let signal = &planned.plan.config.signal;
-        let crop = reader::crop(signal, (input.start, input.end), source.spec().sample_rate);
-        let spans = reader::spans(source.as_ref(), &planned, &crop);
+        let crop = reading::crop(signal, (input.start, input.end), source.spec().sample_rate);
+        let spans = reading::spans(source.as_ref(), &planned, &crop);
         let mut recording = Recording::new(planned.plan.clone(), &self.folder);
         if let [span] = spans.as_slice() {
             let decoded = &mut outcome.decoded_frames;
             let span = (&crop, span);
             let computed =
-                reader::compute(source.as_mut(), &planned, span, self.stop, decoded, |part| {
+                reading::compute(source.as_mut(), &planned, span, self.stop, decoded, |part| {
                     recording.add(part).map_err(Failed::temporary)
                 });
-            reader::describe(&mut outcome, source.as_ref());
-            return match computed {
+            reading::describe(&mut outcome, source.as_ref());
+            return match watch.settle(computed) {
                 Ok(false) => {}
-                Ok(true) => self.complete(index, outcome, &planned, Ok(recording)),
+                Ok(true) => self.complete(index, outcome, (&planned, &watch), Ok(recording)),
                 Err(failed) => self.fail(index, outcome, failed),
             };
         }
         let partial = Partial {
             outcome,
             planned: planned.clone(),
+            watch: watch.clone(),
             spans: spans.len(),
             added: 0,
             early: BTreeMap::new(),
@@ -249,27 +256,29 @@ impl<'a> Collector<'a> {
             index: i,
             span,
             planned: planned.clone(),
+            watch: watch.clone(),
         }));
-        self.changed.notify_all();
     }
 
     /// Computes one span of a recording that was cut.
-    fn span(&self, job: SpanJob) {
+    fn span<'s>(&'s self, job: SpanJob, scope: &Scope<'s>) {
         let input = &self.inputs[job.input];
         let mut parts = Vec::new();
         let mut last = None;
         let mut decoded = 0;
-        let computed = reader::open(input, self.stop).and_then(|source| {
+        let computed = reading::open(input, self.stop).and_then(|source| {
+            // The spans before this one were read from the file as it was then.
+            job.watch.check()?;
             let signal = &job.planned.plan.config.signal;
-            let crop = reader::crop(signal, (input.start, input.end), source.spec().sample_rate);
+            let crop = reading::crop(signal, (input.start, input.end), source.spec().sample_rate);
             let source = last.insert(source).as_mut();
             let (span, decoded) = ((&crop, &job.span), &mut decoded);
-            reader::compute(source, &job.planned, span, self.stop, decoded, |part| {
+            reading::compute(source, &job.planned, span, self.stop, decoded, |part| {
                 parts.push(part);
                 Ok(())
             })
         });
-        let result = match computed {
+        let result = match job.watch.settle(computed) {
             Ok(false) => return,
             Ok(true) => Ok(parts),
             Err(failed) => Err(failed),
@@ -277,17 +286,17 @@ impl<'a> Collector<'a> {
         let mut state = self.lock();
         if let Some(partial) = state.partial.get_mut(&job.input) {
             if let Some(source) = last {
-                reader::describe(&mut partial.outcome, source.as_ref());
+                reading::describe(&mut partial.outcome, source.as_ref());
             }
             partial.outcome.decoded_frames += decoded;
             partial.early.insert(job.index, result);
         }
         drop(state);
-        self.join(job.input);
+        self.join(job.input, scope);
     }
 
-    /// Adds the spans whose turn it is to their recording, unless another worker is at it.
-    fn join(&self, index: usize) {
+    /// Adds the spans whose turn it is to their recording, unless another job is at it.
+    fn join<'s>(&'s self, index: usize, scope: &Scope<'s>) {
         let mut state = self.lock();
         loop {
             let Some(partial) = state.partial.get_mut(&index) else { return };
@@ -295,7 +304,8 @@ impl<'a> Collector<'a> {
             if partial.added == partial.spans {
                 if let Some(partial) = state.partial.remove(&index) {
                     drop(state);
-                    self.complete(index, partial.outcome, &partial.planned, recording);
+                    let with = (&partial.planned, &partial.watch);
+                    self.complete(index, partial.outcome, with, recording);
                 }
                 return;
             }
@@ -319,7 +329,9 @@ impl<'a> Collector<'a> {
                 partial.recording = Some(recording);
                 partial.added += 1;
             }
-            self.changed.notify_all();
+            drop(state);
+            self.start(scope);
+            state = self.lock();
         }
     }
 
@@ -328,18 +340,18 @@ impl<'a> Collector<'a> {
         &self,
         index: usize,
         outcome: Outcome,
-        planned: &Planned,
+        (planned, watch): (&Planned, &Watch),
         recording: Result<Recording, Failed>,
     ) {
         let plan = &planned.plan;
         let finish = || -> Result<Parts, Failed> {
             let recording = recording?;
+            watch.check_content(&outcome.identity)?;
             let total = recording.total();
-            let features = super::signal::finish(recording, plan)?;
-            Ok(match features {
+            Ok(match recording.complete()? {
                 Features::Summary(row) => (Vec::new(), Some(row), total),
                 Features::Frames(arrays) => {
-                    let compression = self.options.compression;
+                    let compression = self.limits.compression;
                     let id = &self.inputs[index].id;
                     let members = Member::of(id, plan, arrays, compression);
                     (members.map_err(Failed::temporary)?, None, total)
@@ -368,11 +380,15 @@ impl<'a> Collector<'a> {
         if let Some(source) = failed.temporary {
             let path = self.folder.clone();
             self.lock().error.get_or_insert(RunError::Temporary { path, source });
-            return self.changed.notify_all();
+            return;
         }
         if self.inputs[index].source == InputSource::Stdin && self.stop.load(Ordering::Relaxed) {
             // The stream did not fail: it was no longer listened to.
             return;
+        }
+        if failed.status == Status::Changed {
+            // It is of a file that is no more: what is there now is to be read again.
+            outcome.identity.clear();
         }
         outcome.status = failed.status;
         outcome.reason = failed.reason;
@@ -384,15 +400,15 @@ impl<'a> Collector<'a> {
         self.lock().ready.insert(index, finished);
     }
 
-    /// Writes what is ready, unless another worker is at it.
-    fn drain(&self) {
+    /// Writes what is ready, unless another job is at it.
+    fn drain<'s>(&'s self, scope: &Scope<'s>) {
         loop {
             let mut output = match self.output.try_lock() {
                 Ok(output) => output,
                 Err(TryLockError::WouldBlock) => return,
                 Err(TryLockError::Poisoned(_)) => {
                     self.lock().error.get_or_insert(RunError::Broken);
-                    return self.changed.notify_all();
+                    return;
                 }
             };
             loop {
@@ -404,17 +420,19 @@ impl<'a> Collector<'a> {
                 let Some(finished) = state.ready.remove(&index) else { break };
                 drop(state);
                 match output.write(&self.inputs[index], finished) {
-                    Ok(outcome) => self.written(&outcome),
+                    Ok(outcome) => {
+                        self.written(&outcome);
+                        self.start(scope);
+                    }
                     Err(error) => {
                         self.lock().error.get_or_insert(error);
-                        self.changed.notify_all();
                         return;
                     }
                 }
             }
             let next = output.next;
             drop(output);
-            // Another worker may have handed over the next one while we held the lock.
+            // Another job may have handed over the next one while we held the lock.
             if !self.lock().ready.contains_key(&next) {
                 return;
             }
@@ -427,7 +445,7 @@ impl<'a> Collector<'a> {
         state.written += 1;
         if !outcome.status.has_features() {
             state.failed += 1;
-            if let Some(limit) = self.options.max_errors
+            if let Some(limit) = self.limits.max_errors
                 && state.failed > limit
             {
                 let (failed, last) =
@@ -435,7 +453,6 @@ impl<'a> Collector<'a> {
                 state.error = Some(RunError::TooManyErrors { failed, limit, last });
             }
         }
-        self.changed.notify_all();
     }
 }
 

@@ -1,7 +1,5 @@
 //! The output of a run: recordings go in in the order of the inputs.
 
-use std::path::Path;
-
 use crate::engine::{FeatureArray, Plan};
 use crate::inputs::Input;
 use crate::ledger::{Ledger, Record};
@@ -98,11 +96,18 @@ impl Member {
 
 /// The open output.
 pub struct Output {
-    ledger: Ledger,
-    writer: Option<NpzWriter>,
+    /// Where results go besides the table; nowhere, where the table is all that is wanted.
+    partial: Option<Partial>,
     table: Table,
     /// Inputs written so far.
     pub next: usize,
+}
+
+/// A partial output and its ledger.
+struct Partial {
+    ledger: Ledger,
+    /// Of an `.npz`; a Parquet table is written at the end.
+    writer: Option<NpzWriter>,
 }
 
 impl Output {
@@ -113,8 +118,7 @@ impl Output {
         inputs: &[Input],
         format: OutputFormat,
     ) -> Result<Self, RunError> {
-        let columns = inputs.first().map(|i| i.labels.iter().map(|(c, _)| c.clone()).collect());
-        let mut table = Table::new(columns.unwrap_or_default())?;
+        let mut table = empty_table(inputs)?;
         let mut entries = Vec::new();
         let next = records.len();
         for (record, input) in records.into_iter().zip(inputs) {
@@ -126,11 +130,17 @@ impl Output {
         }
         let writer = match format {
             OutputFormat::Npz(compression) => {
-                Some(NpzWriter::resume(&ledger.part(), compression, entries)?)
+                let (part, path) = ledger.part()?;
+                Some(NpzWriter::resume(part, &path, compression, entries)?)
             }
             OutputFormat::Parquet => None,
         };
-        Ok(Self { ledger, writer, table, next })
+        Ok(Self { partial: Some(Partial { ledger, writer }), table, next })
+    }
+
+    /// Only a table.
+    pub fn in_memory(inputs: &[Input]) -> Result<Self, RunError> {
+        Ok(Self { partial: None, table: empty_table(inputs)?, next: 0 })
     }
 
     /// What became of the recordings written so far.
@@ -159,32 +169,48 @@ impl Output {
                 Err(other) => return Err(other.into()),
             }
         }
-        let mut entries = Vec::new();
-        if let Some(writer) = &mut self.writer {
-            for member in finished.arrays {
-                entries.push(member.write(writer)?);
-            }
-        }
         let outcome = finished.outcome;
         self.table.push(outcome.clone(), &input.labels, row.as_deref().unwrap_or(&[]))?;
-        self.ledger.append(&Record { outcome: outcome.clone(), entries, row, names })?;
+        if let Some(Partial { ledger, writer }) = &mut self.partial {
+            let mut entries = Vec::new();
+            if let Some(writer) = writer {
+                for member in finished.arrays {
+                    entries.push(member.write(writer)?);
+                }
+            }
+            ledger.append(&Record { outcome: outcome.clone(), entries, row, names })?;
+        }
         self.next += 1;
         Ok(outcome)
     }
 
-    /// Completes the output and gives it its name.
-    pub fn publish(self, provenance: &Provenance) -> Result<Vec<Outcome>, RunError> {
-        match self.writer {
-            Some(mut writer) => {
-                layout::write_table(&mut writer, &self.table, provenance)?;
-                writer.finish()?;
-            }
-            None => {
-                let part: &Path = &self.ledger.part();
-                parquet::write(part, &self.table, provenance)?;
-            }
-        }
-        self.ledger.publish()?;
-        Ok(self.table.outcomes().to_vec())
+    /// The table.
+    pub fn into_table(self) -> Table {
+        self.table
     }
+
+    /// Completes the output and gives it its name; returns the table.
+    pub fn publish(self, provenance: &Provenance) -> Result<Table, RunError> {
+        let Self { partial, table, .. } = self;
+        if let Some(Partial { ledger, writer }) = partial {
+            match writer {
+                Some(mut writer) => {
+                    layout::write_table(&mut writer, &table, provenance)?;
+                    writer.finish()?;
+                }
+                None => {
+                    let (part, path) = ledger.part()?;
+                    parquet::write_over(part, &path, &table, provenance)?;
+                }
+            }
+            ledger.publish()?;
+        }
+        Ok(table)
+    }
+}
+
+/// A table with the label columns of the inputs.
+fn empty_table(inputs: &[Input]) -> Result<Table, TableError> {
+    let columns = inputs.first().map(|i| i.labels.iter().map(|(c, _)| c.clone()).collect());
+    Table::new(columns.unwrap_or_default())
 }

@@ -6,8 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use corsmal_extract::config::{Config, Preset};
-use corsmal_extract::engine::Features;
-use corsmal_extract::run::Signals;
+use corsmal_extract::engine::{Features, Signals};
 use corsmal_files::npz::NpzFile;
 use ndarray::{ArrayD, ArrayView1, Axis};
 

@@ -1,8 +1,8 @@
 //! What is wrong with one recording, or with this program, costs that recording only.
 
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex};
 
 use corsmal_extract::config::Config;
 use corsmal_extract::inputs;
@@ -144,6 +144,89 @@ fn hostile_headers_take_neither_memory_nor_time() {
         let slow = report.outcomes.last().unwrap();
         assert_eq!(slow.status, Status::Unsupported, "{preset}");
         assert!(slow.reason.contains("Hz"), "{preset}: {}", slow.reason);
+    }
+}
+
+/// Does something to a recording once it is open: between its header and its samples there is a warning
+/// of mel bands without bins.
+struct Meanwhile<'a>(Mutex<Option<Box<dyn FnOnce() + Send + 'a>>>);
+
+impl Progress for Meanwhile<'_> {
+    fn start(&self, _: usize, _: usize) {}
+    fn done(&self, _: &Outcome) {}
+    fn warning(&self, _: &str) {
+        if let Some(change) = self.0.lock().unwrap().take() {
+            change();
+        }
+    }
+}
+
+/// What the outcome says, and what is done to the file.
+type Change = (&'static str, fn(&Path));
+
+/// Replaced, rewritten in place, grown, cut, removed; read whole and in spans.
+#[cfg(unix)]
+#[test]
+fn a_recording_that_changes_while_it_is_read_has_no_features() {
+    use std::fs;
+    use std::os::unix::fs::FileExt;
+
+    let preset = corsmal_extract::config::Preset::find("logmel").unwrap();
+    let wide =
+        ["n_mels=512", "n_fft=256", "hop_length=65536"].map(|key| format!("melspectrogram.{key}"));
+    let config = Arc::new(Config::with_overrides(preset.toml, "logmel", &wide).unwrap());
+    for samples in [100_000, (2 << 20) + 100_000] {
+        let folder = folder();
+        let at = |name: &str| folder.path().join(format!("audio/{name}.wav"));
+        let changes: [Change; 5] = [
+            ("was replaced by another file", |path| {
+                let other = path.with_extension("other");
+                fs::copy(path, &other).unwrap();
+                fs::rename(other, path).unwrap();
+            }),
+            ("was written to", |path| {
+                let file = fs::File::options().write(true).open(path).unwrap();
+                file.write_all_at(&[7; 1000], 50_000).unwrap();
+            }),
+            ("grew from ", |path| {
+                let mut file = fs::File::options().append(true).open(path).unwrap();
+                std::io::Write::write_all(&mut file, &[7; 1000]).unwrap();
+            }),
+            ("was cut from ", |path| {
+                let file = fs::File::options().write(true).open(path).unwrap();
+                file.set_len(file.metadata().unwrap().len() / 2).unwrap();
+            }),
+            ("was removed", |path| fs::remove_file(path).unwrap()),
+        ];
+        for (what, change) in changes {
+            wav(&at("a"), 8000, samples);
+            wav(&at("b"), 8000, 8000);
+            let found = inputs::collect(&[text(&folder.path().join("audio")).to_string()]).unwrap();
+            let options = RunOptions {
+                out: folder.path().join("out.npz"),
+                compression: Compression::Stored,
+                jobs: 1,
+                shard: Shard::default(),
+                resume: false,
+                overwrite: true,
+                max_errors: None,
+            };
+            let go_on = Arc::new(AtomicBool::new(false));
+            let path = at("a");
+            let meanwhile = Meanwhile(Mutex::new(Some(Box::new(move || change(&path)))));
+            let report = run::run(&found, &config, &options, &meanwhile, &go_on).unwrap();
+            assert_eq!(statuses(&report), [Status::Changed, Status::Ok], "{what}");
+            let reason = &report.outcomes[0].reason;
+            assert!(reason.starts_with(what) && reason.ends_with(" while it was read"), "{reason}");
+            assert_eq!(report.outcomes[0].identity, "", "it is of a file that is no more");
+            let options = RunOptions { overwrite: false, ..options };
+            let again = run::run(&found, &config, &options, &Quiet, &go_on);
+            match again {
+                Err(RunError::Exists { .. }) if at("a").exists() => {}
+                Ok(report) if !at("a").exists() => assert!(report.up_to_date),
+                _ => panic!("{what}: not to be taken for done"),
+            }
+        }
     }
 }
 

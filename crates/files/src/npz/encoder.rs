@@ -19,23 +19,53 @@ pub(super) struct Encoder<W: Write> {
 
 enum Body<W: Write> {
     Stored(BufWriter<W>),
-    Deflated(DeflateEncoder<BufWriter<W>>),
+    Deflated(DeflateEncoder<BufWriter<Checked<W>>>),
 }
 
-/// What has gone through a [`Encoder`].
+/// Checks the bytes that go through.
+pub(super) struct Checked<W> {
+    out: W,
+    crc: crc32fast::Hasher,
+}
+
+impl<W: Write> Checked<W> {
+    pub fn new(out: W) -> Self {
+        Self { out, crc: crc32fast::Hasher::new() }
+    }
+
+    pub fn crc32(&self) -> u32 {
+        self.crc.clone().finalize()
+    }
+}
+
+impl<W: Write> Write for Checked<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.out.write(bytes)?;
+        self.crc.update(&bytes[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+/// What has gone through an [`Encoder`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Totals {
     pub crc32: u32,
+    /// Of the bytes as they are stored.
+    pub stored_crc32: u32,
     pub size: u64,
     pub compressed: u64,
 }
 
 impl<W: Write> Encoder<W> {
     pub fn new(out: W, compression: Compression) -> Self {
-        let out = BufWriter::with_capacity(BUFFER, out);
         let body = match compression {
-            Compression::Stored => Body::Stored(out),
+            Compression::Stored => Body::Stored(BufWriter::with_capacity(BUFFER, out)),
             Compression::Deflated => {
+                let out = BufWriter::with_capacity(BUFFER, Checked::new(out));
                 Body::Deflated(DeflateEncoder::new(out, flate2::Compression::new(LEVEL)))
             }
         };
@@ -43,19 +73,21 @@ impl<W: Write> Encoder<W> {
     }
 
     pub fn finish(self) -> io::Result<Totals> {
-        let compressed = match self.body {
+        let crc32 = self.crc.finalize();
+        let (stored_crc32, compressed) = match self.body {
             Body::Stored(mut out) => {
                 out.flush()?;
-                self.size
+                (crc32, self.size)
             }
             Body::Deflated(mut encoder) => {
                 encoder.try_finish()?;
                 let compressed = encoder.total_out();
-                encoder.finish()?.flush()?;
-                compressed
+                let mut out = encoder.finish()?;
+                out.flush()?;
+                (out.get_ref().crc32(), compressed)
             }
         };
-        Ok(Totals { crc32: self.crc.finalize(), size: self.size, compressed })
+        Ok(Totals { crc32, stored_crc32, size: self.size, compressed })
     }
 }
 

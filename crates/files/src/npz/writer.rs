@@ -5,7 +5,7 @@
 //! member is byte for byte what `numpy.save` writes), zip64 records appear exactly where sizes,
 //! offsets or counts need them.
 
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::NpzError;
 use super::disk::DiskSync;
-use super::encoder::Encoder;
+use super::encoder::{Checked, Encoder};
 use super::headers::{self, Zip64};
 use super::packed::Packed;
 use crate::npy::{DType, Header};
@@ -44,6 +44,8 @@ pub struct EntryRecord {
     pub end: u64,
     /// CRC-32 of the member.
     pub crc32: u32,
+    /// CRC-32 of the member as stored in the archive.
+    pub stored_crc32: u32,
     /// Bytes of the member.
     pub size: u64,
     /// Bytes of the member as stored in the archive.
@@ -74,7 +76,8 @@ impl NpzWriter {
         Ok(Self::over(file, path, compression, Vec::new()))
     }
 
-    /// Continues a partial archive behind `entries`, cutting off whatever follows them.
+    /// Continues a partial archive, open as `file`, behind `entries`, cutting off whatever follows
+    /// them; errors call it `path`.
     ///
     /// Give entries that [`super::intact_entries`] found intact.
     ///
@@ -82,17 +85,11 @@ impl NpzWriter {
     /// [`NpzError::Io`]; [`NpzError::Member`] when the entries do not follow each other without a
     /// gap from byte 0 or the file ends before the last of them.
     pub fn resume(
+        file: File,
         path: &Path,
         compression: Compression,
         entries: Vec<EntryRecord>,
     ) -> Result<Self, NpzError> {
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(entries.is_empty())
-            .truncate(false)
-            .open(path)
-            .map_err(|e| NpzError::io(path, e))?;
         let length = file.metadata().map_err(|e| NpzError::io(path, e))?.len();
         let mut end = 0;
         for entry in &entries {
@@ -155,6 +152,7 @@ impl NpzWriter {
         crc.update(&front);
         crc.update(data);
         entry.crc32 = crc.finalize();
+        entry.stored_crc32 = entry.crc32;
         let mut block = headers::local_header(&entry, self.zip64);
         block.extend_from_slice(&front);
         entry.end = entry.offset + block.len() as u64 + data.len() as u64;
@@ -173,6 +171,7 @@ impl NpzWriter {
         let mut entry = self.begin(name, &packed.header)?;
         entry.compression = Compression::Deflated;
         entry.crc32 = totals.crc32;
+        entry.stored_crc32 = totals.stored_crc32;
         entry.compressed = totals.compressed;
         let local = headers::local_header(&entry, self.zip64);
         entry.end = entry.offset + local.len() as u64 + totals.compressed;
@@ -240,6 +239,7 @@ impl NpzWriter {
             .map_err(|e| NpzError::io(&self.path, e))?;
         self.check_length(name, header, totals.size - front.len() as u64)?;
         entry.crc32 = totals.crc32;
+        entry.stored_crc32 = totals.stored_crc32;
         entry.compressed = totals.compressed;
         entry.end = entry.offset + placeholder.len() as u64 + totals.compressed;
         let local = headers::local_header(&entry, self.zip64);
@@ -325,6 +325,7 @@ impl NpzWriter {
             offset: self.end,
             end: self.end,
             crc32: 0,
+            stored_crc32: 0,
             size,
             compressed,
             compression: self.compression,
@@ -352,9 +353,17 @@ impl NpzWriter {
         let mut entry = EntryRecord { offset: self.end, ..entry.clone() };
         let local = headers::local_header(&entry, self.zip64);
         self.write_at_end(&[&local])?;
-        let copied = io::copy(&mut raw, &mut self.file).map_err(|e| NpzError::io(&self.path, e))?;
+        let mut out = Checked::new(&self.file);
+        let copied = io::copy(&mut raw, &mut out).map_err(|e| NpzError::io(&self.path, e))?;
+        entry.stored_crc32 = out.crc32();
+        let damaged =
+            |expected, actual| NpzError::member(&self.path, &entry.name, expected, actual);
         if copied != entry.compressed {
-            return Err(NpzError::member(&self.path, &entry.name, entry.compressed, copied));
+            return Err(damaged(format!("{} bytes", entry.compressed), copied.to_string()));
+        }
+        if entry.compression == Compression::Stored && entry.stored_crc32 != entry.crc32 {
+            let hex = |crc| format!("CRC {crc:08x}");
+            return Err(damaged(hex(entry.crc32), hex(entry.stored_crc32)));
         }
         entry.end = entry.offset + local.len() as u64 + copied;
         Ok(self.push(entry))

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use corsmal_extract::run::{self, RunError, RunOptions};
+use corsmal_extract::inputs;
+use corsmal_extract::run::{self, RunError};
 use corsmal_files::draft;
-use corsmal_files::npz::Compression;
 use corsmal_files::outcome::Status;
+use corsmal_files::provenance::Provenance;
 use corsmal_files::shard::Shard;
 use corsmal_models::ModelError;
 use corsmal_models::model_file::Model;
@@ -17,32 +18,27 @@ use crate::failure::Failure;
 use crate::prediction_lines::{Line, PredictionLines};
 use crate::progress::{LogFormat, Meter};
 
-/// Extracts into a temporary folder, then predicts.
+/// Extracts into memory, then predicts.
 pub fn run(args: &Args, model: &Model, lines: &mut PredictionLines<'_>) -> Result<End, Failure> {
     let config = configuration(args, model)?;
     let found = recordings(args)?;
     let folder = if args.out == Path::new("-") {
-        tempfile::tempdir()
+        std::env::temp_dir()
     } else {
-        tempfile::tempdir_in(draft::folder(&args.out))
-    };
-    let folder = folder.map_err(|e| Failure::new(format!("temporary folder: {e}")))?;
-    let options = RunOptions {
-        out: folder.path().join("features.npz"),
-        compression: Compression::Stored,
-        jobs: args.jobs(),
-        shard: Shard::default(),
-        resume: false,
-        overwrite: false,
-        max_errors: None,
+        draft::folder(&args.out).to_path_buf()
     };
     let stop = crate::interrupt::flag();
     let meter = Meter::new(LogFormat::Text, args.quiet);
-    match run::run(&found, &config, &options, &meter, stop) {
-        Ok(_) => predict(model, &DatasetTable::read(&options.out, &args.foreign)?, lines),
-        Err(RunError::Interrupted) => Ok(End::Interrupted),
-        Err(error) => Err(error.into()),
-    }
+    let table = match run::table(&found, &config, (args.jobs(), &folder), &meter, stop) {
+        Ok(table) => table,
+        Err(RunError::Interrupted) => return Ok(End::Interrupted),
+        Err(error) => return Err(error.into()),
+    };
+    let (text, hash) = (config.to_value().to_string(), config.hash());
+    let provenance = Provenance::new(text, hash, inputs::list_hash(&found), Shard::default());
+    // What the recordings are called where their table is at fault.
+    let place = Path::new("the recordings");
+    predict(model, &DatasetTable::of_extraction(place, &table, provenance)?, lines)
 }
 
 /// Predicts the rows of a table.

@@ -3,9 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use corsmal_extract::engine::Features;
+use corsmal_extract::engine::{Features, SignalError, Signals, Windowing, Windows};
 use corsmal_extract::inputs::Input;
-use corsmal_extract::run::{SignalError, Signals, Windowing, Windows};
 use corsmal_files::outcome::Status;
 use corsmal_models::ModelError;
 use corsmal_models::fusion::WindowVotes;

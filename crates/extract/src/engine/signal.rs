@@ -7,12 +7,14 @@ use std::sync::Arc;
 use corsmal_audio::{AudioSpec, SampleEncoding};
 use thiserror::Error;
 
-use super::Quiet;
+use super::extractor::Extractor;
+use super::failed::Failed;
+use super::front_end::FrontEnd;
+use super::plan::Plan;
 use super::plans::{Planned, Plans};
-use super::reader::{self, Failed};
+use super::reading;
+use super::recording::{Features, Recording};
 use crate::config::Config;
-use crate::engine::{Extractor, Features, FinishError, Plan, Recording};
-use crate::frontend::FrontEnd;
 use corsmal_files::outcome::Status;
 
 /// Frames that come out of the front end at a time.
@@ -44,7 +46,7 @@ pub struct Signals {
 impl Signals {
     /// Signals by `config`. What does not fit in memory goes to the system's temporary folder.
     pub fn new(config: Arc<Config>) -> Self {
-        Self { plans: Plans::new(config, &Quiet), folder: std::env::temp_dir() }
+        Self { plans: Plans::new(config, |_| {}), folder: std::env::temp_dir() }
     }
 
     /// Begins a signal of `sample_rate` Hz and `channels` channels.
@@ -73,7 +75,7 @@ impl Signals {
         Ok(Signal {
             front,
             extractor: Extractor::new(plan.clone(), 0..u64::MAX, 0),
-            crop: reader::crop(config, (None, None), sample_rate),
+            crop: reading::crop(config, (None, None), sample_rate),
             channels: usize::from(channels),
             step,
             position: 0,
@@ -120,7 +122,7 @@ impl Signal {
             let inside = |frame: u64| frame.clamp(begin, self.position) - begin;
             let (from, to) = (inside(self.crop.start), inside(self.crop.end));
             let block = &block[from as usize * self.channels..to as usize * self.channels];
-            reader::require_finite(block, begin + from, self.channels, |_| None)?;
+            reading::require_finite(block, begin + from, self.channels, |_| None)?;
             self.front.push(block, &mut self.held);
             self.extractor.push(&self.held);
             self.held.clear();
@@ -133,44 +135,15 @@ impl Signal {
     /// # Errors
     /// No samples, too few for one frame, or a temporary file that fails.
     pub fn finish(self) -> Result<Features, SignalError> {
-        let Self { plan, front, mut extractor, mut held, folder, .. } = self;
-        let mut silence = front.finish(&mut held);
-        extractor.push(&held);
-        held.clear();
-        held.resize(BLOCK * plan.channels, 0.0);
-        while silence > 0 {
-            let frames = silence.min(BLOCK as u64);
-            extractor.push(&held[..frames as usize * plan.channels]);
-            silence -= frames;
-        }
-        let mut recording = Recording::new(plan.clone(), &folder);
+        let Self { plan, front, mut extractor, folder, .. } = self;
+        front.finish(|block| {
+            extractor.push(block);
+            Ok::<_, Failed>(true)
+        })?;
+        let mut recording = Recording::new(plan, &folder);
         let span = extractor.finish(true).map_err(Failed::from)?;
         recording.add(span).map_err(Failed::temporary)?;
-        Ok(finish(recording, &plan)?)
-    }
-}
-
-/// Finishes a recording of which every span is there.
-pub fn finish(recording: Recording, plan: &Plan) -> Result<Features, Failed> {
-    let total = recording.total();
-    if total == 0 {
-        return Err(Failed::new(Status::Empty, "no samples"));
-    }
-    if recording.fewest_frames() == 0 {
-        let needed = plan.shortest();
-        let reason = format!("{total} samples, at least {needed} make one frame");
-        return Err(Failed::new(Status::TooShort, reason));
-    }
-    let features = recording.finish().map_err(|error| match error {
-        FinishError::Temporary(source) => Failed::temporary(source),
-        few @ FinishError::TooFewFrames { .. } => Failed::new(Status::TooShort, few.to_string()),
-    })?;
-    match (&plan.config.projection, features) {
-        (Some(projection), Features::Summary(row)) => projection
-            .apply(&row)
-            .map(Features::Summary)
-            .map_err(|reason| Failed::new(Status::Unsupported, reason)),
-        (_, features) => Ok(features),
+        Ok(recording.complete()?)
     }
 }
 

@@ -5,9 +5,11 @@ use std::sync::atomic::AtomicBool;
 
 use corsmal_audio::{BlockSource, Repair};
 
-use super::reader::{self, Failed};
+use super::failed::Failed;
+use super::reading;
+use super::recording::Features;
 use super::signal::{SignalError, Signals};
-use crate::engine::Features;
+use super::watch::Watch;
 use crate::inputs::Input;
 use corsmal_files::outcome::Status;
 
@@ -46,9 +48,10 @@ pub struct Window {
 /// Windows begin at multiples of the hop and are whole: what remains at the end is left out, but a
 /// recording shorter than a window is one window. Window and hop are whole numbers of frames, rounded
 /// once. The samples of a window are those of an input with
-/// its start and end. A failure to read is the last item.
+/// its start and end. A failure to read, or a file that changed meanwhile, is the last item.
 pub struct Windows<'a> {
     source: Box<dyn BlockSource>,
+    watch: Watch,
     signals: &'a Signals,
     /// Frames of a window, and from one to the next.
     window: u64,
@@ -75,16 +78,18 @@ impl<'a> Windows<'a> {
         windowing: Windowing,
         stop: &Arc<AtomicBool>,
     ) -> Result<Self, SignalError> {
-        let source = reader::open(input, stop)?;
+        let watch = Watch::begin(input);
+        let source = watch.settle(reading::open(input, stop))?;
         let rate = source.spec().sample_rate;
         let frames = |seconds: f64| ((seconds * f64::from(rate)).round() as u64).max(1);
         Ok(Self {
             source,
+            watch,
             signals,
             window: frames(windowing.window),
             hop: frames(windowing.hop),
-            base: input.start.map_or(0, |start| reader::frame_at(start, rate)),
-            limit: input.end.map_or(u64::MAX, |end| reader::frame_at(end, rate)),
+            base: input.start.map_or(0, |start| reading::frame_at(start, rate)),
+            limit: input.end.map_or(u64::MAX, |end| reading::frame_at(end, rate)),
             held: Vec::new(),
             first: 0,
             number: 0,
@@ -162,7 +167,12 @@ impl Iterator for Windows<'_> {
         if self.ended {
             return None;
         }
-        let item = self.cut().map_err(SignalError::from).transpose();
+        let item = match self.cut() {
+            Ok(Some(window)) => Ok(Some(window)),
+            // The end, or a failure that a change of the file explains.
+            end => self.watch.settle(end),
+        };
+        let item = item.map_err(SignalError::from).transpose();
         self.ended = !matches!(item, Some(Ok(_)));
         item
     }
@@ -231,7 +241,7 @@ mod tests {
         let windowing = Windowing::new(1.0, 0.1).unwrap();
         let all = Windows::open(&input(&path, (None, None)), &signals, windowing, &go_on());
         let crop = |start: f64, end: f64| {
-            reader::crop(&Default::default(), (Some(start), Some(end)), 44_100)
+            reading::crop(&Default::default(), (Some(start), Some(end)), 44_100)
         };
         let mut number = 0;
         for window in all.unwrap() {
@@ -247,7 +257,7 @@ mod tests {
         // A third of a second is no whole number of nanoseconds.
         for frame in [14_700, 14_701, 123_457] {
             let seconds: f64 = format!("{:.9}", f64::from(frame) / 44_100.0).parse().unwrap();
-            assert_eq!(reader::frame_at(seconds, 44_100), frame as u64);
+            assert_eq!(reading::frame_at(seconds, 44_100), frame as u64);
         }
     }
 

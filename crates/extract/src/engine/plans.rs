@@ -7,10 +7,9 @@ use corsmal_audio::AudioSpec;
 use corsmal_dsp::resample::Converter;
 use corsmal_dsp::resample::MAX_EXPANSION;
 
+use super::front_end::channels_out;
+use super::plan::Plan;
 use crate::config::Config;
-use crate::engine::Plan;
-use crate::frontend::channels_out;
-use crate::run::Progress;
 
 /// What a recording is computed with.
 #[derive(Clone)]
@@ -35,7 +34,7 @@ type Made = Result<Planned, String>;
 /// The plans of a run.
 pub struct Plans<'a> {
     config: Arc<Config>,
-    progress: &'a dyn Progress,
+    warn: Box<dyn Fn(&str) + Send + Sync + 'a>,
     state: Mutex<State>,
 }
 
@@ -47,9 +46,9 @@ struct State {
 }
 
 impl<'a> Plans<'a> {
-    /// No plans yet; what a plan warns of goes to `progress`.
-    pub fn new(config: Arc<Config>, progress: &'a dyn Progress) -> Self {
-        Self { config, progress, state: Mutex::default() }
+    /// No plans yet; what a plan warns of goes to `warn`.
+    pub fn new(config: Arc<Config>, warn: impl Fn(&str) + Send + Sync + 'a) -> Self {
+        Self { config, warn: Box::new(warn), state: Mutex::default() }
     }
 
     /// The plan for recordings like this one.
@@ -67,7 +66,7 @@ impl<'a> Plans<'a> {
         if let Ok(planned) = &made {
             for warning in planned.plan.warnings() {
                 if state.warnings.insert(warning.clone()) {
-                    self.progress.warning(&warning);
+                    (self.warn)(&warning);
                 }
             }
         }

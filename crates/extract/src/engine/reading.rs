@@ -1,20 +1,19 @@
 //! One span of one recording: opened, read, pushed through front end and extractor.
 
-use std::io;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use corsmal_audio::{AudioError, BlockSource, Repair, Verdict};
-use corsmal_dsp::DspError;
-
-use super::plans::Planned;
-use super::stdin::Live;
-use crate::config::SignalConfig;
-use crate::engine::{Extractor, Refused, Span};
-use crate::frontend::FrontEnd;
-use crate::inputs::{Input, InputSource};
+use corsmal_audio::{BlockSource, Repair};
 use corsmal_files::outcome::{Outcome, Status};
+
+use super::extractor::{Extractor, Span};
+use super::failed::Failed;
+use super::front_end::FrontEnd;
+use super::live::Live;
+use super::plans::Planned;
+use crate::config::SignalConfig;
+use crate::inputs::{Input, InputSource};
 
 /// Samples read at a time, all channels together.
 const BLOCK: usize = 1 << 16;
@@ -22,54 +21,6 @@ const BLOCK: usize = 1 << 16;
 const PART: usize = 1 << 21;
 /// Frames of a span; recordings of more than two are cut.
 const SPAN: u64 = 1 << 20;
-
-/// Why a recording has no features.
-pub struct Failed {
-    /// The verdict.
-    pub status: Status,
-    /// In words.
-    pub reason: String,
-    /// Byte in the file, where known.
-    pub byte_offset: Option<u64>,
-    /// A temporary file failed, which is not the recording's fault.
-    pub temporary: Option<io::Error>,
-}
-
-impl Failed {
-    /// A failure without a place.
-    pub fn new(status: Status, reason: impl Into<String>) -> Self {
-        Self { status, reason: reason.into(), byte_offset: None, temporary: None }
-    }
-
-    /// A temporary file failed.
-    pub fn temporary(error: io::Error) -> Self {
-        let reason = format!("temporary file: {error}");
-        Self { temporary: Some(error), ..Self::new(Status::Io, reason) }
-    }
-}
-
-impl From<AudioError> for Failed {
-    fn from(error: AudioError) -> Self {
-        let status = match error.verdict() {
-            Verdict::Io => Status::Io,
-            Verdict::Empty => Status::Empty,
-            Verdict::NotAudio => Status::NotAudio,
-            Verdict::Unsupported => Status::Unsupported,
-            Verdict::Corrupt => Status::Corrupt,
-        };
-        Self { byte_offset: error.offset(), ..Self::new(status, error.to_string()) }
-    }
-}
-
-impl From<Refused> for Failed {
-    fn from(error: Refused) -> Self {
-        let status = match error.source {
-            DspError::TooShort { .. } => Status::TooShort,
-            _ => Status::Unsupported,
-        };
-        Self::new(status, error.to_string())
-    }
-}
 
 /// Opens an input. A stream on standard input fails once `stop` is set, also while nothing comes.
 pub fn open(input: &Input, stop: &Arc<AtomicBool>) -> Result<Box<dyn BlockSource>, Failed> {
@@ -199,21 +150,18 @@ pub fn compute(
     // The end of the crop is the end of the signal, too.
     let at_end = ended || end == crop.end;
     if !identity && at_end {
-        let mut silence = front.finish(&mut signal);
-        extractor.push(&signal);
-        let room = (BLOCK / plan.channels).max(1) as u64;
-        signal.clear();
-        signal.resize(room as usize * plan.channels, 0.0);
-        while silence > 0 {
+        let whole = front.finish(|rest| {
             if stop.load(Ordering::Relaxed) {
                 return Ok(false);
             }
             if extractor.stored() > PART {
                 each(extractor.take())?;
             }
-            let frames = silence.min(room);
-            extractor.push(&signal[..frames as usize * plan.channels]);
-            silence -= frames;
+            extractor.push(rest);
+            Ok::<_, Failed>(true)
+        })?;
+        if !whole {
+            return Ok(false);
         }
     }
     each(extractor.finish(at_end)?)?;

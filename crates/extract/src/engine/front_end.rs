@@ -7,6 +7,9 @@ use corsmal_dsp::simd::vectorized;
 
 use crate::config::{Channels, Normalize, SignalConfig};
 
+/// Samples of silence handed on at a time, all channels together.
+const SILENCE: usize = 1 << 16;
+
 /// Channels that features see of a recording with `channels` channels.
 ///
 /// # Errors
@@ -107,21 +110,39 @@ impl FrontEnd {
         }
     }
 
-    /// What remains at the end of the recording. Returns the number of frames of silence that are
-    /// to follow, where a longer signal is configured.
-    pub fn finish(mut self, out: &mut Vec<f32>) -> u64 {
-        let from = out.len();
+    /// Hands what remains at the end of the recording to `push`, in blocks, with the silence of a
+    /// configured length that the recording does not have. Whether it came to its end: `push` says
+    /// whether to go on.
+    ///
+    /// # Errors
+    /// Those of `push`.
+    pub fn finish<E>(mut self, mut push: impl FnMut(&[f32]) -> Result<bool, E>) -> Result<bool, E> {
+        let mut rest = Vec::new();
         if let Some(stream) = self.resample.take() {
-            stream.finish(out);
+            stream.finish(&mut rest);
         }
-        self.emphasize(&mut out[from..]);
+        self.emphasize(&mut rest);
         if let Some((rule, mut held)) = self.held.take() {
-            held.extend(out.drain(from..));
+            held.append(&mut rest);
             normalize(rule, &mut held);
-            out.append(&mut held);
+            rest = held;
         }
-        self.cut(out, from);
-        self.remaining.unwrap_or(0)
+        self.cut(&mut rest, 0);
+        if !push(&rest)? {
+            return Ok(false);
+        }
+        let mut silence = self.remaining.unwrap_or(0);
+        let room = (SILENCE / self.channels).max(1);
+        rest.clear();
+        rest.resize(room.min(usize::try_from(silence).unwrap_or(room)) * self.channels, 0.0);
+        while silence > 0 {
+            let frames = silence.min(room as u64);
+            if !push(&rest[..frames as usize * self.channels])? {
+                return Ok(false);
+            }
+            silence -= frames;
+        }
+        Ok(true)
     }
 
     /// Pre-emphasis of whole frames.
@@ -220,8 +241,11 @@ mod tests {
         let mut front = FrontEnd::new(config, channels, plan, 100.0).unwrap();
         let mut out = Vec::new();
         input.chunks(block * channels).for_each(|b| front.push(b, &mut out));
-        let silence = front.finish(&mut out) as usize;
-        out.resize(out.len() + silence * channels, 0.0);
+        let whole = front.finish(|block| {
+            out.extend_from_slice(block);
+            Ok::<_, ()>(true)
+        });
+        assert_eq!(whole, Ok(true));
         out
     }
 

@@ -1,0 +1,86 @@
+//! Tells whether a recording is still the file that it was when its first byte was read.
+
+use std::io;
+use std::path::PathBuf;
+
+use corsmal_files::identity::{self, Stamp};
+use corsmal_files::outcome::Status;
+
+use super::failed::Failed;
+use crate::inputs::{Input, InputSource};
+
+/// A look at a file before it is read, to be compared with one after the last read.
+#[derive(Debug, Clone)]
+pub struct Watch {
+    /// Streams and devices cannot be looked at twice.
+    seen: Option<(PathBuf, Stamp)>,
+    /// Whether a change could keep the stamp, so that only the content tells.
+    fresh: bool,
+}
+
+impl Watch {
+    /// Looks at an input that is about to be read.
+    pub fn begin(input: &Input) -> Self {
+        let seen = match &input.source {
+            InputSource::Stdin => None,
+            // What cannot be looked at cannot be opened either, which says more.
+            InputSource::File(path) => {
+                Stamp::of_path(path).ok().flatten().map(|stamp| (path.clone(), stamp))
+            }
+        };
+        let fresh = seen.as_ref().is_some_and(|(_, stamp)| stamp.is_fresh());
+        Self { seen, fresh }
+    }
+
+    /// Looks again.
+    ///
+    /// # Errors
+    /// [`Status::Changed`] and what happened to the file.
+    pub fn check(&self) -> Result<(), Failed> {
+        let Some((path, before)) = &self.seen else { return Ok(()) };
+        let changed =
+            |what: String| Err(Failed::new(Status::Changed, format!("{what} while it was read")));
+        let now = match Stamp::of_path(path) {
+            Ok(Some(now)) => now,
+            Ok(None) => return changed("was replaced by something that is no file".into()),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => return changed("was removed".into()),
+            Err(e) => return changed(format!("became unreadable ({e})")),
+        };
+        match (before.size, now.size) {
+            _ if before == &now => Ok(()),
+            _ if before.file != now.file => changed("was replaced by another file".into()),
+            (old, new) if new > old => changed(format!("grew from {old} to {new} bytes")),
+            (old, new) if new < old => changed(format!("was cut from {old} to {new} bytes")),
+            _ => changed("was written to".into()),
+        }
+    }
+
+    /// Looks again, at the content too where the file is so new that its stamp may not tell:
+    /// `identity` is that of [`identity::of_file`] from before the first read.
+    ///
+    /// # Errors
+    /// As [`Watch::check`].
+    pub fn check_content(&self, identity: &str) -> Result<(), Failed> {
+        self.check()?;
+        match &self.seen {
+            Some((path, _))
+                if self.fresh && identity::of_file(path).is_ok_and(|now| now != identity) =>
+            {
+                Err(Failed::new(Status::Changed, "was written to while it was read"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The verdict on what was read: a change explains any failure that it met.
+    ///
+    /// # Errors
+    /// The change, else the failure.
+    pub fn settle<T>(&self, read: Result<T, Failed>) -> Result<T, Failed> {
+        match read {
+            // No fault of the recording.
+            Err(failed) if failed.temporary.is_some() => Err(failed),
+            read => self.check().and(read),
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! What a run refuses before it starts.
+
+use std::path::{Path, PathBuf};
+
+use corsmal_files::feature_file::{FeatureFileError, FeatureTable};
+use corsmal_files::format::OutputFormat;
+use corsmal_files::provenance::Provenance;
+use corsmal_files::{draft, identity};
+
+use super::error::RunError;
+use super::{MAX_JOBS, RunOptions, RunReport};
+use crate::config::Config;
+use crate::inputs::{Input, InputSource, list_hash};
+use crate::ledger::{self, Ledger};
+
+/// What is known of a run before it starts.
+pub struct Checked {
+    /// The output, behind any link.
+    pub(super) out: PathBuf,
+    pub(super) format: OutputFormat,
+    pub(super) provenance: Provenance,
+    /// The report of an output that is there already.
+    pub(super) done: Option<RunReport>,
+}
+
+/// Everything that a run refuses before it starts.
+///
+/// # Errors
+/// As [`run`], in what concerns the output, the inputs as a whole and the number of jobs.
+pub fn check(inputs: &[Input], config: &Config, options: &RunOptions) -> Result<Checked, RunError> {
+    let format = check_output(options, config)?;
+    let out = &draft::destination(&options.out);
+    require_jobs(options.jobs)?;
+    let is_out = |i: &&Input| match &i.source {
+        InputSource::File(path) => path.file_name() == out.file_name() && draft::same(path, out),
+        InputSource::Stdin => false,
+    };
+    if let Some(input) = inputs.iter().find(is_out) {
+        let why = format!("is the input {} itself", input.id);
+        return Err(RunError::Format { path: out.clone(), why });
+    }
+    let (text, hash) = (config.to_value().to_string(), config.hash());
+    let provenance = Provenance::new(text, hash, list_hash(inputs), options.shard);
+    let mut done = None;
+    if !options.overwrite {
+        done = finished(options.shard.of(inputs), &provenance, out, format)?;
+        if done.is_none() && !options.resume && Ledger::is_pending(out) {
+            Ledger::require_idle(out)?;
+            return Err(RunError::Pending { path: ledger::ledger_path(out) });
+        }
+    }
+    Ok(Checked { out: out.clone(), format, provenance, done })
+}
+
+/// Refuses numbers of threads that cannot be.
+pub(super) fn require_jobs(jobs: usize) -> Result<(), RunError> {
+    match (1..=MAX_JOBS).contains(&jobs) {
+        true => Ok(()),
+        false => Err(RunError::Jobs { jobs, why: format!("1 to {MAX_JOBS}") }),
+    }
+}
+
+/// The format of the output, if it can be written.
+fn check_output(options: &RunOptions, config: &Config) -> Result<OutputFormat, RunError> {
+    let out = options.out.as_path();
+    let refuse = |why: String| Err(RunError::Format { path: out.into(), why });
+    let format = OutputFormat::of_name(out, options.compression)?;
+    if format == OutputFormat::Parquet && config.summary.is_none() {
+        let why = "Parquet holds summary tables: the configuration needs a [summary], \
+                   or write .npz";
+        return refuse(why.into());
+    }
+    if out.is_dir() {
+        return refuse("is a folder".into());
+    }
+    if out.exists() && !out.is_file() {
+        return refuse("is no regular file".into());
+    }
+    let target = draft::destination(out);
+    let folder = draft::folder(&target);
+    if !folder.is_dir() {
+        return refuse(format!("there is no folder {}", folder.display()));
+    }
+    Ok(format)
+}
+
+/// The report of an output that is already complete; an error where it holds something else.
+fn finished(
+    inputs: &[Input],
+    provenance: &Provenance,
+    out: &Path,
+    format: OutputFormat,
+) -> Result<Option<RunReport>, RunError> {
+    if !out.exists() {
+        return Ok(None);
+    }
+    let refuse = |why: &str| RunError::Exists { path: out.to_path_buf(), why: why.into() };
+    let FeatureTable { table, provenance: theirs, format: found, .. } = FeatureTable::open(out)
+        .map_err(|error| match error {
+            FeatureFileError::Io { source, .. } => refuse(&format!("cannot be read: {source}")),
+            _ => refuse("is not an output of this tool"),
+        })?;
+    if found != format {
+        return Err(refuse(&format!("is {found}, not {format}")));
+    }
+    if theirs != *provenance {
+        let why = if theirs.config_hash != provenance.config_hash {
+            "holds features of another configuration"
+        } else if theirs.inputs_hash != provenance.inputs_hash {
+            "holds features of other inputs"
+        } else if theirs.shard != provenance.shard {
+            "holds another shard"
+        } else {
+            "was written by another version of this tool"
+        };
+        return Err(refuse(why));
+    }
+    let outcomes = table.outcomes().to_vec();
+    if outcomes.iter().any(|outcome| outcome.identity == identity::STREAM) {
+        return Err(refuse("holds features of a stream, which cannot be read again to compare"));
+    }
+    let same = outcomes.len() == inputs.len()
+        && outcomes.iter().zip(inputs).all(|(o, i)| o.identity == identity_of(i));
+    if !same {
+        return Err(refuse("holds features of files that have changed since"));
+    }
+    Ok(Some(RunReport { resumed: outcomes.len(), outcomes, up_to_date: true }))
+}
+
+/// Identity of an input as it is now; empty where it cannot be read.
+pub(super) fn identity_of(input: &Input) -> String {
+    match &input.source {
+        InputSource::Stdin => identity::STREAM.to_string(),
+        InputSource::File(path) => identity::of_file(path).unwrap_or_default(),
+    }
+}

@@ -1,0 +1,97 @@
+//! Why a run ends without its output.
+
+use std::path::PathBuf;
+
+use corsmal_files::format::FormatError;
+use corsmal_files::npz::NpzError;
+use corsmal_files::parquet::ParquetTableError;
+use corsmal_files::table::TableError;
+use thiserror::Error;
+
+use crate::ledger::LedgerError;
+
+/// Why a run could not start or go on. Bad recordings are not among these: they are outcomes.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum RunError {
+    /// The output is there and holds something else.
+    #[error("{path} exists and {why}; --overwrite replaces it")]
+    Exists {
+        /// The output.
+        path: PathBuf,
+        /// What it is.
+        why: String,
+    },
+    /// An interrupted run is there.
+    #[error(
+        "{path} was left by an interrupted run; --resume continues it, --overwrite starts anew"
+    )]
+    Pending {
+        /// Its ledger.
+        path: PathBuf,
+    },
+    /// Frames have no place in a table.
+    #[error("a table holds statistics: the configuration needs a [summary]")]
+    NoSummary,
+    /// An input of the interrupted run cannot be read any more.
+    #[error("{path} cannot be read, which the interrupted run could; --resume once it can")]
+    Unreadable {
+        /// The input.
+        path: String,
+    },
+    /// The output cannot take what the configuration gives.
+    #[error("{path}: {why}")]
+    Format {
+        /// The output.
+        path: PathBuf,
+        /// Why, and what is allowed.
+        why: String,
+    },
+    /// More failures than allowed.
+    #[error("stopped after {failed} failed files ({limit} allowed), the last: {last}")]
+    TooManyErrors {
+        /// Failed files.
+        failed: usize,
+        /// Allowed.
+        limit: usize,
+        /// Path and reason of the last.
+        last: String,
+    },
+    /// The user stopped the run; `--resume` continues it.
+    #[error("interrupted; --resume continues the run")]
+    Interrupted,
+    /// The output failed.
+    #[error(transparent)]
+    Npz(#[from] NpzError),
+    /// The ledger failed.
+    #[error(transparent)]
+    Ledger(#[from] LedgerError),
+    /// The table failed.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// The Parquet output failed.
+    #[error(transparent)]
+    Parquet(#[from] ParquetTableError),
+    /// The output has a name that none can have.
+    #[error(transparent)]
+    Name(#[from] FormatError),
+    /// A fault of this program while writing the output.
+    #[error("a fault of this program, please report it; --resume continues the run")]
+    Broken,
+    /// A temporary file beside the output failed.
+    #[error("{path}: temporary file: {source}")]
+    Temporary {
+        /// Its folder.
+        path: PathBuf,
+        /// The reason.
+        source: std::io::Error,
+    },
+    /// So many workers are not possible.
+    #[error("jobs = {jobs} is not possible: {why}")]
+    Jobs {
+        /// Number asked for.
+        jobs: usize,
+        /// What is possible, or what the system says.
+        why: String,
+    },
+}
