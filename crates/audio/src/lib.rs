@@ -35,13 +35,12 @@ mod mpeg;
 #[cfg(feature = "symphonia")]
 mod ogg;
 mod open;
+mod pcm;
 mod report;
 mod source;
 mod start;
-#[cfg(feature = "symphonia")]
 mod stream;
 mod tags;
-mod wav;
 
 pub use error::{AudioError, Verdict};
 pub use health::{ChannelHealth, Health, HealthMeter};

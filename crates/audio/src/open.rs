@@ -8,22 +8,26 @@ use crate::error::AudioError;
 use crate::input::{Input, Medium, Seekable, Stream};
 use crate::source::BlockSource;
 use crate::start::{self, Format};
-use crate::wav::WavSource;
 
 /// File name extensions (lower case) that a walk through folders should pick up. Files are still
 /// opened by content, whatever they are called.
 #[cfg(feature = "symphonia")]
-pub const EXTENSIONS: [&str; 9] =
-    ["wav", "wave", "rf64", "bw64", "bwf", "flac", "ogg", "oga", "mp3"];
+pub const EXTENSIONS: [&str; 21] = [
+    "wav", "wave", "rf64", "bw64", "bwf", "w64", "aif", "aiff", "aifc", "au", "snd", "caf", "flac",
+    "ogg", "oga", "opus", "mp1", "mp2", "mp3", "mpga", "amb",
+];
 /// File name extensions (lower case) that a walk through folders should pick up. Files are still
 /// opened by content, whatever they are called.
 #[cfg(not(feature = "symphonia"))]
-pub const EXTENSIONS: [&str; 5] = ["wav", "wave", "rf64", "bw64", "bwf"];
+pub const EXTENSIONS: [&str; 13] = [
+    "wav", "wave", "rf64", "bw64", "bwf", "w64", "aif", "aiff", "aifc", "au", "snd", "caf", "amb",
+];
 
 #[cfg(feature = "symphonia")]
-const FORMATS: &str = "WAV (RIFF, RIFX, RF64, BW64), FLAC, Ogg Vorbis or MP3";
+const FORMATS: &str =
+    "WAV, Wave64, AIFF, AU, CAF, FLAC, Ogg (Vorbis, Opus, FLAC) or MPEG audio (MP1, MP2, MP3)";
 #[cfg(not(feature = "symphonia"))]
-const FORMATS: &str = "WAV (RIFF, RIFX, RF64, BW64)";
+const FORMATS: &str = "WAV (RIFF, RIFX, RF64, BW64), Wave64, AIFF, AU or CAF";
 
 /// Opens a recording, by content.
 ///
@@ -66,7 +70,10 @@ fn from_medium(medium: Box<dyn Medium>) -> Result<Box<dyn BlockSource>, AudioErr
     }
     let found = format!("\"{}\"", start[..start.len().min(12)].escape_ascii());
     match start::find(&mut input)? {
-        Some(Format::Wav) => Ok(Box::new(WavSource::new(input)?)),
+        Some(Format::Pcm(container)) => crate::pcm::open(input, container),
+        Some(Format::Other(name)) => {
+            Err(AudioError::unsupported(input.position(), name, FORMATS))
+        }
         #[cfg(feature = "symphonia")]
         Some(Format::Flac) => crate::flac::open(input),
         #[cfg(feature = "symphonia")]

@@ -26,6 +26,8 @@ pub enum SampleEncoding {
     ALaw,
     /// ITU-T G.711 µ-law.
     MuLaw,
+    /// Differences of 4 bits.
+    Adpcm,
     /// Compressed without loss, to integers.
     Lossless,
     /// Compressed with loss.

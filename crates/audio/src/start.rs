@@ -2,8 +2,8 @@
 
 use crate::error::AudioError;
 use crate::input::Input;
+use crate::pcm::Container;
 use crate::tags;
-use crate::wav;
 
 /// Bytes before the audio that are searched for its beginning, tags not counted.
 const SEARCHED: usize = 64 << 10;
@@ -11,7 +11,9 @@ const SEARCHED: usize = 64 << 10;
 /// A format by its first bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Format {
-    Wav,
+    Pcm(Container),
+    /// One that is not read.
+    Other(&'static str),
     #[cfg(feature = "symphonia")]
     Flac,
     #[cfg(feature = "symphonia")]
@@ -20,11 +22,42 @@ pub(crate) enum Format {
     Ogg,
 }
 
+/// Bytes that tell a format.
+const SHOWN: usize = 16;
+
+/// Formats that are not read: place and bytes of their mark, and their name.
+const OTHERS: [(usize, &[u8], &str); 24] = [
+    (4, b"ftyp", "MP4 (AAC, ALAC, ...)"),
+    (0, b"\x1a\x45\xdf\xa3", "Matroska or WebM"),
+    (0, b"\x30\x26\xb2\x75\x8e\x66\xcf\x11", "ASF (WMA)"),
+    (0, b"\xff\xf1", "AAC in ADTS"),
+    (0, b"\xff\xf9", "AAC in ADTS"),
+    (0, b"\x0b\x77", "AC-3"),
+    (0, b"\x7f\xfe\x80\x01", "DTS"),
+    (0, b"wvpk", "WavPack"),
+    (0, b"MAC ", "Monkey's Audio"),
+    (0, b"TTA1", "True Audio"),
+    (0, b"MPCK", "Musepack"),
+    (0, b"MP+", "Musepack"),
+    (0, b"OFR ", "OptimFROG"),
+    (0, b"DSD ", "DSF"),
+    (0, b"FRM8", "DSDIFF"),
+    (0, b"#!AMR", "AMR"),
+    (0, b"NIST_1A", "NIST SPHERE"),
+    (0, b"Creative Voice File", "Creative VOC"),
+    (0, b"MThd", "MIDI"),
+    (0, b".RMF", "RealMedia"),
+    (0, b"FLV\x01", "Flash video"),
+    (0, b"ajkg", "Shorten"),
+    (0, b"2BIT", "AVR"),
+    (8, b"8SVX", "8SVX"),
+];
+
 /// Goes to the first byte of the audio: behind tags and, where nothing known starts the file, behind
 /// what is no audio. `None` where no format is recognised.
 pub(crate) fn find(input: &mut Input) -> Result<Option<Format>, AudioError> {
     tags::skip(input)?;
-    if let Some(format) = at_start(input.peek(12)?) {
+    if let Some(format) = at_start(input.peek(SHOWN)?) {
         return Ok(Some(format));
     }
     let shown = input.peek(SEARCHED)?;
@@ -45,8 +78,8 @@ pub(crate) fn find(input: &mut Input) -> Result<Option<Format>, AudioError> {
 
 /// The format that starts here, by the mark that every file of it has.
 fn at_start(start: &[u8]) -> Option<Format> {
-    if wav::is_wav(start) {
-        return Some(Format::Wav);
+    if let Some(container) = Container::of(start) {
+        return Some(Format::Pcm(container));
     }
     #[cfg(feature = "symphonia")]
     {
@@ -57,14 +90,16 @@ fn at_start(start: &[u8]) -> Option<Format> {
             return Some(Format::Ogg);
         }
     }
-    None
+    OTHERS.iter().find(|(at, mark, _)| start.get(*at..).is_some_and(|s| s.starts_with(mark)))
+        .map(|(_, _, name)| Format::Other(name))
 }
 
 /// As `at_start`, but with as many bytes right as make chance unlikely.
 fn surely(bytes: &[u8]) -> Option<Format> {
-    let is_wav = bytes.len() >= 12 && bytes.starts_with(b"R") && wav::is_wav(&bytes[..12]);
     match bytes {
-        _ if is_wav => Some(Format::Wav),
+        [b'R', b'I' | b'F', b'F' | b'6', ..] if bytes.get(8..12) == Some(b"WAVE") => {
+            Container::of(&bytes[..12]).map(Format::Pcm)
+        }
         #[cfg(feature = "symphonia")]
         [b'f', b'L', b'a', b'C', 0 | 0x80, 0, 0, 34, ..] => Some(Format::Flac),
         #[cfg(feature = "symphonia")]

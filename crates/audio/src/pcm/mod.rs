@@ -1,23 +1,85 @@
-//! WAV in its dialects: RIFF, RIFX, RF64, BW64. Policy: `docs/wav-policy.md`.
+//! Samples that stand side by side, and the containers that hold them: WAV in its dialects, Wave64,
+//! AIFF, AU, CAF. Policy: `docs/reading.md`.
 
+mod adpcm;
+mod aiff;
+mod au;
+mod caf;
 mod companding;
 mod convert;
-mod encoding;
+mod extent;
+mod format;
 mod header;
+mod wav;
+mod wave64;
 
 use crate::error::AudioError;
 use crate::input::Input;
 use crate::report::{ReadReport, Repair};
 use crate::source::{AudioSpec, BlockSource};
-use encoding::{Encoding, Endian};
+use crate::stream::StreamSource;
+use format::{Encoding, Endian};
 use header::Header;
 
 #[cfg(feature = "symphonia")]
-pub(crate) use encoding::{MAX_CHANNELS, MAX_SAMPLE_RATE};
-pub(crate) use header::is_wav;
+pub(crate) use format::{MAX_CHANNELS, MAX_SAMPLE_RATE};
 
-/// Streams the samples of one WAV.
-pub(crate) struct WavSource {
+/// A container.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Container {
+    Wav,
+    Wave64,
+    Aiff,
+    Au,
+    Caf,
+}
+
+impl Container {
+    /// The one that starts with these (up to 16) bytes.
+    pub(crate) fn of(start: &[u8]) -> Option<Self> {
+        Some(match start {
+            _ if wav::is_wav(start) => Self::Wav,
+            _ if wave64::is_wave64(start) => Self::Wave64,
+            _ if aiff::is_aiff(start) => Self::Aiff,
+            _ if au::is_au(start) => Self::Au,
+            _ if caf::is_caf(start) => Self::Caf,
+            _ => return None,
+        })
+    }
+}
+
+/// Opens what the container at the position of `input` holds.
+pub(crate) fn open(
+    mut input: Input,
+    container: Container,
+) -> Result<Box<dyn BlockSource>, AudioError> {
+    let header = match container {
+        Container::Wav => wav::read(&mut input)?,
+        Container::Wave64 => wave64::read(&mut input)?,
+        Container::Aiff => aiff::read(&mut input)?,
+        Container::Au => au::read(&mut input)?,
+        Container::Caf => caf::read(&mut input)?,
+    };
+    let format = header.format;
+    let declared_frames = header.extent.declared.map(|bytes| format.frames_in(bytes));
+    let spec = AudioSpec {
+        sample_rate: format.sample_rate,
+        channels: format.channels,
+        format: format!("{} {}", header.container, format.encoding.name(header.endian == Endian::Big)),
+        encoding: format.encoding.samples(),
+        declared_frames,
+    };
+    let truncated = header.repairs.iter().any(|r| matches!(r, Repair::Truncated { .. }));
+    let report = ReadReport { decoded_frames: 0, truncated, repairs: header.repairs.clone() };
+    if let Encoding::Adpcm(adpcm) = format.encoding {
+        let blocks = adpcm::Blocks::new(input, adpcm, &header);
+        return Ok(Box::new(StreamSource::new(blocks, spec, report)));
+    }
+    Ok(Box::new(PcmSource::new(input, &header, spec, report)))
+}
+
+/// Streams samples that stand side by side.
+struct PcmSource {
     input: Input,
     spec: AudioSpec,
     encoding: Encoding,
@@ -33,41 +95,21 @@ pub(crate) struct WavSource {
     report: ReadReport,
 }
 
-impl WavSource {
-    /// Reads the header from the start of `input`.
-    pub(crate) fn new(mut input: Input) -> Result<Self, AudioError> {
-        let header = Header::read(&mut input)?;
-        let format = header.format;
-        let frame_bytes = format.frame_bytes() as usize;
-        let container = match &header.form {
-            b"RF64" => "rf64",
-            b"BW64" => "bw64",
-            b"RIFX" => "rifx",
-            _ => "wav",
-        };
-        let big = header.endian == Endian::Big;
-        let spec = AudioSpec {
-            sample_rate: format.sample_rate,
-            channels: format.channels,
-            format: format!("{container} {}", format.encoding.name(big)),
-            encoding: format.encoding.samples(),
-            declared_frames: header.declared_len.map(|n| n / frame_bytes as u64),
-        };
-        let truncated = header.repairs.iter().any(|r| matches!(r, Repair::Truncated { .. }));
-        let report = ReadReport { decoded_frames: 0, truncated, repairs: header.repairs };
-        Ok(Self {
+impl PcmSource {
+    fn new(input: Input, header: &Header, spec: AudioSpec, report: ReadReport) -> Self {
+        Self {
             input,
             spec,
-            encoding: format.encoding,
+            encoding: header.format.encoding,
             endian: header.endian,
-            frame_bytes,
-            data_start: header.data_start,
-            data_len: header.data_len,
-            declared_len: header.declared_len,
+            frame_bytes: header.format.unit_bytes() as usize,
+            data_start: header.extent.start,
+            data_len: header.extent.len,
+            declared_len: header.extent.declared,
             done: 0,
             ended: false,
             report,
-        })
+        }
     }
 
     /// Bytes of samples not yet handed out, as far as known.
@@ -84,22 +126,15 @@ impl WavSource {
         {
             let frame = self.frame_bytes as u64;
             let (declared, actual) = (Some(declared / frame), self.done / frame);
-            self.note(Repair::Truncated { declared, actual });
-            self.report.truncated = true;
+            self.report.note_truncated(declared, actual);
         }
         if rest > 0 {
-            self.note(Repair::PartialFrame { bytes: rest });
-        }
-    }
-
-    fn note(&mut self, repair: Repair) {
-        if !self.report.repairs.contains(&repair) {
-            self.report.repairs.push(repair);
+            self.report.note(Repair::PartialFrame { bytes: rest });
         }
     }
 }
 
-impl BlockSource for WavSource {
+impl BlockSource for PcmSource {
     fn spec(&self) -> &AudioSpec {
         &self.spec
     }

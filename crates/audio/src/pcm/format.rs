@@ -1,5 +1,6 @@
-//! The `fmt ` chunk: which bytes are a sample.
+//! Which bytes are a sample, and what the `fmt ` chunk of WAV and Wave64 says of it.
 
+use super::adpcm::{Adpcm, Kind};
 use crate::error::AudioError;
 use crate::report::Repair;
 use crate::source::SampleEncoding;
@@ -10,14 +11,16 @@ pub(crate) const MAX_CHANNELS: u16 = 64;
 pub(crate) const MAX_SAMPLE_RATE: u32 = 768_000;
 
 const ENCODINGS: &str =
-    "PCM of 1 to 64 bits, IEEE float of 32 or 64 bits, A-law and mu-law of 8 bits";
+    "PCM of 1 to 64 bits, IEEE float of 32 or 64 bits, A-law, mu-law, IMA and Microsoft ADPCM";
 
 /// Numeric values of `wFormatTag`; an EXTENSIBLE sub-format starts with the same number.
 mod tag {
     pub const PCM: u32 = 1;
+    pub const MS_ADPCM: u32 = 2;
     pub const FLOAT: u32 = 3;
     pub const ALAW: u32 = 6;
     pub const MULAW: u32 = 7;
+    pub const IMA_ADPCM: u32 = 0x11;
     pub const EXTENSIBLE: u32 = 0xfffe;
 }
 
@@ -27,7 +30,7 @@ mod tag {
 pub(crate) enum Encoding {
     /// Unsigned 8-bit.
     U8,
-    /// Signed, 2 to 8 bytes.
+    /// Signed, 1 to 8 bytes.
     Int(u8),
     /// IEEE single precision.
     F32,
@@ -37,6 +40,8 @@ pub(crate) enum Encoding {
     ALaw,
     /// ITU-T G.711 mu-law.
     MuLaw,
+    /// Blocks of 4-bit differences.
+    Adpcm(Adpcm),
 }
 
 impl Encoding {
@@ -47,6 +52,8 @@ impl Encoding {
             Self::Int(n) => u16::from(n),
             Self::F32 => 4,
             Self::F64 => 8,
+            // Blocks hold all channels: see `Format::unit_bytes`.
+            Self::Adpcm(_) => 0,
         }
     }
 
@@ -59,6 +66,7 @@ impl Encoding {
             Self::F64 => SampleEncoding::Float { bytes: 8 },
             Self::ALaw => SampleEncoding::ALaw,
             Self::MuLaw => SampleEncoding::MuLaw,
+            Self::Adpcm(_) => SampleEncoding::Adpcm,
         }
     }
 
@@ -67,11 +75,14 @@ impl Encoding {
         let order = if big_endian { "be" } else { "le" };
         match self {
             Self::U8 => "pcm_u8".into(),
+            Self::Int(1) => "pcm_s8".into(),
             Self::Int(n) => format!("pcm_s{}{order}", 8 * u16::from(n)),
             Self::F32 => format!("pcm_f32{order}"),
             Self::F64 => format!("pcm_f64{order}"),
             Self::ALaw => "pcm_alaw".into(),
             Self::MuLaw => "pcm_mulaw".into(),
+            Self::Adpcm(Adpcm { kind: Kind::Ima, .. }) => "adpcm_ima_wav".into(),
+            Self::Adpcm(Adpcm { kind: Kind::Microsoft, .. }) => "adpcm_ms".into(),
         }
     }
 }
@@ -107,9 +118,40 @@ impl Endian {
 }
 
 impl Format {
-    /// Bytes of one sample of every channel.
-    pub(crate) fn frame_bytes(&self) -> u64 {
-        u64::from(self.encoding.bytes()) * u64::from(self.channels)
+    /// A format of samples that stand side by side, checked.
+    pub(super) fn new(
+        channels: u32,
+        sample_rate: f64,
+        encoding: Encoding,
+        at: u64,
+    ) -> Result<Self, AudioError> {
+        const EXPECTED: &str = "1 to 64 channels at 1 to 768000 Hz";
+        let actual = format!("{channels} channels at {sample_rate} Hz");
+        if channels == 0 || !sample_rate.is_finite() || sample_rate < 1.0 {
+            return Err(AudioError::corrupt(at, actual, EXPECTED));
+        }
+        match u16::try_from(channels) {
+            Ok(channels @ 1..=MAX_CHANNELS) if sample_rate <= f64::from(MAX_SAMPLE_RATE) => {
+                Ok(Self { channels, sample_rate: sample_rate.round() as u32, encoding, repair: None })
+            }
+            _ => Err(AudioError::unsupported(at, actual, EXPECTED)),
+        }
+    }
+
+    /// Bytes of what cannot be divided: one sample of every channel, or a block.
+    pub(crate) fn unit_bytes(&self) -> u64 {
+        match self.encoding {
+            Encoding::Adpcm(adpcm) => adpcm.block.into(),
+            encoding => u64::from(encoding.bytes()) * u64::from(self.channels),
+        }
+    }
+
+    /// Samples per channel in so many bytes of data.
+    pub(crate) fn frames_in(&self, bytes: u64) -> u64 {
+        match self.encoding {
+            Encoding::Adpcm(adpcm) => adpcm.frames_in(bytes, self.channels),
+            _ => bytes / self.unit_bytes(),
+        }
     }
 
     /// Parses the body of the chunk (its first 40 bytes suffice), which starts at byte `at`.
@@ -168,16 +210,27 @@ impl Format {
             (tag::FLOAT, 64) => Encoding::F64,
             (tag::ALAW, 8) => Encoding::ALaw,
             (tag::MULAW, 8) => Encoding::MuLaw,
+            (tag::IMA_ADPCM, 4) => adpcm(Kind::Ima, block_align, channels, at)?,
+            (tag::MS_ADPCM, 4) => adpcm(Kind::Microsoft, block_align, channels, at)?,
             (tag, bits) => {
                 let actual = format!("format tag {tag:#06x} with {bits} bits");
                 return Err(AudioError::unsupported(at, actual, ENCODINGS));
             }
         };
         let frame = encoding.bytes() * channels;
-        let repair = (block_align != frame)
+        let repair = (block_align != frame && frame > 0)
             .then(|| Repair::BlockAlign { declared: block_align.into(), used: frame.into() });
         Ok(Self { channels, sample_rate, encoding, repair })
     }
+}
+
+fn adpcm(kind: Kind, block: u16, channels: u16, at: u64) -> Result<Encoding, AudioError> {
+    let adpcm = Adpcm { kind, block };
+    if adpcm.frames_in(block.into(), channels) == 0 {
+        let actual = format!("ADPCM in blocks of {block} bytes for {channels} channels");
+        return Err(AudioError::corrupt(at + 12, actual, "blocks that hold samples"));
+    }
+    Ok(Encoding::Adpcm(adpcm))
 }
 
 fn integer(bytes: u16) -> Encoding {
@@ -190,12 +243,16 @@ fn sub_format(body: &[u8], endian: Endian, at: u64) -> Result<u32, AudioError> {
     const LITTLE: [u8; 4] = [0x00, 0x00, 0x10, 0x00];
     const BIG: [u8; 4] = [0x00, 0x00, 0x00, 0x10];
     const TAIL: [u8; 8] = [0x80, 0x00, 0x00, 0xaa, 0x00, 0x38, 0x9b, 0x71];
+    // Ambisonic B-format: the same tags with another rest.
+    const AMBISONIC: [u8; 12] =
+        [0x21, 0x07, 0xd3, 0x11, 0x86, 0x44, 0xc8, 0xc1, 0xca, 0x00, 0x00, 0x00];
     let Some(guid) = body.get(24..40) else {
         let actual = format!("WAVE_FORMAT_EXTENSIBLE in a fmt chunk of {} bytes", body.len());
         return Err(AudioError::corrupt(at, actual, "at least 40"));
     };
     let middle = if endian == Endian::Big { BIG } else { LITTLE };
-    if guid[4..8] != middle || guid[8..16] != TAIL {
+    let is_plain = guid[4..8] == middle && guid[8..16] == TAIL;
+    if !is_plain && (endian == Endian::Big || guid[4..] != AMBISONIC) {
         let actual = format!("sub-format {:02x?}", guid);
         return Err(AudioError::unsupported(at + 24, actual, ENCODINGS));
     }

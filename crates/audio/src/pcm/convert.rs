@@ -2,7 +2,7 @@
 //! that the compiler vectorises it.
 
 use super::companding::{ALAW, MULAW};
-use super::encoding::{Encoding, Endian};
+use super::format::{Encoding, Endian};
 
 /// Converts `bytes` into `out`; both hold the same number of samples.
 pub(crate) fn convert(encoding: Encoding, endian: Endian, bytes: &[u8], out: &mut [f32]) {
@@ -12,6 +12,7 @@ pub(crate) fn convert(encoding: Encoding, endian: Endian, bytes: &[u8], out: &mu
         Encoding::U8 => each(bytes, out, |[b]| (f32::from(b) - 128.0) * (1.0 / 128.0)),
         Encoding::ALaw => each(bytes, out, |[b]| ALAW[usize::from(b)]),
         Encoding::MuLaw => each(bytes, out, |[b]| MULAW[usize::from(b)]),
+        Encoding::Int(1) => each(bytes, out, |b| f32::from(i8::from_le_bytes(b)) * (1.0 / 128.0)),
         Encoding::Int(2) if big => each(bytes, out, |b| int16(i16::from_be_bytes(b))),
         Encoding::Int(2) => each(bytes, out, |b| int16(i16::from_le_bytes(b))),
         Encoding::Int(3) if big => {
@@ -27,6 +28,8 @@ pub(crate) fn convert(encoding: Encoding, endian: Endian, bytes: &[u8], out: &mu
         Encoding::F32 => each(bytes, out, f32::from_le_bytes),
         Encoding::F64 if big => each(bytes, out, |b| f64::from_be_bytes(b) as f32),
         Encoding::F64 => each(bytes, out, |b| f64::from_le_bytes(b) as f32),
+        // Blocks are decoded by `adpcm`.
+        Encoding::Adpcm(_) => out.fill(0.0),
     }
 }
 

@@ -1,0 +1,178 @@
+//! WAV (RIFF, RIFX, RF64, BW64): finds `fmt ` and `data`, repairs what the policy allows.
+
+use super::extent::{Extent, to_end};
+use super::format::{Endian, Format};
+use super::header::Header;
+use crate::error::AudioError;
+use crate::input::Input;
+use crate::report::Repair;
+
+/// A file with more chunks before its data is hostile.
+const MAX_CHUNKS: usize = 4096;
+
+/// Chunk names that decide whether an odd chunk was padded, where both readings are possible.
+const KNOWN: [&[u8; 4]; 24] = [
+    b"fmt ", b"data", b"fact", b"LIST", b"bext", b"iXML", b"JUNK", b"junk", b"PAD ", b"FLLR",
+    b"smpl", b"inst", b"cue ", b"plst", b"PEAK", b"id3 ", b"ID3 ", b"_PMX", b"axml", b"chna",
+    b"cart", b"acid", b"afsp", b"minf",
+];
+
+/// Whether a file that starts with these (up to 12) bytes is for this reader: a WAV, or cut off
+/// before it can be anything else.
+pub(crate) fn is_wav(start: &[u8]) -> bool {
+    let form = matches!(start.get(..4), Some(b"RIFF" | b"RIFX" | b"RF64" | b"BW64"));
+    form && start.get(8..).is_none_or(|kind| b"WAVE".starts_with(kind) || kind.starts_with(b"WAVE"))
+}
+
+/// Reads up to the first sample.
+pub(super) fn read(input: &mut Input) -> Result<Header, AudioError> {
+    let start = input.position();
+    let Some(&[f0, f1, f2, f3, ..]) = input.peek(12)?.first_chunk::<12>() else {
+        let actual = "the file ends inside the RIFF header";
+        return Err(AudioError::corrupt(start, actual, "12 bytes: id, size, WAVE"));
+    };
+    let form = [f0, f1, f2, f3];
+    input.consume(12);
+    let endian = if &form == b"RIFX" { Endian::Big } else { Endian::Little };
+    let mut format = None;
+    let mut long_size = None;
+    let mut repairs = Vec::new();
+    for _ in 0..MAX_CHUNKS {
+        let at = input.position();
+        let Some(&[i0, i1, i2, i3, s0, s1, s2, s3]) = input.peek(8)?.first_chunk::<8>() else {
+            let missing = if format.is_some() { "data" } else { "fmt" };
+            return Err(AudioError::corrupt(
+                at,
+                format!("the file ends without a {missing} chunk"),
+                "chunks fmt and data",
+            ));
+        };
+        input.consume(8);
+        let id = [i0, i1, i2, i3];
+        let size = endian.u32([s0, s1, s2, s3]);
+        if &id == b"data" {
+            let Some(format) = format else {
+                return Err(AudioError::corrupt(at, "data before fmt", "a fmt chunk first"));
+            };
+            return finish(input, form, endian, format, size, long_size, repairs);
+        }
+        let mut body = [0; 40];
+        let shown = input.peek((size as usize).min(body.len()))?;
+        let n = shown.len().min(body.len()).min(size as usize);
+        body[..n].copy_from_slice(&shown[..n]);
+        let body = &body[..n];
+        skip_chunk(input, at, id, size, &mut repairs)?;
+        match &id {
+            b"fmt " => format = Some(Format::parse(body, endian, at + 8)?),
+            b"ds64" => long_size = body.get(8..16).and_then(|b| b.try_into().ok()),
+            _ => {}
+        }
+    }
+    let at = input.position();
+    Err(AudioError::corrupt(at, format!("{MAX_CHUNKS} chunks and no data"), "a data chunk"))
+}
+
+/// Decides how many bytes belong to the samples.
+fn finish(
+    input: &mut Input,
+    form: [u8; 4],
+    endian: Endian,
+    format: Format,
+    size: u32,
+    long_size: Option<[u8; 8]>,
+    mut repairs: Vec<Repair>,
+) -> Result<Header, AudioError> {
+    let available = input.len().map(|len| len.saturating_sub(input.position()));
+    repairs.extend(format.repair);
+    let mut declared = u64::from(size);
+    let mut unknown = size == u32::MAX;
+    if let (Some(long), u32::MAX) = (long_size, size) {
+        declared = endian.u64(long);
+        unknown = declared == u64::MAX;
+    }
+    let plain = matches!(&form, b"RIFF" | b"RIFX") && long_size.is_none();
+    if let (true, false, Some(there)) = (plain, unknown, available)
+        && there.saturating_sub(declared) >= 1 << 32
+    {
+        // Only the low 32 bits of the size are left: the largest that fits in the file.
+        let used = declared + ((there - declared) >> 32 << 32);
+        repairs.push(Repair::DataSizeWrapped { declared, used });
+        declared = used;
+    }
+    let empty = declared == 0 && is_really_empty(input, endian)?;
+    let declared = match declared {
+        _ if unknown => to_end(Repair::DataSizeUnknown, &mut repairs),
+        0 if !empty => to_end(Repair::DataSizeZero, &mut repairs),
+        declared => Some(declared),
+    };
+    let container = match &form {
+        b"RF64" => "rf64",
+        b"BW64" => "bw64",
+        b"RIFX" => "rifx",
+        _ => "wav",
+    };
+    let extent = Extent::new(input, &format, declared, &mut repairs);
+    Ok(Header { container, format, endian, extent, repairs })
+}
+
+/// Leaves the chunk at byte `at`, whose body comes next, and its padding byte if it has one.
+fn skip_chunk(
+    input: &mut Input,
+    at: u64,
+    id: [u8; 4],
+    size: u32,
+    repairs: &mut Vec<Repair>,
+) -> Result<(), AudioError> {
+    if !input.skip(size.into())? {
+        let actual = format!(
+            "chunk \"{}\" of {size} bytes reaches beyond the end of the file",
+            id.escape_ascii()
+        );
+        return Err(AudioError::corrupt(at, actual, "whole chunks before the data"));
+    }
+    if size % 2 == 1 {
+        let next = input.peek(5)?;
+        if next.first_chunk::<5>().is_some_and(is_unpadded) {
+            repairs.push(Repair::MissingPadding { offset: input.position() });
+        } else if !next.is_empty() {
+            input.consume(1);
+        }
+    }
+    Ok(())
+}
+
+/// Whether the chunk name starts right after an odd chunk rather than one byte later.
+fn is_unpadded(next: &[u8; 5]) -> bool {
+    let known = |id: &[u8]| KNOWN.iter().any(|k| *k == id);
+    let printable = |id: &[u8]| id.iter().all(|b| (0x20..0x7f).contains(b));
+    let (here, after) = (&next[..4], &next[1..]);
+    !known(after) && (known(here) || (printable(here) && !printable(after)))
+}
+
+/// A data size of 0 is meant if nothing follows, or (where the input can be looked through) if
+/// chunks follow that end exactly with the file. Otherwise it was never filled in.
+fn is_really_empty(input: &mut Input, endian: Endian) -> Result<bool, AudioError> {
+    if input.peek(1)?.is_empty() {
+        return Ok(true);
+    }
+    let (Some(len), start) = (input.len(), input.position()) else {
+        return Ok(false);
+    };
+    let mut chunks = 0;
+    let end = loop {
+        let at = input.position();
+        let Some(&[i0, i1, i2, i3, s0, s1, s2, s3]) = input.peek(8)?.first_chunk::<8>() else {
+            break at;
+        };
+        let size = u64::from(endian.u32([s0, s1, s2, s3]));
+        let named = [i0, i1, i2, i3].iter().all(|b| (0x20..0x7f).contains(b));
+        let next = at + 8 + size + size % 2;
+        chunks += 1;
+        if !named || next > len + 1 || chunks > MAX_CHUNKS {
+            break 0;
+        }
+        input.seek(next.min(len))?;
+    };
+    input.seek(start)?;
+    Ok(end == len)
+}
