@@ -44,6 +44,6 @@ mod tags;
 
 pub use error::{AudioError, Verdict};
 pub use health::{ChannelHealth, Health, HealthMeter};
-pub use open::{EXTENSIONS, from_reader, from_seekable, open};
+pub use open::{EXTENSIONS, OTHER_EXTENSIONS, from_reader, from_seekable, open};
 pub use report::{ReadReport, Repair};
 pub use source::{AudioSpec, BlockSource, SampleEncoding};

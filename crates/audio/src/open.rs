@@ -19,8 +19,15 @@ pub const EXTENSIONS: [&str; 21] = [
 /// File name extensions (lower case) that a walk through folders should pick up. Files are still
 /// opened by content, whatever they are called.
 #[cfg(not(feature = "symphonia"))]
-pub const EXTENSIONS: [&str; 13] = [
-    "wav", "wave", "rf64", "bw64", "bwf", "w64", "aif", "aiff", "aifc", "au", "snd", "caf", "amb",
+pub const EXTENSIONS: [&str; 13] =
+    ["wav", "wave", "rf64", "bw64", "bwf", "w64", "aif", "aiff", "aifc", "au", "snd", "caf", "amb"];
+
+/// File name extensions (lower case) of recordings in formats that are not read, so that a walk
+/// through folders can say what it passes over.
+pub const OTHER_EXTENSIONS: [&str; 39] = [
+    "3ga", "3gp", "8svx", "aa3", "aac", "ac3", "adts", "amr", "ape", "asf", "avi", "dff", "dsf",
+    "dts", "eac3", "gsm", "iff", "m4a", "m4b", "m4v", "mka", "mkv", "mov", "mp4", "mpc", "ofr",
+    "ra", "rm", "sd2", "shn", "sph", "spx", "tak", "thd", "tta", "voc", "webm", "wma", "wv",
 ];
 
 #[cfg(feature = "symphonia")]
@@ -71,9 +78,7 @@ fn from_medium(medium: Box<dyn Medium>) -> Result<Box<dyn BlockSource>, AudioErr
     let found = format!("\"{}\"", start[..start.len().min(12)].escape_ascii());
     match start::find(&mut input)? {
         Some(Format::Pcm(container)) => crate::pcm::open(input, container),
-        Some(Format::Other(name)) => {
-            Err(AudioError::unsupported(input.position(), name, FORMATS))
-        }
+        Some(Format::Other(name)) => Err(AudioError::unsupported(input.position(), name, FORMATS)),
         #[cfg(feature = "symphonia")]
         Some(Format::Flac) => crate::flac::open(input),
         #[cfg(feature = "symphonia")]

@@ -26,7 +26,8 @@ pub(crate) enum Format {
 const SHOWN: usize = 16;
 
 /// Formats that are not read: place and bytes of their mark, and their name.
-const OTHERS: [(usize, &[u8], &str); 24] = [
+const OTHERS: [(usize, &[u8], &str); 25] = [
+    (0, b"\0\x05\x16\x07", "macOS metadata (AppleDouble)"),
     (4, b"ftyp", "MP4 (AAC, ALAC, ...)"),
     (0, b"\x1a\x45\xdf\xa3", "Matroska or WebM"),
     (0, b"\x30\x26\xb2\x75\x8e\x66\xcf\x11", "ASF (WMA)"),
@@ -90,7 +91,9 @@ fn at_start(start: &[u8]) -> Option<Format> {
             return Some(Format::Ogg);
         }
     }
-    OTHERS.iter().find(|(at, mark, _)| start.get(*at..).is_some_and(|s| s.starts_with(mark)))
+    OTHERS
+        .iter()
+        .find(|(at, mark, _)| start.get(*at..).is_some_and(|s| s.starts_with(mark)))
         .map(|(_, _, name)| Format::Other(name))
 }
 

@@ -1,7 +1,8 @@
 //! Lists of recordings: CSV (`.csv`) or JSON lines (`.jsonl`, `.ndjson`).
 //!
 //! Columns (CSV header) or keys (JSON) are `path` (required), `id`, `start` and `end` in seconds; any
-//! other one is a label that travels to the output. Relative paths are relative to the manifest.
+//! other one is a label that travels to the output. Columns of CSV without a name, which pandas writes
+//! for its index, are ignored. Relative paths are relative to the manifest.
 //!
 //! Time and memory grow with the size of the file, within [`MAX_LINE`], [`MAX_COLUMNS`] and
 //! [`MAX_CELLS`].
@@ -175,12 +176,15 @@ fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
         Ok(names) => names,
         Err(error) => return Err(failed(error, &reader)),
     };
-    for (index, name) in names.iter().enumerate() {
+    // Where in a record each column is.
+    let mut cells = Vec::new();
+    for (index, name) in names.iter().enumerate().filter(|(_, name)| !is_index(name)) {
         let place = columns.place(name).map_err(|reason| wrong(path, 1, reason))?;
-        if name.is_empty() || place != index {
+        if place != cells.len() {
             let reason = format!("column {} ({}) has no name of its own", index + 1, quoted(name));
             return Err(wrong(path, 1, reason));
         }
+        cells.push(index);
     }
     if !columns.places.contains_key(PATH) {
         let names: Vec<&str> = columns.labels.iter().map(|(_, name)| name.as_str()).collect();
@@ -196,9 +200,15 @@ fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
             Err(error) => return Err(failed(error, &reader)),
         }
         let line = record.position().map_or(0, csv::Position::line);
-        rows.push(columns.entry(path, line, |i| record.get(i).unwrap_or_default().to_owned())?);
+        let cell = |place: usize| record.get(cells[place]).unwrap_or_default().to_owned();
+        rows.push(columns.entry(path, line, cell)?);
         require_cells(rows.len(), columns.labels.len()).map_err(|e| wrong(path, line, e))?;
     }
+}
+
+/// Whether pandas wrote the column for its index, or read such a column and wrote it again.
+fn is_index(name: &str) -> bool {
+    name.is_empty() || name.strip_prefix("Unnamed: ").is_some_and(|n| n.parse::<u32>().is_ok())
 }
 
 fn json_rows(path: &Path) -> Result<Vec<Entry>, InputError> {

@@ -95,7 +95,10 @@ fn extract(
     let warnings = Warnings::default();
     let work = |stop: &Arc<AtomicBool>| {
         let found = inputs::collect(&paths).map_err(|e| RunError::new_err(e.to_string()))?;
-        run::run(&found, &config, &options, &warnings, stop).map_err(|error| match error {
+        if let Some(skipped) = found.warning() {
+            warnings.warning(&skipped);
+        }
+        run::run(&found.inputs, &config, &options, &warnings, stop).map_err(|error| match error {
             run::RunError::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
             other => RunError::new_err(other.to_string()),
         })

@@ -8,8 +8,8 @@ use crate::codec::{Codec, Decoded, PacketDecoder, Refusal};
 use crate::error::AudioError;
 use crate::flac;
 use crate::input::Input;
-use crate::source::SampleEncoding;
 use crate::pcm::{MAX_CHANNELS, MAX_SAMPLE_RATE};
+use crate::source::SampleEncoding;
 
 pub(super) const EXPECTED: &str = "Ogg Vorbis, Opus or FLAC of 1 to 64 channels and 1 to 768000 Hz";
 

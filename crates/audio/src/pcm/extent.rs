@@ -28,7 +28,8 @@ impl Extent {
         let available = input.len().map(|len| len.saturating_sub(start));
         let len = match (declared, available) {
             (Some(declared), Some(there)) if declared > there => {
-                let (declared, actual) = (Some(format.frames_in(declared)), format.frames_in(there));
+                let (declared, actual) =
+                    (Some(format.frames_in(declared)), format.frames_in(there));
                 repairs.push(Repair::Truncated { declared, actual });
                 Some(there)
             }

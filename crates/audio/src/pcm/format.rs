@@ -132,7 +132,12 @@ impl Format {
         }
         match u16::try_from(channels) {
             Ok(channels @ 1..=MAX_CHANNELS) if sample_rate <= f64::from(MAX_SAMPLE_RATE) => {
-                Ok(Self { channels, sample_rate: sample_rate.round() as u32, encoding, repair: None })
+                Ok(Self {
+                    channels,
+                    sample_rate: sample_rate.round() as u32,
+                    encoding,
+                    repair: None,
+                })
             }
             _ => Err(AudioError::unsupported(at, actual, EXPECTED)),
         }

@@ -65,7 +65,11 @@ pub(crate) fn open(
     let spec = AudioSpec {
         sample_rate: format.sample_rate,
         channels: format.channels,
-        format: format!("{} {}", header.container, format.encoding.name(header.endian == Endian::Big)),
+        format: format!(
+            "{} {}",
+            header.container,
+            format.encoding.name(header.endian == Endian::Big)
+        ),
         encoding: format.encoding.samples(),
         declared_frames,
     };

@@ -269,7 +269,11 @@ fn walk(
     let entries = std::fs::read_dir(dir).map_err(|e| CcmError::io(dir, e))?;
     let mut paths = Vec::new();
     for entry in entries {
-        paths.push(entry.map_err(|e| CcmError::io(dir, e))?.path());
+        let entry = entry.map_err(|e| CcmError::io(dir, e))?;
+        // Hidden files are not part of the data set, such as those that macOS puts beside others.
+        if !entry.file_name().as_encoded_bytes().starts_with(b".") {
+            paths.push(entry.path());
+        }
     }
     paths.sort();
     for path in paths {

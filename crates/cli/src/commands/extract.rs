@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use corsmal_extract::config::Config;
 use corsmal_extract::inputs;
-use corsmal_extract::run::{self, RunError, RunOptions};
+use corsmal_extract::run::{self, Progress, RunError, RunOptions};
 use corsmal_files::npz::Compression;
 use corsmal_files::shard::Shard;
 use serde_json::json;
@@ -120,7 +120,9 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 
 fn extract(args: Args) -> Result<ExitCode, Failure> {
     let config = Arc::new(args.config.load()?);
-    let found = inputs::collect(&args.inputs)?;
+    let collected = inputs::collect(&args.inputs)?;
+    let skipped = collected.warning();
+    let found = collected.inputs;
     if found.is_empty() {
         let names: Vec<_> = args.inputs.iter().map(|name| name.to_string_lossy()).collect();
         return Err(Failure::new(format!("--in {}: no recordings found", names.join(" "))));
@@ -135,6 +137,9 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
         max_errors: if args.strict { Some(0) } else { args.max_errors },
     };
     let meter = Meter::new(args.log_format, args.quiet);
+    if let Some(skipped) = skipped {
+        meter.warning(&skipped);
+    }
     if args.dry_run {
         run::check(&found, &config, &options)?;
         let inputs = options.shard.of(&found);

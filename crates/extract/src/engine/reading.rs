@@ -19,6 +19,8 @@ use crate::inputs::{Input, InputSource};
 const BLOCK: usize = 1 << 16;
 /// Values computed of a span before they are handed on (8 MiB).
 const PART: usize = 1 << 21;
+/// The repair of a stretch whose end is behind that of its recording.
+const END_BEYOND: &str = "end_beyond_recording";
 /// Frames of a span; recordings of more than two are cut.
 const SPAN: u64 = 1 << 20;
 
@@ -208,6 +210,28 @@ pub fn require_finite(
         at % channels
     );
     Err(Failed { byte_offset: byte_of(frame), ..Failed::new(Status::NonFinite, reason) })
+}
+
+/// Notes where a stretch reaches beyond the end of its recording, now read.
+///
+/// # Errors
+/// It begins there.
+pub fn check_stretch(
+    input: &Input,
+    signal: &SignalConfig,
+    outcome: &mut Outcome,
+) -> Result<(), Failed> {
+    let Some(rate) = outcome.sample_rate else { return Ok(()) };
+    let crop = crop(signal, (input.start, input.end), rate);
+    if let Some(start) = input.start.filter(|_| crop.start > 0 && outcome.decoded_frames == 0) {
+        let reason = format!("the stretch begins at {start} s, behind the end of the recording");
+        return Err(Failed::new(Status::Empty, reason));
+    }
+    let is_end = input.end.is_some_and(|end| crop.end == frame_at(end, rate));
+    if is_end && outcome.decoded_frames < crop.end - crop.start {
+        outcome.repairs.push(END_BEYOND.into());
+    }
+    Ok(())
 }
 
 /// Fills an outcome with what the reader knows.

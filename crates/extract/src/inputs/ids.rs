@@ -35,7 +35,21 @@ pub(super) fn refusal(id: &str) -> Option<String> {
 /// The id of each input: given ones as they are, others from the shortest form of their path that
 /// collides with none.
 pub(super) fn assign(found: &[Found]) -> Result<Vec<String>, InputError> {
-    let forms: Vec<Vec<String>> = found.iter().map(forms).collect();
+    let mut named: BTreeMap<String, usize> = BTreeMap::new();
+    for found in found.iter().filter(|found| matches!(found.naming, Naming::Derived(_))) {
+        *named.entry(found.source.to_string()).or_default() += 1;
+    }
+    let is_repeated = |found: &Found| named.get(&found.source.to_string()).is_some_and(|n| *n > 1);
+    let forms: Vec<Vec<String>> = found
+        .iter()
+        .map(|found| {
+            let mut forms = forms(found);
+            if let (true, Some(times)) = (is_repeated(found), times(found)) {
+                forms.iter_mut().for_each(|id| id.push_str(&times));
+            }
+            forms
+        })
+        .collect();
     let mut levels = vec![0; found.len()];
     loop {
         let mut holders: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
@@ -85,6 +99,15 @@ fn forms(found: &Found) -> Vec<String> {
             forms
         }
         (Naming::Derived(relative), InputSource::Stdin) => vec![id_of(relative)],
+    }
+}
+
+/// The stretch behind the id of a file that is there more than once.
+fn times(found: &Found) -> Option<String> {
+    match (&found.naming, found.start, found.end) {
+        (Naming::Given(_), ..) | (_, None, None) => None,
+        (_, start, None) => Some(format!("@{:?}-", start.unwrap_or(0.0))),
+        (_, start, Some(end)) => Some(format!("@{:?}-{end:?}", start.unwrap_or(0.0))),
     }
 }
 

@@ -10,7 +10,8 @@
 //! the parts. The root is the folder named, the part of a glob before its first wildcard, or the
 //! folder of a file named; paths in a manifest are taken as written. Where ids collide, all those
 //! that do keep their extension; where that does not help, they take the path as given on the
-//! command line. What still collides is refused. Ids from a manifest stand as they are. Ids that
+//! command line. Of several stretches of one file, each has its times behind the id, as
+//! `x@0.5-1.0`. What still collides is refused. Ids from a manifest stand as they are. Ids that
 //! would begin with `__`, the prefix of an output's own arrays, get `./` in front.
 
 mod ids;
@@ -130,15 +131,42 @@ pub struct Input {
     pub labels: Vec<(String, String)>,
 }
 
+/// What names stand for.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Collected {
+    /// The recordings.
+    pub inputs: Vec<Input>,
+    /// Files in folders whose names are those of recordings, of formats that are not read.
+    pub skipped: Vec<PathBuf>,
+}
+
+impl Collected {
+    /// A sentence about the files skipped, if there are any.
+    pub fn warning(&self) -> Option<String> {
+        const SHOWN: usize = 3;
+        let names: Vec<_> =
+            self.skipped.iter().take(SHOWN).map(|p| p.display().to_string()).collect();
+        let more = if self.skipped.len() > SHOWN { ", ..." } else { "" };
+        let files = match self.skipped.len() {
+            0 => return None,
+            1 => "1 file was skipped, whose format is".to_string(),
+            n => format!("{n} files were skipped, whose formats are"),
+        };
+        Some(format!("{files} not read: {}{more}", names.join(", ")))
+    }
+}
+
 /// Finds the recordings that `names` stand for, in a stable order, with unique ids.
 ///
 /// # Errors
 /// [`InputError`] names the path, and in a manifest the line.
-pub fn collect<S: AsRef<OsStr>>(names: &[S]) -> Result<Vec<Input>, InputError> {
-    let mut found = Vec::new();
+pub fn collect<S: AsRef<OsStr>>(names: &[S]) -> Result<Collected, InputError> {
+    let (mut found, mut skipped) = (Vec::new(), Vec::new());
     for name in names {
-        find(name.as_ref(), &mut found)?;
+        find(name.as_ref(), &mut found, &mut skipped)?;
     }
+    skipped.sort_unstable();
+    skipped.dedup();
     let ids = ids::assign(&found)?;
     let mut columns: Vec<String> = Vec::new();
     let mut known = HashSet::new();
@@ -161,7 +189,7 @@ pub fn collect<S: AsRef<OsStr>>(names: &[S]) -> Result<Vec<Input>, InputError> {
             labels: labels.collect(),
         }
     });
-    Ok(inputs.collect())
+    Ok(Collected { inputs: inputs.collect(), skipped })
 }
 
 /// BLAKE3 (hex) over ids, paths, stretches and labels of all inputs: equal for equal lists only.
@@ -214,7 +242,11 @@ impl Found {
     }
 }
 
-fn find(name: &OsStr, found: &mut Vec<Found>) -> Result<(), InputError> {
+fn find(
+    name: &OsStr,
+    found: &mut Vec<Found>,
+    skipped: &mut Vec<PathBuf>,
+) -> Result<(), InputError> {
     if name == "-" {
         let naming = Naming::Given("stdin".into());
         let (start, end, labels) = (None, None, Vec::new());
@@ -225,7 +257,7 @@ fn find(name: &OsStr, found: &mut Vec<Found>) -> Result<(), InputError> {
     match std::fs::metadata(path) {
         Ok(meta) if meta.is_dir() => {
             let mut files = Vec::new();
-            walk(path, &mut files)?;
+            walk(path, &mut files, skipped)?;
             push_sorted(path, path, files, found)
         }
         Ok(_) if has_extension(path, &manifest::EXTENSIONS) => find_manifest(path, found),
@@ -236,7 +268,7 @@ fn find(name: &OsStr, found: &mut Vec<Found>) -> Result<(), InputError> {
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             match name.to_str().filter(|name| wildcard::is_glob(name)) {
-                Some(pattern) => find_glob(pattern, found),
+                Some(pattern) => find_glob(pattern, found, skipped),
                 None => Err(InputError::Missing { path: path.into() }),
             }
         }
@@ -268,16 +300,24 @@ fn find_manifest(path: &Path, found: &mut Vec<Found>) -> Result<(), InputError> 
     Ok(())
 }
 
-fn find_glob(pattern: &str, found: &mut Vec<Found>) -> Result<(), InputError> {
+fn find_glob(
+    pattern: &str,
+    found: &mut Vec<Found>,
+    skipped: &mut Vec<PathBuf>,
+) -> Result<(), InputError> {
     let mut files = Vec::new();
     for path in wildcard::expand(pattern)? {
-        walk(&path, &mut files)?;
+        walk(&path, &mut files, skipped)?;
     }
     push_sorted(Path::new(pattern), &wildcard::root(pattern), files, found)
 }
 
-/// Appends the audio files at or below `path`.
-fn walk(path: &Path, files: &mut Vec<PathBuf>) -> Result<(), InputError> {
+/// Appends the audio files at or below `path`, and to `skipped` those whose formats are not read.
+fn walk(
+    path: &Path,
+    files: &mut Vec<PathBuf>,
+    skipped: &mut Vec<PathBuf>,
+) -> Result<(), InputError> {
     let is_audio = |path: &Path| has_extension(path, &corsmal_audio::EXTENSIONS);
     let visible = |entry: &walkdir::DirEntry| !is_hidden(entry);
     for entry in WalkDir::new(path).follow_links(true).into_iter().filter_entry(visible) {
@@ -285,7 +325,12 @@ fn walk(path: &Path, files: &mut Vec<PathBuf>) -> Result<(), InputError> {
             Ok(entry) if entry.file_type().is_file() && is_audio(entry.path()) => {
                 files.push(entry.into_path());
             }
-            Ok(_) => {}
+            Ok(entry) => {
+                let is_other = has_extension(entry.path(), &corsmal_audio::OTHER_EXTENSIONS);
+                if entry.file_type().is_file() && is_other {
+                    skipped.push(entry.into_path());
+                }
+            }
             Err(error) => {
                 let at = error.path().filter(|at| is_audio(at)).map(Path::to_path_buf);
                 let is_loop = error.loop_ancestor().is_some();

@@ -339,14 +339,16 @@ impl<'a> Collector<'a> {
     fn complete(
         &self,
         index: usize,
-        outcome: Outcome,
+        mut outcome: Outcome,
         (planned, watch): (&Planned, &Watch),
         recording: Result<Recording, Failed>,
     ) {
         let plan = &planned.plan;
+        let stretch = reader::check_stretch(&self.inputs[index], &plan.config.signal, &mut outcome);
         let finish = || -> Result<Parts, Failed> {
             let recording = recording?;
             watch.check_content(&outcome.identity)?;
+            stretch?;
             let total = recording.total();
             Ok(match recording.complete()? {
                 Features::Summary(row) => (Vec::new(), Some(row), total),

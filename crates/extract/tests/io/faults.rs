@@ -32,7 +32,7 @@ fn run(
     progress: &dyn Progress,
     change: impl Fn(&mut RunOptions),
 ) -> Result<RunReport, RunError> {
-    let found = inputs::collect(&[text(&folder.join("audio")).to_string()]).unwrap();
+    let found = inputs::collect(&[text(&folder.join("audio")).to_string()]).unwrap().inputs;
     let config = Arc::new(Config::preset(preset).unwrap());
     let mut options = RunOptions {
         out: folder.join("out.npz"),

@@ -11,7 +11,7 @@ use proptest::prelude::*;
 fn ids(names: &[&str]) -> Result<Vec<String>, String> {
     let names: Vec<String> = names.iter().map(|name| name.to_string()).collect();
     match inputs::collect(&names) {
-        Ok(inputs) => Ok(inputs.into_iter().map(|input| input.id).collect()),
+        Ok(found) => Ok(found.inputs.into_iter().map(|input| input.id).collect()),
         Err(error) => Err(error.to_string()),
     }
 }
@@ -90,7 +90,7 @@ fn names_that_are_not_utf8_are_kept_apart() {
     assert_eq!(in_folder(dir.path(), &["a/*.wav"]).unwrap(), expected);
     assert_eq!(in_folder(dir.path(), &["**/*.wav"]).unwrap(), expected.map(|id| format!("a/{id}")));
     let named = dir.path().join("a").join(OsStr::from_bytes(b"x\xff.wav"));
-    let found = inputs::collect(&[&named]).unwrap();
+    let found = inputs::collect(&[&named]).unwrap().inputs;
     assert_eq!((found[0].id.as_str(), &found[0].source), ("x\\xff", &InputSource::File(named)));
 }
 
@@ -131,7 +131,7 @@ fn manifests_bring_stretches_and_labels() {
         "\u{feff}level,path,id,start,end\n0,data/a.wav,,,\nhalf,data/a.wav,a-2,0.5,1.25\n\"a,b\",data/b.wav,,2,\n",
     )
     .unwrap();
-    let found = inputs::collect(&[&csv]).unwrap();
+    let found = inputs::collect(&[&csv]).unwrap().inputs;
     let row = |id: &str, file: &str, start, end, level: &str| Input {
         id: id.into(),
         source: InputSource::File(dir.path().join(file)),
@@ -154,7 +154,7 @@ fn manifests_bring_stretches_and_labels() {
         r#"{"path": "data/b.wav", "id": null, "start": 2, "level": "a,b"}"#,
     ];
     fs::write(&json, lines.join("\n")).unwrap();
-    assert_eq!(inputs::collect(&[&json]).unwrap(), expected);
+    assert_eq!(inputs::collect(&[&json]).unwrap().inputs, expected);
 }
 
 #[test]
@@ -163,10 +163,42 @@ fn labels_of_different_lists_are_joined() {
     fs::write(dir.path().join("1.jsonl"), "{\"path\": \"a.wav\", \"x\": true}\n").unwrap();
     fs::write(dir.path().join("2.csv"), "path,y\nb.wav,2\n").unwrap();
     let names = ["1.jsonl", "2.csv", "c.wav"].map(|n| text(&dir.path().join(n)).to_string());
-    let found = inputs::collect(&names).unwrap();
+    let found = inputs::collect(&names).unwrap().inputs;
     let labels: Vec<Vec<&str>> =
         found.iter().map(|i| i.labels.iter().map(|(_, v)| v.as_str()).collect()).collect();
     assert_eq!(labels, [["true", ""], ["", "2"], ["", ""]]);
+}
+
+#[test]
+fn stretches_of_one_file_get_ids_by_their_times() {
+    let dir = folder(&["a.wav", "b.wav"]);
+    let csv = dir.path().join("m.csv");
+    fs::write(&csv, "path,start,end\na.wav,0.5,1\na.wav,1,\nb.wav,2,3\na.wav,,2\na.wav,,\n").unwrap();
+    let expected = ["a@0.5-1.0", "a@1.0-", "b", "a@0.0-2.0", "a"];
+    assert_eq!(ids(&[text(&csv)]).unwrap(), expected);
+    fs::write(&csv, "path,start,end\na.wav,0.5,1\na.wav,0.5,1\n").unwrap();
+    assert!(ids(&[text(&csv)]).unwrap_err().contains("both have the id \"a.wav@0.5-1.0\""));
+}
+
+#[test]
+fn index_columns_of_pandas_are_no_labels() {
+    let dir = folder(&["a.wav"]);
+    let csv = dir.path().join("m.csv");
+    fs::write(&csv, ",Unnamed: 0,path,y,\n0,0,a.wav,1,9\n").unwrap();
+    let found = inputs::collect(&[&csv]).unwrap().inputs;
+    assert_eq!(found[0].labels, [("y".to_string(), "1".to_string())]);
+}
+
+#[test]
+fn recordings_of_other_formats_are_counted() {
+    let dir = folder(&["a.wav", "b.M4A", "c.txt", "d/e.wma", "._f.wav", ".g.m4a", "d/._h.wma"]);
+    let found = inputs::collect(&[text(dir.path())]).unwrap();
+    assert_eq!(found.inputs.len(), 1);
+    let names: Vec<_> = found.skipped.iter().map(|p| p.file_name().unwrap()).collect();
+    assert_eq!(names, ["b.M4A", "e.wma"]);
+    let warning = found.warning().unwrap();
+    assert!(warning.starts_with("2 files were skipped, whose formats are not read: "), "{warning}");
+    assert_eq!(inputs::collect(&[text(&dir.path().join("a.wav"))]).unwrap().warning(), None);
 }
 
 #[test]

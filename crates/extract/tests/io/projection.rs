@@ -40,7 +40,7 @@ fn recordings(folder: &Path, channels: &[u16]) {
 }
 
 fn extract(folder: &Path, config: Config, out: &Path) -> Table {
-    let found = inputs::collect(&[text(folder).to_string()]).unwrap();
+    let found = inputs::collect(&[text(folder).to_string()]).unwrap().inputs;
     let options = RunOptions {
         out: out.to_path_buf(),
         compression: Compression::Stored,

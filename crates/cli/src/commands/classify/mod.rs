@@ -164,7 +164,11 @@ fn recordings(args: &Args) -> Result<Vec<Input>, Failure> {
     if let Some(name) = args.inputs.iter().find(is_table) {
         return Err(Failure::new(format!("--in {name} is a feature file: give it as --features")));
     }
-    let found = inputs::collect(&args.inputs)?;
+    let collected = inputs::collect(&args.inputs)?;
+    if let Some(skipped) = collected.warning() {
+        eprintln!("warning: {skipped}");
+    }
+    let found = collected.inputs;
     if found.is_empty() {
         let names = args.inputs.join(" ");
         return Err(Failure::new(format!("--in {names}: no recordings found")));
