@@ -1,8 +1,9 @@
-//! Recordings to samples: WAV in all its dialects by a demultiplexer of its own, FLAC, Ogg Vorbis
-//! and MP3 through symphonia (feature `symphonia`, on by default), all as streams of blocks.
+//! Recordings to samples, as streams of blocks: WAV, Wave64, AIFF, AU and CAF by demultiplexers of its
+//! own; FLAC, Ogg and MPEG audio with the decoders of symphonia, lewton and opus-decoder (feature
+//! `symphonia`, on by default).
 //!
 //! Nothing in a file can make a reader panic or allocate more than a fixed amount; what is
-//! accepted, repaired and refused is the table in `docs/wav-policy.md`.
+//! accepted, repaired and refused is the table in `docs/reading.md`.
 //!
 //! ```no_run
 //! let mut source = corsmal_audio::open("recording.wav".as_ref())?;

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-/// One deviation from the standard that the reader worked around; `docs/wav-policy.md` lists the
+/// One deviation from the standard that the reader worked around; `docs/reading.md` lists the
 /// rules. `name` is stable and meant for tables, `Display` is for people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(tag = "name", rename_all = "snake_case")]
@@ -82,7 +82,7 @@ pub enum Repair {
 }
 
 impl Repair {
-    /// Stable short code, the one that `docs/wav-policy.md` uses.
+    /// Stable short code, the one that `docs/reading.md` uses.
     pub fn name(&self) -> &'static str {
         match self {
             Self::DataSizeZero => "data_size_zero",

@@ -41,13 +41,9 @@ pub(crate) fn skip(input: &mut Input) -> Result<(), AudioError> {
         let Some(length) = length(input.peek(SHOWN)?) else {
             return Ok(());
         };
-        let end = input.position().saturating_add(length);
-        if input.len().is_some_and(|len| end > len) {
+        if !input.pass(length)? {
             let first = input.peek(3)?.len().min(3);
             input.consume(first);
-            return Ok(());
-        }
-        if !input.skip(length)? {
             return Ok(());
         }
     }

@@ -104,7 +104,7 @@ pub(super) fn read(input: &mut Input) -> Result<Info, AudioError> {
             info = shown.get(4..4 + LENGTH).and_then(Info::parse);
         }
         input.consume(4);
-        if !input.skip(length.into())? || is_last {
+        if !input.pass(length.into())? || is_last {
             break;
         }
     }

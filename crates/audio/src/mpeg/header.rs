@@ -50,29 +50,36 @@ impl Header {
             code => 4 - code,
         };
         let mpeg1 = halvings == 0;
-        let row = match (mpeg1, layer) {
-            (true, layer) => usize::from(layer) - 1,
-            (false, 1) => 3,
-            (false, _) => 4,
-        };
+        let row = row(mpeg1, layer);
         let bit_rate = 1000 * u32::from(*KBITS[row].get(usize::from(b2 >> 4))?);
         let sample_rate = [44_100, 48_000, 32_000].get(usize::from(b2 >> 2 & 3))? >> halvings;
-        let padding = u32::from(b2 >> 1 & 1);
-        let (samples, size) = match layer {
-            1 => (384, (12 * bit_rate / sample_rate + padding) * 4),
-            2 => (1152, 144 * bit_rate / sample_rate + padding),
-            _ if mpeg1 => (1152, 144 * bit_rate / sample_rate + padding),
-            _ => (576, 72 * bit_rate / sample_rate + padding),
+        let padding = usize::from(b2 >> 1 & 1);
+        let samples = match layer {
+            1 => 384,
+            3 if !mpeg1 => 576,
+            _ => 1152,
         };
+        let slot = if layer == 1 { 4 } else { 1 };
+        let size = slots(samples, slot, bit_rate, sample_rate) + padding * slot;
         Some(Self {
             layer,
             mpeg1,
             sample_rate,
             channels: if b3 >> 6 == 3 { 1 } else { 2 },
             bit_rate,
-            size: if bit_rate == 0 { 0 } else { size as usize },
+            size: if bit_rate == 0 { 0 } else { size },
             samples,
         })
+    }
+
+    /// The sizes that a frame of this recording can have.
+    pub(crate) fn sizes(self) -> impl Iterator<Item = usize> {
+        let slot = if self.layer == 1 { 4 } else { 1 };
+        let rates = KBITS[row(self.mpeg1, self.layer)].iter().skip(1);
+        let plain = move |kbits: &u16| {
+            slots(self.samples, slot, 1000 * u32::from(*kbits), self.sample_rate)
+        };
+        rates.map(plain).flat_map(move |size| [size, size + slot])
     }
 
     /// Whether frames with these headers can follow each other in one recording.
@@ -92,6 +99,20 @@ impl Header {
             (false, _) => 9,
         }
     }
+}
+
+/// The row of [`KBITS`].
+fn row(mpeg1: bool, layer: u8) -> usize {
+    match (mpeg1, layer) {
+        (true, layer) => usize::from(layer) - 1,
+        (false, 1) => 3,
+        (false, _) => 4,
+    }
+}
+
+/// Bytes of a frame without padding: a whole number of slots.
+fn slots(samples: usize, slot: usize, bit_rate: u32, sample_rate: u32) -> usize {
+    samples / 8 / slot * bit_rate as usize / sample_rate as usize * slot
 }
 
 #[cfg(test)]

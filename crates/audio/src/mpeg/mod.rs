@@ -75,13 +75,16 @@ impl Frames {
         }
     }
 
-    /// How many frames the `foreign` bytes before a frame were: damaged headers hide frames, of which
-    /// those of constant bit rate have a known size. Other bytes were put between the frames.
+    /// How many frames the `foreign` bytes before a frame were: damaged headers hide frames, one of
+    /// any bit rate, or several of a constant one. Other bytes were put between the frames.
     fn missing_in(&self, foreign: u64, header: &Header) -> u64 {
-        let Some(before) = self.before.filter(|b| foreign > 0 && b.bit_rate == header.bit_rate)
-        else {
+        let Some(before) = self.before.filter(|_| foreign > 0) else { return 0 };
+        if header.sizes().any(|size| size as u64 == foreign) {
+            return 1;
+        }
+        if before.bit_rate != header.bit_rate {
             return 0;
-        };
+        }
         // A frame is so many bytes on average, times 8 times the sample rate.
         let scale = 8 * u64::from(before.sample_rate);
         let average = before.samples as u64 * u64::from(before.bit_rate);

@@ -179,7 +179,15 @@ impl OggStream {
             (None, Some(_)) if total + place.unplaced == 0 => {}
             (None, Some(granule)) => {
                 let count = total + place.unplaced;
-                // A recording that begins later than 0 was cut out of a longer one.
+                let longest = LONGEST_GAP * u64::from(self.link.sample_rate);
+                let late =
+                    u64::try_from(granule).map_or(0, |granule| granule.saturating_sub(count));
+                if is_lost && (1..=longest).contains(&late) {
+                    let first = self.given + queued(&self.steps);
+                    report.note(Repair::LostFrames { first, count: late });
+                    self.steps.push_back(Step::Silence(late));
+                }
+                // Otherwise, what begins later than 0 was cut out of a longer recording.
                 let extra =
                     u64::try_from(granule).map_or(0, |granule| count.saturating_sub(granule));
                 if self.page.is_last {

@@ -1,4 +1,4 @@
-//! Dialects, repairs and refusals of the WAV reader, as `docs/wav-policy.md` lists them.
+//! Dialects, repairs and refusals of the WAV reader, as `docs/reading.md` lists them.
 
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};

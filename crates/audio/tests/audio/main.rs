@@ -4,10 +4,17 @@
 #![allow(clippy::unwrap_used)]
 
 mod allocations;
+#[cfg(feature = "symphonia")]
+mod cases;
 mod common;
 #[cfg(feature = "symphonia")]
 mod compressed;
+mod containers;
 mod corpus;
+#[cfg(feature = "symphonia")]
+mod damage;
 mod dialects;
 mod mutations;
+#[cfg(feature = "symphonia")]
+mod oracles;
 mod properties;

@@ -173,7 +173,8 @@ fn labels_of_different_lists_are_joined() {
 fn stretches_of_one_file_get_ids_by_their_times() {
     let dir = folder(&["a.wav", "b.wav"]);
     let csv = dir.path().join("m.csv");
-    fs::write(&csv, "path,start,end\na.wav,0.5,1\na.wav,1,\nb.wav,2,3\na.wav,,2\na.wav,,\n").unwrap();
+    fs::write(&csv, "path,start,end\na.wav,0.5,1\na.wav,1,\nb.wav,2,3\na.wav,,2\na.wav,,\n")
+        .unwrap();
     let expected = ["a@0.5-1.0", "a@1.0-", "b", "a@0.0-2.0", "a"];
     assert_eq!(ids(&[text(&csv)]).unwrap(), expected);
     fs::write(&csv, "path,start,end\na.wav,0.5,1\na.wav,0.5,1\n").unwrap();

@@ -1,5 +1,10 @@
-"""Writes the compressed samples beside it (soundfile 0.13, libsndfile 1.2): python make_samples.py."""
+"""Writes the samples beside it: python make_samples.py.
 
+Needs soundfile 0.13 (libsndfile 1.2), ffmpeg 5 with libvorbis and libopus, flac and sndfile-convert.
+"""
+
+import subprocess
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +12,12 @@ import soundfile
 
 HERE = Path(__file__).parent
 FRAMES = 3000
+
+
+def run(*command):
+    """Runs a command, which must succeed."""
+    subprocess.run([str(part) for part in command], check=True, capture_output=True)
+
 
 i, c = np.ogrid[:FRAMES, :8]
 steps = ((i * 37 + c * 1001) % 20011 - 10005).astype(np.int16)
@@ -18,3 +29,24 @@ sines = np.stack([0.5 * np.sin(2 * np.pi * hz * t) for hz in (440, 1000)], 1)
 sines += 0.003 * np.random.default_rng(0).standard_normal(sines.shape)
 soundfile.write(HERE / "sines-2ch.ogg", sines, 44100)
 soundfile.write(HERE / "sine-1ch.mp3", sines[:, 0], 44100)
+
+with tempfile.TemporaryDirectory() as folder:
+    folder = Path(folder)
+    # Sixteen blocks of 192 samples, the last one shorter.
+    soundfile.write(folder / "steps.wav", steps[:, :2], 48000)
+    run("flac", "-s", "-f", "-b", "192", "-o", HERE / "steps-2ch-blocks.flac", folder / "steps.wav")
+    for kind in ("ima", "ms"):
+        wav = HERE / f"sines-2ch-{kind}.wav"
+        soundfile.write(folder / "sines.wav", sines[:1500], 8000)
+        run("sndfile-convert", f"-{kind}-adpcm", folder / "sines.wav", wav)
+        soundfile.read(wav, dtype="int16")[0].astype("<i2").tofile(HERE / f"sines-2ch-{kind}.s16")
+    # Each channel a sine of its own level, so that mixed-up channels show.
+    for channels in (4, 6, 8):
+        many = np.stack([np.sin(2 * np.pi * 300 * t[:6000]) * (n + 1) / 10 for n in range(channels)], 1)
+        soundfile.write(folder / "many.wav", many, 44100)
+        layout = {4: "quad", 6: "5.1", 8: "7.1"}[channels]
+        source = ["ffmpeg", "-y", "-channel_layout", layout, "-i", folder / "many.wav"]
+        run(*source, "-c:a", "libvorbis", "-q:a", "1", HERE / f"levels-{channels}ch.ogg")
+        if channels == 8:
+            opus = ["-c:a", "libopus", "-mapping_family", "255", "-b:a", "128k"]
+            run(*source, *opus, HERE / "levels-8ch.opus")

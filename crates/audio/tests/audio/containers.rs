@@ -1,0 +1,151 @@
+//! Containers beside WAV, built byte by byte: the same samples as in a WAV.
+
+use crate::common::{Recording, read_file, read_pipe};
+
+const SAMPLES: [i16; 8] = [0, 1, -1, 12_345, -12_345, i16::MAX, i16::MIN, 77];
+
+fn read_both(bytes: &[u8]) -> Recording {
+    let file = read_file(bytes.to_vec()).unwrap();
+    assert_eq!(file, read_pipe(bytes.to_vec()).unwrap());
+    file
+}
+
+fn expected() -> Vec<f32> {
+    SAMPLES.iter().map(|s| f32::from(*s) / 32768.0).collect()
+}
+
+fn big() -> Vec<u8> {
+    SAMPLES.iter().flat_map(|s| s.to_be_bytes()).collect()
+}
+
+fn little() -> Vec<u8> {
+    SAMPLES.iter().flat_map(|s| s.to_le_bytes()).collect()
+}
+
+fn check(bytes: &[u8], format: &str, repairs: &[&str]) {
+    let got = read_both(bytes);
+    assert_eq!((got.format.as_str(), got.channels, got.sample_rate), (format, 2, 44_100));
+    assert_eq!((got.samples.as_slice(), got.repairs()), (&expected()[..], repairs.to_vec()));
+}
+
+fn chunk(name: &[u8; 4], body: &[u8]) -> Vec<u8> {
+    let mut chunk = [name.as_slice(), &(body.len() as u32).to_be_bytes(), body].concat();
+    chunk.resize(chunk.len() + body.len() % 2, 0);
+    chunk
+}
+
+fn aiff(kind: &[u8; 4], compression: &[u8], data: &[u8], sound_size: Option<u32>) -> Vec<u8> {
+    let mut common = vec![0, 2, 0, 0, 0, 4, 0, 16, 0x40, 0x0e, 0xac, 0x44, 0, 0, 0, 0, 0, 0];
+    common.extend(compression);
+    let mut sound = chunk(b"SSND", &[&[0; 8], data].concat());
+    if let Some(size) = sound_size {
+        sound[4..8].copy_from_slice(&size.to_be_bytes());
+    }
+    let body = [kind.to_vec(), chunk(b"NAME", b"odd"), chunk(b"COMM", &common), sound].concat();
+    [b"FORM".as_slice(), &(body.len() as u32).to_be_bytes(), &body].concat()
+}
+
+#[test]
+fn aiff_and_aiff_c() {
+    check(&aiff(b"AIFF", b"", &big(), None), "aiff pcm_s16be", &[]);
+    check(&aiff(b"AIFC", b"NONE\0\0", &big(), None), "aifc pcm_s16be", &[]);
+    check(&aiff(b"AIFC", b"sowt\0\0", &little(), None), "aifc pcm_s16le", &[]);
+    check(&aiff(b"AIFF", b"", &big(), Some(0)), "aiff pcm_s16be", &["data_size_zero"]);
+    check(&aiff(b"AIFF", b"", &big(), Some(u32::MAX)), "aiff pcm_s16be", &["data_size_unknown"]);
+    check(&aiff(b"AIFF", b"", &big(), Some(900)), "aiff pcm_s16be", &["truncated"]);
+    let error = read_file(aiff(b"AIFC", b"ima4\0\0", &big(), None)).unwrap_err();
+    assert!(error.to_string().contains("ima4"), "{error}");
+    // The samples first, which only a file can have.
+    let plain = aiff(b"AIFF", b"", &big(), None);
+    let (head, rest) = plain.split_at(12 + 12);
+    let (common, sound) = rest.split_at(8 + 18);
+    let swapped = [head, sound, common].concat();
+    assert_eq!(read_file(swapped.clone()).unwrap().samples, expected());
+    assert!(read_pipe(swapped).unwrap_err().to_string().contains("COMM first"));
+}
+
+#[test]
+fn au_in_both_byte_orders() {
+    let au = |size: u32| {
+        let fields = [28u32, size, 3, 44_100, 2].map(u32::to_be_bytes).concat();
+        [b".snd".as_slice(), &fields, b"text", &big()].concat()
+    };
+    check(&au(16), "au pcm_s16be", &[]);
+    check(&au(u32::MAX), "au pcm_s16be", &[]);
+    check(&au(0), "au pcm_s16be", &["data_size_zero"]);
+    check(&au(160), "au pcm_s16be", &["truncated"]);
+    let fields = [24u32, 16, 3, 44_100, 2].map(u32::to_le_bytes).concat();
+    check(&[b"dns.".as_slice(), &fields, &little()].concat(), "au pcm_s16le", &[]);
+}
+
+#[test]
+fn core_audio_format() {
+    let caf = |flags: u32, data: &[u8], size: i64| {
+        let mut bytes = b"caff\0\x01\0\0desc\0\0\0\0\0\0\0\x20".to_vec();
+        bytes.extend(44_100f64.to_be_bytes());
+        bytes.extend(b"lpcm");
+        bytes.extend([flags, 4, 1, 2, 16].map(u32::to_be_bytes).concat());
+        bytes.extend(b"free\0\0\0\0\0\0\0\x03abcdata");
+        bytes.extend(size.to_be_bytes());
+        bytes.extend([0; 4]);
+        bytes.extend(data);
+        bytes
+    };
+    check(&caf(0, &big(), 20), "caf pcm_s16be", &[]);
+    check(&caf(2, &little(), 20), "caf pcm_s16le", &[]);
+    check(&caf(2, &little(), -1), "caf pcm_s16le", &[]);
+    check(&caf(2, &little(), 200), "caf pcm_s16le", &["truncated"]);
+}
+
+#[test]
+fn wave64() {
+    let rest = *b"\xf3\xac\xd3\x11\x8c\xd1\x00\xc0\x4f\x8e\xdb\x8a";
+    let part = |name: &[u8; 4], size: u64, body: &[u8]| {
+        let mut part = [name.as_slice(), &rest, &size.to_le_bytes(), body].concat();
+        part.resize(part.len().next_multiple_of(8), 0);
+        part
+    };
+    let file = |size: u64| {
+        let mut bytes = b"riff\x2e\x91\xcf\x11\xa5\xd6\x28\xdb\x04\xc1\x00\x00".to_vec();
+        bytes.extend([0; 8]);
+        bytes.extend(b"wave");
+        bytes.extend(rest);
+        let format = [1, 0, 2, 0, 0x44, 0xac, 0, 0, 0x10, 0xb1, 2, 0, 4, 0, 16, 0];
+        bytes.extend(part(b"junk", 24 + 3, b"abc"));
+        bytes.extend(part(b"fmt ", 24 + 16, &format));
+        bytes.extend(part(b"data", size, &little()));
+        bytes
+    };
+    check(&file(24 + 16), "w64 pcm_s16le", &[]);
+    check(&file(24), "w64 pcm_s16le", &["data_size_zero"]);
+    check(&file(240), "w64 pcm_s16le", &["truncated"]);
+}
+
+/// libsndfile's samples of the same files are beside them.
+#[test]
+fn adpcm_is_that_of_libsndfile() {
+    let cases: [(&[u8], &[u8], &str); 2] = [
+        (
+            include_bytes!("samples/sines-2ch-ima.wav"),
+            include_bytes!("samples/sines-2ch-ima.s16"),
+            "wav adpcm_ima_wav",
+        ),
+        (
+            include_bytes!("samples/sines-2ch-ms.wav"),
+            include_bytes!("samples/sines-2ch-ms.s16"),
+            "wav adpcm_ms",
+        ),
+    ];
+    for (wav, samples, format) in cases {
+        let got = read_both(wav);
+        let (pairs, _) = samples.as_chunks::<2>();
+        let expected: Vec<f32> =
+            pairs.iter().map(|b| f32::from(i16::from_le_bytes(*b)) / 32768.0).collect();
+        assert_eq!((got.samples.as_slice(), got.format.as_str()), (&expected[..], format));
+        assert_eq!(got.declared_frames, Some(expected.len() as u64 / 2));
+        // Cut inside a block: whole samples of it count, and the rest is said.
+        let cut = read_file(wav[..wav.len() - 101].to_vec()).unwrap();
+        assert!(cut.report.truncated && !cut.samples.is_empty());
+        assert_eq!(cut.samples, expected[..cut.samples.len()]);
+    }
+}
