@@ -344,7 +344,8 @@ impl<'a> Collector<'a> {
         recording: Result<Recording, Failed>,
     ) {
         let plan = &planned.plan;
-        let stretch = reader::check_stretch(&self.inputs[index], &plan.config.signal, &mut outcome);
+        let stretch =
+            reading::check_stretch(&self.inputs[index], &plan.config.signal, &mut outcome);
         let finish = || -> Result<Parts, Failed> {
             let recording = recording?;
             watch.check_content(&outcome.identity)?;
