@@ -72,9 +72,19 @@ impl Header {
         })
     }
 
+    /// Bytes of a frame of the same bit rate without padding.
+    pub(crate) fn plain_size(&self) -> usize {
+        slots(self.samples, self.slot(), self.bit_rate, self.sample_rate)
+    }
+
+    /// Bytes of padding, where there is some.
+    fn slot(&self) -> usize {
+        if self.layer == 1 { 4 } else { 1 }
+    }
+
     /// The sizes that a frame of this recording can have.
     pub(crate) fn sizes(self) -> impl Iterator<Item = usize> {
-        let slot = if self.layer == 1 { 4 } else { 1 };
+        let slot = self.slot();
         let rates = KBITS[row(self.mpeg1, self.layer)].iter().skip(1);
         let plain = move |kbits: &u16| {
             slots(self.samples, slot, 1000 * u32::from(*kbits), self.sample_rate)

@@ -85,7 +85,12 @@ impl Frames {
         if before.bit_rate != header.bit_rate {
             return 0;
         }
-        // A frame is so many bytes on average, times 8 times the sample rate.
+        // Some encoders never pad.
+        let plain = before.plain_size().max(1) as u64;
+        if foreign.is_multiple_of(plain) {
+            return foreign / plain;
+        }
+        // With padding, a frame is so many bytes on average, times 8 times the sample rate.
         let scale = 8 * u64::from(before.sample_rate);
         let average = before.samples as u64 * u64::from(before.bit_rate);
         let frames = (foreign * scale + average / 2) / average;

@@ -138,10 +138,7 @@ fn damaged_frames_of_mp3_are_silence_of_their_length() {
     // One of a variable bit rate, and two of those that have the same one.
     let constant: Vec<_> = frames.iter().copied().filter(|f| f[2] >> 4 == 5).collect();
     assert!(constant.len() > 8, "{} frames of 64 kbit/s", constant.len());
-    // Padding makes two such frames 418 bytes long in a stream of constant bit rate.
-    let is_pair = |at: &usize| constant[*at].len() + constant[*at + 1].len() == 418;
-    let pair = (2..constant.len() - 4).find(is_pair).expect("a pair of 418 bytes");
-    for (frames, at, count, trimmed) in [(frames, 11, 1, 1105), (constant.clone(), pair, 2, 0)] {
+    for (frames, at, count, trimmed) in [(frames, 11, 1, 1105), (constant, 3, 2, 0)] {
         let plain = read_both(&frames.concat());
         let mut damaged: Vec<Vec<u8>> = frames.iter().map(|f| f.to_vec()).collect();
         for frame in &mut damaged[at..at + count] {
