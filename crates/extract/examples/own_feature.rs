@@ -106,7 +106,7 @@ pub fn main() -> Result<(), Box<dyn Error>> {
     let mut wav = hound::WavWriter::create(&path, spec)?;
     sine.iter().try_for_each(|x| wav.write_sample(*x))?;
     wav.finalize()?;
-    let inputs = inputs::collect(&[path.into_os_string()])?;
+    let inputs = inputs::collect(&[path.into_os_string()])?.inputs;
     let options = RunOptions {
         out: folder.path().join("features.npz"),
         compression: Compression::Stored,

@@ -201,7 +201,8 @@ fn a_recording_that_changes_while_it_is_read_has_no_features() {
         for (what, change) in changes {
             wav(&at("a"), 8000, samples);
             wav(&at("b"), 8000, 8000);
-            let found = inputs::collect(&[text(&folder.path().join("audio")).to_string()]).unwrap();
+            let found =
+                inputs::collect(&[text(&folder.path().join("audio")).to_string()]).unwrap().inputs;
             let options = RunOptions {
                 out: folder.path().join("out.npz"),
                 compression: Compression::Stored,
