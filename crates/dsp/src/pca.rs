@@ -29,14 +29,76 @@ impl Pca {
     /// Fewer than two rows, `n_components` of 0 or above the smaller side, non-finite values.
     pub fn fit(x: ArrayView2<f64>, n_components: usize) -> Result<Self> {
         let (rows, columns) = x.dim();
+        let most = rows.min(columns);
+        if rows >= 2 && (n_components == 0 || n_components > most) {
+            let allowed = format!("1 to {most}, the smaller side of X");
+            return Err(DspError::parameter("n_components", n_components, allowed));
+        }
+        Eigen::of(x)?.directions(n_components)
+    }
+
+    /// Fits as many directions as explain more than `part` of the variance, all of them for 1; gives
+    /// the total variance too (denominator rows - 1).
+    ///
+    /// # Errors
+    /// As [`Pca::fit`]; `part` outside 0 to 1.
+    pub fn fit_explaining(x: ArrayView2<f64>, part: f64) -> Result<(Self, f64)> {
+        if !(0.0..=1.0).contains(&part) {
+            return Err(DspError::parameter("part of the variance", part, "0 to 1"));
+        }
+        let most = x.nrows().min(x.ncols());
+        let eigen = Eigen::of(x)?;
+        let values = eigen.values.mapv(|v| v.max(0.0));
+        let total = values.sum();
+        let mut sum = 0.0;
+        let enough = values.iter().position(|v| {
+            sum += v / total;
+            sum > part
+        });
+        let kept = enough.map_or(most, |at| (at + 1).min(most));
+        Ok((eigen.directions(kept)?, total / (x.nrows() - 1) as f64))
+    }
+
+    /// Total variance of `x [rows, columns]` (denominator rows - 1), of which the
+    /// [`explained_variance`](Self::explained_variance) of all components is the sum.
+    pub fn total_variance(&self, x: ArrayView2<f64>) -> f64 {
+        let squares: f64 = (&x - &self.mean).iter().map(|v| v * v).sum();
+        squares / x.nrows().saturating_sub(1).max(1) as f64
+    }
+
+    /// Coordinates `[rows, components]` of `x [rows, columns]`; `whiten` divides each by its
+    /// standard deviation.
+    ///
+    /// # Errors
+    /// Another number of columns than the fit had.
+    pub fn project(&self, x: ArrayView2<f64>, whiten: bool) -> Result<Array2<f64>> {
+        if x.ncols() != self.mean.len() || self.components.ncols() != self.mean.len() {
+            let expected = format!("{} columns", self.mean.len());
+            return Err(DspError::Shape { name: "X", expected, actual: x.shape().to_vec() });
+        }
+        let mut z = (&x - &self.mean).dot(&self.components.t());
+        if whiten {
+            z /= &self.explained_variance.mapv(f64::sqrt);
+        }
+        Ok(z)
+    }
+}
+
+/// The centred data with the eigenvectors of the smaller of its two Gram matrices.
+struct Eigen {
+    mean: Array1<f64>,
+    centred: Array2<f64>,
+    /// Descending.
+    values: Array1<f64>,
+    vectors: Array2<f64>,
+}
+
+impl Eigen {
+    fn of(x: ArrayView2<f64>) -> Result<Self> {
+        let (rows, columns) = x.dim();
         if rows < 2 {
             let expected = "at least two rows".into();
             return Err(DspError::Shape { name: "X", expected, actual: x.shape().to_vec() });
-        }
-        let most = rows.min(columns);
-        if n_components == 0 || n_components > most {
-            let allowed = format!("1 to {most}, the smaller side of X");
-            return Err(DspError::parameter("n_components", n_components, allowed));
         }
         require_finite("X", x)?;
         let mean = x.sum_axis(Axis(0)) / rows as f64;
@@ -44,11 +106,18 @@ impl Pca {
         let tall = rows > columns;
         let gram = if tall { centred.t().dot(&centred) } else { centred.dot(&centred.t()) };
         require_finite("X, squared", &gram)?;
-        let (_, vectors) = gram
+        let (values, vectors) = gram
             .eigh_into()
             .map_err(|e| DspError::parameter("X", e, "data whose eigenvectors converge"))?
             .sort_eig_desc();
+        Ok(Self { mean, centred, values, vectors })
+    }
 
+    /// The first directions as an orthonormal set.
+    fn directions(self, n_components: usize) -> Result<Pca> {
+        let Self { mean, centred, vectors, .. } = self;
+        let (rows, columns) = centred.dim();
+        let tall = rows > columns;
         let mut components = Array2::<f64>::zeros((n_components, columns));
         let mut explained_variance = Array1::zeros(n_components);
         let mut largest = 0.0f64;
@@ -74,24 +143,7 @@ impl Pca {
             components.row_mut(k).assign(&unit);
             explained_variance[k] = spread * spread / (rows - 1) as f64;
         }
-        Ok(Self { mean, components, explained_variance })
-    }
-
-    /// Coordinates `[rows, components]` of `x [rows, columns]`; `whiten` divides each by its
-    /// standard deviation.
-    ///
-    /// # Errors
-    /// Another number of columns than the fit had.
-    pub fn project(&self, x: ArrayView2<f64>, whiten: bool) -> Result<Array2<f64>> {
-        if x.ncols() != self.mean.len() || self.components.ncols() != self.mean.len() {
-            let expected = format!("{} columns", self.mean.len());
-            return Err(DspError::Shape { name: "X", expected, actual: x.shape().to_vec() });
-        }
-        let mut z = (&x - &self.mean).dot(&self.components.t());
-        if whiten {
-            z /= &self.explained_variance.mapv(f64::sqrt);
-        }
-        Ok(z)
+        Ok(Pca { mean, components, explained_variance })
     }
 }
 

@@ -7,7 +7,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
 use crate::error::{ModelError, Result};
-use crate::metrics::Scores;
+use crate::scores::Scores;
 
 /// McNemar's exact test.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -1,50 +1,66 @@
 //! Predictions of rows that were not trained on, with or without a choice of pipeline inside.
 
+use linfa::DatasetBase;
+use linfa::traits::{Fit, Predict};
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::Serialize;
 
+use crate::classifiers::Predicted;
 use crate::error::{ModelError, Result};
 use crate::fusion::merge_classes;
-use crate::metrics::Scores;
 use crate::pipeline::PipelineSpec;
+use crate::scores::Scores;
 use crate::splits::Fold;
 use crate::spread::Spread;
 use crate::table::argmax;
+use crate::targets::Classes;
 
 /// Labelled rows.
 #[derive(Clone, Copy, Debug)]
 pub struct Data<'a> {
-    /// `[rows, features]`
-    pub x: ArrayView2<'a, f64>,
-    /// class indices trained on
-    pub y: &'a [usize],
-    /// classes trained on
-    pub n_classes: usize,
+    /// `[rows, features]` and the classes trained on
+    pub dataset: &'a DatasetBase<ArrayView2<'a, f64>, Classes>,
     /// the class scored for each class trained on, e.g. the level of each joint class: their
     /// probabilities are added up
     pub merge: Option<&'a [usize]>,
 }
 
 impl Data<'_> {
+    fn classes(&self) -> &Classes {
+        &self.dataset.targets
+    }
+
     fn scored_classes(&self) -> usize {
-        self.merge.map_or(self.n_classes, |m| m.iter().max().map_or(0, |c| c + 1))
+        let all = self.classes().n_classes();
+        self.merge.map_or(all, |m| m.iter().max().map_or(0, |c| c + 1))
     }
 
     fn scored(&self, rows: &[usize]) -> Vec<usize> {
-        let class = |&row: &usize| self.merge.map_or(self.y[row], |m| m[self.y[row]]);
+        let y = self.classes().indices();
+        let class = |&row: &usize| self.merge.map_or(y[row], |m| m[y[row]]);
         rows.iter().map(class).collect()
     }
 
+    /// Some of the rows as a data set of their own.
+    fn select(&self, rows: &[usize]) -> DatasetBase<Array2<f64>, Classes> {
+        let x = self.dataset.records.select(Axis(0), rows);
+        DatasetBase::new(x, self.classes().select(rows))
+    }
+
     fn check(&self, folds: &[Fold]) -> Result<()> {
-        crate::table::check_features(self.x)?;
-        crate::table::check_labels(self.x.nrows(), self.y, self.n_classes)?;
+        let (x, n_classes) = (&self.dataset.records, self.classes().n_classes());
+        crate::table::check_features(x.view())?;
+        if self.classes().len() != x.nrows() {
+            let (expected, actual) = (x.nrows(), self.classes().len());
+            return Err(ModelError::Length { what: "labels", expected, actual });
+        }
         if let Some(merge) = self.merge
-            && merge.len() != self.n_classes
+            && merge.len() != n_classes
         {
             let what = "merged classes";
-            return Err(ModelError::Length { what, expected: self.n_classes, actual: merge.len() });
+            return Err(ModelError::Length { what, expected: n_classes, actual: merge.len() });
         }
-        let mut tested = vec![false; self.x.nrows()];
+        let mut tested = vec![false; x.nrows()];
         for fold in folds {
             let refuse = |reason: &str| {
                 Err(ModelError::Folds { reason: format!("fold {}: {reason}", fold.name) })
@@ -138,22 +154,19 @@ pub fn cross_validate(
 }
 
 fn run_fold(data: &Data<'_>, fold: &Fold, spec: &PipelineSpec) -> Result<FoldOutcome> {
-    let train_y: Vec<usize> = fold.train.iter().map(|&row| data.y[row]).collect();
-    let train_x = data.x.select(Axis(0), &fold.train);
-    let model = spec.train(train_x.view(), &train_y, data.n_classes)?;
-    let test_x = data.x.select(Axis(0), &fold.test);
-    let proba = match model.predict_proba(test_x.view()) {
-        Ok(proba) => Some(proba),
-        Err(ModelError::NoProbability { .. }) if data.merge.is_none() => None,
-        Err(e) => return Err(e),
-    };
-    let (predicted, proba) = match data.merge {
-        None => (model.predict(test_x.view())?, proba),
-        Some(merge) => {
-            let merged = proba.map(|p| merge_classes(p.view(), merge, data.scored_classes()));
-            let merged = merged.transpose()?;
-            let rows = merged.iter().flat_map(|m| m.outer_iter());
-            (rows.map(|row| argmax(row.iter())).collect(), merged)
+    let model = spec.fit(&data.select(&fold.train))?;
+    let predicted: Result<Predicted> = Predict::predict(&model, &data.select(&fold.test));
+    let Predicted { classes, proba } = predicted?;
+    let (predicted, proba) = match (data.merge, proba) {
+        (None, proba) => (classes, proba),
+        (Some(merge), Some(proba)) => {
+            let merged = merge_classes(proba.view(), merge, data.scored_classes())?;
+            (merged.outer_iter().map(|row| argmax(row.iter())).collect(), Some(merged))
+        }
+        (Some(_), None) => {
+            let owner = spec.classifier.name();
+            let remedy = "merged classes add them up, so train with probabilities";
+            return Err(ModelError::NoProbability { owner, remedy });
         }
     };
     let scores = Scores::new(&data.scored(&fold.test), &predicted, data.scored_classes())?;
@@ -197,9 +210,9 @@ pub fn choose(
     if candidates.is_empty() {
         return Err(ModelError::Folds { reason: "no pipeline to choose from".into() });
     }
-    let x = data.x.select(Axis(0), rows);
-    let y: Vec<usize> = rows.iter().map(|&row| data.y[row]).collect();
-    let inside = Data { x: x.view(), y: &y, ..*data };
+    let inside = data.select(rows);
+    let inside = DatasetBase::new(inside.records.view(), inside.targets.clone());
+    let inside = Data { dataset: &inside, ..*data };
     let inner_folds = inner(rows)?;
     let score = |spec| cross_validate(&inside, &inner_folds, spec).map(|cv| cv.weighted_f1.mean);
     let scores: Vec<f64> = candidates.iter().map(score).collect::<Result<_>>()?;

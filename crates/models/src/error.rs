@@ -132,11 +132,19 @@ pub enum ModelError {
         /// why
         reason: String,
     },
-    /// Probabilities asked of a model trained without them.
-    #[error("this {owner} was trained without probabilities: train with probability=true")]
+    /// Probabilities asked of a model that has none.
+    #[error("this {owner} has no probabilities: {remedy}")]
     NoProbability {
         /// classifier
         owner: &'static str,
+        /// how to train one that has
+        remedy: &'static str,
+    },
+    /// A classifier registered under a name that another one has.
+    #[error("the name {name:?} already belongs to a classifier: register yours under another one")]
+    NameTaken {
+        /// the name
+        name: &'static str,
     },
     /// An iterative method that did not get there.
     #[error("{owner}: {reason}")]

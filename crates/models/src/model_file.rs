@@ -19,11 +19,13 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use ndarray::{Array2, ArrayView2};
+use linfa::traits::PredictInplace;
+use ndarray::{Array2, ArrayBase, ArrayView2, Data, Ix2};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
+use crate::classifiers::Predicted;
 use crate::error::{ModelError, Result};
 use crate::labels::Labels;
 use crate::pipeline::{Pipeline, PipelineSpec};
@@ -129,6 +131,22 @@ pub enum ModelFileError {
         /// hash of the features
         features: String,
     },
+}
+
+impl ModelHeader {
+    /// A header that knows pipeline and labels only: of features that no program made.
+    pub fn new(pipeline: PipelineSpec, labels: Labels) -> Self {
+        Self {
+            pipeline,
+            labels,
+            target: "y".into(),
+            feature_names: Vec::new(),
+            feature_config: Value::Null,
+            feature_config_hash: String::new(),
+            provenance: Value::Null,
+            tool_version: env!("CARGO_PKG_VERSION").into(),
+        }
+    }
 }
 
 impl Model {
@@ -275,6 +293,17 @@ fn configuration(hash: &str) -> String {
     match hash {
         "" => "no configuration (of another program)".into(),
         hash => format!("configuration {hash}"),
+    }
+}
+
+/// A model predicts as linfa's do: `model.predict(&dataset)`, or `&array`; a refusal is in the result.
+impl<D: Data<Elem = f64>> PredictInplace<ArrayBase<D, Ix2>, Result<Predicted>> for Model {
+    fn predict_inplace<'a>(&'a self, x: &'a ArrayBase<D, Ix2>, y: &mut Result<Predicted>) {
+        self.pipeline.predict_inplace(x, y);
+    }
+
+    fn default_target(&self, x: &ArrayBase<D, Ix2>) -> Result<Predicted> {
+        self.pipeline.default_target(x)
     }
 }
 

@@ -31,11 +31,16 @@ pub trait Parameters: Default + Serialize + DeserializeOwned {
     /// [`ModelError::ParameterValue`] naming key, value and what is allowed.
     fn check(&self) -> Result<()>;
 
-    /// From a JSON object; keys left out keep their defaults.
+    /// Every parameter with its value, in the order of the table.
+    fn values(&self) -> Map<String, Value>;
+
+    /// From a JSON object; keys left out keep their defaults, and scikit-learn's names of keys are
+    /// understood ([`SKLEARN_NAMES`]).
     ///
     /// # Errors
     /// [`ModelError::UnknownParameter`] or [`ModelError::ParameterValue`].
     fn from_json(object: &Map<String, Value>) -> Result<Self> {
+        let object = &canonical(Self::OWNER, Self::TABLE, object)?;
         for (key, value) in object {
             let Some(parameter) = Self::TABLE.iter().find(|p| p.key == key) else {
                 let keys: Vec<_> = Self::TABLE.iter().map(|p| p.key).collect();
@@ -78,13 +83,69 @@ pub trait Parameters: Default + Serialize + DeserializeOwned {
     }
 }
 
+/// scikit-learn's names of parameters that are called otherwise here.
+pub const SKLEARN_NAMES: &[(&str, &str)] = &[
+    ("n_neighbors", "k"),
+    ("n_estimators", "trees"),
+    ("random_state", "seed"),
+    ("cache_size", "cache_mb"),
+];
+
+/// The key of `table` that a user's word stands for: itself, or scikit-learn's name of it.
+pub(crate) fn key_of<'a>(table: &[Parameter], word: &'a str) -> &'a str {
+    let known = |key: &str| table.iter().any(|p| p.key == key);
+    let alias = SKLEARN_NAMES.iter().find(|(name, key)| *name == word && known(key));
+    match alias {
+        Some((_, key)) if !known(word) => key,
+        _ => word,
+    }
+}
+
+/// The same object with the keys of the table.
+fn canonical(
+    owner: &'static str,
+    table: &[Parameter],
+    object: &Map<String, Value>,
+) -> Result<Map<String, Value>> {
+    let mut renamed = Map::new();
+    for (word, value) in object {
+        let key = key_of(table, word);
+        if renamed.insert(key.to_string(), value.clone()).is_some() {
+            return Err(ModelError::ParameterValue {
+                owner,
+                key: key.into(),
+                value: value.to_string(),
+                allowed: format!("{key} is given twice (scikit-learn calls it {word})"),
+            });
+        }
+    }
+    Ok(renamed)
+}
+
 /// Declares a parameter struct with its table: `field: Type = default, "what it may be", "what it
-/// does";`. The ranges are given by a closure-like block over `self`.
+/// does";`. The ranges are checked by the block after `check`, to which the struct is given by the
+/// name in parentheses; it gives a [`Result`](crate::Result).
+///
+/// ```
+/// use corsmal_models::params::{Parameters, parameters};
+///
+/// parameters! {
+///     /// Parameters of a rule with one threshold.
+///     ThresholdParams, "threshold" {
+///         feature: usize = 0, "a feature number from 0", "the feature compared";
+///     }
+///     check(_this) {
+///         Ok(())
+///     }
+/// }
+/// assert_eq!(ThresholdParams::TABLE[0].key, "feature");
+/// ```
+#[macro_export]
 macro_rules! parameters {
     (
         $(#[$meta:meta])*
         $name:ident, $owner:literal {
-            $($field:ident: $type:ty = $default:expr, $allowed:literal, $help:literal;)*
+            $($(#[$field_meta:meta])* $field:ident: $type:ty = $default:expr, $allowed:literal, $help:literal;)*
         }
         check($this:ident) $check:block
     ) => {
@@ -92,7 +153,7 @@ macro_rules! parameters {
         #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
         #[serde(deny_unknown_fields, default)]
         pub struct $name {
-            $(#[doc = $help] pub $field: $type,)*
+            $(#[doc = $help] $(#[$field_meta])* pub $field: $type,)*
         }
 
         impl Default for $name {
@@ -113,10 +174,28 @@ macro_rules! parameters {
                 let $this = self;
                 $check
             }
+
+            fn values(&self) -> $crate::params::Values {
+                let mut values = $crate::params::Values::new();
+                $(values.insert(
+                    stringify!($field).to_string(),
+                    $crate::params::json(&self.$field),
+                );)*
+                values
+            }
         }
     };
 }
-pub(crate) use parameters;
+pub use parameters;
+
+/// Parameters by key.
+pub type Values = Map<String, Value>;
+
+/// A parameter's value as JSON; `null` where it has none.
+#[doc(hidden)]
+pub fn json<T: Serialize>(value: &T) -> Value {
+    serde_json::to_value(value).unwrap_or(Value::Null)
+}
 
 /// Parses `key=value` texts into a JSON object: values that are JSON stay so, `a,b,c` becomes a
 /// list, anything else is text.

@@ -1,12 +1,15 @@
 //! Steps followed by a classifier.
 
-use ndarray::{Array2, ArrayView2, CowArray, Ix2};
+use linfa::DatasetBase;
+use linfa::traits::{Fit, PredictInplace};
+use ndarray::{Array2, ArrayBase, ArrayView2, CowArray, Data, Ix2};
 use serde::{Deserialize, Serialize};
 
-use crate::classifiers::{Classifier, ClassifierSpec};
+use crate::classifiers::{Classifier, ClassifierSpec, Predicted};
 use crate::error::{ModelError, Result};
 use crate::steps::{Step, StepSpec};
 use crate::table::{check_features, check_labels, check_query};
+use crate::targets::Classes;
 
 /// What is trained: steps, then a classifier.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -51,6 +54,15 @@ impl PipelineSpec {
         }
         let classifier = self.classifier.train(current.view(), y, n_classes)?;
         Ok(Pipeline { steps, classifier })
+    }
+}
+
+impl<D: Data<Elem = f64>> Fit<ArrayBase<D, Ix2>, Classes, ModelError> for PipelineSpec {
+    type Object = Pipeline;
+
+    fn fit(&self, dataset: &DatasetBase<ArrayBase<D, Ix2>, Classes>) -> Result<Pipeline> {
+        let classes = &dataset.targets;
+        self.train(dataset.records.view(), &classes.indices().to_vec(), classes.n_classes())
     }
 }
 
@@ -112,5 +124,17 @@ impl Pipeline {
         let joined = self.steps.windows(2).all(|w| w[0].n_outputs() == w[1].n_inputs());
         let last = self.steps.last().is_none_or(|s| s.n_outputs() == self.classifier.n_features());
         if joined && last { Ok(()) } else { Err(ModelError::Inconsistent("pipeline".into())) }
+    }
+}
+
+impl<D: Data<Elem = f64>> PredictInplace<ArrayBase<D, Ix2>, Result<Predicted>> for Pipeline {
+    fn predict_inplace<'a>(&'a self, x: &'a ArrayBase<D, Ix2>, y: &mut Result<Predicted>) {
+        *y = self
+            .through_steps(x.view())
+            .and_then(|x| linfa::traits::Predict::predict(&self.classifier, &x));
+    }
+
+    fn default_target(&self, _: &ArrayBase<D, Ix2>) -> Result<Predicted> {
+        Ok(Predicted { classes: Vec::new(), proba: None })
     }
 }

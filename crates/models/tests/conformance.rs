@@ -6,10 +6,12 @@ mod common;
 
 use common::clouds;
 use corsmal_models::ModelError;
-use corsmal_models::classifiers::{CLASSIFIERS, ClassifierSpec};
+use corsmal_models::classifiers::{CLASSIFIERS, ClassifierSpec, Predicted};
 use corsmal_models::params::key_values;
-use linfa::Dataset;
-use linfa::traits::{Fit, PredictInplace};
+use corsmal_models::pipeline::PipelineSpec;
+use corsmal_models::targets::Classes;
+use linfa::traits::{Fit, Predict};
+use linfa::{Dataset, DatasetBase};
 use ndarray::{Array1, Axis, s};
 
 fn all() -> impl Iterator<Item = ClassifierSpec> {
@@ -173,13 +175,41 @@ fn linfa_users_are_at_home() {
     let dataset = Dataset::new(x.clone(), Array1::from(y.clone()));
     for spec in all() {
         let model = spec.fit(&dataset).unwrap();
-        let mut labels = model.default_target(&x);
-        model.predict_inplace(&x, &mut labels);
-        assert_eq!(
-            labels.to_vec(),
-            spec.train(x.view(), &y, 3).unwrap().predict(x.view()).unwrap()
-        );
+        let predicted: Result<Predicted, ModelError> = Predict::predict(&model, &dataset);
+        let expected = spec.train(x.view(), &y, 3).unwrap();
+        assert_eq!(predicted.unwrap().classes, expected.predict(x.view()).unwrap());
+        let narrow = x.slice(s![.., ..3]).to_owned();
+        let refused: Result<Predicted, ModelError> = Predict::predict(&model, &narrow);
+        assert!(matches!(refused, Err(ModelError::Length { expected: 4, actual: 3, .. })));
     }
+}
+
+#[test]
+fn pipelines_fit_data_sets_whose_classes_may_lack_rows() {
+    let (x, y) = clouds(60, 4, 2, 8);
+    let dataset = DatasetBase::new(x.view(), Classes::new(y.clone(), 3).unwrap());
+    let spec = PipelineSpec::standardized(ClassifierSpec::named("rf").unwrap());
+    let fitted = spec.fit(&dataset).unwrap();
+    assert_eq!(fitted.n_classes(), 3);
+    let predicted: Result<Predicted, ModelError> = Predict::predict(&fitted, &dataset);
+    let proba = predicted.unwrap().proba.unwrap();
+    assert!(proba.column(2).iter().all(|p| *p == 0.0));
+    assert!(Classes::new(y, 1).is_err());
+}
+
+#[test]
+fn names_of_scikit_learn_are_understood() {
+    let spec = |name: &str, texts: &[&str]| ClassifierSpec::new(name, &key_values(texts).unwrap());
+    let forest = spec("rf", &["n_estimators=7", "random_state=3"]).unwrap();
+    assert_eq!(
+        (&forest.parameters()["trees"], &forest.parameters()["seed"]),
+        (&7.into(), &3.into())
+    );
+    assert_eq!(spec("knn", &["n_neighbors=2"]).unwrap().parameters()["k"], 2);
+    assert_eq!(forest.key("n_estimators"), "trees");
+    let twice = spec("rf", &["trees=3", "n_estimators=4"]).unwrap_err().to_string();
+    assert!(twice.contains("trees is given twice"), "{twice}");
+    assert!(spec("knn", &["n_estimators=4"]).is_err(), "kNN has no trees");
 }
 
 #[test]
@@ -190,7 +220,7 @@ fn parameters_are_checked_by_name() {
     };
     assert_eq!(
         refuse("knn", &["neighbours=3"]),
-        "knn has no parameter neighbours: it has k, weights, metric, p"
+        "knn has no parameter neighbours: it has k, weights, metric, p, algorithm"
     );
     assert_eq!(
         refuse("knn", &["k=0"]),

@@ -13,7 +13,8 @@ fn same_together_and_alone(x: &Array2<f64>, y: &[usize], what: &str) {
     for metric in [Metric::Euclidean, Metric::Cosine] {
         for k in [1, 5, 20] {
             let weights = if k == 5 { Weights::Uniform } else { Weights::Distance };
-            let spec = ClassifierSpec::from(KNearestParams { k, metric, weights, p: 2.0 });
+            let spec =
+                ClassifierSpec::from(KNearestParams { k, metric, weights, ..Default::default() });
             let model = spec.train(x.view(), y, 3).unwrap();
             let together = model.predict_proba(x.view()).unwrap();
             for (row, expected) in x.axis_chunks_iter(Axis(0), 1).zip(together.outer_iter()) {

@@ -9,13 +9,23 @@ use corsmal_models::ModelError;
 use corsmal_models::classifiers::ClassifierSpec;
 use corsmal_models::cross_validation::{Data, cross_validate, nested_cross_validate};
 use corsmal_models::grid::combinations;
-use corsmal_models::metrics::Scores;
 use corsmal_models::params::key_values;
 use corsmal_models::pipeline::PipelineSpec;
+use corsmal_models::scores::Scores;
 use corsmal_models::splits::{Fold, stratified_k_fold};
 use corsmal_models::steps::StepSpec;
-use ndarray::array;
+use corsmal_models::targets::Classes;
+use linfa::DatasetBase;
+use ndarray::{Array2, ArrayView2, array};
 use serde_json::json;
+
+fn labelled<'a>(
+    x: &'a Array2<f64>,
+    y: &[usize],
+    n_classes: usize,
+) -> DatasetBase<ArrayView2<'a, f64>, Classes> {
+    DatasetBase::new(x.view(), Classes::new(y.to_vec(), n_classes).unwrap())
+}
 
 // scikit-learn 1.9.1
 const TALL: &[[f64; 2]] = &[
@@ -80,7 +90,8 @@ fn held_out_rows_are_predicted_once_by_a_pipeline_that_has_not_seen_them() {
     let (x, y) = clouds(90, 5, 3, 21);
     let folds = stratified_k_fold(&y, 3, Some(0)).unwrap();
     let spec = PipelineSpec::standardized(ClassifierSpec::named("knn").unwrap());
-    let data = Data { x: x.view(), y: &y, n_classes: 3, merge: None };
+    let rows = labelled(&x, &y, 3);
+    let data = Data { dataset: &rows, merge: None };
     let cv = cross_validate(&data, &folds, &spec).unwrap();
     let mut rows: Vec<usize> = cv.folds.iter().flat_map(|f| f.rows.clone()).collect();
     rows.sort_unstable();
@@ -89,7 +100,8 @@ fn held_out_rows_are_predicted_once_by_a_pipeline_that_has_not_seen_them() {
     // One nearest neighbour of itself would be always right: leakage would show.
     let one = ClassifierSpec::new("knn", &key_values(&["k=1"]).unwrap()).unwrap();
     let random: Vec<usize> = (0..90).map(|i| (i * i + i / 7) % 3).collect();
-    let data = Data { y: &random, ..data };
+    let rows = labelled(&x, &random, 3);
+    let data = Data { dataset: &rows, merge: None };
     let cv = cross_validate(&data, &folds, &PipelineSpec::plain(one)).unwrap();
     assert!(cv.pooled.accuracy < 0.6, "{}", cv.pooled.accuracy);
 }
@@ -99,7 +111,8 @@ fn merged_classes_are_scored() {
     let (x, y) = clouds(120, 5, 4, 22);
     let folds = stratified_k_fold(&y, 3, None).unwrap();
     let spec = PipelineSpec::plain(ClassifierSpec::named("logistic").unwrap());
-    let data = Data { x: x.view(), y: &y, n_classes: 4, merge: Some(&[0, 1, 0, 1]) };
+    let rows = labelled(&x, &y, 4);
+    let data = Data { dataset: &rows, merge: Some(&[0, 1, 0, 1]) };
     let cv = cross_validate(&data, &folds, &spec).unwrap();
     assert_eq!(cv.pooled.classes.len(), 2);
     assert_eq!(cv.folds[0].proba.as_ref().unwrap().ncols(), 2);
@@ -115,7 +128,8 @@ fn the_better_pipeline_is_chosen_inside() {
     let grid = [("k".to_string(), vec![json!(95), json!(5)])];
     let specs = combinations(&base, &grid).unwrap();
     let candidates: Vec<_> = specs.into_iter().map(PipelineSpec::plain).collect();
-    let data = Data { x: x.view(), y: &y, n_classes: 3, merge: None };
+    let rows = labelled(&x, &y, 3);
+    let data = Data { dataset: &rows, merge: None };
     let inner = |rows: &[usize]| {
         let y: Vec<usize> = rows.iter().map(|&r| y[r]).collect();
         stratified_k_fold(&y, 2, Some(2))
@@ -147,7 +161,8 @@ fn grids_multiply_and_refuse() {
 #[test]
 fn overlapping_or_empty_folds_are_refused() {
     let (x, y) = clouds(12, 2, 2, 24);
-    let data = Data { x: x.view(), y: &y, n_classes: 2, merge: None };
+    let rows = labelled(&x, &y, 2);
+    let data = Data { dataset: &rows, merge: None };
     let spec =
         PipelineSpec::plain(ClassifierSpec::new("knn", &key_values(&["k=1"]).unwrap()).unwrap());
     let fold = |train: &[usize], test: &[usize]| Fold {

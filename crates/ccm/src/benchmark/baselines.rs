@@ -9,7 +9,10 @@ use corsmal_models::classifiers::{
 use corsmal_models::pipeline::{Pipeline, PipelineSpec};
 use corsmal_models::splits::{Fold, group_lists, train_test_split};
 use corsmal_models::steps::{Components, PcaParams, StepSpec};
+use corsmal_models::targets::Classes;
 use corsmal_models::{ModelError, cross_validation};
+use linfa::DatasetBase;
+use linfa::traits::Fit;
 use ndarray::{Array2, ArrayView2, Axis};
 
 use super::features::FeatureSet;
@@ -215,14 +218,11 @@ impl Baseline {
         if self.pca {
             spec.steps.push(pca(COMPONENTS.min(least)));
         }
-        let data = cross_validation::Data {
-            x: matrices.training.view(),
-            y: &joint,
-            n_classes: Filling::COUNT,
-            merge: None,
-        };
+        let classes = Classes::new(joint, Filling::COUNT)?;
+        let dataset = DatasetBase::new(matrices.training.view(), classes);
+        let data = cross_validation::Data { dataset: &dataset, merge: None };
         let validated = cross_validation::cross_validate(&data, &folds, &spec)?;
-        let mut held_out = Vec::with_capacity(joint.len());
+        let mut held_out = Vec::with_capacity(dataset.targets.len());
         for fold in &validated.folds {
             for (i, (&row, &class)) in fold.rows.iter().zip(&fold.predicted).enumerate() {
                 let p = fold.proba.as_ref().map(|p| p.row(i).to_vec());
@@ -230,7 +230,7 @@ impl Baseline {
             }
         }
         held_out.sort_by_key(|(row, _)| *row);
-        let model = spec.train(matrices.training.view(), &joint, Filling::COUNT)?;
+        let model = spec.fit(&dataset)?;
         let tests = matrices
             .tests
             .iter()

@@ -1,12 +1,11 @@
 //! Scores of submissions under the rules of the paper and of the official evaluators.
 
-mod classification;
 mod density;
 mod mass;
 mod regression;
 mod rules;
 
-pub use classification::{ClassScores, ConfusionMatrix};
+pub use corsmal_models::scores::{ClassScores, ConfusionMatrix};
 pub use density::DensityTable;
 pub use mass::object_weight;
 pub use rules::{RuleSet, Scores, evaluate};

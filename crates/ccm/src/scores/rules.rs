@@ -10,10 +10,11 @@
 //!
 //! Text comparison means that a column with any decimal point (`1.0`) matches nothing.
 
-use super::classification::ConfusionMatrix;
 use super::density::DensityTable;
 use super::mass::{MassInput, object_weight};
 use super::regression;
+use corsmal_models::scores::ConfusionMatrix;
+
 use crate::dataset::{Annotations, Filling, FillingLevel, FillingType};
 use crate::error::{CcmError, Result};
 use crate::submission::{Estimates, Submission};

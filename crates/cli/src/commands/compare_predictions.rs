@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use corsmal_models::comparison::{Bootstrap, bootstrap, mcnemar};
 use corsmal_models::labels::Labels;
-use corsmal_models::metrics::Scores;
+use corsmal_models::scores::Scores;
 use serde_json::json;
 
 use crate::failure::Failure;

@@ -7,9 +7,11 @@ use corsmal_models::cross_validation::{
     CrossValidation, Data, cross_validate, nested_cross_validate,
 };
 use corsmal_models::labels::Labels;
-use corsmal_models::metrics::Scores;
 use corsmal_models::pipeline::PipelineSpec;
+use corsmal_models::scores::Scores;
 use corsmal_models::spread::Spread;
+use corsmal_models::targets::Classes;
+use linfa::DatasetBase;
 use serde_json::json;
 
 use crate::dataset_table::{DatasetArgs, DatasetTable};
@@ -64,7 +66,8 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     for (class, fold) in folds.untrained(&y) {
         eprintln!("warning: fold {fold}: class {} has no training rows", labels.names()[class]);
     }
-    let data = Data { x: table.x.view(), y: &y, n_classes: labels.len(), merge: None };
+    let dataset = DatasetBase::new(table.x.view(), Classes::new(y.clone(), labels.len())?);
+    let data = Data { dataset: &dataset, merge: None };
     let result = match candidates.as_slice() {
         [only] => cross_validate(&data, &folds.outer, only)?,
         _ => nested_cross_validate(&data, &folds.outer, &candidates, |rows| folds.inner(rows, &y))?,

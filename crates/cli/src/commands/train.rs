@@ -6,6 +6,8 @@ use std::process::ExitCode;
 use corsmal_models::cross_validation::{Data, choose};
 use corsmal_models::labels::Labels;
 use corsmal_models::model_file::{Model, ModelHeader};
+use corsmal_models::targets::Classes;
+use linfa::DatasetBase;
 use serde_json::{Map, Value, json};
 
 use crate::dataset_table::DatasetArgs;
@@ -62,7 +64,8 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     if candidates.len() > 1 {
         let (seed, named) = (args.pipeline.seed, args.dataset.groups.as_deref());
         let folds = Folds::new(None, &table, named, (&labels, &y), seed)?;
-        let data = Data { x: table.x.view(), y: &y, n_classes: labels.len(), merge: None };
+        let dataset = DatasetBase::new(table.x.view(), Classes::new(y.clone(), labels.len())?);
+        let data = Data { dataset: &dataset, merge: None };
         let all: Vec<usize> = (0..y.len()).collect();
         let (best, scores) = choose(&data, &all, &candidates, |rows| folds.inner(rows, &y))?;
         chosen = best;

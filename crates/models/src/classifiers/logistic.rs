@@ -90,7 +90,9 @@ impl Objective<'_, '_> {
         let weights = table.slice(s![.., ..features]);
         let mut scores = self.x.dot(&weights.t()) + table.column(features);
         let mut loss = 0.0;
-        for ((mut row, &class), weight) in scores.outer_iter_mut().zip(self.y).zip(&self.row_weights) {
+        for ((mut row, &class), weight) in
+            scores.outer_iter_mut().zip(self.y).zip(&self.row_weights)
+        {
             // The row of scores becomes the row of slopes.
             loss += weight * slopes(row.view_mut(), class);
             row *= weight / self.total;

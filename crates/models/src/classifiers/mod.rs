@@ -1,208 +1,105 @@
 //! The classifiers, and the table that names them.
 //!
-//! Adding one: a file here with a parameter struct (`parameters!`), a fitted type implementing
-//! [`Classify`], and [`Train`] for the parameters; then one line in the `registry!` below (at its
-//! end: model files store the position).
+//! A classifier is a parameter struct ([`parameters!`](crate::parameters)) that implements [`Train`],
+//! and a fitted type that implements [`Classify`]. Those that come with the crate are one file here
+//! and one line in the table of `spec.rs` each. [`register`] adds a classifier of another crate: it
+//! then has a name in [`ClassifierSpec::new`], trains in pipelines and cross-validations, and is kept
+//! in model files. `examples/own_classifier.rs` shows one.
+
+mod cart;
+mod decision_tree;
+mod extra_trees;
+mod fitted;
+mod knn;
+mod logistic;
+mod random_forest;
+mod registry;
+mod spec;
+mod svm;
+mod trees;
+
+use std::fmt::Debug;
 
 use linfa::DatasetBase;
 use linfa::traits::{Fit, PredictInplace};
 use ndarray::{Array1, Array2, ArrayBase, ArrayView2, Axis, Data, Ix2};
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
 
 use crate::error::{ModelError, Result};
-use crate::params::{Parameter, Parameters};
-use crate::table::{argmax, check_features, check_labels, check_query, check_varied, class_counts};
+use crate::params::Parameters;
+use crate::table::{argmax, check_query};
+use fitted::Fitted;
+
+pub use cart::{Criterion, MaxFeatures};
+pub use decision_tree::{DecisionTreeParams, TreeSolver};
+pub use extra_trees::ExtraTreesParams;
+pub use knn::{KNearestParams, Metric, Search, Weights};
+pub use logistic::LogisticParams;
+pub use random_forest::RandomForestParams;
+pub use registry::{RegisteredSpec, classifiers, register};
+pub use spec::{CLASSIFIERS, ClassifierSpec};
+pub use svm::{Gamma, Kernel, SvmParams, SvmSolver};
 
 /// A classifier that can be fitted.
-pub(crate) trait Train: Parameters {
-    /// What fitting gives.
-    type Fitted: Classify;
+pub trait Train: Parameters + Clone {
+    /// What fitting gives: for a classifier to [`register`], a [`Classify`].
+    type Fitted;
     /// Fewest different classes it can learn from.
     const FEWEST_CLASSES: usize;
 
     /// Learns from finite `[rows, features]` and class indices `y < n_classes`, every class present.
+    ///
+    /// # Errors
+    /// Parameters that do not fit the rows, or numbers that cannot be computed with.
     fn train(&self, x: ArrayView2<'_, f64>, y: &[usize], n_classes: usize) -> Result<Self::Fitted>;
 }
 
 /// A fitted classifier. The rows given are finite and have the right number of features.
-pub(crate) trait Classify {
+pub trait Classify: Debug + Send + Sync {
     /// Features per row.
     fn n_features(&self) -> usize;
+
     /// Classes it was fitted on.
     fn n_classes(&self) -> usize;
-    /// Probabilities `[rows, classes]`.
+
+    /// Probabilities `[rows, classes]`, every row summing to one.
+    ///
+    /// # Errors
+    /// [`ModelError::NoProbability`] where the method has none.
     fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>>;
+
     /// Class indices; the most probable, the lowest among equals, unless the method says otherwise.
+    ///
+    /// # Errors
+    /// What the method cannot compute.
     fn predict(&self, x: ArrayView2<'_, f64>) -> Result<Vec<usize>> {
         let proba = self.predict_proba(x)?;
         Ok(proba.outer_iter().map(|row| argmax(row.iter())).collect())
     }
-    /// Whether the parts fit together, for models read from files.
+
+    /// Whether the parts fit together: asked of models read from files, whose bytes may be anyone's.
+    ///
+    /// # Errors
+    /// [`ModelError::Inconsistent`].
     fn validate(&self) -> Result<()>;
 }
 
-macro_rules! registry {
-    ($($module:ident: $variant:ident, $name:literal, $params:ident, $fitted:ident, $about:literal;)*) => {
-        $(
-            mod $module;
-            pub use $module::$params;
-        )*
-
-        /// A classifier's name with its parameters.
-        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-        #[serde(tag = "name", content = "parameters")]
-        pub enum ClassifierSpec {
-            $(#[doc = $about] #[serde(rename = $name)] $variant($params),)*
-        }
-
-        #[derive(Clone, Debug, Serialize, Deserialize)]
-        enum Fitted {
-            $($variant($module::$fitted),)*
-        }
-
-        /// Names and descriptions of all classifiers.
-        pub const CLASSIFIERS: &[(&str, &str)] = &[$(($name, $about)),*];
-
-        impl ClassifierSpec {
-            /// The classifier of this name, its parameters from a JSON object.
-            ///
-            /// # Errors
-            /// Unknown name, unknown parameter, impossible value.
-            pub fn new(name: &str, parameters: &Map<String, Value>) -> Result<Self> {
-                match name {
-                    $($name => Ok(Self::$variant($params::from_json(parameters)?)),)*
-                    _ => Err(ModelError::UnknownName {
-                        kind: "classifier",
-                        name: name.into(),
-                        allowed: CLASSIFIERS.iter().map(|c| c.0).collect::<Vec<_>>().join(", "),
-                    }),
-                }
-            }
-
-            /// Its name.
-            pub fn name(&self) -> &'static str {
-                match self { $(Self::$variant(_) => $name,)* }
-            }
-
-            /// Its parameters as listed to people.
-            pub fn table(&self) -> &'static [Parameter] {
-                match self { $(Self::$variant(_) => <$params as Parameters>::TABLE,)* }
-            }
-
-            /// All parameters, defaults included.
-            pub fn parameters(&self) -> Map<String, Value> {
-                let value = match self { $(Self::$variant(p) => serde_json::to_value(p),)* };
-                match value {
-                    Ok(Value::Object(map)) => map,
-                    _ => Map::new(),
-                }
-            }
-
-            fn fit_present(&self, x: ArrayView2<'_, f64>, y: &[usize], n: usize) -> Result<Fitted> {
-                match self { $(Self::$variant(p) => {
-                    p.check()?;
-                    if n < <$params as Train>::FEWEST_CLASSES {
-                        return Err(ModelError::TooFewClasses {
-                            owner: $name, rows: y.len(), classes: n,
-                        });
-                    }
-                    p.train(x, y, n).map(Fitted::$variant)
-                })* }
-            }
-        }
-
-        impl Fitted {
-            fn as_classify(&self) -> &dyn Classify {
-                match self { $(Self::$variant(m) => m,)* }
-            }
-        }
-
-        $(
-            impl From<$params> for ClassifierSpec {
-                fn from(params: $params) -> Self {
-                    Self::$variant(params)
-                }
-            }
-
-            impl<D: Data<Elem = f64>> Fit<ArrayBase<D, Ix2>, Array1<usize>, ModelError> for $params {
-                type Object = Classifier;
-
-                fn fit(
-                    &self,
-                    dataset: &DatasetBase<ArrayBase<D, Ix2>, Array1<usize>>,
-                ) -> Result<Classifier> {
-                    ClassifierSpec::from(self.clone()).fit(dataset)
-                }
-            }
-        )*
-    };
+/// What a model says of some rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Predicted {
+    /// class index of each row
+    pub classes: Vec<usize>,
+    /// probabilities `[rows, classes]`; absent for classifiers without them
+    pub proba: Option<Array2<f64>>,
 }
 
-registry! {
-    knn: KNearest, "knn", KNearestParams, KNearest, "k nearest neighbours";
-    svm: Svm, "svm", SvmParams, Svm, "support vector machine, one against one";
-    decision_tree: DecisionTree, "tree", DecisionTreeParams, DecisionTree, "decision tree (CART)";
-    random_forest: RandomForest, "rf", RandomForestParams, RandomForest, "random forest";
-    extra_trees: ExtraTrees, "et", ExtraTreesParams, ExtraTrees, "extremely randomised trees";
-    logistic: Logistic, "logistic", LogisticParams, Logistic, "logistic regression (multinomial, L2)";
-}
-
-mod cart;
-mod trees;
-
-pub use cart::{Criterion, MaxFeatures};
-pub use knn::{Metric, Weights};
-pub use svm::{Gamma, Kernel};
-
-impl ClassifierSpec {
-    /// The classifier of this name with default parameters.
-    ///
-    /// # Errors
-    /// Unknown name.
-    pub fn named(name: &str) -> Result<Self> {
-        Self::new(name, &Map::new())
-    }
-
-    /// Learns from `[rows, features]` and class indices below `n_classes`. Classes without rows
-    /// are allowed: they get probability zero.
-    ///
-    /// # Errors
-    /// Impossible parameters, features that are not finite, labels that do not match, too few
-    /// classes.
-    pub fn train(
-        &self,
-        x: ArrayView2<'_, f64>,
-        y: &[usize],
-        n_classes: usize,
-    ) -> Result<Classifier> {
-        check_features(x)?;
-        check_labels(x.nrows(), y, n_classes)?;
-        check_varied(x)?;
-        let counts = class_counts(y, n_classes);
-        let present: Vec<usize> = (0..n_classes).filter(|&c| counts[c] > 0).collect();
-        let mut position = vec![0; n_classes];
-        present.iter().enumerate().for_each(|(i, &c)| position[c] = i);
-        let compact: Vec<usize> = y.iter().map(|&c| position[c]).collect();
-        let spec = self.for_classes(&present, n_classes)?;
-        let fitted = spec.fit_present(x, &compact, present.len())?;
-        Ok(Classifier { present, n_classes, fitted })
-    }
-
-    /// The same with explicit class weights restricted to the classes that have rows.
-    fn for_classes(&self, present: &[usize], n_classes: usize) -> Result<Self> {
-        let mut parameters = self.parameters();
-        match parameters.get_mut("class_weight") {
-            Some(Value::Array(weights)) if weights.len() != n_classes => Err(ModelError::Length {
-                what: "class_weight",
-                expected: n_classes,
-                actual: weights.len(),
-            }),
-            Some(Value::Array(weights)) => {
-                *weights = present.iter().map(|&c| weights[c].clone()).collect();
-                Self::new(self.name(), &parameters)
-            }
-            _ => Ok(self.clone()),
+impl Predicted {
+    /// Joins classes with probabilities that a classifier may not have.
+    pub(crate) fn new(classes: Vec<usize>, proba: Result<Array2<f64>>) -> Result<Self> {
+        match proba {
+            Ok(proba) => Ok(Self { classes, proba: Some(proba) }),
+            Err(ModelError::NoProbability { .. }) => Ok(Self { classes, proba: None }),
+            Err(error) => Err(error),
         }
     }
 }
@@ -234,16 +131,21 @@ impl Classifier {
     pub fn predict(&self, x: ArrayView2<'_, f64>) -> Result<Vec<usize>> {
         check_query(x, self.n_features())?;
         let labels = self.fitted.as_classify().predict(x)?;
-        Ok(labels.into_iter().map(|c| self.present[c]).collect())
+        let class = |c| self.present.get(c).copied();
+        let classes: Option<Vec<usize>> = labels.into_iter().map(class).collect();
+        classes.ok_or_else(|| ModelError::Inconsistent("a class beyond the class table".into()))
     }
 
     /// Probabilities `[rows, classes]`, every row summing to one.
     ///
     /// # Errors
-    /// As [`Classifier::predict`]; [`ModelError::NoProbability`] for an SVM trained without.
+    /// As [`Classifier::predict`]; [`ModelError::NoProbability`] for a classifier without them.
     pub fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
         check_query(x, self.n_features())?;
         let known = self.fitted.as_classify().predict_proba(x)?;
+        if known.dim() != (x.nrows(), self.present.len()) {
+            return Err(ModelError::Inconsistent("probabilities of another shape".into()));
+        }
         if self.present.len() == self.n_classes {
             return Ok(known);
         }
@@ -286,17 +188,14 @@ impl<D: Data<Elem = f64>> Fit<ArrayBase<D, Ix2>, Array1<usize>, ModelError> for 
     }
 }
 
-/// linfa's way out.
-///
-/// # Panics
-/// Where [`Classifier::predict`] gives an error: linfa's trait has no room for one.
-impl<D: Data<Elem = f64>> PredictInplace<ArrayBase<D, Ix2>, Array1<usize>> for Classifier {
-    fn predict_inplace<'a>(&'a self, x: &'a ArrayBase<D, Ix2>, y: &mut Array1<usize>) {
-        let labels = self.predict(x.view()).unwrap_or_else(|e| panic!("{e}"));
-        y.assign(&Array1::from(labels));
+/// linfa's way out. The result may be a refusal: of rows that are not those of the training.
+impl<D: Data<Elem = f64>> PredictInplace<ArrayBase<D, Ix2>, Result<Predicted>> for Classifier {
+    fn predict_inplace<'a>(&'a self, x: &'a ArrayBase<D, Ix2>, y: &mut Result<Predicted>) {
+        let x = x.view();
+        *y = self.predict(x).and_then(|classes| Predicted::new(classes, self.predict_proba(x)));
     }
 
-    fn default_target(&self, x: &ArrayBase<D, Ix2>) -> Array1<usize> {
-        Array1::zeros(x.nrows())
+    fn default_target(&self, _: &ArrayBase<D, Ix2>) -> Result<Predicted> {
+        Ok(Predicted { classes: Vec::new(), proba: None })
     }
 }

@@ -22,6 +22,75 @@ pub struct Trees {
 /// Most trees of an ensemble.
 pub(super) const MAX_TREES: usize = 100_000;
 
+/// Declares the parameters of a method that grows trees: those of its own, then those that all have.
+macro_rules! tree_parameters {
+    (
+        $(#[$meta:meta])*
+        $name:ident, $owner:literal {
+            first { $($first:tt)* }
+            max_features: $rule:expr;
+            then { $($then:tt)* }
+            last { $($last:tt)* }
+        }
+        random_thresholds: $random_thresholds:literal;
+        check($this:ident) $check:block
+    ) => {
+        $crate::params::parameters! {
+            $(#[$meta])*
+            $name, $owner {
+                $($first)*
+                criterion: $crate::classifiers::Criterion = $crate::classifiers::Criterion::Gini,
+                    "gini or entropy", "measure of impurity";
+                max_depth: Option<usize> = None,
+                    "a whole number of at least 1, or null", "deepest level";
+                min_samples_split: usize = 2,
+                    "a whole number of at least 2", "fewest rows to split";
+                min_samples_leaf: usize = 1,
+                    "a whole number of at least 1", "fewest rows in a leaf";
+                max_features: $crate::classifiers::MaxFeatures =
+                    $crate::classifiers::MaxFeatures::Rule($rule),
+                    "sqrt, log2, all, a whole number of at least 1, or a fraction up to 1.0",
+                    "features looked at in each split";
+                $($then)*
+                class_weight: $crate::params::ClassWeight = $crate::params::ClassWeight::Equal,
+                    "null, balanced, or one positive number per class in label order",
+                    "weight of each class";
+                seed: u64 = 0, "a whole number", "seed of all draws";
+                $($last)*
+            }
+            check(params) {
+                let $this = params;
+                Self::require($this.max_depth != Some(0), "max_depth", 0)?;
+                Self::require(
+                    $this.min_samples_split >= 2, "min_samples_split", $this.min_samples_split,
+                )?;
+                Self::require(
+                    $this.min_samples_leaf >= 1, "min_samples_leaf", $this.min_samples_leaf,
+                )?;
+                let features = $this.max_features;
+                Self::require(features.is_valid(), "max_features", format!("{features:?}"))?;
+                let weight = &$this.class_weight;
+                Self::require(weight.is_valid(), "class_weight", format!("{weight:?}"))?;
+                $check
+            }
+        }
+
+        impl $name {
+            fn growth(&self) -> $crate::classifiers::cart::Growth {
+                $crate::classifiers::cart::Growth {
+                    criterion: self.criterion,
+                    max_depth: self.max_depth,
+                    min_samples_split: self.min_samples_split,
+                    min_samples_leaf: self.min_samples_leaf,
+                    max_features: self.max_features,
+                    random_thresholds: $random_thresholds,
+                }
+            }
+        }
+    };
+}
+pub(super) use tree_parameters;
+
 /// How an ensemble is grown.
 pub(super) struct Plan<'a> {
     pub growth: Growth,

@@ -1,10 +1,7 @@
-//! Principal components through the smaller of the two Gram matrices.
-//!
-//! Signs follow scikit-learn (1.5 and later): the entry of largest magnitude of each component is
-//! positive.
+//! Principal components ([`corsmal_dsp::pca`]) as a step before a classifier.
 
-use linfa_linalg::eigh::{EigSort, EighInto};
-use ndarray::{Array1, Array2, ArrayView2, Axis, s};
+use corsmal_dsp::DspError;
+use ndarray::{Array1, Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{ModelError, Result};
@@ -66,23 +63,22 @@ impl PcaParams {
                 allowed: format!("{rows} rows x {features} features give at most {most}"),
             });
         }
-        let mean = x.sum_axis(Axis(0)) / rows as f64;
-        let centred = &x - &mean;
-        let wide = features > rows;
-        let gram = if wide { centred.dot(&centred.t()) } else { centred.t().dot(&centred) };
-        let failed = |e: linfa_linalg::LinalgError| ModelError::Numerical {
+        let failed = |e: DspError| ModelError::Numerical {
             owner: Self::OWNER,
-            reason: e.to_string(),
+            reason: format!("{e}: standardise the features"),
         };
-        if !gram.iter().all(|v| v.is_finite()) {
-            return Err(ModelError::Numerical {
-                owner: Self::OWNER,
-                reason: "features too large for their variance".into(),
-            });
-        }
-        let (values, vectors) = gram.eigh_into().map_err(failed)?.sort_eig_desc();
-        let values = values.mapv(|v| v.max(0.0));
-        let total = values.sum();
+        let part = match self.n_components {
+            Some(Components::Variance(part)) => part,
+            _ => 1.0,
+        };
+        let (fitted, total) = match self.n_components {
+            Some(Components::Count(n)) => {
+                let fitted = corsmal_dsp::pca::Pca::fit(x, n).map_err(failed)?;
+                let total = fitted.total_variance(x);
+                (fitted, total)
+            }
+            _ => corsmal_dsp::pca::Pca::fit_explaining(x, part).map_err(failed)?,
+        };
         if total <= 0.0 {
             return Err(ModelError::ConstantFeature {
                 feature: 0,
@@ -91,36 +87,9 @@ impl PcaParams {
                 features,
             });
         }
-        let kept = match self.n_components {
-            None => most,
-            Some(Components::Count(n)) => n,
-            Some(Components::Variance(part)) => {
-                let mut sum = 0.0;
-                let enough = values.iter().position(|v| {
-                    sum += v / total;
-                    sum > part
-                });
-                enough.map_or(most, |at| (at + 1).min(most))
-            }
-        };
-        let kept_vectors = vectors.slice(s![.., ..kept]);
-        let mut components =
-            if wide { kept_vectors.t().dot(&centred) } else { kept_vectors.t().to_owned() };
-        for mut component in components.outer_iter_mut() {
-            let length = component.dot(&component).sqrt();
-            let largest =
-                component.iter().fold(0.0f64, |a, &b| if b.abs() > a.abs() { b } else { a });
-            // A direction without any variance (rank below the count asked) stays zero.
-            let factor = if length > 0.0 { largest.signum() / length } else { 0.0 };
-            component *= factor;
-        }
-        let kept_values = values.slice(s![..kept]);
-        Ok(Pca {
-            mean,
-            components: components.as_standard_layout().into_owned(),
-            explained_variance: &kept_values / (rows - 1) as f64,
-            explained_variance_ratio: &kept_values / total,
-        })
+        let corsmal_dsp::pca::Pca { mean, components, explained_variance } = fitted;
+        let explained_variance_ratio = &explained_variance / total;
+        Ok(Pca { mean, components, explained_variance, explained_variance_ratio })
     }
 }
 

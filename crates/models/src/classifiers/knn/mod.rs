@@ -5,6 +5,7 @@
 //! loops. Equal distances are ordered as scikit-learn 1.9's brute-force search orders them (a binary
 //! max-heap filled in row order, [`nearest`]), equal votes go to the lowest class.
 
+mod linfa;
 mod nearest;
 mod screen;
 
@@ -14,6 +15,8 @@ use serde::{Deserialize, Serialize};
 
 use nearest::Nearest;
 use screen::Screen;
+
+pub(super) use linfa::{LinfaNeighbours, STORED_NAME};
 
 use super::{Classify, Train};
 use crate::error::{ModelError, Result};
@@ -45,6 +48,23 @@ pub enum Weights {
     Distance,
 }
 
+/// Who finds the neighbours.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Search {
+    /// this crate, by exhaustive search
+    #[default]
+    Brute,
+    /// linfa-nn: a k-d tree up to 16 features, else its linear search
+    Linfa,
+}
+
+impl Search {
+    fn is_brute(&self) -> bool {
+        *self == Self::Brute
+    }
+}
+
 parameters! {
     /// Parameters of k nearest neighbours.
     KNearestParams, "knn" {
@@ -53,10 +73,14 @@ parameters! {
         metric: Metric = Metric::Euclidean,
             "euclidean, manhattan, cosine, chebyshev or minkowski", "distance between rows";
         p: f64 = 2.0, "a number of at least 1", "exponent of the minkowski metric";
+        #[serde(skip_serializing_if = "Search::is_brute")]
+        algorithm: Search = Search::Brute, "brute or linfa",
+            "who finds the neighbours: this program, or linfa-nn";
     }
     check(this) {
         Self::require(this.k >= 1, "k", this.k)?;
-        Self::require(this.p.is_finite() && this.p >= 1.0, "p", this.p)
+        Self::require(this.p.is_finite() && this.p >= 1.0, "p", this.p)?;
+        linfa::check(this)
     }
 }
 
@@ -75,11 +99,22 @@ pub struct KNearest {
     norms: Vec<f64>,
 }
 
+/// Training rows of either search.
+pub enum FittedNeighbours {
+    Own(KNearest),
+    Linfa(LinfaNeighbours),
+}
+
 impl Train for KNearestParams {
-    type Fitted = KNearest;
+    type Fitted = FittedNeighbours;
     const FEWEST_CLASSES: usize = 1;
 
-    fn train(&self, x: ArrayView2<'_, f64>, y: &[usize], n_classes: usize) -> Result<KNearest> {
+    fn train(
+        &self,
+        x: ArrayView2<'_, f64>,
+        y: &[usize],
+        n_classes: usize,
+    ) -> Result<FittedNeighbours> {
         if self.k > x.nrows() {
             return Err(ModelError::ParameterValue {
                 owner: Self::OWNER,
@@ -97,7 +132,7 @@ impl Train for KNearestParams {
             }
             _ => copied(x),
         };
-        Ok(KNearest {
+        let rows = KNearest {
             k: self.k,
             weights: self.weights,
             metric: self.metric,
@@ -106,7 +141,11 @@ impl Train for KNearestParams {
             x,
             y: y.to_vec(),
             norms,
-        })
+        };
+        match self.algorithm {
+            Search::Brute => Ok(FittedNeighbours::Own(rows)),
+            Search::Linfa => LinfaNeighbours::new(rows).map(FittedNeighbours::Linfa),
+        }
     }
 }
 
@@ -187,7 +226,11 @@ impl KNearest {
             .collect();
         let tied: Vec<usize> = (0..found.len()).filter(|&q| found[q].is_none()).collect();
         let mut in_order = self.in_order(block.select(Axis(0), &tied).view(), screen).into_iter();
-        found.into_iter().map(|f| f.or_else(|| in_order.next())).map(|f| f.expect("one per tie")).collect()
+        found
+            .into_iter()
+            .map(|f| f.or_else(|| in_order.next()))
+            .map(|f| f.expect("one per tie"))
+            .collect()
     }
 
     /// Training rows, for each query row, among which the k nearest are.
@@ -257,7 +300,12 @@ impl KNearest {
 }
 
 /// Folds the differences of two rows in four independent lanes.
-fn lanes(a: &[f64], b: &[f64], step: impl Fn(f64, f64) -> f64, join: impl Fn(f64, f64) -> f64) -> f64 {
+fn lanes(
+    a: &[f64],
+    b: &[f64],
+    step: impl Fn(f64, f64) -> f64,
+    join: impl Fn(f64, f64) -> f64,
+) -> f64 {
     let mut acc = [0.0; 4];
     let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
     let tail = a4.remainder().iter().zip(b4.remainder());
@@ -276,7 +324,9 @@ fn check_lengths(x: ArrayView2<'_, f64>) -> Result<()> {
         None => Ok(()),
         Some(row) => Err(ModelError::Numerical {
             owner: KNearestParams::OWNER,
-            reason: format!("the features of row {row} are too large for distances: standardize them"),
+            reason: format!(
+                "the features of row {row} are too large for distances: standardize them"
+            ),
         }),
     }
 }

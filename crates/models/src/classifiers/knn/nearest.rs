@@ -50,6 +50,12 @@ impl Nearest {
         Some(Self(all))
     }
 
+    /// These, which are the k nearest already.
+    pub(super) fn exactly(mut all: Vec<(f64, usize)>) -> Self {
+        all.iter_mut().for_each(|(d, _)| *d = bounded(*d));
+        Self(all)
+    }
+
     /// The largest distance kept; infinite until there are k.
     pub(super) fn farthest(&self) -> f64 {
         self.0[0].0

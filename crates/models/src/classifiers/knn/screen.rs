@@ -152,7 +152,8 @@ fn prepared(
             |shifted: &mut Array1<f64>, (mut low, row)| {
                 shifted.assign(&row);
                 *shifted -= centre;
-                low.slice_mut(s![..features]).zip_mut_with(shifted, |l, &v| *l = (factor * v) as f32);
+                low.slice_mut(s![..features])
+                    .zip_mut_with(shifted, |l, &v| *l = (factor * v) as f32);
                 let norm = shifted.dot(shifted);
                 low[features] = last(norm);
                 (norm, row.dot(&row))

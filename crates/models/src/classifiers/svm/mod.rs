@@ -4,6 +4,7 @@
 //! per pair fitted on five-fold held-out decision values, then pairwise coupling.
 
 mod kernel;
+mod linfa;
 mod probability;
 mod smo;
 
@@ -51,6 +52,23 @@ pub enum GammaRule {
     Auto,
 }
 
+/// Who solves the two-class problems.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SvmSolver {
+    /// this crate
+    #[default]
+    Own,
+    /// linfa-svm: no probabilities, the whole kernel matrix in memory
+    Linfa,
+}
+
+impl SvmSolver {
+    fn is_own(&self) -> bool {
+        *self == Self::Own
+    }
+}
+
 parameters! {
     /// Parameters of the support vector machine.
     #[allow(non_snake_case, reason = "C is its name everywhere")]
@@ -67,6 +85,9 @@ parameters! {
         tol: f64 = 1e-3, "a positive number", "tolerance of the optimality conditions";
         cache_mb: usize = 200, "a whole number of at least 1", "memory for kernel values, MiB";
         seed: u64 = 0, "a whole number", "seed of the folds for the probabilities";
+        #[serde(skip_serializing_if = "SvmSolver::is_own")]
+        solver: SvmSolver = SvmSolver::Own, "own or linfa",
+            "who solves it: this program, or linfa-svm (no probabilities, smaller tables)";
     }
     check(this) {
         let positive = |v: f64| v.is_finite() && v > 0.0;
@@ -194,6 +215,9 @@ impl Train for SvmParams {
         let weights = self.class_weight.per_class(y, n_classes)?;
         let function = self.function(x);
         let x = x.as_standard_layout();
+        if self.solver == SvmSolver::Linfa {
+            return linfa::train(self, x.view(), y, &weights, function);
+        }
         let budget = self.cache_mb.saturating_mul(1 << 20);
         let gram = Gram::new(x.view(), function, budget)?;
         let mut members = vec![Vec::new(); n_classes];
@@ -207,7 +231,8 @@ impl Train for SvmParams {
         let mut pairs: Vec<Pair> = jobs
             .into_par_iter()
             .map(|(first, second, seed)| {
-                let sizes = [(first, members[first].len(), 1.0), (second, members[second].len(), -1.0)];
+                let sizes =
+                    [(first, members[first].len(), 1.0), (second, members[second].len(), -1.0)];
                 let repeat = |value: fn(&(usize, usize, f64)) -> (usize, f64)| {
                     sizes.iter().flat_map(move |s| std::iter::repeat_n(value(s), s.1))
                 };
@@ -227,7 +252,9 @@ impl Train for SvmParams {
                     None
                 };
                 let (mut rows, mut coefficients) = (Vec::new(), Vec::new());
-                for ((&row, &alpha), sign) in problem.rows.iter().zip(&solution.alpha).zip(&problem.signs) {
+                for ((&row, &alpha), sign) in
+                    problem.rows.iter().zip(&solution.alpha).zip(&problem.signs)
+                {
                     if alpha > 0.0 {
                         rows.push(row);
                         coefficients.push(alpha * sign);
@@ -305,7 +332,10 @@ impl Classify for Svm {
 
     fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
         let sigmoids: Option<Vec<Sigmoid>> = self.pairs.iter().map(|p| p.sigmoid).collect();
-        let sigmoids = sigmoids.ok_or(ModelError::NoProbability { owner: SvmParams::OWNER })?;
+        let sigmoids = sigmoids.ok_or(ModelError::NoProbability {
+            owner: SvmParams::OWNER,
+            remedy: "train with probability=true and solver=own",
+        })?;
         let rows = self.decide(x, |decisions| {
             let mut pairwise = Array2::zeros((self.n_classes, self.n_classes));
             for ((pair, sigmoid), &d) in self.pairs.iter().zip(&sigmoids).zip(decisions) {

@@ -13,7 +13,12 @@ pub(super) struct Solution {
 /// Smallest curvature used, where the kernel matrix is not positive definite.
 const TAU: f64 = 1e-12;
 
-pub(super) fn solve(kernel: &mut Rows<'_, '_>, y: &[f64], bound: &[f64], tol: f64) -> Result<Solution> {
+pub(super) fn solve(
+    kernel: &mut Rows<'_, '_>,
+    y: &[f64],
+    bound: &[f64],
+    tol: f64,
+) -> Result<Solution> {
     let n = kernel.len();
     let diagonal: Vec<f64> = (0..n).map(|i| kernel.diagonal(i)).collect();
     let mut alpha = vec![0.0; n];

@@ -1,46 +1,46 @@
-//! Confusion matrices and the weighted F1 score.
+//! Confusion matrices and the scores that follow from them.
 
 use serde::Serialize;
 
-/// Counts of estimated against true classes; the last column counts what is not estimated.
+/// Counts of predicted against true classes; the last column counts rows without a prediction.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ConfusionMatrix {
-    /// `[true class][estimated class, or the number of classes where there is none]`.
+    /// `[true class][predicted class, or the number of classes where there is none]`.
     pub counts: Vec<Vec<u64>>,
 }
 
 /// Scores of one class, 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ClassScores {
-    /// Share of the estimates of this class that are right.
+    /// Share of the predictions of this class that are right; 0 when it is never predicted.
     pub precision: f64,
-    /// Share of the recordings of this class that are found.
+    /// Share of the rows of this class that are found; 0 without rows.
     pub recall: f64,
-    /// Harmonic mean of both.
+    /// Harmonic mean of both; 0 when both are 0.
     pub f1: f64,
-    /// Number of recordings of this class.
+    /// Number of rows of this class.
     pub support: u64,
 }
 
 impl ConfusionMatrix {
-    /// Counts pairs of true class and estimate, both below `classes`; larger estimates count as
-    /// not estimated.
+    /// Counts pairs of true class and prediction, both below `classes`; larger predictions count as
+    /// none.
     pub fn new(classes: usize, pairs: impl IntoIterator<Item = (usize, Option<usize>)>) -> Self {
         let mut counts = vec![vec![0; classes + 1]; classes];
-        for (truth, estimate) in pairs {
+        for (truth, predicted) in pairs {
             if let Some(row) = counts.get_mut(truth) {
-                row[estimate.unwrap_or(classes).min(classes)] += 1;
+                row[predicted.unwrap_or(classes).min(classes)] += 1;
             }
         }
         Self { counts }
     }
 
-    /// Number of recordings counted.
+    /// Number of rows counted.
     pub fn total(&self) -> u64 {
         self.counts.iter().flatten().sum()
     }
 
-    /// Share of recordings with the right class; 0 where there are none.
+    /// Share of rows with the right class; 0 where there are none.
     pub fn accuracy(&self) -> f64 {
         let right: u64 = (0..self.counts.len()).map(|c| self.counts[c][c]).sum();
         ratio(right, self.total())
@@ -64,11 +64,31 @@ impl ConfusionMatrix {
     }
 
     /// Mean of the classes' F1 scores weighted by their support (scikit-learn
-    /// `f1_score(average="weighted")`); what is not estimated is one more class without support.
+    /// `f1_score(average="weighted")`); rows without a prediction count as of one more class, which
+    /// has no support.
     pub fn weighted_f1(&self) -> f64 {
         let sum: f64 = self.classes().iter().map(|c| c.f1 * c.support as f64).sum();
         let total = self.total();
         if total == 0 { 0.0 } else { sum / total as f64 }
+    }
+}
+
+impl ConfusionMatrix {
+    /// Mean of the F1 scores of the classes that occur or are predicted (scikit-learn
+    /// `f1_score(average="macro")`).
+    pub fn macro_f1(&self) -> f64 {
+        let predicted = |c: usize| self.counts.iter().any(|row| row[c] > 0);
+        let classes = self.classes().into_iter().enumerate();
+        let seen: Vec<f64> = classes
+            .filter(|(c, scores)| scores.support > 0 || predicted(*c))
+            .map(|(_, scores)| scores.f1)
+            .collect();
+        seen.iter().sum::<f64>() / seen.len().max(1) as f64
+    }
+
+    /// Rows without a prediction, by true class.
+    pub fn unknown(&self) -> Vec<u64> {
+        self.counts.iter().map(|row| row[self.counts.len()]).collect()
     }
 }
 

@@ -1,0 +1,73 @@
+//! A single decision tree, grown here or by linfa-trees.
+
+mod linfa;
+
+use ndarray::ArrayView2;
+use serde::{Deserialize, Serialize};
+
+use super::Train;
+use super::cart::FeatureRule;
+use super::trees::{Plan, Trees, tree_parameters};
+use crate::error::Result;
+
+pub(super) use linfa::{LinfaTree, STORED_NAME};
+
+/// Who grows the tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TreeSolver {
+    /// this crate
+    #[default]
+    Own,
+    /// linfa-trees: no probabilities
+    Linfa,
+}
+
+impl TreeSolver {
+    fn is_own(&self) -> bool {
+        *self == Self::Own
+    }
+}
+
+tree_parameters! {
+    /// Parameters of a decision tree.
+    DecisionTreeParams, "tree" {
+        first {}
+        max_features: FeatureRule::All;
+        then {}
+        last {
+            #[serde(skip_serializing_if = "TreeSolver::is_own")]
+            solver: TreeSolver = TreeSolver::Own, "own or linfa",
+                "who grows the tree: this program, or linfa-trees (no probabilities)";
+        }
+    }
+    random_thresholds: false;
+    check(this) {
+        linfa::check(this)
+    }
+}
+
+/// A fitted tree of either solver.
+pub enum FittedTree {
+    Own(Trees),
+    Linfa(LinfaTree),
+}
+
+impl Train for DecisionTreeParams {
+    type Fitted = FittedTree;
+    const FEWEST_CLASSES: usize = 1;
+
+    fn train(&self, x: ArrayView2<'_, f64>, y: &[usize], n_classes: usize) -> Result<FittedTree> {
+        if self.solver == TreeSolver::Linfa {
+            return LinfaTree::train(self, x, y, n_classes).map(FittedTree::Linfa);
+        }
+        let plan = Plan {
+            growth: self.growth(),
+            n_trees: 1,
+            bootstrap: false,
+            class_weight: &self.class_weight,
+            seed: self.seed,
+        };
+        Trees::grow(x, y, n_classes, &plan).map(FittedTree::Own)
+    }
+}
