@@ -8,7 +8,7 @@ use ndarray::{Array2, ArrayView1};
 
 use crate::dataset::{Category, Container, Filling, FillingLevel, FillingType};
 use crate::error::{CcmError, Result};
-use crate::predictions::{ProbabilityTable, RowName};
+use crate::predictions::{RecordingPredictions, RowName, classes};
 use crate::submission::{Prediction, RowKey};
 
 /// How type and level are decided.
@@ -28,8 +28,8 @@ pub enum Rule {
 /// [`CcmError`] for class names that are no types or levels, lines that are no recording of the data
 /// set or occur twice, and recordings that one table has and the other has not.
 pub fn decide(
-    kind: Option<&ProbabilityTable>,
-    level: Option<&ProbabilityTable>,
+    kind: Option<&RecordingPredictions>,
+    level: Option<&RecordingPredictions>,
     rule: Rule,
 ) -> Result<Vec<Prediction>> {
     let kinds = kind.map(of_kind).transpose()?;
@@ -68,9 +68,9 @@ pub fn decide(
 ///
 /// # Errors
 /// As [`decide`].
-pub fn decide_joint(table: &ProbabilityTable) -> Result<Vec<Prediction>> {
+pub fn decide_joint(table: &RecordingPredictions) -> Result<Vec<Prediction>> {
     let what = "a filling such as 'pasta half', '1-1' or a joint class 0 to 6";
-    let fillings = table.classes(Filling::parse, what)?;
+    let fillings = classes(table, Filling::parse, what)?;
     let into = |number: fn(&Filling) -> usize| fillings.iter().map(number).collect::<Vec<_>>();
     let kinds = table.merged(&into(|f| f.kind() as usize), FillingType::ALL.len())?;
     let levels = table.merged(&into(|f| f.level() as usize), FillingLevel::ALL.len())?;
@@ -87,9 +87,9 @@ pub fn decide_joint(table: &ProbabilityTable) -> Result<Vec<Prediction>> {
     Ok(estimates)
 }
 
-fn of_kind(table: &ProbabilityTable) -> Result<Vec<Prediction>> {
+fn of_kind(table: &RecordingPredictions) -> Result<Vec<Prediction>> {
     let what = "a filling type: none, pasta, rice, water or 0 to 3";
-    let classes = table.classes(FillingType::parse, what)?;
+    let classes = classes(table, FillingType::parse, what)?;
     let numbers: Vec<usize> = classes.iter().map(|&c| c as usize).collect();
     let merged = table.merged(&numbers, FillingType::ALL.len())?;
     let mut estimates = blank(table)?;
@@ -101,9 +101,9 @@ fn of_kind(table: &ProbabilityTable) -> Result<Vec<Prediction>> {
     Ok(estimates)
 }
 
-fn of_level(table: &ProbabilityTable) -> Result<Vec<Prediction>> {
+fn of_level(table: &RecordingPredictions) -> Result<Vec<Prediction>> {
     let what = "a filling level: empty, half, full, 0 to 2, 50 or 90";
-    let classes = table.classes(FillingLevel::parse, what)?;
+    let classes = classes(table, FillingLevel::parse, what)?;
     let numbers: Vec<usize> = classes.iter().map(|&c| c as usize).collect();
     let merged = table.merged(&numbers, FillingLevel::ALL.len())?;
     let mut estimates = blank(table)?;
@@ -120,7 +120,7 @@ fn fixed<const N: usize>(row: ArrayView1<'_, f64>) -> Option<[f64; N]> {
 }
 
 /// Nothing estimated, one for each line.
-fn blank(table: &ProbabilityTable) -> Result<Vec<Prediction>> {
+fn blank(table: &RecordingPredictions) -> Result<Vec<Prediction>> {
     let mut seen = HashSet::new();
     let fault = |problem, rows: String| CcmError::Rows {
         path: table.path.clone(),
@@ -140,7 +140,7 @@ fn blank(table: &ProbabilityTable) -> Result<Vec<Prediction>> {
         }
         RowName::Recording(key) => Ok(Prediction::empty(*key)),
     };
-    table.rows.iter().map(|row| &row.name).map(key).collect()
+    table.rows.iter().map(|row| &row.key).map(key).collect()
 }
 
 /// Replaces type and level by the best feasible pair, where both have probabilities.
@@ -171,10 +171,10 @@ fn together(estimate: &mut Prediction, dry_boxes: bool) -> Result<()> {
 mod tests {
     use super::*;
 
-    fn table(text: &str) -> ProbabilityTable {
+    fn table(text: &str) -> RecordingPredictions {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();
-        ProbabilityTable::read(file.path()).unwrap()
+        crate::predictions::read(file.path()).unwrap()
     }
 
     #[test]

@@ -64,6 +64,9 @@ pub enum CcmError {
         /// What the annotations have.
         expected: String,
     },
+    /// Prediction files that cannot be read or joined; the text names the file.
+    #[error(transparent)]
+    Predictions(#[from] corsmal_models::predictions::PredictionError),
     /// The user stopped the work; what is done is kept for the next run.
     #[error("interrupted; the same command continues")]
     Interrupted,

@@ -3,17 +3,14 @@
 #[macro_use]
 mod streams;
 
+mod args;
 mod commands;
-mod dataset_table;
 mod failure;
-mod folds;
 mod interrupt;
-mod label_file;
-mod pipeline;
-mod prediction_lines;
+mod output;
 mod progress;
 mod publish;
-mod voting;
+mod text_table;
 
 use std::process::ExitCode;
 

@@ -5,7 +5,7 @@
 use corsmal_models::classifiers::{ClassifierSpec, Classify, Train, register};
 use corsmal_models::labels::Labels;
 use corsmal_models::model_file::{Model, ModelHeader};
-use corsmal_models::params::{Parameters, key_values, parameters};
+use corsmal_models::params::{key_values, parameters};
 use corsmal_models::pipeline::PipelineSpec;
 use corsmal_models::{ModelError, Result};
 use ndarray::{Array2, ArrayView2, Axis, array};
@@ -23,7 +23,7 @@ parameters! {
 
 /// The mean of each class.
 #[derive(Debug, Serialize, Deserialize)]
-struct NearestMean {
+pub struct NearestMean {
     sharpness: f64,
     /// `[classes, features]`
     means: Array2<f64>,

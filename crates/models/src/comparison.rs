@@ -1,12 +1,14 @@
 //! Whether two classifiers differ on the same rows.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
 use crate::error::{ModelError, Result};
+use crate::labels::Labels;
+use crate::predictions::{Id, PredictionError, PredictionTable};
 use crate::scores::Scores;
 
 /// McNemar's exact test.
@@ -110,6 +112,103 @@ pub fn bootstrap<S: AsRef<str>>(
         low: at(0.025),
         high: at(0.975),
         p_value: (2.0 * tail).min(1.0),
+    })
+}
+
+/// Two prediction files of the same recordings, compared.
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    /// recordings that both predict
+    pub rows: usize,
+    /// the first file
+    pub first: Compared,
+    /// the second
+    pub second: Compared,
+    /// McNemar's test
+    pub mcnemar: McNemar,
+    /// difference of weighted F1 with recordings drawn
+    pub bootstrap_rows: Bootstrap,
+    /// the same with whole folds drawn, where all lines have one and there are several
+    pub bootstrap_folds: Option<Bootstrap>,
+    /// number of folds
+    pub folds: usize,
+    /// draws of each bootstrap
+    pub resamples: usize,
+    /// its seed
+    pub seed: u64,
+}
+
+/// One of two files.
+#[derive(Clone, Debug, Serialize)]
+pub struct Compared {
+    /// the file
+    pub path: String,
+    /// its scores
+    pub scores: Scores,
+}
+
+/// Compares predictions of the same recordings. `target` names the column of true classes, else
+/// `true`. A line without a prediction is wrong.
+///
+/// # Errors
+/// Recordings that one file has and the other has not, other true classes, recordings that occur twice.
+pub fn compare(
+    first: &PredictionTable,
+    second: &PredictionTable,
+    target: Option<&str>,
+    resamples: usize,
+    seed: u64,
+) -> std::result::Result<Comparison, PredictionError> {
+    first.check_once_each()?;
+    second.check_once_each()?;
+    let places: HashMap<&Id, usize> =
+        second.rows.iter().enumerate().map(|(at, row)| (&row.key, at)).collect();
+    let (one, two) = (first.path.display(), second.path.display());
+    let known: HashSet<&Id> = first.rows.iter().map(|row| &row.key).collect();
+    if let Some(extra) = second.rows.iter().find(|row| !known.contains(&row.key)) {
+        return Err(second.content(format!("{:?} is not in {one}", extra.key.0)));
+    }
+    let (truth, other_truth) = (first.truth(target)?, second.truth(target)?);
+    let (mut a, mut b) = (Vec::new(), Vec::new());
+    for (row, truth) in first.rows.iter().zip(&truth) {
+        let Some(&at) = places.get(&row.key) else {
+            return Err(first.content(format!("{:?} is not in {two}", row.key.0)));
+        };
+        if other_truth[at] != *truth {
+            return Err(first.content(format!(
+                "{:?} is {truth} here and {} in {two}: predictions of one target are compared",
+                row.key.0, other_truth[at]
+            )));
+        }
+        // A class that no row has stands for no prediction.
+        let name = |table: &PredictionTable, class: Option<usize>| {
+            class.map_or(String::new(), |class| table.labels[class].clone())
+        };
+        a.push(name(first, row.class));
+        b.push(name(second, second.rows[at].class));
+    }
+    let truth: Vec<String> = truth.into_iter().map(String::from).collect();
+    let (labels, all) = Labels::of(&[&truth[..], &a, &b].concat());
+    let (truth, rest) = all.split_at(truth.len());
+    let (a, b) = rest.split_at(truth.len());
+    let refuse = |e: ModelError| first.model(e);
+    let scores = |p: &[usize], path: String| {
+        Scores::new(truth, p, labels.len()).map(|scores| Compared { path, scores })
+    };
+    let folds = first.column("fold").unwrap_or_default();
+    let n_folds = Labels::of(&folds).0.len();
+    let foldwise = n_folds > 1 && folds.iter().all(|fold| !fold.is_empty());
+    let by_fold = foldwise.then(|| bootstrap(truth, a, b, Some(&folds), resamples, seed));
+    Ok(Comparison {
+        rows: truth.len(),
+        first: scores(a, one.to_string()).map_err(refuse)?,
+        second: scores(b, two.to_string()).map_err(refuse)?,
+        mcnemar: mcnemar(truth, a, b).map_err(refuse)?,
+        bootstrap_rows: bootstrap::<&str>(truth, a, b, None, resamples, seed).map_err(refuse)?,
+        bootstrap_folds: by_fold.transpose().map_err(refuse)?,
+        folds: n_folds,
+        resamples,
+        seed,
     })
 }
 

@@ -1,5 +1,7 @@
 //! Predictions of rows that were not trained on, with or without a choice of pipeline inside.
 
+use std::path::Path;
+
 use linfa::DatasetBase;
 use linfa::traits::{Fit, Predict};
 use ndarray::{Array2, ArrayView2, Axis};
@@ -8,7 +10,9 @@ use serde::Serialize;
 use crate::classifiers::Predicted;
 use crate::error::{ModelError, Result};
 use crate::fusion::merge_classes;
+use crate::labels::Labels;
 use crate::pipeline::PipelineSpec;
+use crate::predictions::{Id, PredictionRow, PredictionTable};
 use crate::scores::Scores;
 use crate::splits::Fold;
 use crate::spread::Spread;
@@ -122,6 +126,36 @@ pub struct CrossValidation {
 }
 
 impl CrossValidation {
+    /// The predictions of the held-out rows in the order of the table: columns `id`, `fold` and
+    /// `true`. `ids`, the class `names` and `classes` are those of the data set.
+    pub fn predictions(
+        &self,
+        ids: &[String],
+        names: &Labels,
+        classes: &Classes,
+        path: &Path,
+    ) -> PredictionTable {
+        let mut rows = Vec::new();
+        let truth = classes.indices();
+        for fold in &self.folds {
+            for (at, (&row, &class)) in fold.rows.iter().zip(&fold.predicted).enumerate() {
+                let proba = fold.proba.as_ref().map(|proba| proba.row(at).to_vec());
+                let name = names.names()[truth[row]].clone();
+                let cells = vec![ids[row].clone(), fold.name.clone(), name];
+                let key = Id(ids[row].clone());
+                rows.push((row, PredictionRow { key, cells, class: Some(class), proba }));
+            }
+        }
+        rows.sort_by_key(|(row, _)| *row);
+        PredictionTable {
+            path: path.into(),
+            columns: ["id", "fold", "true"].map(String::from).to_vec(),
+            naming: 1,
+            labels: names.names().to_vec(),
+            rows: rows.into_iter().map(|(_, row)| row).collect(),
+        }
+    }
+
     fn of(folds: Vec<FoldOutcome>, data: &Data<'_>) -> Result<Self> {
         let rows: Vec<usize> = folds.iter().flat_map(|f| f.rows.iter().copied()).collect();
         let predicted: Vec<usize> =

@@ -15,10 +15,12 @@
 //! | … | payload, postcard |
 //! | 32 | BLAKE3 |
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use corsmal_files::draft;
 use linfa::traits::PredictInplace;
 use ndarray::{Array2, ArrayBase, ArrayView2, Data, Ix2};
 use serde::{Deserialize, Serialize};
@@ -58,8 +60,85 @@ pub struct ModelHeader {
     pub feature_config_hash: String,
     /// where it was learned: rows, classes, files, folds, scores
     pub provenance: Value,
+    /// formats of the recordings learned from; absent where unknown, as in models of version 0.1.0
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trained_on: Option<TrainedOn>,
     /// version of the program that wrote it
     pub tool_version: String,
+}
+
+/// Formats of the recordings that a model was trained on.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrainedOn {
+    /// sampling rates in Hz, ascending
+    pub sample_rates: Vec<u32>,
+    /// channel counts, ascending
+    pub channels: Vec<u32>,
+}
+
+impl TrainedOn {
+    /// The formats of some recordings, given as (rate, channels); `None` unless all are known.
+    pub fn of(formats: impl IntoIterator<Item = (Option<u32>, Option<u32>)>) -> Option<Self> {
+        let (mut rates, mut channels) = (BTreeSet::new(), BTreeSet::new());
+        for (rate, count) in formats {
+            rates.insert(rate?);
+            channels.insert(count?);
+        }
+        let known = !rates.is_empty();
+        let (sample_rates, channels) =
+            (rates.into_iter().collect(), channels.into_iter().collect());
+        known.then_some(Self { sample_rates, channels })
+    }
+}
+
+/// Which recordings a model may be applied to, as far as their format matters to its features.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct FormatRule {
+    sample_rates: Option<Vec<u32>>,
+    channels: Option<Vec<u32>>,
+}
+
+impl FormatRule {
+    /// Refuses a recording of another format in words that say what to do; what is unknown passes.
+    ///
+    /// # Errors
+    /// The refusal.
+    pub fn check(
+        &self,
+        sample_rate: Option<u32>,
+        channels: Option<u32>,
+    ) -> std::result::Result<(), String> {
+        if let (Some(known), Some(rate)) = (&self.sample_rates, sample_rate)
+            && !known.contains(&rate)
+        {
+            let trained = known.iter().map(|rate| hertz(*rate)).collect::<Vec<_>>().join(", ");
+            let resample = known[0];
+            return Err(format!(
+                "{}; the model was trained on {trained}: --set signal.sample_rate={resample} \
+                 resamples it, --any-rate takes it as it is",
+                hertz(rate)
+            ));
+        }
+        if let (Some(known), Some(count)) = (&self.channels, channels)
+            && !known.contains(&count)
+        {
+            let trained: Vec<String> = known.iter().map(u32::to_string).collect();
+            return Err(format!(
+                "{}; the model was trained on recordings of {}: train on features with \
+                 signal.channels=mean or summary.average_channels=true to take any number",
+                crate::dataset::count(count as usize, "channel"),
+                trained.join(", ")
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// `44,100 Hz`
+fn hertz(rate: u32) -> String {
+    let (thousands, rest) = (rate / 1000, rate % 1000);
+    if thousands == 0 { format!("{rest} Hz") } else { format!("{thousands},{rest:03} Hz") }
 }
 
 /// A trained model with everything needed to use it.
@@ -81,6 +160,9 @@ pub enum ModelFileError {
         /// why
         source: std::io::Error,
     },
+    /// The file could not be written; the text names it.
+    #[error(transparent)]
+    Write(std::io::Error),
     /// The file does not begin as a model file does.
     #[error("not a model file of corsmal-feat")]
     NotAModel,
@@ -119,6 +201,24 @@ pub enum ModelFileError {
         /// why
         reason: String,
     },
+    /// The model does not know the formats of the recordings that it was trained on.
+    #[error(
+        "the model (of version {version}) does not record the sample rates and channels it was \
+         trained on, so recordings of another format would be classified wrongly without a word: \
+         train it again, or --any-rate takes every recording as it is"
+    )]
+    FormatUnknown {
+        /// version of the program that wrote it
+        version: String,
+    },
+    /// Recordings would be brought to a rate that the model was not trained on.
+    #[error("signal.sample_rate = {rate}: the model was trained on {trained}")]
+    Rate {
+        /// the rate asked
+        rate: f64,
+        /// the rates in the model
+        trained: String,
+    },
     /// The features offered were made with another configuration.
     #[error(
         "the model was trained on features with {}, these have {}",
@@ -144,6 +244,7 @@ impl ModelHeader {
             feature_config: Value::Null,
             feature_config_hash: String::new(),
             provenance: Value::Null,
+            trained_on: None,
             tool_version: env!("CARGO_PKG_VERSION").into(),
         }
     }
@@ -192,6 +293,48 @@ impl Model {
     /// See [`Pipeline::predict_proba`].
     pub fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
         self.pipeline.predict_proba(x)
+    }
+
+    /// Which recordings the model may be applied to when their features are made with `config`, its
+    /// own feature configuration or one that differs in `signal`.
+    ///
+    /// # Errors
+    /// [`ModelFileError::FormatUnknown`] for a model that does not know what it was trained on, where
+    /// that matters; [`ModelFileError::Rate`] for a rate to which no training recording was brought.
+    pub fn format_rule(&self, config: &Value) -> std::result::Result<FormatRule, ModelFileError> {
+        let rate = |config: &Value| config["signal"]["sample_rate"].as_f64().unwrap_or(0.0);
+        let averaged = config["summary"]["average_channels"] == Value::Bool(true);
+        let every_channel = config["signal"]["channels"] == "all" && !averaged;
+        let own_rate = rate(config) == 0.0;
+        let resampled_alike = !own_rate && rate(config) == rate(&self.header.feature_config);
+        let Some(trained) = &self.header.trained_on else {
+            // Another number of channels gives another number of features, which is refused anyway.
+            return match resampled_alike {
+                true => Ok(FormatRule::default()),
+                false => {
+                    let version = self.header.tool_version.clone();
+                    Err(ModelFileError::FormatUnknown { version })
+                }
+            };
+        };
+        let rates = &trained.sample_rates;
+        if !own_rate && !resampled_alike && !rates.iter().any(|r| f64::from(*r) == rate(config)) {
+            let trained = rates.iter().map(|rate| hertz(*rate)).collect::<Vec<_>>().join(", ");
+            return Err(ModelFileError::Rate { rate: rate(config), trained });
+        }
+        Ok(FormatRule {
+            sample_rates: own_rate.then(|| rates.clone()),
+            channels: every_channel.then(|| trained.channels.clone()),
+        })
+    }
+
+    /// Writes the file, whole or not at all.
+    ///
+    /// # Errors
+    /// [`ModelFileError::TooLarge`], or [`ModelFileError::Io`] naming the file.
+    pub fn save(&self, path: &Path) -> std::result::Result<(), ModelFileError> {
+        let bytes = self.to_bytes()?;
+        draft::write(path, &bytes).map_err(ModelFileError::Write)
     }
 
     /// Refuses features made with another configuration.

@@ -29,6 +29,7 @@ fn model(name: &str, texts: &[&str], rows: usize) -> (Model, Array2<f64>) {
         feature_config: serde_json::json!({"sample_rate": 22050, "mfcc": {"n_mfcc": 6}}),
         feature_config_hash: "00ff".into(),
         provenance: serde_json::json!({"rows": rows}),
+        trained_on: None,
         tool_version: "0.1.0".into(),
     };
     (Model::new(header, fitted).unwrap(), x)

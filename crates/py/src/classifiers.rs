@@ -56,6 +56,7 @@ impl PyModel {
             feature_config: serde_json::Value::Null,
             feature_config_hash: String::new(),
             provenance,
+            trained_on: None,
             tool_version: env!("CARGO_PKG_VERSION").into(),
         };
         Model::new(header, fitted).map(Self).map_err(value_error)

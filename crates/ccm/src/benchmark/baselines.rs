@@ -6,6 +6,7 @@ use corsmal_extract::config::Config;
 use corsmal_models::classifiers::{
     ClassifierSpec, Gamma, KNearestParams, RandomForestParams, SvmParams,
 };
+use corsmal_models::model_file::TrainedOn;
 use corsmal_models::pipeline::{Pipeline, PipelineSpec};
 use corsmal_models::splits::{Fold, group_lists, train_test_split};
 use corsmal_models::steps::{Components, PcaParams, StepSpec};
@@ -116,6 +117,8 @@ pub(super) struct Outcome {
     /// The features that it takes.
     pub(super) config: Arc<Config>,
     pub(super) feature_names: Vec<String>,
+    /// Formats of the recordings that it was trained on.
+    pub(super) trained_on: Option<TrainedOn>,
 }
 
 impl Baseline {
@@ -202,6 +205,7 @@ impl Baseline {
             spec,
             config: matrices.config.clone(),
             feature_names: matrices.names.clone(),
+            trained_on: matrices.trained_on.clone(),
         })
     }
 
@@ -246,6 +250,7 @@ impl Baseline {
             spec,
             config: matrices.config.clone(),
             feature_names: matrices.names.clone(),
+            trained_on: matrices.trained_on.clone(),
         })
     }
 }

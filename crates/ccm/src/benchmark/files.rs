@@ -52,12 +52,12 @@ pub(super) fn write_outcome(out: &Path, outcome: &Outcome, rows: &Rows) -> Resul
             "variant": outcome.variant.name(),
             "training_recordings": rows.training.len(),
         }),
+        trained_on: outcome.trained_on.clone(),
         tool_version: env!("CARGO_PKG_VERSION").into(),
     };
     let model = Model::new(header, outcome.model.clone()).map_err(|e| fault(&e))?;
-    let bytes = model.to_bytes().map_err(|e| fault(&e))?;
     let path = out.join("models").join(format!("{name}.model"));
-    draft::write(&path, &bytes).map_err(CcmError::Write)
+    model.save(&path).map_err(|e| fault(&e))
 }
 
 /// Writes the pseudo-random estimates of every part as submissions.

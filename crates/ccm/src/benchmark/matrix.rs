@@ -14,6 +14,7 @@ use corsmal_extract::run::{self, Quiet, RunError};
 use corsmal_files::layout;
 use corsmal_files::npz::{Compression, NpzFile};
 use corsmal_files::shard::Shard;
+use corsmal_models::model_file::TrainedOn;
 use ndarray::Array2;
 
 use super::features::FeatureSet;
@@ -29,6 +30,8 @@ pub(super) struct Matrices {
     pub(super) names: Vec<String>,
     /// By which they were computed.
     pub(super) config: Arc<Config>,
+    /// Formats of the training recordings.
+    pub(super) trained_on: Option<TrainedOn>,
 }
 
 /// Where features are kept and how they are computed.
@@ -53,11 +56,11 @@ impl Store<'_> {
             format!("{}-{:.12}-{}.npz", features.slug(), config.hash(), part.replace(' ', "-"))
         };
         let training = inputs(&set.root, &rows.training, &actions);
-        let (training, names) = self.part(&name("training"), &training, &config)?;
+        let (training, names, trained_on) = self.part(&name("training"), &training, &config)?;
         let mut tests = Vec::with_capacity(rows.tests.len());
         for test in &rows.tests {
             let inputs = inputs(&set.root, &test.rows, &Actions::new());
-            let (values, own) = self.part(&name(test.subset.name()), &inputs, &config)?;
+            let (values, own, _) = self.part(&name(test.subset.name()), &inputs, &config)?;
             if own != names {
                 return Err(CcmError::Request(format!(
                     "{}: {} recordings have other features than those of training: another number \
@@ -68,7 +71,7 @@ impl Store<'_> {
             }
             tests.push(values);
         }
-        Ok(Matrices { training, tests, names, config })
+        Ok(Matrices { training, tests, names, config, trained_on })
     }
 
     fn part(
@@ -76,7 +79,7 @@ impl Store<'_> {
         name: &str,
         inputs: &[Input],
         config: &Arc<Config>,
-    ) -> Result<(Array2<f64>, Vec<String>)> {
+    ) -> Result<(Array2<f64>, Vec<String>, Option<TrainedOn>)> {
         let path = self.folder.join(name);
         let fault = |e: &dyn std::fmt::Display| CcmError::Request(e.to_string());
         let extract = |overwrite: bool| {
@@ -112,7 +115,9 @@ impl Store<'_> {
         }
         let mut npz = NpzFile::open(&path).map_err(|e| fault(&e))?;
         let (table, _) = layout::read_table(&mut npz).map_err(|e| fault(&e))?;
-        Ok((table.values().mapv(f64::from), table.feature_names().to_vec()))
+        let trained_on =
+            TrainedOn::of(table.outcomes().iter().map(|o| (o.sample_rate, o.channels)));
+        Ok((table.values().mapv(f64::from), table.feature_names().to_vec(), trained_on))
     }
 }
 

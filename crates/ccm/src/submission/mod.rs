@@ -7,7 +7,6 @@ mod writer;
 pub use baseline::pseudo_random;
 pub(crate) use reader::listed;
 pub use writer::Prediction;
-pub(crate) use writer::SUM_TOLERANCE;
 
 use std::fmt;
 use std::path::PathBuf;

@@ -10,7 +10,7 @@ use crate::dataset::{Dimensions, FillingLevel, FillingType};
 use crate::error::{CcmError, Result};
 
 /// Probabilities of a row must add up to one within this.
-pub(crate) const SUM_TOLERANCE: f64 = 1e-3;
+const SUM_TOLERANCE: f64 = 1e-3;
 
 const HEADER_2022: &str = "Configuration ID,Container capacity,Container mass,Filling mass,None,\
 Pasta,Rice,Water,Filling type,Empty,Half-full,Full,Filling level,Width at the top,\

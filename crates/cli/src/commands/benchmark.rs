@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use corsmal_ccm::CcmError;
 use corsmal_ccm::benchmark::{self, Baseline, Options};
 
+use crate::args::Jobs;
 use crate::failure::{Failure, INTERRUPTED};
 
 /// Arguments of `benchmark`.
@@ -31,9 +32,8 @@ pub struct Args {
     /// Seed of the forests and of the pseudo-random estimates.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Recordings that are extracted at a time; by default one for each core.
-    #[arg(long, value_name = "N", env = "CORSMAL_FEAT_JOBS", value_parser = clap::value_parser!(u16).range(1..))]
-    jobs: Option<u16>,
+    #[command(flatten)]
+    jobs: Jobs,
     /// Do not say what is being done.
     #[arg(long)]
     quiet: bool,
@@ -59,13 +59,12 @@ fn named_file(text: &str) -> Result<(String, PathBuf), String> {
 /// Runs the baselines and writes the report.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let baselines = if args.baselines.is_empty() { Baseline::all() } else { args.baselines };
-    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let options = Options {
         data: args.data,
         out: args.out,
         baselines,
         added: args.add,
-        jobs: args.jobs.map_or_else(cores, usize::from),
+        jobs: args.jobs.count(),
         seed: args.seed,
     };
     let quiet = args.quiet;

@@ -10,7 +10,6 @@ use corsmal_ccm::submission::{Submission, pseudo_random};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use crate::failure::Failure;
-use crate::prediction_lines::csv_line;
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Rules {
@@ -133,13 +132,15 @@ fn print(results: &[(String, Scores)], format: Format) -> Result<(), Failure> {
             println!("{text}");
         }
         Format::Csv => {
-            let mut bytes = csv_line(&[&["submission"], &columns[..]].concat())?;
+            let mut writer = csv::Writer::from_writer(Vec::new());
+            writer.write_record([&["submission"], &columns[..]].concat())?;
             for (name, scores) in results {
                 let value =
                     |column: &&str| scores.get(column).map_or_else(String::new, two_decimals);
                 let line = std::iter::once(name.clone()).chain(columns.iter().map(value));
-                bytes.extend(csv_line(&line.collect::<Vec<_>>())?);
+                writer.write_record(line)?;
             }
+            let bytes = writer.into_inner().map_err(|e| e.into_error())?;
             print!("{}", String::from_utf8_lossy(&bytes));
         }
         Format::Table => {

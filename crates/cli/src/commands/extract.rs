@@ -12,6 +12,7 @@ use corsmal_files::npz::Compression;
 use corsmal_files::shard::Shard;
 use serde_json::json;
 
+use crate::args::Jobs;
 use crate::failure::{COULD_NOT_RUN, FAILED_FILES, Failure, INTERRUPTED};
 use crate::progress::{LogFormat, Meter};
 
@@ -36,10 +37,8 @@ pub struct Args {
     out: PathBuf,
     #[command(flatten)]
     config: ConfigArgs,
-    /// Worker threads; by default one for each core.
-    #[arg(long, value_name = "N", env = "CORSMAL_FEAT_JOBS")]
-    #[arg(value_parser = clap::value_parser!(u16).range(1..=1024))]
-    jobs: Option<u16>,
+    #[command(flatten)]
+    jobs: Jobs,
     /// Only the i-th of n parts of the inputs, counted from 0; `merge` joins the outputs.
     #[arg(long, value_name = "I/N", default_value = "0/1")]
     shard: Shard,
@@ -130,7 +129,7 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
     let options = RunOptions {
         out: args.out,
         compression: if args.compress { Compression::Deflated } else { Compression::Stored },
-        jobs: args.jobs.map_or_else(cores, usize::from),
+        jobs: args.jobs.count(),
         shard: args.shard,
         resume: args.resume,
         overwrite: args.overwrite,
@@ -167,8 +166,4 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
         }
         Err(error) => Err(error.into()),
     }
-}
-
-fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
 }

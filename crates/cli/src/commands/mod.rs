@@ -1,6 +1,7 @@
 //! One file per command: its arguments (`Args`) and what it does (`run`).
 
 mod benchmark;
+mod classifiers;
 mod classify;
 mod compare;
 mod compare_predictions;
@@ -16,6 +17,7 @@ mod inspect;
 mod merge;
 mod pca;
 mod presets;
+mod score;
 mod synth;
 mod train;
 
@@ -44,12 +46,16 @@ pub enum Command {
     Demo(demo::Args),
     /// Fit principal components to training features, for `extract --project`.
     Pca(pca::Args),
+    /// List the classifiers and explain their parameters.
+    Classifiers(classifiers::Args),
     /// Learn a classifier from features with labels and write it to a model file.
     Train(train::Args),
     /// Predict the classes of recordings, or of features, with a trained model.
     Classify(classify::Args),
     /// Score a classifier on rows that it was not trained on.
     CrossValidate(cross_validate::Args),
+    /// Score predictions against true classes or numbers.
+    Score(score::Args),
     /// Test whether two classifiers differ on the same held-out recordings.
     ComparePredictions(compare_predictions::Args),
     /// Make one prediction from several files, from windows, or from type and level.
@@ -78,6 +84,8 @@ impl Command {
             Self::Compare(args) => compare::run(args),
             Self::Demo(args) => demo::run(args),
             Self::Pca(args) => pca::run(args),
+            Self::Classifiers(args) => classifiers::run(args),
+            Self::Score(args) => score::run(args),
             Self::Train(args) => train::run(args),
             Self::Classify(args) => classify::run(args),
             Self::CrossValidate(args) => cross_validate::run(args),

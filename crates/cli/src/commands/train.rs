@@ -4,41 +4,47 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use corsmal_models::cross_validation::{Data, choose};
+use corsmal_models::folds::Folds;
 use corsmal_models::labels::Labels;
 use corsmal_models::model_file::{Model, ModelHeader};
-use corsmal_models::targets::Classes;
-use linfa::DatasetBase;
+use linfa::traits::Fit;
 use serde_json::{Map, Value, json};
 
-use crate::dataset_table::DatasetArgs;
+use crate::args::{DatasetArgs, Jobs, PipelineArgs};
 use crate::failure::Failure;
-use crate::folds::Folds;
-use crate::pipeline::{self, PipelineArgs};
 use crate::publish;
-use corsmal_files::draft;
 
 /// Arguments of `train`.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  corsmal-feat train --features feats.npz --labels labels.csv --target type \\
-    --classifier rf --set trees=500 --standardize --out type.model
-  corsmal-feat train --features other.npz --x X --y type --groups container \\
-    --classifier svm --standardize --tune C=0.1,1,10 --out type.model
+  corsmal-feat train feats.npz --labels labels.csv --target type --set trees=500 -o type.model
+  corsmal-feat train feats.npz --labels folders -o class.model
+  corsmal-feat train feats.npz --labels meta.csv --id-column file --target class -o class.model
+  corsmal-feat train other.npz --x X --y type --groups container \\
+    --classifier svm --standardize --tune C=0.1,1,10 -o type.model
 
-The model file holds classifier, scaling, label names and the feature configuration, so
-`corsmal-feat classify` needs nothing else. Classifiers are described in docs/classifiers.md.")]
+The model file holds classifier, scaling, label names, the feature configuration and the sample rates
+and channels of the recordings, so `corsmal-feat classify` needs nothing else.
+`corsmal-feat classifiers` explains the classifiers and their parameters.
+
+Exit codes: 0 fine, 2 could not run.")]
 pub struct Args {
     #[command(flatten)]
     dataset: DatasetArgs,
     #[command(flatten)]
     pipeline: PipelineArgs,
     /// Model file to write.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
     /// Replace an existing model file.
     #[arg(long)]
     overwrite: bool,
+    /// Print what was trained as JSON.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    jobs: Jobs,
     /// Print nothing but warnings.
     #[arg(long, short)]
     quiet: bool,
@@ -46,12 +52,15 @@ pub struct Args {
 
 /// Trains on all rows and writes the model.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    args.jobs.pool()?.install(|| train(&args))
+}
+
+fn train(args: &Args) -> Result<ExitCode, Failure> {
     publish::check(&args.out, args.overwrite)?;
     let candidates = args.pipeline.candidates()?;
-    let table = args.dataset.load()?;
-    let target = args.dataset.target.as_str();
-    let (labels, y) = table.classes(target)?;
-    let rows_of = counts(&labels, &y);
+    let (table, target) = args.dataset.load()?;
+    let (labels, classes) = table.classes(&target)?;
+    let rows_of = counts(&labels, &classes.indices().to_vec());
     for (name, rows) in &rows_of {
         if *rows == 1 {
             let text = format!("class {name} of {target} has 1 row: at least 2 are needed");
@@ -59,49 +68,67 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         }
     }
     let groups = args.dataset.groups.as_deref().map(|g| table.column(g)).transpose()?;
+    let dataset = table.dataset(classes.clone());
     let mut chosen = 0;
     let mut choice = Value::Null;
     if candidates.len() > 1 {
         let (seed, named) = (args.pipeline.seed, args.dataset.groups.as_deref());
-        let folds = Folds::new(None, &table, named, (&labels, &y), seed)?;
-        let dataset = DatasetBase::new(table.x.view(), Classes::new(y.clone(), labels.len())?);
+        let folds = Folds::new(None, &table, named, (&labels, &classes), seed)?;
         let data = Data { dataset: &dataset, merge: None };
-        let all: Vec<usize> = (0..y.len()).collect();
-        let (best, scores) = choose(&data, &all, &candidates, |rows| folds.inner(rows, &y))?;
+        let all: Vec<usize> = (0..classes.len()).collect();
+        let (best, scores) = choose(&data, &all, &candidates, |rows| folds.inner(rows, &classes))?;
         chosen = best;
         choice = json!({ "candidates": candidates, "weighted_f1": scores });
     }
     let spec = candidates[chosen].clone();
-    let fitted = spec.train(table.x.view(), &y, labels.len())?;
+    let fitted = spec.fit(&dataset)?;
     let provenance = json!({
         "files": args.dataset.provenance()?,
-        "rows": y.len(),
+        "rows": classes.len(),
         "rows_per_class": rows_of.iter().map(|(n, r)| (n.clone(), (*r).into())).collect::<Map<_, _>>(),
         "groups": groups.map(|g| Labels::of(&g).0),
         "seed": args.pipeline.seed,
         "choice": choice,
     });
+    let trained_on = table.trained_on();
     let header = ModelHeader {
         pipeline: spec.clone(),
         labels: labels.clone(),
-        target: target.to_string(),
-        feature_names: table.feature_names,
-        feature_config: table.config,
-        feature_config_hash: table.config_hash,
+        target: target.clone(),
+        feature_names: table.feature_names.clone(),
+        feature_config: table.config.clone(),
+        feature_config_hash: table.config_hash.clone(),
         provenance,
+        trained_on: trained_on.clone(),
         tool_version: env!("CARGO_PKG_VERSION").to_string(),
     };
-    let bytes = Model::new(header, fitted)?.to_bytes()?;
-    draft::write(&args.out, &bytes)?;
-    if !args.quiet {
-        let classes: Vec<_> =
+    Model::new(header, fitted)?.save(&args.out)?;
+    let out = args.out.display();
+    if args.json {
+        let report = json!({
+            "model": out.to_string(),
+            "pipeline": spec,
+            "target": target,
+            "rows": classes.len(),
+            "n_features": table.x.ncols(),
+            "rows_per_class": rows_of.iter().map(|(n, r)| (n.clone(), (*r).into())).collect::<Map<_, _>>(),
+            "trained_on": trained_on,
+        });
+        println!("{}", serde_json::to_string_pretty(&report)?);
+    } else if !args.quiet {
+        let classes_text: Vec<_> =
             rows_of.iter().map(|(name, rows)| format!("{name} ({rows})")).collect();
-        println!("{}: {}", args.out.display(), pipeline::describe(&spec));
+        println!("{out}: {}", spec.describe());
         println!(
             "{} rows, {} features, {target}: {}",
-            y.len(),
+            classes.len(),
             table.x.ncols(),
-            classes.join(", ")
+            classes_text.join(", ")
+        );
+        let apply = if table.config.is_null() { "--features OTHER.npz" } else { "YOUR_RECORDINGS" };
+        println!(
+            "next: corsmal-feat classify --model {out} {apply} -o predictions.csv\n      \
+             corsmal-feat cross-validate with the same arguments estimates how good it is"
         );
     }
     Ok(ExitCode::SUCCESS)

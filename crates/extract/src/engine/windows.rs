@@ -103,6 +103,12 @@ impl<'a> Windows<'a> {
         self.source.health().repairs.iter().any(lost)
     }
 
+    /// Sample rate in Hz and channels of the recording.
+    pub fn format(&self) -> (u32, u32) {
+        let spec = self.source.spec();
+        (spec.sample_rate, u32::from(spec.channels))
+    }
+
     fn channels(&self) -> usize {
         usize::from(self.source.spec().channels)
     }

@@ -10,41 +10,59 @@ use std::sync::Arc;
 
 use corsmal_extract::config::Config;
 use corsmal_extract::inputs::{self, Input};
-use corsmal_models::model_file::{Model, ModelFileError};
+use corsmal_models::dataset::LabelledTable;
+use corsmal_models::model_file::{FormatRule, Model, ModelFileError};
+use corsmal_models::predictions::{Form, RecordWriter, Unit};
 
-use crate::dataset_table::{DatasetTable, ForeignArgs};
+use crate::args::{Jobs, MemberArgs, VoteArgs};
 use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
-use crate::prediction_lines::{Form, PredictionLines, Target, Unit};
+use crate::output::Output;
 use crate::publish;
-use crate::voting::VoteArgs;
 
 /// Arguments of `classify`.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  corsmal-feat classify --model type.model --in audio/ --out predictions.csv
+  corsmal-feat classify -m type.model audio/ -o predictions.csv
   corsmal-feat classify --model type.model --features feats.npz --out -
+  corsmal-feat classify -m type.model audio/ --reject 0.6 -o predictions.csv
   arecord -f cd -t wav | corsmal-feat classify --model type.model --in - --window 2 --hop 0.5
   corsmal-feat classify --model type.model --in audio/ --window 1 --vote majority --out votes.csv
 
-One line per recording: id, path, status, predicted, and p_<label> for each class. Recordings
-that could not be read have a status other than ok and no prediction. With --window one line per
+One line per recording: id, path, status, label columns of a manifest (the one that the model predicts
+is called true), predicted, and p_<label> for each class. Recordings that could not be read, or differ
+in sample rate or channels from those that the model was trained on, have a status other than ok and no
+prediction. With --window one line per
 window, with its start and end in seconds, written as soon as the window is complete; memory does
 not grow with the stream.
 
 Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 interrupted.")]
 pub struct Args {
     /// Model file of `corsmal-feat train`, or one of `corsmal-feat benchmark`.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE")]
     model: PathBuf,
     /// Recordings: files, folders, globs, manifests, or - for one WAV stream on standard input.
-    #[arg(long = "in", value_name = "PATH", num_args = 1.., required_unless_present = "features")]
+    #[arg(value_name = "PATH", required_unless_present_any = ["features", "inputs"])]
+    paths: Vec<String>,
+    /// The same by name.
+    #[arg(long = "in", short = 'i', value_name = "PATH", num_args = 1.., conflicts_with = "paths")]
     inputs: Vec<String>,
     /// Features instead of recordings.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["inputs", "window"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["paths", "inputs", "window"])]
     features: Option<PathBuf>,
     #[command(flatten)]
-    foreign: ForeignArgs,
+    members: MemberArgs,
+    /// Bring recordings to the format that the model was trained on: signal.sample_rate=44100
+    /// resamples them, signal.channels=mean mixes their channels.
+    #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with = "features")]
+    overrides: Vec<String>,
+    /// Take recordings of any sample rate and channel count as they are, whatever the model was
+    /// trained on.
+    #[arg(long)]
+    any_rate: bool,
+    /// Predictions with a highest probability below P are unknown.
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = crate::args::share)]
+    reject: f64,
     /// Predict windows of so many seconds instead of whole recordings.
     #[arg(long, value_name = "SECONDS")]
     window: Option<f64>,
@@ -54,26 +72,67 @@ pub struct Args {
     #[command(flatten)]
     vote: VoteArgs,
     /// File of predictions; - is standard output.
-    #[arg(long, value_name = "FILE", default_value = "-")]
+    #[arg(long, short, value_name = "FILE", default_value = "-")]
     out: PathBuf,
     /// Form of the predictions.
     #[arg(long, value_enum, default_value = "csv")]
-    format: Form,
+    format: Format,
+    /// The same as --format jsonl: a JSON object a line.
+    #[arg(long, conflicts_with = "format")]
+    json: bool,
     /// Replace an existing output.
     #[arg(long)]
     overwrite: bool,
-    /// Worker threads; by default one for each core.
-    #[arg(long, value_name = "N", env = "CORSMAL_FEAT_JOBS", value_parser = clap::value_parser!(u16).range(1..))]
-    jobs: Option<u16>,
+    #[command(flatten)]
+    jobs: Jobs,
     /// Only errors on standard error.
     #[arg(long, short)]
     quiet: bool,
 }
 
+/// How lines are written.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Format {
+    /// A header, then a line each.
+    Csv,
+    /// A JSON object a line.
+    #[value(alias = "json")]
+    Jsonl,
+}
+
+/// The writer of this command.
+type Records = RecordWriter<Output>;
+
 impl Args {
-    fn jobs(&self) -> usize {
-        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-        self.jobs.map_or_else(cores, usize::from)
+    fn form(&self) -> Form {
+        if self.json || self.format == Format::Jsonl { Form::JsonLines } else { Form::Csv }
+    }
+
+    /// Recordings, however they were named.
+    fn names(&self) -> &[String] {
+        if self.paths.is_empty() { &self.inputs } else { &self.paths }
+    }
+
+    /// A writer for records with these label columns.
+    fn records(&self, model: &Model, columns: &[String]) -> Result<Records, Failure> {
+        let labels = &model.header().labels;
+        let unit = match (self.window, self.vote.rule(labels)?) {
+            (None, _) => Unit::Recording,
+            (Some(_), None) => Unit::Window,
+            (Some(_), Some(_)) => Unit::Vote,
+        };
+        let target = (columns, model.header().target.as_str());
+        let output = Output::open(&self.out)?;
+        Ok(RecordWriter::new(output, (self.form(), unit), labels, target, self.reject))
+    }
+
+    /// Which recordings the model may be applied to.
+    fn rule(&self, model: &Model, config: &serde_json::Value) -> Result<FormatRule, Failure> {
+        if self.any_rate {
+            return Ok(FormatRule::default());
+        }
+        let place = self.model.display();
+        model.format_rule(config).map_err(|e| Failure::new(format!("{place}: {e}")))
     }
 }
 
@@ -95,35 +154,43 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         e @ ModelFileError::Io { .. } => Failure::from(e),
         e => Failure::new(format!("{place}: {e}")),
     })?;
-    let labels = &model.header().labels;
-    let vote = args.vote.rule(labels)?;
-    let unit = match (args.window, vote) {
-        (None, None) => Unit::Recording,
-        (None, Some(_)) => return Err(Failure::new("--vote decides over windows: give --window")),
-        (Some(_), None) => Unit::Window,
-        (Some(_), Some(_)) => Unit::Vote,
-    };
-    let mut lines = PredictionLines::new(Target::open(&args.out)?, args.format, unit, labels);
-    let end = match (&args.features, args.window) {
+    let vote = args.vote.rule(&model.header().labels)?;
+    if vote.is_some() && args.window.is_none() {
+        return Err(Failure::new("--vote decides over windows: give --window"));
+    }
+    let (end, records) = match (&args.features, args.window) {
         (Some(path), _) => {
-            let table = DatasetTable::read(path, &args.foreign)?;
-            whole::predict(&model, &table, &mut lines)?
+            let table = LabelledTable::read(path, &args.members.names())?;
+            whole::of_features(&args, &model, &table)?
         }
-        (None, None) => whole::run(&args, &model, &mut lines)?,
-        (None, Some(window)) => windows::run(&args, &model, window, vote, &mut lines)?,
+        (None, None) => whole::run(&args, &model)?,
+        (None, Some(window)) => windows::run(&args, &model, window, vote)?,
     };
-    let (written, failed) = (lines.written, lines.failed);
+    let Some(records) = records else {
+        eprintln!("interrupted; nothing was written");
+        return Ok(ExitCode::from(INTERRUPTED));
+    };
+    let rejected = records.rejected;
+    let (written, failed) = (records.written, records.failed);
     match end {
         End::Unread => return Ok(ExitCode::SUCCESS),
         End::Interrupted if written == 0 => {
             eprintln!("interrupted; nothing was written");
             return Ok(ExitCode::from(INTERRUPTED));
         }
-        End::Done | End::Interrupted => lines.finish()?,
+        End::Done | End::Interrupted => records.finish()?.publish()?,
     }
     if !args.quiet {
-        let predicted = written - failed;
-        eprintln!("{predicted} predictions of {}, {failed} failed", model.header().target);
+        let target = &model.header().target;
+        let predictions = match written - failed {
+            1 => "1 prediction".into(),
+            n => format!("{n} predictions"),
+        };
+        let unknown = match rejected {
+            0 => String::new(),
+            n => format!(", {n} of them unknown (below {})", args.reject),
+        };
+        eprintln!("{predictions} of {target}{unknown}, {failed} failed");
     }
     Ok(match (end, failed) {
         (End::Interrupted, _) => ExitCode::from(INTERRUPTED),
@@ -151,7 +218,19 @@ fn configuration(args: &Args, model: &Model) -> Result<Arc<Config>, Failure> {
             header.tool_version
         )));
     }
-    Ok(Arc::new(config))
+    if args.overrides.is_empty() {
+        return Ok(Arc::new(config));
+    }
+    const FORMAT: [&str; 2] = ["signal.sample_rate", "signal.channels"];
+    let key = |text: &String| text.split('=').next().unwrap_or_default().trim().to_string();
+    if let Some(other) = args.overrides.iter().find(|text| !FORMAT.contains(&key(text).as_str())) {
+        return Err(Failure::new(format!(
+            "--set {other}: the model's features are fixed; only signal.sample_rate and \
+             signal.channels may bring recordings to the format that it was trained on"
+        )));
+    }
+    let changed = Config::from_tree(header.feature_config.clone(), &args.overrides)?;
+    Ok(Arc::new(changed))
 }
 
 /// The recordings named.
@@ -161,17 +240,17 @@ fn recordings(args: &Args) -> Result<Vec<Input>, Failure> {
         extension
             .is_some_and(|e| e.eq_ignore_ascii_case("npz") || e.eq_ignore_ascii_case("parquet"))
     };
-    if let Some(name) = args.inputs.iter().find(is_table) {
-        return Err(Failure::new(format!("--in {name} is a feature file: give it as --features")));
+    if let Some(name) = args.names().iter().find(is_table) {
+        return Err(Failure::new(format!("{name} is a feature file: give it as --features")));
     }
-    let collected = inputs::collect(&args.inputs)?;
+    let collected = inputs::collect(args.names())?;
     if let Some(skipped) = collected.warning() {
         eprintln!("warning: {skipped}");
     }
     let found = collected.inputs;
     if found.is_empty() {
-        let names = args.inputs.join(" ");
-        return Err(Failure::new(format!("--in {names}: no recordings found")));
+        let names = args.names().join(" ");
+        return Err(Failure::new(format!("{names}: no recordings found")));
     }
     Ok(found)
 }

@@ -1,123 +1,227 @@
 //! One prediction for each recording, from all of it.
 
+use std::collections::HashMap;
 use std::path::Path;
 
-use corsmal_extract::inputs;
-use corsmal_extract::run::{self, RunError};
+use corsmal_extract::inputs::{Input, InputSource};
+use corsmal_extract::run::{self, RunError, RunOptions};
 use corsmal_files::draft;
-use corsmal_files::outcome::Status;
-use corsmal_files::provenance::Provenance;
+use corsmal_files::npz::Compression;
+use corsmal_files::outcome::{Outcome, Status};
 use corsmal_files::shard::Shard;
-use corsmal_models::ModelError;
-use corsmal_models::model_file::Model;
+use corsmal_models::classifiers::Predicted;
+use corsmal_models::dataset::{LabelledTable, MemberNames};
+use corsmal_models::model_file::{FormatRule, Model};
+use corsmal_models::predictions::Record;
+use linfa::traits::Predict;
 use ndarray::Axis;
 
-use super::{Args, End, configuration, delivered, recordings};
-use crate::dataset_table::DatasetTable;
+use super::{Args, End, Records, configuration, delivered, recordings};
 use crate::failure::Failure;
-use crate::prediction_lines::{Line, PredictionLines};
 use crate::progress::{LogFormat, Meter};
 
-/// Extracts into memory, then predicts.
-pub fn run(args: &Args, model: &Model, lines: &mut PredictionLines<'_>) -> Result<End, Failure> {
+/// Extracts into a temporary folder, then predicts.
+pub fn run(args: &Args, model: &Model) -> Result<(End, Option<Records>), Failure> {
     let config = configuration(args, model)?;
+    let formats = args.rule(model, &config.to_value())?;
     let found = recordings(args)?;
+    let columns: Vec<String> =
+        found.iter().take(1).flat_map(|f| &f.labels).map(|(column, _)| column.clone()).collect();
+    let (accepted, refused) = by_format(&found, &formats, args);
     let folder = if args.out == Path::new("-") {
-        std::env::temp_dir()
+        tempfile::tempdir()
     } else {
-        draft::folder(&args.out).to_path_buf()
+        tempfile::tempdir_in(draft::folder(&args.out))
+    };
+    let folder = folder.map_err(|e| Failure::new(format!("temporary folder: {e}")))?;
+    let options = RunOptions {
+        out: folder.path().join("features.npz"),
+        compression: Compression::Stored,
+        jobs: args.jobs.count(),
+        shard: Shard::default(),
+        resume: false,
+        overwrite: false,
+        max_errors: None,
     };
     let stop = crate::interrupt::flag();
     let meter = Meter::new(LogFormat::Text, args.quiet);
-    let table = match run::table(&found, &config, (args.jobs(), &folder), &meter, stop) {
-        Ok(table) => table,
-        Err(RunError::Interrupted) => return Ok(End::Interrupted),
+    let table = match run::run(&accepted, &config, &options, &meter, stop) {
+        Ok(_) => LabelledTable::read(&options.out, &MemberNames::default())?,
+        Err(RunError::Interrupted) => return Ok((End::Interrupted, None)),
         Err(error) => return Err(error.into()),
     };
-    let (text, hash) = (config.to_value().to_string(), config.hash());
-    let provenance = Provenance::new(text, hash, inputs::list_hash(&found), Shard::default());
-    // What the recordings are called where their table is at fault.
-    let place = Path::new("the recordings");
-    predict(model, &DatasetTable::of_extraction(place, &table, provenance)?, lines)
+    let predictions = predictions(model, &table, &formats, args)?;
+    let mut records = args.records(model, &columns)?;
+    for input in &found {
+        let labels = input.labels.iter().map(|(_, value)| value.as_str()).collect();
+        let path = path(input);
+        let none = Prediction { status: Status::Mismatch, class: None, proba: None };
+        let Prediction { status, class, proba } = match predictions.get(input.id.as_str()) {
+            Some(prediction) if !refused.contains(&input.id) => prediction.clone(),
+            _ => none,
+        };
+        let id = input.id.as_str();
+        let record =
+            Record { id, path: &path, span: None, windows: 0, status, labels, class, proba };
+        if !delivered(records.write(&record))? {
+            return Ok((End::Unread, Some(records)));
+        }
+    }
+    Ok((End::Done, Some(records)))
 }
 
-/// Predicts the rows of a table.
-pub fn predict(
+/// Predicts the rows of a feature file.
+pub fn of_features(
+    args: &Args,
     model: &Model,
-    table: &DatasetTable,
-    lines: &mut PredictionLines<'_>,
-) -> Result<End, Failure> {
-    check_features(model, table)?;
-    let refused: Vec<usize> = table.non_finite().iter().map(|(row, _)| *row).collect();
-    let usable: Vec<usize> = (0..table.ids.len()).filter(|r| !refused.contains(r)).collect();
-    let x = table.x.select(Axis(0), &usable);
-    let classes = if usable.is_empty() { Vec::new() } else { model.predict(x.view())? };
-    let proba = match model.predict_proba(x.view()) {
-        _ if usable.is_empty() => None,
-        Ok(proba) => Some(proba),
-        Err(ModelError::NoProbability { .. }) => None,
-        Err(e) => return Err(e.into()),
-    };
-    let mut by_row = vec![None; table.ids.len()];
-    usable.iter().enumerate().for_each(|(at, &row)| by_row[row] = Some(at));
-    let mut record = |id: &str, path: &str, status: Status, at: Option<usize>| {
-        delivered(lines.write(&Line {
-            id,
-            path,
-            span: None,
-            windows: 0,
-            status,
-            class: at.map(|at| classes[at]),
-            proba: at.zip(proba.as_ref()).map(|(at, proba)| proba.row(at).to_vec()),
-        }))
-    };
-    if table.outcomes.is_empty() {
-        for (row, id) in table.ids.iter().enumerate() {
-            let status = if by_row[row].is_some() { Status::Ok } else { Status::NonFinite };
-            if !record(id, "", status, by_row[row])? {
-                return Ok(End::Unread);
-            }
-        }
-    }
-    let mut row = 0;
-    for outcome in &table.outcomes {
-        let mut at = None;
-        let mut status = outcome.status;
-        if status.has_features() {
-            at = by_row[row];
-            row += 1;
-            if at.is_none() {
-                status = Status::NonFinite;
-            }
-        }
-        if !record(&outcome.id, &outcome.path, status, at)? {
-            return Ok(End::Unread);
-        }
-    }
-    Ok(End::Done)
-}
-
-/// Refuses features that are not those the model knows.
-fn check_features(model: &Model, table: &DatasetTable) -> Result<(), Failure> {
+    table: &LabelledTable,
+) -> Result<(End, Option<Records>), Failure> {
     let place = table.path.display();
     model
         .check_configuration(&table.config_hash)
         .map_err(|e| Failure::new(format!("{place}: {e}")))?;
-    if table.ids.is_empty() {
-        return Ok(());
+    // Files of other programs say nothing of recordings.
+    let formats = match table.outcomes.is_empty() {
+        true => FormatRule::default(),
+        false => args.rule(model, &table.config)?,
+    };
+    let predictions = predictions(model, table, &formats, args)?;
+    let columns: Vec<String> = table.columns().iter().map(|(name, _)| name.clone()).collect();
+    let mut records = args.records(model, &columns)?;
+    let rows: HashMap<&str, usize> =
+        table.ids.iter().enumerate().map(|(row, id)| (id.as_str(), row)).collect();
+    let inputs: Vec<(&str, &str)> = match table.outcomes.is_empty() {
+        true => table.ids.iter().map(|id| (id.as_str(), "")).collect(),
+        false => table.outcomes.iter().map(|o| (o.id.as_str(), o.path.as_str())).collect(),
+    };
+    for (id, path) in inputs {
+        let labels = rows.get(id).map_or(Vec::new(), |&row| {
+            table.columns().iter().map(|(_, values)| values[row].as_str()).collect()
+        });
+        let Prediction { status, class, proba } = predictions[id].clone();
+        let record = Record { id, path, span: None, windows: 0, status, labels, class, proba };
+        if !delivered(records.write(&record))? {
+            return Ok((End::Unread, Some(records)));
+        }
     }
+    Ok((End::Done, Some(records)))
+}
+
+/// What is said of a recording.
+#[derive(Clone)]
+struct Prediction {
+    status: Status,
+    class: Option<usize>,
+    proba: Option<Vec<f64>>,
+}
+
+/// Splits recordings by what their headers say, before anything is computed: one of another format
+/// must not decide how wide the table is. What cannot be opened is left to the extraction.
+fn by_format(found: &[Input], formats: &FormatRule, args: &Args) -> (Vec<Input>, Vec<String>) {
+    let (mut accepted, mut refused) = (Vec::new(), Vec::new());
+    for input in found {
+        let header = match &input.source {
+            InputSource::File(path) => corsmal_audio::open(path).ok(),
+            InputSource::Stdin => None,
+        };
+        let spec = header.as_ref().map(|source| source.spec());
+        let channels = spec.map(|spec| u32::from(spec.channels));
+        match formats.check(spec.map(|spec| spec.sample_rate), channels) {
+            Ok(()) => accepted.push(input.clone()),
+            Err(reason) => {
+                refuse(args, &path(input), &reason);
+                refused.push(input.id.clone());
+            }
+        }
+    }
+    (accepted, refused)
+}
+
+/// The prediction of each recording of a table by its id.
+fn predictions(
+    model: &Model,
+    table: &LabelledTable,
+    formats: &FormatRule,
+    args: &Args,
+) -> Result<HashMap<String, Prediction>, Failure> {
+    let mut found = HashMap::new();
+    let none = |status| Prediction { status, class: None, proba: None };
+    let by_id: HashMap<&str, &Outcome> =
+        table.outcomes.iter().map(|o| (o.id.as_str(), o)).collect();
+    let not_finite: HashMap<usize, usize> = table.non_finite().into_iter().collect();
+    let fits = table.ids.is_empty() || check_features(model, table, args)?;
+    let mut usable = Vec::new();
+    for (row, id) in table.ids.iter().enumerate() {
+        let outcome = by_id.get(id.as_str());
+        let format = outcome.map_or(Ok(()), |o| formats.check(o.sample_rate, o.channels));
+        if let Err(reason) = format {
+            refuse(args, outcome.map_or(id, |o| &o.path), &reason);
+            found.insert(id.clone(), none(Status::Mismatch));
+        } else if !fits {
+            found.insert(id.clone(), none(Status::Mismatch));
+        } else if let Some(&feature) = not_finite.get(&row) {
+            if !args.quiet {
+                let (name, value) = (table.feature_name(feature), table.x[[row, feature]]);
+                eprintln!("{id}: non_finite: feature {name} is {value}");
+            }
+            found.insert(id.clone(), none(Status::NonFinite));
+        } else {
+            usable.push(row);
+        }
+    }
+    if !usable.is_empty() {
+        let x = table.x.select(Axis(0), &usable);
+        let predicted: corsmal_models::Result<Predicted> =
+            args.jobs.pool()?.install(|| Predict::predict(model, &x));
+        let Predicted { classes, proba } = predicted?;
+        for (at, &row) in usable.iter().enumerate() {
+            let id = &table.ids[row];
+            let status = by_id.get(id.as_str()).map_or(Status::Ok, |o| o.status);
+            let proba = proba.as_ref().map(|proba| proba.row(at).to_vec());
+            let prediction = Prediction { status, class: Some(classes[at]), proba };
+            found.insert(id.clone(), prediction);
+        }
+    }
+    for outcome in table.outcomes.iter().filter(|o| !o.status.has_features()) {
+        found.insert(outcome.id.clone(), none(outcome.status));
+    }
+    Ok(found)
+}
+
+/// Whether the features are those that the model knows. Rows of another width become outcome rows;
+/// other names are another kind of table altogether.
+fn check_features(model: &Model, table: &LabelledTable, args: &Args) -> Result<bool, Failure> {
     let (known, given) = (model.n_features(), table.x.ncols());
     if known != given {
-        return Err(Failure::new(format!(
-            "{place}: {given} features, the model was trained on {known}: another number of \
-             channels?"
-        )));
+        let channels = table.outcomes.iter().find_map(|o| o.channels);
+        let channels = channels.map_or(String::new(), |n| format!(", of {n} channels"));
+        let reason = format!(
+            "gives {given} features{channels}; the model was trained on {known}, so on recordings of \
+             another number of channels"
+        );
+        table.ids.iter().for_each(|id| refuse(args, id, &reason));
+        return Ok(false);
     }
     let names = model.header().feature_names.iter().zip(&table.feature_names);
     match names.enumerate().find(|(_, (known, given))| known != given) {
-        None => Ok(()),
+        None => Ok(true),
         Some((at, (known, given))) => Err(Failure::new(format!(
-            "{place}: feature {at} is {given}, the model was trained on {known} there"
+            "{}: feature {at} is {given}, the model was trained on {known} there",
+            table.path.display()
         ))),
+    }
+}
+
+/// Says why a recording has no prediction.
+fn refuse(args: &Args, name: &str, reason: &str) {
+    if !args.quiet {
+        eprintln!("{name}: mismatch: {reason}");
+    }
+}
+
+fn path(input: &Input) -> String {
+    match &input.source {
+        InputSource::File(path) => path.display().to_string(),
+        InputSource::Stdin => "-".into(),
     }
 }

@@ -6,16 +6,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use corsmal_extract::engine::{Features, SignalError, Signals, Windowing, Windows};
 use corsmal_extract::inputs::Input;
 use corsmal_files::outcome::Status;
-use corsmal_models::ModelError;
+use corsmal_models::classifiers::Predicted;
 use corsmal_models::fusion::WindowVotes;
-use corsmal_models::model_file::Model;
+use corsmal_models::model_file::{FormatRule, Model};
+use corsmal_models::predictions::Record;
+use corsmal_models::voting::{Decision, VotingRule};
+use linfa::traits::Predict;
 use ndarray::ArrayView2;
 use rayon::prelude::*;
 
-use super::{Args, End, configuration, delivered, recordings};
+use super::{Args, End, Records, configuration, delivered, recordings};
 use crate::failure::Failure;
-use crate::prediction_lines::{Line, PredictionLines};
-use crate::voting::Rule;
 
 /// Recordings of each worker whose lines wait to be written in order.
 const AHEAD: usize = 4;
@@ -25,23 +26,39 @@ pub fn run(
     args: &Args,
     model: &Model,
     window: f64,
-    vote: Option<Rule>,
-    lines: &mut PredictionLines<'_>,
-) -> Result<End, Failure> {
+    vote: Option<VotingRule>,
+) -> Result<(End, Option<Records>), Failure> {
     let hop = args.hop.unwrap_or(window / 2.0);
     let windowing = Windowing::new(window, hop).ok_or_else(|| {
         Failure::new(format!("--window {window} --hop {hop}: 0.01 to 600 seconds are possible"))
     })?;
-    let signals = Signals::new(configuration(args, model)?);
+    let config = configuration(args, model)?;
+    let formats = args.rule(model, &config.to_value())?;
+    let signals = Signals::new(config);
     let found = recordings(args)?;
-    let predictor = Predictor { model, signals, windowing, vote, stop: crate::interrupt::flag() };
-    let mut write = |found: Found<'_>| {
-        if let Some(reason) = found.reason.filter(|_| !args.quiet) {
-            eprintln!("{}: {}: {reason}", found.line.id, found.line.status.name());
+    let columns: Vec<String> =
+        found.iter().take(1).flat_map(|f| &f.labels).map(|(column, _)| column.clone()).collect();
+    let mut records = args.records(model, &columns)?;
+    let stop = crate::interrupt::flag();
+    let predictor = Predictor { model, formats, signals, windowing, vote, stop };
+    let end = predict(args, &found, &predictor, &mut records)?;
+    let nothing = matches!(end, End::Interrupted) && records.written == 0;
+    Ok((end, (!nothing).then_some(records)))
+}
+
+fn predict(
+    args: &Args,
+    found: &[Input],
+    predictor: &Predictor<'_>,
+    records: &mut Records,
+) -> Result<End, Failure> {
+    let mut write = |line: Line<'_>| {
+        if let Some(reason) = line.reason.filter(|_| !args.quiet) {
+            eprintln!("{}: {}: {reason}", line.record.id, line.record.status.name());
         }
-        delivered(lines.write(&found.line))
+        delivered(records.write(&line.record))
     };
-    if let [only] = found.as_slice() {
+    if let [only] = found {
         // A stream may never end: what is predicted is written at once.
         let mut unread = false;
         predictor.predict(only, &mut |line| {
@@ -50,9 +67,9 @@ pub fn run(
         })?;
         return Ok(if unread { End::Unread } else { predictor.end() });
     }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.jobs()).build()?;
-    for part in found.chunks(AHEAD * args.jobs()) {
-        let predicted: Vec<Result<Vec<Found<'_>>, Failure>> = pool.install(|| {
+    let pool = args.jobs.pool()?;
+    for part in found.chunks(AHEAD * args.jobs.count()) {
+        let predicted: Vec<Result<Vec<Line<'_>>, Failure>> = pool.install(|| {
             let each = part.par_iter().map(|input| {
                 let mut all = Vec::new();
                 predictor.predict(input, &mut |line| {
@@ -76,21 +93,19 @@ pub fn run(
 }
 
 /// A line, and in words why it has no prediction or one from a part of the windows only.
-struct Found<'a> {
-    line: Line<'a>,
+struct Line<'a> {
+    record: Record<'a>,
     reason: Option<String>,
 }
 
 struct Predictor<'a> {
     model: &'a Model,
+    formats: FormatRule,
     signals: Signals,
     windowing: Windowing,
-    vote: Option<Rule>,
+    vote: Option<VotingRule>,
     stop: &'static Arc<AtomicBool>,
 }
-
-/// Class and probabilities.
-type Prediction = (usize, Option<Vec<f64>>);
 
 impl Predictor<'_> {
     fn end(&self) -> End {
@@ -105,15 +120,16 @@ impl Predictor<'_> {
     fn predict<'i>(
         &self,
         input: &'i Input,
-        each: &mut dyn FnMut(Found<'i>) -> Result<bool, Failure>,
+        each: &mut dyn FnMut(Line<'i>) -> Result<bool, Failure>,
     ) -> Result<(), Failure> {
         let path = Self::path(input);
-        let line = |span, windows, status: Status, found: Option<Prediction>| {
+        let record = |span, windows, status: Status, found: Option<Decision>| {
             let (class, proba) = found.map_or((None, None), |(c, p)| (Some(c), p));
-            Line { id: &input.id, path, span, windows, status, class, proba }
+            let labels = input.labels.iter().map(|(_, value)| value.as_str()).collect();
+            Record { id: &input.id, path, span, windows, status, labels, class, proba }
         };
-        let failed = |span, error: SignalError| Found {
-            line: line(span, 0, error.status, None),
+        let failed = |span, error: SignalError| Line {
+            record: record(span, 0, error.status, None),
             reason: Some(error.reason),
         };
         let opened = Windows::open(input, &self.signals, self.windowing, self.stop);
@@ -122,6 +138,11 @@ impl Predictor<'_> {
             Err(_) if self.stopped() => return Ok(()),
             Err(error) => return each(failed(None, error)).map(|_| ()),
         };
+        let (rate, channels) = windows.format();
+        if let Err(reason) = self.formats.check(Some(rate), Some(channels)) {
+            let error = SignalError { status: Status::Mismatch, reason };
+            return each(failed(None, error)).map(|_| ());
+        }
         let mut votes = WindowVotes::new(self.model.header().labels.len());
         let mut trouble: Option<SignalError> = None;
         let mut failures = 0;
@@ -149,8 +170,8 @@ impl Predictor<'_> {
                         votes.add(class, proba.as_deref())?;
                         continue;
                     }
-                    let line = line(span, 1, Status::Ok, Some((class, proba)));
-                    if !each(Found { line, reason: None })? {
+                    let record = record(span, 1, Status::Ok, Some((class, proba)));
+                    if !each(Line { record, reason: None })? {
                         return Ok(());
                     }
                 }
@@ -160,14 +181,15 @@ impl Predictor<'_> {
         let found = match (rule.decide(&votes)?, trouble) {
             (None, Some(error)) => failed(None, error),
             (decision, Some(error)) => {
-                let reason = format!("{failures} windows failed, the first: {}", error.reason);
-                let line = line(None, votes.windows(), error.status, decision);
-                Found { line, reason: Some(reason) }
+                let windows = if failures == 1 { "window" } else { "windows" };
+                let reason = format!("{failures} {windows} failed, the first: {}", error.reason);
+                let record = record(None, votes.windows(), error.status, decision);
+                Line { record, reason: Some(reason) }
             }
             (decision, None) => {
                 let truncated = windows.is_truncated();
                 let status = if truncated { Status::Truncated } else { Status::Ok };
-                Found { line: line(None, votes.windows(), status, decision), reason: None }
+                Line { record: record(None, votes.windows(), status, decision), reason: None }
             }
         };
         each(found).map(|_| ())
@@ -193,7 +215,8 @@ impl Predictor<'_> {
         let known = self.model.n_features();
         if row.len() != known {
             let reason = format!(
-                "{} features, the model was trained on {known}: another number of channels?",
+                "gives {} features; the model was trained on {known}, so on recordings of another \
+                 number of channels",
                 row.len()
             );
             return refuse(Status::Mismatch, reason);
@@ -204,13 +227,10 @@ impl Predictor<'_> {
         Ok(row.into_iter().map(f64::from).collect())
     }
 
-    fn classify(&self, row: &[f64]) -> Result<Prediction, Failure> {
+    fn classify(&self, row: &[f64]) -> Result<Decision, Failure> {
         let x = ArrayView2::from_shape((1, row.len()), row)?;
-        let class = self.model.predict(x)?[0];
-        match self.model.predict_proba(x) {
-            Ok(proba) => Ok((class, Some(proba.row(0).to_vec()))),
-            Err(ModelError::NoProbability { .. }) => Ok((class, None)),
-            Err(e) => Err(e.into()),
-        }
+        let predicted: corsmal_models::Result<Predicted> = Predict::predict(self.model, &x);
+        let Predicted { classes, proba } = predicted?;
+        Ok((classes[0], proba.map(|proba| proba.row(0).to_vec())))
     }
 }

@@ -4,12 +4,11 @@ use std::collections::HashMap;
 use std::fmt;
 use std::str::FromStr;
 
-use corsmal_models::ModelError;
-use corsmal_models::labels::Labels;
-use corsmal_models::splits::{self, Fold};
-
-use crate::dataset_table::DatasetTable;
-use crate::failure::Failure;
+use crate::dataset::{LabelledTable, Result, count};
+use crate::error::ModelError;
+use crate::labels::Labels;
+use crate::splits::{self, Fold};
+use crate::targets::Classes;
 
 /// Inner folds of a choice, and folds without groups, unless there are fewer groups.
 const FOLDS: usize = 5;
@@ -22,7 +21,7 @@ const GROUPS: [&str; 2] = ["container", "group"];
 pub enum CvPlan {
     /// `group=COLUMN`: each group once
     Group(String),
-    /// `k=N`: this many folds, of whole groups where there are groups, else stratified
+    /// `k=N` or `N`: this many folds, of whole groups where there are groups, else stratified
     K(usize),
     /// `lists=1,4,7/2,5,8`: these groups together
     Lists(Vec<Vec<String>>),
@@ -33,10 +32,16 @@ pub enum CvPlan {
 impl FromStr for CvPlan {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
         let expected = || {
-            format!("{text:?}: expected group=COLUMN, k=N, lists=1,4,7/2,5,8/3,6,9 or fold=COLUMN")
+            format!(
+                "{text:?}: expected a number of folds, group=COLUMN, k=N, \
+                 lists=1,4,7/2,5,8/3,6,9 or fold=COLUMN"
+            )
         };
+        if let Ok(folds) = text.parse() {
+            return Ok(Self::K(folds));
+        }
         let (kind, value) = text.split_once('=').ok_or_else(expected)?;
         if value.is_empty() {
             return Err(expected());
@@ -66,6 +71,7 @@ impl fmt::Display for CvPlan {
 }
 
 /// Outer folds and what inner folds are made of.
+#[derive(Clone, Debug)]
 pub struct Folds {
     /// in words
     pub description: String,
@@ -80,14 +86,18 @@ pub struct Folds {
 
 impl Folds {
     /// Carries out a plan; without one, each group once where there are groups (`groups`, or a
-    /// column called [`GROUPS`]), else stratified folds.
+    /// column called container or group), else stratified folds.
+    ///
+    /// # Errors
+    /// Columns that are not there, groups that the folds would split, classes with too few rows.
     pub fn new(
         plan: Option<&CvPlan>,
-        table: &DatasetTable,
+        table: &LabelledTable,
         groups: Option<&str>,
-        (labels, y): (&Labels, &[usize]),
+        (labels, classes): (&Labels, &Classes),
         seed: u32,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self> {
+        let y = &classes.indices().to_vec();
         let known = || GROUPS.into_iter().find(|column| has_groups(table, column));
         let default = match groups.or_else(known) {
             Some(column) => CvPlan::Group(column.into()),
@@ -104,7 +114,10 @@ impl Folds {
             (CvPlan::K(k), Some(g)) => splits::group_k_fold(g, *k)?,
             (CvPlan::Lists(lists), Some(g)) => splits::group_lists(g, lists)?,
             (CvPlan::K(k), None) => stratified(labels, y, *k, seed)?,
-            _ => return Err(Failure::new("--cv lists=…: which column is listed? give --groups")),
+            _ => {
+                let reason = "lists of which column? Name it as the groups (--groups)".into();
+                return Err(ModelError::Folds { reason }.into());
+            }
         };
         let description = match (plan, column) {
             (CvPlan::K(_), None) => format!("{plan}, stratified, seed {seed}"),
@@ -122,9 +135,18 @@ impl Folds {
         Ok(Self { description, outer, groups: kept, names: labels.names().to_vec(), seed })
     }
 
+    /// What is never split, one name per row; `None` where any row may be held out.
+    pub fn groups(&self) -> Option<&[String]> {
+        self.groups.as_deref()
+    }
+
     /// Folds inside these rows, of whole groups where there are groups. Row numbers are positions
     /// in `rows`.
-    pub fn inner(&self, rows: &[usize], y: &[usize]) -> Result<Vec<Fold>, ModelError> {
+    ///
+    /// # Errors
+    /// [`ModelError::Folds`] for a class with a single row.
+    pub fn inner(&self, rows: &[usize], classes: &Classes) -> crate::Result<Vec<Fold>> {
+        let y = classes.indices();
         let Some(groups) = &self.groups else {
             let inside: Vec<usize> = rows.iter().map(|&row| y[row]).collect();
             let count = |class| inside.iter().filter(|&&c| c == class).count();
@@ -146,7 +168,8 @@ impl Folds {
     }
 
     /// Classes that some fold tests without having trained on them, each with the fold.
-    pub fn untrained(&self, y: &[usize]) -> Vec<(usize, &str)> {
+    pub fn untrained(&self, classes: &Classes) -> Vec<(usize, &str)> {
+        let y = classes.indices();
         let mut found = Vec::new();
         for fold in &self.outer {
             let trained: Vec<usize> = fold.train.iter().map(|&row| y[row]).collect();
@@ -161,36 +184,34 @@ impl Folds {
 }
 
 /// Refuses folds that hold out a part of a group.
-fn refuse_split(
-    folds: &[Fold],
-    groups: &[String],
-    (plan, column): (&CvPlan, &str),
-) -> Result<(), Failure> {
+fn refuse_split(folds: &[Fold], groups: &[String], (plan, column): (&CvPlan, &str)) -> Result<()> {
     let mut fold_of: HashMap<&str, &str> = HashMap::new();
     for fold in folds {
         for &row in &fold.test {
             let other = *fold_of.entry(&groups[row]).or_insert(&fold.name);
             if other != fold.name {
-                return Err(Failure::new(format!(
+                let reason = format!(
                     "{plan}: {column} {} is in the folds {other} and {}; --groups must not be split",
                     groups[row], fold.name
-                )));
+                );
+                return Err(ModelError::Folds { reason }.into());
             }
         }
     }
     Ok(())
 }
 
-fn has_groups(table: &DatasetTable, column: &str) -> bool {
+fn has_groups(table: &LabelledTable, column: &str) -> bool {
     table.column(column).is_ok_and(|values| Labels::of(&values).0.len() > 1)
 }
 
-fn stratified(labels: &Labels, y: &[usize], k: usize, seed: u32) -> Result<Vec<Fold>, Failure> {
+fn stratified(labels: &Labels, y: &[usize], k: usize, seed: u32) -> Result<Vec<Fold>> {
     for (class, name) in labels.names().iter().enumerate() {
         let rows = y.iter().filter(|&&c| c == class).count();
         if rows < k {
-            let text = format!("class {name} has {rows} rows, too few for {k} stratified folds");
-            return Err(Failure::new(text));
+            let rows = count(rows, "row");
+            let reason = format!("class {name} has {rows}, too few for {k} stratified folds");
+            return Err(ModelError::Folds { reason }.into());
         }
     }
     Ok(splits::stratified_k_fold(y, k, Some(seed))?)
@@ -207,7 +228,8 @@ mod tests {
         assert_eq!("k=3".parse(), Ok(CvPlan::K(3)));
         assert_eq!("group=container".parse(), Ok(CvPlan::Group("container".into())));
         assert_eq!("fold=fold".parse(), Ok(CvPlan::Fold("fold".into())));
-        for wrong in ["k=", "k=x", "3", "leave=1", ""] {
+        assert_eq!("5".parse(), Ok(CvPlan::K(5)));
+        for wrong in ["k=", "k=x", "leave=1", "-3", ""] {
             assert!(wrong.parse::<CvPlan>().is_err(), "{wrong}");
         }
     }

@@ -1,0 +1,169 @@
+//! Labelled features.
+
+use std::path::{Path, PathBuf};
+
+use corsmal_files::identity;
+use corsmal_models::dataset::{LabelSource, LabelledTable, MemberNames};
+use serde_json::{Value, json};
+
+use crate::failure::Failure;
+
+/// What --labels says for class folders.
+const FOLDERS: &str = "folders";
+
+/// Column of the classes that folders name.
+const FOLDER_COLUMN: &str = "class";
+
+/// Label columns that are groups rather than something to predict.
+const NO_TARGETS: [&str; 3] = ["fold", "group", "container"];
+
+/// How to read an `.npz` that `extract` did not write.
+#[derive(clap::Args, Clone)]
+pub struct MemberArgs {
+    /// In an .npz of another program: the member with the features, rows x features. Its
+    /// one-dimensional members of that many rows are label columns.
+    #[arg(long, value_name = "MEMBER", default_value = "X")]
+    x: String,
+    /// In an .npz of another program: the member with the ids; else rows are numbered from 0.
+    #[arg(long, value_name = "MEMBER")]
+    ids: Option<String>,
+}
+
+impl MemberArgs {
+    /// The names.
+    pub fn names(&self) -> MemberNames {
+        MemberNames { x: self.x.clone(), ids: self.ids.clone() }
+    }
+}
+
+/// Where labels come from.
+#[derive(clap::Args, Clone)]
+pub struct LabelArgs {
+    /// Labels: a CSV whose column id or path names the recordings, or `folders` where each recording
+    /// lies in a folder named like its class.
+    #[arg(long, value_name = "CSV|folders")]
+    labels: Option<PathBuf>,
+    /// Column of the label file that names the recordings by id, path or file name, such as `file`.
+    #[arg(long, value_name = "COLUMN", requires = "labels")]
+    id_column: Option<String>,
+}
+
+impl LabelArgs {
+    /// The source; `None` where labels are columns of the features or predictions themselves.
+    pub fn source(&self, target: Option<&str>) -> Result<Option<LabelSource>, Failure> {
+        match &self.labels {
+            None => Ok(None),
+            Some(path) if path == Path::new(FOLDERS) => match &self.id_column {
+                None => {
+                    let column = target.unwrap_or(FOLDER_COLUMN).into();
+                    Ok(Some(LabelSource::Folders { column }))
+                }
+                Some(_) => {
+                    Err(Failure::new("--id-column goes with a label file, not with folders"))
+                }
+            },
+            Some(path) => {
+                Ok(Some(LabelSource::File { path: path.clone(), key: self.id_column.clone() }))
+            }
+        }
+    }
+
+    /// The label file, if there is one.
+    fn file(&self) -> Option<&Path> {
+        self.labels.as_deref().filter(|path| *path != Path::new(FOLDERS))
+    }
+
+    /// Whether the classes are folders.
+    pub fn folders(&self) -> bool {
+        self.labels.as_deref() == Some(Path::new(FOLDERS))
+    }
+}
+
+/// Labelled features, as `train` and `cross-validate` take them.
+#[derive(clap::Args)]
+pub struct DatasetArgs {
+    /// Features: an .npz or .parquet of `extract` with summaries, or any .npz.
+    #[arg(value_name = "FEATURES", required_unless_present = "features")]
+    table: Option<PathBuf>,
+    /// The same by name.
+    #[arg(long, value_name = "FILE", conflicts_with = "table")]
+    features: Option<PathBuf>,
+    #[command(flatten)]
+    members: MemberArgs,
+    #[command(flatten)]
+    labels: LabelArgs,
+    /// Label column to learn; the only one where there is one. `joint` is type and level together
+    /// where there is no such column.
+    #[arg(long, visible_alias = "y", value_name = "COLUMN")]
+    target: Option<String>,
+    /// Label column of groups that must not be split between training and test. A column called
+    /// container or group is taken by itself where no --cv is given.
+    #[arg(long, value_name = "COLUMN")]
+    pub groups: Option<String>,
+}
+
+impl DatasetArgs {
+    /// The feature file.
+    fn path(&self) -> &Path {
+        self.table.as_deref().or(self.features.as_deref()).unwrap_or(Path::new(""))
+    }
+
+    /// Reads features and labels, refuses what cannot be learned from, warns of what is odd. Gives
+    /// the name of the column to learn, too.
+    pub fn load(&self) -> Result<(LabelledTable, String), Failure> {
+        let mut table = LabelledTable::read(self.path(), &self.members.names())?;
+        if let Some(source) = self.labels.source(self.target.as_deref())? {
+            table.add_labels(&source)?;
+        }
+        let constant = table.check()?;
+        if let Some(&first) = constant.first() {
+            eprintln!(
+                "warning: {}: {} of {} features have one value in all rows, the first is {}",
+                self.path().display(),
+                constant.len(),
+                table.x.ncols(),
+                table.feature_name(first)
+            );
+        }
+        let target = self.target(&table)?;
+        Ok((table, target))
+    }
+
+    fn target(&self, table: &LabelledTable) -> Result<String, Failure> {
+        if let Some(target) = &self.target {
+            return Ok(target.clone());
+        }
+        if self.labels.folders() {
+            return Ok(FOLDER_COLUMN.into());
+        }
+        let is_group =
+            |name: &&str| !NO_TARGETS.contains(name) && self.groups.as_deref() != Some(*name);
+        let columns = table.columns().iter().map(|(name, _)| name.as_str());
+        let candidates: Vec<&str> = columns.filter(is_group).collect();
+        match candidates.as_slice() {
+            [only] => Ok((*only).into()),
+            [] => Err(Failure::new(format!(
+                "{}: has no label column; --labels adds labels from a CSV or from class folders",
+                self.path().display()
+            ))),
+            several => Err(Failure::new(format!(
+                "{}: which column is to be learned? --target is one of {}",
+                self.path().display(),
+                several.join(", ")
+            ))),
+        }
+    }
+
+    /// Where the table came from, for a model's provenance.
+    pub fn provenance(&self) -> Result<Value, Failure> {
+        let file = |path: &Path| -> Result<Value, Failure> {
+            let identity = identity::of_file(path)
+                .map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
+            Ok(json!({ "path": path.display().to_string(), "identity": identity }))
+        };
+        Ok(json!({
+            "features": file(self.path())?,
+            "labels": self.labels.file().map(file).transpose()?,
+        }))
+    }
+}

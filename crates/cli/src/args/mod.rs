@@ -1,0 +1,19 @@
+//! Arguments that several commands share.
+
+mod dataset;
+mod jobs;
+mod pipeline;
+mod vote;
+
+pub use dataset::{DatasetArgs, LabelArgs, MemberArgs};
+pub use jobs::Jobs;
+pub use pipeline::PipelineArgs;
+pub use vote::VoteArgs;
+
+/// A number from 0 to 1.
+pub fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
+        _ => Err(format!("{text:?}: expected a probability from 0 to 1")),
+    }
+}

@@ -1,0 +1,45 @@
+//! Which classifier is trained, with which steps before it.
+
+use corsmal_models::pipeline::PipelineSpec;
+use corsmal_models::recipe::Recipe;
+
+use crate::failure::Failure;
+
+/// Steps and classifier.
+#[derive(clap::Args)]
+pub struct PipelineArgs {
+    /// Classifier: knn, svm, tree, rf, et or logistic; `corsmal-feat classifiers` explains them.
+    #[arg(long, value_name = "NAME", default_value = "rf")]
+    classifier: String,
+    /// A parameter of the classifier, such as trees=500 or C=10. scikit-learn's names are understood.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    parameters: Vec<String>,
+    /// Scale every feature to zero mean and unit variance on the training rows.
+    #[arg(long)]
+    standardize: bool,
+    /// Principal components to keep: a number of them, or a part of the variance below 1.0.
+    #[arg(long, value_name = "N")]
+    pca: Option<String>,
+    /// Try these values, such as C=0.1,1,10; repeated, every combination. The choice is made on
+    /// folds inside the training rows.
+    #[arg(long, value_name = "KEY=V1,V2")]
+    tune: Vec<String>,
+    /// Seed of the classifier and of shuffled folds.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u32,
+}
+
+impl PipelineArgs {
+    /// The pipelines to choose from: one, unless something is tuned.
+    pub fn candidates(&self) -> Result<Vec<PipelineSpec>, Failure> {
+        let recipe = Recipe {
+            classifier: self.classifier.clone(),
+            parameters: self.parameters.clone(),
+            standardize: self.standardize,
+            pca: self.pca.clone(),
+            tune: self.tune.clone(),
+            seed: self.seed,
+        };
+        Ok(recipe.candidates()?)
+    }
+}

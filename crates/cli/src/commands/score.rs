@@ -1,0 +1,172 @@
+//! `corsmal-feat score`: how good predictions are.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use corsmal_models::predictions::PredictionTable;
+use corsmal_models::scores::{ClassReport, Interval, NumericScores, ScoreReport, Scoring};
+
+use crate::args::LabelArgs;
+use crate::failure::Failure;
+use crate::text_table::{TextTable, confusion, percent};
+
+/// Arguments of `score`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  corsmal-feat score held-out.csv
+  corsmal-feat score predictions.csv --labels labels.csv --target type --groups container
+  corsmal-feat score predictions.csv --labels meta.csv --id-column file --target class --reject 0.6
+  corsmal-feat score capacities.csv --labels labels.csv --target capacity
+
+Prediction files are those of `classify`, `cross-validate --predictions` and `fuse`. Accuracy, weighted
+and macro F1 with 95 % bootstrap intervals, scores of each class, confusion matrix, calibration (Brier
+score, ECE), areas under the ROC and precision-recall curves. Lines without a prediction count as wrong.
+A numeric target gives errors and the score of the CORSMAL challenge. CORSMAL submissions have their own
+rules: `corsmal-feat evaluate`.
+
+Exit codes: 0 fine, 2 could not run.")]
+pub struct Args {
+    /// Prediction file.
+    #[arg(value_name = "CSV")]
+    predictions: PathBuf,
+    #[command(flatten)]
+    labels: LabelArgs,
+    /// Column of the true classes; `true` by default, or `class` with --labels folders.
+    #[arg(long, visible_alias = "y", value_name = "COLUMN")]
+    target: Option<String>,
+    /// Column of groups that the bootstrap draws together; by default group, container or fold where
+    /// there is one, else single lines are drawn.
+    #[arg(long, value_name = "COLUMN")]
+    groups: Option<String>,
+    /// Predictions with a highest probability below P are unknown, and count as wrong.
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = crate::args::share)]
+    reject: f64,
+    /// The target is a number although all its values are whole.
+    #[arg(long)]
+    numeric: bool,
+    /// Draws of the bootstrap.
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    resamples: u32,
+    /// Seed of the bootstrap.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Print everything as JSON, curves included.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Scores and prints.
+pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    let mut table = PredictionTable::read(&args.predictions)?;
+    let mut target = args.target.clone();
+    if let Some(source) = args.labels.source(target.as_deref())? {
+        table.add_labels(&source)?;
+        if args.labels.folders() {
+            target.get_or_insert_with(|| "class".into());
+        }
+    }
+    let scoring = Scoring {
+        target,
+        groups: args.groups,
+        reject: args.reject,
+        numeric: args.numeric,
+        draws: args.resamples as usize,
+        seed: args.seed,
+    };
+    let report = table.score(&scoring)?;
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&report)?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    match report {
+        ScoreReport::Classes(report) => {
+            print_overall(&report);
+            println!();
+            print_classes(&report);
+        }
+        ScoreReport::Numbers(scores) => print_numbers(&scores),
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn interval(interval: &Interval) -> [String; 2] {
+    [percent(interval.low), percent(interval.high)]
+}
+
+fn print_overall(report: &ClassReport) {
+    let (s, i) = (&report.scores, &report.intervals);
+    println!("{} rows, {} classes", report.rows, report.labels.len());
+    if report.unknown > 0 {
+        println!(
+            "{} without a prediction count as wrong; accuracy of the others {} %",
+            report.unknown,
+            percent(report.accuracy_of_known)
+        );
+    }
+    println!();
+    let mut table = TextTable::new(["percent", "score", "95 % CI from", "to"]);
+    for (name, score, bounds) in [
+        ("accuracy", s.accuracy, &i.accuracy),
+        ("weighted F1", s.weighted_f1, &i.weighted_f1),
+        ("macro F1", s.macro_f1, &i.macro_f1),
+    ] {
+        table.row([name.to_string(), percent(score)].into_iter().chain(interval(bounds)));
+    }
+    println!("{}", table.text());
+    let drawn =
+        if report.drawn == "rows" { "rows".into() } else { format!("values of {}", report.drawn) };
+    println!("bootstrap over {} {drawn}", report.units);
+    if report.drawn != "rows" && report.units < 10 {
+        println!("with so few of them the interval says little");
+    }
+    if let Some(calibration) = &report.calibration {
+        println!(
+            "\nBrier score {:.4}, expected calibration error {:.4}",
+            calibration.brier, calibration.ece
+        );
+    }
+    if let (Some(roc), Some(precision)) = (report.roc_auc, report.average_precision) {
+        println!(
+            "area under the ROC curve {roc:.4}, average precision {precision:.4} (class means)"
+        );
+    }
+}
+
+/// Scores of each class, and the confusion matrix.
+pub fn print_classes(report: &ClassReport) {
+    let curves = report.curves.as_deref().unwrap_or_default();
+    let heads = ["class, percent", "precision", "recall", "F1", "ROC area", "rows"];
+    let mut table = TextTable::new(heads);
+    for (at, (name, c)) in report.labels.iter().zip(&report.scores.classes).enumerate() {
+        let area =
+            curves.get(at).and_then(Option::as_ref).map_or(String::new(), |c| percent(c.roc_auc));
+        table.row([
+            name.clone(),
+            percent(c.precision),
+            percent(c.recall),
+            percent(c.f1),
+            area,
+            c.support.to_string(),
+        ]);
+    }
+    println!("{}\n", table.text());
+    println!("{}", confusion(&report.labels, &report.scores.confusion, &report.scores.unknown));
+}
+
+fn print_numbers(scores: &NumericScores) {
+    println!("{} rows, {} without an estimate\n", scores.rows, scores.unknown);
+    let mut table = TextTable::new(["error", "value"]);
+    for (name, value) in [
+        ("mean absolute error", format!("{:.4}", scores.mean_absolute_error)),
+        ("root mean squared error", format!("{:.4}", scores.root_mean_squared_error)),
+        ("mean relative error, percent", percent(scores.mean_relative_error)),
+        ("R squared", format!("{:.4}", scores.r2)),
+        ("CORSMAL score, percent", percent(scores.score)),
+        ("  95 % CI from", percent(scores.score_interval.low)),
+        ("  95 % CI to", percent(scores.score_interval.high)),
+    ] {
+        table.row([name.to_string(), value]);
+    }
+    println!("{}", table.text());
+}

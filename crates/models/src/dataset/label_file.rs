@@ -1,0 +1,231 @@
+//! Label files: CSV with a column that names the recording, and label columns.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use super::{DatasetError, Result};
+
+/// Where labels come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LabelSource {
+    /// A CSV file.
+    File {
+        /// the file
+        path: PathBuf,
+        /// the column that names recordings; else `id`, or `path`
+        key: Option<String>,
+    },
+    /// The folder in which each recording lies is its class.
+    Folders {
+        /// the name that this column gets
+        column: String,
+    },
+}
+
+/// The columns of a label file by recording.
+#[derive(Clone, Debug)]
+pub struct LabelFile {
+    path: PathBuf,
+    key: Key,
+    columns: Vec<String>,
+    /// line in the file and values, by the key's text
+    rows: HashMap<String, (u64, Vec<String>)>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Key {
+    Id,
+    Path,
+    /// a column of another name, which may hold ids, paths or file names
+    Other,
+}
+
+impl LabelFile {
+    /// Reads a file. `key` is the column that names recordings: by id, by path, by file name, or by
+    /// file name without extension. Without it a column `id` counts, else `path`.
+    ///
+    /// # Errors
+    /// [`DatasetError::Content`] for a file that is no table, has no such column, names a column
+    /// twice, or names a recording twice.
+    pub fn read(path: &Path, key: Option<&str>) -> Result<Self> {
+        let fault = |e: csv::Error| DatasetError::content(path, e.to_string());
+        let mut reader =
+            csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path).map_err(fault)?;
+        let header = reader.headers().map_err(fault)?.clone();
+        let find = |wanted: &str| header.iter().position(|h| h == wanted);
+        let (key, at) = match (key, find("id"), find("path")) {
+            (Some(name), ..) => match find(name) {
+                Some(at) if name == "id" => (Key::Id, at),
+                Some(at) => (Key::Other, at),
+                None => {
+                    let choices = corsmal_names::choices(name, header.iter());
+                    let reason = format!("no column {name:?} (--id-column): {choices}");
+                    return Err(DatasetError::content(path, reason));
+                }
+            },
+            (None, Some(at), _) => (Key::Id, at),
+            (None, None, Some(at)) => (Key::Path, at),
+            (None, None, None) => {
+                let found = header.iter().collect::<Vec<_>>().join(", ");
+                let reason = format!(
+                    "needs a column id or path, has {found}; --id-column NAME says which column \
+                     names the recordings"
+                );
+                return Err(DatasetError::content(path, reason));
+            }
+        };
+        for (i, column) in header.iter().enumerate() {
+            if header.iter().take(i).any(|other| other == column) {
+                let reason = format!("two columns are named {column:?}");
+                return Err(DatasetError::content(path, reason));
+            }
+        }
+        let is_label = |i: usize| i != at && !matches!(&header[i], "id" | "path");
+        let label_at: Vec<usize> = (0..header.len()).filter(|&i| is_label(i)).collect();
+        let mut rows: HashMap<String, (u64, Vec<String>)> = HashMap::new();
+        for record in reader.records() {
+            let record = record.map_err(fault)?;
+            let line = record.position().map_or(0, csv::Position::line);
+            let values = label_at.iter().map(|&i| record[i].to_string()).collect();
+            if let Some((before, _)) = rows.insert(record[at].to_string(), (line, values)) {
+                let reason = format!("line {line} repeats {:?} of line {before}", &record[at]);
+                return Err(DatasetError::content(path, reason));
+            }
+        }
+        let columns = label_at.iter().map(|&i| header[i].to_string()).collect();
+        Ok(Self { path: path.into(), key, columns, rows })
+    }
+
+    /// Label columns in the order of these recordings, given as (id, path). Lines of recordings
+    /// that `failed` extraction are allowed; any other line must have its recording, and every
+    /// recording its line.
+    ///
+    /// # Errors
+    /// [`DatasetError::Content`] with the first line or recording that has no counterpart.
+    pub fn for_recordings(
+        &self,
+        recordings: &[(&str, &str)],
+        failed: &[(&str, &str)],
+        features: &Path,
+    ) -> Result<Vec<(String, Vec<String>)>> {
+        let mut unused: HashMap<&str, u64> =
+            self.rows.iter().map(|(key, (line, _))| (key.as_str(), *line)).collect();
+        let mut columns: Vec<(String, Vec<String>)> =
+            self.columns.iter().map(|c| (c.clone(), Vec::new())).collect();
+        let mut missing = Vec::new();
+        let mut of_name: HashMap<&str, (&str, &str)> = HashMap::new();
+        for &recording in recordings {
+            let Some((key, (line, values))) = self.find(recording) else {
+                missing.push(recording.0);
+                continue;
+            };
+            // A file name may stand for several recordings in different folders; an id and a path
+            // (of several stretches of one recording) may not.
+            let (id, path) = recording;
+            let other = of_name.insert(key, recording).filter(|(_, other)| *other != path);
+            if let Some((other, _)) = other {
+                return Err(DatasetError::content(
+                    &self.path,
+                    format!(
+                        "line {line}: {key:?} matches the recordings {other:?} and {id:?}: name \
+                         them by id or path"
+                    ),
+                ));
+            }
+            unused.remove(key.as_str());
+            columns.iter_mut().zip(values).for_each(|((_, column), v)| column.push(v.clone()));
+        }
+        for recording in failed {
+            if let Some((key, _)) = self.find(*recording) {
+                unused.remove(key.as_str());
+            }
+        }
+        let features = features.display();
+        if let Some((key, line)) = unused.iter().min_by_key(|(_, line)| **line) {
+            let count = count(unused.len(), "such line");
+            return Err(DatasetError::content(
+                &self.path,
+                format!("line {line}: {key:?} matches no recording of {features} ({count})"),
+            ));
+        }
+        if let Some(first) = missing.first() {
+            let count = count(missing.len(), "recording");
+            return Err(DatasetError::content(
+                &self.path,
+                format!("no line for recording {first:?} of {features} ({count} without labels)"),
+            ));
+        }
+        Ok(columns)
+    }
+
+    /// By id; by path as extracted or, failing that, the path without extension as id; by any of
+    /// these or the file name where the column has another name.
+    fn find(&self, (id, path): (&str, &str)) -> Option<(&String, &(u64, Vec<String>))> {
+        let get = |key: &str| self.rows.get_key_value(key);
+        if self.key == Key::Id {
+            return get(id);
+        }
+        let file = Path::new(path);
+        let with_extension = || {
+            let extension = file.extension().and_then(|e| e.to_str())?;
+            get(&format!("{id}.{extension}"))
+        };
+        let by_path = get(path).or_else(with_extension);
+        if self.key == Key::Path {
+            return by_path;
+        }
+        let name = || file.file_name().and_then(|n| n.to_str()).and_then(get);
+        let stem = || file.file_stem().and_then(|n| n.to_str()).and_then(get);
+        by_path.or_else(|| get(id)).or_else(name).or_else(stem)
+    }
+}
+
+/// A number with its noun.
+pub(crate) fn count(n: usize, noun: &str) -> String {
+    if n == 1 { format!("1 {noun}") } else { format!("{n} {noun}s") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(text: &str, key: Option<&str>) -> Result<LabelFile> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        LabelFile::read(file.path(), key)
+    }
+
+    #[test]
+    fn any_column_can_name_the_recordings() {
+        let recordings = [("a/x", "data/a/x.wav"), ("b/y", "data/b/y.flac")];
+        let classes = |text: &str, key| {
+            let columns = file(text, key)?.for_recordings(&recordings, &[], Path::new("f.npz"))?;
+            Ok::<_, DatasetError>(columns[0].1.clone())
+        };
+        for (text, key) in [
+            ("id,class\nb/y,dog\na/x,cat\n", None),
+            ("path,class\ndata/b/y.flac,dog\na/x.wav,cat\n", None),
+            ("file,class\ny.flac,dog\nx.wav,cat\n", Some("file")),
+            ("name,class\ny,dog\ndata/a/x.wav,cat\n", Some("name")),
+        ] {
+            assert_eq!(classes(text, key).unwrap(), ["cat", "dog"], "{text}");
+        }
+        let refused = classes("file,class\nx,cat\n", None).unwrap_err().to_string();
+        assert!(refused.contains("--id-column NAME"), "{refused}");
+        let unknown = classes("file,class\nx,cat\n", Some("fil")).unwrap_err().to_string();
+        assert!(unknown.contains("did you mean \"file\""), "{unknown}");
+        let missing = classes("file,class\nx.wav,cat\n", Some("file")).unwrap_err().to_string();
+        assert!(
+            missing.contains("\"b/y\"") && missing.contains("1 recording without"),
+            "{missing}"
+        );
+    }
+
+    #[test]
+    fn a_file_name_that_two_recordings_have_is_refused() {
+        let recordings = [("a/x", "a/x.wav"), ("b/x", "b/x.wav")];
+        let file = file("file,class\nx.wav,cat\n", Some("file")).unwrap();
+        let refused = file.for_recordings(&recordings, &[], Path::new("f.npz")).unwrap_err();
+        assert!(refused.to_string().contains("matches the recordings \"a/x\" and \"b/x\""));
+    }
+}

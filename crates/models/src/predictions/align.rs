@@ -1,0 +1,154 @@
+//! One table from several of the same recordings.
+
+use std::collections::{HashMap, HashSet};
+use std::fmt::Display;
+use std::hash::Hash;
+
+use ndarray::Array2;
+
+use super::{OF_LINES, PredictionError, PredictionRow, PredictionTable, Result, content};
+use crate::fusion::{self, WindowVotes};
+use crate::table::argmax;
+use crate::voting::VotingRule;
+
+impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
+    /// Makes the windows of each recording one decision, in the order in which recordings appear.
+    ///
+    /// # Errors
+    /// What the rule refuses.
+    pub fn vote(&self, rule: VotingRule) -> Result<Self> {
+        let mut at: HashMap<&K, usize> = HashMap::new();
+        let mut recordings: Vec<(&PredictionRow<K>, WindowVotes)> = Vec::new();
+        for row in &self.rows {
+            let next = recordings.len();
+            let slot = *at.entry(&row.key).or_insert(next);
+            if slot == next {
+                recordings.push((row, WindowVotes::new(self.labels.len())));
+            }
+            if let Some(class) = row.class {
+                let votes = &mut recordings[slot].1;
+                votes.add(class, row.proba.as_deref()).map_err(|e| self.model(e))?;
+            }
+        }
+        let mut rows = Vec::with_capacity(recordings.len());
+        for (first, votes) in recordings {
+            let decision = rule.decide(&votes).map_err(|e| self.model(e))?;
+            let (class, proba) = decision.map_or((None, None), |(c, p)| (Some(c), p));
+            rows.push(PredictionRow { class, proba, ..first.clone() });
+        }
+        Ok(Self { rows, ..self.clone() }.of_recordings())
+    }
+
+    /// Weighted mean of tables over the same recordings, in the order of the first. A recording
+    /// without probabilities in one of them has none; one that some table lacks is allowed where the
+    /// others have no prediction of it either.
+    ///
+    /// # Errors
+    /// [`PredictionError`] for no tables, weights that are not one positive number per table, other
+    /// classes, recordings with several lines, and predictions that a table has and another has not.
+    pub fn average(tables: &[Self], weights: Option<&[f64]>) -> Result<Self> {
+        let Some(first) = tables.first() else {
+            return Err(content("".as_ref(), "no prediction files to average"));
+        };
+        let mut first = first.clone();
+        let mut known: HashSet<K> = first.rows.iter().map(|row| row.key.clone()).collect();
+        for table in &tables[1..] {
+            for row in table.rows.iter().filter(|row| row.class.is_none()) {
+                if known.insert(row.key.clone()) {
+                    let cell = |column| table.columns.iter().position(|c| c == column);
+                    let cells = first.columns.iter().map(|column| {
+                        cell(column).map_or(String::new(), |at| row.cells[at].clone())
+                    });
+                    let row = PredictionRow { cells: cells.collect(), ..row.clone() };
+                    first.rows.push(row);
+                }
+            }
+        }
+        let aligned = tables.iter().map(|t| t.aligned_to(&first)).collect::<Result<Vec<_>>>()?;
+        let equal = vec![1.0; tables.len()];
+        let views: Vec<_> = aligned.iter().map(|(values, _)| values.view()).collect();
+        let mean =
+            fusion::average(&views, weights.unwrap_or(&equal)).map_err(|e| first.model(e))?;
+        let rows = first.rows.iter().enumerate().map(|(row, of)| {
+            let known = aligned.iter().all(|(_, known)| known[row]);
+            let proba = known.then(|| mean.row(row).to_vec());
+            let class = proba.as_deref().map(argmax);
+            PredictionRow { class, proba, ..of.clone() }
+        });
+        Ok(Self { rows: rows.collect(), ..first.clone() }.of_recordings())
+    }
+
+    /// Refuses a recording with several lines.
+    ///
+    /// # Errors
+    /// [`PredictionError::Rows`] naming it.
+    pub fn check_once_each(&self) -> Result<()> {
+        let mut seen = HashSet::new();
+        match self.rows.iter().find(|row| !seen.insert(&row.key)) {
+            Some(row) => Err(self.rows_fault("more than one row", &row.key, self)),
+            None => Ok(()),
+        }
+    }
+
+    /// The same without the columns that tell how a single line came about: times, status, windows.
+    pub fn of_recordings(self) -> Self {
+        let keep: Vec<usize> = (0..self.columns.len())
+            .filter(|&at| at < self.naming || !OF_LINES.contains(&self.columns[at].as_str()))
+            .collect();
+        let columns = keep.iter().map(|&at| self.columns[at].clone()).collect();
+        let rows = self.rows.into_iter().map(|row| {
+            let cells = keep.iter().map(|&at| row.cells[at].clone()).collect();
+            PredictionRow { cells, ..row }
+        });
+        Self { columns, rows: rows.collect(), ..self }
+    }
+
+    /// The rows and classes in the order of another table, which must have the same ones; rows
+    /// without probabilities are zero and marked.
+    fn aligned_to(&self, other: &Self) -> Result<(Array2<f64>, Vec<bool>)> {
+        let mut at = HashMap::new();
+        for row in &self.rows {
+            if at.insert(&row.key, row).is_some() {
+                return Err(self.rows_fault("more than one row", &row.key, other));
+            }
+        }
+        let order: Option<Vec<usize>> =
+            other.labels.iter().map(|l| self.labels.iter().position(|own| own == l)).collect();
+        let Some(order) = order.filter(|o| o.len() == self.labels.len()) else {
+            return Err(self.content(format!(
+                "has the classes {}, {} has {}",
+                self.labels.join(", "),
+                other.path.display(),
+                other.labels.join(", ")
+            )));
+        };
+        let mut values = Array2::zeros((other.rows.len(), order.len()));
+        let mut known = Vec::with_capacity(other.rows.len());
+        for (row, mut to) in other.rows.iter().zip(values.outer_iter_mut()) {
+            let Some(own) = at.remove(&row.key) else {
+                if row.class.is_none() {
+                    known.push(false);
+                    continue;
+                }
+                return Err(self.rows_fault("missing rows", &row.key, other));
+            };
+            known.push(own.proba.is_some());
+            if let Some(proba) = &own.proba {
+                to.iter_mut().zip(&order).for_each(|(to, &class)| *to = proba[class]);
+            }
+        }
+        match at.keys().min() {
+            Some(extra) => Err(self.rows_fault("rows that the first file lacks", extra, other)),
+            None => Ok((values, known)),
+        }
+    }
+
+    fn rows_fault(&self, problem: &'static str, key: &K, other: &Self) -> PredictionError {
+        PredictionError::Rows {
+            path: self.path.clone(),
+            problem,
+            row: key.to_string(),
+            expected: format!("the {} lines of {}", other.rows.len(), other.path.display()),
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! Reading prediction files.
+
+use std::path::Path;
+
+use super::{
+    Id, KEYS, MAX_BYTES, PredictionError, PredictionRow, PredictionTable, Result, SUM_TOLERANCE,
+    content,
+};
+use crate::labels::Labels;
+use crate::table::argmax;
+
+/// What a prediction is called that was rejected.
+pub(super) const UNKNOWN: &str = "unknown";
+
+impl PredictionTable {
+    /// Reads a file; a recording may have several lines, one for each of its windows. Columns
+    /// `Object` or `container` with `sequence` name a recording together.
+    ///
+    /// # Errors
+    /// [`PredictionError`] for a file that is no table, missing columns, no lines, probabilities
+    /// that are not 0 to 1 with sum 1, and predictions that are no class.
+    pub fn read(path: &Path) -> Result<Self> {
+        let io = |source| PredictionError::Io { path: path.into(), source };
+        let size = std::fs::metadata(path).map_err(io)?.len();
+        if size > MAX_BYTES {
+            let reason = format!("{size} bytes; prediction files of up to {MAX_BYTES} are read");
+            return Err(content(path, reason));
+        }
+        Self::parse(&std::fs::read(path).map_err(io)?, path)
+    }
+
+    /// The same from bytes; `path` is named in errors.
+    ///
+    /// # Errors
+    /// As [`PredictionTable::read`].
+    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
+        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        let first = bytes.split(|&b| b == b'\n').next().unwrap_or_default();
+        let semicolons = first.contains(&b';') && !first.contains(&b',');
+        let mut reader = csv::ReaderBuilder::new()
+            .delimiter(if semicolons { b';' } else { b',' })
+            .trim(csv::Trim::All)
+            .from_reader(bytes);
+        let fault = |e: csv::Error| content(path, format!("not a readable table: {e}"));
+        let header: Vec<String> =
+            reader.headers().map_err(fault)?.iter().map(String::from).collect();
+        let mut lines = Vec::new();
+        for record in reader.records() {
+            let record = record.map_err(fault)?;
+            lines.push((record.position().map_or(0, csv::Position::line), record));
+        }
+        if lines.is_empty() {
+            return Err(content(path, "has no predictions"));
+        }
+        Columns::find(path, &header, &lines)?.table(path, &header, &lines)
+    }
+}
+
+type Lines = [(u64, csv::StringRecord)];
+
+/// Columns by what they hold.
+struct Columns {
+    naming: Vec<usize>,
+    others: Vec<usize>,
+    /// one per class; none in files without probabilities
+    proba: Vec<usize>,
+    predicted: Option<usize>,
+    labels: Vec<String>,
+}
+
+impl Columns {
+    fn find(path: &Path, header: &[String], lines: &Lines) -> Result<Self> {
+        let find = |name: &str| header.iter().position(|h| h.eq_ignore_ascii_case(name));
+        let container = ["Object", "container", "Container ID"].iter().find_map(|n| find(n));
+        let lacking = |column: &str| PredictionError::Column {
+            path: path.into(),
+            column: column.into(),
+            header: header.join(", "),
+        };
+        let id = KEYS.iter().filter_map(|name| find(name)).collect::<Vec<_>>();
+        let naming = match (container, find("sequence")) {
+            (Some(container), Some(sequence)) => vec![container, sequence],
+            _ => id,
+        };
+        if naming.is_empty() {
+            return Err(lacking("id, path, or container and sequence"));
+        }
+        let numbered: Vec<usize> = (0..).map_while(|c| find(&format!("p{c}"))).collect();
+        let named: Vec<usize> =
+            (0..header.len()).filter(|&i| header[i].starts_with("p_")).collect();
+        let proba = if numbered.len() > 1 { numbered } else { named };
+        let predicted = find("predicted");
+        let labels = match (proba.len(), predicted) {
+            (0, None) => {
+                return Err(lacking(
+                    "predicted, nor p_<label> (or p0, p1, …) for each of two or more classes",
+                ));
+            }
+            // Without probabilities the classes are those that occur.
+            (0, Some(predicted)) => {
+                let truth = find("true").into_iter().chain([predicted]);
+                let values = truth.flat_map(|at| lines.iter().map(move |(_, line)| &line[at]));
+                let given: Vec<&str> = values.filter(|v| !v.is_empty() && *v != UNKNOWN).collect();
+                Labels::of(&given).0.names().to_vec()
+            }
+            (1, _) => return Err(lacking("p_<label> for each of two or more classes")),
+            _ => {
+                let label = |&at: &usize| {
+                    let name = &header[at];
+                    name.strip_prefix("p_").or(name.strip_prefix('p')).unwrap_or(name).to_string()
+                };
+                proba.iter().map(label).collect()
+            }
+        };
+        if let Some(twice) = (1..labels.len()).find(|&i| labels[..i].contains(&labels[i])) {
+            return Err(content(path, format!("two columns for the class {}", labels[twice])));
+        }
+        let taken = |i: &usize| naming.contains(i) || proba.contains(i) || predicted == Some(*i);
+        let others = (0..header.len()).filter(|i| !taken(i)).collect();
+        Ok(Self { naming, others, proba, predicted, labels })
+    }
+
+    fn table(self, path: &Path, header: &[String], lines: &Lines) -> Result<PredictionTable> {
+        let order: Vec<usize> = self.naming.iter().chain(&self.others).copied().collect();
+        let rows = lines.iter().map(|line| self.row(path, header, line, &order));
+        Ok(PredictionTable {
+            path: path.into(),
+            columns: order.iter().map(|&at| header[at].clone()).collect(),
+            naming: self.naming.len(),
+            rows: rows.collect::<Result<_>>()?,
+            labels: self.labels,
+        })
+    }
+
+    fn row(
+        &self,
+        path: &Path,
+        header: &[String],
+        (line, record): &(u64, csv::StringRecord),
+        order: &[usize],
+    ) -> Result<PredictionRow> {
+        let text = |at: usize| record.get(at).unwrap_or_default();
+        let refuse = |at: usize, expected: String| {
+            Err(PredictionError::Value {
+                path: path.into(),
+                line: *line,
+                column: header[at].clone(),
+                value: text(at).into(),
+                expected,
+            })
+        };
+        let mut proba = Vec::with_capacity(self.proba.len());
+        if !self.proba.iter().all(|&at| text(at).is_empty()) {
+            for &at in &self.proba {
+                match text(at).parse::<f64>() {
+                    Ok(p) if (0.0..=1.0 + SUM_TOLERANCE).contains(&p) => proba.push(p),
+                    _ => return refuse(at, "a probability (0 to 1)".into()),
+                }
+            }
+            let sum: f64 = proba.iter().sum();
+            if (sum - 1.0).abs() > SUM_TOLERANCE {
+                let reason = format!("line {line}: the probabilities have the sum {sum}, not 1");
+                return Err(content(path, reason));
+            }
+        }
+        let proba = (!proba.is_empty()).then_some(proba);
+        let class = match self.predicted.map(|at| (at, text(at))) {
+            Some((_, UNKNOWN)) if !self.labels.iter().any(|l| l == UNKNOWN) => None,
+            None | Some((_, "")) => proba.as_deref().map(argmax),
+            Some((at, name)) => match self.labels.iter().position(|label| label == name) {
+                Some(class) => Some(class),
+                None => {
+                    let choices =
+                        corsmal_names::choices(name, self.labels.iter().map(String::as_str));
+                    return refuse(at, format!("one of the classes of the header: {choices}"));
+                }
+            },
+        };
+        let cells: Vec<String> = order.iter().map(|&at| text(at).to_string()).collect();
+        let key = Id(cells[..self.naming.len().min(1)].concat());
+        Ok(PredictionRow { key, cells, class, proba })
+    }
+}

@@ -1,0 +1,69 @@
+//! How well probabilities say how often a prediction is right.
+
+use ndarray::ArrayView1;
+use serde::Serialize;
+
+use crate::table::argmax;
+
+/// Bins of the highest probability, of equal width.
+const BINS: usize = 15;
+
+/// Scores of probabilities.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Calibration {
+    /// mean squared distance of the probabilities from the truth, 0 to 2; with two classes half of
+    /// it, 0 to 1 (scikit-learn's `brier_score_loss` with `scale_by_half="auto"`)
+    pub brier: f64,
+    /// expected calibration error: the mean difference, over rows, between the highest probability
+    /// and the share of right predictions in its bin (15 bins of equal width)
+    pub ece: f64,
+    /// the bins that hold rows
+    pub bins: Vec<CalibrationBin>,
+}
+
+/// Rows whose highest probability is in one interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CalibrationBin {
+    /// rows
+    pub rows: usize,
+    /// mean of their highest probabilities
+    pub confidence: f64,
+    /// share of them whose most probable class is right
+    pub accuracy: f64,
+}
+
+impl Calibration {
+    /// Of the rows' true classes and their probabilities, one for each class.
+    pub(super) fn new<'a>(rows: &[(usize, ArrayView1<'a, f64>)]) -> Self {
+        let n = rows.len().max(1) as f64;
+        let mut brier = 0.0;
+        let mut bins = [(0usize, 0.0, 0usize); BINS];
+        let mut n_classes = 0;
+        for (truth, proba) in rows {
+            n_classes = proba.len();
+            brier += proba
+                .iter()
+                .enumerate()
+                .map(|(class, p)| (p - f64::from(u8::from(class == *truth))).powi(2))
+                .sum::<f64>();
+            let best = argmax(proba.iter());
+            let highest = proba[best];
+            let bin = ((highest * BINS as f64).ceil() as usize).clamp(1, BINS) - 1;
+            bins[bin].0 += 1;
+            bins[bin].1 += highest;
+            bins[bin].2 += usize::from(best == *truth);
+        }
+        let filled = bins.into_iter().filter(|bin| bin.0 > 0);
+        let bins: Vec<CalibrationBin> = filled
+            .map(|(rows, sum, right)| CalibrationBin {
+                rows,
+                confidence: sum / rows as f64,
+                accuracy: right as f64 / rows as f64,
+            })
+            .collect();
+        let gap = |bin: &CalibrationBin| bin.rows as f64 * (bin.accuracy - bin.confidence).abs();
+        let ece = bins.iter().map(gap).sum::<f64>() / n;
+        let scale = if n_classes == 2 { 0.5 } else { 1.0 };
+        Self { brier: scale * brier / n, ece, bins }
+    }
+}

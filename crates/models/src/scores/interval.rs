@@ -1,0 +1,51 @@
+//! Intervals of scores by drawing rows, or whole groups, with replacement.
+
+use std::collections::BTreeMap;
+
+use rand::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::Serialize;
+
+/// A 95 % percentile interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Interval {
+    /// lower end
+    pub low: f64,
+    /// upper end
+    pub high: f64,
+}
+
+/// Rows that are drawn together: those of each group, or each row by itself.
+pub(super) fn units<S: AsRef<str>>(rows: usize, groups: Option<&[S]>) -> Vec<Vec<usize>> {
+    let Some(groups) = groups else { return (0..rows).map(|row| vec![row]).collect() };
+    let mut units: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    groups.iter().enumerate().for_each(|(row, g)| units.entry(g.as_ref()).or_default().push(row));
+    units.into_values().collect()
+}
+
+/// The interval of each score of drawn rows.
+pub(super) fn intervals<const N: usize>(
+    units: &[Vec<usize>],
+    draws: usize,
+    seed: u64,
+    scores: impl Fn(&[usize]) -> [f64; N],
+) -> [Interval; N] {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut found: [Vec<f64>; N] = std::array::from_fn(|_| Vec::with_capacity(draws));
+    let mut rows = Vec::new();
+    for _ in 0..draws {
+        rows.clear();
+        for _ in 0..units.len() {
+            rows.extend_from_slice(&units[rng.gen_range(0..units.len())]);
+        }
+        found.iter_mut().zip(scores(&rows)).for_each(|(all, score)| all.push(score));
+    }
+    found.map(|mut all| {
+        all.sort_by(f64::total_cmp);
+        let at = |part: f64| {
+            let place = (all.len().saturating_sub(1) as f64 * part).round() as usize;
+            all.get(place).copied().unwrap_or(f64::NAN)
+        };
+        Interval { low: at(0.025), high: at(0.975) }
+    })
+}

@@ -1,0 +1,81 @@
+//! Scores of estimated numbers, such as capacities and masses.
+
+use serde::Serialize;
+
+use super::interval::{Interval, intervals, units};
+use crate::error::{ModelError, Result};
+
+/// Scores of estimated against true numbers.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NumericScores {
+    /// rows
+    pub rows: usize,
+    /// rows without an estimate: they count in the paper's score, with 0, and in nothing else
+    pub unknown: usize,
+    /// mean absolute error
+    pub mean_absolute_error: f64,
+    /// root of the mean squared error
+    pub root_mean_squared_error: f64,
+    /// mean of |estimate − truth| / truth over rows with a true value other than 0
+    pub mean_relative_error: f64,
+    /// coefficient of determination (scikit-learn's `r2_score`)
+    pub r2: f64,
+    /// the paper's score: mean of exp(−|estimate − truth| / truth), the error being the estimate
+    /// itself where the true value is 0
+    pub score: f64,
+    /// 95 % bootstrap interval of the paper's score
+    pub score_interval: Interval,
+}
+
+impl NumericScores {
+    /// Scores of `estimates` against `truth`, with intervals over rows or whole groups.
+    ///
+    /// # Errors
+    /// Different lengths, or no rows.
+    pub fn new<S: AsRef<str>>(
+        truth: &[f64],
+        estimates: &[Option<f64>],
+        groups: Option<&[S]>,
+        (draws, seed): (usize, u64),
+    ) -> Result<Self> {
+        let length = |what, expected, actual| Err(ModelError::Length { what, expected, actual });
+        if estimates.len() != truth.len() {
+            return length("estimates", truth.len(), estimates.len());
+        }
+        if let Some(groups) = groups.filter(|g| g.len() != truth.len()) {
+            return length("groups", truth.len(), groups.len());
+        }
+        let pairs: Vec<(f64, f64)> =
+            truth.iter().zip(estimates).filter_map(|(t, e)| e.map(|e| (*t, e))).collect();
+        if pairs.is_empty() {
+            return length("rows with an estimate", 1, 0);
+        }
+        let n = pairs.len() as f64;
+        let mean = |f: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / n;
+        let centre = mean(&|(t, _)| *t);
+        let squared = mean(&|(t, e)| (e - t).powi(2));
+        let spread = mean(&|(t, _)| (t - centre).powi(2));
+        let relative: Vec<f64> =
+            pairs.iter().filter(|(t, _)| *t != 0.0).map(|(t, e)| ((e - t) / t).abs()).collect();
+        let of_row = |row: usize| {
+            let (t, Some(e)) = (truth[row], estimates[row]) else { return 0.0 };
+            let error = if t == 0.0 { e.abs() } else { ((e - t) / t).abs() };
+            (-error).exp()
+        };
+        let score = |rows: &[usize]| {
+            [rows.iter().map(|&row| of_row(row)).sum::<f64>() / rows.len().max(1) as f64]
+        };
+        let all: Vec<usize> = (0..truth.len()).collect();
+        let [score_interval] = intervals(&units(truth.len(), groups), draws, seed, score);
+        Ok(Self {
+            rows: truth.len(),
+            unknown: truth.len() - pairs.len(),
+            mean_absolute_error: mean(&|(t, e)| (e - t).abs()),
+            root_mean_squared_error: squared.sqrt(),
+            mean_relative_error: relative.iter().sum::<f64>() / relative.len().max(1) as f64,
+            r2: if spread > 0.0 { 1.0 - squared / spread } else { 0.0 },
+            score: score(&all)[0],
+            score_interval,
+        })
+    }
+}

@@ -1,0 +1,221 @@
+//! Everything that a prediction file with true classes is scored by.
+
+use std::fmt::Display;
+use std::hash::Hash;
+
+use ndarray::ArrayView1;
+use serde::Serialize;
+
+use super::calibration::Calibration;
+use super::curves::ClassCurves;
+use super::interval::{Interval, intervals, units};
+use super::{NumericScores, Scores};
+use crate::error::ModelError;
+use crate::labels::Labels;
+use crate::predictions::{PredictionError, PredictionTable};
+
+/// What is scored against what.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scoring {
+    /// column of true classes; `true` where not given
+    pub target: Option<String>,
+    /// column of groups that are drawn together; a column `fold` or `group` where not given
+    pub groups: Option<String>,
+    /// predictions with a highest probability below it are unknown
+    pub reject: f64,
+    /// whether the target is a number even where all its values are whole
+    pub numeric: bool,
+    /// draws of the bootstrap
+    pub draws: usize,
+    /// its seed
+    pub seed: u64,
+}
+
+impl Default for Scoring {
+    fn default() -> Self {
+        Self { target: None, groups: None, reject: 0.0, numeric: false, draws: 2000, seed: 0 }
+    }
+}
+
+/// Scores of a prediction file.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+pub enum ScoreReport {
+    /// of classes
+    Classes(Box<ClassReport>),
+    /// of numbers
+    Numbers(NumericScores),
+}
+
+/// Scores of classes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ClassReport {
+    /// names of the classes
+    pub labels: Vec<String>,
+    /// rows scored
+    pub rows: usize,
+    /// rows without a prediction, failed or rejected: they count as wrong
+    pub unknown: usize,
+    /// accuracy of the rows that have a prediction
+    pub accuracy_of_known: f64,
+    /// accuracy, F1, per class, confusion
+    pub scores: Scores,
+    /// 95 % bootstrap intervals
+    pub intervals: ScoreIntervals,
+    /// what was drawn: the name of a column, or `rows`
+    pub drawn: String,
+    /// number of different groups, or rows
+    pub units: usize,
+    /// scores of probabilities, over rows that have them
+    pub calibration: Option<Calibration>,
+    /// curves of each class against the others; absent where a class or all others have no rows
+    pub curves: Option<Vec<Option<ClassCurves>>>,
+    /// mean of the areas under the ROC curves (`roc_auc_score(multi_class="ovr")`)
+    pub roc_auc: Option<f64>,
+    /// mean of the average precisions
+    pub average_precision: Option<f64>,
+}
+
+/// Intervals of the scores over all classes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ScoreIntervals {
+    /// of the accuracy
+    pub accuracy: Interval,
+    /// of the weighted F1
+    pub weighted_f1: Interval,
+    /// of the macro F1
+    pub macro_f1: Interval,
+}
+
+/// Columns that are groups unless the user says otherwise.
+const GROUPS: [&str; 3] = ["group", "container", "fold"];
+
+impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
+    /// Scores every line against its true class or number.
+    ///
+    /// # Errors
+    /// [`PredictionError`] for missing columns or values, and recordings with several lines.
+    pub fn score(&self, how: &Scoring) -> Result<ScoreReport, PredictionError> {
+        self.check_once_each()?;
+        let truth = self.truth(how.target.as_deref())?;
+        let several = |column: &str| {
+            self.column(column).is_some_and(|values| Labels::of(&values).0.len() > 1)
+        };
+        let column = match &how.groups {
+            Some(column) => Some(column.as_str()),
+            None => GROUPS.into_iter().find(|column| several(column)),
+        };
+        let groups = match column {
+            None => None,
+            Some(name) => Some(self.column(name).ok_or_else(|| {
+                let choices = corsmal_names::choices(name, self.columns.iter().map(String::as_str));
+                self.content(format!("no column {name:?} of groups; {choices}"))
+            })?),
+        };
+        let drawn = column.unwrap_or("rows").to_string();
+        let decimal = |text: &&str| text.parse::<f64>().is_ok() && text.parse::<i128>().is_err();
+        let has_proba = self.rows.iter().any(|row| row.proba.is_some());
+        if how.numeric || (!has_proba && truth.iter().any(decimal)) {
+            return self.score_numbers(&truth, groups.as_deref(), how).map(ScoreReport::Numbers);
+        }
+        let report = self.score_classes(&truth, groups.as_deref(), drawn, how)?;
+        Ok(ScoreReport::Classes(Box::new(report)))
+    }
+
+    fn score_numbers(
+        &self,
+        truth: &[&str],
+        groups: Option<&[&str]>,
+        how: &Scoring,
+    ) -> Result<NumericScores, PredictionError> {
+        let number = |text: &str, row: usize| match text.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => {
+                let id = &self.rows[row].cells[0];
+                Err(self.content(format!("{id}: {text:?} is not a number")))
+            }
+        };
+        let truths: Vec<f64> = truth
+            .iter()
+            .enumerate()
+            .map(|(row, text)| number(text, row))
+            .collect::<Result<_, _>>()?;
+        let estimate = |(at, row): (usize, &crate::predictions::PredictionRow<K>)| {
+            // The benchmark's -1 stands for no estimate.
+            let text = row.class.map(|class| self.labels[class].as_str());
+            let value = text.map(|text| number(text, at)).transpose()?;
+            Ok(value.filter(|value| *value > -1.0))
+        };
+        let estimates: Vec<Option<f64>> =
+            self.rows.iter().enumerate().map(estimate).collect::<Result<_, PredictionError>>()?;
+        NumericScores::new(&truths, &estimates, groups, (how.draws, how.seed))
+            .map_err(|e| self.model(e))
+    }
+
+    fn score_classes(
+        &self,
+        truth: &[&str],
+        groups: Option<&[&str]>,
+        drawn: String,
+        how: &Scoring,
+    ) -> Result<ClassReport, PredictionError> {
+        let mut table = self.clone();
+        if how.reject > 0.0 {
+            table.reject_below(how.reject)?;
+        }
+        // Classes that the model does not know are wrong whatever it says.
+        let mut labels = self.labels.clone();
+        let mut strange: Vec<&str> =
+            truth.iter().copied().filter(|t| !labels.iter().any(|l| l == t)).collect();
+        strange.sort_unstable();
+        strange.dedup();
+        labels.extend(strange.into_iter().map(String::from));
+        let names = Labels::new(labels.clone()).map_err(|e| self.model(e))?;
+        let truth = names.encode(truth).map_err(|e| self.model(e))?;
+        let predicted: Vec<Option<usize>> = table.rows.iter().map(|row| row.class).collect();
+        let of = |rows: &[usize]| {
+            let truth: Vec<usize> = rows.iter().map(|&row| truth[row]).collect();
+            let predicted = rows.iter().map(|&row| predicted[row]);
+            Scores::with_unknown(&truth, predicted, labels.len())
+        };
+        let all: Vec<usize> = (0..truth.len()).collect();
+        let scores = of(&all).map_err(|e: ModelError| self.model(e))?;
+        let units = units(truth.len(), groups);
+        let [accuracy, weighted_f1, macro_f1] = intervals(&units, how.draws, how.seed, |rows| {
+            of(rows).map_or([f64::NAN; 3], |s| [s.accuracy, s.weighted_f1, s.macro_f1])
+        });
+        let known = predicted.iter().filter(|class| class.is_some()).count();
+        let right = truth.iter().zip(&predicted).filter(|(t, p)| Some(**t) == **p).count();
+        let with_proba: Vec<(usize, ArrayView1<'_, f64>)> = truth
+            .iter()
+            .zip(&self.rows)
+            .filter_map(|(t, row)| Some((*t, ArrayView1::from(row.proba.as_deref()?))))
+            .collect();
+        let curves = (!with_proba.is_empty()).then(|| {
+            let curve = |class: usize| {
+                let rows: Vec<(f64, bool)> =
+                    with_proba.iter().map(|(t, p)| (p[class], *t == class)).collect();
+                ClassCurves::new(&rows)
+            };
+            (0..self.labels.len()).map(curve).collect::<Vec<_>>()
+        });
+        let mean = |area: fn(&ClassCurves) -> f64| {
+            let areas: Vec<f64> = curves.as_ref()?.iter().flatten().map(area).collect();
+            (!areas.is_empty()).then(|| areas.iter().sum::<f64>() / areas.len() as f64)
+        };
+        Ok(ClassReport {
+            rows: truth.len(),
+            unknown: truth.len() - known,
+            accuracy_of_known: right as f64 / known.max(1) as f64,
+            scores,
+            intervals: ScoreIntervals { accuracy, weighted_f1, macro_f1 },
+            drawn,
+            units: units.len(),
+            calibration: (!with_proba.is_empty()).then(|| Calibration::new(&with_proba)),
+            roc_auc: mean(|c| c.roc_auc),
+            average_precision: mean(|c| c.average_precision),
+            curves,
+            labels,
+        })
+    }
+}
