@@ -11,6 +11,16 @@ from ._harmonic import cqt, istft
 from ._mono import to_mono
 from ._pitch import estimate_tuning, piptrack, pitch_tuning
 from ._resample import resample
+from ._scoring import (
+    Comparison,
+    CrossValidation,
+    Predictions,
+    ScoreReport,
+    compare_predictions,
+    cross_validate,
+    fuse,
+    score,
+)
 from .errors import (
     ConfigError,
     CorsmalFeatError,
@@ -38,8 +48,10 @@ if TYPE_CHECKING:
 __all__ = [
     "KNN",
     "SVC",
+    "Comparison",
     "ConfigError",
     "CorsmalFeatError",
+    "CrossValidation",
     "DecisionTree",
     "DecodeError",
     "ExtraTrees",
@@ -49,15 +61,19 @@ __all__ = [
     "ModelError",
     "NotFittedError",
     "ParameterError",
+    "Predictions",
     "RandomForest",
     "RunError",
+    "ScoreReport",
     "Scores",
     "SignalExtractor",
     "__version__",
     "amplitude_to_db",
     "classifiers",
+    "compare_predictions",
     "corsmal",
     "cqt",
+    "cross_validate",
     "decompose",
     "effects",
     "errors",
@@ -66,6 +82,7 @@ __all__ = [
     "extract",
     "feature",
     "filters",
+    "fuse",
     "istft",
     "load",
     "load_model",
@@ -74,6 +91,7 @@ __all__ = [
     "pitch_tuning",
     "power_to_db",
     "resample",
+    "score",
     "stft",
     "to_mono",
 ]

@@ -26,7 +26,9 @@ __all__ = [
     "chroma_filter",
     "chroma_of_cqt",
     "classifier_parameters",
+    "compare_predictions",
     "cqt",
+    "cross_validate",
     "delta",
     "detrend",
     "effective_config",
@@ -35,6 +37,7 @@ __all__ = [
     "extract",
     "fft_frequencies",
     "fit_projection",
+    "fuse",
     "get_window",
     "hpss_masks",
     "istft",
@@ -64,6 +67,7 @@ __all__ = [
     "resample",
     "rms",
     "rms_of_spectrogram",
+    "score",
     "separate",
     "sk_resize",
     "spec9216",
@@ -239,3 +243,32 @@ class TrainedModel:
     def load(path: str | os.PathLike[str]) -> TrainedModel: ...
 
 def classifier_parameters(name: str, parameters: str) -> str: ...
+
+def cross_validate(
+    features: str,
+    target: str,
+    labels: dict[str, str | None],
+    groups: str | None,
+    cv: str | None,
+    recipe: dict[str, Any],
+) -> tuple[str, str]: ...
+def fuse(
+    paths: list[str],
+    weights: list[float] | None,
+    vote: str | None,
+    background: str | None,
+    least: int,
+) -> str: ...
+def compare_predictions(
+    first: str, second: str, target: str | None, resamples: int, seed: int
+) -> str: ...
+def score(
+    predictions: str,
+    labels: dict[str, str | None],
+    target: str | None,
+    groups: str | None,
+    reject: float,
+    numeric: bool,
+    resamples: int,
+    seed: int,
+) -> str: ...

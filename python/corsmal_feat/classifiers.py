@@ -37,6 +37,7 @@ class KNN(Classifier):
     weights : "uniform", or "distance" for votes of 1 / distance
     metric : "euclidean", "manhattan", "cosine", "chebyshev" or "minkowski"
     p : exponent of the minkowski metric
+    algorithm : "brute", or "linfa" for neighbours found by linfa-nn
     """
 
     _name = "knn"
@@ -49,11 +50,13 @@ class KNN(Classifier):
         weights: str = "uniform",
         metric: str = "euclidean",
         p: float = 2.0,
+        algorithm: str = "brute",
     ) -> None:
         self.n_neighbors = n_neighbors
         self.weights = weights
         self.metric = metric
         self.p = p
+        self.algorithm = algorithm
 
 
 class SVC(Classifier):
@@ -69,6 +72,7 @@ class SVC(Classifier):
     tol : tolerance of the optimality conditions
     cache_size : memory for kernel values, MiB
     random_state : seed of the folds for the probabilities
+    solver : "own", or "linfa" for linfa-svm (no probabilities, smaller tables)
     """
 
     _name = "svm"
@@ -85,6 +89,7 @@ class SVC(Classifier):
         tol: float = 1e-3,
         cache_size: int = 200,
         random_state: Any = None,
+        solver: str = "own",
     ) -> None:
         self.C = C
         self.kernel = kernel
@@ -94,6 +99,7 @@ class SVC(Classifier):
         self.tol = tol
         self.cache_size = cache_size
         self.random_state = random_state
+        self.solver = solver
 
     @property
     def predict_proba(self) -> Any:
@@ -115,6 +121,7 @@ class DecisionTree(Classifier):
     max_features : None, "sqrt", "log2", a whole number, or a fraction up to 1.0
     class_weight : None, "balanced" or a weight per label
     random_state : seed of the order in which features are tried
+    solver : "own", or "linfa" for linfa-trees (no probabilities)
     """
 
     _name = "tree"
@@ -130,6 +137,7 @@ class DecisionTree(Classifier):
         max_features: str | float | None = None,
         class_weight: Any = None,
         random_state: Any = None,
+        solver: str = "own",
     ) -> None:
         self.criterion = criterion
         self.max_depth = max_depth
@@ -138,6 +146,7 @@ class DecisionTree(Classifier):
         self.max_features = max_features
         self.class_weight = class_weight
         self.random_state = random_state
+        self.solver = solver
 
 
 class _Forest(Classifier):

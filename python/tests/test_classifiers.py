@@ -132,3 +132,25 @@ def test_parameters_must_be_finite() -> None:
     weights = {"full": float("inf")}
     with pytest.raises(ParameterError, match="class_weight = inf is not possible"):
         classifiers.SVC(class_weight=weights).fit(x, y)
+
+
+@pytest.mark.parametrize(
+    "estimator",
+    [
+        classifiers.KNN(algorithm="linfa"),
+        classifiers.SVC(solver="linfa"),
+        classifiers.DecisionTree(solver="linfa"),
+    ],
+    ids=lambda e: type(e).__name__,
+)
+def test_linfas_solvers_learn_and_survive_the_disk(estimator, tmp_path: Path):
+    x, y = clouds()
+    model = fresh(estimator).fit(x[:100], y[:100])
+    assert model.score(x[100:], y[100:]) > 0.75
+    model.save(tmp_path / "model")
+    back = type(model).load(tmp_path / "model")
+    np.testing.assert_array_equal(back.predict(x), model.predict(x))
+    assert back.get_params() == model.get_params()
+    with pytest.raises(ParameterError, match="own or linfa|brute or linfa"):
+        name = "algorithm" if isinstance(estimator, classifiers.KNN) else "solver"
+        type(estimator)(**{name: "fast"}).fit(x, y)

@@ -6,6 +6,7 @@ mod streams;
 mod args;
 mod commands;
 mod failure;
+mod help;
 mod interrupt;
 mod output;
 mod progress;
@@ -27,7 +28,7 @@ struct Cli {
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = help::parse();
     match cli.command.run() {
         Ok(code) => code,
         Err(failure) => {

@@ -75,7 +75,11 @@ impl Classify for NearestMean {
     }
 }
 
-fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
+/// Registers, trains, stores and asks.
+///
+/// # Errors
+/// None is expected.
+pub fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
     register::<NearestMeanParams>("nearest class mean")?;
 
     let x = array![[0.0, 0.1], [0.2, 0.0], [3.0, 3.1], [2.9, 3.0]];

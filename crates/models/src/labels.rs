@@ -48,7 +48,7 @@ impl Labels {
                 self.0.iter().position(|n| n == row).ok_or_else(|| ModelError::UnknownName {
                     kind: "label",
                     name: row.into(),
-                    allowed: self.0.join(", "),
+                    allowed: corsmal_names::choices(row, self.0.iter().map(String::as_str)),
                 })
             })
             .collect()

@@ -47,10 +47,12 @@ pub trait Parameters: Default + Serialize + DeserializeOwned {
                 return Err(ModelError::UnknownParameter {
                     owner: Self::OWNER,
                     key: key.clone(),
-                    allowed: if keys.is_empty() {
-                        "it has none".into()
-                    } else {
-                        format!("it has {}", keys.join(", "))
+                    allowed: match corsmal_names::closest(key, keys.iter().copied()) {
+                        _ if keys.is_empty() => "it has none".into(),
+                        Some(meant) => {
+                            format!("did you mean {meant}? It has {}", keys.join(", "))
+                        }
+                        None => format!("it has {}", keys.join(", ")),
                     },
                 });
             };

@@ -7,7 +7,7 @@ mod common;
 use common::clouds;
 use corsmal_models::classifiers::{CLASSIFIERS, ClassifierSpec};
 use corsmal_models::labels::Labels;
-use corsmal_models::model_file::{Model, ModelFileError, ModelHeader};
+use corsmal_models::model_file::{Model, ModelFileError, ModelHeader, TrainedOn};
 use corsmal_models::params::key_values;
 use corsmal_models::pipeline::PipelineSpec;
 use corsmal_models::steps::{Components, PcaParams, StepSpec};
@@ -40,6 +40,13 @@ fn small(name: &str) -> (Model, Array2<f64>) {
     model(name, trees, 45)
 }
 
+/// Every kind of content that a model file can have: all classifiers, and linfa's solvers.
+fn kinds() -> Vec<(Model, Array2<f64>)> {
+    let own = CLASSIFIERS.iter().map(|(name, _)| small(name));
+    let linfa = [("knn", "algorithm=linfa"), ("tree", "solver=linfa"), ("svm", "solver=linfa")];
+    own.chain(linfa.map(|(name, text)| model(name, &[text], 45))).collect()
+}
+
 /// The same bytes with a checksum that fits them, as somebody hostile would make them.
 fn reseal(mut bytes: Vec<u8>) -> Vec<u8> {
     let end = bytes.len() - 32;
@@ -51,17 +58,77 @@ fn reseal(mut bytes: Vec<u8>) -> Vec<u8> {
 #[test]
 fn every_classifier_survives_the_disk() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, _) in CLASSIFIERS {
-        let (model, x) = small(name);
-        let path = folder.path().join(name);
-        std::fs::write(&path, model.to_bytes().unwrap()).unwrap();
+    let all = kinds();
+    for (at, (model, x)) in all.iter().enumerate() {
+        let path = folder.path().join(at.to_string());
+        model.save(&path).unwrap();
         let back = Model::load(&path).unwrap();
         assert_eq!(back.header(), model.header());
         assert_eq!(back.predict(x.view()).unwrap(), model.predict(x.view()).unwrap());
-        assert_eq!(back.predict_proba(x.view()).unwrap(), model.predict_proba(x.view()).unwrap());
+        let proba = |model: &Model| model.predict_proba(x.view()).ok();
+        assert_eq!(proba(&back), proba(model));
         assert_eq!(back.to_bytes().unwrap(), model.to_bytes().unwrap());
     }
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), CLASSIFIERS.len());
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), all.len());
+}
+
+/// A model of version 0.1.0 says nothing of the recordings, and its parameters nothing of solvers.
+#[test]
+fn what_came_after_0_1_0_is_written_only_where_it_is_used() {
+    for name in ["knn", "svm", "tree"] {
+        let header = serde_json::to_string(small(name).0.header()).unwrap();
+        for word in ["trained_on", "solver", "algorithm"] {
+            assert!(!header.contains(word), "{name}: {header}");
+        }
+    }
+    let linfa = model("knn", &["algorithm=linfa"], 45).0;
+    let header = serde_json::to_string(linfa.header()).unwrap();
+    assert!(header.contains("\"algorithm\":\"linfa\""), "{header}");
+}
+
+#[test]
+fn a_model_knows_which_recordings_it_may_be_applied_to() {
+    let with = |trained_on: Option<TrainedOn>, config: serde_json::Value| {
+        let header =
+            ModelHeader { trained_on, feature_config: config, ..small("knn").0.header().clone() };
+        let (x, y) = clouds(45, 6, 3, 11);
+        let fitted = header.pipeline.train(x.view(), &y, 3).unwrap();
+        Model::new(header, fitted).unwrap()
+    };
+    let config = |rate: f64, channels: &str, averaged: bool| {
+        serde_json::json!({
+            "signal": {"sample_rate": rate, "channels": channels},
+            "summary": {"average_channels": averaged},
+        })
+    };
+    let formats = [(Some(44_100), Some(8)), (Some(48_000), Some(8)), (Some(44_100), Some(8))];
+    let trained = TrainedOn::of(formats).unwrap();
+    assert_eq!(
+        (&trained.sample_rates[..], &trained.channels[..]),
+        (&[44_100, 48_000][..], &[8][..])
+    );
+    assert_eq!(TrainedOn::of([(Some(8000), None)]), None, "unknown for one is unknown for all");
+    let own = config(0.0, "all", false);
+    let model = with(Some(trained), own.clone());
+    let rule = model.format_rule(&own).unwrap();
+    assert!(rule.check(Some(44_100), Some(8)).is_ok() && rule.check(None, None).is_ok());
+    let rate = rule.check(Some(22_050), Some(8)).unwrap_err();
+    assert!(rate.starts_with("22,050 Hz; the model was trained on 44,100 Hz, 48,000 Hz"), "{rate}");
+    assert!(rule.check(Some(44_100), Some(1)).unwrap_err().starts_with("1 channel;"));
+    // Resampled to a rate of the training, mixed or averaged: another format does not matter.
+    let rule = model.format_rule(&config(48_000.0, "mean", false)).unwrap();
+    assert!(rule.check(Some(22_050), Some(1)).is_ok());
+    let rule = model.format_rule(&config(0.0, "all", true)).unwrap();
+    assert!(rule.check(Some(44_100), Some(2)).is_ok() && rule.check(Some(8000), None).is_err());
+    assert!(matches!(
+        model.format_rule(&config(16_000.0, "all", false)),
+        Err(ModelFileError::Rate { .. })
+    ));
+    // A model of version 0.1.0 matters only where recordings keep their own rate.
+    let old = with(None, own.clone());
+    assert!(matches!(old.format_rule(&own), Err(ModelFileError::FormatUnknown { .. })));
+    let fixed = config(22_050.0, "mean", false);
+    assert!(with(None, fixed.clone()).format_rule(&fixed).is_ok());
 }
 
 /// Squared lengths beyond the range of numbers made a file that could not be read back.
@@ -89,8 +156,8 @@ fn neighbours_with_huge_features_are_refused_or_survive_the_disk() {
 
 #[test]
 fn every_truncation_and_every_flipped_byte_is_noticed() {
-    for (name, _) in CLASSIFIERS {
-        let bytes = small(name).0.to_bytes().unwrap();
+    for (name, (model, _)) in kinds().iter().enumerate() {
+        let bytes = model.to_bytes().unwrap();
         for at in 0..bytes.len() {
             assert!(Model::from_bytes(&bytes[..at]).is_err(), "{name}: cut at {at}");
             // Every byte of the frame, every seventh inside.
@@ -139,7 +206,7 @@ proptest! {
     // Damage under a checksum that fits: refused, or a model that can be used without panic.
     #[test]
     fn hostile_files_never_panic(
-        which in 0..CLASSIFIERS.len(),
+        which in 0..CLASSIFIERS.len() + 3,
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
         cut in prop::option::of(any::<prop::sample::Index>()),
     ) {
@@ -174,9 +241,6 @@ proptest! {
 
 fn hostile_base(which: usize) -> &'static (Vec<u8>, Array2<f64>) {
     static BASES: std::sync::OnceLock<Vec<(Vec<u8>, Array2<f64>)>> = std::sync::OnceLock::new();
-    let make = |(name, _): &(&str, &str)| {
-        let (model, x) = small(name);
-        (model.to_bytes().unwrap(), x)
-    };
-    &BASES.get_or_init(|| CLASSIFIERS.iter().map(make).collect())[which]
+    let make = |(model, x): (Model, Array2<f64>)| (model.to_bytes().unwrap(), x);
+    &BASES.get_or_init(|| kinds().into_iter().map(make).collect())[which]
 }

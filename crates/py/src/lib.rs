@@ -16,6 +16,7 @@ mod mel;
 mod onset;
 mod pool;
 mod resample;
+mod scoring;
 mod spectral;
 mod spectrum;
 mod time_domain;
@@ -42,6 +43,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     classifiers::register(m)?;
     evaluate::register(m)?;
+    scoring::register(m)?;
     spectrum::register(m)?;
     harmonic::register(m)?;
     mel::register(m)?;

@@ -91,6 +91,19 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
         "choice": choice,
     });
     let trained_on = table.trained_on();
+    let own_rate = table.config["signal"]["sample_rate"].as_f64() == Some(0.0);
+    if let Some(rates) =
+        trained_on.as_ref().map(|t| &t.sample_rates).filter(|r| own_rate && r.len() > 1)
+    {
+        let rates: Vec<String> = rates.iter().map(u32::to_string).collect();
+        eprintln!(
+            "warning: {}: the recordings have the sample rates {} Hz, which give different features; \
+             extract with --set signal.sample_rate={} makes them one",
+            table.path.display(),
+            rates.join(", "),
+            rates[0]
+        );
+    }
     let header = ModelHeader {
         pipeline: spec.clone(),
         labels: labels.clone(),

@@ -201,9 +201,9 @@ fn two_classifiers_are_tested_on_the_same_rows() {
     for (lines, message) in [
         (table(0..2).replace("r7,", "r77,"), "\"r77\" is not in"),
         (table(0..2).lines().take(9).collect::<Vec<_>>().join("\n"), "\"r8\" is not in"),
-        (table(0..2).replace("r7,3,rice", "r7,3,tea"), "\"r7\" is rice in"),
-        (table(0..2).replace("r7,", "r6,"), "repeats \"r6\""),
-        ("id,predicted\nr,x\n".into(), "needs the columns id, true and predicted"),
+        (table(0..2).replace("r7,3,rice", "r7,3,tea"), "\"r7\" is rice here and tea in"),
+        (table(0..2).replace("r7,", "r6,"), "more than one row: id r6"),
+        ("id,predicted\nr,x\n".into(), "no column \"true\" with true classes"),
         ("id,true,predicted\n".into(), "has no predictions"),
     ] {
         std::fs::write(&other, lines).unwrap();

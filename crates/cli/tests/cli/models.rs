@@ -209,9 +209,9 @@ fn what_cannot_be_learned_from_is_refused() {
     };
     let plain = |extra: &[&str]| validate("type", extra);
     small_table(&odd, |x, _| x[3 * 7 + 1] = f32::NAN);
-    assert!(plain(&[]).contains("7: feature 1 is NaN (1 rows are not finite)"));
+    assert!(plain(&[]).contains("7: feature 1 is NaN (1 row is not finite)"));
     small_table(&odd, |_, labels| labels[0] = "tea".into());
-    assert!(plain(&["--cv", "k=4"]).contains("class tea has 1 rows, too few for 4"));
+    assert!(plain(&["--cv", "k=4"]).contains("class tea has 1 row, too few for 4"));
     small_table(&odd, |_, _| {});
     let found = plain(&["--groups", "group", "--cv", "k=9"]);
     assert!(found.starts_with("warning: ") && found.contains("1 of 3 features have one value"));
@@ -219,7 +219,7 @@ fn what_cannot_be_learned_from_is_refused() {
     let open = ["cross-validate", "--features", text(&odd), "--target", "type"];
     let by_group = done(&[&open[..], &["--classifier", "knn"]].concat());
     assert!(by_group.contains("one group of group held out"), "groups are not split: {by_group}");
-    assert!(plain(&["--cv", "lists=0/1"]).contains("give --groups"));
+    assert!(plain(&["--cv", "lists=0/1"]).contains("(--groups)"));
     assert!(plain(&["--x", "Z"]).contains("no member \"Z\""));
     assert!(plain(&["--ids", "type"]).contains("id \"rice\" occurs twice"));
     assert!(validate("mass", &[]).contains("is a decimal number"));

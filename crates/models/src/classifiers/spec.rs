@@ -48,7 +48,7 @@ macro_rules! built_in {
                         None => Err(ModelError::UnknownName {
                             kind: "classifier",
                             name: name.into(),
-                            allowed: registry::names().join(", "),
+                            allowed: corsmal_names::choices(name, registry::names()),
                         }),
                     },
                 }

@@ -39,11 +39,15 @@ pub struct Record<'a> {
     pub proba: Option<Vec<f64>>,
 }
 
+/// Columns that tell how a line came about: no label column is called so.
+const RESERVED: [&str; 7] = ["id", "path", "start", "end", "status", "windows", "predicted"];
+
 /// Writes records of one unit.
 pub struct RecordWriter<W> {
     writer: PredictionWriter<W>,
     unit: Unit,
-    label_columns: usize,
+    /// which label columns are written
+    carried: Vec<usize>,
     /// least probability of a prediction that counts
     reject: f64,
     /// Lines written.
@@ -56,7 +60,8 @@ pub struct RecordWriter<W> {
 
 impl<W: Write> RecordWriter<W> {
     /// `columns` names the label columns of the recordings; the column that the model predicts is
-    /// called `true`. Predictions with a highest probability below `reject` are unknown.
+    /// called `true`, and columns that are called like others of the file are left out. Predictions
+    /// with a highest probability below `reject` are unknown.
     pub fn new(
         out: W,
         (form, unit): (Form, Unit),
@@ -69,12 +74,20 @@ impl<W: Write> RecordWriter<W> {
             Unit::Window => &["start", "end", "status"],
             Unit::Vote => &["status", "windows"],
         };
-        let named = columns.iter().map(|c| if c == target { "true" } else { c.as_str() });
-        let all: Vec<&str> =
-            ["id", "path"].into_iter().chain(by_unit.iter().copied()).chain(named).collect();
+        let mut all: Vec<&str> = ["id", "path"].into_iter().chain(by_unit.iter().copied()).collect();
+        let has_target = columns.iter().any(|column| column == target);
+        let mut carried = Vec::new();
+        for (at, column) in columns.iter().enumerate() {
+            let name = if column == target { "true" } else { column.as_str() };
+            let own = RESERVED.contains(&name) || name.starts_with("p_");
+            let replaced = has_target && column == "true" && column != target;
+            if !own && !replaced && !all.contains(&name) {
+                all.push(name);
+                carried.push(at);
+            }
+        }
         let writer = PredictionWriter::new(out, form, &all, labels.names());
-        let label_columns = columns.len();
-        Self { writer, unit, label_columns, reject, written: 0, failed: 0, rejected: 0 }
+        Self { writer, unit, carried, reject, written: 0, failed: 0, rejected: 0 }
     }
 
     /// Writes a line and hands it on at once.
@@ -97,7 +110,7 @@ impl<W: Write> RecordWriter<W> {
             cells.push(Cell::Count(record.windows));
         }
         let label = |at: usize| record.labels.get(at).map_or(Cell::Absent, |text| Cell::Text(text));
-        cells.extend((0..self.label_columns).map(label));
+        cells.extend(self.carried.iter().map(|&at| label(at)));
         let proba = record.proba.as_deref();
         let highest = proba.map(|p| p.iter().copied().fold(0.0, f64::max));
         let certain = highest.is_none_or(|p| p >= self.reject);
@@ -111,5 +124,38 @@ impl<W: Write> RecordWriter<W> {
     /// What the output refuses.
     pub fn finish(self) -> io::Result<W> {
         self.writer.finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn label_columns_do_not_hide_those_of_the_file() {
+        let columns = ["id", "type", "site", "true", "p_rice", "status"].map(String::from);
+        let labels = Labels::new(vec!["rice".into(), "water".into()]).unwrap();
+        let form = (Form::Csv, Unit::Recording);
+        let mut writer = RecordWriter::new(Vec::new(), form, &labels, (&columns, "type"), 0.7);
+        let mut record = Record {
+            id: "x",
+            path: "x.wav",
+            span: None,
+            windows: 0,
+            status: Status::Ok,
+            labels: vec!["7", "rice", "A", "no", "0.5", "fine"],
+            class: Some(0),
+            proba: Some(vec![0.75, 0.25]),
+        };
+        writer.write(&record).unwrap();
+        record.proba = Some(vec![0.625, 0.375]);
+        writer.write(&record).unwrap();
+        assert_eq!((writer.written, writer.failed, writer.rejected), (2, 0, 1));
+        let text = String::from_utf8(writer.finish().unwrap()).unwrap();
+        assert_eq!(
+            text,
+            "id,path,status,true,site,predicted,p_rice,p_water\n\
+             x,x.wav,ok,rice,A,rice,0.75,0.25\nx,x.wav,ok,rice,A,unknown,0.625,0.375\n"
+        );
     }
 }

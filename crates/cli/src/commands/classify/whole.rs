@@ -27,7 +27,7 @@ pub fn run(args: &Args, model: &Model) -> Result<(End, Option<Records>), Failure
     let found = recordings(args)?;
     let columns: Vec<String> =
         found.iter().take(1).flat_map(|f| &f.labels).map(|(column, _)| column.clone()).collect();
-    let (accepted, refused) = by_format(&found, &formats, args);
+    let accepted = by_format(&found, &formats, args);
     let folder = if args.out == Path::new("-") {
         tempfile::tempdir()
     } else {
@@ -45,21 +45,23 @@ pub fn run(args: &Args, model: &Model) -> Result<(End, Option<Records>), Failure
     };
     let stop = crate::interrupt::flag();
     let meter = Meter::new(LogFormat::Text, args.quiet);
-    let table = match run::run(&accepted, &config, &options, &meter, stop) {
-        Ok(_) => LabelledTable::read(&options.out, &MemberNames::default())?,
-        Err(RunError::Interrupted) => return Ok((End::Interrupted, None)),
-        Err(error) => return Err(error.into()),
-    };
-    let predictions = predictions(model, &table, &formats, args)?;
+    let mut predictions = HashMap::new();
+    if !accepted.is_empty() {
+        let table = match run::run(&accepted, &config, &options, &meter, stop) {
+            Ok(_) => LabelledTable::read(&options.out, &MemberNames::default())?,
+            Err(RunError::Interrupted) => return Ok((End::Interrupted, None)),
+            Err(error) => return Err(error.into()),
+        };
+        predictions = self::predictions(model, &table, &formats, args)?;
+    }
     let mut records = args.records(model, &columns)?;
     for input in &found {
         let labels = input.labels.iter().map(|(_, value)| value.as_str()).collect();
         let path = path(input);
-        let none = Prediction { status: Status::Mismatch, class: None, proba: None };
-        let Prediction { status, class, proba } = match predictions.get(input.id.as_str()) {
-            Some(prediction) if !refused.contains(&input.id) => prediction.clone(),
-            _ => none,
-        };
+        // What was refused by its header is in no table.
+        let refused = Prediction { status: Status::Mismatch, class: None, proba: None };
+        let Prediction { status, class, proba } =
+            predictions.remove(input.id.as_str()).unwrap_or(refused);
         let id = input.id.as_str();
         let record =
             Record { id, path: &path, span: None, windows: 0, status, labels, class, proba };
@@ -115,10 +117,11 @@ struct Prediction {
     proba: Option<Vec<f64>>,
 }
 
-/// Splits recordings by what their headers say, before anything is computed: one of another format
-/// must not decide how wide the table is. What cannot be opened is left to the extraction.
-fn by_format(found: &[Input], formats: &FormatRule, args: &Args) -> (Vec<Input>, Vec<String>) {
-    let (mut accepted, mut refused) = (Vec::new(), Vec::new());
+/// The recordings whose headers say that the model may be applied to them, before anything is
+/// computed: one of another format must not decide how wide the table is. What cannot be opened is left
+/// to the extraction.
+fn by_format(found: &[Input], formats: &FormatRule, args: &Args) -> Vec<Input> {
+    let mut accepted = Vec::new();
     for input in found {
         let header = match &input.source {
             InputSource::File(path) => corsmal_audio::open(path).ok(),
@@ -128,13 +131,10 @@ fn by_format(found: &[Input], formats: &FormatRule, args: &Args) -> (Vec<Input>,
         let channels = spec.map(|spec| u32::from(spec.channels));
         match formats.check(spec.map(|spec| spec.sample_rate), channels) {
             Ok(()) => accepted.push(input.clone()),
-            Err(reason) => {
-                refuse(args, &path(input), &reason);
-                refused.push(input.id.clone());
-            }
+            Err(reason) => refuse(args, &path(input), &reason),
         }
     }
-    (accepted, refused)
+    accepted
 }
 
 /// The prediction of each recording of a table by its id.

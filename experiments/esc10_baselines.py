@@ -1,6 +1,6 @@
 """The 12 CORSMAL audio baselines on ESC-10, from the .ogg files: a Markdown table.
 
-    python benches/esc10_baselines.py [--tool corsmal-feat] [--shared ../shared] [--work DIR]
+    python experiments/esc10_baselines.py [--tool corsmal-feat] [--shared ../shared] [--work DIR]
         [--librosa 0.8]
 
 Runs `corsmal-feat extract` and `corsmal-feat cross-validate --cv fold=fold` and prints mean

@@ -1,6 +1,6 @@
 """Own configuration on ESC-10, chosen inside the training folds, from the .ogg files.
 
-    python benches/esc10_nested.py [--shared ../shared] [--check]
+    python experiments/esc10_nested.py [--shared ../shared] [--check]
 
 Protocol, written down before any score of these candidates on a published fold was seen (those of
 the baselines, `esc10_baselines.py`, were known):

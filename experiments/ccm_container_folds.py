@@ -1,6 +1,6 @@
 """Filling type and level on the CCM training features, containers held out three at a time.
 
-    python benches/ccm_container_folds.py [--shared ../shared] [--only m5,a34f,fusion]
+    python experiments/ccm_container_folds.py [--shared ../shared] [--only m5,a34f,fusion]
         [--inner] [--check]
 
 m5      random forest of 500 trees on A34F, the settings of M5; five seeds

@@ -1,0 +1,59 @@
+//! The help of the command: what it can do, in groups.
+
+use clap::{Command, CommandFactory, FromArgMatches};
+
+use crate::Cli;
+
+/// Commands by what they are about. A command in none of them is listed last.
+const GROUPS: [(&str, &[&str]); 4] = [
+    ("Features", &["demo", "extract", "presets", "features", "inspect", "pca"]),
+    (
+        "Models",
+        &[
+            "train",
+            "classify",
+            "cross-validate",
+            "score",
+            "compare-predictions",
+            "fuse",
+            "classifiers",
+        ],
+    ),
+    ("Files", &["compare", "merge", "completions"]),
+    ("CORSMAL", &["benchmark", "evaluate", "dataset", "synth"]),
+];
+
+const EXIT_CODES: &str = "\
+Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 interrupted.";
+
+/// Parses the arguments of the process; ends it for help, version and errors.
+pub fn parse() -> Cli {
+    let matches = grouped(Cli::command()).get_matches();
+    Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+}
+
+/// The same command with its subcommands in groups.
+pub fn grouped(command: Command) -> Command {
+    let known = |name: &str| GROUPS.iter().any(|(_, names)| names.contains(&name));
+    let others: Vec<&str> =
+        command.get_subcommands().map(Command::get_name).filter(|name| !known(name)).collect();
+    let mut lists = String::new();
+    for (heading, names) in GROUPS.into_iter().chain([("Other", others.as_slice())]) {
+        let found: Vec<&Command> =
+            names.iter().filter_map(|name| command.find_subcommand(name)).collect();
+        if found.is_empty() {
+            continue;
+        }
+        lists += &format!("{heading}:\n");
+        for subcommand in found {
+            let about = subcommand.get_about().map(ToString::to_string).unwrap_or_default();
+            lists += &format!("  {:<20} {about}\n", subcommand.get_name());
+        }
+        lists.push('\n');
+    }
+    command.help_template(format!(
+        "start: corsmal-feat demo\n\n{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{lists}\
+         Options:\n{{options}}\n\n`corsmal-feat COMMAND --help` shows arguments and examples.\n\
+         {EXIT_CODES}\n"
+    ))
+}

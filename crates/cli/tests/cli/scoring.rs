@@ -1,0 +1,96 @@
+//! `score` and `classifiers` as a user runs them.
+
+use serde_json::Value;
+
+use crate::command::{done, refused, run, text};
+
+/// Values of scikit-learn 1.9: accuracy_score, f1_score, brier_score_loss, roc_auc_score(ovr),
+/// average_precision_score of these six rows.
+const HELD_OUT: &str = "id,group,true,predicted,p_a,p_b,p_c\n\
+    1,g,a,a,0.7,0.2,0.1\n2,g,b,a,0.5,0.4,0.1\n3,g,c,c,0.1,0.1,0.8\n\
+    4,h,a,b,0.3,0.6,0.1\n5,h,b,b,0.2,0.7,0.1\n6,h,c,c,0.2,0.2,0.6\n";
+
+#[test]
+fn predictions_are_scored() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("p.csv");
+    std::fs::write(&file, HELD_OUT).unwrap();
+    let report = done(&["score", text(&file), "--json", "--resamples", "200"]);
+    let report: Value = serde_json::from_str(&report).unwrap();
+    let close = |value: &Value, expected: f64| {
+        let value = value.as_f64().unwrap();
+        assert!((value - expected).abs() < 1e-12, "{value} and {expected}");
+    };
+    close(&report["scores"]["accuracy"], 4.0 / 6.0);
+    close(&report["scores"]["weighted_f1"], 2.0 / 3.0);
+    close(&report["calibration"]["brier"], 2.22 / 6.0);
+    close(&report["roc_auc"], (0.875 + 0.875 + 1.0) / 3.0);
+    assert_eq!((&report["drawn"], &report["units"]), (&"group".into(), &2.into()));
+    assert_eq!(report["unknown"], 0);
+    let rejected = done(&["score", text(&file), "--json", "--reject", "0.65"]);
+    let rejected: Value = serde_json::from_str(&rejected).unwrap();
+    assert_eq!(rejected["unknown"], 3);
+    close(&rejected["scores"]["accuracy"], 0.5);
+    close(&rejected["accuracy_of_known"], 1.0);
+    let shown = done(&["score", text(&file), "--reject", "0.65"]);
+    for part in
+        ["3 without a prediction count as wrong", "bootstrap over 2 values of group", "unknown"]
+    {
+        assert!(shown.contains(part), "{part}: {shown}");
+    }
+    assert!(shown.lines().all(|line| line.chars().count() <= 80), "{shown}");
+}
+
+#[test]
+fn numbers_have_scores_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("p.csv");
+    std::fs::write(&file, "id,true,predicted\n1,100.5,100.5\n2,200,300\n3,50,-1\n").unwrap();
+    let report: Value = serde_json::from_str(&done(&["score", text(&file), "--json"])).unwrap();
+    assert_eq!((&report["kind"], &report["unknown"]), (&"numbers".into(), &1.into()));
+    let score = report["score"].as_f64().unwrap();
+    assert!((score - (1.0 + (-0.5f64).exp()) / 3.0).abs() < 1e-12, "{score}");
+    assert!(done(&["score", text(&file)]).contains("CORSMAL score"));
+}
+
+#[test]
+fn labels_come_from_a_file_with_any_key_column() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, labels) = (folder.path().join("p.csv"), folder.path().join("meta.csv"));
+    std::fs::write(&file, "id,path,predicted,p_a,p_b\nx,d/x.ogg,a,1,0\ny,d/y.ogg,b,0,1\n").unwrap();
+    std::fs::write(&labels, "file,fold,category\ny.ogg,2,b\nx.ogg,1,b\n").unwrap();
+    let by = ["--labels", text(&labels), "--id-column", "file", "--target", "category", "--json"];
+    let report = done(&[&["score", text(&file)], &by[..]].concat());
+    let report: Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["scores"]["accuracy"], 0.5);
+    let without = refused(&["score", text(&file)]);
+    assert!(without.contains("--labels") && without.contains("--target"), "{without}");
+    let unnamed = refused(&["score", text(&file), "--labels", text(&labels)]);
+    assert!(unnamed.contains("--id-column"), "{unnamed}");
+}
+
+#[test]
+fn classifiers_are_explained() {
+    let list = done(&["classifiers"]);
+    assert!(list.contains("rf         random forest"), "{list}");
+    let shown = done(&["classifiers", "rf"]);
+    for part in ["trees", "100", "number of trees", "n_estimators", "max_features", "sqrt"] {
+        assert!(shown.contains(part), "{part}: {shown}");
+    }
+    assert!(shown.lines().all(|line| line.chars().count() <= 80), "{shown}");
+    let json: Value = serde_json::from_str(&done(&["classifiers", "svm", "--json"])).unwrap();
+    assert_eq!(json["parameters"][0]["default"], 1.0);
+    let wrong = refused(&["classifiers", "random-forest"]);
+    assert!(wrong.contains("there is no classifier"), "{wrong}");
+}
+
+#[test]
+fn the_help_is_in_groups_and_says_where_to_start() {
+    let output = run(&["--help"]);
+    let help = String::from_utf8(output.stdout).unwrap();
+    assert!(help.starts_with("start: corsmal-feat demo\n"), "{help}");
+    for heading in ["Features:", "Models:", "Files:", "CORSMAL:", "Exit codes:"] {
+        assert!(help.contains(heading), "{heading}: {help}");
+    }
+    assert!(!help.contains("Other:"), "every command has a group: {help}");
+}

@@ -1,0 +1,196 @@
+//! Prediction files: cross-validation, fusion, comparison, scores. Results cross as JSON and CSV.
+
+use std::path::{Path, PathBuf};
+
+use corsmal_ccm::predictions::{self, RecordingPredictions};
+use corsmal_models::comparison::compare;
+use corsmal_models::dataset::{LabelSource, LabelledTable, MemberNames};
+use corsmal_models::labels::Labels;
+use corsmal_models::predictions::PredictionTable;
+use corsmal_models::recipe::Recipe;
+use corsmal_models::scores::Scoring;
+use corsmal_models::validation::validate;
+use corsmal_models::voting::VotingRule;
+use pyo3::prelude::*;
+
+use crate::pool::compute;
+use crate::value_error;
+
+/// Where labels come from.
+#[derive(FromPyObject)]
+struct LabelArguments {
+    #[pyo3(item)]
+    file: Option<PathBuf>,
+    #[pyo3(item)]
+    folders: Option<String>,
+    #[pyo3(item)]
+    id_column: Option<String>,
+}
+
+impl LabelArguments {
+    fn source(self) -> Option<LabelSource> {
+        match (self.file, self.folders) {
+            (Some(path), _) => Some(LabelSource::File { path, key: self.id_column }),
+            (None, Some(column)) => Some(LabelSource::Folders { column }),
+            (None, None) => None,
+        }
+    }
+}
+
+/// Which pipelines are tried.
+#[derive(FromPyObject)]
+struct RecipeArguments {
+    #[pyo3(item)]
+    classifier: String,
+    #[pyo3(item)]
+    parameters: Vec<String>,
+    #[pyo3(item)]
+    standardize: bool,
+    #[pyo3(item)]
+    pca: Option<String>,
+    #[pyo3(item)]
+    tune: Vec<String>,
+    #[pyo3(item)]
+    seed: u32,
+}
+
+/// The report as JSON, and the predictions of the held-out rows as CSV.
+#[pyfunction]
+fn cross_validate(
+    py: Python<'_>,
+    features: PathBuf,
+    target: &str,
+    labels: LabelArguments,
+    groups: Option<&str>,
+    cv: Option<&str>,
+    recipe: RecipeArguments,
+) -> PyResult<(String, String)> {
+    let plan = cv.map(str::parse).transpose().map_err(|e| value_error(format!("cv = {e}")))?;
+    let seed = recipe.seed;
+    let recipe = Recipe {
+        classifier: recipe.classifier,
+        parameters: recipe.parameters,
+        standardize: recipe.standardize,
+        pca: recipe.pca,
+        tune: recipe.tune,
+        seed,
+    };
+    let candidates = recipe.candidates().map_err(value_error)?;
+    let source = labels.source();
+    compute(py, || {
+        let mut table = LabelledTable::read(&features, &MemberNames::default())?;
+        if let Some(source) = &source {
+            table.add_labels(source)?;
+        }
+        table.check()?;
+        let validation = validate(&table, target, candidates, (plan.as_ref(), groups), seed)?;
+        let held_out = validation.predictions(&table.ids, Path::new("the held-out predictions"));
+        Ok((validation, held_out))
+    })?
+    .map_err(|e: corsmal_models::dataset::DatasetError| value_error(e))
+    .and_then(|(validation, held_out)| {
+        Ok((serde_json::to_string(&validation).map_err(value_error)?, csv(held_out.to_csv())?))
+    })
+}
+
+/// The fused predictions as CSV.
+#[pyfunction]
+fn fuse(
+    py: Python<'_>,
+    paths: Vec<PathBuf>,
+    weights: Option<Vec<f64>>,
+    vote: Option<&str>,
+    background: Option<&str>,
+    least: usize,
+) -> PyResult<String> {
+    let rule = |labels: &[String]| match (vote, background) {
+        (None, _) => Ok(None),
+        (Some("mean"), None) => Ok(Some(VotingRule::Mean)),
+        (Some("majority"), None) => Ok(Some(VotingRule::Majority(None))),
+        (Some("majority"), Some(label)) => {
+            let labels = Labels::new(labels.to_vec()).map_err(value_error)?;
+            VotingRule::majority_over(label, least, &labels).map(Some).map_err(value_error)
+        }
+        (Some("mean"), Some(_)) => Err(value_error("background goes with vote=\"majority\" only")),
+        (Some(other), _) => {
+            Err(value_error(format!("vote = {other:?}: expected \"majority\" or \"mean\"")))
+        }
+    };
+    let mut tables = Vec::with_capacity(paths.len());
+    for path in &paths {
+        let table = compute(py, || predictions::read(path))?.map_err(value_error)?;
+        tables.push(match rule(&table.labels)? {
+            Some(rule) => table.vote(rule).map_err(value_error)?,
+            None => table,
+        });
+    }
+    let averaged = tables.len() != 1 || weights.is_some();
+    if averaged && background.is_some() {
+        return Err(value_error(
+            "background decides over the windows of one file, not together with an average of files",
+        ));
+    }
+    let fused = if averaged {
+        RecordingPredictions::average(&tables, weights.as_deref()).map_err(value_error)?
+    } else {
+        let table = tables.remove(0);
+        table.check_once_each().map_err(value_error)?;
+        table.of_recordings()
+    };
+    csv(fused.to_csv())
+}
+
+/// McNemar's test and bootstrap intervals, as JSON.
+#[pyfunction]
+fn compare_predictions(
+    py: Python<'_>,
+    first: PathBuf,
+    second: PathBuf,
+    target: Option<&str>,
+    resamples: usize,
+    seed: u64,
+) -> PyResult<String> {
+    let report = compute(py, || {
+        let (first, second) = (PredictionTable::read(&first)?, PredictionTable::read(&second)?);
+        compare(&first, &second, target, resamples, seed)
+    })?;
+    serde_json::to_string(&report.map_err(value_error)?).map_err(value_error)
+}
+
+/// Scores of a prediction file, as JSON.
+#[pyfunction]
+#[allow(clippy::too_many_arguments, reason = "one private caller, by name")]
+fn score(
+    py: Python<'_>,
+    predictions: PathBuf,
+    labels: LabelArguments,
+    target: Option<String>,
+    groups: Option<String>,
+    reject: f64,
+    numeric: bool,
+    resamples: usize,
+    seed: u64,
+) -> PyResult<String> {
+    let source = labels.source();
+    let scoring = Scoring { target, groups, reject, numeric, draws: resamples, seed };
+    let report = compute(py, || {
+        let mut table = PredictionTable::read(&predictions)?;
+        if let Some(source) = &source {
+            table.add_labels(source)?;
+        }
+        table.score(&scoring)
+    })?;
+    serde_json::to_string(&report.map_err(value_error)?).map_err(value_error)
+}
+
+fn csv(bytes: std::io::Result<Vec<u8>>) -> PyResult<String> {
+    String::from_utf8(bytes.map_err(value_error)?).map_err(value_error)
+}
+
+/// Adds this family to the module.
+pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_function(wrap_pyfunction!(cross_validate, m)?)?;
+    m.add_function(wrap_pyfunction!(fuse, m)?)?;
+    m.add_function(wrap_pyfunction!(compare_predictions, m)?)?;
+    m.add_function(wrap_pyfunction!(score, m)?)
+}

@@ -1,0 +1,386 @@
+"""Prediction files: cross-validation, fusion, comparison, scores."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from .errors import ParameterError
+
+__all__ = [
+    "Comparison",
+    "CrossValidation",
+    "Predictions",
+    "ScoreReport",
+    "compare_predictions",
+    "cross_validate",
+    "fuse",
+    "score",
+]
+
+StrPath = str | os.PathLike[str]
+
+#: What `labels` says where each recording lies in a folder named like its class.
+FOLDERS = "folders"
+
+
+@dataclass(frozen=True)
+class Predictions:
+    """Predictions of recordings, as the command writes them.
+
+    Attributes
+    ----------
+    columns : text of the columns beside prediction and probabilities, such as `id`, `fold`, `true`
+    predicted : name of each class predicted; "" without a prediction, "unknown" where rejected
+    labels : names of the classes
+    proba : probabilities [shape=(rows, classes)]; NaN where there are none
+    """
+
+    columns: dict[str, list[str]]
+    predicted: list[str]
+    labels: list[str]
+    proba: npt.NDArray[np.float64]
+    _text: str = field(repr=False)
+
+    @property
+    def ids(self) -> list[str]:
+        """What names each recording."""
+        return next(iter(self.columns.values()))
+
+    def __len__(self) -> int:
+        return len(self.predicted)
+
+    def save(self, path: StrPath) -> None:
+        """Writes the prediction file: CSV that `score`, `fuse` and the command read."""
+        Path(path).write_text(self._text, encoding="utf-8", newline="")
+
+
+@dataclass(frozen=True)
+class CrossValidation:
+    """Scores on rows that were not trained on.
+
+    Attributes
+    ----------
+    accuracy, weighted_f1, macro_f1 : over folds, `mean`, `std`, and the ends `low` and `high` of
+        the 95 % interval (Student's t)
+    predictions : of the held-out rows
+    report : everything, as `corsmal-feat cross-validate --json` prints it
+    """
+
+    accuracy: dict[str, float]
+    weighted_f1: dict[str, float]
+    macro_f1: dict[str, float]
+    predictions: Predictions
+    report: dict[str, Any] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Whether two classifiers differ on the same recordings.
+
+    Attributes
+    ----------
+    only_first, only_second : recordings that only the one got right
+    p_value : of McNemar's exact test
+    difference, low, high : weighted F1 of the second minus that of the first, with its 95 %
+        bootstrap interval over recordings
+    report : everything, as `corsmal-feat compare-predictions --json` prints it
+    """
+
+    only_first: int
+    only_second: int
+    p_value: float
+    difference: float
+    low: float
+    high: float
+    report: dict[str, Any] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class ScoreReport:
+    """Scores of a prediction file.
+
+    Attributes
+    ----------
+    kind : "classes" or "numbers"
+    values : by name the scores over all rows: `accuracy`, `weighted_f1`, `macro_f1`, and where
+        there are probabilities `brier`, `ece`, `roc_auc`, `average_precision`; of numbers
+        `mean_absolute_error`, `root_mean_squared_error`, `mean_relative_error`, `r2`, `score`
+    report : everything, as `corsmal-feat score --json` prints it: classes, confusion, intervals,
+        curves
+    """
+
+    kind: str
+    values: dict[str, float]
+    report: dict[str, Any] = field(repr=False)
+
+    def __getitem__(self, name: str) -> float:
+        return self.values[name]
+
+
+def cross_validate(
+    features: StrPath,
+    target: str = "class",
+    *,
+    labels: StrPath | None = None,
+    id_column: str | None = None,
+    groups: str | None = None,
+    cv: int | str | None = None,
+    classifier: str = "rf",
+    parameters: Mapping[str, Any] | None = None,
+    standardize: bool = False,
+    pca: float | None = None,
+    tune: Mapping[str, Iterable[Any]] | None = None,
+    seed: int = 0,
+) -> CrossValidation:
+    """Scores a classifier on held-out rows, as `corsmal-feat cross-validate` does.
+
+    Parameters
+    ----------
+    features : path
+        Feature file of `extract` with statistics, or any `.npz` with a member `X`.
+    target : str
+        Label column to learn.
+    labels : path or "folders", optional
+        CSV with labels, or the folders of the recordings as their classes; else the label columns
+        of the feature file.
+    id_column : str, optional
+        Column of the label file that names the recordings by id, path or file name.
+    groups : str, optional
+        Label column of groups that are not split between training and test.
+    cv : int or str, optional
+        Number of folds, or a plan: "group=COLUMN", "fold=COLUMN", "lists=1,4,7/2,5,8".
+    classifier : str
+        "knn", "svm", "tree", "rf", "et" or "logistic".
+    parameters : mapping, optional
+        Parameters of the classifier; scikit-learn's names are understood.
+    standardize, pca : bool, int or float
+        Steps before it, fitted on training rows only.
+    tune : mapping, optional
+        Values to try by parameter; the choice is made on folds inside the training rows.
+    seed : int
+        Seed of the classifier and of shuffled folds.
+
+    Raises
+    ------
+    ParameterError
+        A file cannot be read, labels do not fit the recordings, or a parameter is not possible.
+
+    Examples
+    --------
+    >>> result = corsmal_feat.cross_validate("feats.npz", "type", cv=5)  # doctest: +SKIP
+    >>> result.accuracy["mean"]  # doctest: +SKIP
+    0.93
+    """
+    plan = str(cv) if cv is not None else None
+    recipe = {
+        "classifier": classifier,
+        "parameters": [f"{key}={_value(value)}" for key, value in (parameters or {}).items()],
+        "standardize": bool(standardize),
+        "pca": None if pca is None else repr(pca),
+        "tune": [
+            f"{key}={json.dumps([_plain(value) for value in values])}"
+            for key, values in (tune or {}).items()
+        ],
+        "seed": _whole("seed", seed, 2**32),
+    }
+    text, held_out = _core.cross_validate(
+        os.fspath(features), target, _labels(labels, id_column, target), groups, plan, recipe
+    )
+    report = json.loads(text)
+    result = report["result"]
+    spreads = (result[name] for name in ("accuracy", "weighted_f1", "macro_f1"))
+    return CrossValidation(*spreads, _predictions(held_out), report)
+
+
+def fuse(
+    predictions: StrPath | Iterable[StrPath],
+    *,
+    weights: Iterable[float] | None = None,
+    vote: Literal["majority", "mean"] | None = None,
+    background: str | None = None,
+    least: int = 1,
+) -> Predictions:
+    """Makes one prediction from several files, or from windows, as `corsmal-feat fuse` does.
+
+    Parameters
+    ----------
+    predictions : path or paths
+        Prediction files of the same recordings and classes. They are averaged.
+    weights : iterable of float, optional
+        One positive number for each file.
+    vote : {"majority", "mean"}, optional
+        Makes the windows of each recording one decision first.
+    background : str, optional
+        With a majority: this class wins only where no other has `least` windows.
+
+    Raises
+    ------
+    ParameterError
+        Files of other recordings or classes, weights that are not one positive number per file.
+
+    Examples
+    --------
+    >>> corsmal_feat.fuse(["rf.csv", "svm.csv"], weights=[2, 1]).save("mean.csv")  # doctest: +SKIP
+    """
+    one = isinstance(predictions, (str, os.PathLike))
+    paths = [os.fspath(predictions)] if one else [os.fspath(path) for path in predictions]
+    chosen = None if weights is None else [float(weight) for weight in weights]
+    least = _whole("least", least, 2**32)
+    return _predictions(_core.fuse(paths, chosen, vote, background, least))
+
+
+def compare_predictions(
+    first: StrPath,
+    second: StrPath,
+    *,
+    target: str | None = None,
+    resamples: int = 2000,
+    seed: int = 0,
+) -> Comparison:
+    """Tests whether two classifiers differ, as `corsmal-feat compare-predictions` does.
+
+    Parameters
+    ----------
+    first, second : path
+        Prediction files of the same recordings with true classes.
+    target : str, optional
+        Column of the true classes; `true` by default.
+    resamples, seed : int
+        Draws of the bootstrap, and its seed.
+
+    Raises
+    ------
+    ParameterError
+        Recordings that only one file has, other true classes, missing columns.
+    """
+    count = _whole("resamples", resamples, 1_000_001)
+    text = _core.compare_predictions(
+        os.fspath(first), os.fspath(second), target, count, _whole("seed", seed, 2**64)
+    )
+    report = json.loads(text)
+    test, interval = report["mcnemar"], report["bootstrap_rows"]
+    return Comparison(
+        test["only_first"],
+        test["only_second"],
+        test["p_value"],
+        interval["difference"],
+        interval["low"],
+        interval["high"],
+        report,
+    )
+
+
+def score(
+    predictions: StrPath,
+    *,
+    labels: StrPath | None = None,
+    id_column: str | None = None,
+    target: str | None = None,
+    groups: str | None = None,
+    reject: float = 0.0,
+    numeric: bool = False,
+    resamples: int = 2000,
+    seed: int = 0,
+) -> ScoreReport:
+    """Scores predictions against true classes or numbers, as `corsmal-feat score` does.
+
+    Parameters
+    ----------
+    predictions : path
+        Prediction file of `classify`, `cross_validate` or `fuse`.
+    labels : path or "folders", optional
+        Where true classes come from, if not from the file itself.
+    id_column : str, optional
+        Column of the label file that names the recordings by id, path or file name.
+    target : str, optional
+        Column of the true classes; `true` by default.
+    groups : str, optional
+        Column of groups that the bootstrap draws together; by default `group`, `container` or
+        `fold` where there is one.
+    reject : float
+        Predictions with a highest probability below it are unknown and count as wrong.
+    numeric : bool
+        The target is a number although all its values are whole.
+    resamples, seed : int
+        Draws of the bootstrap, and its seed.
+
+    Raises
+    ------
+    ParameterError
+        Missing columns, recordings without labels, labels without recordings.
+
+    Examples
+    --------
+    >>> corsmal_feat.score("held-out.csv")["weighted_f1"]  # doctest: +SKIP
+    0.93
+    """
+    if not 0.0 <= reject <= 1.0:
+        raise ParameterError(f"reject = {reject} is not possible: a probability from 0 to 1")
+    if labels is not None and os.fspath(labels) == FOLDERS and target is None:
+        target = "class"
+    text = _core.score(
+        os.fspath(predictions),
+        _labels(labels, id_column, target or "class"),
+        target,
+        groups,
+        float(reject),
+        bool(numeric),
+        _whole("resamples", resamples, 1_000_001),
+        _whole("seed", seed, 2**64),
+    )
+    report = json.loads(text)
+    if report["kind"] == "numbers":
+        names = ("mean_absolute_error", "root_mean_squared_error", "mean_relative_error", "r2")
+        return ScoreReport("numbers", {name: report[name] for name in (*names, "score")}, report)
+    values = {name: report["scores"][name] for name in ("accuracy", "weighted_f1", "macro_f1")}
+    if report["calibration"] is not None:
+        values |= {name: report["calibration"][name] for name in ("brier", "ece")}
+    areas = {name: report[name] for name in ("roc_auc", "average_precision")}
+    values |= {name: area for name, area in areas.items() if area is not None}
+    return ScoreReport("classes", values, report)
+
+
+def _labels(labels: StrPath | None, id_column: str | None, target: str) -> dict[str, str | None]:
+    folders = labels is not None and os.fspath(labels) == FOLDERS
+    if id_column is not None and (labels is None or folders):
+        raise ParameterError("id_column goes with a label file")
+    return {
+        "file": None if labels is None or folders else os.fspath(labels),
+        "folders": target if folders else None,
+        "id_column": id_column,
+    }
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _value(value: Any) -> str:
+    return json.dumps(_plain(value))
+
+
+def _whole(name: str, value: int, limit: int) -> int:
+    if not 0 <= int(value) < limit:
+        raise ParameterError(f"{name} = {value} is not possible: a whole number below {limit}")
+    return int(value)
+
+
+def _predictions(text: str) -> Predictions:
+    header, *rows = csv.reader(io.StringIO(text))
+    at = header.index("predicted")
+    labels = [name.removeprefix("p_") for name in header[at + 1 :]]
+    columns = {name: [row[i] for row in rows] for i, name in enumerate(header[:at])}
+    numbers = [[float(cell) if cell else np.nan for cell in row[at + 1 :]] for row in rows]
+    proba = np.asarray(numbers, dtype=np.float64).reshape(len(rows), len(labels))
+    return Predictions(columns, [row[at] for row in rows], labels, proba, text)
