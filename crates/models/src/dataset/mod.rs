@@ -9,12 +9,11 @@ mod label_file;
 
 use std::path::{Path, PathBuf};
 
-use corsmal_files::layout::{self, LayoutError};
-use corsmal_files::npz::{NpzError, NpzFile};
+use corsmal_files::feature_file::{FeatureFile, FeatureFileError, FeatureTable};
+use corsmal_files::layout;
+use corsmal_files::npz::NpzError;
 use corsmal_files::outcome::Outcome;
-use corsmal_files::parquet::{self, ParquetTableError};
-use corsmal_files::provenance::Provenance;
-use corsmal_files::table;
+use corsmal_files::table::Table;
 use linfa::DatasetBase;
 use ndarray::{Array2, ArrayView2};
 use serde_json::Value;
@@ -36,12 +35,9 @@ pub enum DatasetError {
     /// An archive cannot be read.
     #[error(transparent)]
     Npz(#[from] NpzError),
-    /// The `.npz` of features cannot be read.
+    /// The feature file cannot be read.
     #[error(transparent)]
-    Layout(#[from] LayoutError),
-    /// The Parquet file of features cannot be read.
-    #[error(transparent)]
-    Parquet(#[from] ParquetTableError),
+    Features(#[from] FeatureFileError),
     /// A file holds something else than it should.
     #[error("{path}: {reason}")]
     Content {
@@ -90,18 +86,29 @@ impl LabelledTable {
     /// # Errors
     /// [`DatasetError`] for a file that cannot be read or has no matrix of features.
     pub fn read(path: &Path, members: &MemberNames) -> Result<Self> {
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet")) {
-            return Self::of_extraction(path, parquet::read(path)?);
-        }
-        let mut npz = NpzFile::open(path)?;
-        if layout::is_ours(&npz) {
-            Self::of_extraction(path, layout::read_table(&mut npz)?)
-        } else {
-            foreign::read(path, &mut npz, members)
+        match FeatureFile::open(path)? {
+            FeatureFile::Npz(mut npz) if !layout::is_ours(&npz) => {
+                foreign::read(path, &mut npz, members)
+            }
+            mut ours => {
+                let FeatureTable { table, provenance, .. } = ours.table()?;
+                let config = serde_json::from_str(&provenance.config)
+                    .map_err(|e| DatasetError::content(path, format!("its configuration: {e}")))?;
+                Self::of_extraction(path, &table, config, provenance.config_hash)
+            }
         }
     }
 
-    fn of_extraction(path: &Path, (table, provenance): (table::Table, Provenance)) -> Result<Self> {
+    /// The table of an extraction; `path` is named in messages about it.
+    ///
+    /// # Errors
+    /// [`DatasetError::Content`] for a table without statistics.
+    pub fn of_extraction(
+        path: &Path,
+        table: &Table,
+        config: Value,
+        config_hash: String,
+    ) -> Result<Self> {
         if table.feature_names().is_empty() && !table.ids().is_empty() {
             return Err(DatasetError::content(
                 path,
@@ -109,16 +116,14 @@ impl LabelledTable {
                  [summary], such as --preset esc26",
             ));
         }
-        let config = serde_json::from_str(&provenance.config);
-        let unreadable = |e| DatasetError::content(path, format!("its configuration: {e}"));
         Ok(Self {
             path: path.into(),
             x: table.values().mapv(f64::from),
             feature_names: table.feature_names().to_vec(),
             ids: table.ids().to_vec(),
             outcomes: table.outcomes().to_vec(),
-            config: config.map_err(unreadable)?,
-            config_hash: provenance.config_hash,
+            config,
+            config_hash,
             columns: table.labels().map(|(name, c)| (name.to_string(), c.to_vec())).collect(),
         })
     }

@@ -74,7 +74,8 @@ impl<W: Write> RecordWriter<W> {
             Unit::Window => &["start", "end", "status"],
             Unit::Vote => &["status", "windows"],
         };
-        let mut all: Vec<&str> = ["id", "path"].into_iter().chain(by_unit.iter().copied()).collect();
+        let mut all: Vec<&str> =
+            ["id", "path"].into_iter().chain(by_unit.iter().copied()).collect();
         let has_target = columns.iter().any(|column| column == target);
         let mut carried = Vec::new();
         for (at, column) in columns.iter().enumerate() {

@@ -4,13 +4,11 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use corsmal_extract::inputs::{Input, InputSource};
-use corsmal_extract::run::{self, RunError, RunOptions};
+use corsmal_extract::run::{self, RunError};
 use corsmal_files::draft;
-use corsmal_files::npz::Compression;
 use corsmal_files::outcome::{Outcome, Status};
-use corsmal_files::shard::Shard;
 use corsmal_models::classifiers::Predicted;
-use corsmal_models::dataset::{LabelledTable, MemberNames};
+use corsmal_models::dataset::LabelledTable;
 use corsmal_models::model_file::{FormatRule, Model};
 use corsmal_models::predictions::Record;
 use linfa::traits::Predict;
@@ -20,7 +18,7 @@ use super::{Args, End, Records, configuration, delivered, recordings};
 use crate::failure::Failure;
 use crate::progress::{LogFormat, Meter};
 
-/// Extracts into a temporary folder, then predicts.
+/// Extracts into memory, then predicts.
 pub fn run(args: &Args, model: &Model) -> Result<(End, Option<Records>), Failure> {
     let config = configuration(args, model)?;
     let formats = args.rule(model, &config.to_value())?;
@@ -29,29 +27,23 @@ pub fn run(args: &Args, model: &Model) -> Result<(End, Option<Records>), Failure
         found.iter().take(1).flat_map(|f| &f.labels).map(|(column, _)| column.clone()).collect();
     let accepted = by_format(&found, &formats, args);
     let folder = if args.out == Path::new("-") {
-        tempfile::tempdir()
+        std::env::temp_dir()
     } else {
-        tempfile::tempdir_in(draft::folder(&args.out))
-    };
-    let folder = folder.map_err(|e| Failure::new(format!("temporary folder: {e}")))?;
-    let options = RunOptions {
-        out: folder.path().join("features.npz"),
-        compression: Compression::Stored,
-        jobs: args.jobs.count(),
-        shard: Shard::default(),
-        resume: false,
-        overwrite: false,
-        max_errors: None,
+        draft::folder(&args.out).to_path_buf()
     };
     let stop = crate::interrupt::flag();
     let meter = Meter::new(LogFormat::Text, args.quiet);
     let mut predictions = HashMap::new();
     if !accepted.is_empty() {
-        let table = match run::run(&accepted, &config, &options, &meter, stop) {
-            Ok(_) => LabelledTable::read(&options.out, &MemberNames::default())?,
+        let extracted = run::table(&accepted, &config, (args.jobs.count(), &folder), &meter, stop);
+        let table = match extracted {
+            Ok(table) => table,
             Err(RunError::Interrupted) => return Ok((End::Interrupted, None)),
             Err(error) => return Err(error.into()),
         };
+        // What the recordings are called where their table is at fault.
+        let place = Path::new("the recordings");
+        let table = LabelledTable::of_extraction(place, &table, config.to_value(), config.hash())?;
         predictions = self::predictions(model, &table, &formats, args)?;
     }
     let mut records = args.records(model, &columns)?;
