@@ -243,7 +243,6 @@ class TrainedModel:
     def load(path: str | os.PathLike[str]) -> TrainedModel: ...
 
 def classifier_parameters(name: str, parameters: str) -> str: ...
-
 def cross_validate(
     features: str,
     target: str,

@@ -199,8 +199,13 @@ def cross_validate(
     )
     report = json.loads(text)
     result = report["result"]
-    spreads = (result[name] for name in ("accuracy", "weighted_f1", "macro_f1"))
-    return CrossValidation(*spreads, _predictions(held_out), report)
+    return CrossValidation(
+        accuracy=result["accuracy"],
+        weighted_f1=result["weighted_f1"],
+        macro_f1=result["macro_f1"],
+        predictions=_predictions(held_out),
+        report=report,
+    )
 
 
 def fuse(
@@ -233,8 +238,11 @@ def fuse(
     --------
     >>> corsmal_feat.fuse(["rf.csv", "svm.csv"], weights=[2, 1]).save("mean.csv")  # doctest: +SKIP
     """
-    one = isinstance(predictions, (str, os.PathLike))
-    paths = [os.fspath(predictions)] if one else [os.fspath(path) for path in predictions]
+    if isinstance(predictions, (str, os.PathLike)):
+        predictions = [predictions]
+    paths = [os.fspath(path) for path in predictions]
+    if not paths:
+        raise ParameterError("fuse needs at least one prediction file")
     chosen = None if weights is None else [float(weight) for weight in weights]
     least = _whole("least", least, 2**32)
     return _predictions(_core.fuse(paths, chosen, vote, background, least))
