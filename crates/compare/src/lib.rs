@@ -3,6 +3,27 @@
 //! One pair of arrays is held at a time. An array is seen as `[channel, coefficient, frame]`: its
 //! last axis as frames, the one before as coefficients, all before that as channels; a table of
 //! summaries as `[1, column, row]`.
+//!
+//! ```
+//! use corsmal_compare::{Criteria, compare};
+//! use corsmal_files::npz::{Compression, NpzWriter};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let folder = tempfile::tempdir()?;
+//! # let (a, b) = (folder.path().join("a.npz"), folder.path().join("b.npz"));
+//! for (path, scale) in [(&a, 1.0), (&b, 2.0)] {
+//!     let values: Vec<f32> = (1..=60).map(|i| scale * (i as f32).sqrt()).collect();
+//!     let mut writer = NpzWriter::create(path, Compression::Stored)?;
+//!     writer.floats("mfcc", &[3, 20], &values)?;
+//!     writer.finish()?;
+//! }
+//! let found = compare(&a, &b, &Criteria::default())?;
+//! assert!(!found.within);
+//! assert_eq!(found.features[0].differing, 1);
+//! assert!(!found.features[0].causes.is_empty(), "a factor of two");
+//! # Ok(())
+//! # }
+//! ```
 
 mod causes;
 mod compared_file;

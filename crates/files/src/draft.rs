@@ -1,13 +1,22 @@
 //! Files that appear under their name only when they are whole.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::Duration;
 
 use tempfile::NamedTempFile;
 
-/// A file under another name in the same folder, until it is whole. Errors name the file it is to
-/// become.
+/// What the name of a draft begins with after the name of the file that it is to become.
+const SUFFIX: &str = ".unfinished-";
+
+/// A file under another name in the same folder, `.NAME.unfinished-XXXXXX`, until it is whole. Errors
+/// name the file it is to become.
+///
+/// A process that is killed leaves its draft. The next one that writes to the folder removes it; it
+/// tells drafts of living processes by their locks.
 pub struct Draft {
     path: PathBuf,
     file: NamedTempFile,
@@ -19,16 +28,22 @@ impl Draft {
     /// # Errors
     /// Its folder cannot be written.
     pub fn create(path: &Path) -> io::Result<Self> {
-        #[cfg_attr(not(unix), expect(unused_mut, reason = "nothing is set there"))]
+        let path = destination(path);
+        remove_left(folder(&path));
+        let mut prefix = std::ffi::OsString::from(".");
+        prefix.push(path.file_name().unwrap_or_default());
+        prefix.push(SUFFIX);
         let mut builder = tempfile::Builder::new();
+        builder.prefix(&prefix);
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
             // As any new file: the process's umask applies, where temporary files are private.
             builder.permissions(std::fs::Permissions::from_mode(0o666));
         }
-        let path = destination(path);
         let file = builder.tempfile_in(folder(&path)).map_err(|e| named(&path, &e))?;
+        // Where a file system knows no locks, others cannot lock it either and leave it alone.
+        let _ = file.as_file().try_lock();
         Ok(Self { path, file })
     }
 
@@ -59,6 +74,30 @@ impl Write for Draft {
 
     fn flush(&mut self) -> io::Result<()> {
         self.file.as_file_mut().flush().map_err(|e| named(&self.path, &e))
+    }
+}
+
+/// Removes the drafts that killed processes have left in a folder; looks at each folder once.
+fn remove_left(folder: &Path) {
+    static SEEN: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+    if !SEEN.lock().unwrap_or_else(|e| e.into_inner()).insert(folder.into()) {
+        return;
+    }
+    // What cannot be looked at cannot be tidied; whoever writes there will hear of it.
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let Some(name) = name.to_str().filter(|name| name.starts_with('.')) else { continue };
+        let Some((_, random)) = name.rsplit_once(SUFFIX) else { continue };
+        let ours = random.len() == 6 && random.bytes().all(|byte| byte.is_ascii_alphanumeric());
+        let left = |file: File| {
+            // A new one may be about to be locked.
+            let modified = file.metadata().and_then(|meta| meta.modified());
+            let age = modified.map(|modified| modified.elapsed().unwrap_or_default());
+            age.is_ok_and(|age| age > Duration::from_secs(10)) && file.try_lock().is_ok()
+        };
+        if ours && File::open(entry.path()).is_ok_and(left) {
+            let _ = std::fs::remove_file(entry.path());
+        }
     }
 }
 
@@ -103,6 +142,46 @@ fn named(path: &Path, error: &io::Error) -> io::Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Makes a file an hour old.
+    fn age(path: &Path) -> File {
+        let file = File::options().write(true).open(path).unwrap();
+        file.set_modified(std::time::SystemTime::now() - Duration::from_secs(3600)).unwrap();
+        file
+    }
+
+    #[test]
+    fn what_killed_processes_left_is_removed_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for name in
+            [".a.model.unfinished-Ab3xY9", ".a.model.unfinished-notes", "a.unfinished-Ab3xY9"]
+        {
+            std::fs::write(at(name), b"part").unwrap();
+            age(&at(name));
+        }
+        // Just begun by another process.
+        std::fs::write(at(".a.unfinished-Ab3xY9"), b"part").unwrap();
+        // Of a process that lives.
+        std::fs::write(at(".b.unfinished-Ab3xY9"), b"part").unwrap();
+        let alive = age(&at(".b.unfinished-Ab3xY9"));
+        alive.lock().unwrap();
+        let draft = Draft::create(&at("c.npz")).unwrap();
+        let names = || {
+            let entries = std::fs::read_dir(folder.path()).unwrap();
+            let mut names: Vec<_> =
+                entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+            names.sort();
+            names
+        };
+        let now = names();
+        let others = [".a.model.unfinished-notes", ".a.unfinished-Ab3xY9", ".b.unfinished-Ab3xY9"];
+        assert_eq!(now[..3], others);
+        assert!(now[3].starts_with(".c.npz.unfinished-"), "{now:?}");
+        assert_eq!((&now[4], now.len()), (&"a.unfinished-Ab3xY9".to_string(), 5));
+        draft.publish().unwrap();
+        assert!(names().contains(&"c.npz".to_string()));
+    }
 
     #[test]
     fn the_file_is_there_when_it_is_whole() {

@@ -3,9 +3,13 @@
 //! Frame-level arrays come first, in the order of the inputs, named by id. The members that cover
 //! the whole run follow; their names begin with [`RESERVED`], which no id does.
 
+use std::io::{self, Write};
+use std::path::Path;
+
 use serde::Serialize;
 use thiserror::Error;
 
+use crate::npy::{DType, Header};
 use crate::npz::{Compression, NpzError, NpzFile, NpzWriter};
 use crate::outcome::Outcome;
 use crate::provenance::{LAYOUT_VERSION, Provenance};
@@ -85,10 +89,35 @@ pub fn write_table(
     for (column, values) in table.labels() {
         writer.strings(&format!("{LABELS}{column}"), values)?;
     }
-    writer.text(OUTCOMES, &json_lines(table.outcomes()))?;
+    // There may be very many, so their text is made twice rather than held.
+    let mut length = Count(0);
+    let write = |out: &mut dyn Write| -> io::Result<()> {
+        let mut out = io::BufWriter::with_capacity(1 << 16, out);
+        for outcome in table.outcomes() {
+            serde_json::to_writer(&mut out, outcome)?;
+            out.write_all(b"\n")?;
+        }
+        out.flush()
+    };
+    write(&mut length).map_err(|e| NpzError::io(Path::new(OUTCOMES), e))?;
+    writer.array_with(OUTCOMES, &Header::new(DType::U8, &[length.0]), write)?;
     writer.text(CONFIG, &provenance.config)?;
     writer.text(META, &json_lines(std::slice::from_ref(provenance)))?;
     Ok(())
+}
+
+/// Counts bytes.
+struct Count(usize);
+
+impl Write for Count {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0 += bytes.len();
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 /// Reads back what [`write_table`] wrote.

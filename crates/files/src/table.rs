@@ -212,6 +212,11 @@ impl Table {
         &self.outcomes
     }
 
+    /// The outcomes alone.
+    pub fn into_outcomes(self) -> Vec<Outcome> {
+        self.outcomes
+    }
+
     fn check_columns(&self, features: &[String]) -> Result<(), TableError> {
         let mut taken = HashSet::from([ID]);
         for name in self.label_columns.iter().chain(features) {

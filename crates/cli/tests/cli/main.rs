@@ -6,9 +6,11 @@
 mod ccm_commands;
 mod command;
 mod compare;
+mod compat;
 mod extract;
 mod formats;
 mod fusion;
+mod hostile;
 mod inspect;
 mod live;
 mod models;

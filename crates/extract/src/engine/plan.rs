@@ -204,10 +204,8 @@ impl Plan {
 
     /// Samples that the first frame of every feature needs.
     pub fn shortest(&self) -> u64 {
-        let needed = |s: &Box<dyn Stream>| {
-            let Framing { length, pad, .. } = s.framing();
-            length.saturating_sub(2 * pad).max(1) as u64
-        };
-        self.streams.iter().map(needed).max().unwrap_or(1)
+        let needed =
+            |framing: Framing| framing.length.saturating_sub(2 * framing.pad).max(1) as u64;
+        self.streams.iter().map(|s| needed(s.framing())).max().unwrap_or(1)
     }
 }

@@ -66,7 +66,7 @@ impl<'a> Plans<'a> {
         if let Ok(planned) = &made {
             for warning in planned.plan.warnings() {
                 if state.warnings.insert(warning.clone()) {
-                    (self.warn)(&warning);
+                    (self.warn)(warning);
                 }
             }
         }

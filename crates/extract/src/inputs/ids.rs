@@ -1,6 +1,6 @@
 //! Unique ids for a list of inputs.
 
-use std::collections::BTreeMap;
+use std::collections::HashMap;
 use std::ffi::OsStr;
 use std::path::{Component, Path};
 
@@ -35,50 +35,48 @@ pub(super) fn refusal(id: &str) -> Option<String> {
 /// The id of each input: given ones as they are, others from the shortest form of their path that
 /// collides with none.
 pub(super) fn assign(found: &[Found]) -> Result<Vec<String>, InputError> {
-    let mut named: BTreeMap<String, usize> = BTreeMap::new();
-    for found in found.iter().filter(|found| matches!(found.naming, Naming::Derived(_))) {
-        *named.entry(found.source.to_string()).or_default() += 1;
-    }
-    let is_repeated = |found: &Found| named.get(&found.source.to_string()).is_some_and(|n| *n > 1);
-    let forms: Vec<Vec<String>> = found
-        .iter()
-        .map(|found| {
-            let mut forms = forms(found);
-            if let (true, Some(times)) = (is_repeated(found), times(found)) {
-                forms.iter_mut().for_each(|id| id.push_str(&times));
-            }
-            forms
-        })
-        .collect();
-    let mut levels = vec![0; found.len()];
-    loop {
-        let mut holders: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
-        for (index, forms) in forms.iter().enumerate() {
-            holders.entry(&forms[levels[index]]).or_default().push(index);
+    let mut named: HashMap<Option<&Path>, usize> = HashMap::new();
+    // Only a stretch asks whether there are others of its file.
+    if found.iter().any(|found| times(found).is_some()) {
+        for found in found.iter().filter(|found| matches!(found.naming, Naming::Derived(_))) {
+            *named.entry(place(found)).or_default() += 1;
         }
-        let mut changed = false;
-        for (id, group) in holders.into_iter().filter(|(_, group)| group.len() > 1) {
-            let advancing: Vec<usize> =
-                group.iter().copied().filter(|&i| levels[i] + 1 < forms[i].len()).collect();
-            if advancing.is_empty() {
+    }
+    let forms = |found: &Found| {
+        let mut forms = forms(found);
+        let repeated = named.get(&place(found)).is_some_and(|n| *n > 1);
+        if let (true, Some(times)) = (repeated, times(found)) {
+            forms.iter_mut().for_each(|id| id.push_str(&times));
+        }
+        forms
+    };
+    let mut ids: Vec<String> = found.iter().map(|found| forms(found).swap_remove(0)).collect();
+    let mut levels = vec![0; found.len()];
+    let mut order: Vec<usize> = (0..found.len()).collect();
+    loop {
+        order.sort_unstable_by(|a, b| ids[*a].cmp(&ids[*b]).then(a.cmp(b)));
+        let mut changed = Vec::new();
+        for group in order.chunk_by(|a, b| ids[*a] == ids[*b]).filter(|group| group.len() > 1) {
+            let before = changed.len();
+            for &index in group {
+                let mut forms = forms(&found[index]);
+                if levels[index] + 1 < forms.len() {
+                    levels[index] += 1;
+                    changed.push((index, forms.swap_remove(levels[index])));
+                }
+            }
+            if changed.len() == before {
                 return Err(InputError::Duplicate {
-                    id: id.into(),
+                    id: ids[group[0]].clone(),
                     first: found[group[0]].source.to_string(),
                     second: found[group[1]].source.to_string(),
                 });
             }
-            for index in advancing {
-                levels[index] += 1;
-                changed = true;
-            }
         }
-        if !changed {
-            return Ok(forms
-                .into_iter()
-                .zip(levels)
-                .map(|(mut f, level)| f.swap_remove(level))
-                .collect());
+        if changed.is_empty() {
+            return Ok(ids);
         }
+        changed.into_iter().for_each(|(index, id)| ids[index] = id);
     }
 }
 
@@ -99,6 +97,14 @@ fn forms(found: &Found) -> Vec<String> {
             forms
         }
         (Naming::Derived(relative), InputSource::Stdin) => vec![id_of(relative)],
+    }
+}
+
+/// The file, where it is one.
+fn place(found: &Found) -> Option<&Path> {
+    match &found.source {
+        InputSource::File(path) => Some(path),
+        InputSource::Stdin => None,
     }
 }
 

@@ -332,11 +332,16 @@ fn walk(
                 }
             }
             Err(error) => {
-                let at = error.path().filter(|at| is_audio(at)).map(Path::to_path_buf);
+                let at = error.path().map(Path::to_path_buf);
                 let is_loop = error.loop_ancestor().is_some();
-                unless_harmless(path, error)?;
-                // A dangling link to a recording, which will fail on its own.
-                files.extend(at.filter(|_| !is_loop));
+                let below = error.depth() > 0;
+                match unless_harmless(path, error) {
+                    // A dangling link to a recording, which will fail on its own.
+                    Ok(()) => files.extend(at.filter(|at| !is_loop && is_audio(at))),
+                    // So will a folder that cannot be read: the others do not have to wait for it.
+                    Err(_) if below => files.extend(at),
+                    Err(error) => return Err(error),
+                }
             }
         }
     }

@@ -18,6 +18,8 @@ mod record;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::Duration;
 
 use corsmal_files::draft;
 use corsmal_files::npz::{EntryRecord, intact_entries};
@@ -353,7 +355,10 @@ fn beside(out: &Path, suffix: &str) -> PathBuf {
 
 /// Opens a file, which is made where there is none, and locks it.
 fn locked(path: &Path) -> Result<File, LedgerError> {
+    // A process that is being started holds the locks of its parent for a moment.
+    const PATIENCE: u32 = 20;
     let io = |source| LedgerError::Io { path: path.into(), source };
+    let mut tries = 0;
     loop {
         let mut options = OpenOptions::new();
         let file = options.read(true).write(true).create(true).truncate(false).open(path);
@@ -362,6 +367,11 @@ fn locked(path: &Path) -> Result<File, LedgerError> {
             Ok(()) => {}
             // Some file systems of clusters know no locks; work goes on without.
             Err(TryLockError::Error(e)) if e.kind() == io::ErrorKind::Unsupported => {}
+            Err(TryLockError::WouldBlock) if tries < PATIENCE => {
+                tries += 1;
+                thread::sleep(Duration::from_millis(10));
+                continue;
+            }
             Err(TryLockError::WouldBlock) => return Err(LedgerError::Locked { path: path.into() }),
             Err(TryLockError::Error(source)) => return Err(io(source)),
         }

@@ -60,6 +60,8 @@ struct State {
     partial: BTreeMap<usize, Partial>,
     ready: BTreeMap<usize, Finished>,
     failed: usize,
+    /// Whether a recording shorter than a transform was met.
+    warned: bool,
     error: Option<RunError>,
 }
 
@@ -365,9 +367,10 @@ impl<'a> Collector<'a> {
             Ok((arrays, row, total)) => {
                 if let Some(longest) = plan.longest_transform()
                     && total < longest as u64
+                    && !std::mem::replace(&mut self.lock().warned, true)
                 {
                     self.progress.warning(&format!(
-                        "{}: {total} samples are shorter than n_fft = {longest}",
+                        "{}: {total} samples are shorter than n_fft = {longest}; said once a run",
                         outcome.id
                     ));
                 }

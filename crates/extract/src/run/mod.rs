@@ -129,7 +129,7 @@ pub fn run(
     if stop.load(Ordering::Relaxed) {
         return Err(RunError::Interrupted);
     }
-    let outcomes = output.publish(&provenance)?.outcomes().to_vec();
+    let outcomes = output.publish(&provenance)?.into_outcomes();
     Ok(RunReport { outcomes, resumed, up_to_date: false })
 }
 

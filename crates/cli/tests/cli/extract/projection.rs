@@ -56,7 +56,7 @@ fn what_cannot_be_fitted_or_applied_is_refused_and_leaves_nothing() {
         ("train.npz", "5", "new.npz", "n_components = 5"),
         ("train.npz", "0", "new.npz", "n_components = 0"),
         ("frames.npz", "2", "new.npz", "no statistics"),
-        ("pca.npz", "2", "new.npz", "no output of extract"),
+        ("pca.npz", "2", "new.npz", "file of another program"),
         ("projected.npz", "1", "new.npz", "projected already"),
         ("absent.npz", "2", "new.npz", "absent.npz"),
     ] {
