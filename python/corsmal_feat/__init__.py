@@ -3,13 +3,33 @@
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING, Any
 
-from . import corsmal, decompose, effects, errors, feature, filters, onset
+from . import corsmal, decompose, display, effects, errors, feature, filters, onset, util
+from ._audio import get_duration, get_samplerate, load, stream
 from ._core import __version__
+from ._decibels import amplitude_to_db, db_to_amplitude, db_to_power, magphase, power_to_db
 from ._evaluate import Scores, evaluate
-from ._extract import Features, SignalExtractor, extract, load
+from ._extract import SignalExtractor, extract
+from ._features import Features, load_features
 from ._harmonic import cqt, istft
 from ._mono import to_mono
 from ._pitch import estimate_tuning, piptrack, pitch_tuning
+from ._pitches import (
+    A4_to_tuning,
+    cqt_frequencies,
+    fft_frequencies,
+    fourier_tempo_frequencies,
+    hz_to_mel,
+    hz_to_midi,
+    hz_to_octs,
+    mel_frequencies,
+    mel_to_hz,
+    midi_to_hz,
+    note_to_hz,
+    note_to_midi,
+    octs_to_hz,
+    tempo_frequencies,
+    tuning_to_A4,
+)
 from ._resample import resample
 from ._scoring import (
     Comparison,
@@ -21,6 +41,31 @@ from ._scoring import (
     fuse,
     score,
 )
+from ._spectrum import stft
+from ._times import (
+    blocks_to_frames,
+    blocks_to_samples,
+    blocks_to_time,
+    frames_to_samples,
+    frames_to_time,
+    samples_like,
+    samples_to_frames,
+    samples_to_time,
+    time_to_frames,
+    time_to_samples,
+    times_like,
+)
+from ._weightings import (
+    A_weighting,
+    B_weighting,
+    C_weighting,
+    D_weighting,
+    Z_weighting,
+    frequency_weighting,
+    multi_frequency_weighting,
+    perceptual_weighting,
+)
+from ._yin import yin
 from .errors import (
     ConfigError,
     CorsmalFeatError,
@@ -29,8 +74,8 @@ from .errors import (
     NotFittedError,
     ParameterError,
     RunError,
+    UnknownIdError,
 )
-from .spectrum import amplitude_to_db, power_to_db, stft
 
 if TYPE_CHECKING:
     from . import classifiers
@@ -48,10 +93,15 @@ if TYPE_CHECKING:
 __all__ = [
     "KNN",
     "SVC",
+    "A4_to_tuning",
+    "A_weighting",
+    "B_weighting",
+    "C_weighting",
     "Comparison",
     "ConfigError",
     "CorsmalFeatError",
     "CrossValidation",
+    "D_weighting",
     "DecisionTree",
     "DecodeError",
     "ExtraTrees",
@@ -67,33 +117,73 @@ __all__ = [
     "ScoreReport",
     "Scores",
     "SignalExtractor",
+    "UnknownIdError",
+    "Z_weighting",
     "__version__",
     "amplitude_to_db",
+    "blocks_to_frames",
+    "blocks_to_samples",
+    "blocks_to_time",
     "classifiers",
     "compare_predictions",
     "corsmal",
     "cqt",
+    "cqt_frequencies",
     "cross_validate",
+    "db_to_amplitude",
+    "db_to_power",
     "decompose",
+    "display",
     "effects",
     "errors",
     "estimate_tuning",
     "evaluate",
     "extract",
     "feature",
+    "fft_frequencies",
     "filters",
+    "fourier_tempo_frequencies",
+    "frames_to_samples",
+    "frames_to_time",
+    "frequency_weighting",
     "fuse",
+    "get_duration",
+    "get_samplerate",
+    "hz_to_mel",
+    "hz_to_midi",
+    "hz_to_octs",
     "istft",
     "load",
+    "load_features",
     "load_model",
+    "magphase",
+    "mel_frequencies",
+    "mel_to_hz",
+    "midi_to_hz",
+    "multi_frequency_weighting",
+    "note_to_hz",
+    "note_to_midi",
+    "octs_to_hz",
     "onset",
+    "perceptual_weighting",
     "piptrack",
     "pitch_tuning",
     "power_to_db",
     "resample",
+    "samples_like",
+    "samples_to_frames",
+    "samples_to_time",
     "score",
     "stft",
+    "stream",
+    "tempo_frequencies",
+    "time_to_frames",
+    "time_to_samples",
+    "times_like",
     "to_mono",
+    "tuning_to_A4",
+    "util",
+    "yin",
 ]
 
 # Estimators are scikit-learn's where it is installed, and importing that takes a second: they come

@@ -14,8 +14,38 @@ from .errors import ParameterError
 Singles = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
 Floats = Singles | Doubles
+Complexes = npt.NDArray[np.complex64] | npt.NDArray[np.complex128]
 #: an array of either precision, and the same one again
-Same = TypeVar("Same", Singles, Doubles, Floats)
+Same = TypeVar("Same", Singles, Doubles, Floats, Complexes)
+
+
+#: Largest number that is taken as a size; what memory has room for is checked where it is taken.
+MOST = 1 << 40
+
+
+def size(name: str, value: Any, least: int = 1) -> int:
+    """A number from outside that becomes a size."""
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+        raise ParameterError(f"{name} = {value!r} is not possible: a whole number")
+    if not least <= value <= MOST:
+        raise ParameterError(f"{name} = {value} is not possible: {least} to {MOST}")
+    return int(value)
+
+
+def room(what: str, *shape: int) -> None:
+    """Refuses an array of doubles for which there is no memory, before anything is computed: the
+    Rust side would end the process."""
+    count = prod(shape)
+    if count < 1 << 17:
+        return
+    try:
+        if count <= MOST:
+            np.empty(count)
+            return
+    except MemoryError:
+        pass
+    sizes = " x ".join(map(str, shape))
+    raise ParameterError(f"{what} of {sizes} values is not possible: there is no memory for it")
 
 
 def floats(name: str, value: Any, min_ndim: int = 1) -> Floats:
@@ -23,10 +53,14 @@ def floats(name: str, value: Any, min_ndim: int = 1) -> Floats:
     array = np.asarray(value)
     if array.dtype not in (np.float32, np.float64):
         hint = ""
-        if array.dtype.kind in "iu":
-            bits = 8 * array.dtype.itemsize - 1
-            hint = f"; divide {array.dtype} samples by 2**{bits} and cast to float32 first"
-        elif array.dtype.kind == "f":
+        if array.dtype.kind in "iu" and name == "y":
+            bits = 8 * array.dtype.itemsize
+            hint = f"; divide {array.dtype} samples by 2**{bits - 1} and cast to float32 first"
+            if bits > 16:
+                hint = (
+                    "; divide them by their full scale (16 bits: 2**15) and cast to float32 first"
+                )
+        elif array.dtype.kind in "iuf":
             hint = "; cast it first, as by .astype(numpy.float32)"
         raise ParameterError(f"{name} has dtype {array.dtype}, expected float32 or float64{hint}")
     if array.ndim < min_ndim:

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import rows, unrows
+from ._arrays import Floats, rows, unrows
+from ._filters import Window, chroma_params
 from ._pitch import estimate_tuning
-from .filters import chroma_params
-from .spectrum import spectrogram
+from ._spectrum import spectrogram
 
 
 def chroma_stft(
     *,
-    y: Any = None,
+    y: npt.ArrayLike | None = None,
     sr: float = 22050,
-    S: Any = None,
+    S: npt.ArrayLike | None = None,
     norm: float | None = np.inf,
     n_fft: int = 2048,
     hop_length: int = 512,
     win_length: int | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     center: bool = True,
     pad_mode: str = "constant",
     tuning: float | None = None,
@@ -32,7 +30,7 @@ def chroma_stft(
     octwidth: float | None = 2,
     base_c: bool = True,
     dtype: npt.DTypeLike = np.float32,
-) -> Any:
+) -> Floats:
     """Chromagram [shape=(..., n_chroma, t)] of the power spectrogram, or of S whatever it is
     (librosa.feature.chroma_stft).
 

@@ -6,9 +6,11 @@ import os
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from . import _core
-from ._arrays import Doubles, floats, rows, unrows
+from ._arrays import Doubles, Floats, floats, room, rows, size, unrows
+from ._params import PaaFrames
 from .errors import ParameterError
 
 __all__ = [
@@ -36,52 +38,63 @@ def _doubles(name: str, value: Any, ndim: int) -> Doubles:
 
 def paa_fbank(sr: float, num_fft: int) -> Doubles:
     """pyAudioAnalysis' mel filters [shape=(40, num_fft)] (`mfcc_filter_banks`)."""
+    room("filters", 40, size("num_fft", num_fft))
     return _core.paa_fbank(float(sr), int(num_fft))
 
 
-def a34_short(y: Any, sr: float, window: int, step: int, deltas: bool = True) -> Doubles:
+def a34_short(y: npt.ArrayLike, sr: float, window: int, step: int, deltas: bool = True) -> Doubles:
     """pyAudioAnalysis' short-term features [shape=(..., 68 or 34, frames)] of recordings `y`
     [shape=(..., n)], 16-bit counts or samples in -1..1 (`feature_extraction`).
 
     Each recording is centred and peak-normalised as a whole. `window` and `step` are in samples.
     """
     y = _doubles("y", y, 1)
-    frame = (int(window), int(step))
-    return unrows(_core.a34_short(rows(y, 1), float(sr), frame, bool(deltas)), y, 1)
+    window, step = size("window", window), size("step", step)
+    room("filters", 40, window)
+    return unrows(_core.a34_short(rows(y, 1), float(sr), window, step, bool(deltas)), y, 1)
 
 
-def a34f136(y: Any, sr: float, mid_window: int, mid_step: int, window: int, step: int) -> Doubles:
+def a34f136(
+    y: npt.ArrayLike, sr: float, mid_window: int, mid_step: int, window: int, step: int
+) -> Doubles:
     """Means, then standard deviations of the 68 short-term features over mid-term windows
     [shape=(..., 136, windows)] (pyAudioAnalysis `mid_feature_extraction`). All in samples."""
     y = _doubles("y", y, 1)
-    mid, frame = (int(mid_window), int(mid_step)), (int(window), int(step))
-    return unrows(_core.a34f136(rows(y, 1), float(sr), mid, frame), y, 1)
+    room("filters", 40, size("window", window))
+    frames = PaaFrames(
+        window=size("window", window),
+        step=size("step", step),
+        mid_window=size("mid_window", mid_window),
+        mid_step=size("mid_step", mid_step),
+    )
+    return unrows(_core.a34f136(rows(y, 1), float(sr), frames), y, 1)
 
 
 def a34f136_mean(
-    y: Any, sr: float, mid_window: int, mid_step: int, window: int, step: int
+    y: npt.ArrayLike, sr: float, mid_window: int, mid_step: int, window: int, step: int
 ) -> Doubles:
     """The vector of a recording [shape=(..., 136)]: the mean of `a34f136` over its windows."""
     return np.asarray(a34f136(y, sr, mid_window, mid_step, window, step).mean(axis=-1))
 
 
 def sk_resize(
-    S: Any,
+    S: npt.ArrayLike,
     shape: tuple[int, int],
     *,
     mode: str = "reflect",
     anti_aliasing: bool | None = None,
-) -> Any:
+) -> Floats:
     """`S` [shape=(rows, columns)] at another size, as scikit-image's `transform.resize` with linear
     interpolation; Gaussian smoothing first if an axis shrinks."""
     s = floats("S", S, 2)
     if s.ndim != 2 or len(shape) != 2:
         raise ParameterError(f"S has {s.ndim} dimensions and shape {len(shape)}, expected 2 and 2")
-    size = (int(shape[0]), int(shape[1]))
-    return _core.sk_resize(rows(s, 1), size, mode, anti_aliasing)
+    height, width = size("shape", shape[0]), size("shape", shape[1])
+    room("an image", 4, height + s.shape[0], width + s.shape[1])
+    return _core.sk_resize(rows(s, 1), height, width, mode, anti_aliasing)
 
 
-def pca_fit(X: Any, n_components: int) -> Doubles:
+def pca_fit(X: npt.ArrayLike, n_components: int) -> Doubles:
     """Principal components of `X` [shape=(rows, columns)] in one matrix
     [shape=(n_components + 2, columns)]: the components, the column means, the explained variances
     (padded with zeros). The largest entry of each component is positive."""
@@ -91,7 +104,7 @@ def pca_fit(X: Any, n_components: int) -> Doubles:
     return np.vstack([components, mean, padded])
 
 
-def pca_fit_transform(X: Any, n_components: int) -> Doubles:
+def pca_fit_transform(X: npt.ArrayLike, n_components: int) -> Doubles:
     """Coordinates [shape=(rows, n_components)] of the very data that the components are fitted to.
 
     For other data project on the fitted components: fitting them again on test data gives
@@ -102,7 +115,11 @@ def pca_fit_transform(X: Any, n_components: int) -> Doubles:
 
 
 def pca_project(
-    X: Any, components: Any, mean: Any, variance: Any = None, whiten: bool = False
+    X: npt.ArrayLike,
+    components: npt.ArrayLike,
+    mean: npt.ArrayLike,
+    variance: npt.ArrayLike | None = None,
+    whiten: bool = False,
 ) -> Doubles:
     """`X` [shape=(rows, columns)] on fitted components [shape=(k, columns)], each coordinate
     divided by its standard deviation if `whiten`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Self
@@ -12,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._extract import Config, configuration, extract, interleaved, whole_rate
+from ._extract import MOST_JOBS, Config, configuration, extract, interleaved, whole_rate
+from ._features import GOOD
 from ._sklearn import BaseEstimator, TransformerMixin, not_fitted
 from .errors import DecodeError, ParameterError
 
@@ -32,13 +34,17 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
     preset, config, set : see `corsmal_feat.extract`; preset is "esc26" where no config is given
     sr : sample rate in Hz of signals in memory; not used for files
     jobs : worker threads; by default one for each core
+    errors : what a file without features does: "raise" a `DecodeError`, or "nan" makes a row of NaN
+        and a warning
+    progress : tell on the standard error stream how many files are done
 
     Rows to transform are paths, or signals in memory: a list of float arrays, each [shape=(n,) or
     (channels, n)], or one array [shape=(recordings, n) or (recordings, channels, n)].
 
     Examples
     --------
-    >>> model = make_pipeline(FeatureExtractor("esc26"), StandardScaler(), corsmal_feat.SVC())
+    >>> extractor = corsmal_feat.FeatureExtractor("esc26")
+    >>> model = make_pipeline(extractor, StandardScaler(), corsmal_feat.SVC())  # doctest: +SKIP
     >>> model.fit(["a.wav", "b.wav"], ["water", "rice"])  # doctest: +SKIP
     """
 
@@ -50,12 +56,16 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         set: Mapping[str, Any] | None = None,
         sr: float | None = None,
         jobs: int | None = None,
+        errors: str = "raise",
+        progress: bool = False,
     ) -> None:
         self.preset = preset
         self.config = config
         self.set = set
         self.sr = sr
         self.jobs = jobs
+        self.errors = errors
+        self.progress = progress
 
     _names: list[str] | None = None
 
@@ -128,23 +138,38 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
     def _of_files(self, paths: list[Any]) -> tuple[list[str], Matrix]:
         names = [os.fspath(path) for path in paths]
         # The same file may be in X twice, as in a bootstrap.
+        if self.errors not in ("raise", "nan"):
+            raise ParameterError(f"errors = {self.errors!r} is not possible: 'raise' or 'nan'")
         different = list(dict.fromkeys(names))
         preset = "esc26" if self.preset is None and self.config is None else self.preset
-        found = extract(different, preset=preset, config=self.config, set=self.set, jobs=self.jobs)
+        found = extract(
+            different,
+            preset=preset,
+            config=self.config,
+            set=self.set,
+            jobs=self.jobs,
+            progress=self.progress,
+        )
         if len(found.outcomes) != len(different):
             raise ParameterError("X holds folders, globs or manifests: name each recording")
         rows = iter(found.summary if found.summary is not None else ())
+        columns = found.names or self._names or []
         row_of: dict[str, Matrix] = {}
         for name, outcome in zip(different, found.outcomes, strict=True):
-            if outcome["status"] not in ("ok", "truncated"):
-                raise DecodeError(f"{name}: {outcome['status']}: {outcome['reason']}")
-            row_of[name] = next(rows)
-        return found.names, np.stack([row_of[name] for name in names])
+            if outcome["status"] in GOOD:
+                row_of[name] = next(rows)
+                continue
+            reason = f"{name}: {outcome['status']}: {outcome['reason']}"
+            if self.errors == "raise" or not columns:
+                raise DecodeError(reason)
+            warnings.warn(f"a row of NaN for {reason}", stacklevel=4)
+            row_of[name] = np.full(len(columns), np.nan, dtype=np.float32)
+        return columns, np.stack([row_of[name] for name in names])
 
     def _of_signals(self, signals: list[Any], by: _core.Signals) -> tuple[list[str], Matrix]:
         rate = whole_rate(self.sr)
-        if self.jobs is not None and self.jobs < 1:
-            raise ParameterError(f"jobs = {self.jobs} is not possible: at least 1")
+        if self.jobs is not None and not 1 <= self.jobs <= MOST_JOBS:
+            raise ParameterError(f"jobs = {self.jobs} is not possible: 1 to {MOST_JOBS}")
 
         def row(position: int) -> tuple[list[str], Any]:
             samples = _signal(signals[position], position)

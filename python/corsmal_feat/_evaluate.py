@@ -61,6 +61,10 @@ def evaluate(
     containers : iterable of int, optional
         Score only the recordings of these containers.
 
+    Returns
+    -------
+    Scores
+
     Raises
     ------
     ParameterError

@@ -1,14 +1,13 @@
-"""Runs over files, what they wrote, and features of signals that arrive in blocks."""
+"""Runs over files, and features of signals that arrive in blocks."""
 
 from __future__ import annotations
 
 import json
 import os
+import sys
 import tempfile
 import warnings
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from importlib import import_module
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,129 +16,15 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import audio
+from ._features import Features, load_features
 from .errors import ParameterError
-
-__all__ = ["Features", "SignalExtractor", "extract", "load"]
 
 StrPath = str | os.PathLike[str]
 Config = StrPath | Mapping[str, Any]
-Values = npt.NDArray[Any]
+Progress = Callable[[int, int], object]
 
-
-@dataclass(repr=False)
-class Features:
-    """What a run wrote (see `load`).
-
-    Attributes
-    ----------
-    ids : ids of the recordings that have features, in the order of the inputs
-    arrays : by id the frames [shape=(channels, coefficients, frames)], or by id and then by feature
-        where there are several; empty for summaries
-    times : for each of them the time of every frame in seconds, arranged alike
-    summary : statistics [shape=(len(ids), len(names))], or None
-    names : name of each column of `summary`
-    labels : by label column of the manifest the text of each of `ids`
-    config, config_hash : the whole configuration and its hash
-    outcomes : one row for each input, also for those without features: id, path, status, ...
-    """
-
-    ids: list[str]
-    arrays: dict[str, Any]
-    times: dict[str, Any]
-    summary: npt.NDArray[np.float32] | None
-    names: list[str]
-    labels: dict[str, npt.NDArray[np.str_]]
-    config: dict[str, Any]
-    config_hash: str
-    outcomes: list[dict[str, Any]]
-
-    def __repr__(self) -> str:
-        failed = len(self.outcomes) - len(self.ids)
-        if self.summary is None:
-            what = "frames of " + ", ".join(self.config["features"])
-        else:
-            what = f"summary of {len(self.names)} values"
-        return f"<Features: {len(self.ids)} recordings, {failed} failed, {what}>"
-
-    def __len__(self) -> int:
-        return len(self.ids)
-
-
-def load(path: StrPath) -> Features:
-    """Reads an output of `extract` or of the command `corsmal-feat extract`, whole.
-
-    `.parquet` needs pyarrow; pandas and polars read such files, too.
-    """
-    name = os.fspath(path)
-    if name.lower().endswith(".parquet"):
-        return _load_parquet(name)
-    with np.load(name, allow_pickle=False) as archive:
-        if "__meta__" not in archive.files:
-            raise ParameterError(f"{name} is not an output of corsmal-feat: it has no __meta__")
-        run = {k: archive[k] for k in archive.files if not _is_frames(k)}
-        frames = {k: archive[k] for k in archive.files if _is_frames(k)}
-    ids = [str(i) for i in run["__ids__"]]
-    config = json.loads(run["__config__"].tobytes())
-    several = len(config["features"]) > 1
-    arrays: dict[str, Any] = {}
-    times: dict[str, Any] = {}
-    for member, values in frames.items():
-        key = member.removeprefix("__times__/")
-        into = arrays if key == member else times
-        if several:
-            recording, _, feature = key.rpartition("/")
-            into.setdefault(recording, {})[feature] = values
-        else:
-            into[key] = values
-    prefix = "__labels__/"
-    return Features(
-        ids=ids,
-        arrays=arrays,
-        times=times,
-        summary=run.get("__summary__"),
-        names=[str(n) for n in run.get("__summary_names__", ())],
-        labels={k.removeprefix(prefix): v for k, v in run.items() if k.startswith(prefix)},
-        config=config,
-        config_hash=json.loads(run["__meta__"].tobytes())["config_hash"],
-        outcomes=_lines(run["__outcomes__"].tobytes()),
-    )
-
-
-def _is_frames(member: str) -> bool:
-    return member.startswith("__times__/") or not member.startswith("__")
-
-
-def _lines(text: str | bytes) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in text.splitlines() if line]
-
-
-def _load_parquet(name: str) -> Features:
-    try:
-        parquet = import_module("pyarrow.parquet")
-    except ImportError as error:
-        raise ImportError(
-            f"{name}: reading Parquet needs pyarrow (pip install pyarrow); "
-            "pandas.read_parquet and polars.read_parquet give the table, too"
-        ) from error
-    table = parquet.read_table(name)
-    metadata = table.schema.metadata or {}
-    if b"corsmal.meta" not in metadata:
-        raise ParameterError(f"{name} is not an output of corsmal-feat: it has no corsmal.meta")
-    columns = {k: table.column(k).to_numpy() for k in table.column_names if k != "id"}
-    names = [k for k, v in columns.items() if v.dtype == np.float32]
-    rows = table.num_rows
-    summary = np.stack([columns[k] for k in names], axis=1) if names else np.zeros((rows, 0), "f4")
-    return Features(
-        ids=table.column("id").to_pylist(),
-        arrays={},
-        times={},
-        summary=summary,
-        names=names,
-        labels={k: v.astype(np.str_) for k, v in columns.items() if k not in names},
-        config=json.loads(metadata[b"corsmal.config"]),
-        config_hash=json.loads(metadata[b"corsmal.meta"])["config_hash"],
-        outcomes=_lines(metadata[b"corsmal.outcomes"]),
-    )
+#: Most worker threads.
+MOST_JOBS = 4096
 
 
 def extract(
@@ -152,6 +37,7 @@ def extract(
     out: StrPath | None = None,
     resume: bool = False,
     overwrite: bool = False,
+    progress: bool | Progress = False,
 ) -> Features:
     """Features of recordings, as the command `corsmal-feat extract` computes them.
 
@@ -166,9 +52,19 @@ def extract(
         once it is loaded
     resume : continue an interrupted run to `out`
     overwrite : replace `out`
+    progress : True tells on the standard error stream how many recordings are done; a function is
+        called with that number and the number of all
 
     A bad recording is no error: its row of `outcomes` says what is wrong. Ctrl-C stops the run, and
     `resume=True` continues it.
+
+    Returns
+    -------
+    Features
+
+    Examples
+    --------
+    >>> features = corsmal_feat.extract(["audio/"], preset="mfcc-zcr")  # doctest: +SKIP
 
     Raises
     ------
@@ -180,15 +76,15 @@ def extract(
     if not names:
         raise ParameterError("paths = [] is not possible: at least one recording is needed")
     inputs = [os.fspath(name) for name in names]
-    if jobs is not None and jobs < 1:
-        raise ParameterError(f"jobs = {jobs} is not possible: at least 1")
+    if jobs is not None and not 1 <= jobs <= MOST_JOBS:
+        raise ParameterError(f"jobs = {jobs} is not possible: 1 to {MOST_JOBS}")
     if out is not None:
-        return _run(inputs, chosen, overrides, os.fspath(out), jobs, resume, overwrite)
+        return _run(inputs, chosen, overrides, os.fspath(out), jobs, resume, overwrite, progress)
     if resume or overwrite:
         raise ParameterError("resume and overwrite need out: nothing is kept without it")
     with tempfile.TemporaryDirectory(prefix="corsmal_feat_") as folder:
         temporary = str(Path(folder, "features.npz"))
-        return _run(inputs, chosen, overrides, temporary, jobs, False, False)
+        return _run(inputs, chosen, overrides, temporary, jobs, False, False, progress)
 
 
 def _run(
@@ -199,10 +95,19 @@ def _run(
     jobs: int | None,
     resume: bool,
     overwrite: bool,
+    progress: bool | Progress,
 ) -> Features:
-    for message in _core.extract(inputs, config, overrides, out, jobs, resume, overwrite):
+    tell = _to_stderr if progress is True else progress or None
+    found = _core.extract(inputs, config, overrides, out, jobs, resume, overwrite, tell)
+    if progress is True:
+        print(file=sys.stderr)
+    for message in found:
         warnings.warn(message, stacklevel=3)
-    return load(out)
+    return load_features(out)
+
+
+def _to_stderr(done: int, total: int) -> None:
+    print(f"\r{done} of {total} recordings", end="", file=sys.stderr, flush=True)
 
 
 def configuration(
@@ -264,6 +169,8 @@ class SignalExtractor:
         config: Config | None = None,
         set: Mapping[str, Any] | None = None,
     ) -> None:
+        if not 1 <= channels < 1 << 16:
+            raise ParameterError(f"channels = {channels} is not possible: 1 to {(1 << 16) - 1}")
         signals = _core.Signals(*configuration(preset, config, set))
         self._signal = signals.start(whole_rate(sr), channels)
         self._channels = channels

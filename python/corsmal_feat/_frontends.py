@@ -8,9 +8,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from . import _core
-from ._arrays import Doubles, Singles, audio, floats, rows
+from ._arrays import Doubles, Floats, Singles, audio, floats, room, rows, size
 from ._mel import mfcc
 from ._mono import to_mono
 from ._time_domain import zero_crossing_rate
@@ -37,19 +38,23 @@ def _recording(y: Any) -> Singles:
     return np.ascontiguousarray(np.atleast_2d(y), dtype=np.float32)
 
 
-def spec9216(y: Any, sr: float, fixed_len: int | None = None, *, librosa: str = "0.11") -> Any:
+def spec9216(
+    y: npt.ArrayLike, sr: float, fixed_len: int | None = None, *, librosa: str = "0.11"
+) -> Floats:
     """9216 values of one channel `y`: divided by its RMS, |STFT| (512, hop 128) in dB, resized to
     96 x 96. `fixed_len` cuts or zero-pads first; padding makes the result float64, as it does in
     the baselines. `sr` is not used; `librosa="0.8"` pads frames as the published baselines did."""
     y = audio(y)
     if y.ndim != 1:
         raise ParameterError(f"y has {y.ndim} dimensions, expected one channel")
-    image = _core.spec9216(rows(y, 1), fixed_len or None, librosa).ravel()
+    room("a signal", fixed_len or 0)
+    image: Any = _core.spec9216(rows(y, 1), fixed_len or None, librosa).ravel()
     padded = (fixed_len or 0) > len(y)
-    return image if padded else image.astype(y.dtype, copy=False)
+    values: Floats = image if padded else image.astype(y.dtype, copy=False)
+    return values
 
 
-def esc26(y: Any, sr: float) -> Doubles:
+def esc26(y: npt.ArrayLike, sr: float) -> Doubles:
     """26 values of the mean channel of `y`: means, then standard deviations over frames of MFCC 1
     to 12, then mean and standard deviation of the zero-crossing rate."""
     y = to_mono(y)
@@ -59,31 +64,35 @@ def esc26(y: Any, sr: float) -> Doubles:
     return np.concatenate(list(parts)).astype(np.float64)
 
 
-def m1_stft(y: Any, *, n_fft: int = 2048, hop_length: int = 512) -> Singles:
+def m1_stft(y: npt.ArrayLike, *, n_fft: int = 2048, hop_length: int = 512) -> Singles:
     """M1: magnitudes [shape=(1 + n_fft/2, frames)] of the mean channel. The paper gives no
     parameters; these are our choice."""
-    return _core.m1_stft(_recording(y), int(n_fft), int(hop_length))
+    return _core.m1_stft(_recording(y), size("n_fft", n_fft), size("hop_length", hop_length))
 
 
-def m2_mfcc(y: Any, sr: float, *, padded: bool = True, librosa: str = "0.8") -> Singles:
+def m2_mfcc(y: npt.ArrayLike, sr: float, *, padded: bool = True, librosa: str = "0.8") -> Singles:
     """M2: 40 standardised MFCCs of the first 30 s [shape=(1501, 40)], or of the frames that are
     there if not `padded`."""
     return _core.m2_mfcc(_recording(y), float(sr), bool(padded), librosa)
 
 
-def m3_spectrogram(y: Any, sr: float, *, n_fft: int = 512, hop_length: int = 256) -> Singles:
+def m3_spectrogram(
+    y: npt.ArrayLike, sr: float, *, n_fft: int = 512, hop_length: int = 256
+) -> Singles:
     """M3: magnitudes [shape=(1 + n_fft/2, frames)] of the last 32,000 samples at 16,600 Hz. Window
     and hop are our choice, the paper gives none."""
-    return _core.m3_spectrogram(_recording(y), float(sr), int(n_fft), int(hop_length))
+    return _core.m3_spectrogram(
+        _recording(y), float(sr), size("n_fft", n_fft), size("hop_length", hop_length)
+    )
 
 
-def m4_logmel(y: Any, sr: float, *, variant: str = "code") -> Singles:
+def m4_logmel(y: npt.ArrayLike, sr: float, *, variant: str = "code") -> Singles:
     """M4: 64 log-mel bands of every channel [shape=(frames, 64, channels)]. `variant="code"` cuts
     each frame to 512 samples and doubles the decibels as the code does, "paper" does neither."""
     return _core.m4_logmel(_recording(y), float(sr), variant)
 
 
-def m4_windows(features: Any) -> Singles:
+def m4_windows(features: npt.ArrayLike) -> Singles:
     """M4: windows of 64 frames with 75 % overlap [shape=(windows, channels, 64, 64)] of
     `m4_logmel`'s result."""
     features = floats("features", features, 3)
@@ -92,18 +101,18 @@ def m4_windows(features: Any) -> Singles:
     return _core.m4_windows(np.ascontiguousarray(features, dtype=np.float32))
 
 
-def m5_a34f136(y: Any, sr: float) -> Doubles:
+def m5_a34f136(y: npt.ArrayLike, sr: float) -> Doubles:
     """M5: 136 pyAudioAnalysis values of a recording of 8 channels (mixed as 7.1), 2 or 1."""
     return _core.m5_a34f136(_recording(y), float(sr))
 
 
-def m5_vggish_patches(y: Any, sr: float, *, res_type: str = "kaiser_best") -> Singles:
+def m5_vggish_patches(y: npt.ArrayLike, sr: float, *, res_type: str = "kaiser_best") -> Singles:
     """M5: log-mel patches for VGGish [shape=(patches, 96, 64)]."""
     return _core.m5_vggish_patches(_recording(y), float(sr), res_type)
 
 
 def m6_spectrogram(
-    y: Any, sr: float, *, start: float | None = None, librosa: str = "0.8"
+    y: npt.ArrayLike, sr: float, *, start: float | None = None, librosa: str = "0.8"
 ) -> Singles:
     """M6: decibel spectrogram of 10 s from the second onset, or from `start` seconds, as an image
     [shape=(96, 96)]."""

@@ -10,20 +10,18 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import audio, floats, rows, unrows
+from ._arrays import Complexes, Floats, audio, floats, room, rows, size, unrows
 from ._chroma import chroma_stft
+from ._filters import Window, wavelet_window
 from ._mel import melspectrogram, mfcc
+from ._params import CqtChromaParams, CqtParams, HpssParams
 from ._pitch import estimate_tuning
+from ._resample import CONVERTERS
 from ._spectral import spectral_contrast
+from ._spectrum import stft, stft_params, warn_short
 from .errors import ParameterError
-from .filters import window_name
-from .spectrum import stft, stft_params, warn_short
 
 C1 = 440.0 * 2.0 ** ((24.0 - 69.0) / 12.0)
-
-HpssParams = tuple[int, int, float, float, float]
-CqtParams = tuple[float, int, float, int, int, float, float, float | None, float, str, bool, str]
-CqtChromaParams = tuple[int, int, float, list[float] | None, float | None, float | None]
 
 
 def _pair(value: Any) -> tuple[Any, Any]:
@@ -37,23 +35,27 @@ def _pair(value: Any) -> tuple[Any, Any]:
 
 def _hpss_params(kernel_size: Any, power: float, margin: Any) -> HpssParams:
     kernels, margins = _pair(kernel_size), _pair(margin)
-    if any(kernel < 1 for kernel in kernels):
-        raise ParameterError(f"kernel_size = {kernel_size} is not possible: at least 1")
-    return int(kernels[0]), int(kernels[1]), float(power), float(margins[0]), float(margins[1])
+    return HpssParams(
+        kernel_harmonic=size("kernel_size", kernels[0]),
+        kernel_percussive=size("kernel_size", kernels[1]),
+        power=float(power),
+        margin_harmonic=float(margins[0]),
+        margin_percussive=float(margins[1]),
+    )
 
 
 def istft(
-    stft_matrix: Any,
+    stft_matrix: npt.ArrayLike,
     *,
     hop_length: int | None = None,
     win_length: int | None = None,
     n_fft: int | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     center: bool = True,
     dtype: npt.DTypeLike | None = None,
     length: int | None = None,
-    out: Any = None,
-) -> Any:
+    out: Floats | None = None,
+) -> Floats:
     """Signal [shape=(..., n)] of a spectrogram [shape=(..., 1 + n_fft/2, frames)]
     (librosa.istft).
 
@@ -84,8 +86,10 @@ def istft(
     if n_fft is None:
         n_fft = 2 * (d.shape[-2] - 1)
     params = stft_params(n_fft, hop_length, win_length, window, center, "constant")
-    y = _core.istft(np.ascontiguousarray(d.reshape(-1, *d.shape[-2:])), params, length or None)
-    y = y.reshape(*d.shape[:-2], y.shape[-1])
+    samples = size("length", length) if length else None
+    room("a signal", d.size // (d.shape[-2] * d.shape[-1] or 1), samples or 0)
+    flat = _core.istft(np.ascontiguousarray(d.reshape(-1, *d.shape[-2:])), params, samples)
+    y: Floats = flat.reshape(*d.shape[:-2], flat.shape[-1])
     if dtype is not None:
         y = y.astype(dtype, copy=False)
     if out is None:
@@ -97,17 +101,38 @@ def istft(
 
 
 def hpss(
-    S: Any,
+    S: npt.ArrayLike,
     *,
     kernel_size: int | Sequence[int] = 31,
     power: float = 2.0,
     mask: bool = False,
     margin: float | Sequence[float] = 1.0,
 ) -> tuple[Any, Any]:
-    """Harmonic and percussive part, or mask, of a spectrogram [shape=(..., d, n)], real or complex
-    (librosa.decompose.hpss).
+    """Harmonic and percussive part of a spectrogram by median filtering (librosa.decompose.hpss).
 
-    An axis of two values is filtered as defined; scipy 1.17 reads beyond such rows.
+    Parameters
+    ----------
+    S : float or complex [shape=(..., d, t)]
+        Spectrogram.
+    kernel_size : int or pair of int
+        Frames, and bins, of the median filters.
+    power : float
+        Exponent of the soft masks, infinite for binary ones.
+    mask : bool
+        The masks instead of the parts.
+    margin : float or pair of float
+        Factors by which one part must exceed the other, at least 1.
+
+    Returns
+    -------
+    harmonic and percussive part, or mask, each in the shape of `S`
+
+    Examples
+    --------
+    >>> S = np.abs(corsmal_feat.stft(np.random.default_rng(0).normal(size=22050)))
+    >>> harmonic, percussive = corsmal_feat.decompose.hpss(S)
+    >>> np.allclose(harmonic + percussive, S)
+    True
     """
     params = _hpss_params(kernel_size, power, margin)
     spectrogram = np.asarray(S)
@@ -132,7 +157,7 @@ def _separate(
     center: bool,
     pad_mode: str,
     parts: tuple[bool, bool],
-) -> list[Any]:
+) -> list[Floats]:
     """The asked ones of the harmonic and the percussive part."""
     y = audio(y)
     stft_tuple = stft_params(n_fft, hop_length, win_length, "hann", center, pad_mode)
@@ -143,7 +168,7 @@ def _separate(
 
 
 def effects_hpss(
-    y: Any,
+    y: npt.ArrayLike,
     *,
     kernel_size: int | Sequence[int] = 31,
     power: float = 2.0,
@@ -152,13 +177,33 @@ def effects_hpss(
     n_fft: int = 2048,
     hop_length: int | None = None,
     win_length: int | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     center: bool = True,
     pad_mode: str = "constant",
 ) -> tuple[Any, Any]:
-    """Harmonic and percussive part of `y` [shape=(..., n)] (librosa.effects.hpss).
+    """Harmonic and percussive part of a signal (librosa.effects.hpss).
 
-    `window` is ignored, as in librosa: both transforms take a Hann window.
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)]
+        Signal.
+    kernel_size, power, mask, margin
+        See `decompose.hpss`.
+    n_fft, hop_length, win_length, center, pad_mode
+        See `stft`.
+    window : str
+        Without effect, as in librosa.
+
+    Returns
+    -------
+    harmonic and percussive part, each in the shape of `y`
+
+    Examples
+    --------
+    >>> y = np.sin(0.1 * np.arange(22050))
+    >>> harmonic, percussive = corsmal_feat.effects.hpss(y)
+    >>> harmonic.shape
+    (22050,)
     """
     harmonic, percussive = _separate(
         y, kernel_size, power, mask, margin, n_fft, hop_length, win_length, center, pad_mode,
@@ -168,7 +213,7 @@ def effects_hpss(
 
 
 def harmonic(
-    y: Any,
+    y: npt.ArrayLike,
     *,
     kernel_size: int | Sequence[int] = 31,
     power: float = 2.0,
@@ -177,19 +222,41 @@ def harmonic(
     n_fft: int = 2048,
     hop_length: int | None = None,
     win_length: int | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     center: bool = True,
     pad_mode: str = "constant",
-) -> Any:
-    """Harmonic part of `y` [shape=(..., n)] (librosa.effects.harmonic); `window` is ignored."""
-    return _separate(
+) -> Floats:
+    """Harmonic part of a signal (librosa.effects.harmonic).
+
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)]
+        Signal.
+    kernel_size, power, mask, margin
+        See `decompose.hpss`.
+    n_fft, hop_length, win_length, center, pad_mode
+        See `stft`.
+    window : str
+        Without effect, as in librosa.
+
+    Returns
+    -------
+    in the shape of `y`
+
+    Examples
+    --------
+    >>> corsmal_feat.effects.harmonic(np.sin(0.1 * np.arange(22050))).shape
+    (22050,)
+    """
+    (part,) = _separate(
         y, kernel_size, power, mask, margin, n_fft, hop_length, win_length, center, pad_mode,
         (True, False),
-    )[0]  # fmt: skip
+    )  # fmt: skip
+    return part
 
 
 def percussive(
-    y: Any,
+    y: npt.ArrayLike,
     *,
     kernel_size: int | Sequence[int] = 31,
     power: float = 2.0,
@@ -198,21 +265,37 @@ def percussive(
     n_fft: int = 2048,
     hop_length: int | None = None,
     win_length: int | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     center: bool = True,
     pad_mode: str = "constant",
-) -> Any:
-    """Percussive part of `y` [shape=(..., n)] (librosa.effects.percussive); `window` is ignored."""
-    return _separate(
+) -> Floats:
+    """Percussive part of a signal (librosa.effects.percussive).
+
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)]
+        Signal.
+    kernel_size, power, mask, margin
+        See `decompose.hpss`.
+    n_fft, hop_length, win_length, center, pad_mode
+        See `stft`.
+    window : str
+        Without effect, as in librosa.
+
+    Returns
+    -------
+    in the shape of `y`
+
+    Examples
+    --------
+    >>> corsmal_feat.effects.percussive(np.sin(0.1 * np.arange(22050))).shape
+    (22050,)
+    """
+    (part,) = _separate(
         y, kernel_size, power, mask, margin, n_fft, hop_length, win_length, center, pad_mode,
         (False, True),
-    )[0]  # fmt: skip
-
-
-def _positive(name: str, value: int) -> int:
-    if value < 1:
-        raise ParameterError(f"{name} = {value} is not possible: at least 1")
-    return int(value)
+    )  # fmt: skip
+    return part
 
 
 def _cqt_params(
@@ -225,28 +308,28 @@ def _cqt_params(
     filter_scale: float = 1.0,
     norm: float | None = 1.0,
     sparsity: float = 0.01,
-    window: Any = "hann",
+    window: Window = "hann",
     scale: bool = True,
     pad_mode: str = "constant",
 ) -> CqtParams:
-    return (
-        float(sr),
-        _positive("hop_length", hop_length),
-        C1 if fmin is None else float(fmin),
-        _positive("n_bins", n_bins),
-        _positive("bins_per_octave", bins_per_octave),
-        float(tuning),
-        float(filter_scale),
-        None if norm is None else float(norm),
-        float(sparsity),
-        window_name(window),
-        bool(scale),
-        str(pad_mode),
+    return CqtParams(
+        sr=float(sr),
+        hop_length=size("hop_length", hop_length),
+        fmin=C1 if fmin is None else float(fmin),
+        n_bins=size("n_bins", n_bins),
+        bins_per_octave=size("bins_per_octave", bins_per_octave),
+        tuning=float(tuning),
+        filter_scale=float(filter_scale),
+        norm=None if norm is None else float(norm),
+        sparsity=float(sparsity),
+        window=wavelet_window(window),
+        scale=bool(scale),
+        pad_mode=str(pad_mode),
     )
 
 
 def cqt(
-    y: Any,
+    y: npt.ArrayLike,
     *,
     sr: float = 22050,
     hop_length: int = 512,
@@ -257,37 +340,77 @@ def cqt(
     filter_scale: float = 1,
     norm: float | None = 1,
     sparsity: float = 0.01,
-    window: Any = "hann",
+    window: Window = "hann",
     scale: bool = True,
     pad_mode: str = "constant",
     res_type: str | None = "soxr_hq",
     dtype: npt.DTypeLike | None = None,
-) -> Any:
-    """Constant-Q transform [shape=(..., n_bins, t)] of `y` [shape=(..., n)] (librosa.cqt).
+) -> Complexes:
+    """Constant-Q transform (librosa.cqt).
 
-    `tuning=None` estimates one for all channels. The octaves are decimated by a filter equal to
-    soxr's "HQ" to 1e-6; no other `res_type` exists here.
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)]
+        Signal at the sample rate `sr` in Hz.
+    hop_length : int
+        Samples between frames.
+    fmin : float, optional
+        Lowest bin in Hz, C1 by default.
+    n_bins, bins_per_octave : int
+        Bins in all, and of an octave.
+    tuning : float, optional
+        Deviation from A440 in fractions of a bin; None estimates one for all channels.
+    filter_scale : float
+        Factor of the filters' lengths.
+    norm : float, optional
+        Norm of the filters.
+    sparsity : float
+        Share of each filter's energy that is left out.
+    window : str, tuple or float
+        See `filters.get_window`.
+    scale : bool
+        Divide by the square roots of the filters' lengths.
+    pad_mode : {"constant", "edge", "reflect", "symmetric"}
+        What lies beyond the ends.
+    res_type : str
+        One of `resample`; whatever it is, the octaves are decimated by a filter equal to soxr's
+        "HQ" to 1e-6.
+    dtype : complex dtype, optional
+        Of the result.
+
+    Returns
+    -------
+    complex64 or complex128 [shape=(..., n_bins, t)]
+
+    Examples
+    --------
+    >>> y = np.sin(2 * np.pi * 440 * np.arange(22050) / 22050)
+    >>> np.abs(corsmal_feat.cqt(y, sr=22050))[:, 20].argmax()
+    np.int64(45)
     """
     y = audio(y)
     if res_type is None:
         warnings.warn("res_type=None stands for 'soxr_hq'", FutureWarning, stacklevel=2)
-    elif res_type != "soxr_hq":
-        raise ParameterError(f"res_type = {res_type!r} is not possible: 'soxr_hq'")
+    elif res_type not in CONVERTERS:
+        names = ", ".join(CONVERTERS)
+        raise ParameterError(f"res_type = {res_type!r} is not possible: one of {names}")
     if tuning is None:
         tuning = estimate_tuning(y=y, sr=sr, bins_per_octave=bins_per_octave)
     params = _cqt_params(
         sr, hop_length, fmin, n_bins, bins_per_octave, tuning, filter_scale, norm, sparsity,
         window, scale, pad_mode,
     )  # fmt: skip
-    result = unrows(_core.cqt(rows(y, 1), params), y, 1)
-    return result if dtype is None else result.astype(dtype, copy=False)
+    room("a transform", 2, y.size // (y.shape[-1] or 1), n_bins, 1 + y.shape[-1] // hop_length)
+    result: Any = unrows(_core.cqt(rows(y, 1), params), y, 1)
+    transform: Complexes = result if dtype is None else result.astype(dtype, copy=False)
+    return transform
 
 
 def chroma_cqt(
     *,
-    y: Any = None,
+    y: npt.ArrayLike | None = None,
     sr: float = 22050,
-    C: Any = None,
+    C: npt.ArrayLike | None = None,
     hop_length: int = 512,
     fmin: float | None = None,
     norm: float | None = np.inf,
@@ -298,22 +421,52 @@ def chroma_cqt(
     window: Any = None,
     bins_per_octave: int | None = 36,
     cqt_mode: str = "full",
-) -> Any:
-    """Chromagram [shape=(..., n_chroma, t)] of the constant-Q transform of `y`, or of constant-Q
-    magnitudes `C` (librosa.feature.chroma_cqt). Only `cqt_mode="full"` exists here."""
+) -> Floats:
+    """Chromagram of a constant-Q transform (librosa.feature.chroma_cqt).
+
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)], optional
+        Signal at the sample rate `sr` in Hz.
+    C : [shape=(..., d, t)], optional
+        Constant-Q magnitudes to use instead.
+    hop_length, fmin, tuning
+        See `cqt`; the tuning is estimated by default.
+    norm : float, optional
+        Norm that each frame is divided by, None for none.
+    threshold : float, optional
+        Smaller values become zero.
+    n_chroma, n_octaves, bins_per_octave : int
+        Classes, octaves, and bins of an octave (`n_chroma` by default).
+    window : [shape=(any,)], optional
+        Weights of neighbouring bins.
+    cqt_mode : {"full"}
+        The other modes of librosa do not exist here.
+
+    Returns
+    -------
+    [shape=(..., n_chroma, t)]
+
+    Examples
+    --------
+    >>> y = np.sin(2 * np.pi * 440 * np.arange(22050) / 22050)
+    >>> corsmal_feat.feature.chroma_cqt(y=y, sr=22050, tuning=0)[:, 20].argmax()
+    np.int64(9)
+    """
     if cqt_mode != "full":
         raise ParameterError(f"cqt_mode = {cqt_mode!r} is not possible: 'full'")
-    n_chroma = _positive("n_chroma", n_chroma)
+    n_chroma = size("n_chroma", n_chroma)
+    room("a chromagram", n_chroma)
     bins_per_octave = n_chroma if bins_per_octave is None else bins_per_octave
-    bins_per_octave = _positive("bins_per_octave", bins_per_octave)
+    bins_per_octave = size("bins_per_octave", bins_per_octave)
     weights = None if window is None else np.ravel(window)
-    chroma = (
-        bins_per_octave,
-        n_chroma,
-        C1 if fmin is None else float(fmin),
-        None if weights is None else [float(w) for w in weights],
-        None if threshold is None else float(threshold),
-        None if norm is None else float(norm),
+    chroma = CqtChromaParams(
+        bins_per_octave=bins_per_octave,
+        n_chroma=n_chroma,
+        fmin=C1 if fmin is None else float(fmin),
+        window=None if weights is None else [float(w) for w in weights],
+        threshold=None if threshold is None else float(threshold),
+        norm=None if norm is None else float(norm),
     )
     if C is not None:
         c = floats("C", C, 2)
@@ -323,21 +476,47 @@ def chroma_cqt(
     y = audio(y)
     if tuning is None:
         tuning = estimate_tuning(y=y, sr=sr, bins_per_octave=bins_per_octave)
-    n_bins = _positive("n_octaves", n_octaves) * bins_per_octave
+    n_bins = size("n_octaves", n_octaves) * bins_per_octave
+    room("a folding", n_chroma, n_bins)
     params = _cqt_params(sr, hop_length, fmin, n_bins, bins_per_octave, tuning)
     return _promoted(unrows(_core.chroma_cqt(rows(y, 1), params, chroma), y, 1), weights)
 
 
-def _promoted(chroma: Any, weights: Any) -> Any:
+def _promoted(chroma: Floats, weights: Any) -> Floats:
     """A double-precision window makes librosa's folding matrix double, and with it the result."""
     if weights is None:
         return chroma
-    return chroma.astype(np.result_type(chroma, weights.dtype), copy=False)
+    promoted: Floats = chroma.astype(np.result_type(chroma, weights.dtype), copy=False)
+    return promoted
 
 
-def tonnetz(*, y: Any = None, sr: float = 22050, chroma: Any = None, **kwargs: Any) -> Any:
-    """Tonal centroids [shape=(..., 6, t)] of a chromagram, by default of
-    `chroma_cqt(y=y, **kwargs)` (librosa.feature.tonnetz)."""
+def tonnetz(
+    *,
+    y: npt.ArrayLike | None = None,
+    sr: float = 22050,
+    chroma: npt.ArrayLike | None = None,
+    **kwargs: Any,
+) -> Floats:
+    """Tonal centroids (librosa.feature.tonnetz).
+
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)], optional
+        Signal at the sample rate `sr` in Hz.
+    chroma : [shape=(..., n_chroma, t)], optional
+        A chromagram to use instead of `chroma_cqt(y=y, sr=sr, **kwargs)`.
+    **kwargs
+        Of `chroma_cqt`.
+
+    Returns
+    -------
+    [shape=(..., 6, t)]
+
+    Examples
+    --------
+    >>> corsmal_feat.feature.tonnetz(chroma=np.eye(12)).shape
+    (6, 12)
+    """
     if chroma is None:
         if y is None:
             raise ParameterError("y or chroma is needed")
@@ -346,27 +525,27 @@ def tonnetz(*, y: Any = None, sr: float = 22050, chroma: Any = None, **kwargs: A
     return unrows(_core.tonnetz(rows(c, 2)), c, 2)
 
 
-def hpss_masks(S: Any, **kwargs: Any) -> Any:
+def hpss_masks(S: npt.ArrayLike, **kwargs: Any) -> Floats:
     """Harmonic and percussive mask, stacked (see `decompose.hpss`)."""
     return np.stack(hpss(S, mask=True, **kwargs))
 
 
-def hpss_mags(S: Any, **kwargs: Any) -> Any:
+def hpss_mags(S: npt.ArrayLike, **kwargs: Any) -> Floats:
     """Harmonic and percussive part of a spectrogram, stacked (see `decompose.hpss`)."""
     return np.stack(hpss(S, **kwargs))
 
 
-def hpss_audio(y: Any, **kwargs: Any) -> Any:
+def hpss_audio(y: npt.ArrayLike, **kwargs: Any) -> Floats:
     """Harmonic and percussive part of a signal, stacked (see `effects.hpss`)."""
     return np.stack(effects_hpss(y, **kwargs))
 
 
-def abs_cqt(y: Any, **kwargs: Any) -> Any:
+def abs_cqt(y: npt.ArrayLike, **kwargs: Any) -> Floats:
     """Constant-Q magnitudes (see `cqt`)."""
     return np.abs(cqt(y, **kwargs))
 
 
-def af193(y: Any, sr: float, *, librosa: str = "0.11") -> Any:
+def af193(y: npt.ArrayLike, sr: float, *, librosa: str = "0.11") -> Floats:
     """The baseline's vector [shape=(..., 193)] of `y` [shape=(..., n)]: means over time of 40 MFCC,
     12 chroma, 128 mel, 7 spectral contrast and 6 tonnetz rows; leading axes are independent.
 

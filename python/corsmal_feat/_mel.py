@@ -5,23 +5,25 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, channels, floats, rows, unrows
+from ._arrays import Floats, channels, floats, room, rows, size, unrows
+from ._decibels import power_to_db
+from ._filters import Window, mel_params, warn_empty
+from ._spectrum import length_of, signal
 from .errors import ParameterError
-from .filters import mel_params, warn_empty
-from .spectrum import length_of, power_to_db, signal
 
 
 def melspectrogram(
     *,
-    y: Any = None,
+    y: npt.ArrayLike | None = None,
     sr: float = 22050,
-    S: Any = None,
+    S: npt.ArrayLike | None = None,
     n_fft: int = 2048,
     hop_length: int = 512,
     win_length: int | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     center: bool = True,
     pad_mode: str = "constant",
     power: float = 2.0,
@@ -30,7 +32,7 @@ def melspectrogram(
     fmax: float | None = None,
     htk: bool = False,
     norm: Any = "slaney",
-) -> Any:
+) -> Floats:
     """Mel spectrogram (librosa.feature.melspectrogram).
 
     Parameters
@@ -73,16 +75,16 @@ def melspectrogram(
 
 def mfcc(
     *,
-    y: Any = None,
+    y: npt.ArrayLike | None = None,
     sr: float = 22050,
-    S: Any = None,
+    S: npt.ArrayLike | None = None,
     n_mfcc: int = 20,
     dct_type: int = 2,
     norm: str | None = "ortho",
     lifter: float = 0,
     mel_norm: Any = "slaney",
     **kwargs: Any,
-) -> Any:
+) -> Floats:
     """Mel-frequency cepstral coefficients (librosa.feature.mfcc).
 
     Parameters
@@ -115,18 +117,19 @@ def mfcc(
     """
     if norm not in ("ortho", None):
         raise ParameterError(f"norm = {norm!r} is not possible: 'ortho' or None")
-    if n_mfcc < 1:
-        raise ParameterError(f"n_mfcc = {n_mfcc} is not possible: at least 1")
+    n_mfcc = size("n_mfcc", n_mfcc)
     if S is None:
         S = power_to_db(melspectrogram(y=y, sr=sr, norm=mel_norm, **kwargs))
     s: Floats = floats("S", S, 2)
-    cepstrum = (int(n_mfcc), int(dct_type), norm == "ortho", float(lifter))
-    return unrows(_core.mfcc(rows(s, 2), cepstrum), s, 2)
+    kind = size("dct_type", dct_type)
+    if kind > 3:
+        raise ParameterError(f"dct_type = {dct_type} is not possible: 1, 2 or 3")
+    return unrows(_core.mfcc(rows(s, 2), n_mfcc, kind, norm == "ortho", float(lifter)), s, 2)
 
 
 def delta(
-    data: Any, *, width: int = 9, order: int = 1, axis: int = -1, mode: str = "interp"
-) -> Any:
+    data: npt.ArrayLike, *, width: int = 9, order: int = 1, axis: int = -1, mode: str = "interp"
+) -> Floats:
     """Local derivative along an axis, by a Savitzky-Golay fit (librosa.feature.delta).
 
     Parameters
@@ -151,8 +154,8 @@ def delta(
     """
     if width < 3 or width % 2 == 0:
         raise ParameterError(f"width = {width} is not possible: an odd number, at least 3")
-    if order < 1:
-        raise ParameterError(f"order = {order} is not possible: at least 1")
+    width, order = size("width", width), size("order", order)
+    room("a filter", width)
     array = floats("data", data)
     moved = np.moveaxis(array, axis, -1)
     result = _core.delta(rows(moved, 1), int(width), int(order), str(mode))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+import numpy.typing as npt
 
 from . import _core
-from ._arrays import audio
+from ._arrays import Floats, audio
 
 
-def to_mono(y: Any) -> Any:
+def to_mono(y: npt.ArrayLike) -> Floats:
     """Mean over all leading axes [shape=(n,)] (librosa.to_mono).
 
     Parameters

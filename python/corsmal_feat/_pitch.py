@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, rows, unrows
+from ._arrays import Floats, rows, size, unrows
+from ._filters import Window
+from ._params import PitchParams
+from ._spectrum import spectrogram
 from .errors import ParameterError
-from .spectrum import spectrogram
-
-PitchParams = tuple[float, int, float, float, float]
 
 
 def _tracked(
@@ -38,7 +38,7 @@ def _tracked(
     if np.iscomplexobj(S):
         S = np.abs(S)
     s, n_fft = spectrogram(y, S, n_fft or 0, hop_length, win_length, window, center, pad_mode, 1.0)
-    params = (float(sr), n_fft, float(fmin), float(fmax), float(threshold))
+    params = PitchParams(float(sr), n_fft, float(fmin), float(fmax), float(threshold))
     if ref is None or ref is np.max:
         return s, None, params
     shape = (*s.shape[:-2], s.shape[-1])
@@ -54,16 +54,16 @@ def _tracked(
 
 def piptrack(
     *,
-    y: Any = None,
+    y: npt.ArrayLike | None = None,
     sr: float = 22050,
-    S: Any = None,
+    S: npt.ArrayLike | None = None,
     n_fft: int | None = 2048,
     hop_length: int | None = None,
     fmin: float = 150.0,
     fmax: float = 4000.0,
     threshold: float = 0.1,
     win_length: int | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     center: bool = True,
     pad_mode: str = "constant",
     ref: float | Callable[..., Any] | None = None,
@@ -106,9 +106,9 @@ def piptrack(
 
 def estimate_tuning(
     *,
-    y: Any = None,
+    y: npt.ArrayLike | None = None,
     sr: float = 22050,
-    S: Any = None,
+    S: npt.ArrayLike | None = None,
     n_fft: int | None = 2048,
     resolution: float = 0.01,
     bins_per_octave: int = 12,
@@ -117,7 +117,7 @@ def estimate_tuning(
     fmax: float = 4000.0,
     threshold: float = 0.1,
     win_length: int | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     center: bool = True,
     pad_mode: str = "constant",
     ref: float | Callable[..., Any] | None = None,
@@ -154,8 +154,9 @@ def estimate_tuning(
         y, sr, S, n_fft, hop_length, fmin, fmax, threshold, win_length, window, center, pad_mode,
         ref,
     )  # fmt: skip
-    histogram = (float(resolution), _positive("bins_per_octave", bins_per_octave))
-    return _or_untuned(_core.estimate_tuning(rows(s, 2), levels, params, histogram))
+    bins = size("bins_per_octave", bins_per_octave)
+    tuning = _core.estimate_tuning(rows(s, 2), levels, params, float(resolution), bins)
+    return _or_untuned(tuning)
 
 
 def pitch_tuning(
@@ -184,15 +185,9 @@ def pitch_tuning(
     array = np.atleast_1d(np.asarray(frequencies))
     if array.dtype != np.float32:
         array = array.astype(np.float64)
-    bins = _positive("bins_per_octave", bins_per_octave)
+    bins = size("bins_per_octave", bins_per_octave)
     flat = np.ascontiguousarray(array.reshape(-1))
     return _or_untuned(_core.pitch_tuning(flat, float(resolution), bins))
-
-
-def _positive(name: str, value: int) -> int:
-    if value < 1:
-        raise ParameterError(f"{name} = {value} is not possible: at least 1")
-    return int(value)
 
 
 def _or_untuned(tuning: float | None) -> float:
@@ -202,6 +197,6 @@ def _or_untuned(tuning: float | None) -> float:
     return tuning
 
 
-def piptrack_both(**kwargs: Any) -> Any:
+def piptrack_both(**kwargs: Any) -> npt.NDArray[Any]:
     """Pitches and magnitudes of `piptrack`, stacked [shape=(2, ..., d, t)]."""
     return np.stack(piptrack(**kwargs))

@@ -2,18 +2,36 @@
 
 from __future__ import annotations
 
+from math import gcd
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from . import _core
-from ._arrays import audio, rows, unrows
+from ._arrays import MOST, Floats, audio, rows, unrows
+from .errors import ParameterError
+from .util import fix_length
 
-__all__ = ["resample"]
+#: The band-limited converters of librosa that have no filter of their own here.
+_AS_SOXR_HQ = (
+    "soxr_vhq",
+    "soxr_mq",
+    "soxr_lq",
+    "soxr_qq",
+    "sinc_best",
+    "sinc_medium",
+    "sinc_fastest",
+)
+_OWN = ("soxr_hq", "kaiser_best", "kaiser_fast")
+_WHOLE = ("fft", "scipy", "polyphase", "linear", "zero_order_hold")
+CONVERTERS = _OWN + _WHOLE + _AS_SOXR_HQ
+#: Largest term of a ratio for the polyphase filter, which has 20 times as many taps.
+_MOST_PHASES = 100_000
 
 
 def resample(
-    y: Any,
+    y: npt.ArrayLike,
     *,
     orig_sr: float,
     target_sr: float,
@@ -21,21 +39,25 @@ def resample(
     fix: bool = True,
     scale: bool = False,
     axis: int = -1,
-) -> Any:
+) -> Floats:
     """`y` at another rate (librosa.resample).
-
-    `res_type` is "soxr_hq" (librosa's default since 0.10), "kaiser_best" (its default before) or
-    "kaiser_fast". With `fix` the result has `ceil(n * target_sr / orig_sr)` samples; `scale`
-    divides it by the square root of the ratio. Equal rates return `y` itself.
 
     Parameters
     ----------
     y : float32 or float64 [shape=(..., n)]
         Signal, along the last axis unless `axis` says otherwise.
     orig_sr, target_sr : float
-        Rates in Hz.
-    res_type, fix, scale
-        See above.
+        Rates in Hz. Equal rates return `y` itself.
+    res_type : str
+        "soxr_hq" (librosa's default since 0.10), "kaiser_best" (its default before) or
+        "kaiser_fast"; "fft" or "scipy", "polyphase" (whole numbers of Hz), "linear" and
+        "zero_order_hold". The other soxr_* and sinc_* give what "soxr_hq" gives.
+    fix : bool
+        The result has `ceil(n * target_sr / orig_sr)` samples.
+    scale : bool
+        The result is divided by the square root of the ratio.
+    axis : int
+        Axis of time.
 
     Returns
     -------
@@ -48,9 +70,108 @@ def resample(
     (8, 16000)
     """
     y = audio(y)
+    if not -y.ndim <= axis < y.ndim:
+        raise ParameterError(f"axis = {axis} is not possible: y has {y.ndim} dimensions")
+    name = "soxr_hq" if res_type in _AS_SOXR_HQ else str(res_type)
+    if name not in CONVERTERS:
+        names = ", ".join(CONVERTERS)
+        raise ParameterError(f"res_type = {res_type!r} is not possible: one of {names}")
+    if not (np.isfinite([orig_sr, target_sr]).all() and orig_sr > 0 and target_sr > 0):
+        raise ParameterError(
+            f"orig_sr = {orig_sr}, target_sr = {target_sr} are not possible: positive rates in Hz"
+        )
+    if y.shape[axis] * (target_sr / orig_sr) > MOST:
+        raise ParameterError(f"target_sr = {target_sr} is not possible: a result of {MOST} samples")
     if orig_sr == target_sr:
         return y
     moved = np.moveaxis(y, axis, -1)
-    rates = (float(orig_sr), float(target_sr))
-    result = _core.resample(rows(moved, 1), rates, str(res_type), bool(fix), bool(scale))
-    return np.moveaxis(unrows(result, moved, 1), -1, axis)
+    result: Any
+    if name in _OWN:
+        flat = _core.resample(
+            rows(moved, 1), float(orig_sr), float(target_sr), name, bool(fix), bool(scale)
+        )
+        result = unrows(flat, moved, 1)
+    else:
+        result = _by_whole_signal(moved, float(orig_sr), float(target_sr), name)
+        if fix:
+            samples = int(np.ceil(moved.shape[-1] * (target_sr / orig_sr)))
+            result = fix_length(result, size=samples)
+        if scale:
+            result = result / np.sqrt(target_sr / orig_sr)
+        result = np.ascontiguousarray(result, dtype=y.dtype)
+    resampled: Floats = np.moveaxis(result, -1, axis)
+    return resampled
+
+
+def _by_whole_signal(y: Floats, orig_sr: float, target_sr: float, name: str) -> Any:
+    ratio = target_sr / orig_sr
+    samples = int(np.ceil(y.shape[-1] * ratio))
+    if samples < 1:
+        raise ParameterError(f"y of {y.shape[-1]} samples gives none at {target_sr} Hz")
+    try:
+        if name in ("fft", "scipy"):
+            return _fourier(y, samples)
+        if name == "polyphase":
+            return _polyphase(y, orig_sr, target_sr)
+        return _interpolated(y, samples, ratio, name == "linear")
+    except MemoryError as error:
+        raise ParameterError(f"no memory for {samples} samples") from error
+
+
+def _fourier(y: Floats, samples: int) -> Any:
+    """The spectrum cut or continued with zeros (scipy.signal.resample)."""
+    n = y.shape[-1]
+    spectrum = np.fft.rfft(y)
+    shorter = min(n, samples)
+    kept = np.zeros((*y.shape[:-1], samples // 2 + 1), dtype=spectrum.dtype)
+    kept[..., : shorter // 2 + 1] = spectrum[..., : shorter // 2 + 1]
+    if shorter % 2 == 0 and n != samples:
+        # The bin at half the lower rate stands for a pair at the higher one.
+        kept[..., shorter // 2] *= 2 if samples < n else 0.5
+    return np.fft.irfft(kept, samples) * (samples / n)
+
+
+def _polyphase(y: Floats, orig_sr: float, target_sr: float) -> Any:
+    """A windowed sinc of the rates' ratio in whole numbers (scipy.signal.resample_poly)."""
+    if int(orig_sr) != orig_sr or int(target_sr) != target_sr:
+        raise ParameterError(
+            f"orig_sr = {orig_sr}, target_sr = {target_sr} are not possible with polyphase:"
+            " whole numbers of Hz"
+        )
+    common = gcd(int(orig_sr), int(target_sr))
+    up, down = int(target_sr) // common, int(orig_sr) // common
+    widest = max(up, down)
+    if widest > _MOST_PHASES:
+        raise ParameterError(
+            f"{up} / {down} is not possible with polyphase: terms up to {_MOST_PHASES}; soxr_hq"
+            " takes any ratio"
+        )
+    half = 10 * widest
+    taps = np.sinc(np.arange(-half, half + 1) / widest) * np.kaiser(2 * half + 1, 5.0)
+    taps = (taps / taps.sum()).astype(y.dtype) * y.dtype.type(up)
+    n = y.shape[-1]
+    samples = -(-n * up // down)
+    longest = 2 * half // up + 1
+    behind = longest + (samples * down + half) // up + 1 - n
+    padded = np.pad(y, [(0, 0)] * (y.ndim - 1) + [(longest, max(behind, 0))])
+    result = np.empty((*y.shape[:-1], samples), dtype=y.dtype)
+    for first in range(min(up, samples)):
+        last_input, phase = divmod(first * down + half, up)
+        weights = taps[phase::up][::-1]
+        windows = np.lib.stride_tricks.sliding_window_view(padded, len(weights), axis=-1)
+        outputs = len(range(first, samples, up))
+        start = longest + last_input - len(weights) + 1
+        part = windows[..., start : start + (outputs - 1) * down + 1 : down, :]
+        result[..., first::up] = part @ weights
+    return result
+
+
+def _interpolated(y: Floats, samples: int, ratio: float, linear: bool) -> Any:
+    """Between neighbouring samples, or the one before."""
+    at = np.minimum(np.arange(samples) / ratio, y.shape[-1] - 1)
+    before = at.astype(np.int64)
+    if not linear:
+        return y[..., before]
+    after = np.minimum(before + 1, y.shape[-1] - 1)
+    weight = at - before
+    return y[..., before] * (1 - weight) + y[..., after] * weight

@@ -6,11 +6,13 @@ import warnings
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from . import _core
-from ._arrays import rows
+from ._arrays import Doubles, Floats, room, rows, size
+from ._filters import Window
+from ._spectrum import Framing, Spectra, spectra, spectrogram
 from .errors import ParameterError
-from .spectrum import Framing, Spectra, spectra, spectrogram
 
 
 def _spectra(y: Any, S: Any, n_fft: int, framing: Framing, whole: bool = False) -> Spectra:
@@ -30,6 +32,11 @@ def _frequencies(freq: Any, sr: float, s: Spectra) -> Any:
     return rows(_fitting("freq", freq, s.shape), 2)
 
 
+def _varies(freq: Any) -> bool:
+    """Whether the frequencies are given for each frame."""
+    return np.ndim(freq) > 1
+
+
 def _fitting(name: str, array: Any, shape: tuple[int, ...]) -> Any:
     """`array` broadcast to `shape`."""
     try:
@@ -40,17 +47,17 @@ def _fitting(name: str, array: Any, shape: tuple[int, ...]) -> Any:
 
 def spectral_centroid(
     *,
-    y: Any = None,
+    y: npt.ArrayLike | None = None,
     sr: float = 22050,
-    S: Any = None,
+    S: npt.ArrayLike | None = None,
     n_fft: int = 2048,
     hop_length: int = 512,
-    freq: Any = None,
+    freq: npt.ArrayLike | None = None,
     win_length: int | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     center: bool = True,
     pad_mode: str = "constant",
-) -> Any:
+) -> Doubles:
     """Magnitude-weighted mean frequency; 0 in silence (librosa.feature.spectral_centroid).
 
     Parameters
@@ -75,27 +82,27 @@ def spectral_centroid(
     (8, 1, 87)
     """
     framing = (hop_length, win_length, window, center, pad_mode)
-    s = _spectra(y, S, n_fft, framing, whole=np.ndim(freq) > 1)
-    freq = _frequencies(freq, sr, s)
-    return s.restored(_core.spectral_centroid(s.source, freq))
+    s = _spectra(y, S, n_fft, framing, whole=_varies(freq))
+    at = _frequencies(freq, sr, s)
+    return s.restored(_core.spectral_centroid(s.source, at))
 
 
 def spectral_bandwidth(
     *,
-    y: Any = None,
+    y: npt.ArrayLike | None = None,
     sr: float = 22050,
-    S: Any = None,
+    S: npt.ArrayLike | None = None,
     n_fft: int = 2048,
     hop_length: int = 512,
     win_length: int | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     center: bool = True,
     pad_mode: str = "constant",
-    freq: Any = None,
-    centroid: Any = None,
+    freq: npt.ArrayLike | None = None,
+    centroid: npt.ArrayLike | None = None,
     norm: bool = True,
     p: float = 2,
-) -> Any:
+) -> Doubles:
     """Width of the spectrum around its centroid (librosa.feature.spectral_bandwidth): the p-norm of
     the deviations.
 
@@ -127,30 +134,31 @@ def spectral_bandwidth(
     (8, 1, 87)
     """
     framing = (hop_length, win_length, window, center, pad_mode)
-    s = _spectra(y, S, n_fft, framing, whole=np.ndim(freq) > 1 or centroid is not None)
-    freq = _frequencies(freq, sr, s)
+    s = _spectra(y, S, n_fft, framing, whole=_varies(freq) or centroid is not None)
+    at = _frequencies(freq, sr, s)
+    centres: Any = None
     if centroid is not None and s.shape is not None:
         shape = (*s.shape[:-2], 1, s.shape[-1])
-        centroid = np.asarray(centroid, dtype=np.float64)
-        centroid = rows(_fitting("centroid", centroid, shape), 2)[:, 0]
-    result = _core.spectral_bandwidth(s.source, freq, centroid, bool(norm), float(p))
+        given = np.asarray(centroid, dtype=np.float64)
+        centres = rows(_fitting("centroid", given, shape), 2)[:, 0]
+    result = _core.spectral_bandwidth(s.source, at, centres, bool(norm), float(p))
     return s.restored(result)
 
 
 def spectral_rolloff(
     *,
-    y: Any = None,
+    y: npt.ArrayLike | None = None,
     sr: float = 22050,
-    S: Any = None,
+    S: npt.ArrayLike | None = None,
     n_fft: int = 2048,
     hop_length: int = 512,
     win_length: int | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     center: bool = True,
     pad_mode: str = "constant",
-    freq: Any = None,
+    freq: npt.ArrayLike | None = None,
     roll_percent: float = 0.85,
-) -> Any:
+) -> Doubles:
     """Lowest frequency that has the fraction `roll_percent` of the magnitudes at or below it
     (librosa.feature.spectral_rolloff).
 
@@ -178,24 +186,24 @@ def spectral_rolloff(
     (8, 1, 87)
     """
     framing = (hop_length, win_length, window, center, pad_mode)
-    s = _spectra(y, S, n_fft, framing, whole=np.ndim(freq) > 1)
-    freq = _frequencies(freq, sr, s)
-    return s.restored(_core.spectral_rolloff(s.source, freq, float(roll_percent)))
+    s = _spectra(y, S, n_fft, framing, whole=_varies(freq))
+    at = _frequencies(freq, sr, s)
+    return s.restored(_core.spectral_rolloff(s.source, at, float(roll_percent)))
 
 
 def spectral_flatness(
     *,
-    y: Any = None,
-    S: Any = None,
+    y: npt.ArrayLike | None = None,
+    S: npt.ArrayLike | None = None,
     n_fft: int = 2048,
     hop_length: int = 512,
     win_length: int | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     center: bool = True,
     pad_mode: str = "constant",
     amin: float = 1e-10,
     power: float = 2.0,
-) -> Any:
+) -> Floats:
     """Geometric over arithmetic mean of the powers: 1 for white noise and silence
     (librosa.feature.spectral_flatness).
 
@@ -229,21 +237,21 @@ def spectral_flatness(
 
 def spectral_contrast(
     *,
-    y: Any = None,
+    y: npt.ArrayLike | None = None,
     sr: float = 22050,
-    S: Any = None,
+    S: npt.ArrayLike | None = None,
     n_fft: int = 2048,
     hop_length: int = 512,
     win_length: int | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     center: bool = True,
     pad_mode: str = "constant",
-    freq: Any = None,
+    freq: npt.ArrayLike | None = None,
     fmin: float = 200.0,
     n_bands: int = 6,
     quantile: float = 0.02,
     linear: bool = False,
-) -> Any:
+) -> Doubles:
     """Peaks over valleys of octave bands (librosa.feature.spectral_contrast), both clamped 80 dB
     below their maximum over the whole array.
 
@@ -280,11 +288,12 @@ def spectral_contrast(
     s = _spectra(y, S, n_fft, framing)
     if not isinstance(n_bands, (int, np.integer)) or n_bands < 1:
         raise ParameterError(f"n_bands = {n_bands} is not possible: an integer, at least 1")
-    freq = np.atleast_1d(_frequencies(freq, sr, s))
-    if freq.ndim != 1:
-        raise ParameterError(f"freq has shape {freq.shape}, expected one frequency for each bin")
+    room("a contrast", n_bands)
+    at = np.atleast_1d(_frequencies(freq, sr, s))
+    if at.ndim != 1:
+        raise ParameterError(f"freq has shape {at.shape}, expected one frequency for each bin")
     result, empty = _core.spectral_contrast(
-        s.source, freq, float(sr), float(fmin), int(n_bands), float(quantile), bool(linear)
+        s.source, at, float(sr), float(fmin), int(n_bands), float(quantile), bool(linear)
     )
     if empty:
         warnings.warn(
@@ -298,18 +307,18 @@ def spectral_contrast(
 
 def poly_features(
     *,
-    y: Any = None,
+    y: npt.ArrayLike | None = None,
     sr: float = 22050,
-    S: Any = None,
+    S: npt.ArrayLike | None = None,
     n_fft: int = 2048,
     hop_length: int = 512,
     win_length: int | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     center: bool = True,
     pad_mode: str = "constant",
     order: int = 1,
-    freq: Any = None,
-) -> Any:
+    freq: npt.ArrayLike | None = None,
+) -> Doubles:
     """Polynomial over frequency, fitted to each frame (librosa.feature.poly_features).
 
     Parameters
@@ -336,11 +345,11 @@ def poly_features(
     (8, 2, 87)
     """
     framing = (hop_length, win_length, window, center, pad_mode)
-    s = _spectra(y, S, n_fft, framing, whole=np.ndim(freq) > 1)
-    if order < 0:
-        raise ParameterError(f"order = {order} is not possible: at least 0")
-    freq = _frequencies(freq, sr, s)
-    result, deficient = _core.poly_features(s.source, freq, int(order))
+    s = _spectra(y, S, n_fft, framing, whole=_varies(freq))
+    order = size("order", order, 0)
+    room("a fit", order + 1, s.n_fft // 2 + 1)
+    at = _frequencies(freq, sr, s)
+    result, deficient = _core.poly_features(s.source, at, int(order))
     if deficient:
         warnings.warn(
             f"the frequencies cannot determine a polynomial of order {order}",

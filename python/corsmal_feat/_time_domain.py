@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy.typing as npt
+
 from . import _core
-from ._arrays import audio, channels, floats, rows, unrows
+from ._arrays import Doubles, Singles, audio, channels, floats, room, rows, size, unrows
+from ._params import FrameParams
 from .errors import ParameterError
 
 
 def zero_crossing_rate(
-    y: Any,
+    y: npt.ArrayLike,
     *,
     frame_length: int = 2048,
     hop_length: int = 512,
@@ -19,7 +22,7 @@ def zero_crossing_rate(
     ref_magnitude: Any = None,
     pad: bool = False,
     zero_pos: bool = True,
-) -> Any:
+) -> Doubles:
     """Share of the samples of a frame at which the sign changes
     (librosa.feature.zero_crossing_rate).
 
@@ -56,19 +59,19 @@ def zero_crossing_rate(
         threshold = threshold * float(ref_magnitude(abs(y)))
     elif ref_magnitude is not None:
         threshold = threshold * float(ref_magnitude)
-    crossings = (float(threshold), bool(zero_pos), bool(pad))
-    return unrows(_core.zero_crossing_rate(channels(y), frame, crossings), y, 1)
+    rate = _core.zero_crossing_rate(channels(y), frame, float(threshold), bool(zero_pos), bool(pad))
+    return unrows(rate, y, 1)
 
 
 def rms(
     *,
-    y: Any = None,
-    S: Any = None,
+    y: npt.ArrayLike | None = None,
+    S: npt.ArrayLike | None = None,
     frame_length: int = 2048,
     hop_length: int = 512,
     center: bool = True,
     pad_mode: str = "constant",
-) -> Any:
+) -> Singles:
     """Root-mean-square level of each frame (librosa.feature.rms).
 
     Parameters
@@ -101,10 +104,8 @@ def rms(
     return unrows(_core.rms(channels(y), frame, str(pad_mode)), y, 1)
 
 
-def framing(frame_length: int, hop_length: int, center: bool) -> tuple[int, int, bool]:
+def framing(frame_length: int, hop_length: int, center: bool) -> FrameParams:
     """Framing as the Rust side takes it."""
-    if frame_length < 1 or hop_length < 1:
-        raise ParameterError(
-            f"frame_length = {frame_length}, hop_length = {hop_length} are not possible: at least 1"
-        )
-    return int(frame_length), int(hop_length), bool(center)
+    length, hop = size("frame_length", frame_length), size("hop_length", hop_length)
+    room("a frame", length)
+    return FrameParams(length, hop, bool(center))

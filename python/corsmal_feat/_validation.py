@@ -83,7 +83,14 @@ def labels_of(y: Any, rows: int, owner: str) -> tuple[npt.NDArray[Any], npt.NDAr
         labels.dtype == object and any(isinstance(label, bytes) for label in labels)
     ):
         raise ParameterError(f"{owner}: y holds bytes, labels are text: decode them first")
-    classes, positions = np.unique(labels, return_inverse=True)
+    if labels.dtype == object:
+        missing = [row for row, label in enumerate(labels) if label is None or label != label]
+        if missing:
+            raise ParameterError(f"{owner}: y contains missing values (row {missing[0]})")
+    try:
+        classes, positions = np.unique(labels, return_inverse=True)
+    except TypeError as error:
+        raise ParameterError(f"{owner}: y mixes labels of different types: {error}") from error
     return classes, positions
 
 

@@ -1,6 +1,7 @@
-"""Harmonic-percussive separation of signals (librosa.effects)."""
+"""Harmonic and percussive parts, silence, pre-emphasis (librosa.effects)."""
 
 from ._harmonic import effects_hpss as hpss
 from ._harmonic import harmonic, percussive
+from ._silence import preemphasis, split, trim
 
-__all__ = ["harmonic", "hpss", "percussive"]
+__all__ = ["harmonic", "hpss", "percussive", "preemphasis", "split", "trim"]

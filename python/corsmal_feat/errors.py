@@ -10,6 +10,7 @@ __all__ = [
     "NotFittedError",
     "ParameterError",
     "RunError",
+    "UnknownIdError",
 ]
 
 
@@ -31,6 +32,13 @@ class ModelError(ParameterError):
 
 class NotFittedError(ParameterError, AttributeError):
     """An estimator was used before `fit`."""
+
+
+class UnknownIdError(ParameterError, KeyError):
+    """No recording of that id has features."""
+
+    # A KeyError shows the repr of its message.
+    __str__ = Exception.__str__
 
 
 class RunError(CorsmalFeatError, RuntimeError):

@@ -1,8 +1,10 @@
 """Features (librosa.feature): re-exported from one private module per family."""
 
+from ._cens import chroma_cens
 from ._chroma import chroma_stft
 from ._harmonic import chroma_cqt, tonnetz
 from ._mel import delta, melspectrogram, mfcc
+from ._memory import stack_memory
 from ._spectral import (
     poly_features,
     spectral_bandwidth,
@@ -14,6 +16,7 @@ from ._spectral import (
 from ._time_domain import rms, zero_crossing_rate
 
 __all__ = [
+    "chroma_cens",
     "chroma_cqt",
     "chroma_stft",
     "delta",
@@ -26,6 +29,7 @@ __all__ = [
     "spectral_contrast",
     "spectral_flatness",
     "spectral_rolloff",
+    "stack_memory",
     "tonnetz",
     "zero_crossing_rate",
 ]

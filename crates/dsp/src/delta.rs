@@ -6,7 +6,7 @@ use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::error::{DspError, Result};
+use crate::error::{DspError, Result, from_name};
 use crate::real::Real;
 use crate::simd::vectorized;
 
@@ -26,6 +26,15 @@ pub enum DeltaMode {
     /// Periodic.
     Wrap,
 }
+
+from_name!(
+    DeltaMode, "mode",
+    "interp" => Self::Interp,
+    "nearest" => Self::Nearest,
+    "mirror" => Self::Mirror,
+    "constant" => Self::Constant,
+    "wrap" => Self::Wrap,
+);
 
 /// Parameters of the derivative, in librosa's names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -49,6 +49,44 @@ pub enum DspError {
     },
 }
 
+/// `FromStr` of an enum by the names of its choices.
+macro_rules! from_name {
+    ($type:ty, $parameter:literal, $($name:literal => $value:expr),+ $(,)?) => {
+        impl std::str::FromStr for $type {
+            type Err = $crate::error::DspError;
+
+            fn from_str(name: &str) -> $crate::error::Result<Self> {
+                match name {
+                    $($name => Ok($value),)+
+                    _ => {
+                        let allowed = format!("one of {}", [$($name),+].join(", "));
+                        Err($crate::error::DspError::parameter($parameter, name, allowed))
+                    }
+                }
+            }
+        }
+    };
+}
+pub(crate) use from_name;
+
+/// Refuses an array of `shape` for which there is no memory, before it is made: a failed allocation
+/// would end the process.
+///
+/// # Errors
+/// More elements than can be addressed, or than the allocator has room for.
+pub fn room_for<T>(name: &'static str, shape: &[usize]) -> Result<()> {
+    let count = shape.iter().try_fold(1_usize, |n, size| n.checked_mul(*size));
+    let fits = count.is_some_and(|n| {
+        // What is small is not worth asking for twice.
+        n.saturating_mul(size_of::<T>()) < 1 << 20 || Vec::<T>::new().try_reserve_exact(n).is_ok()
+    });
+    if fits {
+        return Ok(());
+    }
+    let expected = "a shape that memory has room for".into();
+    Err(DspError::Shape { name, expected, actual: shape.to_vec() })
+}
+
 impl DspError {
     /// Shorthand for [`DspError::Parameter`].
     pub fn parameter(

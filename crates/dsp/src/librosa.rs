@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::error::from_name;
 use crate::resample::ResType;
 use crate::stft::PadMode;
 
@@ -16,6 +17,8 @@ pub enum LibrosaVersion {
     #[serde(rename = "0.11")]
     V011,
 }
+
+from_name!(LibrosaVersion, "librosa", "0.8" => Self::V08, "0.11" => Self::V011);
 
 impl LibrosaVersion {
     /// The version that this one differs from.

@@ -1,5 +1,7 @@
 //! Mel scale and filter bank (librosa 0.11 `filters.mel`, `feature.melspectrogram`).
 
+use std::str::FromStr;
+
 use ndarray::{Array2, Array3, ArrayView3, Axis, s};
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +20,19 @@ pub enum MelNorm {
     None,
     /// Each row divided by its p-norm (`f64::INFINITY` for the maximum).
     P(f64),
+}
+
+impl FromStr for MelNorm {
+    type Err = DspError;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match (text, text.parse::<f64>()) {
+            ("slaney", _) => Ok(Self::Slaney),
+            ("none", _) => Ok(Self::None),
+            (_, Ok(p)) if p > 0.0 => Ok(Self::P(p)),
+            _ => Err(DspError::parameter("norm", text, "'slaney', None, inf or a positive number")),
+        }
+    }
 }
 
 impl Serialize for MelNorm {

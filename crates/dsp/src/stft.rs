@@ -5,13 +5,16 @@ use num_complex::Complex;
 use num_traits::Zero;
 use serde::{Deserialize, Serialize};
 
-use crate::error::{DspError, Result};
+use crate::error::{DspError, Result, from_name, room_for};
 use crate::lanes::{LANES, Row};
 use crate::real::Real;
 use crate::simd::vectorized;
 use crate::tiles::{LanePlan, for_each_tile, neighbours, planar, write_columns};
 use crate::transform::Forward;
 use crate::window::Window;
+
+/// Longest transform; bounds the memory that a length from outside can take.
+pub const MAX_N_FFT: usize = 1 << 24;
 
 /// How `center = true` fills the `n_fft / 2` samples before the first and after the last one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -27,6 +30,14 @@ pub enum PadMode {
     /// Mirrored with the edge sample repeated.
     Symmetric,
 }
+
+from_name!(
+    PadMode, "pad_mode",
+    "constant" => Self::Constant,
+    "edge" => Self::Edge,
+    "reflect" => Self::Reflect,
+    "symmetric" => Self::Symmetric,
+);
 
 impl PadMode {
     /// Index into `0..n` that stands for `i` (which may lie outside), or `None` for a zero.
@@ -112,8 +123,8 @@ impl StftParams {
 
     /// Refuses impossible values.
     pub fn check(&self) -> Result<()> {
-        if self.n_fft == 0 {
-            return Err(DspError::parameter("n_fft", 0, "at least 1"));
+        if !(1..=MAX_N_FFT).contains(&self.n_fft) {
+            return Err(DspError::parameter("n_fft", self.n_fft, format!("1 to {MAX_N_FFT}")));
         }
         if self.hop_length == 0 {
             return Err(DspError::parameter("hop_length", 0, "at least 1"));
@@ -153,7 +164,11 @@ impl StftParams {
                 let needed = if self.center { 1 } else { self.n_fft };
                 Err(DspError::TooShort { name: "y", actual: n, needed })
             }
-            frames => Ok((channels, self.n_bins(), frames)),
+            frames => {
+                let shape = (channels, self.n_bins(), frames);
+                room_for::<Complex<T>>("the spectrogram", &[shape.0, shape.1, shape.2])?;
+                Ok(shape)
+            }
         }
     }
 }

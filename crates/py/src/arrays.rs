@@ -11,7 +11,7 @@ use numpy::{
 use pyo3::prelude::*;
 
 use crate::pool::compute;
-use crate::spectrum::{StftTuple, stft_params};
+use crate::spectrum::Transform;
 use crate::value_error;
 
 /// A contiguous float array from Python, in the precision it came in.
@@ -62,7 +62,7 @@ pub fn view3<'a, T: Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> PyResult<A
 #[derive(FromPyObject)]
 pub enum Source<'py> {
     /// A signal and the parameters of its transform.
-    Signal(Floats<'py>, StftTuple),
+    Signal(Floats<'py>, Transform<'py>),
     /// A spectrogram.
     Spectrogram(Floats<'py>),
 }
@@ -71,7 +71,7 @@ impl<'py> Source<'py> {
     /// The array, and the transform where it is a signal.
     pub fn parts(self) -> PyResult<(Floats<'py>, Option<StftParams>)> {
         match self {
-            Self::Signal(y, params) => Ok((y, Some(stft_params(&params)?))),
+            Self::Signal(y, params) => Ok((y, Some(params.params()?))),
             Self::Spectrogram(s) => Ok((s, None)),
         }
     }

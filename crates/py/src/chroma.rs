@@ -15,26 +15,46 @@ use crate::arrays::{Floats, each_precision, into_numpy, view2, view3};
 use crate::pool::compute;
 use crate::value_error;
 
-/// Tracker parameters from the front end: (sr, n_fft, fmin, fmax, threshold).
-type PitchTuple = (f64, usize, f64, f64, f64);
-
-fn pitch_params((sr, n_fft, fmin, fmax, threshold): PitchTuple) -> PitchParams {
-    PitchParams { sr, n_fft, fmin, fmax, threshold }
+/// `PitchParams` of the front end.
+#[derive(FromPyObject)]
+pub(crate) struct Tracker {
+    sr: f64,
+    n_fft: usize,
+    fmin: f64,
+    fmax: f64,
+    threshold: f64,
 }
 
-/// Filter bank parameters from the front end: (sr, n_fft, n_chroma, tuning, ctroct, octwidth, norm,
-/// base_c), `norm` being librosa's number.
-type ChromaTuple = (f64, usize, usize, f64, f64, Option<f64>, Option<f64>, bool);
+impl From<Tracker> for PitchParams {
+    fn from(Tracker { sr, n_fft, fmin, fmax, threshold }: Tracker) -> Self {
+        Self { sr, n_fft, fmin, fmax, threshold }
+    }
+}
+
+/// `ChromaParams` of the front end; `norm` is librosa's number.
+#[derive(FromPyObject)]
+pub(crate) struct Bank {
+    sr: f64,
+    n_fft: usize,
+    n_chroma: usize,
+    tuning: f64,
+    ctroct: f64,
+    octwidth: Option<f64>,
+    norm: Option<f64>,
+    base_c: bool,
+}
 
 /// The norm that librosa's number stands for.
 pub(crate) fn norm_of(number: Option<f64>) -> PyResult<Option<Norm>> {
     number.map(Norm::try_from).transpose().map_err(value_error)
 }
 
-fn chroma_params(tuple: ChromaTuple) -> PyResult<ChromaParams> {
-    let (sr, n_fft, n_chroma, tuning, ctroct, octwidth, norm, base_c) = tuple;
-    let norm = norm_of(norm)?;
-    Ok(ChromaParams { sr, n_fft, n_chroma, tuning, ctroct, octwidth, norm, base_c })
+impl Bank {
+    fn params(self) -> PyResult<ChromaParams> {
+        let Self { sr, n_fft, n_chroma, tuning, ctroct, octwidth, norm, base_c } = self;
+        let norm = norm_of(norm)?;
+        Ok(ChromaParams { sr, n_fft, n_chroma, tuning, ctroct, octwidth, norm, base_c })
+    }
 }
 
 /// A spectrogram with its reference levels `[channels, frames]`, which have the same precision.
@@ -68,33 +88,34 @@ impl<'py, T: Real + Element> Spectrogram<'py, T> {
     }
 }
 
-type PitchesMagnitudes<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
+pub(crate) type PitchesMagnitudes<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
 
 #[pyfunction]
-fn piptrack<'py>(
+pub(crate) fn piptrack<'py>(
     py: Python<'py>,
     s: Floats<'py>,
     reference: Option<Bound<'py, PyAny>>,
-    params: PitchTuple,
+    params: Tracker,
 ) -> PyResult<PitchesMagnitudes<'py>> {
-    let (params, reference) = (pitch_params(params), reference.as_ref());
+    let (params, reference) = (params.into(), reference.as_ref());
     match s {
         Floats::F32(s) => Spectrogram::new(s, reference)?.peaks(py, params),
         Floats::F64(s) => Spectrogram::new(s, reference)?.peaks(py, params),
     }
 }
 
-/// The tuning, or None where there are no peaks; `histogram` is (resolution, bins_per_octave).
+/// The tuning, or None where there are no peaks.
 #[pyfunction]
-fn estimate_tuning<'py>(
+pub(crate) fn estimate_tuning<'py>(
     py: Python<'py>,
     s: Floats<'py>,
     reference: Option<Bound<'py, PyAny>>,
-    params: PitchTuple,
-    histogram: (f64, usize),
+    params: Tracker,
+    resolution: f64,
+    bins_per_octave: usize,
 ) -> PyResult<Option<f64>> {
-    let (params, reference) = (pitch_params(params), reference.as_ref());
-    let (resolution, bins) = histogram;
+    let (params, reference) = (params.into(), reference.as_ref());
+    let bins = bins_per_octave;
     match s {
         Floats::F32(s) => Spectrogram::new(s, reference)?.tuning(py, params, resolution, bins),
         Floats::F64(s) => Spectrogram::new(s, reference)?.tuning(py, params, resolution, bins),
@@ -103,7 +124,7 @@ fn estimate_tuning<'py>(
 
 /// The tuning, or None where there are no frequencies.
 #[pyfunction]
-fn pitch_tuning(
+pub(crate) fn pitch_tuning(
     py: Python<'_>,
     frequencies: Floats<'_>,
     resolution: f64,
@@ -124,22 +145,22 @@ fn pitch_tuning(
 
 /// The filter bank in double precision; the front end rounds it.
 #[pyfunction]
-fn chroma_filter(py: Python<'_>, params: ChromaTuple) -> PyResult<Bound<'_, PyAny>> {
-    let params = chroma_params(params)?;
+pub(crate) fn chroma_filter(py: Python<'_>, params: Bank) -> PyResult<Bound<'_, PyAny>> {
+    let params = params.params()?;
     into_numpy(py, compute(py, || dsp_chroma_filter::<f64>(&params))?.map_err(value_error)?)
 }
 
 /// Chromagram under a filter bank, which is rounded to single precision (as librosa's) unless
 /// `double_bank`.
 #[pyfunction]
-fn chroma<'py>(
+pub(crate) fn chroma<'py>(
     py: Python<'py>,
     s: Floats<'py>,
-    params: ChromaTuple,
+    params: Bank,
     norm: Option<f64>,
     double_bank: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (params, norm) = (chroma_params(params)?, norm_of(norm)?);
+    let (params, norm) = (params.params()?, norm_of(norm)?);
     let bank = dsp_chroma_filter::<f64>(&params).map_err(value_error)?;
     let bank = if double_bank { bank } else { bank.mapv(|w| f64::from(w as f32)) };
     each_precision!(py, view3(s), chroma_of(s, &bank, norm))
@@ -151,12 +172,4 @@ fn chroma_of<T: Real>(
     norm: Option<Norm>,
 ) -> corsmal_dsp::Result<Array3<T>> {
     dsp_chroma(s, bank.mapv(T::of).view(), norm)
-}
-
-pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
-    m.add_function(wrap_pyfunction!(piptrack, m)?)?;
-    m.add_function(wrap_pyfunction!(estimate_tuning, m)?)?;
-    m.add_function(wrap_pyfunction!(pitch_tuning, m)?)?;
-    m.add_function(wrap_pyfunction!(chroma_filter, m)?)?;
-    m.add_function(wrap_pyfunction!(chroma, m)?)
 }

@@ -15,12 +15,12 @@ use crate::{model_error, value_error};
 
 /// A trained model, of any classifier, as it is kept in a file.
 #[pyclass(frozen, name = "TrainedModel", module = "corsmal_feat._core")]
-struct PyModel(Model);
+pub(crate) struct PyModel(Model);
 
 /// The classifier's parameters with all defaults, as JSON: refuses names and values as training
 /// would.
 #[pyfunction]
-fn classifier_parameters(name: &str, parameters: &str) -> PyResult<String> {
+pub(crate) fn classifier_parameters(name: &str, parameters: &str) -> PyResult<String> {
     let object = serde_json::from_str(parameters).map_err(value_error)?;
     let spec =
         corsmal_models::classifiers::ClassifierSpec::new(name, &object).map_err(value_error)?;
@@ -117,10 +117,4 @@ impl PyModel {
     fn load(path: PathBuf) -> PyResult<Self> {
         Model::load(&path).map(Self).map_err(model_error)
     }
-}
-
-/// Adds this family to the module.
-pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
-    m.add_class::<PyModel>()?;
-    m.add_function(wrap_pyfunction!(classifier_parameters, m)?)
 }

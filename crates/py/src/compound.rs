@@ -16,40 +16,50 @@ use crate::value_error;
 type Doubles<'py> = PyReadonlyArrayDyn<'py, f64>;
 
 #[pyfunction]
-fn paa_fbank(py: Python<'_>, sr: f64, num_fft: usize) -> PyResult<Bound<'_, PyAny>> {
+pub(crate) fn paa_fbank(py: Python<'_>, sr: f64, num_fft: usize) -> PyResult<Bound<'_, PyAny>> {
     into_numpy(py, dsp_paa_fbank(sr, num_fft).map_err(value_error)?)
 }
 
-/// `[channels, 34 or 68, frames]`; `frame` is (window, step) in samples.
+/// `PaaFrames` of the front end: windows and steps in samples.
+#[derive(FromPyObject)]
+pub(crate) struct Frames {
+    window: usize,
+    step: usize,
+    mid_window: usize,
+    mid_step: usize,
+}
+
+/// `[channels, 34 or 68, frames]`; windows and steps are in samples.
 #[pyfunction]
-fn a34_short<'py>(
+pub(crate) fn a34_short<'py>(
     py: Python<'py>,
     y: Doubles<'py>,
     sr: f64,
-    frame: (usize, usize),
+    window: usize,
+    step: usize,
     deltas: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     let y = view2(&y)?;
     let run = || {
-        let plan = PaaPlan::new(sr, frame.0, frame.1)?;
+        let plan = PaaPlan::new(sr, window, step)?;
         y.outer_iter().map(|signal| plan.short_term(signal, deltas)).collect::<Result<Vec<_>, _>>()
     };
     into_numpy(py, stacked(&compute(py, run)?.map_err(value_error)?)?)
 }
 
-/// `[channels, 136, windows]`; `frame` and `mid` are (window, step) in samples.
+/// `[channels, 136, windows]`.
 #[pyfunction]
-fn a34f136<'py>(
+pub(crate) fn a34f136<'py>(
     py: Python<'py>,
     y: Doubles<'py>,
     sr: f64,
-    mid: (usize, usize),
-    frame: (usize, usize),
+    frames: Frames,
 ) -> PyResult<Bound<'py, PyAny>> {
     let y = view2(&y)?;
     let run = || {
-        let plan = PaaPlan::new(sr, frame.0, frame.1)?;
-        let mid = MidTerm::from_samples(mid.0, mid.1, frame.0, frame.1)?;
+        let Frames { window, step, mid_window, mid_step } = frames;
+        let plan = PaaPlan::new(sr, window, step)?;
+        let mid = MidTerm::from_samples(mid_window, mid_step, window, step)?;
         let windows = |signal| Ok(mid.statistics(plan.short_term(signal, true)?.view()));
         y.outer_iter().map(windows).collect::<corsmal_dsp::Result<Vec<_>>>()
     };
@@ -62,25 +72,16 @@ fn stacked(parts: &[Array2<f64>]) -> PyResult<Array3<f64>> {
 }
 
 #[pyfunction]
-fn sk_resize<'py>(
+pub(crate) fn sk_resize<'py>(
     py: Python<'py>,
     image: Floats<'py>,
-    shape: (usize, usize),
+    rows: usize,
+    columns: usize,
     mode: &str,
     anti_aliasing: Option<bool>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let mode = match mode {
-        "reflect" => PadMode::Reflect,
-        "symmetric" => PadMode::Symmetric,
-        "edge" => PadMode::Edge,
-        "constant" => PadMode::Constant,
-        other => {
-            return Err(value_error(format!(
-                "mode = {other} is not possible: reflect, symmetric, edge or constant"
-            )));
-        }
-    };
-    let params = ResizeParams { shape, mode, anti_aliasing };
+    let mode = mode.parse::<PadMode>().map_err(|error| value_error(format!("mode: {error}")))?;
+    let params = ResizeParams { shape: (rows, columns), mode, anti_aliasing };
     let result = match image {
         Floats::F32(s) => {
             let s = view2(&s)?;
@@ -96,7 +97,7 @@ fn sk_resize<'py>(
 
 /// (components `[k, columns]`, mean `[columns]`, explained variance `[k]`)
 #[pyfunction]
-fn pca_fit<'py>(
+pub(crate) fn pca_fit<'py>(
     py: Python<'py>,
     x: Doubles<'py>,
     n_components: usize,
@@ -113,7 +114,7 @@ fn pca_fit<'py>(
 /// `x [rows, columns]` in the coordinates of `components [k, columns]`, whitened where `variance`
 /// is given.
 #[pyfunction]
-fn pca_project<'py>(
+pub(crate) fn pca_project<'py>(
     py: Python<'py>,
     x: Doubles<'py>,
     components: Doubles<'py>,
@@ -135,13 +136,4 @@ fn pca_project<'py>(
     let (mean, explained_variance) = (Array1::from_vec(mean), Array1::from_vec(variance));
     let pca = Pca { mean, components, explained_variance };
     into_numpy(py, compute(py, || pca.project(x, whiten))?.map_err(value_error)?)
-}
-
-pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
-    m.add_function(wrap_pyfunction!(paa_fbank, m)?)?;
-    m.add_function(wrap_pyfunction!(a34_short, m)?)?;
-    m.add_function(wrap_pyfunction!(a34f136, m)?)?;
-    m.add_function(wrap_pyfunction!(sk_resize, m)?)?;
-    m.add_function(wrap_pyfunction!(pca_fit, m)?)?;
-    m.add_function(wrap_pyfunction!(pca_project, m)?)
 }

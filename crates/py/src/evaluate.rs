@@ -10,12 +10,12 @@ use pyo3::prelude::*;
 use crate::pool::compute;
 use crate::value_error;
 
-type Scored = (Vec<(&'static str, f64)>, usize, Vec<String>);
+pub(crate) type Scored = (Vec<(&'static str, f64)>, usize, Vec<String>);
 
 /// Scores by name, recordings scored, notes. Tasks that are not addressed are taken from `baseline`,
 /// or from pseudo-random estimates of `seed`, in the filling mass.
 #[pyfunction]
-fn evaluate(
+pub(crate) fn evaluate(
     py: Python<'_>,
     submission: PathBuf,
     annotations: PathBuf,
@@ -43,8 +43,4 @@ fn evaluate(
     })?
     .map_err(value_error)?;
     Ok((scores.values, scores.rows, scores.notes))
-}
-
-pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
-    m.add_function(wrap_pyfunction!(evaluate, m)?)
 }

@@ -1,7 +1,7 @@
 //! Runs over files, and features of signals in memory.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -47,7 +47,7 @@ fn config_of((kind, text): (&str, &str), overrides: &[String]) -> PyResult<Arc<C
 
 /// The effective configuration as JSON, and its hash.
 #[pyfunction]
-fn effective_config(
+pub(crate) fn effective_config(
     config: (String, String),
     overrides: Vec<String>,
 ) -> PyResult<(String, String)> {
@@ -55,25 +55,41 @@ fn effective_config(
     Ok((config.to_value().to_string(), config.hash()))
 }
 
-/// Keeps warnings for Python.
+/// Keeps for Python how far a run is and what it warns of.
 #[derive(Default)]
-struct Warnings(Mutex<Vec<String>>);
+struct Told {
+    done: AtomicUsize,
+    inputs: AtomicUsize,
+    warnings: Mutex<Vec<String>>,
+}
 
-impl Progress for Warnings {
-    fn start(&self, _: usize, _: usize) {}
-
-    fn done(&self, _: &Outcome) {}
-
-    fn warning(&self, message: &str) {
-        self.0.lock().unwrap_or_else(|e| e.into_inner()).push(message.to_string());
+impl Told {
+    fn so_far(&self) -> (usize, usize) {
+        (self.done.load(Ordering::Relaxed), self.inputs.load(Ordering::Relaxed))
     }
 }
 
-/// Extracts the features of `paths` into the file `out` and gives what is to be warned of. An
-/// interrupt stops the run, its ledger intact.
+impl Progress for Told {
+    fn start(&self, inputs: usize, done: usize) {
+        self.inputs.store(inputs, Ordering::Relaxed);
+        self.done.store(done, Ordering::Relaxed);
+    }
+
+    fn done(&self, _: &Outcome) {
+        self.done.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn warning(&self, message: &str) {
+        self.warnings.lock().unwrap_or_else(|e| e.into_inner()).push(message.to_string());
+    }
+}
+
+/// Extracts the features of `paths` into the file `out` and gives what is to be warned of.
+/// `progress` is called with the recordings done and all of them. An interrupt, or an exception of
+/// `progress`, stops the run, its ledger intact.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "one private caller, by name")]
-fn extract(
+pub(crate) fn extract(
     py: Python<'_>,
     paths: Vec<String>,
     config: (String, String),
@@ -82,6 +98,7 @@ fn extract(
     jobs: Option<usize>,
     resume: bool,
     overwrite: bool,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<Vec<String>> {
     let config = config_of((&config.0, &config.1), &overrides)?;
     let jobs = match jobs {
@@ -92,24 +109,33 @@ fn extract(
     let compression = Compression::Stored;
     let shard = "0/1".parse::<Shard>().map_err(value_error)?;
     let options = RunOptions { out, compression, jobs, shard, resume, overwrite, max_errors: None };
-    let warnings = Warnings::default();
+    let told = Told::default();
     let work = |stop: &Arc<AtomicBool>| {
         let found = inputs::collect(&paths).map_err(|e| RunError::new_err(e.to_string()))?;
         if let Some(skipped) = found.warning() {
-            warnings.warning(&skipped);
+            told.warning(&skipped);
         }
-        run::run(&found.inputs, &config, &options, &warnings, stop).map_err(|error| match error {
+        run::run(&found.inputs, &config, &options, &told, stop).map_err(|error| match error {
             run::RunError::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
             other => RunError::new_err(other.to_string()),
         })
     };
-    py.detach(|| interruptible(work))?;
-    Ok(warnings.0.into_inner().unwrap_or_else(|e| e.into_inner()))
+    let mut last = (0, 0);
+    let mut tell = |py: Python<'_>| {
+        let (Some(progress), now) = (&progress, told.so_far()) else { return Ok(()) };
+        if std::mem::replace(&mut last, now) != now {
+            progress.call1(py, now)?;
+        }
+        Ok(())
+    };
+    py.detach(|| interruptible(work, &mut tell))?;
+    tell(py)?;
+    Ok(told.warnings.into_inner().unwrap_or_else(|e| e.into_inner()))
 }
 
 /// Fits principal components to the summary of a feature file and writes them to `out`.
 #[pyfunction]
-fn fit_projection(
+pub(crate) fn fit_projection(
     py: Python<'_>,
     features: PathBuf,
     n_components: usize,
@@ -118,9 +144,11 @@ fn fit_projection(
     compute(py, || Projection::fit(&features, n_components)?.save(&out))?.map_err(value_error)
 }
 
-/// Does `work` in another thread and raises its flag when Python has an exception for this one.
+/// Does `work` in another thread; between looks at it this one calls `tell`. Raises the flag of
+/// `work` when Python, or `tell`, has an exception.
 fn interruptible<T: Send>(
     work: impl FnOnce(&Arc<AtomicBool>) -> PyResult<T> + Send,
+    tell: &mut (impl FnMut(Python<'_>) -> PyResult<()> + Send),
 ) -> PyResult<T> {
     let stop = Arc::new(AtomicBool::new(false));
     std::thread::scope(|scope| {
@@ -134,7 +162,7 @@ fn interruptible<T: Send>(
         let mut raised = None;
         while finished.recv_timeout(POLL) == Err(RecvTimeoutError::Timeout) {
             if raised.is_none() {
-                raised = Python::attach(|py| py.check_signals()).err();
+                raised = Python::attach(|py| py.check_signals().and_then(|()| tell(py))).err();
                 stop.store(raised.is_some(), Ordering::Relaxed);
             }
         }
@@ -148,7 +176,7 @@ fn interruptible<T: Send>(
 
 /// Features of signals in memory, by one configuration.
 #[pyclass(frozen, name = "Signals", module = "corsmal_feat._core")]
-struct PySignals(Signals);
+pub(crate) struct PySignals(Signals);
 
 #[pymethods]
 impl PySignals {
@@ -166,7 +194,7 @@ impl PySignals {
 
 /// One signal, pushed block by block.
 #[pyclass(name = "Signal", module = "corsmal_feat._core")]
-struct PySignal(Option<Signal>);
+pub(crate) struct PySignal(Option<Signal>);
 
 impl PySignal {
     fn open(&mut self) -> PyResult<&mut Signal> {
@@ -212,13 +240,4 @@ impl PySignal {
     }
 }
 
-type Finished<'py> = (Option<Bound<'py, PyAny>>, Vec<(String, bool, Bound<'py, PyAny>)>);
-
-/// Adds this family to the module.
-pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
-    m.add_class::<PySignals>()?;
-    m.add_class::<PySignal>()?;
-    m.add_function(wrap_pyfunction!(effective_config, m)?)?;
-    m.add_function(wrap_pyfunction!(fit_projection, m)?)?;
-    m.add_function(wrap_pyfunction!(extract, m)?)
-}
+pub(crate) type Finished<'py> = (Option<Bound<'py, PyAny>>, Vec<(String, bool, Bound<'py, PyAny>)>);

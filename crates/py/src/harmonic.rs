@@ -11,7 +11,6 @@ use corsmal_dsp::hpss::{HpssParams, Part, masks as dsp_masks, separate as dsp_se
 use corsmal_dsp::istft::istft as dsp_istft;
 use corsmal_dsp::librosa::LibrosaVersion;
 use corsmal_dsp::tonnetz::tonnetz as dsp_tonnetz;
-use corsmal_dsp::window::Window;
 use ndarray::{Array2, ArrayView2, ArrayView3};
 use num_complex::Complex;
 use numpy::{Element, PyReadonlyArrayDyn};
@@ -19,26 +18,25 @@ use pyo3::prelude::*;
 
 use crate::arrays::{Floats, each_precision, into_numpy, view2, view3};
 use crate::chroma::norm_of;
-use crate::frontends::librosa_version;
 use crate::pool::compute;
-use crate::spectrum::{StftTuple, pad_mode, stft_params};
+use crate::spectrum::{Transform, WindowSpec, named};
 use crate::value_error;
 
 /// A contiguous complex array from Python, in the precision it came in.
 #[derive(FromPyObject)]
-enum Complexes<'py> {
+pub(crate) enum Complexes<'py> {
     Single(PyReadonlyArrayDyn<'py, Complex<f32>>),
     Double(PyReadonlyArrayDyn<'py, Complex<f64>>),
 }
 
 #[pyfunction]
-fn istft<'py>(
+pub(crate) fn istft<'py>(
     py: Python<'py>,
     spectrogram: Complexes<'py>,
-    params: StftTuple,
+    params: Transform<'py>,
     length: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let params = stft_params(&params)?;
+    let params = params.params()?;
     match spectrogram {
         Complexes::Single(d) => {
             let d = view3(&d)?;
@@ -51,31 +49,40 @@ fn istft<'py>(
     }
 }
 
-/// Separation parameters from the front end: (harmonic kernel, percussive kernel, power, harmonic
-/// margin, percussive margin).
-type HpssTuple = (usize, usize, f64, f64, f64);
+/// `HpssParams` of the front end.
+#[derive(FromPyObject)]
+pub(crate) struct Separation {
+    kernel_harmonic: usize,
+    kernel_percussive: usize,
+    power: f64,
+    margin_harmonic: f64,
+    margin_percussive: f64,
+}
 
-fn hpss_params(tuple: HpssTuple) -> HpssParams {
-    let (kernel_harmonic, kernel_percussive, power, margin_harmonic, margin_percussive) = tuple;
-    HpssParams { kernel_harmonic, kernel_percussive, power, margin_harmonic, margin_percussive }
+impl From<Separation> for HpssParams {
+    fn from(from: Separation) -> Self {
+        let Separation { kernel_harmonic, kernel_percussive, power, .. } = from;
+        let Separation { margin_harmonic, margin_percussive, .. } = from;
+        Self { kernel_harmonic, kernel_percussive, power, margin_harmonic, margin_percussive }
+    }
 }
 
 fn masks_of<'py, T: Lane + Element>(
     py: Python<'py>,
     s: ArrayView3<T>,
-    params: HpssTuple,
+    params: Separation,
 ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
-    let params = hpss_params(params);
+    let params = params.into();
     let (harmonic, percussive) = compute(py, || dsp_masks(s, &params))?.map_err(value_error)?;
     Ok((into_numpy(py, harmonic)?, into_numpy(py, percussive)?))
 }
 
 /// Harmonic and percussive masks of magnitudes `[channels, bins, frames]`.
 #[pyfunction]
-fn hpss_masks<'py>(
+pub(crate) fn hpss_masks<'py>(
     py: Python<'py>,
     s: Floats<'py>,
-    params: HpssTuple,
+    params: Separation,
 ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     match s {
         Floats::F32(s) => masks_of(py, view3(&s)?, params),
@@ -86,12 +93,12 @@ fn hpss_masks<'py>(
 fn separate_parts<'py, T: Lane + Element>(
     py: Python<'py>,
     y: ArrayView2<T>,
-    stft: &StftTuple,
-    params: HpssTuple,
+    stft: &Transform<'_>,
+    params: Separation,
     mask: bool,
     parts: &[Part],
 ) -> PyResult<Vec<Bound<'py, PyAny>>> {
-    let (stft, params) = (stft_params(stft)?, hpss_params(params));
+    let (stft, params) = (stft.params()?, params.into());
     let separated =
         compute(py, || dsp_separate(y, &stft, &params, mask, parts))?.map_err(value_error)?;
     separated.into_iter().map(|part| into_numpy(py, part)).collect()
@@ -99,11 +106,11 @@ fn separate_parts<'py, T: Lane + Element>(
 
 /// The asked parts of `y [channels, samples]`, harmonic before percussive.
 #[pyfunction]
-fn separate<'py>(
+pub(crate) fn separate<'py>(
     py: Python<'py>,
     y: Floats<'py>,
-    stft: StftTuple,
-    params: HpssTuple,
+    stft: Transform<'py>,
+    params: Separation,
     mask: bool,
     harmonic: bool,
     percussive: bool,
@@ -116,71 +123,97 @@ fn separate<'py>(
     }
 }
 
-/// Transform parameters from the front end: (sr, hop_length, fmin, n_bins, bins_per_octave, tuning,
-/// filter_scale, norm, sparsity, window, scale, pad_mode).
-type CqtTuple = (f64, usize, f64, usize, usize, f64, f64, Option<f64>, f64, String, bool, String);
+/// `CqtParams` of the front end.
+#[derive(FromPyObject)]
+pub(crate) struct ConstantQ<'py> {
+    sr: f64,
+    hop_length: usize,
+    fmin: f64,
+    n_bins: usize,
+    bins_per_octave: usize,
+    tuning: f64,
+    filter_scale: f64,
+    norm: Option<f64>,
+    sparsity: f64,
+    window: WindowSpec<'py>,
+    scale: bool,
+    pad_mode: String,
+}
 
-fn cqt_params(tuple: CqtTuple) -> PyResult<CqtParams> {
-    let (sr, hop_length, fmin, n_bins, bins_per_octave, tuning, ..) = tuple;
-    let (.., filter_scale, norm, sparsity, ref window, scale, ref padding) = tuple;
-    Ok(CqtParams {
-        sr,
-        hop_length,
-        fmin,
-        n_bins,
-        bins_per_octave,
-        tuning,
-        filter_scale,
-        norm: norm_of(norm)?,
-        sparsity,
-        window: window.parse::<Window>().map_err(value_error)?,
-        scale,
-        pad_mode: pad_mode(padding)?,
-        ..CqtParams::new(sr)
-    })
+impl ConstantQ<'_> {
+    fn params(&self) -> PyResult<CqtParams> {
+        Ok(CqtParams {
+            sr: self.sr,
+            hop_length: self.hop_length,
+            fmin: self.fmin,
+            n_bins: self.n_bins,
+            bins_per_octave: self.bins_per_octave,
+            tuning: self.tuning,
+            filter_scale: self.filter_scale,
+            norm: norm_of(self.norm)?,
+            sparsity: self.sparsity,
+            window: self.window.window()?,
+            scale: self.scale,
+            pad_mode: named(&self.pad_mode)?,
+            ..CqtParams::new(self.sr)
+        })
+    }
 }
 
 #[pyfunction]
-fn cqt<'py>(py: Python<'py>, y: Floats<'py>, params: CqtTuple) -> PyResult<Bound<'py, PyAny>> {
-    let params = cqt_params(params)?;
+pub(crate) fn cqt<'py>(
+    py: Python<'py>,
+    y: Floats<'py>,
+    params: ConstantQ<'py>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let params = params.params()?;
     each_precision!(py, view2(y), dsp_cqt(y, &params))
 }
 
-/// Folding parameters from the front end: (bins_per_octave, n_chroma, fmin, window, threshold,
-/// norm).
-type ChromaTuple = (usize, usize, f64, Option<Vec<f64>>, Option<f64>, Option<f64>);
+/// `CqtChromaParams` of the front end.
+#[derive(FromPyObject)]
+pub(crate) struct Folding {
+    bins_per_octave: usize,
+    n_chroma: usize,
+    fmin: f64,
+    window: Option<Vec<f64>>,
+    threshold: Option<f64>,
+    norm: Option<f64>,
+}
 
-fn chroma_params(tuple: ChromaTuple) -> PyResult<ChromaCqtParams> {
-    let (bins_per_octave, n_chroma, fmin, window, threshold, norm) = tuple;
-    let norm = norm_of(norm)?;
-    let base_c = true;
-    Ok(ChromaCqtParams { bins_per_octave, n_chroma, fmin, window, base_c, threshold, norm })
+impl Folding {
+    fn params(self) -> PyResult<ChromaCqtParams> {
+        let Self { bins_per_octave, n_chroma, fmin, window, threshold, norm } = self;
+        let norm = norm_of(norm)?;
+        let base_c = true;
+        Ok(ChromaCqtParams { bins_per_octave, n_chroma, fmin, window, base_c, threshold, norm })
+    }
 }
 
 #[pyfunction]
-fn chroma_cqt<'py>(
+pub(crate) fn chroma_cqt<'py>(
     py: Python<'py>,
     y: Floats<'py>,
-    cqt: CqtTuple,
-    chroma: ChromaTuple,
+    cqt: ConstantQ<'py>,
+    chroma: Folding,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (cqt, chroma) = (cqt_params(cqt)?, chroma_params(chroma)?);
+    let (cqt, chroma) = (cqt.params()?, chroma.params()?);
     each_precision!(py, view2(y), dsp_chroma_cqt(y, &cqt, &chroma))
 }
 
 /// Chromagram of constant-Q magnitudes `[channels, n_bins, frames]`.
 #[pyfunction]
-fn chroma_of_cqt<'py>(
+pub(crate) fn chroma_of_cqt<'py>(
     py: Python<'py>,
     c: Floats<'py>,
-    chroma: ChromaTuple,
+    chroma: Folding,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let params = chroma_params(chroma)?;
+    let params = chroma.params()?;
     each_precision!(py, view3(c), ChromaCqt::new(c.dim().1, &params)?.of_magnitudes(c))
 }
 
 #[pyfunction]
-fn tonnetz<'py>(py: Python<'py>, chroma: Floats<'py>) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn tonnetz<'py>(py: Python<'py>, chroma: Floats<'py>) -> PyResult<Bound<'py, PyAny>> {
     each_precision!(py, view3(chroma), dsp_tonnetz(chroma))
 }
 
@@ -192,13 +225,13 @@ static AF193: Mutex<Option<KeptAf193>> = Mutex::new(None);
 
 /// The vectors `[channels, 193]` of `y [channels, samples]`.
 #[pyfunction]
-fn af193<'py>(
+pub(crate) fn af193<'py>(
     py: Python<'py>,
     y: PyReadonlyArrayDyn<'py, f32>,
     sr: f64,
     librosa: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (y, key) = (view2(&y)?, (sr, librosa_version(librosa)?));
+    let (y, key) = (view2(&y)?, (sr, named::<LibrosaVersion>(librosa)?));
     let vectors = compute(py, || {
         let mut last = AF193.lock().unwrap_or_else(PoisonError::into_inner);
         let plan = match &*last {
@@ -214,15 +247,4 @@ fn af193<'py>(
         Ok(vectors)
     })?;
     into_numpy(py, vectors.map_err(|e: corsmal_dsp::DspError| value_error(e))?)
-}
-
-pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
-    m.add_function(wrap_pyfunction!(istft, m)?)?;
-    m.add_function(wrap_pyfunction!(hpss_masks, m)?)?;
-    m.add_function(wrap_pyfunction!(separate, m)?)?;
-    m.add_function(wrap_pyfunction!(cqt, m)?)?;
-    m.add_function(wrap_pyfunction!(chroma_cqt, m)?)?;
-    m.add_function(wrap_pyfunction!(chroma_of_cqt, m)?)?;
-    m.add_function(wrap_pyfunction!(tonnetz, m)?)?;
-    m.add_function(wrap_pyfunction!(af193, m)?)
 }

@@ -2,7 +2,7 @@
 //!
 //! Functions take contiguous `[channels, samples]` or `[channels, rows, frames]` arrays; the typed
 //! Python front end (`python/corsmal_feat/`) checks, reshapes and gives librosa's signatures. One
-//! file per family, each with a `register`. The GIL is released while we compute.
+//! file per family, exported below. The GIL is released while we compute.
 
 mod arrays;
 mod chroma;
@@ -15,6 +15,7 @@ mod harmonic;
 mod mel;
 mod onset;
 mod pool;
+mod recording;
 mod resample;
 mod scoring;
 mod spectral;
@@ -24,6 +25,7 @@ mod time_domain;
 use pyo3::prelude::*;
 
 pyo3::import_exception!(corsmal_feat.errors, ConfigError);
+pyo3::import_exception!(corsmal_feat.errors, DecodeError);
 pyo3::import_exception!(corsmal_feat.errors, ModelError);
 pyo3::import_exception!(corsmal_feat.errors, ParameterError);
 pyo3::import_exception!(corsmal_feat.errors, RunError);
@@ -39,21 +41,52 @@ pub(crate) fn value_error(error: impl std::fmt::Display) -> PyErr {
 }
 
 #[pymodule]
-fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
-    m.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    classifiers::register(m)?;
-    evaluate::register(m)?;
-    scoring::register(m)?;
-    spectrum::register(m)?;
-    harmonic::register(m)?;
-    mel::register(m)?;
-    pool::register(m)?;
-    time_domain::register(m)?;
-    resample::register(m)?;
-    compound::register(m)?;
-    extract::register(m)?;
-    frontends::register(m)?;
-    spectral::register(m)?;
-    chroma::register(m)?;
-    onset::register(m)
+mod _core {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::chroma::{chroma, chroma_filter, estimate_tuning, piptrack, pitch_tuning};
+    #[pymodule_export]
+    use crate::classifiers::{PyModel, classifier_parameters};
+    #[pymodule_export]
+    use crate::compound::{a34_short, a34f136, paa_fbank, pca_fit, pca_project, sk_resize};
+    #[pymodule_export]
+    use crate::evaluate::evaluate;
+    #[pymodule_export]
+    use crate::extract::{PySignal, PySignals, effective_config, extract, fit_projection};
+    #[pymodule_export]
+    use crate::frontends::{
+        m1_stft, m2_mfcc, m3_spectrogram, m4_logmel, m4_windows, m5_a34f136, m5_vggish_patches,
+        m6_spectrogram, spec9216,
+    };
+    #[pymodule_export]
+    use crate::harmonic::{
+        af193, chroma_cqt, chroma_of_cqt, cqt, hpss_masks, istft, separate, tonnetz,
+    };
+    #[pymodule_export]
+    use crate::mel::{apply_mel, delta, mel, melspectrogram, mfcc, power_to_db};
+    #[pymodule_export]
+    use crate::onset::{detrend, onset_backtrack, onset_detect, onset_rises, onset_strength};
+    #[pymodule_export]
+    use crate::pool::jobs;
+    #[pymodule_export]
+    use crate::recording::PyRecording;
+    #[pymodule_export]
+    use crate::resample::resample;
+    #[pymodule_export]
+    use crate::scoring::{compare_predictions, cross_validate, fuse, score};
+    #[pymodule_export]
+    use crate::spectral::{
+        fft_frequencies, poly_features, spectral_bandwidth, spectral_centroid, spectral_contrast,
+        spectral_flatness, spectral_rolloff, to_mono,
+    };
+    #[pymodule_export]
+    use crate::spectrum::{all_finite, get_window, spectrogram, stft};
+    #[pymodule_export]
+    use crate::time_domain::{rms, rms_of_spectrogram, zero_crossing_rate};
+
+    #[pymodule_init]
+    fn init(m: &Bound<'_, PyModule>) -> PyResult<()> {
+        m.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
 }

@@ -14,10 +14,16 @@ use crate::arrays::{Floats, each_precision, into_numpy, view2, view3};
 use crate::pool::compute;
 use crate::value_error;
 
-/// Peak conditions from the front end: (pre_max, post_max, pre_avg, post_avg, delta, wait); the
-/// missing ones are librosa's for the sample rate and hop.
-type PeakTuple =
-    (Option<usize>, Option<usize>, Option<usize>, Option<usize>, Option<f64>, Option<usize>);
+/// `PeakParams` of the front end; what is missing is librosa's for the sample rate and hop.
+#[derive(FromPyObject)]
+pub(crate) struct Peaks {
+    pre_max: Option<usize>,
+    post_max: Option<usize>,
+    pre_avg: Option<usize>,
+    post_avg: Option<usize>,
+    delta: Option<f64>,
+    wait: Option<usize>,
+}
 
 /// A spectrogram in dB with an optional one of the same shape and precision to compare with.
 struct Compared<'py, T: Element> {
@@ -45,7 +51,7 @@ impl<'py, T: Real + Element> Compared<'py, T> {
 
 /// Envelope `[channels, frames]`; `center` is the delay in frames, None for a plain analysis.
 #[pyfunction]
-fn onset_strength<'py>(
+pub(crate) fn onset_strength<'py>(
     py: Python<'py>,
     s: Floats<'py>,
     reference: Option<Bound<'py, PyAny>>,
@@ -62,7 +68,7 @@ fn onset_strength<'py>(
 
 /// Rises `[channels, bands, frames - lag]`, for aggregation by a Python function.
 #[pyfunction]
-fn onset_rises<'py>(
+pub(crate) fn onset_rises<'py>(
     py: Python<'py>,
     s: Floats<'py>,
     reference: Option<Bound<'py, PyAny>>,
@@ -77,29 +83,28 @@ fn onset_rises<'py>(
 }
 
 #[pyfunction]
-fn detrend<'py>(py: Python<'py>, envelope: Floats<'py>) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn detrend<'py>(py: Python<'py>, envelope: Floats<'py>) -> PyResult<Bound<'py, PyAny>> {
     each_precision!(py, view2(envelope), Ok::<_, DspError>(dsp_detrend(envelope)))
 }
 
 /// Onset frames of each channel of an envelope `[channels, frames]`.
 #[pyfunction]
-fn onset_detect(
+pub(crate) fn onset_detect(
     py: Python<'_>,
     envelope: Floats<'_>,
-    rate: (f64, usize),
+    sr: f64,
+    hop_length: usize,
     normalize: bool,
-    peaks: PeakTuple,
+    peaks: Peaks,
 ) -> PyResult<Vec<Vec<usize>>> {
-    let (sr, hop_length) = rate;
     let defaults = PeakPick::new(sr, hop_length).map_err(value_error)?;
-    let (pre_max, post_max, pre_avg, post_avg, delta, wait) = peaks;
     let pick = PeakPick {
-        pre_max: pre_max.unwrap_or(defaults.pre_max),
-        post_max: post_max.unwrap_or(defaults.post_max),
-        pre_avg: pre_avg.unwrap_or(defaults.pre_avg),
-        post_avg: post_avg.unwrap_or(defaults.post_avg),
-        delta: delta.unwrap_or(defaults.delta),
-        wait: wait.unwrap_or(defaults.wait),
+        pre_max: peaks.pre_max.unwrap_or(defaults.pre_max),
+        post_max: peaks.post_max.unwrap_or(defaults.post_max),
+        pre_avg: peaks.pre_avg.unwrap_or(defaults.pre_avg),
+        post_avg: peaks.post_avg.unwrap_or(defaults.post_avg),
+        delta: peaks.delta.unwrap_or(defaults.delta),
+        wait: peaks.wait.unwrap_or(defaults.wait),
     };
     match envelope {
         Floats::F32(e) => onsets(py, view2(&e)?, normalize, &pick),
@@ -119,17 +124,9 @@ fn onsets<T: Real>(
 }
 
 #[pyfunction]
-fn onset_backtrack(events: Vec<usize>, energy: Floats<'_>) -> PyResult<Vec<usize>> {
+pub(crate) fn onset_backtrack(events: Vec<usize>, energy: Floats<'_>) -> PyResult<Vec<usize>> {
     Ok(match energy {
         Floats::F32(energy) => dsp_backtrack(&events, energy.as_slice()?),
         Floats::F64(energy) => dsp_backtrack(&events, energy.as_slice()?),
     })
-}
-
-pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
-    m.add_function(wrap_pyfunction!(onset_strength, m)?)?;
-    m.add_function(wrap_pyfunction!(onset_rises, m)?)?;
-    m.add_function(wrap_pyfunction!(detrend, m)?)?;
-    m.add_function(wrap_pyfunction!(onset_detect, m)?)?;
-    m.add_function(wrap_pyfunction!(onset_backtrack, m)?)
 }

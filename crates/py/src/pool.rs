@@ -51,7 +51,3 @@ pub(crate) fn compute<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) 
     let pool = pool(py)?;
     Ok(py.detach(|| pool.install(work)))
 }
-
-pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
-    m.add_function(wrap_pyfunction!(jobs, m)?)
-}

@@ -18,7 +18,7 @@ use crate::value_error;
 
 /// Where labels come from.
 #[derive(FromPyObject)]
-struct LabelArguments {
+pub(crate) struct LabelArguments {
     #[pyo3(item)]
     file: Option<PathBuf>,
     #[pyo3(item)]
@@ -39,7 +39,7 @@ impl LabelArguments {
 
 /// Which pipelines are tried.
 #[derive(FromPyObject)]
-struct RecipeArguments {
+pub(crate) struct RecipeArguments {
     #[pyo3(item)]
     classifier: String,
     #[pyo3(item)]
@@ -56,7 +56,7 @@ struct RecipeArguments {
 
 /// The report as JSON, and the predictions of the held-out rows as CSV.
 #[pyfunction]
-fn cross_validate(
+pub(crate) fn cross_validate(
     py: Python<'_>,
     features: PathBuf,
     target: &str,
@@ -95,7 +95,7 @@ fn cross_validate(
 
 /// The fused predictions as CSV.
 #[pyfunction]
-fn fuse(
+pub(crate) fn fuse(
     py: Python<'_>,
     paths: Vec<PathBuf>,
     weights: Option<Vec<f64>>,
@@ -142,7 +142,7 @@ fn fuse(
 
 /// McNemar's test and bootstrap intervals, as JSON.
 #[pyfunction]
-fn compare_predictions(
+pub(crate) fn compare_predictions(
     py: Python<'_>,
     first: PathBuf,
     second: PathBuf,
@@ -160,7 +160,7 @@ fn compare_predictions(
 /// Scores of a prediction file, as JSON.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, reason = "one private caller, by name")]
-fn score(
+pub(crate) fn score(
     py: Python<'_>,
     predictions: PathBuf,
     labels: LabelArguments,
@@ -185,12 +185,4 @@ fn score(
 
 fn csv(bytes: std::io::Result<Vec<u8>>) -> PyResult<String> {
     String::from_utf8(bytes.map_err(value_error)?).map_err(value_error)
-}
-
-/// Adds this family to the module.
-pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
-    m.add_function(wrap_pyfunction!(cross_validate, m)?)?;
-    m.add_function(wrap_pyfunction!(fuse, m)?)?;
-    m.add_function(wrap_pyfunction!(compare_predictions, m)?)?;
-    m.add_function(wrap_pyfunction!(score, m)?)
 }

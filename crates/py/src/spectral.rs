@@ -19,18 +19,18 @@ fn frequencies<'a>(freq: &'a PyReadonlyArrayDyn<'_, f64>) -> PyResult<Frequencie
 }
 
 #[pyfunction]
-fn fft_frequencies(py: Python<'_>, sr: f64, n_fft: usize) -> PyResult<Bound<'_, PyAny>> {
+pub(crate) fn fft_frequencies(py: Python<'_>, sr: f64, n_fft: usize) -> PyResult<Bound<'_, PyAny>> {
     let freqs = dsp_fft_frequencies(sr, n_fft).map_err(value_error)?;
     into_numpy(py, ndarray::Array1::from_vec(freqs))
 }
 
 #[pyfunction]
-fn to_mono<'py>(py: Python<'py>, y: Floats<'py>) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn to_mono<'py>(py: Python<'py>, y: Floats<'py>) -> PyResult<Bound<'py, PyAny>> {
     each_precision!(py, view2(y), dsp_to_mono(y))
 }
 
 #[pyfunction]
-fn spectral_centroid<'py>(
+pub(crate) fn spectral_centroid<'py>(
     py: Python<'py>,
     s: Source<'py>,
     freq: PyReadonlyArrayDyn<'py, f64>,
@@ -40,7 +40,7 @@ fn spectral_centroid<'py>(
 }
 
 #[pyfunction]
-fn spectral_bandwidth<'py>(
+pub(crate) fn spectral_bandwidth<'py>(
     py: Python<'py>,
     s: Source<'py>,
     freq: PyReadonlyArrayDyn<'py, f64>,
@@ -54,7 +54,7 @@ fn spectral_bandwidth<'py>(
 }
 
 #[pyfunction]
-fn spectral_rolloff<'py>(
+pub(crate) fn spectral_rolloff<'py>(
     py: Python<'py>,
     s: Source<'py>,
     freq: PyReadonlyArrayDyn<'py, f64>,
@@ -65,7 +65,7 @@ fn spectral_rolloff<'py>(
 }
 
 #[pyfunction]
-fn spectral_flatness<'py>(
+pub(crate) fn spectral_flatness<'py>(
     py: Python<'py>,
     s: Source<'py>,
     amin: f64,
@@ -78,7 +78,7 @@ fn spectral_flatness<'py>(
 #[pyfunction]
 #[pyo3(signature = (s, freq, sr, fmin, n_bands, quantile, linear))]
 #[expect(clippy::too_many_arguments, reason = "librosa's parameters, one by one")]
-fn spectral_contrast<'py>(
+pub(crate) fn spectral_contrast<'py>(
     py: Python<'py>,
     s: Source<'py>,
     freq: PyReadonlyArrayDyn<'py, f64>,
@@ -97,7 +97,7 @@ fn spectral_contrast<'py>(
 
 /// The coefficients and whether a fit is deficient.
 #[pyfunction]
-fn poly_features<'py>(
+pub(crate) fn poly_features<'py>(
     py: Python<'py>,
     s: Source<'py>,
     freq: PyReadonlyArrayDyn<'py, f64>,
@@ -112,15 +112,4 @@ fn poly_features<'py>(
         })
     })?;
     Ok((result, deficient))
-}
-
-pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
-    m.add_function(wrap_pyfunction!(fft_frequencies, m)?)?;
-    m.add_function(wrap_pyfunction!(to_mono, m)?)?;
-    m.add_function(wrap_pyfunction!(spectral_centroid, m)?)?;
-    m.add_function(wrap_pyfunction!(spectral_bandwidth, m)?)?;
-    m.add_function(wrap_pyfunction!(spectral_rolloff, m)?)?;
-    m.add_function(wrap_pyfunction!(spectral_flatness, m)?)?;
-    m.add_function(wrap_pyfunction!(spectral_contrast, m)?)?;
-    m.add_function(wrap_pyfunction!(poly_features, m)?)
 }

@@ -1,66 +1,79 @@
 //! Windows and the short-time Fourier transform.
 
+use std::str::FromStr;
+
 use corsmal_dsp::real::all_finite as dsp_all_finite;
 use corsmal_dsp::stft::{PadMode, StftParams, spectrogram_into, stft_into};
 use corsmal_dsp::window::{Window, get_window as dsp_get_window};
+use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, filled, into_numpy, signal, view1};
 use crate::pool::compute;
 use crate::value_error;
 
-/// Transform parameters, all resolved by the front end: (n_fft, hop_length, win_length, window,
-/// center, pad_mode).
-pub(crate) type StftTuple = (usize, usize, usize, String, bool, String);
-
-/// A padding mode by numpy's name.
-pub(crate) fn pad_mode(name: &str) -> PyResult<PadMode> {
-    Ok(match name {
-        "constant" => PadMode::Constant,
-        "edge" => PadMode::Edge,
-        "reflect" => PadMode::Reflect,
-        "symmetric" => PadMode::Symmetric,
-        other => {
-            return Err(value_error(format!(
-                "pad_mode = {other} is not possible: constant, edge, reflect or symmetric"
-            )));
-        }
-    })
+/// The choice that a text from Python names.
+pub(crate) fn named<T: FromStr<Err: std::fmt::Display>>(name: &str) -> PyResult<T> {
+    name.parse().map_err(value_error)
 }
 
-/// The checked parameters behind a tuple from Python.
-pub(crate) fn stft_params(tuple: &StftTuple) -> PyResult<StftParams> {
-    let (n_fft, hop_length, win_length, window, center, pad_mode) = tuple;
-    let pad_mode = self::pad_mode(pad_mode)?;
-    let params = StftParams {
-        n_fft: *n_fft,
-        hop_length: *hop_length,
-        win_length: *win_length,
-        window: window.parse::<Window>().map_err(value_error)?,
-        center: *center,
-        pad_mode,
-    };
-    params.check().map_err(value_error)?;
-    Ok(params)
+/// A window by its name with parameters, or as values.
+#[derive(FromPyObject)]
+pub(crate) enum WindowSpec<'py> {
+    Name(String),
+    Samples(PyReadonlyArray1<'py, f64>),
+}
+
+impl WindowSpec<'_> {
+    pub(crate) fn window(&self) -> PyResult<Window> {
+        match self {
+            Self::Name(name) => named(name),
+            Self::Samples(values) => Ok(Window::Samples(values.as_slice()?.to_vec().into())),
+        }
+    }
+}
+
+/// `StftParams` of the front end, all resolved.
+#[derive(FromPyObject)]
+pub(crate) struct Transform<'py> {
+    n_fft: usize,
+    hop_length: usize,
+    win_length: usize,
+    window: WindowSpec<'py>,
+    center: bool,
+    pad_mode: String,
+}
+
+impl Transform<'_> {
+    /// The checked parameters.
+    pub(crate) fn params(&self) -> PyResult<StftParams> {
+        let params = StftParams {
+            n_fft: self.n_fft,
+            hop_length: self.hop_length,
+            win_length: self.win_length,
+            window: self.window.window()?,
+            center: self.center,
+            pad_mode: named::<PadMode>(&self.pad_mode)?,
+        };
+        params.check().map_err(value_error)?;
+        Ok(params)
+    }
 }
 
 #[pyfunction]
-fn get_window<'py>(
+pub(crate) fn get_window<'py>(
     py: Python<'py>,
-    window: &str,
+    window: WindowSpec<'py>,
     nx: usize,
     fftbins: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let window: Window = window.parse().map_err(value_error)?;
-    into_numpy(
-        py,
-        ndarray::Array1::from_vec(dsp_get_window(&window, nx, fftbins).map_err(value_error)?),
-    )
+    let values = dsp_get_window(&window.window()?, nx, fftbins).map_err(value_error)?;
+    into_numpy(py, ndarray::Array1::from_vec(values))
 }
 
 /// Whether all values are finite.
 #[pyfunction]
-fn all_finite<'py>(py: Python<'py>, array: Floats<'py>) -> PyResult<bool> {
+pub(crate) fn all_finite<'py>(py: Python<'py>, array: Floats<'py>) -> PyResult<bool> {
     match array {
         Floats::F32(array) => {
             let values = view1(&array)?;
@@ -74,8 +87,12 @@ fn all_finite<'py>(py: Python<'py>, array: Floats<'py>) -> PyResult<bool> {
 }
 
 #[pyfunction]
-fn stft<'py>(py: Python<'py>, y: Floats<'py>, params: StftTuple) -> PyResult<Bound<'py, PyAny>> {
-    let params = stft_params(&params)?;
+pub(crate) fn stft<'py>(
+    py: Python<'py>,
+    y: Floats<'py>,
+    params: Transform<'py>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let params = params.params()?;
     match y {
         Floats::F32(y) => filled(py, signal(&y)?, &params, |y, out| stft_into(y, &params, out)),
         Floats::F64(y) => filled(py, signal(&y)?, &params, |y, out| stft_into(y, &params, out)),
@@ -83,13 +100,13 @@ fn stft<'py>(py: Python<'py>, y: Floats<'py>, params: StftTuple) -> PyResult<Bou
 }
 
 #[pyfunction]
-fn spectrogram<'py>(
+pub(crate) fn spectrogram<'py>(
     py: Python<'py>,
     y: Floats<'py>,
-    params: StftTuple,
+    params: Transform<'py>,
     power: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let params = stft_params(&params)?;
+    let params = params.params()?;
     match y {
         Floats::F32(y) => {
             filled(py, signal(&y)?, &params, |y, out| spectrogram_into(y, &params, power, out))
@@ -98,11 +115,4 @@ fn spectrogram<'py>(
             filled(py, signal(&y)?, &params, |y, out| spectrogram_into(y, &params, power, out))
         }
     }
-}
-
-pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
-    m.add_function(wrap_pyfunction!(get_window, m)?)?;
-    m.add_function(wrap_pyfunction!(all_finite, m)?)?;
-    m.add_function(wrap_pyfunction!(stft, m)?)?;
-    m.add_function(wrap_pyfunction!(spectrogram, m)?)
 }

@@ -7,53 +7,55 @@ use corsmal_dsp::time_domain::{
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, each_precision, signal, view3};
-use crate::spectrum::pad_mode;
+use crate::spectrum::named;
 
-/// Framing from the front end: (frame_length, hop_length, center).
-type FrameTuple = (usize, usize, bool);
-
-fn frame_params((frame_length, hop_length, center): FrameTuple) -> FrameParams {
-    FrameParams { frame_length, hop_length, center }
+/// `FrameParams` of the front end.
+#[derive(FromPyObject)]
+pub(crate) struct Frames {
+    frame_length: usize,
+    hop_length: usize,
+    center: bool,
 }
 
-/// Share of crossings per frame; `crossings` is (threshold, zero_pos, pad).
+impl From<Frames> for FrameParams {
+    fn from(Frames { frame_length, hop_length, center }: Frames) -> Self {
+        Self { frame_length, hop_length, center }
+    }
+}
+
+/// Share of crossings per frame.
 #[pyfunction]
-fn zero_crossing_rate<'py>(
+pub(crate) fn zero_crossing_rate<'py>(
     py: Python<'py>,
     y: Floats<'py>,
-    frame: FrameTuple,
-    crossings: (f64, bool, bool),
+    frame: Frames,
+    threshold: f64,
+    zero_pos: bool,
+    pad: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let frame = frame_params(frame);
-    let (threshold, zero_pos, pad) = crossings;
+    let frame = frame.into();
     let params = ZeroCrossingParams { threshold, zero_pos, pad };
     each_precision!(py, signal(y), dsp_zero_crossing_rate(y, &frame, &params))
 }
 
 /// Level per frame of a waveform.
 #[pyfunction]
-fn rms<'py>(
+pub(crate) fn rms<'py>(
     py: Python<'py>,
     y: Floats<'py>,
-    frame: FrameTuple,
+    frame: Frames,
     padding: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (frame, padding) = (frame_params(frame), pad_mode(padding)?);
+    let (frame, padding) = (frame.into(), named(padding)?);
     each_precision!(py, signal(y), dsp_rms(y, &frame, padding))
 }
 
 /// Level per frame of a magnitude spectrogram.
 #[pyfunction]
-fn rms_of_spectrogram<'py>(
+pub(crate) fn rms_of_spectrogram<'py>(
     py: Python<'py>,
     s: Floats<'py>,
     frame_length: usize,
 ) -> PyResult<Bound<'py, PyAny>> {
     each_precision!(py, view3(s), dsp_rms_of_spectrogram(s, frame_length))
-}
-
-pub(crate) fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
-    m.add_function(wrap_pyfunction!(zero_crossing_rate, m)?)?;
-    m.add_function(wrap_pyfunction!(rms, m)?)?;
-    m.add_function(wrap_pyfunction!(rms_of_spectrogram, m)?)
 }

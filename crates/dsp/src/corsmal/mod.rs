@@ -27,7 +27,7 @@ use ndarray::{Array1, Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
 use crate::decibel::Decibel;
-use crate::error::{DspError, Result};
+use crate::error::{DspError, Result, from_name};
 use crate::mono::to_mono;
 use crate::real::Real;
 use crate::resample::{MAX_EXPANSION, ResType, resample};
@@ -43,6 +43,8 @@ pub enum Variant {
     /// The paper's words.
     Paper,
 }
+
+from_name!(Variant, "variant", "code" => Self::Code, "paper" => Self::Paper);
 
 /// Mean over the channels at `target_sr` (librosa `load` with `mono=True`).
 fn mono_at(y: ArrayView2<f32>, sr: f64, target_sr: f64, res_type: ResType) -> Result<Array1<f32>> {

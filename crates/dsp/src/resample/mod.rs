@@ -19,7 +19,7 @@ use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::error::{DspError, Result};
+use crate::error::{DspError, Result, from_name};
 use crate::real::{Real, all_finite, require_finite};
 use crate::tiles::planar;
 use stage::{Frames, Stage};
@@ -41,6 +41,13 @@ pub enum ResType {
     /// resampy's `kaiser_fast`.
     KaiserFast,
 }
+
+from_name!(
+    ResType, "res_type",
+    "soxr_hq" => Self::SoxrHq,
+    "kaiser_best" => Self::KaiserBest,
+    "kaiser_fast" => Self::KaiserFast,
+);
 
 /// Largest growth of a recording whose rate comes from its file: a header that says 1 Hz would turn
 /// a small file into billions of samples.

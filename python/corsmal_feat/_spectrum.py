@@ -1,23 +1,21 @@
-"""Short-time Fourier transform and decibels (librosa.core.spectrum)."""
+"""Short-time Fourier transform (librosa.stft) and what features are computed from."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, audio, channels, floats, rows, unrows
+from ._arrays import Complexes, Floats, Same, audio, channels, floats, rows, size, unrows
+from ._filters import Window, window_spec
+from ._params import StftParams
 from .errors import ParameterError
-from .filters import window_name
 
-__all__ = ["amplitude_to_db", "power_to_db", "stft"]
-
-StftParams = tuple[int, int, int, str, bool, str]
 #: hop_length, win_length, window, center, pad_mode as they were given
-Framing = tuple[int | None, int | None, Any, bool, str]
+Framing = tuple[int | None, int | None, Window, bool, str]
 
 
 def stft_params(
@@ -29,28 +27,25 @@ def stft_params(
     pad_mode: str,
 ) -> StftParams:
     """Transform parameters with librosa's defaults filled in: hop is a quarter of the window."""
-    if n_fft < 1:
-        raise ParameterError(f"n_fft = {n_fft} is not possible: at least 1")
-    win_length = n_fft if win_length is None else win_length
-    hop_length = win_length // 4 if hop_length is None else hop_length
-    if hop_length < 1:
-        raise ParameterError(f"hop_length = {hop_length} is not possible: at least 1")
-    if win_length < 1:
-        raise ParameterError(f"win_length = {win_length} is not possible: at least 1")
-    name = window_name(window)
-    return int(n_fft), int(hop_length), int(win_length), name, bool(center), str(pad_mode)
+    n_fft = size("n_fft", n_fft)
+    win_length = size("win_length", n_fft if win_length is None else win_length)
+    hop_length = size("hop_length", win_length // 4 if hop_length is None else hop_length)
+    spec = window_spec(window, win_length)
+    return StftParams(n_fft, hop_length, win_length, spec, bool(center), str(pad_mode))
 
 
 def stft(
-    y: Any,
+    y: npt.ArrayLike,
     *,
     n_fft: int = 2048,
     hop_length: int | None = None,
     win_length: int | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     center: bool = True,
+    dtype: npt.DTypeLike | None = None,
     pad_mode: str = "constant",
-) -> Any:
+    out: npt.NDArray[Any] | None = None,
+) -> Complexes:
     """Short-time Fourier transform (librosa.stft).
 
     float32 signals are transformed in single precision (within 1e-6 of the largest value of a
@@ -66,12 +61,16 @@ def stft(
         Samples between frames; `win_length // 4` by default.
     win_length : int, optional
         Length of the window in samples, at most `n_fft`, which is the default. It is centred.
-    window : str or ("kaiser", beta)
-        Name of a window.
+    window : str, tuple, float, array or callable
+        See `filters.get_window`.
     center : bool
         Frame `t` is centred on sample `t * hop_length` (or starts there).
     pad_mode : {"constant", "edge", "reflect", "symmetric"}
         What `center` puts before the first and after the last sample.
+    dtype : complex dtype, optional
+        Of the result; by default that of the precision of `y`.
+    out : complex [shape=(..., 1 + n_fft // 2, at least t)], optional
+        Where to put the result.
 
     Returns
     -------
@@ -86,7 +85,28 @@ def stft(
     y = audio(y)
     params = stft_params(n_fft, hop_length, win_length, window, center, pad_mode)
     warn_short(y, n_fft, stacklevel=3)
-    return unrows(_core.stft(channels(y), params), y, 1)
+    result: Any = unrows(_core.stft(channels(y), params), y, 1)
+    if dtype is not None:
+        if np.dtype(dtype).kind != "c":
+            raise ParameterError(f"dtype = {dtype} is not possible: a complex type")
+        result = result.astype(dtype, copy=False)
+    spectrum: Complexes = result if out is None else _put(result, out)
+    return spectrum
+
+
+def _put(result: Any, out: npt.NDArray[Any]) -> Any:
+    """`result` in the first frames of `out`."""
+    frames = result.shape[-1]
+    if out.shape[:-1] != result.shape[:-1] or out.shape[-1] < frames:
+        raise ParameterError(
+            f"Shape mismatch for provided output array out.shape={out.shape} and target "
+            f"shape={result.shape}"
+        )
+    if not np.iscomplexobj(out):
+        raise ParameterError(f"output with dtype={out.dtype} is not of complex type")
+    part = out if out.shape[-1] == frames else out[..., :frames]
+    part[...] = result
+    return part
 
 
 def warn_short(y: Floats, n_fft: int, stacklevel: int) -> None:
@@ -110,9 +130,10 @@ class Spectra(NamedTuple):
     #: the shape of the spectrogram where there is one
     shape: tuple[int, ...] | None
 
-    def restored(self, result: Any) -> Any:
+    def restored(self, result: Same) -> Same:
         """`result` [shape=(channels, ...)] with the leading axes of the caller's array."""
-        return result.reshape((*self.leading, *result.shape[1:]))
+        shaped: Same = result.reshape((*self.leading, *result.shape[1:]))
+        return shaped
 
 
 def signal(
@@ -165,81 +186,3 @@ def spectrogram(
         return S, length_of(S, n_fft)
     y, params = signal(y, n_fft, hop_length, win_length, window, center, pad_mode)
     return unrows(_core.spectrogram(channels(y), params, float(power)), y, 1), n_fft
-
-
-def power_to_db(
-    S: Any,
-    *,
-    ref: float | Callable[..., Any] = 1.0,
-    amin: float = 1e-10,
-    top_db: float | None = 80.0,
-) -> Any:
-    """Power to decibels (librosa.power_to_db): 10 log10 of `S / ref`.
-
-    Parameters
-    ----------
-    S : float32 or float64, any shape
-        Powers; of complex values the magnitude is taken, with a warning.
-    ref : float or callable
-        The power of 0 dB, or a function that finds it in `S`, such as `numpy.max`.
-    amin : float
-        Smallest power that is told apart from zero.
-    top_db : float, optional
-        Range in dB below the maximum over the whole array, channels included; None keeps all.
-
-    Returns
-    -------
-    dB, in the shape and precision of `S`
-
-    Examples
-    --------
-    >>> corsmal_feat.power_to_db(np.array([1.0, 0.1, 0.0]))
-    array([  0., -10., -80.])
-    """
-    S = np.asarray(S)
-    if np.iscomplexobj(S):
-        warnings.warn("power_to_db was called on complex input: phase is discarded", stacklevel=2)
-        S = np.abs(S)
-    scalar = S.ndim == 0
-    S = floats("S", S.astype(np.float64) if S.dtype.kind in "iu" else S, 0)
-    reference = float(abs(ref(S) if callable(ref) else ref))
-    top = None if top_db is None else float(top_db)
-    result = _core.power_to_db(np.ascontiguousarray(S), reference, float(amin), top)
-    return result[0] if scalar else result.reshape(S.shape)
-
-
-def amplitude_to_db(
-    S: Any,
-    *,
-    ref: float | Callable[..., Any] = 1.0,
-    amin: float = 1e-5,
-    top_db: float | None = 80.0,
-) -> Any:
-    """Amplitude to decibels (librosa.amplitude_to_db): `power_to_db` of the squares.
-
-    Parameters
-    ----------
-    S : float32 or float64, any shape
-        Amplitudes.
-    ref, amin, top_db
-        As in `power_to_db`, `ref` and `amin` being amplitudes.
-
-    Returns
-    -------
-    dB, in the shape and precision of `S`
-
-    Examples
-    --------
-    >>> corsmal_feat.amplitude_to_db(np.array([1.0, 0.1]))
-    array([  0., -20.])
-    """
-    S = np.asarray(S)
-    if np.iscomplexobj(S):
-        warnings.warn(
-            "amplitude_to_db was called on complex input: phase is discarded", stacklevel=2
-        )
-    if amin <= 0:
-        raise ParameterError(f"amin = {amin} is not possible: above 0")
-    magnitude = np.abs(S)
-    reference = float(abs(ref(magnitude) if callable(ref) else ref))
-    return power_to_db(np.square(magnitude), ref=reference**2, amin=amin**2, top_db=top_db)

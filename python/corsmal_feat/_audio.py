@@ -1,0 +1,260 @@
+"""Recordings as arrays (librosa.load, librosa.stream, librosa.get_duration)."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterator
+from typing import Any, BinaryIO
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._arrays import Floats, size
+from ._mono import to_mono
+from ._resample import resample
+from .errors import DecodeError, ParameterError
+
+Source = str | os.PathLike[str] | BinaryIO
+
+
+def _open(path: Source) -> _core.Recording:
+    if isinstance(path, (str, os.PathLike)):
+        try:
+            return _core.Recording.open(path)
+        except DecodeError as error:
+            name = os.fspath(path)
+            hint = ""
+            if name.lower().endswith((".npz", ".parquet")):
+                hint = "; corsmal_feat.load_features reads the output of a run"
+            raise DecodeError(f"{name}: {error}{hint}") from error
+    if hasattr(path, "read"):
+        content = path.read()
+        if isinstance(content, bytes):
+            return _core.Recording.from_bytes(content)
+    raise ParameterError(f"path = {path!r} is not possible: a path, or a file opened as binary")
+
+
+def _dtype(dtype: npt.DTypeLike) -> np.dtype[Any]:
+    kind = np.dtype(dtype)
+    if kind not in (np.float32, np.float64):
+        raise ParameterError(f"dtype = {dtype} is not possible: float32 or float64")
+    return kind
+
+
+def _seconds(name: str, value: float, rate: int) -> int:
+    """Seconds as frames, cut as librosa does."""
+    if not 0 <= value * rate <= 2**53:
+        raise ParameterError(f"{name} = {value} is not possible: seconds, 0 or more")
+    return int(value * rate)
+
+
+def _tell(recording: _core.Recording, path: Source) -> None:
+    for repair in recording.repairs:
+        warnings.warn(f"{path}: {repair}", stacklevel=3)
+
+
+def load(
+    path: Source,
+    *,
+    sr: float | None = 22050,
+    mono: bool = True,
+    offset: float = 0.0,
+    duration: float | None = None,
+    dtype: npt.DTypeLike = np.float32,
+    res_type: str = "soxr_hq",
+) -> tuple[Floats, float]:
+    """Reads a recording (librosa.load): WAV, FLAC, Ogg Vorbis or MP3, by what it holds.
+
+    Parameters
+    ----------
+    path : path, or binary file
+        The recording.
+    sr : float, optional
+        Sample rate wanted in Hz; None keeps that of the file.
+    mono : bool
+        Mean of the channels.
+    offset, duration : float
+        The part to read in seconds; to the end without `duration`.
+    dtype : float32 or float64
+        Of the samples, which are decoded in single precision.
+    res_type : str
+        See `resample`.
+
+    Returns
+    -------
+    samples [shape=(n,) or (channels, n)] in -1..1, and their rate
+
+    Examples
+    --------
+    >>> y, sr = corsmal_feat.load("recording.wav")  # doctest: +SKIP
+    >>> y.shape, sr  # doctest: +SKIP
+    ((117601,), 22050)
+    """
+    kind = _dtype(dtype)
+    recording = _open(path)
+    rate = recording.sample_rate
+    start = _seconds("offset", offset, rate)
+    frames = None if duration is None else _seconds("duration", duration, rate)
+    if start:
+        recording.skip(start)
+    samples = recording.read(frames)
+    if not len(samples) and frames != 0:
+        what = f"offset = {offset} s lies beyond its end" if start else "it holds no samples"
+        raise DecodeError(f"{path}: {what}")
+    _tell(recording, path)
+    y: Floats = samples[:, 0] if samples.shape[1] == 1 else samples.T
+    y = y.astype(kind, copy=False)
+    if mono and y.ndim > 1:
+        y = to_mono(y)
+    if sr is None:
+        return y, rate
+    return (resample(y, orig_sr=rate, target_sr=sr, res_type=res_type) if y.size else y), sr
+
+
+def stream(
+    path: Source,
+    *,
+    block_length: int,
+    frame_length: int,
+    hop_length: int,
+    mono: bool = True,
+    offset: float = 0.0,
+    duration: float | None = None,
+    fill_value: float | None = None,
+    dtype: npt.DTypeLike = np.float32,
+) -> Iterator[Floats]:
+    """Blocks of a recording at its own rate, for frames that are not centred (librosa.stream).
+
+    Parameters
+    ----------
+    path : path, or binary file
+        The recording.
+    block_length : int
+        Frames of a block.
+    frame_length, hop_length : int
+        Samples of a frame, and between frames, at most as many.
+    mono, offset, duration, dtype
+        See `load`.
+    fill_value : float, optional
+        Fills up the last block, which is shorter without it.
+
+    Yields
+    ------
+    samples [shape=(n,) or (channels, n)], each block beginning with the end of the one before
+
+    Examples
+    --------
+    >>> blocks = corsmal_feat.stream(
+    ...     "recording.wav", block_length=256, frame_length=2048, hop_length=512
+    ... )  # doctest: +SKIP
+    """
+    sizes = {"block_length": block_length, "frame_length": frame_length, "hop_length": hop_length}
+    for name, value in sizes.items():
+        if not isinstance(value, (int, np.integer)) or value < 1:
+            raise ParameterError(f"{name}={value} must be a positive integer")
+        size(name, value)
+    if hop_length > frame_length:
+        raise ParameterError(
+            f"hop_length = {hop_length} is not possible: at most frame_length ({frame_length})"
+        )
+    kind = _dtype(dtype)
+    recording = _open(path)
+    rate = recording.sample_rate
+    start = _seconds("offset", offset, rate)
+    left = _seconds("duration", duration, rate) if duration else None
+    if start:
+        recording.skip(start)
+    wanted = frame_length + (block_length - 1) * hop_length
+    return _blocks(recording, wanted, frame_length - hop_length, left, mono, fill_value, kind)
+
+
+def _blocks(
+    recording: _core.Recording,
+    length: int,
+    overlap: int,
+    left: int | None,
+    mono: bool,
+    fill_value: float | None,
+    dtype: np.dtype[Any],
+) -> Iterator[Floats]:
+    kept: Any = np.empty((0, recording.channels), dtype=dtype)
+    while left is None or left > 0:
+        wanted = length - len(kept)
+        new = recording.read(wanted if left is None else min(wanted, left))
+        if not len(new):
+            return
+        left = None if left is None else left - len(new)
+        block = np.concatenate([kept, new.astype(dtype, copy=False)])
+        kept = block[len(block) - overlap :].copy() if overlap else block[:0]
+        if len(block) < length and fill_value is not None:
+            rest = np.full((length - len(block), block.shape[1]), fill_value, dtype=dtype)
+            block = np.concatenate([block, rest])
+        y = block[:, 0] if block.shape[1] == 1 else np.ascontiguousarray(block.T)
+        yield to_mono(y) if mono else y
+
+
+def get_samplerate(path: Source) -> float:
+    """Sample rate of a recording in Hz (librosa.get_samplerate).
+
+    Parameters
+    ----------
+    path : path, or binary file
+        The recording.
+
+    Returns
+    -------
+    Hz
+
+    Examples
+    --------
+    >>> corsmal_feat.get_samplerate("recording.wav")  # doctest: +SKIP
+    44100
+    """
+    return _open(path).sample_rate
+
+
+def get_duration(
+    *,
+    y: npt.ArrayLike | None = None,
+    sr: float = 22050,
+    S: npt.ArrayLike | None = None,
+    n_fft: int = 2048,
+    hop_length: int = 512,
+    center: bool = True,
+    path: Source | None = None,
+) -> float:
+    """Duration of a signal, of what a spectrogram was made from, or of a recording
+    (librosa.get_duration).
+
+    Parameters
+    ----------
+    y : [shape=(..., n)], optional
+        Signal at the sample rate `sr` in Hz.
+    S : [shape=(..., d, t)], optional
+        A spectrogram, with the `n_fft`, `hop_length` and `center` of its transform.
+    path : path, or binary file, optional
+        A recording; it goes before `y` and `S`.
+
+    Returns
+    -------
+    seconds
+
+    Examples
+    --------
+    >>> corsmal_feat.get_duration(y=np.zeros(11025), sr=22050)
+    0.5
+    """
+    if path is not None:
+        recording = _open(path)
+        frames = recording.declared_frames
+        return (recording.count() if frames is None else frames) / recording.sample_rate
+    if not sr > 0:
+        raise ParameterError(f"sr = {sr} is not possible: a positive sample rate in Hz")
+    if y is not None:
+        return float(np.shape(y)[-1]) / sr
+    if S is None:
+        raise ParameterError("At least one of (y, sr), S, or path must be provided")
+    samples = n_fft + hop_length * (np.shape(S)[-1] - 1)
+    return float(samples - 2 * int(n_fft // 2) if center else samples) / sr

@@ -1,0 +1,322 @@
+"""What a run wrote."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from html import escape
+from importlib import import_module
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import ParameterError, UnknownIdError
+
+StrPath = str | os.PathLike[str]
+Values = npt.NDArray[Any]
+
+#: Statuses of recordings that have features.
+GOOD = ("ok", "truncated")
+
+
+@dataclass(repr=False)
+class Features:
+    """What a run wrote (see `load_features`).
+
+    `features[id]` gives the row of a summary, or the frames of a recording: an array
+    [shape=(channels, coefficients, frames)], or one for each feature by name where there are
+    several.
+
+    Attributes
+    ----------
+    ids : list of str
+        Ids of the recordings that have features, in the order of the inputs.
+    arrays : dict
+        By id the frames, and then by feature where there are several; empty for summaries.
+    times : dict
+        For each of them the time of every frame in seconds, arranged alike.
+    summary : float32 [shape=(len(ids), len(names))], or None
+        Statistics.
+    names : list of str
+        Name of each column of `summary`.
+    labels : dict
+        By label column of the manifest the text of each of `ids`.
+    config, config_hash : dict, str
+        The whole configuration and its hash.
+    outcomes : list of dict
+        One row for each input, also for those without features: id, path, status, ...
+    """
+
+    ids: list[str]
+    arrays: dict[str, Any]
+    times: dict[str, Any]
+    summary: npt.NDArray[np.float32] | None
+    names: list[str]
+    labels: dict[str, npt.NDArray[np.str_]]
+    config: dict[str, Any]
+    config_hash: str
+    outcomes: list[dict[str, Any]]
+
+    @classmethod
+    def load(cls, path: StrPath) -> Self:
+        """Reads an output of `extract` or of the command `corsmal-feat extract`, whole.
+
+        Parameters
+        ----------
+        path : path
+            `.npz`, or `.parquet` (needs pyarrow).
+
+        Returns
+        -------
+        Features
+        """
+        name = os.fspath(path)
+        return cls(**(_of_parquet(name) if name.lower().endswith(".parquet") else _of_npz(name)))
+
+    def __repr__(self) -> str:
+        failed = len(self.outcomes) - len(self.ids)
+        return f"<Features: {len(self.ids)} recordings, {failed} failed, {self._what()}>"
+
+    def _what(self) -> str:
+        if self.summary is None:
+            return "frames of " + ", ".join(self.config["features"])
+        return f"summary of {len(self.names)} values"
+
+    def _repr_html_(self) -> str:
+        """The outcomes as a table, for notebooks; the first ones of many."""
+        shown = self.outcomes[:20]
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{escape(str(row.get(k, '')))}</td>" for k in _COLUMNS) + "</tr>"
+            for row in shown
+        )
+        head = "".join(f"<th>{k}</th>" for k in _COLUMNS)
+        left = len(self.outcomes) - len(shown)
+        more = f"<p>{left} more</p>" if left else ""
+        return f"<p>{escape(repr(self)[1:-1])}</p><table><tr>{head}</tr>{rows}</table>{more}"
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.ids)
+
+    def __contains__(self, recording: object) -> bool:
+        return recording in self.ids
+
+    def __getitem__(self, recording: str) -> Any:
+        if self.summary is None and recording in self.arrays:
+            return self.arrays[recording]
+        if recording not in self.ids:
+            close = [i for i in self.ids if str(recording) in i or i in str(recording)][:3]
+            hint = f"; did you mean {', '.join(map(repr, close))}?" if close else ""
+            raise UnknownIdError(f"no recording {recording!r} among {len(self.ids)}{hint}")
+        if self.summary is None:
+            # A recording may be too short for any frame.
+            return {} if len(self.config["features"]) > 1 else np.empty((0, 0, 0), np.float32)
+        return self.summary[self.ids.index(recording)]
+
+    def to_frame(self) -> Any:
+        """The features as a pandas data frame with index (file, start, end), as opensmile's.
+
+        A summary has a row for each recording, frames have a row for each frame. Columns are the
+        names of a summary, or `feature[channel][coefficient]`; label columns follow.
+
+        Returns
+        -------
+        pandas.DataFrame
+        """
+        try:
+            pandas = import_module("pandas")
+        except ImportError as error:
+            raise ImportError("to_frame needs pandas (pip install pandas)") from error
+        paths = {row["id"]: row["path"] for row in self.outcomes}
+        files = [paths.get(i, i) for i in self.ids]
+        if self.summary is not None:
+            starts, ends = np.zeros(len(files)), self._durations()
+            counts = [1] * len(files)
+            columns = dict(zip(self.names, self.summary.T, strict=True))
+        else:
+            tables = [self._columns(i) for i in self.ids]
+            counts = [len(times) for times, _ in tables]
+            names = list(dict.fromkeys(name for _, table in tables for name in table))
+            columns = {
+                name: np.concatenate([table.get(name, _missing(len(t))) for t, table in tables])
+                for name in names
+            }
+            starts = np.concatenate([t for t, _ in tables]) if tables else np.zeros(0)
+            steps = [np.diff(t, append=_next(t)) for t, _ in tables]
+            ends = starts + (np.concatenate(steps) if steps else np.zeros(0))
+        columns |= {k: np.repeat(np.asarray(v), counts) for k, v in self.labels.items()}
+        index = pandas.MultiIndex.from_arrays(
+            [
+                np.repeat(np.asarray(files, dtype=object), counts),
+                pandas.to_timedelta(starts, unit="s"),
+                pandas.to_timedelta(ends, unit="s"),
+            ],
+            names=["file", "start", "end"],
+        )
+        return pandas.DataFrame(columns, index=index)
+
+    def _durations(self) -> npt.NDArray[np.float64]:
+        rows = {row["id"]: row for row in self.outcomes}
+
+        def seconds(recording: str) -> float:
+            row = rows.get(recording, {})
+            rate = row.get("sample_rate")
+            return row["decoded_frames"] / rate if rate else np.nan
+
+        return np.array([seconds(i) for i in self.ids], dtype=np.float64)
+
+    def _columns(self, recording: str) -> tuple[Values, dict[str, Values]]:
+        """Times and named columns of the frames of a recording; features with other frames than
+        the first one cannot share its rows."""
+        arrays, times = self[recording], self.times.get(recording, np.zeros(0))
+        if not isinstance(arrays, dict):
+            arrays, times = {next(iter(self.config["features"])): arrays}, {None: times}
+        shared = next(iter(times.values()), np.zeros(0))
+        columns = {}
+        for feature, values in arrays.items():
+            if values.shape[-1] != len(shared):
+                raise ParameterError(
+                    f"{recording}: {feature} has {values.shape[-1]} frames where the first feature"
+                    f" has {len(shared)}: to_frame needs features of one hop"
+                )
+            for c, k in np.ndindex(values.shape[:2]):
+                columns[f"{feature}[{c}][{k}]"] = values[c, k]
+        return shared, columns
+
+
+def _missing(count: int) -> Values:
+    return np.full(count, np.nan, dtype=np.float32)
+
+
+def _next(times: Values) -> Values:
+    """Where the frame after the last one would begin."""
+    return times[-1:] + (times[-1:] - times[-2:-1] if len(times) > 1 else 0)
+
+
+_COLUMNS = ("id", "status", "reason", "sample_rate", "channels", "decoded_frames")
+
+
+def load_features(path: StrPath) -> Features:
+    """Reads an output of `extract` or of the command `corsmal-feat extract`, whole.
+
+    Parameters
+    ----------
+    path : path
+        `.npz`, or `.parquet` (needs pyarrow; pandas and polars read such files, too).
+
+    Returns
+    -------
+    Features
+
+    Examples
+    --------
+    >>> features = corsmal_feat.load_features("features.npz")  # doctest: +SKIP
+    """
+    return Features.load(path)
+
+
+def _of_npz(name: str) -> dict[str, Any]:
+    try:
+        archive = np.load(name, allow_pickle=False)
+    except (ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise ParameterError(
+            f"{name} is not an output of corsmal-feat: no .npz archive; corsmal_feat.load reads"
+            " recordings"
+        ) from error
+    if not isinstance(archive, np.lib.npyio.NpzFile):
+        raise ParameterError(f"{name} is not an output of corsmal-feat: a single array")
+    with archive:
+        if "__meta__" not in archive.files:
+            raise ParameterError(f"{name} is not an output of corsmal-feat: it has no __meta__")
+        members = {member: _member(archive, name, member) for member in archive.files}
+    run = {k: v for k, v in members.items() if not _is_frames(k)}
+    config = json.loads(run["__config__"].tobytes())
+    several = len(config["features"]) > 1
+    arrays: dict[str, Any] = {}
+    times: dict[str, Any] = {}
+    for member, values in members.items():
+        if not _is_frames(member):
+            continue
+        key = member.removeprefix("__times__/")
+        into = arrays if key == member else times
+        if several:
+            recording, _, feature = key.rpartition("/")
+            into.setdefault(recording, {})[feature] = values
+        else:
+            into[key] = values
+    prefix = "__labels__/"
+    return {
+        "ids": [str(i) for i in run["__ids__"]],
+        "arrays": arrays,
+        "times": times,
+        "summary": run.get("__summary__"),
+        "names": [str(n) for n in run.get("__summary_names__", ())],
+        "labels": {k.removeprefix(prefix): v for k, v in run.items() if k.startswith(prefix)},
+        "config": config,
+        "config_hash": json.loads(run["__meta__"].tobytes())["config_hash"],
+        "outcomes": _lines(run["__outcomes__"].tobytes()),
+    }
+
+
+def _member(archive: Any, name: str, member: str) -> Values:
+    try:
+        values: Values = archive[member]
+    except (ValueError, EOFError, zipfile.BadZipFile, MemoryError) as error:
+        what = "holds Python objects" if "pickle" in str(error) else f"cannot be read: {error}"
+        raise ParameterError(f"{name}: {member} {what}") from error
+    return values
+
+
+def _is_frames(member: str) -> bool:
+    return member.startswith("__times__/") or not member.startswith("__")
+
+
+def _lines(text: str | bytes) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in text.splitlines() if line]
+
+
+def _of_parquet(name: str) -> dict[str, Any]:
+    try:
+        parquet = import_module("pyarrow.parquet")
+        failed = import_module("pyarrow").ArrowInvalid
+    except ImportError as error:
+        raise ImportError(
+            f"{name}: reading Parquet needs pyarrow (pip install pyarrow); "
+            "pandas.read_parquet and polars.read_parquet give the table, too"
+        ) from error
+    try:
+        table = parquet.read_table(name)
+    except failed as error:
+        raise ParameterError(f"{name} is no Parquet file: {error}") from error
+    metadata = table.schema.metadata or {}
+    if "id" not in table.column_names:
+        raise ParameterError(f"{name} is not an output of corsmal-feat: it has no column id")
+    columns = {k: table.column(k).to_numpy() for k in table.column_names if k != "id"}
+    # Other tools write the summary in double precision and their own metadata only.
+    names = [k for k, v in columns.items() if v.dtype.kind == "f" and not k.startswith("__")]
+    ids = [str(i) for i in table.column("id").to_pylist()]
+    empty = np.zeros((len(ids), 0), np.float32)
+    meta = json.loads(metadata.get(b"corsmal.meta", b"{}"))
+    return {
+        "ids": ids,
+        "arrays": {},
+        "times": {},
+        "summary": np.stack([columns[k] for k in names], axis=1).astype(np.float32)
+        if names
+        else empty,
+        "names": names,
+        "labels": {
+            k: v.astype(np.str_)
+            for k, v in columns.items()
+            if k not in names and not k.startswith("__")
+        },
+        "config": json.loads(metadata.get(b"corsmal.config", b"{}")),
+        "config_hash": meta.get("config_hash", ""),
+        "outcomes": _lines(metadata.get(b"corsmal.outcomes", b"")),
+    }

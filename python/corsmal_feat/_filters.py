@@ -1,0 +1,237 @@
+"""Filter banks and windows (librosa.filters)."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._arrays import room, size
+from ._params import ChromaParams, MelParams, WindowSpec
+from .errors import ParameterError
+
+#: a window by name, as ("kaiser", 8.6), as the beta of a Kaiser window, as values, as a function
+Window = str | tuple[Any, ...] | float | npt.ArrayLike | Callable[[int], npt.ArrayLike]
+
+#: Longest window of a function; bounds the memory that a number from outside can take.
+_LONGEST = 1 << 26
+
+
+def window_spec(window: Window, length: int) -> WindowSpec:
+    """A window of `length` points as the Rust side takes it."""
+    if isinstance(window, str):
+        return window
+    if isinstance(window, (int, float, np.number)) and not isinstance(window, bool):
+        return f"kaiser:{float(window)!r}"
+    if isinstance(window, tuple) and window and isinstance(window[0], str):
+        return ":".join([window[0], ",".join(_parameters(window))])
+    if callable(window):
+        if not 0 < length <= _LONGEST:
+            raise ParameterError(f"a window of {length} points is not possible: 1 to {_LONGEST}")
+        window = window(length)
+    try:
+        values = np.ascontiguousarray(window, dtype=np.float64)
+    except (TypeError, ValueError):
+        values = np.empty(())
+    if values.ndim != 1:
+        raise ParameterError(
+            f"window = {window!r} is not possible: a name, a tuple of a name and parameters, a"
+            " number (the beta of a Kaiser window), values, or a function of the length"
+        )
+    if len(values) != length:
+        raise ParameterError(f"Window size mismatch: {len(values)} != {length}")
+    if not np.isfinite(values).all():
+        raise ParameterError("window holds NaN or infinite values")
+    return values
+
+
+def wavelet_window(window: Window) -> WindowSpec:
+    """A window for filters of many lengths, which only a formula has."""
+    if callable(window) or not isinstance(window, (str, tuple, int, float, np.number)):
+        raise ParameterError(
+            f"window = {window!r} is not possible here: a name, a tuple of a name and parameters,"
+            " or a number, since the filters differ in length"
+        )
+    return window_spec(window, 1)
+
+
+def _parameters(window: tuple[Any, ...]) -> list[str]:
+    """The parameters of a window in words."""
+    words = []
+    for value in window[1:]:
+        several = np.ravel(value) if isinstance(value, (list, tuple, np.ndarray)) else [value]
+        try:
+            words += ["none" if one is None else repr(float(one)) for one in several]
+        except (TypeError, ValueError) as error:
+            raise ParameterError(f"window = {window!r} is not possible: {error}") from error
+    return words
+
+
+def get_window(window: Window, Nx: int, *, fftbins: bool = True) -> npt.NDArray[np.float64]:
+    """A window of `Nx` points, periodic unless `fftbins=False` (librosa.filters.get_window).
+
+    Parameters
+    ----------
+    window : str, tuple, float, array or callable
+        A name of scipy's; a tuple of a name and its parameters; the beta of a Kaiser window; `Nx`
+        values; or a function of `Nx` that gives them.
+    Nx : int
+        Points.
+    fftbins : bool
+        Periodic, as transforms need it, or symmetric.
+
+    Returns
+    -------
+    float64 [shape=(Nx,)]
+
+    Examples
+    --------
+    >>> corsmal_feat.filters.get_window("hann", 4)
+    array([0. , 0.5, 1. , 0.5])
+    """
+    if not 0 <= Nx <= _LONGEST:
+        raise ParameterError(f"Nx = {Nx} is not possible: 0 to {_LONGEST}")
+    return _core.get_window(window_spec(window, int(Nx)), int(Nx), bool(fftbins))
+
+
+def mel_params(
+    sr: float,
+    n_fft: int,
+    n_mels: int,
+    fmin: float,
+    fmax: float | None,
+    htk: bool,
+    norm: Any,
+) -> MelParams:
+    """Filter bank parameters as the Rust side takes them."""
+    n_fft, n_mels = size("n_fft", n_fft), size("n_mels", n_mels)
+    room("a filter bank", 2, n_mels, n_fft // 2 + 1)
+    name = "none" if norm is None else norm if isinstance(norm, str) else repr(float(norm))
+    high = None if fmax is None else float(fmax)
+    return MelParams(float(sr), int(n_fft), int(n_mels), float(fmin), high, bool(htk), name)
+
+
+def mel(
+    *,
+    sr: float,
+    n_fft: int,
+    n_mels: int = 128,
+    fmin: float = 0.0,
+    fmax: float | None = None,
+    htk: bool = False,
+    norm: Any = "slaney",
+    dtype: npt.DTypeLike = np.float32,
+) -> npt.NDArray[Any]:
+    """Mel filter bank [shape=(n_mels, 1 + n_fft/2)], float32 (librosa.filters.mel).
+
+    Parameters
+    ----------
+    sr : float
+        Sample rate in Hz.
+    n_fft, n_mels : int
+        Length of the transform, bands.
+    fmin, fmax : float
+        Range in Hz; fmax is `sr / 2` by default.
+    htk : bool
+        HTK's scale, or Slaney's.
+    norm : {"slaney", None} or float
+        Bands of equal area, of height 1, or of a norm of 1.
+    dtype : dtype
+        Of the result; computed as float32.
+
+    Returns
+    -------
+    [shape=(n_mels, 1 + n_fft // 2)]
+
+    Examples
+    --------
+    >>> corsmal_feat.filters.mel(sr=44100, n_fft=2048).shape
+    (128, 1025)
+    """
+    bank, empty = _core.mel(mel_params(sr, n_fft, n_mels, fmin, fmax, htk, norm))
+    if empty:
+        warn_empty()
+    return bank.astype(dtype, copy=False)
+
+
+def warn_empty() -> None:
+    """What librosa warns of: bands too narrow to hold a bin."""
+    warnings.warn(
+        "Empty filters detected in the mel bank: fewer n_mels or a longer n_fft avoid them",
+        stacklevel=3,
+    )
+
+
+def chroma_params(
+    sr: float,
+    n_fft: int,
+    n_chroma: int,
+    tuning: float,
+    ctroct: float,
+    octwidth: float | None,
+    norm: float | None,
+    base_c: bool,
+) -> ChromaParams:
+    """Filter bank parameters as the Rust side takes them."""
+    n_fft, n_chroma = size("n_fft", n_fft), size("n_chroma", n_chroma)
+    room("a filter bank", 4, n_chroma, n_fft // 2 + 1)
+    width = None if octwidth is None else float(octwidth)
+    power = None if norm is None else float(norm)
+    return ChromaParams(
+        sr=float(sr),
+        n_fft=int(n_fft),
+        n_chroma=int(n_chroma),
+        tuning=float(tuning),
+        ctroct=float(ctroct),
+        octwidth=width,
+        norm=power,
+        base_c=bool(base_c),
+    )
+
+
+def chroma(
+    *,
+    sr: float,
+    n_fft: int,
+    n_chroma: int = 12,
+    tuning: float = 0.0,
+    ctroct: float = 5.0,
+    octwidth: float | None = 2,
+    norm: float | None = 2,
+    base_c: bool = True,
+    dtype: npt.DTypeLike = np.float32,
+) -> npt.NDArray[Any]:
+    """Chroma filter bank [shape=(n_chroma, 1 + n_fft/2)] (librosa.filters.chroma).
+
+    Parameters
+    ----------
+    sr : float
+        Sample rate in Hz.
+    n_fft, n_chroma : int
+        Length of the transform, bins of the octave.
+    tuning : float
+        Deviation from A440 in fractions of a bin.
+    ctroct, octwidth : float
+        Centre and width in octaves of the dominance window; width None for none.
+    norm : float, optional
+        Norm of each column.
+    base_c : bool
+        Begin with C, not A.
+    dtype : dtype
+        Of the result.
+
+    Returns
+    -------
+    [shape=(n_chroma, 1 + n_fft // 2)]
+
+    Examples
+    --------
+    >>> corsmal_feat.filters.chroma(sr=44100, n_fft=2048).shape
+    (12, 1025)
+    """
+    params = chroma_params(sr, n_fft, n_chroma, tuning, ctroct, octwidth, norm, base_c)
+    return _core.chroma_filter(params).astype(dtype, copy=False)

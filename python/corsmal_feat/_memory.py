@@ -1,0 +1,64 @@
+"""Features of frames beside each other (librosa.feature.stack_memory)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ._arrays import MOST
+from .errors import ParameterError
+
+
+def stack_memory(
+    data: npt.ArrayLike, *, n_steps: int = 2, delay: int = 1, **kwargs: Any
+) -> npt.NDArray[Any]:
+    """Each frame with those before it (librosa.feature.stack_memory).
+
+    Parameters
+    ----------
+    data : [shape=(..., d, t)]
+        Features.
+    n_steps : int
+        Frames together.
+    delay : int
+        Frames between them; below 0 for those that follow.
+    **kwargs
+        Of `numpy.pad` for what lies beyond the ends; zeros by default.
+
+    Returns
+    -------
+    [shape=(..., d * n_steps, t)]
+
+    Examples
+    --------
+    >>> corsmal_feat.feature.stack_memory(np.arange(1, 4))
+    array([[1, 2, 3],
+           [0, 1, 2]])
+    """
+    if n_steps < 1:
+        raise ParameterError(f"n_steps = {n_steps} must be a positive integer")
+    if delay == 0:
+        raise ParameterError("delay must be a non-zero integer")
+    array = np.atleast_2d(np.asarray(data))
+    frames = array.shape[-1]
+    if frames < 1:
+        raise ParameterError(
+            f"Cannot stack memory when input data has no columns. Given data.shape={array.shape}"
+        )
+    reach = (int(n_steps) - 1) * abs(int(delay))
+    if array.size * int(n_steps) > MOST or reach > MOST:
+        raise ParameterError(
+            f"n_steps = {n_steps}, delay = {delay} are not possible: a result of up to"
+            f" {MOST} values"
+        )
+    kwargs.setdefault("mode", "constant")
+    widths = [(0, 0)] * array.ndim
+    widths[-1] = (reach, 0) if delay > 0 else (0, reach)
+    try:
+        padded = np.pad(array, widths, **kwargs)
+        starts = [(reach if delay > 0 else 0) - step * int(delay) for step in range(n_steps)]
+        return np.concatenate([padded[..., s : s + frames] for s in starts], axis=-2)
+    except MemoryError as error:
+        raise ParameterError(f"no memory for n_steps = {n_steps}, delay = {delay}") from error

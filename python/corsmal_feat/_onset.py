@@ -1,0 +1,237 @@
+"""Onset strength and onset detection (librosa.onset)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._arrays import Floats, audio, floats, rows, size, unrows
+from ._decibels import power_to_db
+from ._mel import melspectrogram
+from ._params import PeakParams
+from .errors import ParameterError
+from .util import fix_frames
+
+
+def _count(name: str, value: Any) -> int:
+    if not isinstance(value, (int, np.integer)) or value < 1:
+        raise ParameterError(f"{name} = {value} is not possible: an integer, at least 1")
+    return int(value)
+
+
+def _double_melspectrogram(*, y: Any, **kwargs: Any) -> Any:
+    """`melspectrogram` by a transform in double precision: differences of decibels bring out its
+    rounding where a spectrum is mostly empty."""
+    y = audio(y)
+    return melspectrogram(y=y.astype(np.float64), **kwargs).astype(y.dtype)
+
+
+def onset_strength(
+    *,
+    y: npt.ArrayLike | None = None,
+    sr: float = 22050,
+    S: npt.ArrayLike | None = None,
+    lag: int = 1,
+    max_size: int = 1,
+    ref: Any = None,
+    detrend: bool = False,
+    center: bool = True,
+    feature: Callable[..., Any] | None = None,
+    aggregate: Callable[..., Any] | bool | None = None,
+    n_fft: int = 2048,
+    hop_length: int = 512,
+    **kwargs: Any,
+) -> Floats:
+    """Spectral flux envelope [shape=(..., t)] of the mel spectrogram in dB, or of S in dB
+    (librosa.onset.onset_strength). Further keyword arguments go to `feature`.
+
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)]
+        Signal at the sample rate `sr` in Hz.
+    S : [shape=(..., d, t)], optional
+        A spectrogram in dB to use instead.
+    lag, max_size : int
+        Frames to look back, and bands of the maximum filter.
+    ref : [shape of S], optional
+        What to compare with instead of the filtered S.
+    detrend, center : bool
+        Remove the slow part; align frames with their centres.
+    feature, aggregate : callable
+        Instead of `melspectrogram` and the mean over bands.
+    n_fft, hop_length : int
+        See `stft`.
+
+    Returns
+    -------
+    [shape=(..., t)] in the precision of `y` or `S`
+
+    Examples
+    --------
+    >>> corsmal_feat.onset.onset_strength(y=np.zeros(44100, np.float32), sr=44100).shape
+    (87,)
+    """
+    if aggregate is False:
+        raise ParameterError("aggregate = False is not possible: a function or None")
+    lag, max_size = _count("lag", lag), _count("max_size", max_size)
+    n_fft, hop_length = _count("n_fft", n_fft), _count("hop_length", hop_length)
+    if S is None:
+        if feature is None:
+            feature = _double_melspectrogram
+            kwargs.setdefault("fmax", 0.5 * sr)
+        mel = feature(y=y, sr=sr, n_fft=n_fft, hop_length=hop_length, **kwargs)
+        S = power_to_db(np.abs(mel))
+    s: Any = np.atleast_2d(floats("S", S))
+    if ref is not None:
+        ref = np.asarray(ref)
+        if ref.shape != s.shape:
+            raise ParameterError(f"ref has shape {ref.shape}, expected {s.shape}")
+        ref = rows(ref.astype(s.dtype), 2)
+    delay = n_fft // (2 * hop_length) if center else None
+    envelope: Any
+    if callable(aggregate) and aggregate is not np.mean:
+        rises: Any = unrows(_core.onset_rises(rows(s, 2), ref, lag, max_size), s, 2)
+        flux = np.asarray(aggregate(rises, axis=-2), dtype=s.dtype)
+        padding = [(0, 0)] * (flux.ndim - 1) + [(lag + (delay or 0), 0)]
+        envelope = np.pad(flux, padding)
+        envelope = envelope[..., : s.shape[-1]] if center else envelope
+    else:
+        envelope = unrows(_core.onset_strength(rows(s, 2), ref, lag, max_size, delay), s, 2)
+    if detrend:
+        envelope = unrows(_core.detrend(rows(envelope, 1)), envelope, 1)
+    strength: Floats = envelope
+    return strength
+
+
+def onset_detect(
+    *,
+    y: npt.ArrayLike | None = None,
+    sr: float = 22050,
+    onset_envelope: npt.ArrayLike | None = None,
+    hop_length: int = 512,
+    backtrack: bool = False,
+    energy: npt.ArrayLike | None = None,
+    units: str = "frames",
+    normalize: bool = True,
+    sparse: bool = True,
+    pre_max: float | None = None,
+    post_max: float | None = None,
+    pre_avg: float | None = None,
+    post_avg: float | None = None,
+    delta: float | None = None,
+    wait: float | None = None,
+) -> npt.NDArray[Any]:
+    """Onsets: peaks of the onset strength (librosa.onset.onset_detect).
+
+    Parameters
+    ----------
+    y : float32 or float64 [shape=(..., n)], optional
+        Signal at the sample rate `sr` in Hz.
+    onset_envelope : [shape=(..., t)], optional
+        Onset strength to use instead.
+    hop_length : int
+        Samples between frames.
+    backtrack : bool
+        Move each onset to the minimum of `energy` (the envelope by default) before it.
+    units : {"frames", "samples", "time"}
+        What onsets are given in.
+    normalize : bool
+        Bring the envelope to 0..1 first.
+    sparse : bool
+        Onsets, or a mask of all frames.
+    pre_max, post_max, pre_avg, post_avg, delta, wait : float, optional
+        Conditions of a peak; librosa's defaults for the sample rate and hop.
+
+    Returns
+    -------
+    [shape=(n_onsets,)], or with `sparse=False` bool in the shape of the envelope
+
+    Examples
+    --------
+    >>> envelope = np.zeros(60)
+    >>> envelope[[10, 40]] = 1.0
+    >>> corsmal_feat.onset.onset_detect(onset_envelope=envelope)
+    array([10, 40])
+    """
+    if units not in ("frames", "samples", "time"):
+        raise ParameterError(f"units = {units!r} is not possible: 'frames', 'samples' or 'time'")
+    hop_length = _count("hop_length", hop_length)
+    if onset_envelope is None:
+        if y is None:
+            raise ParameterError("y or onset_envelope must be given")
+        onset_envelope = onset_strength(y=y, sr=sr, hop_length=hop_length)
+    envelope = floats("onset_envelope", onset_envelope)
+    if envelope.shape[-1] == 0:
+        raise ParameterError("onset_envelope is empty")
+    if sparse and envelope.ndim != 1:
+        raise ParameterError(
+            f"onset_envelope has {envelope.ndim} dimensions: sparse=True allows only one"
+        )
+    if backtrack and not sparse:
+        raise ParameterError("backtrack = True is not possible with sparse=False")
+    peaks = PeakParams(
+        pre_max=_frames("pre_max", pre_max),
+        post_max=_frames("post_max", post_max),
+        pre_avg=_frames("pre_avg", pre_avg),
+        post_avg=_frames("post_avg", post_avg),
+        delta=None if delta is None else float(delta),
+        wait=_frames("wait", wait),
+    )
+    found: list[list[int]] = [[] for _ in range(envelope[..., 0].size)]
+    if np.isfinite(envelope).all():
+        found = _core.onset_detect(rows(envelope, 1), float(sr), hop_length, bool(normalize), peaks)
+    if not sparse:
+        mask = np.zeros((len(found), envelope.shape[-1]), dtype=bool)
+        for row, frames in zip(mask, found, strict=True):
+            row[frames] = True
+        return mask.reshape(envelope.shape)
+    onsets = np.asarray(found[0], dtype=np.int64)
+    if backtrack:
+        onsets = onset_backtrack(onsets, envelope if energy is None else energy)
+    if units == "frames":
+        return onsets
+    samples = onsets * hop_length
+    return samples if units == "samples" else samples / sr
+
+
+def _frames(name: str, value: float | None) -> int | None:
+    if value is None:
+        return None
+    return size(name, np.ceil(value), 0)
+
+
+def onset_backtrack(events: npt.ArrayLike, energy: npt.ArrayLike) -> npt.NDArray[np.int64]:
+    """The minimum of `energy` at or before each event (librosa.onset.onset_backtrack).
+
+    Parameters
+    ----------
+    events : int [shape=(n,)]
+        Frames.
+    energy : [shape=(t,)]
+        Energy or onset strength; of more dimensions, minima along the first one.
+
+    Returns
+    -------
+    frames, int64 [shape=(n,)]
+
+    Examples
+    --------
+    >>> corsmal_feat.onset.onset_backtrack(np.array([3]), np.array([2.0, 0.0, 1.0, 5.0, 1.0]))
+    array([1])
+    """
+    events = np.asarray(events)
+    if events.dtype.kind not in "iu" and events.size:
+        raise ParameterError(f"events has dtype {events.dtype}, expected integers")
+    array: Any = np.ascontiguousarray(floats("energy", energy))
+    if array.ndim != 1:
+        # As librosa: minima along the first axis, numbered through the whole array.
+        low = (array[1:-1] <= array[:-2]) & (array[1:-1] < array[2:])
+        minima = fix_frames(1 + np.flatnonzero(low))
+        return minima[np.searchsorted(minima, events, side="right") - 1]
+    if events.size and (events.min() < 0 or events.max() >= array.size):
+        raise ParameterError(f"events reach beyond the {array.size} frames of energy")
+    return np.asarray(_core.onset_backtrack(events.tolist(), array), dtype=np.int64)

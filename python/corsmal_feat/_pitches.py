@@ -1,0 +1,467 @@
+"""Hertz, mel, octaves, notes and the frequencies of bins (librosa.core.convert)."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from ._times import Doubles, Number
+from .errors import ParameterError
+
+#: Slaney's scale is linear below 1000 Hz (3 mel in 200 Hz) and logarithmic above.
+_MEL_HZ = 200.0 / 3
+_BREAK_HZ = 1000.0
+_BREAK_MEL = _BREAK_HZ / _MEL_HZ
+_LOG_STEP = np.log(6.4) / 27.0
+
+
+@overload
+def hz_to_mel(frequencies: Number, *, htk: bool = False) -> np.float64: ...
+@overload
+def hz_to_mel(frequencies: npt.ArrayLike, *, htk: bool = False) -> Doubles: ...
+def hz_to_mel(frequencies: Any, *, htk: bool = False) -> Any:
+    """Hertz to mel (librosa.hz_to_mel).
+
+    Parameters
+    ----------
+    frequencies : number or [shape=(n,)]
+        Hz.
+    htk : bool
+        HTK's formula, or Slaney's.
+
+    Returns
+    -------
+    mel, in the shape of `frequencies`
+
+    Examples
+    --------
+    >>> corsmal_feat.hz_to_mel([200.0, 1000.0])
+    array([ 3., 15.])
+    """
+    hz = np.asanyarray(frequencies)
+    if htk:
+        return 2595.0 * np.log10(1.0 + hz / 700.0)
+    mel = hz / _MEL_HZ
+    above = hz >= _BREAK_HZ
+    if hz.ndim:
+        mel[above] = _BREAK_MEL + np.log(hz[above] / _BREAK_HZ) / _LOG_STEP
+    elif above:
+        mel = _BREAK_MEL + np.log(hz / _BREAK_HZ) / _LOG_STEP
+    return mel
+
+
+@overload
+def mel_to_hz(mels: Number, *, htk: bool = False) -> np.float64: ...
+@overload
+def mel_to_hz(mels: npt.ArrayLike, *, htk: bool = False) -> Doubles: ...
+def mel_to_hz(mels: Any, *, htk: bool = False) -> Any:
+    """Mel to hertz (librosa.mel_to_hz).
+
+    Parameters
+    ----------
+    mels : number or [shape=(n,)]
+        Mel.
+    htk : bool
+        HTK's formula, or Slaney's.
+
+    Returns
+    -------
+    Hz, in the shape of `mels`
+
+    Examples
+    --------
+    >>> corsmal_feat.mel_to_hz([3, 15])
+    array([ 200., 1000.])
+    """
+    mel = np.asanyarray(mels)
+    if htk:
+        return 700.0 * (10.0 ** (mel / 2595.0) - 1.0)
+    hz = _MEL_HZ * mel
+    above = mel >= _BREAK_MEL
+    if mel.ndim:
+        hz[above] = _BREAK_HZ * np.exp(_LOG_STEP * (mel[above] - _BREAK_MEL))
+    elif above:
+        hz = _BREAK_HZ * np.exp(_LOG_STEP * (mel - _BREAK_MEL))
+    return hz
+
+
+@overload
+def hz_to_midi(frequencies: Number) -> np.float64: ...
+@overload
+def hz_to_midi(frequencies: npt.ArrayLike) -> Doubles: ...
+def hz_to_midi(frequencies: Any) -> Any:
+    """Hertz to MIDI note numbers with fractions (librosa.hz_to_midi).
+
+    Parameters
+    ----------
+    frequencies : number or [shape=(n,)]
+        Hz.
+
+    Returns
+    -------
+    note numbers, in the shape of `frequencies`
+
+    Examples
+    --------
+    >>> corsmal_feat.hz_to_midi([440.0, 880.0])
+    array([69., 81.])
+    """
+    return 12 * (np.log2(np.asanyarray(frequencies)) - np.log2(440.0)) + 69
+
+
+@overload
+def midi_to_hz(notes: Number) -> np.float64: ...
+@overload
+def midi_to_hz(notes: npt.ArrayLike) -> Doubles: ...
+def midi_to_hz(notes: Any) -> Any:
+    """MIDI note numbers to hertz (librosa.midi_to_hz).
+
+    Parameters
+    ----------
+    notes : number or [shape=(n,)]
+        Note numbers, fractions allowed.
+
+    Returns
+    -------
+    Hz, in the shape of `notes`
+
+    Examples
+    --------
+    >>> corsmal_feat.midi_to_hz([57, 69])
+    array([220., 440.])
+    """
+    return 440.0 * (2.0 ** ((np.asanyarray(notes) - 69.0) / 12.0))
+
+
+@overload
+def hz_to_octs(
+    frequencies: Number, *, tuning: float = 0.0, bins_per_octave: int = 12
+) -> np.float64: ...
+@overload
+def hz_to_octs(
+    frequencies: npt.ArrayLike, *, tuning: float = 0.0, bins_per_octave: int = 12
+) -> Doubles: ...
+def hz_to_octs(frequencies: Any, *, tuning: float = 0.0, bins_per_octave: int = 12) -> Any:
+    """Hertz to octaves, A0 being 0 (librosa.hz_to_octs).
+
+    Parameters
+    ----------
+    frequencies : number or [shape=(n,)]
+        Hz.
+    tuning : float
+        Deviation from A440 in fractions of a bin.
+    bins_per_octave : int
+        Bins of an octave.
+
+    Returns
+    -------
+    octaves, in the shape of `frequencies`
+
+    Examples
+    --------
+    >>> corsmal_feat.hz_to_octs([27.5, 440.0])
+    array([0., 4.])
+    """
+    return np.log2(np.asanyarray(frequencies) / (_a440(tuning, bins_per_octave) / 16))
+
+
+@overload
+def octs_to_hz(octs: Number, *, tuning: float = 0.0, bins_per_octave: int = 12) -> np.float64: ...
+@overload
+def octs_to_hz(
+    octs: npt.ArrayLike, *, tuning: float = 0.0, bins_per_octave: int = 12
+) -> Doubles: ...
+def octs_to_hz(octs: Any, *, tuning: float = 0.0, bins_per_octave: int = 12) -> Any:
+    """Octaves to hertz (librosa.octs_to_hz).
+
+    Parameters
+    ----------
+    octs : number or [shape=(n,)]
+        Octaves, A0 being 0.
+    tuning, bins_per_octave
+        See `hz_to_octs`.
+
+    Returns
+    -------
+    Hz, in the shape of `octs`
+
+    Examples
+    --------
+    >>> corsmal_feat.octs_to_hz([0, 4])
+    array([ 27.5, 440. ])
+    """
+    return (_a440(tuning, bins_per_octave) / 16) * (2.0 ** np.asanyarray(octs))
+
+
+def _a440(tuning: float, bins_per_octave: int) -> float:
+    return float(440.0 * 2.0 ** (tuning / bins_per_octave))
+
+
+@overload
+def A4_to_tuning(A4: Number, *, bins_per_octave: int = 12) -> np.float64: ...
+@overload
+def A4_to_tuning(A4: npt.ArrayLike, *, bins_per_octave: int = 12) -> Doubles: ...
+def A4_to_tuning(A4: Any, *, bins_per_octave: int = 12) -> Any:
+    """The frequency of A4 as a tuning (librosa.A4_to_tuning).
+
+    Parameters
+    ----------
+    A4 : number or [shape=(n,)]
+        Hz.
+    bins_per_octave : int
+        Bins of an octave.
+
+    Returns
+    -------
+    deviations from A440 in fractions of a bin, in the shape of `A4`
+
+    Examples
+    --------
+    >>> corsmal_feat.A4_to_tuning([440.0, 880.0])
+    array([ 0., 12.])
+    """
+    return bins_per_octave * (np.log2(np.asanyarray(A4)) - np.log2(440.0))
+
+
+@overload
+def tuning_to_A4(tuning: Number, *, bins_per_octave: int = 12) -> np.float64: ...
+@overload
+def tuning_to_A4(tuning: npt.ArrayLike, *, bins_per_octave: int = 12) -> Doubles: ...
+def tuning_to_A4(tuning: Any, *, bins_per_octave: int = 12) -> Any:
+    """A tuning as the frequency of A4 (librosa.tuning_to_A4).
+
+    Parameters
+    ----------
+    tuning : number or [shape=(n,)]
+        Deviation from A440 in fractions of a bin.
+    bins_per_octave : int
+        Bins of an octave.
+
+    Returns
+    -------
+    Hz, in the shape of `tuning`
+
+    Examples
+    --------
+    >>> corsmal_feat.tuning_to_A4([0.0, 12.0])
+    array([440., 880.])
+    """
+    return 440.0 * 2.0 ** (np.asanyarray(tuning) / bins_per_octave)
+
+
+#: several note names
+Names = list[str] | tuple[str, ...] | npt.NDArray[Any]
+
+_NOTE = re.compile(
+    r"(?P<note>[A-Ga-g])(?P<accidental>[#♯𝄪b!♭𝄫♮]*)(?P<octave>[+-]?\d+)?(?P<cents>[+-]\d+)?$"
+)
+_PITCHES = {"C": 0, "D": 2, "E": 4, "F": 5, "G": 7, "A": 9, "B": 11}
+_ACCIDENTALS = {"#": 1, "♯": 1, "𝄪": 2, "b": -1, "!": -1, "♭": -1, "𝄫": -2, "♮": 0}
+
+
+@overload
+def note_to_midi(note: str, *, round_midi: bool = True) -> float: ...
+@overload
+def note_to_midi(note: Names, *, round_midi: bool = True) -> npt.NDArray[Any]: ...
+def note_to_midi(note: Any, *, round_midi: bool = True) -> Any:
+    """Note names to MIDI note numbers (librosa.note_to_midi).
+
+    Parameters
+    ----------
+    note : str or iterable of str
+        Such as "C4", "A#3", "B!3" (a flat), "C4-32" (cents). The octave is 0 where it is missing.
+    round_midi : bool
+        Whole numbers; otherwise cents are kept.
+
+    Returns
+    -------
+    a number, or an array of them
+
+    Examples
+    --------
+    >>> corsmal_feat.note_to_midi(["A4", "C#4"])
+    array([69, 61])
+    """
+    if not isinstance(note, str):
+        return np.array([note_to_midi(one, round_midi=round_midi) for one in note])
+    found = _NOTE.match(note)
+    if found is None:
+        raise ParameterError(f"note = {note!r} is not possible: a name such as 'C4' or 'F#3+20'")
+    shift = sum(_ACCIDENTALS[sign] for sign in found["accidental"])
+    octave, cents = int(found["octave"] or 0), int(found["cents"] or 0)
+    value = 12 * (octave + 1) + _PITCHES[found["note"].upper()] + shift + cents * 0.01
+    return int(np.round(value)) if round_midi else value
+
+
+@overload
+def note_to_hz(note: str, *, round_midi: bool = True) -> np.float64: ...
+@overload
+def note_to_hz(note: Names, *, round_midi: bool = True) -> Doubles: ...
+def note_to_hz(note: Any, *, round_midi: bool = True) -> Any:
+    """Note names to hertz (librosa.note_to_hz).
+
+    Parameters
+    ----------
+    note, round_midi
+        See `note_to_midi`.
+
+    Returns
+    -------
+    Hz: a number, or an array of them
+
+    Examples
+    --------
+    >>> corsmal_feat.note_to_hz("A3")
+    np.float64(220.0)
+    """
+    return midi_to_hz(note_to_midi(note, round_midi=round_midi))
+
+
+def fft_frequencies(*, sr: float = 22050, n_fft: int = 2048) -> Doubles:
+    """Frequencies of the bins of `stft` (librosa.fft_frequencies).
+
+    Parameters
+    ----------
+    sr : float
+        Sample rate in Hz.
+    n_fft : int
+        Length of the transform.
+
+    Returns
+    -------
+    Hz, float64 [shape=(1 + n_fft // 2,)]
+
+    Examples
+    --------
+    >>> corsmal_feat.fft_frequencies(sr=8000, n_fft=4)
+    array([   0., 2000., 4000.])
+    """
+    if not sr > 0 or not 0 < n_fft <= _MOST_BINS:
+        raise ParameterError(
+            f"sr = {sr}, n_fft = {n_fft} are not possible: above 0, and n_fft up to {_MOST_BINS}"
+        )
+    return np.asarray(np.fft.rfftfreq(int(n_fft), 1.0 / sr), dtype=np.float64)
+
+
+#: Longest table of frequencies; bounds the memory that a number from outside can take.
+_MOST_BINS = 1 << 26
+
+
+def _count(name: str, value: int) -> int:
+    if not 0 <= value <= _MOST_BINS:
+        raise ParameterError(f"{name} = {value} is not possible: 0 to {_MOST_BINS}")
+    return int(value)
+
+
+def cqt_frequencies(
+    n_bins: int, *, fmin: float, bins_per_octave: int = 12, tuning: float = 0.0
+) -> Doubles:
+    """Centres of the bins of `cqt` (librosa.cqt_frequencies).
+
+    Parameters
+    ----------
+    n_bins : int
+        Bins.
+    fmin : float
+        Lowest one in Hz.
+    bins_per_octave : int
+        Bins of an octave.
+    tuning : float
+        Deviation from A440 in fractions of a bin.
+
+    Returns
+    -------
+    Hz, float64 [shape=(n_bins,)]
+
+    Examples
+    --------
+    >>> corsmal_feat.cqt_frequencies(3, fmin=110, bins_per_octave=1)
+    array([110., 220., 440.])
+    """
+    steps = np.arange(0, _count("n_bins", n_bins), dtype=np.float64) / bins_per_octave
+    correction: float = 2.0 ** (float(tuning) / bins_per_octave)
+    return np.asarray(correction * fmin * 2.0**steps)
+
+
+def mel_frequencies(
+    n_mels: int = 128, *, fmin: float = 0.0, fmax: float = 11025.0, htk: bool = False
+) -> Doubles:
+    """Frequencies that lie evenly on the mel scale (librosa.mel_frequencies).
+
+    Parameters
+    ----------
+    n_mels : int
+        How many.
+    fmin, fmax : float
+        First and last one in Hz.
+    htk : bool
+        HTK's scale, or Slaney's.
+
+    Returns
+    -------
+    Hz, float64 [shape=(n_mels,)]
+
+    Examples
+    --------
+    >>> corsmal_feat.mel_frequencies(3, fmin=0, fmax=1000)
+    array([   0.,  500., 1000.])
+    """
+    low, high = hz_to_mel(fmin, htk=htk), hz_to_mel(fmax, htk=htk)
+    return mel_to_hz(np.linspace(low, high, _count("n_mels", n_mels)), htk=htk)
+
+
+def tempo_frequencies(n_bins: int, *, hop_length: int = 512, sr: float = 22050) -> Doubles:
+    """Tempi of the rows of a tempogram in beats per minute (librosa.tempo_frequencies).
+
+    Parameters
+    ----------
+    n_bins : int
+        Rows.
+    hop_length : int
+        Samples between frames.
+    sr : float
+        Sample rate in Hz.
+
+    Returns
+    -------
+    float64 [shape=(n_bins,)], the first one infinite
+
+    Examples
+    --------
+    >>> corsmal_feat.tempo_frequencies(3, hop_length=500, sr=1000)
+    array([ inf, 120.,  60.])
+    """
+    count = _count("n_bins", n_bins)
+    if count == 0:
+        raise ParameterError("n_bins = 0 is not possible: at least 1")
+    tempi = 60.0 * sr / (hop_length * np.arange(1.0, count))
+    return np.concatenate([[np.inf], tempi])
+
+
+def fourier_tempo_frequencies(
+    *, sr: float = 22050, win_length: int = 384, hop_length: int = 512
+) -> Doubles:
+    """Tempi of the rows of a Fourier tempogram (librosa.fourier_tempo_frequencies).
+
+    Parameters
+    ----------
+    sr : float
+        Sample rate in Hz.
+    win_length : int
+        Frames of the analysis window.
+    hop_length : int
+        Samples between frames.
+
+    Returns
+    -------
+    float64 [shape=(win_length // 2 + 1,)]
+
+    Examples
+    --------
+    >>> corsmal_feat.fourier_tempo_frequencies(sr=1000, win_length=4, hop_length=500)
+    array([ 0., 30., 60.])
+    """
+    return fft_frequencies(sr=sr * 60 / float(hop_length), n_fft=win_length)

@@ -1,0 +1,224 @@
+"""Spectrograms and waveforms (librosa.display), with matplotlib: the extra `plot`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ._pitches import cqt_frequencies, fft_frequencies, mel_frequencies, midi_to_hz
+from ._times import times_like
+from .errors import ParameterError
+
+__all__ = ["specshow", "waveshow"]
+
+_C1 = float(midi_to_hz(24))
+#: Axes in seconds or beats of them, and what one second is.
+_TIMES = {"time": 1.0, "s": 1.0, "ms": 1e3}
+_PLAIN = ("frames", "off", "none", None)
+_HERTZ = ("linear", "fft", "hz", "log", "mel", "cqt_hz", "cqt_note")
+_CLASSES = ("chroma", "tonnetz")
+
+
+def _pyplot() -> Any:
+    try:
+        return import_module("matplotlib.pyplot")
+    except ImportError as error:
+        raise ImportError(
+            "corsmal_feat.display needs matplotlib: pip install 'corsmal-feat[plot]'"
+        ) from error
+
+
+def specshow(
+    data: npt.ArrayLike,
+    *,
+    x_coords: npt.ArrayLike | None = None,
+    y_coords: npt.ArrayLike | None = None,
+    x_axis: str | None = None,
+    y_axis: str | None = None,
+    sr: float = 22050,
+    hop_length: int = 512,
+    n_fft: int | None = None,
+    win_length: int | None = None,
+    fmin: float | None = None,
+    fmax: float | None = None,
+    bins_per_octave: int = 12,
+    htk: bool = False,
+    ax: Any = None,
+    **kwargs: Any,
+) -> Any:
+    """Draws a spectrogram (librosa.display.specshow).
+
+    Parameters
+    ----------
+    data : [shape=(d, t)]
+        What is drawn; of complex values the magnitude.
+    x_coords, y_coords : [shape=(t,)] and [shape=(d,)], optional
+        Positions instead of those of the axes.
+    x_axis, y_axis : str, optional
+        "time", "s", "ms", "frames", "linear" (or "fft", "hz"), "log", "mel", "cqt_hz",
+        "cqt_note", "chroma", "tonnetz", "off", or None.
+    sr : float
+        Sample rate in Hz.
+    hop_length, n_fft, win_length : int
+        Of the transform.
+    fmin, fmax : float, optional
+        Range of mel bands, lowest bin of a constant-Q transform, in Hz.
+    bins_per_octave : int
+        Of a constant-Q transform, or of a chromagram.
+    htk : bool
+        Scale of the mel bands.
+    ax : matplotlib axes, optional
+        Where to draw; the current ones by default.
+    **kwargs
+        Of matplotlib's `pcolormesh`.
+
+    Returns
+    -------
+    matplotlib's mesh
+
+    Examples
+    --------
+    >>> corsmal_feat.display.specshow(np.zeros((128, 9)), y_axis="mel")  # doctest: +SKIP
+    """
+    values = np.asarray(data)
+    if values.ndim != 2:
+        raise ParameterError(f"data has {values.ndim} dimensions, expected 2")
+    if np.iscomplexobj(values):
+        values = np.abs(values)
+    plot = _pyplot()
+    axes = plot.gca() if ax is None else ax
+    kwargs.setdefault("cmap", _colors(values))
+    kwargs.setdefault("rasterized", True)
+    kwargs.setdefault("shading", "auto")
+    length = 2 * (values.shape[0] - 1) if n_fft is None else n_fft
+
+    def positions(axis: str | None, count: int, given: npt.ArrayLike | None) -> Any:
+        if given is not None:
+            found = np.asarray(given)
+            if found.shape not in ((count,), (count + 1,)):
+                raise ParameterError(f"coordinates of shape {found.shape}, expected ({count},)")
+            return found
+        if axis in _TIMES:
+            return times_like(count, sr=sr, hop_length=hop_length)
+        if axis in ("linear", "fft", "hz", "log"):
+            return np.resize(fft_frequencies(sr=sr, n_fft=length), count)
+        if axis == "mel":
+            high = sr / 2 if fmax is None else fmax
+            return mel_frequencies(count, fmin=fmin or 0.0, fmax=high, htk=htk)
+        if axis in ("cqt_hz", "cqt_note"):
+            low = _C1 if fmin is None else fmin
+            return cqt_frequencies(count, fmin=low, bins_per_octave=bins_per_octave)
+        if axis in _PLAIN or axis in _CLASSES:
+            return np.arange(count)
+        names = ", ".join(str(name) for name in (*_TIMES, *_HERTZ, *_CLASSES, *_PLAIN))
+        raise ParameterError(f"axis = {axis!r} is not possible: one of {names}")
+
+    x = positions(x_axis, values.shape[1], x_coords)
+    y = positions(y_axis, values.shape[0], y_coords)
+    mesh = axes.pcolormesh(x, y, values, **kwargs)
+    if ax is None:
+        plot.sci(mesh)
+    _decorate(axes.xaxis, axes.set_xscale, x_axis, bins_per_octave)
+    _decorate(axes.yaxis, axes.set_yscale, y_axis, bins_per_octave)
+    return mesh
+
+
+def _colors(values: npt.NDArray[Any]) -> str:
+    """A map of two colours where there are values on both sides of zero."""
+    if values.dtype == bool:
+        return "gray_r"
+    return "coolwarm" if values.size and values.min() < 0 < values.max() else "magma"
+
+
+def _decorate(axis: Any, scale: Callable[..., Any], kind: str | None, bins: int) -> None:
+    """Scale, ticks and label of an axis."""
+    ticker = import_module("matplotlib.ticker")
+    if kind in ("log", "cqt_hz", "cqt_note"):
+        if kind == "log":
+            scale("symlog", base=2, linthresh=64)
+        else:
+            scale("log", base=2)
+        axis.set_major_formatter(ticker.ScalarFormatter())
+    elif kind == "mel":
+        scale("symlog", base=2, linthresh=1000.0)
+        axis.set_major_formatter(ticker.ScalarFormatter())
+    elif kind == "chroma":
+        steps = np.array([0, 2, 4, 5, 7, 9, 11]) * bins // 12
+        axis.set_major_locator(ticker.FixedLocator(steps))
+        axis.set_major_formatter(ticker.FixedFormatter(("C", "D", "E", "F", "G", "A", "B")))
+    elif kind == "tonnetz":
+        axis.set_major_locator(ticker.FixedLocator(np.arange(6)))
+        axis.set_major_formatter(ticker.FixedFormatter(("5x", "5y", "m3x", "m3y", "M3x", "M3y")))
+    elif kind == "ms":
+        axis.set_major_formatter(ticker.FuncFormatter(lambda x, _: f"{1e3 * x:g}"))
+    elif kind in ("off", "none", None):
+        axis.set_ticks([])
+    labels = {"time": "Time", "s": "Time (s)", "ms": "Time (ms)", "frames": "Frames"}
+    labels |= {"chroma": "Pitch class", "tonnetz": "Tonnetz"} | dict.fromkeys(_HERTZ, "Hz")
+    axis.set_label_text(labels.get(kind or "", ""))
+
+
+def waveshow(
+    y: npt.ArrayLike,
+    *,
+    sr: float = 22050,
+    max_points: int = 11025,
+    axis: str | None = "time",
+    offset: float = 0.0,
+    ax: Any = None,
+    **kwargs: Any,
+) -> Any:
+    """Draws a waveform: its samples, or the range of each piece where they are too many
+    (librosa.display.waveshow).
+
+    Parameters
+    ----------
+    y : [shape=(n,) or (channels, n)]
+        Signal; of two or more channels the largest magnitudes.
+    sr : float
+        Sample rate in Hz.
+    max_points : int
+        Most points that are drawn.
+    axis : {"time", "s", "ms", "frames", "off", None}
+        Label of the horizontal axis.
+    offset : float
+        Seconds at the first sample.
+    ax : matplotlib axes, optional
+        Where to draw; the current ones by default.
+    **kwargs
+        Of matplotlib's `plot` or `fill_between`.
+
+    Returns
+    -------
+    matplotlib's line, or filled area
+
+    Examples
+    --------
+    >>> corsmal_feat.display.waveshow(np.zeros(22050))  # doctest: +SKIP
+    """
+    signal = np.atleast_2d(np.asarray(y))
+    if signal.ndim > 2 or not signal.size:
+        raise ParameterError(f"y has shape {np.shape(y)}, expected (n,) or (channels, n)")
+    if max_points < 1:
+        raise ParameterError(f"max_points = {max_points} is not possible: at least 1")
+    plot = _pyplot()
+    axes = plot.gca() if ax is None else ax
+    samples = signal.shape[1]
+    if samples <= max_points and len(signal) == 1:
+        (drawn,) = axes.plot(offset + np.arange(samples) / sr, signal[0], **kwargs)
+    else:
+        piece = -(-samples // max_points)
+        padded = np.pad(np.abs(signal).max(axis=0), (0, -samples % piece))
+        upper = padded.reshape(-1, piece).max(axis=1)
+        lower = -upper
+        if len(signal) == 1:
+            padded = np.pad(signal[0], (0, -samples % piece), mode="edge").reshape(-1, piece)
+            upper, lower = padded.max(axis=1), padded.min(axis=1)
+        times = offset + np.arange(len(upper)) * piece / sr
+        drawn = axes.fill_between(times, lower, upper, step="post", **kwargs)
+    _decorate(axes.xaxis, axes.set_xscale, axis, 12)
+    return drawn

@@ -1,0 +1,314 @@
+"""Frames, lengths, norms (librosa.util)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ._arrays import size as whole
+from .errors import ParameterError
+
+__all__ = ["fix_frames", "fix_length", "frame", "normalize", "pad_center", "tiny", "valid_audio"]
+
+Array = npt.NDArray[Any]
+
+
+def _along(x: Array, axis: int) -> int:
+    if not -x.ndim <= axis < x.ndim:
+        raise ParameterError(f"axis = {axis} is not possible: the array has {x.ndim} dimensions")
+    return int(x.shape[axis])
+
+
+def frame(
+    x: npt.ArrayLike,
+    *,
+    frame_length: int,
+    hop_length: int,
+    axis: int = -1,
+    writeable: bool = False,
+    subok: bool = False,
+) -> Array:
+    """Overlapping frames of an array, as a view (librosa.util.frame).
+
+    Parameters
+    ----------
+    x : array
+        What is cut.
+    frame_length, hop_length : int
+        Elements of a frame, and between frames.
+    axis : int
+        The axis that is cut. A negative one gives [shape=(..., frame_length, t)], another one
+        [shape=(t, frame_length, ...)].
+    writeable : bool
+        Whether the view may be written to; its elements overlap.
+    subok : bool
+        Keep a subclass of numpy's arrays.
+
+    Returns
+    -------
+    view of `x` with one dimension more
+
+    Examples
+    --------
+    >>> corsmal_feat.util.frame(np.arange(6), frame_length=4, hop_length=2)
+    array([[0, 2],
+           [1, 3],
+           [2, 4],
+           [3, 5]])
+    """
+    array = np.asanyarray(x) if subok else np.asarray(x)
+    length = _along(array, axis)
+    if frame_length < 1 or length < frame_length:
+        raise ParameterError(
+            f"Input is too short (n={length}) for frame_length={frame_length}: frames of 1 to"
+            f" {length} elements are possible"
+        )
+    if hop_length < 1:
+        raise ParameterError(f"Invalid hop_length: {hop_length}; it is at least 1")
+    windows = np.lib.stride_tricks.sliding_window_view(
+        array, int(frame_length), axis, subok=subok, writeable=writeable
+    )
+    # The elements of a frame come before the frames, or after them for an axis from the front.
+    windows = np.moveaxis(windows, -1, axis - 1 if axis < 0 else axis + 1)
+    steps = [slice(None)] * windows.ndim
+    steps[axis] = slice(0, None, int(hop_length))
+    return windows[tuple(steps)]
+
+
+def fix_length(data: npt.ArrayLike, *, size: int, axis: int = -1, **kwargs: Any) -> Array:
+    """Cuts or pads an axis to `size` (librosa.util.fix_length).
+
+    Parameters
+    ----------
+    data : array
+        What is cut or padded at its end.
+    size : int
+        Elements wanted.
+    axis : int
+        The axis.
+    **kwargs
+        Of `numpy.pad`; zeros by default.
+
+    Returns
+    -------
+    array of that size along `axis`
+
+    Examples
+    --------
+    >>> corsmal_feat.util.fix_length(np.arange(3), size=5)
+    array([0, 1, 2, 0, 0])
+    """
+    array = np.asarray(data)
+    length, size = _along(array, axis), whole("size", size, 0)
+    if length > size:
+        part = [slice(None)] * array.ndim
+        part[axis] = slice(0, size)
+        return array[tuple(part)]
+    if length == size:
+        return array
+    widths = [(0, 0)] * array.ndim
+    widths[axis] = (0, size - length)
+    return _padded(array, widths, kwargs)
+
+
+def _padded(array: Array, widths: list[tuple[int, int]], kwargs: dict[str, Any]) -> Array:
+    kwargs.setdefault("mode", "constant")
+    try:
+        padded: Array = np.pad(array, widths, **kwargs)
+    except MemoryError as error:
+        raise ParameterError(f"no memory for padding of {widths}: {error}") from error
+    return padded
+
+
+def pad_center(data: npt.ArrayLike, *, size: int, axis: int = -1, **kwargs: Any) -> Array:
+    """Pads an axis on both sides to `size` (librosa.util.pad_center).
+
+    Parameters
+    ----------
+    data : array
+        What is padded; it ends up in the middle.
+    size : int
+        Elements wanted, at least as many as there are.
+    axis : int
+        The axis.
+    **kwargs
+        Of `numpy.pad`; zeros by default.
+
+    Returns
+    -------
+    array of that size along `axis`
+
+    Examples
+    --------
+    >>> corsmal_feat.util.pad_center(np.ones(2), size=5)
+    array([0., 1., 1., 0., 0.])
+    """
+    array = np.asarray(data)
+    length = _along(array, axis)
+    if size < length:
+        raise ParameterError(f"Target size ({size}) must be at least input size ({length})")
+    before = (whole("size", size, 0) - length) // 2
+    widths = [(0, 0)] * array.ndim
+    widths[axis] = (before, int(size - length - before))
+    return _padded(array, widths, kwargs)
+
+
+def fix_frames(
+    frames: npt.ArrayLike, *, x_min: int | None = 0, x_max: int | None = None, pad: bool = True
+) -> npt.NDArray[np.int64]:
+    """Different frame numbers within limits, sorted (librosa.util.fix_frames).
+
+    Parameters
+    ----------
+    frames : int [shape=(n,)]
+        Frame numbers, 0 or more.
+    x_min, x_max : int, optional
+        The limits.
+    pad : bool
+        Add the limits, and move what is outside to them; otherwise it is left out.
+
+    Returns
+    -------
+    int64 [shape=(m,)]
+
+    Examples
+    --------
+    >>> corsmal_feat.util.fix_frames([3, 9, 9, 40], x_max=20)
+    array([ 0,  3,  9, 20])
+    """
+    values = np.asarray(frames)
+    if np.any(values < 0):
+        raise ParameterError("Negative frame index detected: frames count from 0")
+    limits = [limit for limit in (x_min, x_max) if limit is not None]
+    if pad and limits:
+        values = np.concatenate([limits, np.clip(values, x_min, x_max)])
+    if x_min is not None:
+        values = values[values >= x_min]
+    if x_max is not None:
+        values = values[values <= x_max]
+    return np.unique(values).astype(np.int64)
+
+
+def tiny(x: npt.ArrayLike) -> np.floating[Any]:
+    """Smallest normal number of the precision of `x`, float32 where it holds integers
+    (librosa.util.tiny).
+
+    Parameters
+    ----------
+    x : number or array
+        Whose precision is meant.
+
+    Returns
+    -------
+    number
+
+    Examples
+    --------
+    >>> float(corsmal_feat.util.tiny(np.float64(1)))
+    2.2250738585072014e-308
+    """
+    kind = np.asarray(x).dtype
+    smallest: np.floating[Any] = np.finfo(kind if kind.kind in "fc" else np.float32).tiny
+    return smallest
+
+
+def valid_audio(y: Any) -> bool:
+    """True, or an error that says why `y` is no signal (librosa.util.valid_audio).
+
+    Parameters
+    ----------
+    y : array
+        Floating point, finite, at least one dimension.
+
+    Returns
+    -------
+    True
+
+    Examples
+    --------
+    >>> corsmal_feat.util.valid_audio(np.zeros(9))
+    True
+    """
+    if not isinstance(y, np.ndarray):
+        raise ParameterError("Audio data must be of type numpy.ndarray; use numpy.asarray")
+    if not np.issubdtype(y.dtype, np.floating):
+        raise ParameterError(f"Audio data must be floating-point, got {y.dtype}; cast it first")
+    if y.ndim == 0:
+        raise ParameterError("Audio data must be at least one-dimensional, given y.shape=()")
+    if not np.isfinite(y).all():
+        raise ParameterError("Audio buffer is not finite everywhere")
+    return True
+
+
+def normalize(
+    S: npt.ArrayLike,
+    *,
+    norm: float | None = np.inf,
+    axis: int | None = 0,
+    threshold: float | None = None,
+    fill: bool | None = None,
+) -> Array:
+    """Divides by a norm along an axis (librosa.util.normalize).
+
+    Parameters
+    ----------
+    S : array
+        What is normalised, finite.
+    norm : {inf, -inf, 0, None} or float above 0
+        Largest or smallest magnitude, number of values that are not zero, p-norm; None for none.
+    axis : int, optional
+        The axis; None takes the norm of the whole array.
+    threshold : float, optional
+        Smaller norms count as zero.
+    fill : bool, optional
+        What is too small stays (None), becomes 0 (False) or constant of norm 1 (True).
+
+    Returns
+    -------
+    array in the shape and type of `S`
+
+    Examples
+    --------
+    >>> corsmal_feat.util.normalize(np.array([[2.0, 0.0], [-4.0, 0.0]]))
+    array([[ 0.5,  0. ],
+           [-1. ,  0. ]])
+    """
+    array = np.asarray(S)
+    if threshold is None:
+        threshold = float(tiny(array))
+    elif not threshold > 0:
+        raise ParameterError(f"threshold={threshold} must be strictly positive")
+    if fill not in (None, False, True):
+        raise ParameterError(f"fill={fill} must be None or boolean")
+    if not np.isfinite(array).all():
+        raise ParameterError("Input must be finite")
+    if norm is None:
+        return array
+    if axis is not None:
+        _along(array, axis)
+    magnitude = np.abs(array).astype(np.float64)
+    constant = 1.0
+    length: Any
+    if norm == np.inf:
+        length = magnitude.max(axis=axis, keepdims=True)
+    elif norm == -np.inf:
+        length = magnitude.min(axis=axis, keepdims=True)
+    elif norm == 0:
+        if fill:
+            raise ParameterError("Cannot normalize with norm=0 and fill=True")
+        length = np.sum(magnitude > 0, axis=axis, keepdims=True, dtype=np.float64)
+    elif isinstance(norm, (int, float, np.number)) and norm > 0:
+        length = np.sum(magnitude**norm, axis=axis, keepdims=True) ** (1.0 / norm)
+        count = magnitude.size if axis is None else magnitude.shape[axis]
+        constant = float(count) ** (-1.0 / norm)
+    else:
+        raise ParameterError(f"Unsupported norm: {norm!r}; inf, -inf, 0, a positive number or None")
+    small = length < threshold
+    length = np.where(small, np.inf if fill is False else 1.0, length)
+    result = np.empty_like(array)
+    result[...] = array / length
+    if fill:
+        result[np.broadcast_to(small, result.shape)] = constant
+    return result

@@ -1,0 +1,131 @@
+"""What a run wrote as an object: by id, as a data frame, in a notebook; files of others."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import corsmal_feat as cf
+import numpy as np
+import pytest
+import soundfile
+
+CASES = Path(os.environ.get("CORSMAL_SHARED", "../shared")) / "cases"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("audio")
+    rng = np.random.default_rng(5)
+    for name, seconds in (("a", 0.5), ("b", 1.0)):
+        samples = 0.1 * rng.standard_normal((int(16000 * seconds), 2))
+        soundfile.write(folder / f"{name}.wav", samples, 16000)
+    (folder / "bad.wav").write_bytes(b"no audio at all")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def summary(folder: Path) -> cf.Features:
+    return cf.extract([folder], preset="mfcc-zcr")
+
+
+@pytest.fixture(scope="module")
+def frames(folder: Path) -> cf.Features:
+    return cf.extract([folder], preset="logmel")
+
+
+def test_by_id(summary: cf.Features, frames: cf.Features) -> None:
+    assert list(summary) == summary.ids == ["a", "b"] and "a" in summary and "c" not in summary
+    assert summary.summary is not None
+    assert np.array_equal(summary["b"], summary.summary[1])
+    assert np.array_equal(frames["a"], frames.arrays["a"])
+    for features in (summary, frames):
+        with pytest.raises(KeyError, match="no recording 'c'"):
+            features["c"]
+        with pytest.raises(cf.CorsmalFeatError):
+            features["bad"]
+
+
+def test_data_frames(folder: Path, summary: cf.Features, frames: cf.Features) -> None:
+    pandas = pytest.importorskip("pandas")
+    table = summary.to_frame()
+    assert table.index.names == ["file", "start", "end"]
+    assert table.index.get_level_values("file")[0] == str(folder / "a.wav")
+    ends = table.index.get_level_values("end")
+    assert list(ends) == [pandas.Timedelta("0.5s"), pandas.Timedelta("1s")]
+    assert list(table.columns) == summary.names
+    assert np.array_equal(table.to_numpy(), summary.summary)
+    table = frames.to_frame()
+    assert len(table) == sum(frames.arrays[i].shape[2] for i in frames.ids)
+    first = next(iter(frames.config["features"]))
+    column = table[f"{first}[1][5]"].to_numpy()
+    assert np.array_equal(column, np.concatenate([frames[i][1, 5] for i in frames.ids]))
+    starts = table.index.get_level_values("start").total_seconds().to_numpy()
+    times = np.concatenate([frames.times[i] for i in frames.ids])
+    np.testing.assert_allclose(starts, times, atol=1e-6)
+
+
+def test_notebooks(summary: cf.Features) -> None:
+    html = summary._repr_html_()
+    assert html.count("<tr>") == 4 and "not_audio" in html
+
+
+def test_progress(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    told: list[tuple[int, int]] = []
+    cf.extract([folder], progress=lambda done, total: told.append((done, total)))
+    assert told[-1] == (3, 3) and told == sorted(told)
+    cf.extract([folder], progress=True)
+    assert "3 of 3 recordings" in capfd.readouterr().err
+
+    def stop(done: int, total: int) -> None:
+        raise LookupError("enough")
+
+    with pytest.raises(LookupError, match="enough"):
+        cf.extract([folder], progress=stop)
+
+
+def test_rows_of_nan(folder: Path) -> None:
+    paths = [str(folder / name) for name in ("a.wav", "bad.wav", "b.wav")]
+    with pytest.raises(cf.DecodeError, match=r"bad\.wav: not_audio"):
+        cf.FeatureExtractor("esc26").fit_transform(paths)
+    with pytest.warns(UserWarning, match="a row of NaN"):
+        rows = cf.FeatureExtractor("esc26", errors="nan").fit_transform(paths)
+    assert np.isnan(rows[1]).all() and np.isfinite(rows[[0, 2]]).all()
+    with pytest.raises(cf.ParameterError, match="'raise' or 'nan'"):
+        cf.FeatureExtractor("esc26", errors="skip").fit_transform(paths)
+
+
+def test_files_of_others_are_refused_in_words(tmp_path: Path, folder: Path) -> None:
+    with pytest.raises(cf.ParameterError, match=r"corsmal_feat\.load reads"):
+        cf.load_features(folder / "a.wav")
+    np.save(tmp_path / "one.npy", np.zeros(3))
+    with pytest.raises(cf.ParameterError, match="a single array"):
+        cf.load_features(tmp_path / "one.npy")
+    np.savez(tmp_path / "other.npz", a=np.zeros(3))
+    with pytest.raises(cf.ParameterError, match="no __meta__"):
+        cf.Features.load(tmp_path / "other.npz")
+    objects = {"__meta__": np.array([None, {}], dtype=object)}
+    np.savez(tmp_path / "objects.npz", **objects)
+    with pytest.raises(cf.ParameterError, match="holds Python objects"):
+        cf.load_features(tmp_path / "objects.npz")
+
+
+def test_parquet_edited_by_pandas(tmp_path: Path, folder: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    path = tmp_path / "table.parquet"
+    kept = cf.extract([folder], preset="mfcc-zcr", out=path)
+    table = pandas.read_parquet(path)
+    table["rating"] = ["good", "bad"]
+    table.to_parquet(path)
+    again = cf.load_features(path)
+    assert again.ids == kept.ids and again.names == kept.names
+    assert np.array_equal(again.summary, kept.summary)
+    assert list(again.labels["rating"]) == ["good", "bad"]
+
+
+def test_parquet_of_the_shared_cases() -> None:
+    if not (CASES / "own_ed.parquet").exists():
+        pytest.skip("no shared cases here")
+    features = cf.load_features(CASES / "own_ed.parquet")
+    assert len(features) and features.names

@@ -1,0 +1,148 @@
+"""`load`, `stream`, `get_duration`, `get_samplerate` beside librosa."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import corsmal_feat as cf
+import librosa
+import numpy as np
+import pytest
+import soundfile
+
+RATE = 44100
+# librosa looks for readers among modules that Python has deprecated.
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("recordings")
+    rng = np.random.default_rng(3)
+    t = np.arange(30000) / RATE
+    tone = 0.3 * np.sin(2 * np.pi * 440 * t) + 0.01 * rng.standard_normal(len(t))
+    stereo = np.stack([tone, 0.5 * np.roll(tone, 200)], axis=1)
+    made = {}
+    for name, samples, subtype in (
+        ("mono.wav", tone, "PCM_16"),
+        ("stereo.wav", stereo, "PCM_24"),
+        ("float.wav", stereo, "FLOAT"),
+        ("stereo.flac", stereo, "PCM_16"),
+    ):
+        made[name] = folder / name
+        soundfile.write(made[name], samples, RATE, subtype=subtype)
+    return made
+
+
+PARTS: list[dict[str, Any]] = [
+    {"sr": None},
+    {"sr": None, "mono": False},
+    {"sr": None, "offset": 0.1, "duration": 0.2},
+    {"sr": None, "offset": 0.123456, "dtype": np.float64},
+    {"sr": None, "duration": 99.0, "mono": False},
+]
+
+
+@pytest.mark.parametrize("name", ["mono.wav", "stereo.wav", "float.wav", "stereo.flac"])
+@pytest.mark.parametrize("part", PARTS, ids=str)
+def test_samples_are_librosas(recordings: dict[str, Path], name: str, part: dict[str, Any]) -> None:
+    y, sr = cf.load(recordings[name], **part)
+    want, rate = librosa.load(recordings[name], **part)
+    assert sr == rate == RATE
+    assert y.dtype == want.dtype and y.shape == want.shape
+    np.testing.assert_allclose(y, want, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("sr", [22050, 16000, 48000])
+def test_resampled_is_librosas(recordings: dict[str, Path], sr: int) -> None:
+    y, rate = cf.load(recordings["stereo.wav"], sr=sr)
+    want, _ = librosa.load(recordings["stereo.wav"], sr=sr)
+    assert rate == sr and y.shape == want.shape
+    np.testing.assert_allclose(y, want, rtol=0, atol=2e-6)
+
+
+def test_the_default_is_librosas(recordings: dict[str, Path]) -> None:
+    y, sr = cf.load(str(recordings["mono.wav"]))
+    want, rate = librosa.load(recordings["mono.wav"])
+    assert sr == rate == 22050
+    np.testing.assert_allclose(y, want, rtol=0, atol=2e-6)
+
+
+def test_binary_files_are_read(recordings: dict[str, Path]) -> None:
+    content = recordings["stereo.flac"].read_bytes()
+    with recordings["stereo.flac"].open("rb") as file:
+        opened, _ = cf.load(file, sr=None)
+    kept, _ = cf.load(io.BytesIO(content), sr=None)
+    by_name, _ = cf.load(recordings["stereo.flac"], sr=None)
+    assert np.array_equal(opened, by_name) and np.array_equal(kept, by_name)
+
+
+@pytest.mark.parametrize("name", ["mono.wav", "stereo.wav", "stereo.flac"])
+@pytest.mark.parametrize("mono", [True, False])
+@pytest.mark.parametrize("fill_value", [None, 0.5])
+@pytest.mark.parametrize(
+    "part",
+    [{}, {"offset": 0.05, "duration": 0.31}, {"duration": 0.01}],
+    ids=["whole", "part", "short"],
+)
+def test_blocks_are_librosas(
+    recordings: dict[str, Path],
+    name: str,
+    mono: bool,
+    fill_value: float | None,
+    part: dict[str, float],
+) -> None:
+    framing = {"block_length": 7, "frame_length": 1000, "hop_length": 300}
+
+    def blocks(stream: Callable[..., Any]) -> list[Any]:
+        return list(stream(recordings[name], mono=mono, fill_value=fill_value, **framing, **part))
+
+    ours, theirs = blocks(cf.stream), blocks(librosa.stream)
+    assert [b.shape for b in ours] == [b.shape for b in theirs]
+    for block, want in zip(ours, theirs, strict=True):
+        np.testing.assert_allclose(block, want, rtol=0, atol=1e-7)
+
+
+def test_durations_and_rates(recordings: dict[str, Path]) -> None:
+    for path in recordings.values():
+        assert cf.get_duration(path=path) == librosa.get_duration(path=path)
+        assert cf.get_samplerate(path) == RATE
+
+
+def test_impossible_parts_are_refused(recordings: dict[str, Path], tmp_path: Path) -> None:
+    path = recordings["mono.wav"]
+    with pytest.raises(cf.DecodeError, match="beyond its end"):
+        cf.load(path, offset=100.0)
+    with pytest.raises(cf.DecodeError, match=r"nothing\.wav"):
+        cf.load(tmp_path / "nothing.wav")
+    np.savez(tmp_path / "features.npz", a=np.zeros(3))
+    with pytest.raises(cf.DecodeError, match="load_features"):
+        cf.load(tmp_path / "features.npz")
+    refusals: list[dict[str, Any]] = [
+        {"offset": -1.0},
+        {"duration": float("nan")},
+        {"duration": 1e300},
+        {"dtype": np.int16},
+        {"sr": 0},
+        {"sr": 1e12},
+        {"res_type": "best"},
+    ]
+    for refused in refusals:
+        with pytest.raises(cf.ParameterError):
+            cf.load(path, **refused)
+    with pytest.raises(cf.ParameterError, match="positive integer"):
+        cf.stream(path, block_length=0, frame_length=10, hop_length=5)
+    with pytest.raises(cf.ParameterError, match="hop_length"):
+        cf.stream(path, block_length=2, frame_length=10, hop_length=11)
+
+
+def test_what_was_odd_is_told(tmp_path: Path, recordings: dict[str, Path]) -> None:
+    content = recordings["mono.wav"].read_bytes()
+    cut = tmp_path / "cut.wav"
+    cut.write_bytes(content[: len(content) // 2])
+    with pytest.warns(UserWarning, match="ends after"):
+        y, _ = cf.load(cut, sr=None)
+    assert 0 < len(y) < 30000
