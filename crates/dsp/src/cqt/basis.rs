@@ -193,9 +193,9 @@ mod tests {
         assert!(close(Window::Hann, 1.50018310546875));
         assert!(close(Window::Hamming, 1.3629455320350348));
         assert!(close(Window::Boxcar, 1.0));
-        assert!(close(Window::Parzen, 1.9174603174603191));
-        assert!(close(Window::Bohman, 1.7859588613860062));
-        assert!(close(Window::BartHann, 1.4560255965133932));
+        assert!(close(Window::Parzen, 1.917_460_317_460_319));
+        assert!(close(Window::Bohman, 1.785_958_861_386_006_2));
+        assert!(close(Window::BartHann, 1.456_025_596_513_393_2));
     }
 
     #[test]
