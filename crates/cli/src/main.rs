@@ -9,6 +9,7 @@ mod failure;
 mod help;
 mod interrupt;
 mod output;
+mod paragraphs;
 mod progress;
 mod publish;
 mod text_table;

@@ -6,6 +6,7 @@
 //! in the files of `corsmal_files`.
 
 pub mod config;
+pub mod cut;
 pub mod engine;
 pub mod features;
 pub mod inputs;
@@ -16,3 +17,4 @@ pub mod params;
 pub mod projection;
 pub mod run;
 pub mod summary;
+pub mod survey;

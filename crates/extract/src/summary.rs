@@ -25,6 +25,9 @@ pub enum Stat {
     Percentile(f64),
 }
 
+/// Names without numbers.
+const NAMES: [&str; 7] = ["mean", "std", "min", "max", "median", "skew", "kurtosis"];
+
 const STATS: &str = "mean, std, min, max, median, skew, kurtosis or a percentile such as p95";
 
 impl std::fmt::Display for Stat {
@@ -56,7 +59,12 @@ impl std::str::FromStr for Stat {
             "kurtosis" => Self::Kurtosis,
             other => match other.strip_prefix('p').and_then(|p| p.parse::<f64>().ok()) {
                 Some(p) if (0.0..=100.0).contains(&p) => Self::Percentile(p),
-                _ => return Err(format!("\"{other}\" is not a statistic: {STATS}")),
+                _ => {
+                    let meant = corsmal_names::closest(other, NAMES);
+                    let meant = meant.map(|name| format!(" did you mean \"{name}\"?"));
+                    let meant = meant.unwrap_or_default();
+                    return Err(format!("\"{other}\" is not a statistic:{meant} {STATS}"));
+                }
             },
         })
     }
@@ -75,14 +83,31 @@ impl<'de> Deserialize<'de> for Stat {
 }
 
 /// Which statistics, and over what.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct SummaryConfig {
-    /// Statistics in their order of output.
+    /// Statistics in their order of output; a single one may stand by itself, several as words
+    /// between commas.
+    #[serde(deserialize_with = "one_or_more")]
     pub stats: Vec<Stat>,
     /// Channels are averaged, frame by frame, before the statistics.
-    #[serde(default)]
     pub average_channels: bool,
+}
+
+/// `"mean"`, `"mean,std"` or `["mean", "std"]`.
+fn one_or_more<'de, D: Deserializer<'de>>(d: D) -> Result<Vec<Stat>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "expected statistics, such as [\"mean\", \"std\"]")]
+    enum Words {
+        One(String),
+        List(Vec<String>),
+    }
+    let words = match Words::deserialize(d)? {
+        Words::One(text) => text.split(',').map(|word| word.trim().to_string()).collect(),
+        Words::List(words) => words,
+    };
+    let stats: Result<Vec<Stat>, String> = words.iter().map(|word| word.parse()).collect();
+    stats.map_err(serde::de::Error::custom)
 }
 
 impl SummaryConfig {

@@ -15,6 +15,8 @@ const FOLDS: usize = 5;
 
 /// Columns that are groups unless the user says otherwise.
 const GROUPS: [&str; 2] = ["container", "group"];
+/// The recordings of windows, which no folds split unless the user names other groups.
+const RECORDING: &str = "recording";
 
 /// A plan as written by the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -104,6 +106,8 @@ impl Folds {
             None => CvPlan::K(FOLDS),
         };
         let plan = plan.unwrap_or(&default);
+        let of_windows = !matches!(plan, CvPlan::Lists(_)) && has_groups(table, RECORDING);
+        let groups = groups.or(of_windows.then_some(RECORDING));
         let column = match plan {
             CvPlan::Group(column) | CvPlan::Fold(column) => Some(column.as_str()),
             CvPlan::K(_) | CvPlan::Lists(_) => groups,

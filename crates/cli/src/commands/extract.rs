@@ -6,8 +6,10 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use corsmal_extract::config::Config;
+use corsmal_extract::cut::{WindowSpan, into_windows};
 use corsmal_extract::inputs;
 use corsmal_extract::run::{self, Progress, RunError, RunOptions};
+use corsmal_extract::survey::Survey;
 use corsmal_files::npz::Compression;
 use corsmal_files::shard::Shard;
 use serde_json::json;
@@ -20,9 +22,11 @@ use crate::progress::{LogFormat, Meter};
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  corsmal-feat extract --in audio/ --out feats.npz
-  corsmal-feat extract --in audio/ --out feats.parquet --preset mfcc-zcr --jobs 8
+  corsmal-feat extract audio/ -o feats.npz
+  corsmal-feat extract audio/ -o feats.parquet --preset mfcc-zcr -j 8
+  corsmal-feat extract list.csv -o table.npz --preset esc26 --window 1 --hop 0.5
   corsmal-feat extract --in list.csv --out feats.npz --config my.toml --set mfcc.n_mels=64
+  corsmal-feat extract --in audio/ --out feats.npz --add mfcc --set mfcc.n_mfcc=13
   corsmal-feat extract --in test/ --out test.npz --preset spec9216-code --project pca.npz
   sox in.flac -t wav - | corsmal-feat extract --in - --out feats.npz --preset esc26
 
@@ -30,15 +34,25 @@ Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 inter
 pub struct Args {
     /// Recordings: files, folders (searched through), globs, manifests (.csv, .jsonl), or - for a
     /// WAV stream on standard input.
-    #[arg(long = "in", value_name = "PATH", num_args = 1.., required = true)]
+    #[arg(value_name = "PATH", required_unless_present = "named")]
     inputs: Vec<OsString>,
+    /// The same by name; these follow the others.
+    #[arg(long = "in", short = 'i', value_name = "PATH", num_args = 1..)]
+    named: Vec<OsString>,
     /// Output: .npz, or .parquet for summary tables.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
     #[command(flatten)]
     config: ConfigArgs,
     #[command(flatten)]
     jobs: Jobs,
+    /// Cut recordings into windows of so many seconds: each is a row or arrays of its own with the id
+    /// RECORDING@START, the labels, and the label `recording`.
+    #[arg(long, value_name = "SECONDS", value_parser = window_seconds)]
+    window: Option<f64>,
+    /// Seconds from the begin of one window to that of the next; half a window by default.
+    #[arg(long, value_name = "SECONDS", value_parser = window_seconds, requires = "window")]
+    hop: Option<f64>,
     /// Only the i-th of n parts of the inputs, counted from 0; `merge` joins the outputs.
     #[arg(long, value_name = "I/N", default_value = "0/1")]
     shard: Shard,
@@ -77,10 +91,14 @@ pub struct ConfigArgs {
     /// A configuration file (TOML).
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Change one key, such as mfcc.n_mels=64 or signal.sample_rate=16000; librosa=0.8 is everything
-    /// that gives the numbers of librosa 0.8.
+    /// Change one key, such as melspectrogram.n_mels=64 or signal.sample_rate=16000; librosa=0.8 is
+    /// everything that gives the numbers of librosa 0.8.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
+    /// Add a feature with its defaults (see `corsmal-feat features`), under another name where one
+    /// is given.
+    #[arg(long = "add", value_name = "[NAME=]FEATURE")]
+    pub added: Vec<String>,
     /// Put the statistics of each recording through a projection that `corsmal-feat pca` fitted.
     #[arg(long, value_name = "FILE")]
     pub project: Option<PathBuf>,
@@ -89,7 +107,9 @@ pub struct ConfigArgs {
 impl ConfigArgs {
     /// The effective configuration; `logmel` by default.
     pub fn load(&self) -> Result<Config, Failure> {
-        let mut overrides = self.overrides.clone();
+        // Added first, so that keys of what is added can be set.
+        let added = self.added.iter().map(|feature| format!("+{feature}"));
+        let mut overrides: Vec<String> = added.chain(self.overrides.iter().cloned()).collect();
         if let Some(path) = &self.project {
             let path = serde_json::json!(path.display().to_string());
             overrides.push(format!("projection.file={path}"));
@@ -119,12 +139,16 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 
 fn extract(args: Args) -> Result<ExitCode, Failure> {
     let config = Arc::new(args.config.load()?);
-    let collected = inputs::collect(&args.inputs)?;
+    let names: Vec<OsString> = args.inputs.into_iter().chain(args.named).collect();
+    let collected = inputs::collect(&names)?;
     let skipped = collected.warning();
-    let found = collected.inputs;
+    let mut found = collected.inputs;
     if found.is_empty() {
-        let names: Vec<_> = args.inputs.iter().map(|name| name.to_string_lossy()).collect();
-        return Err(Failure::new(format!("--in {}: no recordings found", names.join(" "))));
+        let names: Vec<_> = names.iter().map(|name| name.to_string_lossy()).collect();
+        return Err(Failure::new(format!("{}: no recordings found", names.join(" "))));
+    }
+    if let Some(window) = args.window {
+        found = into_windows(found, WindowSpan { window, hop: args.hop.unwrap_or(window / 2.0) })?;
     }
     let options = RunOptions {
         out: args.out,
@@ -145,6 +169,7 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
         for input in inputs {
             println!("{}\t{}", input.id, input.source);
         }
+        Survey::of(&found, &config).warnings().iter().for_each(|warning| meter.warning(warning));
         meter.checked(inputs.len(), &config.hash());
         return Ok(ExitCode::SUCCESS);
     }
@@ -165,5 +190,13 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
             Ok(ExitCode::from(FAILED_FILES))
         }
         Err(error) => Err(error.into()),
+    }
+}
+
+/// Seconds of a window or from one to the next.
+fn window_seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (1e-3..=1e6).contains(&seconds) => Ok(seconds),
+        _ => Err("expected seconds, 0.001 to 1000000".into()),
     }
 }

@@ -3,10 +3,11 @@
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use corsmal_extract::config::{Config, PRESETS, Preset, SignalConfig};
-use corsmal_extract::engine::{Plan, channels_out};
+use corsmal_extract::config::{Channels, Config, PRESETS, Preset, SignalConfig};
+use corsmal_extract::engine::{Plan, PlannedFeature, channels_out};
 
 use crate::failure::Failure;
+use crate::paragraphs::wrapped;
 
 /// Arguments of `presets`.
 #[derive(clap::Args)]
@@ -23,12 +24,14 @@ pub struct Args {
     toml: bool,
 }
 
+/// Recordings as those of the CCM data set, by which columns are counted.
+const CHANNELS: usize = 8;
+const RATE: f64 = 44_100.0;
+
 /// Lists or explains presets.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let Some(name) = args.name else {
-        for preset in PRESETS {
-            println!("{:<16} {}", preset.name, Config::preset(preset.name)?.description);
-        }
+        list()?;
         return Ok(ExitCode::SUCCESS);
     };
     let preset = Preset::find(&name)?;
@@ -37,25 +40,84 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::SUCCESS);
     }
     let config = Arc::new(Config::preset(&name)?);
-    println!("{}\n\nConfiguration hash: {}\n", config.description, config.hash());
+    println!("{}\n\nConfiguration hash: {}\n", wrapped(&config.description, ""), config.hash());
     for feature in &config.features {
-        println!("{}: {}", feature.name(), feature.about());
+        println!("{}", wrapped(&format!("{}: {}", feature.name(), feature.about()), ""));
         if let Some([first, end]) = feature.coefficients() {
             println!("  kept: coefficients {first} to {}", end - 1);
         }
-        println!("  {}\n", feature.to_value());
+        println!();
     }
     if let Some(changes) = signal_changes(&config) {
-        println!("Signal: {changes}\n");
+        println!("{}\n", wrapped(&format!("Signal: {changes}"), ""));
     }
-    match &config.summary {
-        None => println!(
-            "Output: for each recording and feature an array [channels, coefficients, frames], and the \
-             times of its frames in seconds."
-        ),
-        Some(_) => println!("Output: one row a recording. {}", columns(&config)?),
-    }
+    let output = match &config.summary {
+        None => {
+            "Output: for each recording and feature an array [channels, coefficients, frames], \
+                 and the times of its frames in seconds."
+                .to_string()
+        }
+        Some(_) => format!("Output: one row a recording. {}", columns(&config)?),
+    };
+    println!("{}\n", wrapped(&output, ""));
+    println!("As a file (every other key has its default: corsmal-feat features NAME):\n");
+    let body = preset.toml.lines().skip_while(|line| line.starts_with("description"));
+    body.skip_while(|line| line.is_empty()).for_each(|line| println!("  {line}"));
     Ok(ExitCode::SUCCESS)
+}
+
+/// A table: what each preset computes of what, and how much.
+fn list() -> Result<(), Failure> {
+    let mut rows = vec![["preset", "channels", "rate", "output of a recording"].map(String::from)];
+    for preset in PRESETS {
+        let config = Arc::new(Config::preset(preset.name)?);
+        let channels = match &config.signal.channels {
+            Channels::All => "each".into(),
+            Channels::Mean => "mean".into(),
+            Channels::Downmix71 => "7.1 mix".into(),
+            Channels::List(list) => list.iter().map(usize::to_string).collect::<Vec<_>>().join(","),
+        };
+        let rate = match config.signal.sample_rate {
+            0.0 => "its own".into(),
+            rate => format!("{rate} Hz"),
+        };
+        rows.push([preset.name.into(), channels, rate, size(&config)?]);
+    }
+    let width = |column: usize| rows.iter().map(|row| row[column].len()).max().unwrap_or(0);
+    let widths = [width(0), width(1), width(2)];
+    for [name, channels, rate, output] in &rows {
+        let [a, b, c] = widths;
+        println!("{name:<a$}  {channels:<b$}  {rate:<c$}  {output}");
+    }
+    println!();
+    for preset in PRESETS {
+        let indent = " ".repeat(widths[0] + 2);
+        let description = wrapped(&Config::preset(preset.name)?.description, &indent);
+        println!("{:<width$}  {}", preset.name, description.trim_start(), width = widths[0]);
+    }
+    Ok(())
+}
+
+/// Numbers of a recording, for each channel where channels stay apart.
+fn size(config: &Arc<Config>) -> Result<String, Failure> {
+    let each = config.signal.channels == Channels::All;
+    let apart = each && !config.summary.as_ref().is_some_and(|s| s.average_channels);
+    let plan = plan(config, 1)?;
+    let of = if apart { " a channel" } else { "" };
+    if config.summary.is_some() {
+        return Ok(format!("{} columns{of}", plan.summary_names().len()));
+    }
+    let array = |feature: &PlannedFeature| match plan.hop(&feature.name) {
+        0.0 => format!("{} {}", feature.labels.len(), feature.name),
+        _ => format!("{} {} x frames", feature.labels.len(), feature.name),
+    };
+    let arrays: Vec<String> = plan.features.iter().map(array).collect();
+    Ok(format!("{}{of}", arrays.join(", ")))
+}
+
+fn plan(config: &Arc<Config>, channels: usize) -> Result<Plan, Failure> {
+    let rate = if config.signal.sample_rate > 0.0 { config.signal.sample_rate } else { RATE };
+    Ok(Plan::new(config, rate, channels)?)
 }
 
 /// Keys of the front end that are not at their defaults.
@@ -68,11 +130,8 @@ fn signal_changes(config: &Config) -> Option<String> {
 
 /// Number, order and names of the columns, for recordings as those of the CCM data set.
 fn columns(config: &Arc<Config>) -> Result<String, Failure> {
-    const CHANNELS: usize = 8;
-    const RATE: f64 = 44_100.0;
     let channels = channels_out(&config.signal.channels, CHANNELS).map_err(Failure::new)?;
-    let rate = if config.signal.sample_rate > 0.0 { config.signal.sample_rate } else { RATE };
-    let names = Plan::new(config, rate, channels)?.summary_names();
+    let names = plan(config, channels)?.summary_names();
     let (first, last) = (names.first(), names.last());
     Ok(format!(
         "Of {CHANNELS} channels at {RATE} Hz, {} columns, {} to {}: feature by feature, in it statistic \

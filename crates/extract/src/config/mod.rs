@@ -120,6 +120,7 @@ impl Config {
             }
         }
         librosa::resolve(&mut value)?;
+        check_tables(&value)?;
         let raw: Raw = serde_json::from_value(value).map_err(|e| top_level(&e))?;
         let signal: SignalConfig = typed("signal", &raw.signal)?;
         signal.check()?;
@@ -137,12 +138,14 @@ impl Config {
         FeatureConfig::check(&features, (rate > 0.0).then_some(rate))?;
         let summary = match raw.summary {
             None => None,
-            Some(value) => {
-                let wrong = |e| ConfigError::key("summary", format!("= {value}: {e}"));
-                let summary: SummaryConfig =
-                    serde_json::from_value(value.clone()).map_err(wrong)?;
+            Some(Value::Object(table)) => {
+                let summary: SummaryConfig = typed("summary", &table)?;
                 summary.check()?;
                 Some(summary)
+            }
+            Some(value) => {
+                let message = format!("= {value}: expected a table with the key stats");
+                return Err(ConfigError::key("summary", message));
             }
         };
         let description = raw.description;
@@ -178,6 +181,33 @@ impl Config {
             projection.remove("file");
         }
         blake3::hash(value.to_string().as_bytes()).to_hex().to_string()
+    }
+}
+
+/// Outermost keys.
+const TABLES: [&str; 5] = ["description", "signal", "features", "summary", "projection"];
+
+/// Refuses outermost keys that are none, and a configuration without features.
+fn check_tables(tree: &Value) -> Result<(), ConfigError> {
+    let Some(tables) = tree.as_object() else {
+        return Err(ConfigError::key("configuration", format!("= {tree}: expected tables")));
+    };
+    for key in tables.keys() {
+        if features::find(key).is_some() {
+            let message = format!("is unknown here: did you mean the table [features.{key}]?");
+            return Err(ConfigError::key(key, message));
+        }
+        if !TABLES.contains(&key.as_str()) {
+            let choices = corsmal_names::choices(key, TABLES.into_iter().chain(["librosa"]));
+            return Err(ConfigError::key(key, format!("is unknown here: {choices}")));
+        }
+    }
+    match tables.get("features") {
+        Some(_) => Ok(()),
+        None => {
+            let message = "are missing: at least one table, such as [features.mfcc]";
+            Err(ConfigError::key("features", message))
+        }
     }
 }
 

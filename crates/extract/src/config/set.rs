@@ -1,33 +1,68 @@
-//! `--set key=value`.
+//! Changes to a configuration: `--set key=value` and `--add feature`.
 
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
+use super::chain::SignalConfig;
+use crate::features;
 use crate::params::ConfigError;
+use crate::summary::SummaryConfig;
 
-/// Applies one assignment to a configuration tree. A key that starts with none of the other tables
-/// is a feature's (`mfcc.n_mels` is `features.mfcc.n_mels`); the value is TOML, or else a plain
+/// Tables beside `features`.
+const TABLES: [&str; 3] = ["signal", "summary", "projection"];
+
+/// What other tools call a key.
+const ELSEWHERE: [(&str, &str); 7] = [
+    ("sr", "signal.sample_rate"),
+    ("rate", "signal.sample_rate"),
+    ("mono", "signal.channels"),
+    ("offset", "signal.start"),
+    ("duration", "signal.length"),
+    ("stat", "summary.stats"),
+    ("statistics", "summary.stats"),
+];
+
+/// Applies one change to a configuration tree: `key=value`, or `+NAME` or `+NAME=KIND`, which adds a
+/// feature with its defaults.
+///
+/// A key that starts with none of the other tables is a feature's (`mfcc.n_mels` is
+/// `features.mfcc.n_mels`), and the feature must be there; the value is TOML, or else a plain
 /// string.
-pub fn apply(tree: &mut Value, assignment: &str) -> Result<(), ConfigError> {
-    let Some((key, text)) = assignment.split_once('=') else {
-        let message = "expected key=value, such as mfcc.n_mels=64";
+pub fn apply(tree: &mut Value, change: &str) -> Result<(), ConfigError> {
+    if let Some(feature) = change.strip_prefix('+') {
+        return add(tree, feature.trim());
+    }
+    let Some((key, text)) = change.split_once('=') else {
+        let message = "expected key=value, such as signal.sample_rate=16000";
         return Err(ConfigError::Syntax {
-            place: format!("--set {assignment}"),
+            place: format!("--set {change}"),
             message: message.into(),
         });
     };
     let (key, text) = (key.trim(), text.trim());
     let mut parts: Vec<&str> = key.split('.').collect();
-    if parts.iter().any(|p| p.is_empty()) || (parts.len() < 2 && key != "librosa") {
-        let message = "expected a dotted key, such as signal.sample_rate or mfcc.n_mels";
+    if parts.iter().any(|part| part.is_empty()) {
+        return Err(ConfigError::key(key, "expected a dotted key, such as signal.sample_rate"));
+    }
+    if parts.len() == 1 && key != "librosa" {
+        let found = homes(tree, key);
+        let message = match found.is_empty() {
+            true => "expected a dotted key, such as signal.sample_rate or mfcc.n_mels".to_string(),
+            false => format!("expected a dotted key: did you mean {}?", assigned(&found, text)),
+        };
         return Err(ConfigError::key(key, message));
     }
-    if !matches!(parts[0], "signal" | "features" | "summary" | "projection" | "librosa") {
+    if !TABLES.contains(&parts[0]) && parts[0] != "features" && key != "librosa" {
         parts.insert(0, "features");
     }
     let value = toml::from_str::<toml::Table>(&format!("value = {text}"))
         .ok()
         .and_then(|mut table| table.remove("value"))
         .map_or_else(|| Value::String(text.to_string()), to_json);
+    if let ["features", name, last, ..] = parts[..]
+        && feature_kind(tree, name).is_none()
+    {
+        return Err(ConfigError::key(key, absent(tree, name, last, text)));
+    }
     let mut place = tree;
     let (last, path) = parts.split_last().expect("one part at least");
     for part in path {
@@ -41,6 +76,105 @@ pub fn apply(tree: &mut Value, assignment: &str) -> Result<(), ConfigError> {
         None => return Err(ConfigError::key(key, "is not in a table")),
     };
     Ok(())
+}
+
+/// Adds the feature `NAME` or `NAME=KIND`.
+fn add(tree: &mut Value, feature: &str) -> Result<(), ConfigError> {
+    let (name, kind) = match feature.split_once('=') {
+        Some((name, kind)) => (name.trim(), kind.trim()),
+        None => (feature, feature),
+    };
+    if features::find(kind).is_none() {
+        let choices = corsmal_names::choices(kind, features::kinds());
+        return Err(ConfigError::key(
+            format!("--add {feature}"),
+            format!("is no feature: {choices}"),
+        ));
+    }
+    if feature_kind(tree, name).is_some() {
+        let message = format!(
+            "the configuration has {name} already: --set {name}.KEY=VALUE changes it, \
+             --add NEW_NAME={kind} adds another one"
+        );
+        return Err(ConfigError::key(format!("--add {feature}"), message));
+    }
+    let root = tree.as_object_mut();
+    let table = root.map(|root| root.entry("features").or_insert_with(|| json!({})));
+    match table.and_then(Value::as_object_mut) {
+        Some(table) => table.insert(name.into(), json!({"kind": kind})),
+        None => return Err(ConfigError::key("features", "is not a table")),
+    };
+    Ok(())
+}
+
+/// Features of the tree: name, kind.
+fn configured(tree: &Value) -> impl Iterator<Item = (&str, &str)> {
+    let table = tree.get("features").and_then(Value::as_object);
+    table.into_iter().flatten().map(|(name, feature)| {
+        (name.as_str(), feature.get("kind").and_then(Value::as_str).unwrap_or(name))
+    })
+}
+
+fn feature_kind<'t>(tree: &'t Value, name: &str) -> Option<&'t str> {
+    configured(tree).find(|(configured, _)| *configured == name).map(|(_, kind)| kind)
+}
+
+/// Dotted keys of the tree that end with this one, or else with the one most like it.
+fn homes(tree: &Value, key: &str) -> Vec<String> {
+    if let Some((_, home)) = ELSEWHERE.iter().find(|(other, _)| *other == key) {
+        return vec![(*home).to_string()];
+    }
+    let mut all: Vec<(String, String)> = Vec::new();
+    let mut table = |prefix: &str, keys: Value| {
+        let keys = keys.as_object().into_iter().flatten();
+        all.extend(keys.map(|(last, _)| (format!("{prefix}.{last}"), last.clone())));
+    };
+    table("signal", json!(SignalConfig::default()));
+    table("summary", json!(SummaryConfig::default()));
+    for (name, kind) in configured(tree) {
+        table(name, features::find(kind).map_or(Value::Null, |entry| entry.defaults()));
+    }
+    let wanted = match all.iter().any(|(_, last)| last == key) {
+        true => Some(key.to_string()),
+        false => {
+            let known = all.iter().map(|(_, last)| last.as_str());
+            corsmal_names::closest(key, known).map(str::to_string)
+        }
+    };
+    let home =
+        |(dotted, last): (String, String)| (Some(&last) == wanted.as_ref()).then_some(dotted);
+    all.into_iter().filter_map(home).collect()
+}
+
+/// The assignments that may have been meant.
+fn assigned(keys: &[String], text: &str) -> String {
+    let assignments: Vec<String> = keys.iter().map(|key| format!("{key}={text}")).collect();
+    assignments.join(" or ")
+}
+
+/// Why a key of a feature that is not there is refused, and what to do.
+fn absent(tree: &Value, name: &str, last: &str, text: &str) -> String {
+    let there: Vec<&str> = configured(tree).map(|(name, _)| name).collect();
+    let mut message = match there.is_empty() {
+        true => format!("the configuration has no feature {name}"),
+        false => format!("the configuration has no feature {name} (it has {})", there.join(", ")),
+    };
+    let slips = there.iter().copied().chain(TABLES);
+    let meant = corsmal_names::closest(name, slips).filter(|_| features::find(name).is_none());
+    let found = match meant {
+        Some(meant) => vec![format!("{meant}.{last}")],
+        None => homes(tree, last),
+    };
+    let adds = features::find(name).is_some();
+    match (found.is_empty(), adds) {
+        (false, _) => message += &format!(": did you mean {}?", assigned(&found, text)),
+        (true, true) => message.push(';'),
+        (true, false) => {}
+    }
+    if adds {
+        message += &format!(" --add {name} adds the feature");
+    }
+    message
 }
 
 /// The same tree as JSON. JSON has no number for infinity and NaN: they are the words `inf`, `-inf`
@@ -63,11 +197,10 @@ pub fn to_json(value: toml::Value) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
     #[test]
     fn infinity_is_a_word() {
-        let mut tree = json!({});
+        let mut tree = json!({"features": {"melspectrogram": {}}});
         apply(&mut tree, "melspectrogram.norm=inf").unwrap();
         assert_eq!(tree["features"]["melspectrogram"]["norm"], "inf");
         apply(&mut tree, "signal.start=-nan").unwrap();
@@ -87,5 +220,55 @@ mod tests {
         assert_eq!(tree["summary"]["stats"][1], "std");
         assert!(apply(&mut tree, "n_mels").is_err());
         assert!(apply(&mut tree, "n_mels=3").is_err());
+    }
+
+    #[test]
+    fn keys_without_a_home_say_where_they_may_belong() {
+        let refused = |change: &str| {
+            let mut tree = json!({"features": {"log": {"kind": "melspectrogram"}, "rms": {}}});
+            let before = tree.clone();
+            let refusal = apply(&mut tree, change).unwrap_err().to_string();
+            assert_eq!(tree, before, "{change}");
+            refusal
+        };
+        for (change, says) in [
+            ("sr=16000", "did you mean signal.sample_rate=16000?"),
+            ("sample_rate=16000", "did you mean signal.sample_rate=16000?"),
+            ("samplerate=16000", "did you mean signal.sample_rate=16000?"),
+            ("n_mels=64", "did you mean log.n_mels=64?"),
+            ("n_mel=64", "did you mean log.n_mels=64?"),
+            ("hop_length=64", "did you mean log.hop_length=64 or rms.hop_length=64?"),
+            ("stats=mean", "did you mean summary.stats=mean?"),
+            ("x=1", "expected a dotted key, such as signal.sample_rate or mfcc.n_mels"),
+            (
+                "mfcc.n_mels=64",
+                "no feature mfcc (it has log, rms): did you mean log.n_mels=64? --add mfcc adds the feature",
+            ),
+            ("features.mfcc.n_mels=64", "--add mfcc adds the feature"),
+            ("logg.n_mels=64", "did you mean log.n_mels=64?"),
+            ("singal.sample_rate=1", "did you mean signal.sample_rate=1?"),
+            ("logmel.n_mels=64", "did you mean log.n_mels=64?"),
+            ("mfcc.n_mfcc=13", "no feature mfcc (it has log, rms); --add mfcc adds the feature"),
+        ] {
+            let refusal = refused(change);
+            assert!(refusal.ends_with(says), "{change}: {refusal}");
+        }
+    }
+
+    #[test]
+    fn features_are_added_by_name_and_kind() {
+        let mut tree = json!({"features": {"rms": {}}});
+        apply(&mut tree, "+mfcc").unwrap();
+        apply(&mut tree, "mfcc.n_mels=64").unwrap();
+        apply(&mut tree, "+quiet=rms").unwrap();
+        assert_eq!(tree["features"]["mfcc"], json!({"kind": "mfcc", "n_mels": 64}));
+        assert_eq!(tree["features"]["quiet"]["kind"], "rms");
+        let refusal = apply(&mut tree, "+rms").unwrap_err().to_string();
+        assert!(refusal.contains("has rms already"), "{refusal}");
+        let refusal = apply(&mut tree, "+mfc").unwrap_err().to_string();
+        assert!(refusal.contains("did you mean \"mfcc\"?"), "{refusal}");
+        let mut empty = json!({});
+        apply(&mut empty, "+rms").unwrap();
+        assert_eq!(empty["features"]["rms"]["kind"], "rms");
     }
 }

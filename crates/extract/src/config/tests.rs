@@ -119,3 +119,42 @@ fn other_versions_are_refused() {
     let refused = config("[features.mfcc]", &["librosa=0.9"]).unwrap_err();
     assert_eq!(refused, "configuration key librosa: = 0.9: expected \"0.8\" or \"0.11\"");
 }
+
+#[test]
+fn outermost_tables_are_checked_by_name() {
+    let refused = |text: &str| config(text, &[]).unwrap_err();
+    let refusal = refused("[feature.mfcc]");
+    assert!(refusal.contains("feature: is unknown here: did you mean \"features\"?"), "{refusal}");
+    let refusal = refused("[mfcc]\nn_mels = 3");
+    assert!(refusal.contains("did you mean the table [features.mfcc]?"), "{refusal}");
+    assert!(refused("[signal]").contains("features: are missing"));
+    assert!(refused("summary = 3\n[features.rms]").contains("expected a table with the key stats"));
+}
+
+#[test]
+fn statistics_are_a_word_words_or_a_list() {
+    let stats = |set: &str| {
+        let found = config("[features.rms]", &[set]).unwrap();
+        found.summary.unwrap().stats.iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    assert_eq!(stats("summary.stats=mean"), ["mean"]);
+    assert_eq!(stats("summary.stats=mean, p95"), ["mean", "p95"]);
+    assert_eq!(stats("summary.stats=[\"mean\", \"std\"]"), ["mean", "std"]);
+    let refusal = config("[features.rms]", &["summary.average_channels=true"]).unwrap_err();
+    assert!(refusal.contains("summary.stats: is empty"), "{refusal}");
+}
+
+#[test]
+fn a_key_of_a_feature_that_is_not_there_changes_nothing() {
+    let preset = Preset::find("logmel").unwrap().toml;
+    let refusal = config(preset, &["mfcc.n_mels=64"]).unwrap_err();
+    assert_eq!(
+        refusal,
+        "configuration key mfcc.n_mels: the configuration has no feature mfcc (it has \
+         melspectrogram): did you mean melspectrogram.n_mels=64? --add mfcc adds the feature"
+    );
+    let added = config(preset, &["+mfcc", "mfcc.n_mels=64"]).unwrap();
+    let names: Vec<&str> = added.features.iter().map(|f| f.name()).collect();
+    assert_eq!(names, ["melspectrogram", "mfcc"]);
+    assert_eq!(added.to_value()["features"]["mfcc"]["n_mels"], 64);
+}

@@ -24,7 +24,7 @@ mod windows;
 pub use extractor::{Extractor, Refused, Span};
 pub use failed::Failed;
 pub use front_end::{FrontEnd, channels_out};
-pub use plan::Plan;
+pub use plan::{Plan, PlannedFeature};
 pub use plans::{Planned, Plans};
 pub use recording::{FeatureArray, Features, FinishError, Recording};
 pub use signal::{Signal, SignalError, Signals};

@@ -51,6 +51,7 @@ impl FeatureKind for A34Short {
         ("step", "Seconds from one frame to the next."),
         ("deltas", "true: the differences from frame to frame as well, 68 values in all."),
     ]];
+    const PYTHON: &'static str = "corsmal.a34_short";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let samples = |name, seconds: f64| {

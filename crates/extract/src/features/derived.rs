@@ -11,6 +11,11 @@ pub trait Derived: Send + Sync {
         source.to_vec()
     }
 
+    /// Whether every frame depends on all frames before it, ever less, as behind a recursive filter.
+    fn is_recursive(&self) -> bool {
+        false
+    }
+
     /// Begins a recording.
     fn start(&self, shape: FrameShape) -> Box<dyn InTime + '_>;
 }

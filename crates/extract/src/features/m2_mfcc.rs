@@ -42,6 +42,7 @@ impl FeatureKind for M2Mfcc {
         the whole recording in memory.";
     const KEYS: &'static [Keys] =
         &[LIBROSA, &[("padded", "true: zero frames up to the 1501 of the network.")]];
+    const PYTHON: &'static str = "corsmal.m2_mfcc";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let plan = Plan { librosa: self.librosa, padded: self.padded };

@@ -42,6 +42,7 @@ impl FeatureKind for M3Spectrogram {
         ("n_fft", "Samples of a frame that the transform sees."),
         ("hop_length", "Samples from one frame to the next, at 16,600 Hz."),
     ]];
+    const PYTHON: &'static str = "corsmal.m3_spectrogram";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let params = StftParams::new(self.n_fft, self.hop_length);

@@ -35,6 +35,7 @@ impl FeatureKind for M4LogMel {
         "variant",
         "code: as the released program computes it; paper: as the paper describes it.",
     )]];
+    const PYTHON: &'static str = "corsmal.m4_logmel";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let step = (0.01 * sr).round_ties_even();

@@ -55,6 +55,7 @@ impl FeatureKind for M6Spectrogram {
         LIBROSA,
         &[("begin", "Where the ten seconds begin: onset (the second detected one) or start.")],
     ];
+    const PYTHON: &'static str = "corsmal.m6_spectrogram";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let crop = match self.begin {

@@ -55,6 +55,10 @@ impl Default for Pcen {
 }
 
 impl Derived for Normalisation {
+    fn is_recursive(&self) -> bool {
+        true
+    }
+
     fn start(&self, shape: FrameShape) -> Box<dyn InTime + '_> {
         let FrameShape { coefficients, channels } = shape;
         Box::new(Smoothing {

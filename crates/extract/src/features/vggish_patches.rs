@@ -37,6 +37,7 @@ impl FeatureKind for VggishPatches {
         from 125 to 7500 Hz; every 96 frames are a patch of VGGish, a shorter rest is dropped \
         (resamples by itself). Holds the whole recording in memory.";
     const KEYS: &'static [Keys] = &[];
+    const PYTHON: &'static str = "corsmal.m5_vggish_patches";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         Ok(Feature::whole(Extent::Frames(0.01 * sr), Patches(sr), indices(64)))

@@ -78,6 +78,14 @@ pub enum InputError {
         /// How many, and how many are allowed.
         reason: String,
     },
+    /// A recording that cannot be cut into windows.
+    #[error("{id}: {reason}")]
+    Window {
+        /// Its id, or that of a window.
+        id: String,
+        /// Why.
+        reason: String,
+    },
     /// Two inputs cannot be told apart.
     #[error(
         "{first} and {second} both have the id {id:?}; name each once, or give ids in a manifest"

@@ -22,6 +22,7 @@ use super::{Progress, RunError, identity_of};
 use crate::config::Config;
 use crate::engine::{Failed, Features, Planned, Plans, Recording, Span, Watch, reading};
 use crate::inputs::{Input, InputSource};
+use crate::survey::Survey;
 
 /// Inputs in work or waiting to be written, per thread.
 const AHEAD: usize = 4;
@@ -41,6 +42,7 @@ pub struct Limits {
 pub struct Collector<'a> {
     inputs: &'a [Input],
     limits: Limits,
+    survey: &'a Survey,
     progress: &'a dyn Progress,
     stop: &'a Arc<AtomicBool>,
     plans: Plans<'a>,
@@ -103,6 +105,7 @@ impl<'a> Collector<'a> {
         inputs: &'a [Input],
         config: &Arc<Config>,
         limits: Limits,
+        survey: &'a Survey,
         folder: PathBuf,
         (progress, stop): (&'a dyn Progress, &'a Arc<AtomicBool>),
         output: Output,
@@ -112,6 +115,7 @@ impl<'a> Collector<'a> {
         Self {
             inputs,
             limits,
+            survey,
             progress,
             stop,
             plans: Plans::new(config.clone(), |warning| progress.warning(warning)),
@@ -220,6 +224,9 @@ impl<'a> Collector<'a> {
             Err(failed) => return self.fail(index, outcome, failed),
         };
         reading::describe(&mut outcome, source.as_ref());
+        if let Some(reason) = self.survey.refusal(source.spec().channels) {
+            return self.fail(index, outcome, Failed::new(Status::Mismatch, reason));
+        }
         let planned = match self.plans.of(source.spec()) {
             Ok(planned) => planned,
             Err(e) => return self.fail(index, outcome, Failed::new(Status::Unsupported, e)),

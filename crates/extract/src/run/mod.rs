@@ -19,6 +19,7 @@ use corsmal_files::table::Table;
 use crate::config::Config;
 use crate::inputs::Input;
 use crate::ledger::{self, Ledger, Record, Resumed};
+use crate::survey::Survey;
 
 use check::identity_of;
 use collector::{Collector, Limits};
@@ -98,7 +99,8 @@ pub fn run(
     stop: &Arc<AtomicBool>,
 ) -> Result<RunReport, RunError> {
     let Checked { out, format, provenance, done } = check(inputs, config, options)?;
-    let inputs = options.shard.of(inputs);
+    let all = inputs;
+    let inputs = options.shard.of(all);
     let header = ledger::Header::new(&provenance, format);
     if let Some(report) = done {
         // What a kill between the last two steps of that run has left.
@@ -120,11 +122,14 @@ pub fn run(
     }
     let resumed = records.len();
     let output = Output::new(ledger, records, inputs, format)?;
+    let survey = Survey::of(all, config);
+    survey.warnings().iter().for_each(|warning| progress.warning(warning));
     progress.start(inputs.len(), resumed);
     let RunOptions { jobs, max_errors, compression, .. } = *options;
     let limits = Limits { jobs, max_errors, compression };
     let folder = draft::folder(&out).to_path_buf();
-    let collector = Collector::new(inputs, config, limits, folder, (progress, stop), output);
+    let collector =
+        Collector::new(inputs, config, limits, &survey, folder, (progress, stop), output);
     let output = collector.work()?;
     if stop.load(Ordering::Relaxed) {
         return Err(RunError::Interrupted);
@@ -150,10 +155,13 @@ pub fn table(
         return Err(RunError::NoSummary);
     }
     let output = Output::in_memory(inputs)?;
+    let survey = Survey::of(inputs, config);
+    survey.warnings().iter().for_each(|warning| progress.warning(warning));
     progress.start(inputs.len(), 0);
     let limits = Limits { jobs, max_errors: None, compression: Compression::Stored };
     let folder = folder.to_path_buf();
-    let collector = Collector::new(inputs, config, limits, folder, (progress, stop), output);
+    let collector =
+        Collector::new(inputs, config, limits, &survey, folder, (progress, stop), output);
     let output = collector.work()?;
     if stop.load(Ordering::Relaxed) {
         return Err(RunError::Interrupted);

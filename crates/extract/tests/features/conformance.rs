@@ -24,6 +24,12 @@ fn plan(feature: &Entry, channels: usize) -> Arc<Plan> {
     Arc::new(Plan::new(&Arc::new(config), SR, channels).unwrap())
 }
 
+/// Whether frames of the feature depend on all frames before them.
+fn is_recursive(feature: &Entry) -> bool {
+    let plan = plan(feature, 1);
+    plan.features.last().unwrap().derived.as_ref().is_some_and(|derived| derived.is_recursive())
+}
+
 fn is_finite(values: &Array3<f32>) -> bool {
     !values.is_empty() && values.iter().all(|x| x.is_finite())
 }
@@ -176,10 +182,15 @@ fn a_delay_of_one_hop_is_a_delay_of_one_frame_or_the_feature_says_that_it_sees_t
         assert_eq!(delayed.dim().2, n + 1, "{kind}");
         // Frames whose neighbours all lie in the signal.
         let (first, last) = (8, n - 8);
-        assert_eq!(
-            plain.slice(s![.., .., first..last]),
-            delayed.slice(s![.., .., first + 1..last + 1]),
-            "{kind}"
-        );
+        let plain = plain.slice(s![.., .., first..last]);
+        let delayed = delayed.slice(s![.., .., first + 1..last + 1]);
+        if !is_recursive(feature) {
+            assert_eq!(plain, delayed, "{kind}");
+            continue;
+        }
+        // What is carried from the first frame on fades.
+        let largest = plain.iter().fold(0.0, |m: f32, x| m.max(x.abs()));
+        let off = plain.iter().zip(delayed).fold(0.0, |m: f32, (a, b)| m.max((a - b).abs()));
+        assert!(off <= 1e-5 * largest, "{kind}: {off} of {largest}");
     }
 }

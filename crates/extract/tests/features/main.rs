@@ -6,4 +6,5 @@ mod arrays;
 mod conformance;
 mod neighbours;
 mod real_audio;
+mod registered;
 mod support;

@@ -1,5 +1,6 @@
 //! `corsmal-feat inspect`: what a file holds and whether it is healthy.
 
+mod extracted;
 mod output;
 mod overview;
 mod recording;

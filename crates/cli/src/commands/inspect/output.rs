@@ -15,6 +15,7 @@ use corsmal_files::table::Table;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::extracted::{Recordings, differences, shapes};
 use super::{Refusal, to_json};
 use crate::failure::Failure;
 use crate::progress::{counts, failure_line};
@@ -61,6 +62,8 @@ struct Run {
     meta: Provenance,
     config: Value,
     statuses: BTreeMap<&'static str, usize>,
+    #[serde(flatten)]
+    recordings: Recordings,
     failed: Vec<Outcome>,
 }
 
@@ -149,16 +152,28 @@ impl Run {
         let config = serde_json::from_str(&meta.config)?;
         let failed = table.outcomes().iter().filter(|o| !o.status.has_features());
         let (statuses, failed) = (counts(table.outcomes()), failed.cloned().collect());
-        Ok(Self { meta, config, statuses, failed })
+        let recordings = Recordings::of(&table);
+        Ok(Self { meta, config, statuses, recordings, failed })
     }
 
+    /// Names of its features.
+    fn features(&self) -> Vec<&str> {
+        let features = self.config["features"].as_object().into_iter().flatten();
+        features.map(|(name, _)| name.as_str()).collect()
+    }
+
+    /// Outcomes, recordings, then what is not usual about the configuration.
     fn text(&self, lines: &mut Vec<String>) {
-        lines.push(format!("\n  configuration {}", self.meta.config_hash));
-        settings("", &self.config, lines);
+        self.recordings.text(lines);
         if !self.failed.is_empty() {
             lines.push("\n  without features".into());
             lines.extend(self.failed.iter().map(|o| format!("    {}", failure_line(o))));
         }
+        let (base, changes) = differences(&self.config);
+        lines.push(format!("\n  configuration {}", self.meta.config_hash));
+        let others = if changes.is_empty() { "" } else { ", but for (there in brackets)" };
+        lines.push(format!("  is {base}{others}"));
+        lines.extend(changes.iter().map(|change| format!("    {change}")));
     }
 }
 
@@ -180,26 +195,23 @@ impl Contents {
             }
         });
         lines.push(String::new());
-        // The arrays of single recordings may be many; what covers the whole run is always shown.
-        let (single, whole): (Vec<_>, Vec<_>) = match self.run {
-            Some(_) if self.format == "npz" => {
-                self.members.iter().partition(|m| layout::is_frame_level(&m.name))
-            }
-            _ => (self.members.iter().collect(), Vec::new()),
-        };
-        let width = self.members.iter().map(|m| m.name.chars().count()).max().unwrap_or(0);
-        let row = |m: &&Member| {
-            let shape: Vec<_> = m.shape.iter().map(u64::to_string).collect();
-            let Member { name, kind, .. } = m;
-            format!("  {name:width$}  {kind:8}  {}", shape.join(" × ")).trim_end().to_owned()
-        };
-        lines.extend(single.iter().take(SHOWN).map(row));
-        if single.len() > SHOWN {
-            lines.push(format!("  … and {} more (--json lists all)", single.len() - SHOWN));
-        }
-        lines.extend(whole.iter().map(row));
         if let Some(run) = &self.run {
+            let names: Vec<&str> = run.features();
+            let arrays = self.members.iter().map(|m| (m.name.as_str(), m.shape.as_slice()));
+            lines.extend(shapes(&names, arrays, self.format == "npz"));
             run.text(&mut lines);
+        } else {
+            let width = self.members.iter().map(|m| m.name.chars().count()).max().unwrap_or(0);
+            let row = |m: &Member| {
+                let shape: Vec<_> = m.shape.iter().map(u64::to_string).collect();
+                let Member { name, kind, .. } = m;
+                format!("  {name:width$}  {kind:8}  {}", shape.join(" × ")).trim_end().to_owned()
+            };
+            lines.extend(self.members.iter().take(SHOWN).map(row));
+            if self.members.len() > SHOWN {
+                let more = self.members.len() - SHOWN;
+                lines.push(format!("  … and {more} more (--json lists all)"));
+            }
         }
         if let Some(Projected { n_inputs, n_components, config_hash, rows }) = &self.projection {
             lines.push(format!(
@@ -214,17 +226,4 @@ impl Contents {
 
 fn plural(n: usize, noun: &str) -> String {
     format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
-}
-
-/// One line `key = value` for every setting.
-fn settings(key: &str, value: &Value, lines: &mut Vec<String>) {
-    match value {
-        Value::Object(table) => {
-            for (name, value) in table {
-                let dot = if key.is_empty() { "" } else { "." };
-                settings(&format!("{key}{dot}{name}"), value, lines);
-            }
-        }
-        value => lines.push(format!("    {key} = {value}")),
-    }
 }

@@ -8,3 +8,4 @@ mod projection;
 mod refusals;
 mod streams;
 mod support;
+mod tables;

@@ -33,7 +33,7 @@ fn impossible_values_name_key_value_and_what_is_allowed() {
         ("mfcc.n_fft=-5", &["n_fft", "-5"]),
         ("mfcc.n_fft=1000000000000", &["n_fft", "1000000000000", "at most"]),
         ("mfcc.n_mels=1000000000000", &["n_mels", "1000000000000", "at most"]),
-        ("rms.frame_length=1000000000000", &["frame_length", "1000000000000", "at most"]),
+        ("+rms rms.frame_length=1000000000000", &["frame_length", "1000000000000", "at most"]),
         ("mfcc.win_length=4096", &["win_length", "4096", "2048"]),
         ("mfcc.fmin=5000.0 mfcc.fmax=100.0", &["features.mfcc", "fm", "5000", "100"]),
         ("mfcc.window=hannn", &["features.mfcc.window", "hannn", "hamming"]),
@@ -43,7 +43,7 @@ fn impossible_values_name_key_value_and_what_is_allowed() {
         ("mfcc.power=3", &["power", "3", "1 or 2"]),
         ("mfcc.coefficients=[5,5]", &["coefficients", "first < end"]),
         ("mfcc.coefficients=[0,21]", &["coefficients", "21", "at most 20"]),
-        ("delta.of=nothing", &["features.delta.of", "nothing", "earlier"]),
+        ("+delta delta.of=nothing", &["features.delta.of", "nothing", "earlier"]),
         ("nonsense.kind=nonsense", &["nonsense", "mfcc"]),
         ("signal.sample_rate=-1", &["signal.sample_rate", "-1", "768000"]),
         ("signal.channels=left", &["signal.channels", "left", "downmix-7.1"]),
@@ -51,17 +51,31 @@ fn impossible_values_name_key_value_and_what_is_allowed() {
         ("signal.preemphasis=nan", &["signal.preemphasis"]),
         ("signal.length=1e9", &["signal.length", "1000000000", "seconds"]),
         ("signal.sample_rate=8000 mfcc.fmin=4100.0", &["features.mfcc", "fmax", "4100"]),
-        ("delta.width=9223372036854775807", &["delta", "width", "at most"]),
-        ("x.kind=onset_strength x.n_mels=1000000", &["n_mels", "1000000", "at most"]),
-        ("chroma_stft.n_chroma=1000000000", &["n_chroma", "at most"]),
-        ("chroma_cqt.n_octaves=1000000000", &["n_octaves", "at most"]),
-        ("tonnetz.n_octaves=9223372036854775807", &["n_octaves", "at most"]),
-        ("m3_spectrogram.n_fft=1000000000", &["n_fft", "at most"]),
-        ("spec9216.fixed_len=9223372036854775807", &["fixed_len", "at most"]),
+        ("+delta delta.width=9223372036854775807", &["delta", "width", "at most"]),
+        ("+x=onset_strength x.n_mels=1000000", &["n_mels", "1000000", "at most"]),
+        ("+chroma_stft chroma_stft.n_chroma=1000000000", &["n_chroma", "at most"]),
+        ("+chroma_cqt chroma_cqt.n_octaves=1000000000", &["n_octaves", "at most"]),
+        ("+tonnetz tonnetz.n_octaves=9223372036854775807", &["n_octaves", "at most"]),
+        ("+m3_spectrogram m3_spectrogram.n_fft=1000000000", &["n_fft", "at most"]),
+        ("+spec9216 spec9216.fixed_len=9223372036854775807", &["fixed_len", "at most"]),
         ("nonsense", &["--set nonsense", "key=value"]),
+        ("rms.center=false", &["no feature rms", "mfcc.center=false?", "--add rms"]),
+        ("sr=16000", &["did you mean signal.sample_rate=16000?"]),
+        ("n_mels=64", &["did you mean mfcc.n_mels=64?"]),
+        ("mfcc.n_mel=64", &["features.mfcc.n_mel", "did you mean \"n_mels\"?"]),
+        ("mfcc.n_mels=many", &["features.mfcc.n_mels", "\"many\"", "a whole number"]),
+        ("mfcc.center=1", &["features.mfcc.center", "true or false"]),
+        ("signal.res_type=soxr", &["signal.res_type", "did you mean \"soxr_hq\"?"]),
+        ("summary.stats=men", &["did you mean \"mean\"?"]),
+        ("summary=3", &["expected a dotted key"]),
+        ("+mfcc", &["has mfcc already"]),
+        ("+mfc", &["did you mean \"mfcc\"?"]),
     ] {
         let mut more = vec!["--preset", "mfcc-zcr"];
-        more.extend(set.split(' ').flat_map(|s| ["--set", s]));
+        more.extend(set.split(' ').flat_map(|change| match change.strip_prefix('+') {
+            Some(feature) => ["--add", feature],
+            None => ["--set", change],
+        }));
         refused(&input, &out, &more, words);
     }
     assert_eq!(names(folder.path()), ["a.wav"]);

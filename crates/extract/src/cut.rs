@@ -1,0 +1,108 @@
+//! Recordings cut into windows, each an input of its own.
+
+use crate::inputs::{Input, InputError, InputSource};
+use crate::survey::{Header, count_frames, headers};
+
+/// Column that holds the recording of a window: the group that folds keep together.
+pub const RECORDING: &str = "recording";
+/// Most windows of a run.
+const MOST: u64 = 50_000_000;
+
+/// Length of windows and distance from one to the next, in seconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WindowSpan {
+    /// Length.
+    pub window: f64,
+    /// From the begin of one to that of the next.
+    pub hop: f64,
+}
+
+/// The windows of every recording, in the order of time: `x@0.5` begins half a second into `x`.
+/// Labels are copied; the column `recording` holds the id of the recording, unless there is such a
+/// label.
+///
+/// Windows begin at multiples of the hop and are whole: what remains at the end is left out, but a
+/// recording shorter than a window is one window. Both are whole numbers of frames, rounded once.
+/// What cannot be read stays as it is, for its row in the output.
+///
+/// # Errors
+/// Standard input, which cannot be read twice; a recording whose length cannot be found; too many
+/// windows; a window with the id of another input.
+pub fn into_windows(inputs: Vec<Input>, span: WindowSpan) -> Result<Vec<Input>, InputError> {
+    let headers = headers(&inputs);
+    let mut windows = Vec::new();
+    for (input, header) in inputs.into_iter().zip(headers) {
+        if input.source == InputSource::Stdin {
+            let reason = "standard input cannot be cut into windows; classify --window can";
+            return Err(InputError::Window { id: input.id, reason: reason.into() });
+        }
+        match header {
+            Some(header) => of_recording(&input, &header, span, &mut windows)?,
+            None => windows.push(labelled(&input, input.id.clone(), input.start, input.end)),
+        }
+    }
+    let mut ids: Vec<&str> = windows.iter().map(|input| input.id.as_str()).collect();
+    ids.sort_unstable();
+    match ids.windows(2).find(|pair| pair[0] == pair[1]) {
+        None => Ok(windows),
+        Some(pair) => {
+            let reason = "a window of one recording has the id of another input".into();
+            Err(InputError::Window { id: pair[0].into(), reason })
+        }
+    }
+}
+
+fn of_recording(
+    input: &Input,
+    header: &Header,
+    span: WindowSpan,
+    windows: &mut Vec<Input>,
+) -> Result<(), InputError> {
+    let rate = f64::from(header.sample_rate);
+    let frames = |seconds: f64| ((seconds * rate).round() as u64).max(1);
+    let refuse = |reason: String| InputError::Window { id: input.id.clone(), reason };
+    let there = match (header.frames, &input.source) {
+        (Some(frames), _) => frames,
+        (None, InputSource::File(path)) => {
+            count_frames(path).map_err(|e| refuse(format!("its length is unknown: {e}")))?
+        }
+        (None, InputSource::Stdin) => 0,
+    };
+    // The frame that a time names: the last one that does not begin later.
+    let at = |seconds: f64| (seconds * rate + 1e-3) as u64;
+    let base = input.start.map_or(0, at);
+    let end = input.end.map_or(there, at).min(there);
+    let (window, hop) = (frames(span.window), frames(span.hop));
+    let count = match end.saturating_sub(base).checked_sub(window) {
+        None => {
+            // Shorter than a window.
+            let id = format!("{}@{}", input.id, seconds(base, rate));
+            windows.push(labelled(input, id, input.start, input.end));
+            return Ok(());
+        }
+        Some(rest) => rest / hop + 1,
+    };
+    if count + windows.len() as u64 > MOST {
+        return Err(refuse(format!("more than {MOST} windows in all: a longer hop makes fewer")));
+    }
+    for number in 0..count {
+        let first = base + number * hop;
+        let id = format!("{}@{}", input.id, seconds(first, rate));
+        let (start, end) = (first as f64 / rate, (first + window) as f64 / rate);
+        windows.push(labelled(input, id, Some(start), Some(end)));
+    }
+    Ok(())
+}
+
+/// Seconds of a frame, to the microsecond and as short as can be.
+fn seconds(frame: u64, rate: f64) -> f64 {
+    (frame as f64 / rate * 1e6).round() / 1e6
+}
+
+fn labelled(input: &Input, id: String, start: Option<f64>, end: Option<f64>) -> Input {
+    let mut labels = input.labels.clone();
+    if !labels.iter().any(|(name, _)| name == RECORDING) {
+        labels.push((RECORDING.into(), input.id.clone()));
+    }
+    Input { id, source: input.source.clone(), start, end, labels }
+}

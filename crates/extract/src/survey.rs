@@ -1,0 +1,192 @@
+//! What the headers of recordings say before any of them is computed: how long they are, and whether
+//! they fit into one table.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use corsmal_audio::{AudioError, BlockSource};
+use rayon::prelude::*;
+
+use crate::config::{Channels, Config};
+use crate::inputs::{Input, InputSource};
+
+/// Samples read at a time where frames have to be counted.
+const BLOCK: usize = 1 << 16;
+/// Different values that a message names.
+const NAMED: usize = 4;
+
+/// What a header says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Header {
+    /// Frames per second.
+    pub sample_rate: u32,
+    /// Channels.
+    pub channels: u16,
+    /// Frames; `None` where only decoding tells.
+    pub frames: Option<u64>,
+    /// Whether its reader can go to any frame.
+    pub seekable: bool,
+}
+
+/// The header of each input, every file opened once; `None` for standard input and for what cannot
+/// be read, which the run will say.
+pub fn headers(inputs: &[Input]) -> Vec<Option<Header>> {
+    let mut paths: Vec<&Path> = inputs.iter().filter_map(path).collect();
+    paths.sort_unstable();
+    paths.dedup();
+    let read = |path: &&Path| corsmal_audio::open(path).ok().map(|source| of(source.as_ref()));
+    let found: Vec<Option<Header>> = paths.par_iter().map(read).collect();
+    let known: HashMap<&Path, Option<Header>> = paths.into_iter().zip(found).collect();
+    inputs.iter().map(|input| path(input).and_then(|path| known.get(path).copied()?)).collect()
+}
+
+fn path(input: &Input) -> Option<&Path> {
+    match &input.source {
+        InputSource::File(path) => Some(path),
+        InputSource::Stdin => None,
+    }
+}
+
+fn of(source: &dyn BlockSource) -> Header {
+    let (spec, frames) = (source.spec(), source.most_frames());
+    let (sample_rate, channels) = (spec.sample_rate, spec.channels);
+    Header { sample_rate, channels, frames, seekable: source.seekable() }
+}
+
+/// Frames of a recording whose header does not say: decodes it.
+///
+/// # Errors
+/// It cannot be read to its end.
+pub fn count_frames(path: &Path) -> Result<u64, AudioError> {
+    let mut source = corsmal_audio::open(path)?;
+    let channels = usize::from(source.spec().channels);
+    let mut block = vec![0.0; (BLOCK / channels).max(1) * channels];
+    let mut frames = 0;
+    loop {
+        match source.read(&mut block)? {
+            0 => return Ok(frames),
+            read => frames += read as u64,
+        }
+    }
+}
+
+/// Whether recordings fit into one summary table.
+///
+/// The number of channels that most of them have sets the width; the first of them in the list where
+/// there are equally many. It is found from all inputs, whatever shard is computed, so that shards
+/// agree.
+#[derive(Debug, Default)]
+pub struct Survey {
+    /// Numbers of channels, the one that sets the width first; empty where the width does not depend
+    /// on them.
+    channels: Vec<Group<u16>>,
+    /// Sample rates, the most frequent first; empty where features run at a common rate.
+    rates: Vec<Group<u32>>,
+}
+
+/// Recordings that agree.
+#[derive(Debug)]
+struct Group<T> {
+    value: T,
+    count: usize,
+    /// Id of the first.
+    first: String,
+}
+
+impl Survey {
+    /// Looks at the headers of `inputs`, where `config` asks for a summary table.
+    pub fn of(inputs: &[Input], config: &Config) -> Self {
+        let Some(summary) = &config.summary else { return Self::default() };
+        let apart = config.signal.channels == Channels::All
+            && !summary.average_channels
+            && config.projection.is_none();
+        let own_rate = config.signal.sample_rate == 0.0;
+        if !apart && !own_rate {
+            return Self::default();
+        }
+        let headers = headers(inputs);
+        let known = || inputs.iter().zip(&headers).filter_map(|(i, h)| Some((i, (*h)?)));
+        let mut survey = Self::default();
+        if apart {
+            survey.channels = groups(known().map(|(input, header)| (input, header.channels)));
+        }
+        if own_rate {
+            survey.rates = groups(known().map(|(input, header)| (input, header.sample_rate)));
+        }
+        survey
+    }
+
+    /// What the user should know before the run.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if let [width, others @ ..] = &self.channels[..]
+            && !others.is_empty()
+        {
+            let odd: usize = others.iter().map(|group| group.count).sum();
+            let all = odd + width.count;
+            warnings.push(format!(
+                "{} of {all} recordings have {}, which sets the width of the table (the first: {}); \
+                 {odd} with another number ({}) will have the status mismatch. {ONE_WIDTH}",
+                width.count,
+                channels_text(width.value),
+                width.first,
+                listed(others, |channels| channels_text(*channels)),
+            ));
+        }
+        if let [usual, _, ..] = &self.rates[..] {
+            warnings.push(format!(
+                "the table mixes {} sample rates ({}): features of different rates are not \
+                 comparable. --set signal.sample_rate={} gives one",
+                self.rates.len(),
+                listed(&self.rates, |rate| format!("{rate} Hz")),
+                usual.value,
+            ));
+        }
+        warnings
+    }
+
+    /// Why a recording of so many channels does not fit into the table.
+    pub fn refusal(&self, channels: u16) -> Option<String> {
+        let width = self.channels.first().filter(|width| width.value != channels)?;
+        Some(format!(
+            "{} where the table has {} (as {}). {ONE_WIDTH}",
+            channels_text(channels),
+            width.value,
+            width.first
+        ))
+    }
+}
+
+/// What the user can do.
+const ONE_WIDTH: &str =
+    "--set signal.channels=mean or --set summary.average_channels=true gives one width";
+
+fn channels_text(channels: u16) -> String {
+    format!("{channels} channel{}", if channels == 1 { "" } else { "s" })
+}
+
+/// The inputs by their value, the most frequent value first, else in the order of the list.
+fn groups<'i, T: PartialEq>(values: impl Iterator<Item = (&'i Input, T)>) -> Vec<Group<T>> {
+    let mut groups: Vec<Group<T>> = Vec::new();
+    for (input, value) in values {
+        match groups.iter_mut().find(|group| group.value == value) {
+            Some(group) => group.count += 1,
+            None => groups.push(Group { value, count: 1, first: input.id.clone() }),
+        }
+    }
+    groups.sort_by_key(|group| std::cmp::Reverse(group.count));
+    groups
+}
+
+/// `44100 Hz: 3, such as a`.
+fn listed<T>(groups: &[Group<T>], name: impl Fn(&T) -> String) -> String {
+    let one = |group: &Group<T>| match group.count {
+        1 => format!("{}: {}", name(&group.value), group.first),
+        count => format!("{}: {count}, such as {}", name(&group.value), group.first),
+    };
+    let mut parts: Vec<String> = groups.iter().take(NAMED).map(one).collect();
+    if groups.len() > NAMED {
+        parts.push(format!("and {} more", groups.len() - NAMED));
+    }
+    parts.join("; ")
+}
