@@ -7,7 +7,6 @@ use corsmal_dsp::DspError;
 use corsmal_files::outcome::Status;
 
 use super::extractor::Refused;
-use super::recording::FinishError;
 
 /// Why a recording has no features.
 #[derive(Debug)]
@@ -56,6 +55,26 @@ impl From<Refused> for Failed {
         };
         Self::new(status, error.to_string())
     }
+}
+
+/// Why stored values could not be finished.
+#[derive(Debug, thiserror::Error)]
+pub enum FinishError {
+    /// The temporary file failed.
+    #[error("temporary file: {0}")]
+    Temporary(#[from] io::Error),
+    /// A feature needs more frames.
+    #[error("{of} has {frames} frames, {feature} needs at least {needed}")]
+    TooFewFrames {
+        /// The feature.
+        feature: String,
+        /// The feature whose frames it reads; itself where these are its own.
+        of: String,
+        /// Frames that there are.
+        frames: usize,
+        /// Frames needed.
+        needed: usize,
+    },
 }
 
 impl From<FinishError> for Failed {

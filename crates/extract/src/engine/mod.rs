@@ -22,11 +22,11 @@ mod watch;
 mod windows;
 
 pub use extractor::{Extractor, Refused, Span};
-pub use failed::Failed;
+pub use failed::{Failed, FinishError};
 pub use front_end::{FrontEnd, channels_out};
 pub use plan::{Plan, PlannedFeature};
 pub use plans::{Planned, Plans};
-pub use recording::{FeatureArray, Features, FinishError, Recording};
+pub use recording::{FeatureArray, Features, Recording};
 pub use signal::{Signal, SignalError, Signals};
 pub use store::Store;
 pub use watch::Watch;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use corsmal_files::outcome::Status;
 
 use super::extractor::Span;
-use super::failed::Failed;
+use super::failed::{Failed, FinishError};
 use super::plan::{Plan, PlannedFeature};
 use super::store::Store;
 use crate::features::{Derived, FrameShape, TooFewFrames};
@@ -287,26 +287,6 @@ impl Recording {
         keep(rest)?;
         Ok(out)
     }
-}
-
-/// Why stored values could not be finished.
-#[derive(Debug, thiserror::Error)]
-pub enum FinishError {
-    /// The temporary file failed.
-    #[error("temporary file: {0}")]
-    Temporary(#[from] io::Error),
-    /// A feature needs more frames.
-    #[error("{of} has {frames} frames, {feature} needs at least {needed}")]
-    TooFewFrames {
-        /// The feature.
-        feature: String,
-        /// The feature whose frames it reads; itself where these are its own.
-        of: String,
-        /// Frames that there are.
-        frames: usize,
-        /// Frames needed.
-        needed: usize,
-    },
 }
 
 /// Raises `peaks [channels]` to the maxima of the values `range` of every frame of `width` values.
