@@ -128,7 +128,8 @@ fn outputs_show_contents_configuration_and_outcomes() {
         let report = text(&shown.stdout);
         for words in [
             "2 inputs: 1 corrupt, 1 ok",
-            "features.mfcc.n_mfcc = 20",
+            "rates       8000 Hz × 1\n  channels    4 × 1\n  durations   1.00 s each, 1.00 s in all",
+            "  is preset mfcc-zcr\n",
             "audio/bad.wav: corrupt at byte 0",
         ] {
             assert!(report.contains(words), "{words:?} is not in: {report}");
@@ -141,6 +142,8 @@ fn outputs_show_contents_configuration_and_outcomes() {
             (&first.into(), &shape)
         );
         assert_eq!(report["config"]["features"]["mfcc"]["n_mfcc"], 20);
+        assert_eq!(report["rates"], serde_json::json!({"8000": 1}));
+        assert_eq!(report["channels"], serde_json::json!({"4": 1}));
         assert_eq!(report["meta"]["shard"], "0/1");
         assert_eq!(report["statuses"], serde_json::json!({"corrupt": 1, "ok": 1}));
         assert_eq!(report["failed"][0]["id"], "bad");
@@ -148,7 +151,7 @@ fn outputs_show_contents_configuration_and_outcomes() {
         assert_eq!(picture.status.code(), Some(2));
     }
     let members = text(&inspect(&[&folder.path().join("feats.npz")]).stdout);
-    assert!(members.contains("__summary__") && members.contains("1 × 168"), "{members}");
+    assert!(members.contains("1 row × 168 columns"), "{members}");
 }
 
 #[test]
