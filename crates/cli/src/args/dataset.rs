@@ -15,7 +15,7 @@ const FOLDERS: &str = "folders";
 const FOLDER_COLUMN: &str = "class";
 
 /// Label columns that are groups rather than something to predict.
-const NO_TARGETS: [&str; 3] = ["fold", "group", "container"];
+const NO_TARGETS: [&str; 4] = ["fold", "group", "container", "recording"];
 
 /// How to read an `.npz` that `extract` did not write.
 #[derive(clap::Args, Clone)]

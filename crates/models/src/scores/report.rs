@@ -88,7 +88,7 @@ pub struct ScoreIntervals {
 }
 
 /// Columns that are groups unless the user says otherwise.
-const GROUPS: [&str; 3] = ["group", "container", "fold"];
+const GROUPS: [&str; 4] = ["group", "container", "recording", "fold"];
 
 impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     /// Scores every line against its true class or number.
