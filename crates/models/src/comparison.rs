@@ -159,6 +159,7 @@ pub fn compare(
     resamples: usize,
     seed: u64,
 ) -> std::result::Result<Comparison, PredictionError> {
+    let (truth, other_truth) = (first.truth(target)?, second.truth(target)?);
     first.check_once_each()?;
     second.check_once_each()?;
     let places: HashMap<&Id, usize> =
@@ -168,7 +169,6 @@ pub fn compare(
     if let Some(extra) = second.rows.iter().find(|row| !known.contains(&row.key)) {
         return Err(second.content(format!("{:?} is not in {one}", extra.key.0)));
     }
-    let (truth, other_truth) = (first.truth(target)?, second.truth(target)?);
     let (mut a, mut b) = (Vec::new(), Vec::new());
     for (row, truth) in first.rows.iter().zip(&truth) {
         let Some(&at) = places.get(&row.key) else {

@@ -124,9 +124,12 @@ impl FormatRule {
             && !known.contains(&count)
         {
             let trained: Vec<String> = known.iter().map(u32::to_string).collect();
+            let remedy = match known.as_slice() {
+                [1] => "--set signal.channels=mean mixes them",
+                _ => "features with signal.channels=mean or summary.average_channels=true take any",
+            };
             return Err(format!(
-                "{}; the model was trained on recordings of {}: train on features with \
-                 signal.channels=mean or summary.average_channels=true to take any number",
+                "{}; the model was trained on recordings of {}: {remedy}",
                 crate::dataset::count(count as usize, "channel"),
                 trained.join(", ")
             ));

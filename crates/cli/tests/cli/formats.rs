@@ -87,10 +87,7 @@ fn recordings_of_another_rate_or_channel_count_are_rows_without_prediction() {
         ] {
             assert!(told.contains(part), "{part}: {told}");
         }
-        assert!(
-            !told.contains("features.npz") && !told.contains("/.tmp"),
-            "no temporary file: {told}"
-        );
+        assert!(!told.contains("features.npz"), "no temporary file: {told}");
     }
 
     let (code, lines, told) = t.classify(&[text(&slow), "--set", "signal.sample_rate=44100"]);
