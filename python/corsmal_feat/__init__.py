@@ -12,6 +12,7 @@ from ._extract import SignalExtractor, extract
 from ._features import Features, load_features
 from ._harmonic import cqt, istft
 from ._mono import to_mono
+from ._pcen import pcen
 from ._pitch import estimate_tuning, piptrack, pitch_tuning
 from ._pitches import (
     A4_to_tuning,
@@ -165,6 +166,7 @@ __all__ = [
     "note_to_midi",
     "octs_to_hz",
     "onset",
+    "pcen",
     "perceptual_weighting",
     "piptrack",
     "pitch_tuning",

@@ -16,6 +16,7 @@ from ._params import (
     HpssParams,
     MelParams,
     PaaFrames,
+    PcenParams,
     PeakParams,
     PitchParams,
     StftParams,
@@ -72,6 +73,7 @@ __all__ = [
     "paa_fbank",
     "pca_fit",
     "pca_project",
+    "pcen",
     "piptrack",
     "pitch_tuning",
     "poly_features",
@@ -159,6 +161,9 @@ def detrend(envelope: Floats) -> _Doubles: ...
 def onset_detect(
     envelope: Floats, sr: float, hop_length: int, normalize: bool, peaks: PeakParams
 ) -> list[list[int]]: ...
+def pcen(
+    s: Floats, reference: Floats | None, zi: _Doubles | None, keys: PcenParams
+) -> tuple[_Doubles, _Doubles]: ...
 def onset_backtrack(events: list[int], energy: Floats) -> list[int]: ...
 def istft(
     spectrogram: npt.NDArray[np.complex64] | npt.NDArray[np.complex128],

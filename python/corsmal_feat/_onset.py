@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -76,14 +77,92 @@ def onset_strength(
     (87,)
     """
     if aggregate is False:
-        raise ParameterError("aggregate = False is not possible: a function or None")
+        raise ParameterError(
+            "aggregate = False is not possible: a function or None; onset_strength_multi gives "
+            "every band"
+        )
     lag, max_size = _count("lag", lag), _count("max_size", max_size)
     n_fft, hop_length = _count("n_fft", n_fft), _count("hop_length", hop_length)
+    s, ref = _compared((y, sr, S), ref, feature, (n_fft, hop_length), kwargs)
+    delay = n_fft // (2 * hop_length) if center else None
+    envelope: Any
+    if callable(aggregate) and aggregate is not np.mean:
+        rises: Any = unrows(_core.onset_rises(rows(s, 2), ref, lag, max_size), s, 2)
+        flux = np.asarray(aggregate(rises, axis=-2), dtype=s.dtype)
+        envelope = _delayed(flux, lag, delay, s.shape[-1])
+    else:
+        envelope = unrows(_core.onset_strength(rows(s, 2), ref, lag, max_size, delay), s, 2)
+    if detrend:
+        envelope = unrows(_core.detrend(rows(envelope, 1)), envelope, 1)
+    strength: Floats = envelope
+    return strength
+
+
+def onset_strength_multi(
+    *,
+    y: npt.ArrayLike | None = None,
+    sr: float = 22050,
+    S: npt.ArrayLike | None = None,
+    n_fft: int = 2048,
+    hop_length: int = 512,
+    lag: int = 1,
+    max_size: int = 1,
+    ref: Any = None,
+    detrend: bool = False,
+    center: bool = True,
+    feature: Callable[..., Any] | None = None,
+    aggregate: Callable[..., Any] | bool | None = None,
+    channels: Sequence[int] | Sequence[slice] | None = None,
+    **kwargs: Any,
+) -> Floats:
+    """Spectral flux of groups of bands, or with `aggregate=False` of every band
+    [shape=(..., groups, t)] (librosa.onset.onset_strength_multi). Parameters are those of
+    `onset_strength`, and
+
+    Parameters
+    ----------
+    channels : list of int or of slice, optional
+        Bands where groups begin and end, or the groups themselves; one group by default.
+    aggregate : callable or False
+        Instead of the mean over the bands of a group; False keeps every band.
+
+    Examples
+    --------
+    >>> y = np.zeros(44100, np.float32)
+    >>> corsmal_feat.onset.onset_strength_multi(y=y, sr=44100, aggregate=False).shape
+    (128, 87)
+    """
+    lag, max_size = _count("lag", lag), _count("max_size", max_size)
+    n_fft, hop_length = _count("n_fft", n_fft), _count("hop_length", hop_length)
+    s, ref = _compared((y, sr, S), ref, feature, (n_fft, hop_length), kwargs)
+    flux: Any = unrows(_core.onset_rises(rows(s, 2), ref, lag, max_size), s, 2)
+    if aggregate is not False:
+        mean = aggregate if callable(aggregate) else np.mean
+        groups = [mean(flux[..., group, :], axis=-2) for group in _groups(channels)]
+        flux = np.stack(groups, axis=-2).astype(s.dtype)
+    delay = n_fft // (2 * hop_length) if center else None
+    envelope: Any = _delayed(flux, lag, delay, None)
+    if detrend:
+        envelope = unrows(_core.detrend(rows(envelope, 1)), envelope, 1)
+    strength: Floats = envelope if delay is None else envelope[..., : s.shape[-1]]
+    return strength
+
+
+def _compared(
+    source: tuple[Any, float, Any],
+    ref: Any,
+    feature: Callable[..., Any] | None,
+    framing: tuple[int, int],
+    keywords: dict[str, Any],
+) -> tuple[Any, Any]:
+    """The spectrogram in dB [shape=(..., d, t)], and the rows of what it is compared with. `source`
+    is (y, sr, S), `framing` (n_fft, hop_length)."""
+    (y, sr, S), (n_fft, hop_length) = source, framing
     if S is None:
         if feature is None:
             feature = _double_melspectrogram
-            kwargs.setdefault("fmax", 0.5 * sr)
-        mel = feature(y=y, sr=sr, n_fft=n_fft, hop_length=hop_length, **kwargs)
+            keywords.setdefault("fmax", 0.5 * sr)
+        mel = feature(y=y, sr=sr, n_fft=n_fft, hop_length=hop_length, **keywords)
         S = power_to_db(np.abs(mel))
     s: Any = np.atleast_2d(floats("S", S))
     if ref is not None:
@@ -91,20 +170,28 @@ def onset_strength(
         if ref.shape != s.shape:
             raise ParameterError(f"ref has shape {ref.shape}, expected {s.shape}")
         ref = rows(ref.astype(s.dtype), 2)
-    delay = n_fft // (2 * hop_length) if center else None
-    envelope: Any
-    if callable(aggregate) and aggregate is not np.mean:
-        rises: Any = unrows(_core.onset_rises(rows(s, 2), ref, lag, max_size), s, 2)
-        flux = np.asarray(aggregate(rises, axis=-2), dtype=s.dtype)
-        padding = [(0, 0)] * (flux.ndim - 1) + [(lag + (delay or 0), 0)]
-        envelope = np.pad(flux, padding)
-        envelope = envelope[..., : s.shape[-1]] if center else envelope
+    return s, ref
+
+
+def _delayed(flux: Any, lag: int, delay: int | None, length: int | None) -> Any:
+    """`flux` behind the zeros before its first comparison, cut to `length` where it is centred."""
+    padding = [(0, 0)] * (flux.ndim - 1) + [(lag + (delay or 0), 0)]
+    padded = np.pad(flux, padding)
+    return padded if delay is None else padded[..., :length]
+
+
+def _groups(channels: Sequence[int] | Sequence[slice] | None) -> list[slice]:
+    """Groups of bands."""
+    if channels is None:
+        return [slice(None)]
+    if all(isinstance(channel, slice) for channel in channels):
+        groups = [channel for channel in channels if isinstance(channel, slice)]
     else:
-        envelope = unrows(_core.onset_strength(rows(s, 2), ref, lag, max_size, delay), s, 2)
-    if detrend:
-        envelope = unrows(_core.detrend(rows(envelope, 1)), envelope, 1)
-    strength: Floats = envelope
-    return strength
+        edges = sorted({int(channel) for channel in channels if not isinstance(channel, slice)})
+        groups = [slice(a, b) for a, b in pairwise(edges)]
+    if not groups:
+        raise ParameterError(f"channels = {channels!r} is not possible: two bands or one slice")
+    return groups
 
 
 def onset_detect(

@@ -121,3 +121,17 @@ class PaaFrames(NamedTuple):
     step: int
     mid_window: int
     mid_step: int
+
+
+class PcenParams(NamedTuple):
+    """Per-channel energy normalisation; `b` is instead of the time constant."""
+
+    sr: float
+    hop_length: int
+    gain: float
+    bias: float
+    power: float
+    time_constant: float
+    eps: float
+    b: float | None
+    max_size: int

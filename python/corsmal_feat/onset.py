@@ -1,5 +1,5 @@
 """Onset strength and onsets (librosa.onset)."""
 
-from ._onset import onset_backtrack, onset_detect, onset_strength
+from ._onset import onset_backtrack, onset_detect, onset_strength, onset_strength_multi
 
-__all__ = ["onset_backtrack", "onset_detect", "onset_strength"]
+__all__ = ["onset_backtrack", "onset_detect", "onset_strength", "onset_strength_multi"]

@@ -14,6 +14,7 @@ mod frontends;
 mod harmonic;
 mod mel;
 mod onset;
+mod pcen;
 mod pool;
 mod recording;
 mod resample;
@@ -67,6 +68,8 @@ mod _core {
     use crate::mel::{apply_mel, delta, mel, melspectrogram, mfcc, power_to_db};
     #[pymodule_export]
     use crate::onset::{detrend, onset_backtrack, onset_detect, onset_rises, onset_strength};
+    #[pymodule_export]
+    use crate::pcen::pcen;
     #[pymodule_export]
     use crate::pool::jobs;
     #[pymodule_export]

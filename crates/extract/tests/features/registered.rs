@@ -22,3 +22,28 @@ fn every_feature_has_its_line_in_the_table_of_parity() {
         .collect();
     assert!(missing.is_empty(), "docs/parity.md, \"At a glance\", has no line for {missing:?}");
 }
+
+#[test]
+fn every_feature_has_its_python_function() {
+    let page = file("docs/python.md");
+    let tables: Vec<&str> = page.lines().filter(|line| line.starts_with('|')).collect();
+    let mut missing = Vec::new();
+    for feature in registry() {
+        if feature.python().is_empty() {
+            continue;
+        }
+        let (module, function) = match feature.python().rsplit_once('.') {
+            Some((module, function)) => (format!("{module}.py"), function),
+            None => ("__init__.py".into(), feature.python()),
+        };
+        let source = file(&format!("python/corsmal_feat/{module}"));
+        let exported = source.split("__all__ = [").nth(1).and_then(|rest| rest.split(']').next());
+        if !exported.unwrap_or_default().contains(&format!("\"{function}\"")) {
+            missing.push(format!("{}: {function} in __all__ of {module}", feature.kind()));
+        }
+        if !tables.iter().any(|row| row.contains(&format!("`{function}`"))) {
+            missing.push(format!("{}: `{function}` in a table of docs/python.md", feature.kind()));
+        }
+    }
+    assert!(missing.is_empty(), "missing: {missing:#?}");
+}

@@ -1,0 +1,115 @@
+"""Per-channel energy normalisation (librosa.pcen)."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._arrays import floats, rows, unrows
+from ._params import PcenParams
+from .errors import ParameterError
+
+
+def pcen(
+    S: npt.ArrayLike,
+    *,
+    sr: float = 22050,
+    hop_length: int = 512,
+    gain: float = 0.98,
+    bias: float = 2,
+    power: float = 0.5,
+    time_constant: float = 0.400,
+    eps: float = 1e-6,
+    b: float | None = None,
+    max_size: int = 1,
+    ref: npt.ArrayLike | None = None,
+    axis: int = -1,
+    max_axis: int | None = None,
+    zi: npt.ArrayLike | None = None,
+    return_zf: bool = False,
+) -> Any:
+    """Per-channel energy normalisation of a spectrogram (librosa.pcen): every band divided by its
+    smoothed level and compressed.
+
+    Parameters
+    ----------
+    S : float32 or float64 [shape=(..., d, t)]
+        A non-negative spectrogram, made for 32-bit counts: multiply one of samples within -1 and 1
+        by 2**31.
+    sr, hop_length : number, int
+        Sample rate in Hz and samples between frames: `time_constant` is in seconds.
+    gain, bias, power, time_constant, eps, b : number
+        Of the gain control, the compression and the smoothing.
+    max_size, max_axis : int
+        Bands of a maximum filter before the smoothing, and their axis.
+    ref : [shape of S], optional
+        What to smooth instead of S.
+    axis : int
+        The axis of time.
+    zi, return_zf
+        State that the smoothing begins with, and whether to return the one behind the last frame.
+
+    Returns
+    -------
+    float64 [shape of S]; with `return_zf` also the state [shape of S, 1 along `axis`]
+
+    Examples
+    --------
+    >>> mel = corsmal_feat.feature.melspectrogram(y=np.zeros(22050, np.float32), power=1)
+    >>> corsmal_feat.pcen(mel * 2**31).shape
+    (128, 44)
+    """
+    if np.iscomplexobj(S):
+        warnings.warn("pcen uses the magnitudes of a complex S", stacklevel=2)
+        S = np.abs(np.asarray(S))
+    s: Any = floats("S", S)
+    time = axis % s.ndim if -s.ndim <= axis < s.ndim else None
+    if time is None:
+        raise ParameterError(f"axis = {axis} is not possible: S has {s.ndim} dimensions")
+    places = [time]
+    if max_size > 1 and ref is None:
+        if s.ndim == 1:
+            raise ParameterError("max_size is not possible for S of one dimension")
+        if max_axis is None and s.ndim != 2:
+            raise ParameterError(f"S has {s.ndim} dimensions: give max_axis, the axis of bands")
+        bands = (1 - time) % 2 if max_axis is None else max_axis % s.ndim
+        if bands == time:
+            raise ParameterError(f"max_axis = {max_axis} is the axis of time")
+        places = [bands, time]
+
+    def in_order(array: Any) -> Any:
+        moved = np.moveaxis(array, places, range(-len(places), 0))
+        return np.ascontiguousarray(moved[np.newaxis] if moved.ndim == 1 else moved)
+
+    ordered = in_order(s)
+    levels = None
+    if ref is not None:
+        given = np.asarray(ref)
+        if given.shape != s.shape:
+            raise ParameterError(f"ref has shape {given.shape}, expected {s.shape}")
+        levels = rows(in_order(given.astype(s.dtype)), 2)
+    state = None
+    if zi is not None:
+        shape = list(s.shape)
+        shape[time] = 1
+        try:
+            begun = np.broadcast_to(np.asarray(zi, np.float64), shape)
+        except ValueError:
+            found = np.shape(zi)
+            raise ParameterError(f"zi has shape {found}, expected {tuple(shape)}") from None
+        state = np.ascontiguousarray(rows(in_order(begun), 2)[..., 0])
+    keys = PcenParams(sr, hop_length, gain, bias, power, time_constant, eps, b, max_size)
+    out, end = _core.pcen(rows(ordered, 2), levels, state, keys)
+
+    def restored(array: Any) -> Any:
+        array = array[0] if s.ndim == 1 else array
+        return np.moveaxis(array, range(-len(places), 0), places)
+
+    result = restored(unrows(out, ordered, 2))
+    if not return_zf:
+        return result
+    return result, restored(end.reshape((*ordered.shape[:-1], 1)))
