@@ -208,7 +208,7 @@ def evaluate(
     annotations: str | os.PathLike[str],
     rules: str,
     baseline: str | os.PathLike[str] | None,
-    seed: int,
+    seed: int | None,
     containers: list[int] | None,
 ) -> tuple[list[tuple[str, float]], int, list[str]]: ...
 def effective_config(config: tuple[str, str], overrides: list[str]) -> tuple[str, str]: ...

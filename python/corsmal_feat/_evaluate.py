@@ -42,7 +42,7 @@ def evaluate(
     *,
     rules: str = "toolkit",
     baseline: StrPath | None = None,
-    seed: int = 1,
+    seed: int | None = None,
     containers: Iterable[int] | None = None,
 ) -> Scores:
     """Scores of a CORSMAL submission, as the command `corsmal-feat evaluate` computes them.
@@ -56,8 +56,10 @@ def evaluate(
     rules : {"paper", "toolkit-2020-10", "toolkit-2021-11", "toolkit"}
         Rule set; docs/benchmark.md describes each with its quirks.
     baseline : path, optional
-        Submission that stands in for tasks that are not addressed, in the filling mass only; by
-        default pseudo-random estimates of `seed`.
+        Submission that stands in, in the filling mass only, for tasks that are not addressed; by
+        default the official random1.csv or random123.csv, which come with this package.
+    seed : int, optional
+        Use pseudo-random estimates of this seed instead.
     containers : iterable of int, optional
         Score only the recordings of these containers.
 
@@ -76,13 +78,13 @@ def evaluate(
     63.2
     """
     chosen = None if containers is None else [int(container) for container in containers]
-    if not 0 <= int(seed) < 2**64:
+    if seed is not None and not 0 <= int(seed) < 2**64:
         raise ParameterError(f"seed = {seed} is not possible: a whole number from 0 to 2**64 - 1")
     for container in chosen or ():
         if not 0 <= container <= 255:
             raise ParameterError(f"containers: {container} is no container: 0 to 255")
     reference = None if baseline is None else os.fspath(baseline)
     values, recordings, notes = _core.evaluate(
-        os.fspath(submission), os.fspath(annotations), rules, reference, int(seed), chosen
+        os.fspath(submission), os.fspath(annotations), rules, reference, seed, chosen
     )
     return Scores(dict(values), rules, recordings, notes)

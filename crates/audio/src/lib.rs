@@ -33,6 +33,7 @@ mod health;
 mod input;
 #[cfg(feature = "symphonia")]
 mod mpeg;
+mod notes;
 #[cfg(feature = "symphonia")]
 mod ogg;
 mod open;

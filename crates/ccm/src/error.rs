@@ -67,6 +67,9 @@ pub enum CcmError {
     /// Prediction files that cannot be read or joined; the text names the file.
     #[error(transparent)]
     Predictions(#[from] corsmal_models::predictions::PredictionError),
+    /// The report could not be made; the text says why.
+    #[error(transparent)]
+    Report(#[from] corsmal_report::ReportError),
     /// The user stopped the work; what is done is kept for the next run.
     #[error("interrupted; the same command continues")]
     Interrupted,

@@ -5,12 +5,12 @@
 //! `docs/benchmark.md` gives the overview.
 
 pub mod benchmark;
+pub mod citation;
 pub mod dataset;
 pub mod decision;
 pub mod error;
 pub mod paper;
 pub mod predictions;
-pub mod report;
 pub mod scores;
 pub mod submission;
 pub mod synth;

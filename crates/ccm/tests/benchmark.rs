@@ -8,11 +8,11 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use corsmal_ccm::benchmark::{Baseline, FeatureSet, Options};
-use corsmal_ccm::report::Report;
+use corsmal_ccm::benchmark::{Baseline, FeatureSet, Made, Options};
 use corsmal_ccm::synth::{self, Size};
 use corsmal_extract::engine::{Features, Signals};
 use corsmal_files::npz::NpzFile;
+use corsmal_report::Report;
 use ndarray::Axis;
 use shared_data::ccm;
 
@@ -56,6 +56,21 @@ fn vector(set: FeatureSet, wav: &Path) -> Vec<f32> {
     }
 }
 
+fn options(data: &Path, out: &Path, baselines: Vec<Baseline>) -> Options {
+    Options {
+        data: data.into(),
+        out: out.into(),
+        baselines,
+        added: Vec::new(),
+        jobs: 2,
+        seed: 1,
+        made: Made {
+            on: Some("2026-11-27".into()),
+            command: Some("corsmal-feat benchmark".into()),
+        },
+    }
+}
+
 fn run(options: &Options) -> corsmal_ccm::Result<Report> {
     corsmal_ccm::benchmark::run(options, &|_| {}, &Arc::new(AtomicBool::new(false)))
 }
@@ -66,35 +81,68 @@ fn the_report_is_complete_and_features_are_kept() {
     let data = dir.path().join("data");
     synth::generate(&data, Size::Reduced, 3).unwrap();
     let out = dir.path().join("report");
-    let options = Options {
-        data: data.clone(),
-        out: out.clone(),
-        baselines: Baseline::all()
-            .into_iter()
-            .filter(|b| b.features == FeatureSet::ZcrMfcc)
-            .collect(),
-        added: Vec::new(),
-        jobs: 2,
-        seed: 1,
-    };
+    let zcr = |b: &Baseline| b.features == FeatureSet::ZcrMfcc;
+    let options = options(&data, &out, Baseline::all().into_iter().filter(zcr).collect());
     let report = run(&options).unwrap();
     assert!(report.warning.unwrap().contains("SYNTHETIC"));
 
     let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
     let html = read("report.html");
     assert!(html.contains("SYNTHETIC") && html.contains("<svg"));
-    for outside in ["http://", "https://", "src=", "@import", "<link"] {
+    for outside in ["src=", "@import", "<link", "url("] {
         assert!(!html.contains(outside), "the page needs {outside}");
     }
+    // The only addresses are links and the name of the SVG format.
+    let links = html.matches("<a href=\"https://").count();
+    let names = html.matches("xmlns=\"http://www.w3.org/2000/svg\"").count();
+    assert_eq!(html.matches("https://").count(), links);
+    assert_eq!(html.matches("http://").count(), names);
+    for told in [
+        "https://doi.org/10.1109/ACCESS.2022.3166906",
+        "https://corsmal.eecs.qmul.ac.uk/containers_manip.html",
+        "CC BY-NC 4.0",
+        "@article{",
+        "Because It's Tactile",
+        "2026-11-27",
+        "corsmal-feat benchmark",
+    ] {
+        assert!(html.contains(told), "{told}");
+    }
     let level = read("tables/level.csv");
-    assert!(level.contains("paper,M6,audio,paper,,80.2200,81.4600,80.8400"), "{level}");
+    let mut table = csv::Reader::from_reader(level.as_bytes());
+    let head = table.headers().unwrap().clone();
+    let place = |name: &str| head.iter().position(|h| h == name).unwrap();
+    let rows: Vec<csv::StringRecord> = table.records().map(|r| r.unwrap()).collect();
+    let m6 = rows.iter().find(|r| &r[1] == "M6").unwrap();
+    let figures = ["Training", "Public", "Private", "Combined"].map(|name| &m6[place(name)]);
+    assert_eq!(figures, ["", "80.2200", "81.4600", "80.8400"]);
+    // What was estimated here lies in its interval; the paper prints none.
+    for row in &rows {
+        let number = |name: &str| row[place(name)].parse::<f64>().ok();
+        let (low, high) = (number("Training, low"), number("Training, high"));
+        assert_eq!(low.is_some(), &row[0] == "ours", "{row:?}");
+        if let (Some(low), Some(high)) = (low, high) {
+            let value = number("Training").unwrap();
+            assert!((low..=high).contains(&value), "{row:?}");
+        }
+    }
+    let latex = read("tables/level.tex");
+    assert!(latex.contains("\\toprule") && latex.contains("80.84"), "{latex}");
     // Three baselines in two variants and the random estimates, each with a public figure.
     assert_eq!(level.lines().filter(|l| l.starts_with("ours,")).count(), 7);
     let json: serde_json::Value = serde_json::from_str(&read("report.json")).unwrap();
     assert_eq!(json["sections"][1]["id"], "level");
     let submission = read("submissions/zcr-mfcc-rf-corrected-public-test.csv");
     assert_eq!(submission.lines().count(), 1 + 19);
-    assert!(out.join("figures/zcr-mfcc-rf-corrected-joint-confusion.svg").exists());
+    for figure in [
+        "zcr-mfcc-rf-corrected-joint-confusion.svg",
+        "zcr-mfcc-knn-published-type-confusion.pdf",
+        "methods-level.svg",
+        "corrections-type.pdf",
+        "level-by-container-training.svg",
+    ] {
+        assert!(out.join("figures").join(figure).exists(), "{figure}");
+    }
     let with_ids = read("submissions/zcr-mfcc-rf-corrected-held-out-2022.csv");
     assert!(with_ids.starts_with("Configuration ID,") && with_ids.lines().count() == 1 + 114);
     assert!(read("submissions/random-training.csv").lines().count() == 1 + 114);
@@ -140,8 +188,7 @@ fn flat_test_recordings_are_submitted_by_id() {
     }
     let out = dir.path().join("report");
     let knn = Baseline::all().into_iter().take(1).collect();
-    let options =
-        Options { data, out: out.clone(), baselines: knn, added: Vec::new(), jobs: 2, seed: 1 };
+    let options = options(&data, &out, knn);
     run(&options).unwrap();
     let by_id = out.join("submissions/zcr-mfcc-knn-corrected-public-test-2022.csv");
     let table = std::fs::read_to_string(by_id).unwrap();
@@ -166,8 +213,7 @@ fn a_test_part_of_one_recording_is_classified() {
     std::fs::copy(from, test.join("000000.wav")).unwrap();
     let out = dir.path().join("report");
     let knn = Baseline::all().into_iter().filter(|b| b.slug() == "spectrogram-pca-knn").collect();
-    let options =
-        Options { data, out: out.clone(), baselines: knn, added: Vec::new(), jobs: 2, seed: 1 };
+    let options = options(&data, &out, knn);
     run(&options).unwrap();
     for variant in ["published", "corrected"] {
         let name = format!("submissions/spectrogram-pca-knn-{variant}-public-test-2022.csv");
@@ -184,6 +230,7 @@ fn one_name_is_not_added_twice() {
         added: vec![("x".into(), "a.csv".into()), ("x".into(), "b.csv".into())],
         jobs: 1,
         seed: 1,
+        made: Made::default(),
     };
     assert_eq!(run(&options).unwrap_err().to_string(), "x: added twice, names must differ");
 }
@@ -200,6 +247,7 @@ fn an_unusable_file_to_add_stops_before_the_work() {
         added: vec![("x".into(), file)],
         jobs: 1,
         seed: 1,
+        made: Made::default(),
     };
     let error = run(&options).unwrap_err().to_string();
     assert!(error.contains("p.csv: no column"), "{error}");
@@ -243,6 +291,7 @@ impl Adding {
             added: vec![("theirs".into(), path)],
             jobs: 1,
             seed: 1,
+            made: Made::default(),
         };
         let said = std::cell::RefCell::new(Vec::new());
         let progress = |step: &str| said.borrow_mut().push(step.to_string());
@@ -283,7 +332,8 @@ fn an_added_file_about_nothing_here_is_said() {
     let adding = Adding::new();
     let (report, said) = adding.run(&["13,0,1,1,-1".into(), "13,1,1,1,-1".into()]);
     assert_eq!(said, ["theirs: has no recording of this data set"]);
-    let notes = report.unwrap().sections.pop().unwrap();
+    let report = report.unwrap();
+    let notes = report.sections.iter().find(|s| s.id == "notes").unwrap();
     assert!(notes.text.last().unwrap().contains("predictions of theirs"), "{:?}", notes.text);
 }
 
@@ -311,6 +361,7 @@ fn a_file_of_ids_is_about_the_part_that_it_fits() {
             added: vec![("theirs".into(), path.clone())],
             jobs: 1,
             seed: 1,
+            made: Made::default(),
         };
         let result = run(&options);
         let level = adding.dir.path().join("report/tables/level.csv");

@@ -179,6 +179,7 @@ fn annotation_files_must_not_contradict_each_other() {
             added: Vec::new(),
             jobs: 1,
             seed: 1,
+            made: Default::default(),
         },
         &|_| {},
         &Default::default(),

@@ -8,6 +8,7 @@ mod commands;
 mod failure;
 mod help;
 mod interrupt;
+mod made;
 mod output;
 mod paragraphs;
 mod progress;

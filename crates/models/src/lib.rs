@@ -17,6 +17,7 @@ pub use table::argmax;
 pub mod comparison;
 pub mod cross_validation;
 pub mod dataset;
+pub mod explain;
 pub mod folds;
 pub mod fusion;
 pub mod grid;

@@ -1,32 +1,49 @@
-//! Pictures for `inspect` and for reports: each figure is drawn once, onto a [`Surface`], which is
-//! an SVG document or a PNG.
+//! Figures of recordings, features and scores. Each is drawn once, as SVG; PNG and PDF are made
+//! from that SVG by resvg and svg2pdf with a bundled font, so that all three look the same on every
+//! machine.
 //!
 //! ```
-//! use corsmal_plot::{BarChart, Series, to_svg};
+//! use corsmal_plot::{Mark, ScorePlot, ScoreRow, to_svg};
 //!
-//! let chart = BarChart {
+//! let plot = ScorePlot {
 //!     title: "Filling type".into(),
-//!     value_label: "F1 (%)".into(),
-//!     groups: vec!["kNN".into(), "SVM".into()],
-//!     series: vec![Series { name: "fold 1".into(), values: vec![71.2, 78.4], errors: vec![] }],
+//!     value_label: "weighted F1, percent".into(),
+//!     series: vec!["container folds".into()],
+//!     rows: vec![ScoreRow {
+//!         name: "Forest".into(),
+//!         marks: vec![Mark { series: 0, value: 93.2, interval: Some((91.2, 95.0)) }],
+//!     }],
+//!     range: Some((0.0, 100.0)),
 //! };
-//! let svg = to_svg(&chart)?;
+//! let svg = to_svg(&plot)?;
 //! assert!(svg.starts_with("<svg"));
 //! # Ok::<(), corsmal_plot::PlotError>(())
 //! ```
 
-mod bars;
+mod axis;
 mod color;
 mod confusion;
+mod drawing;
+mod export;
+mod feature;
 mod font;
-mod raster;
+mod heat_map;
+mod histogram;
+mod legend;
+mod lines;
 mod recording;
-mod surface;
-mod svg;
+mod scores;
+mod slopes;
 mod ticks;
 
-pub use bars::{BarChart, Series};
-pub use color::{Rgb, sequential};
+pub use color::{Paint, Rgb, sequential};
 pub use confusion::ConfusionMatrix;
-pub use recording::{ChannelPicture, RecordingPicture};
-pub use surface::{Anchor, Figure, Pixels, PlotError, Rect, Surface, TextStyle, to_png, to_svg};
+pub use drawing::Drawing;
+pub use export::{DEFAULT_DPI, Figure, PlotError, to_pdf, to_png, to_svg};
+pub use feature::{FeaturePanel, FeaturePicture};
+pub use heat_map::HeatMap;
+pub use histogram::Histogram;
+pub use lines::{Line, LinePlot};
+pub use recording::{ChannelPicture, RecordingPicture, WaveScale};
+pub use scores::{Mark, ScorePlot, ScoreRow};
+pub use slopes::{Slope, Slopes};

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use corsmal_ccm::dataset::Annotations;
 use corsmal_ccm::scores::{RuleSet, evaluate as ccm_evaluate};
-use corsmal_ccm::submission::{Submission, pseudo_random};
+use corsmal_ccm::submission::{Submission, stand_in};
 use pyo3::prelude::*;
 
 use crate::pool::compute;
@@ -13,7 +13,7 @@ use crate::value_error;
 pub(crate) type Scored = (Vec<(&'static str, f64)>, usize, Vec<String>);
 
 /// Scores by name, recordings scored, notes. Tasks that are not addressed are taken from `baseline`,
-/// or from pseudo-random estimates of `seed`, in the filling mass.
+/// by default the official stand-in, or from pseudo-random estimates of `seed`, in the filling mass.
 #[pyfunction]
 pub(crate) fn evaluate(
     py: Python<'_>,
@@ -21,7 +21,7 @@ pub(crate) fn evaluate(
     annotations: PathBuf,
     rules: &str,
     baseline: Option<PathBuf>,
-    seed: u64,
+    seed: Option<u64>,
     containers: Option<Vec<u8>>,
 ) -> PyResult<Scored> {
     let rules = RuleSet::ALL.into_iter().find(|set| set.name() == rules).ok_or_else(|| {
@@ -30,15 +30,11 @@ pub(crate) fn evaluate(
     })?;
     let scores = compute(py, || {
         let submission = Submission::read(&submission)?;
-        let baseline = baseline.map_or_else(
-            || {
-                let estimates = pseudo_random(&submission.keys, seed);
-                let name = format!("pseudo-random estimates, seed {seed}");
-                Ok(Submission::from_predictions(&name, submission.format, &estimates))
-            },
-            |path| Submission::read(&path),
-        )?;
         let annotations = Annotations::read(&annotations)?;
+        let baseline = match baseline {
+            Some(path) => Submission::read(&path)?,
+            None => stand_in(&submission, &annotations, rules, seed)?,
+        };
         ccm_evaluate(&submission, &annotations, &baseline, rules, containers.as_deref())
     })?
     .map_err(value_error)?;

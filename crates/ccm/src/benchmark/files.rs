@@ -5,14 +5,11 @@ use std::path::Path;
 use corsmal_files::draft;
 use corsmal_models::labels::Labels;
 use corsmal_models::model_file::{Model, ModelHeader};
-use corsmal_plot::{BarChart, ConfusionMatrix as MatrixPicture, Series, to_svg};
-use ndarray::Array2;
 
 use super::baselines::Outcome;
 use super::results::{Estimate, Rows, Target};
 use crate::dataset::{Filling, Subset};
 use crate::error::{CcmError, Result};
-use crate::scores::ConfusionMatrix;
 use crate::submission::{Format, RowKey, Submission, pseudo_random};
 
 /// Makes the folders, so that a wrong path fails before the work.
@@ -93,37 +90,4 @@ fn write_submissions(out: &Path, name: &str, pairs: &[(&Target, &Estimate)]) -> 
         Submission::write(&path, format, &predictions, &keys)?;
     }
     Ok(())
-}
-
-/// Writes a confusion matrix and its per-class bars as SVG files.
-pub(super) fn write_pictures(
-    out: &Path,
-    name: &str,
-    title: &str,
-    labels: &[String],
-    matrix: &ConfusionMatrix,
-) -> Result<()> {
-    let put = |file: String, svg: std::result::Result<String, corsmal_plot::PlotError>| {
-        let path = out.join("figures").join(file);
-        let svg = svg.map_err(|e| CcmError::Request(format!("{}: {e}", path.display())))?;
-        draft::write(&path, svg.as_bytes()).map_err(CcmError::Write)
-    };
-    let n = labels.len();
-    let picture = MatrixPicture {
-        title: title.to_string(),
-        labels: labels.to_vec(),
-        counts: Array2::from_shape_fn((n, n), |(t, e)| matrix.counts[t][e]),
-    };
-    put(format!("{name}-confusion.svg"), to_svg(&picture))?;
-    let bars = BarChart {
-        title: title.to_string(),
-        value_label: "F1 / %".into(),
-        groups: labels.to_vec(),
-        series: vec![Series {
-            name: "F1".into(),
-            values: matrix.classes().iter().map(|c| 100.0 * c.f1).collect(),
-            errors: Vec::new(),
-        }],
-    };
-    put(format!("{name}-classes.svg"), to_svg(&bars))
 }

@@ -5,10 +5,11 @@ mod added;
 mod baselines;
 mod features;
 mod files;
+mod interval;
 mod matrix;
+mod method;
+mod report;
 mod results;
-mod sections;
-mod tables;
 
 use std::collections::HashSet;
 use std::path::PathBuf;
@@ -21,7 +22,7 @@ pub use features::FeatureSet;
 
 use crate::dataset::DataSet;
 use crate::error::{CcmError, Result};
-use crate::report::Report;
+use corsmal_report::Report;
 use matrix::Store;
 
 /// What to run.
@@ -39,6 +40,17 @@ pub struct Options {
     pub jobs: usize,
     /// Seed of the forests and of the pseudo-random estimates.
     pub seed: u64,
+    /// When and how this run was started, for the report.
+    pub made: Made,
+}
+
+/// When and how a run was started.
+#[derive(Clone, Debug, Default)]
+pub struct Made {
+    /// The date.
+    pub on: Option<String>,
+    /// The command line.
+    pub command: Option<String>,
 }
 
 /// Runs the benchmark and writes `report.html`, `report.json`, `tables/`, `figures/`,
@@ -96,8 +108,11 @@ pub fn run(options: &Options, progress: &dyn Fn(&str), stop: &Arc<AtomicBool>) -
         }
     }
     files::write_random(&options.out, &rows, options.seed)?;
-    let report = tables::report(&set, &rows, &outcomes, &added, options.seed)?;
-    tables::write_pictures(&options.out, &rows, &outcomes, options.seed)?;
+    progress("report");
+    let made = &options.made;
+    let report = report::report(&set, &rows, &outcomes, &added, options.seed, made)?;
+    let figures = options.out.join("figures");
+    report::write_figures(&figures, &rows, &outcomes, options.seed)?;
     report.write(&options.out)?;
     Ok(report)
 }

@@ -70,6 +70,43 @@ impl Scores {
     }
 }
 
+impl RuleSet {
+    /// What the scores of these rules are about, by name.
+    pub fn legend(self) -> &'static [(&'static str, &'static str)] {
+        match self {
+            Self::Paper => &[
+                ("T1", "filling level, weighted F1"),
+                ("T2", "filling type, weighted F1"),
+                ("T3", "container capacity"),
+                ("mass", "filling mass"),
+                ("joint", "joint filling type and level, weighted F1"),
+                ("weight_error_N", "mean error of the weight, newtons"),
+            ],
+            Self::Toolkit202010 => &[
+                ("T1", "filling level, weighted F1"),
+                ("T2", "filling type, weighted F1"),
+                ("T3", "container capacity"),
+                ("mass", "filling mass"),
+            ],
+            Self::Toolkit202111 | Self::Toolkit => &[
+                ("s1", "filling level, weighted F1"),
+                ("s2", "filling type, weighted F1"),
+                ("s3", "container capacity"),
+                ("s4", "width at the top"),
+                ("s5", "width at the bottom"),
+                ("s6", "height"),
+                ("s7", "container mass"),
+                ("s8", "filling mass"),
+                ("s9", "object safety"),
+                ("s10", "delivery accuracy"),
+                ("overall", "all of these"),
+                ("JFLT", "joint filling level and type"),
+                ("CMD", "capacity and dimensions"),
+            ],
+        }
+    }
+}
+
 /// Scores a submission.
 ///
 /// `containers` restricts the scoring to the recordings of some containers. `baseline` stands in
@@ -107,7 +144,7 @@ pub fn evaluate(
     scores.notes.extend(aligned.notes);
     if input.addressed < 3 {
         scores.notes.push(format!(
-            "{} of the 3 tasks of the filling mass are addressed; the others are from {}",
+            "addresses {} of the 3 tasks of the filling mass; the rest is taken from {}",
             input.addressed,
             baseline.path.display()
         ));

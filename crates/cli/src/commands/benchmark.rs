@@ -4,10 +4,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use corsmal_ccm::CcmError;
-use corsmal_ccm::benchmark::{self, Baseline, Options};
+use corsmal_ccm::benchmark::{self, Baseline, Made, Options};
+use corsmal_report::{Cell, Report, Row, Source};
 
 use crate::args::Jobs;
 use crate::failure::{Failure, INTERRUPTED};
+use crate::made;
 
 /// Arguments of `benchmark`.
 #[derive(clap::Args)]
@@ -34,8 +36,8 @@ pub struct Args {
     seed: u64,
     #[command(flatten)]
     jobs: Jobs,
-    /// Do not say what is being done.
-    #[arg(long)]
+    /// Suppress progress messages.
+    #[arg(short, long)]
     quiet: bool,
 }
 
@@ -66,6 +68,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         added: args.add,
         jobs: args.jobs.count(),
         seed: args.seed,
+        made: Made { on: Some(made::today()), command: Some(made::command()) },
     };
     let quiet = args.quiet;
     let progress = |step: &str| {
@@ -81,10 +84,52 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         report => report?,
     };
     if !quiet {
+        print!("{}", scores(&report));
         if let Some(warning) = &report.warning {
-            println!("{warning}");
+            println!("{warning}\n");
         }
         println!("{}", options.out.join("report.html").display());
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The scores of this run on recordings that were not trained on, from the report's tables of the
+/// two classification tasks.
+fn scores(report: &Report) -> String {
+    const TASKS: [(&str, &str); 2] = [("level", "filling level"), ("type", "filling type")];
+    let tables = report.sections.iter().flat_map(|s| &s.tables);
+    let rows = |name: &str| -> Vec<&Row> {
+        let table = tables.clone().find(|t| t.name == name);
+        let rows = table.into_iter().flat_map(|t| &t.rows);
+        rows.filter(|row| row.source != Source::Paper).collect()
+    };
+    let [levels, types] = TASKS.map(|(name, _)| rows(name));
+    let word = |cell: Option<&Cell>| match cell {
+        Some(Cell::Text(text)) => text.clone(),
+        _ => String::new(),
+    };
+    // Method, inputs, protocol, then the score on the training part.
+    let score = |cell: Option<&Cell>| match cell {
+        Some(Cell::Score(value, Some((low, high)))) => {
+            format!("{value:6.2}  ({low:.1} to {high:.1})")
+        }
+        Some(Cell::Score(value, None)) => format!("{value:6.2}"),
+        _ => "     \u{2013}".into(),
+    };
+    let width = levels.iter().map(|r| word(r.cells.first()).chars().count()).max().unwrap_or(6);
+    let mut out = format!(
+        "\nweighted F1 on training recordings that were not trained on, percent (95 % interval)\n\n\
+         {:width$}  {:10}  {:24}{}\n",
+        "method", "protocol", TASKS[0].1, TASKS[1].1
+    );
+    for row in levels {
+        let (method, protocol) = (word(row.cells.first()), word(row.cells.get(2)));
+        let same = |other: &&&Row| {
+            word(other.cells.first()) == method && word(other.cells.get(2)) == protocol
+        };
+        let other = types.iter().find(same).and_then(|r| r.cells.get(3));
+        let (level, kind) = (score(row.cells.get(3)), score(other));
+        out.push_str(&format!("{method:width$}  {protocol:10}  {level:24}{kind}\n"));
+    }
+    out + "\n"
 }

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::ValueEnum;
 use corsmal_ccm::dataset::Annotations;
 use corsmal_ccm::scores::{self, RuleSet, Scores};
-use corsmal_ccm::submission::{Submission, pseudo_random};
+use corsmal_ccm::submission::{Submission, stand_in};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use crate::failure::Failure;
@@ -35,7 +35,7 @@ enum Format {
 /// Arguments of `evaluate`.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  corsmal-feat evaluate --submission team.csv --annotations \
-                        ccm_train_annotation.csv --rules toolkit --baseline random1.csv\n\n\
+                        ccm_train_annotation.csv --rules toolkit\n\n\
                         Quirks of each rule set are described in docs/benchmark.md.")]
 pub struct Args {
     /// Submissions in the official 2020 or 2022 format.
@@ -47,13 +47,14 @@ pub struct Args {
     /// Rules to score by.
     #[arg(long, value_enum, default_value = "toolkit")]
     rules: Rules,
-    /// Submission that stands in for tasks that are not addressed, in the filling mass only (the
-    /// official random1.csv or random123.csv). Default: pseudo-random estimates of --seed.
+    /// Submission that stands in, in the filling mass only, for tasks that are not addressed.
+    /// Default: the official random1.csv or random123.csv, which come with this tool; pseudo-random
+    /// estimates for recordings that those files do not have.
     #[arg(long, value_name = "CSV")]
     baseline: Option<PathBuf>,
-    /// Seed of the pseudo-random estimates.
-    #[arg(long, default_value_t = 1, conflicts_with = "baseline")]
-    seed: u64,
+    /// Use pseudo-random estimates of this seed instead.
+    #[arg(long, value_name = "N", conflicts_with = "baseline")]
+    seed: Option<u64>,
     /// Score only the recordings of these containers, such as 1-9 or 3,6,9.
     #[arg(long, value_name = "LIST", value_parser = containers)]
     containers: Option<Containers>,
@@ -94,11 +95,10 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let mut results = Vec::new();
     for path in &args.submission {
         let submission = Submission::read(path)?;
-        let baseline = read_baseline.clone().unwrap_or_else(|| {
-            let estimates = pseudo_random(&submission.keys, args.seed);
-            let name = format!("pseudo-random estimates, seed {}", args.seed);
-            Submission::from_predictions(&name, submission.format, &estimates)
-        });
+        let baseline = match &read_baseline {
+            Some(baseline) => baseline.clone(),
+            None => stand_in(&submission, &annotations, rules, args.seed)?,
+        };
         let list = args.containers.as_ref().map(|c| c.0.as_slice());
         let scores = scores::evaluate(&submission, &annotations, &baseline, rules, list)?;
         results.push((submission.name(), scores));
@@ -109,11 +109,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 
 fn print(results: &[(String, Scores)], format: Format) -> Result<(), Failure> {
     if !matches!(format, Format::Json) {
-        for (name, scores) in results {
-            for note in &scores.notes {
-                eprintln!("note: {name}: {note}");
-            }
-        }
+        print_notes(results);
     }
     // Some scores are only of submissions that address their task.
     let mut columns: Vec<&str> = Vec::new();
@@ -159,9 +155,52 @@ fn print(results: &[(String, Scores)], format: Format) -> Result<(), Failure> {
                 }
                 println!();
             }
+            if let Some((_, scores)) = results.first() {
+                println!("\n{}", legend(scores.rules, &columns));
+            }
         }
     }
     Ok(())
+}
+
+/// Each note once, with the submissions that it is about.
+fn print_notes(results: &[(String, Scores)]) {
+    const NAMED: usize = 4;
+    let mut notes: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (name, scores) in results {
+        for note in &scores.notes {
+            match notes.iter_mut().find(|(text, _)| text == note) {
+                Some((_, names)) => names.push(name),
+                None => notes.push((note, vec![name])),
+            }
+        }
+    }
+    for (note, names) in notes {
+        let more = match names.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        let names = names.into_iter().take(NAMED).collect::<Vec<_>>().join(", ");
+        eprintln!("note: {names}{more}: {note}");
+    }
+}
+
+/// What the columns mean, several to a line of a terminal.
+fn legend(rules: RuleSet, columns: &[&str]) -> String {
+    let known = rules.legend().iter().filter(|(name, _)| columns.contains(name));
+    let mut lines = vec![String::new()];
+    for (name, meaning) in known {
+        let entry = format!("{name} {meaning}");
+        match lines.last_mut() {
+            Some(line) if line.is_empty() => line.push_str(&entry),
+            Some(line) if line.chars().count() + entry.chars().count() + 3 <= 80 => {
+                line.push_str(" \u{b7} ");
+                line.push_str(&entry);
+            }
+            _ => lines.push(entry),
+        }
+    }
+    lines.join("\n")
 }
 
 fn two_decimals(value: f64) -> String {

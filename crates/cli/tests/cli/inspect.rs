@@ -50,6 +50,7 @@ fn a_sick_recording_is_diagnosed() {
     assert_eq!(row("1 ")[1..], ["-inf", "-inf", "0.00000", "0", "100.0%", "dead", "(constant)"]);
     assert!(row("2 ").join(" ").ends_with("same as channel 0"));
     assert_eq!(row("3 ")[3], "0.10001");
+    assert!(row("3 ").join(" ").ends_with("DC offset +0.10"));
     assert!(report.contains("to 1.000 (0 and 2)"));
 }
 
@@ -70,7 +71,8 @@ fn json_holds_the_same_with_all_correlations() {
 fn pictures_by_extension() {
     let folder = tempfile::tempdir().unwrap();
     let wav = recording(folder.path());
-    for (name, start) in [("p.png", b"\x89PNG".as_slice()), ("p.SVG", b"<svg")] {
+    for (name, start) in [("p.png", b"\x89PNG".as_slice()), ("p.SVG", b"<svg"), ("p.pdf", b"%PDF")]
+    {
         let picture = folder.path().join(name);
         let out = inspect(&[&wav, "--picture".as_ref(), &picture]);
         assert!(out.status.success(), "{}", text(&out.stderr));
@@ -81,6 +83,125 @@ fn pictures_by_extension() {
         assert_eq!(out.status.code(), Some(2));
         assert!(out.stdout.is_empty() && text(&out.stderr).contains(refused));
     }
+}
+
+/// The SVG that `inspect --picture` draws.
+fn drawn(file: &Path, args: &[&str]) -> String {
+    let picture = file.with_extension("drawn.svg");
+    let out = tool().arg("inspect").arg(file).arg("--picture").arg(&picture).args(args).output();
+    let out = out.unwrap();
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    std::fs::read_to_string(picture).unwrap()
+}
+
+#[test]
+fn pictures_show_what_is_asked_for_and_what_is_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let wav = recording(folder.path());
+    let whole = drawn(&wav, &[]);
+    for told in ["ch 3", "dead (constant)", "clipped in 200 places", "same as channel 0", ">1k<"] {
+        assert!(whole.contains(told), "{told}");
+    }
+    let part =
+        drawn(&wav, &["--channels", "3,1", "--start", "0.25", "--end", "0.5", "--title", "T"]);
+    assert!(part.contains("ch 3") && part.contains("ch 1") && !part.contains("ch 2"));
+    assert!(part.contains(">T</text>") && part.contains(">0.30<") && !part.contains(">0.6"));
+    // A quarter of the clipped places, which are of channel 0.
+    let clipped = drawn(&wav, &["--channels", "0", "--start", "0.25", "--end", "0.5"]);
+    assert!(clipped.contains("clipped in 50 places"), "the notes are of what is drawn");
+    let linear = drawn(&wav, &["--frequency-axis", "linear", "--fmax", "2000"]);
+    assert!(linear.contains(">500<") && !linear.contains(">2k<"));
+    assert!(drawn(&wav, &["--frequency-axis", "log"]).contains(">200<"));
+    assert_ne!(drawn(&wav, &["--wave-scale", "channel"]), whole);
+    let png = |dpi: &str| {
+        let picture = folder.path().join("p.png");
+        let options = ["--picture", "--dpi"].map(Path::new);
+        let args: [&Path; 5] = [&wav, options[0], &picture, options[1], Path::new(dpi)];
+        assert!(inspect(&args).status.success());
+        std::fs::read(picture).unwrap()[16..20].to_vec()
+    };
+    assert_eq!((png("96"), png("192")), (vec![0, 0, 4, 20], vec![0, 0, 8, 40]));
+    for refused in [
+        &["--channels", "4"][..],
+        &["--start", "2"],
+        &["--start", "0.5", "--end", "0.5"],
+        &["--channels", "x"],
+        &["--dpi", "5"],
+    ] {
+        let picture = folder.path().join("q.svg");
+        let mut command = tool();
+        command.arg("inspect").arg(&wav).arg("--picture").arg(&picture).args(refused);
+        let out = command.output().unwrap();
+        assert_eq!(out.status.code(), Some(2), "{refused:?}");
+        assert!(text(&out.stderr).contains(refused[0]) && !picture.exists(), "{refused:?}");
+    }
+}
+
+#[test]
+fn folders_and_several_files_are_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    let wav = recording(folder.path());
+    let listed = inspect(&[folder.path()]);
+    assert!(listed.status.success(), "{}", text(&listed.stderr));
+    let shown = text(&listed.stdout);
+    assert!(
+        shown.contains("1.00 s    8000   4") && shown.contains("ch 1 dead (constant)"),
+        "{shown}"
+    );
+    assert!(shown.contains("1 recording: 1.00 s\n1 of 8000 Hz, 4 channels"), "{shown}");
+    let bad = folder.path().join("bad.wav");
+    std::fs::write(&bad, b"RIFF").unwrap();
+    let both = inspect(&[&wav, &bad]);
+    assert_eq!(both.status.code(), Some(1));
+    assert!(text(&both.stdout).contains("1 file cannot be read"));
+    let json = inspect(&[&wav, &bad, "--json".as_ref()]);
+    let lines: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    assert_eq!((&lines[0]["channels"], &lines[1]["status"]), (&4.into(), &"corrupt".into()));
+    let picture = folder.path().join("p.svg");
+    let refused = inspect(&[folder.path(), "--picture".as_ref(), &picture]);
+    assert!(text(&refused.stderr).contains("name one file") && !picture.exists());
+}
+
+#[test]
+fn models_and_predictions_are_explained() {
+    let folder = tempfile::tempdir().unwrap();
+    let predictions = folder.path().join("p.csv");
+    std::fs::write(&predictions, "id,true,predicted,p_dog\na,dog,dog,1\nb,cat,dog,0.6\n").unwrap();
+    let shown = text(&inspect(&[&predictions]).stdout);
+    assert!(shown.contains("2 rows · 4 columns") && shown.contains("predicted  dog 2"), "{shown}");
+    assert!(shown.contains("accuracy   50.00 %"), "{shown}");
+    let json = inspect(&[&predictions, "--json".as_ref()]);
+    let found: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    assert_eq!((&found["accuracy"], &found["counts"]["true"]["cat"]), (&0.5.into(), &1.into()));
+    let torn = folder.path().join("torn.model");
+    std::fs::write(&torn, b"CORSMDL\0 and no more").unwrap();
+    let refused = inspect(&[&torn]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(text(&refused.stderr).contains("torn.model: "));
+}
+
+#[test]
+fn features_are_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let audio = folder.path().join("audio");
+    std::fs::create_dir_all(&audio).unwrap();
+    recording(&audio);
+    let out = folder.path().join("frames.npz");
+    let mut extract = tool();
+    extract.arg("extract").arg("--in").arg(&audio).arg("--out").arg(&out);
+    assert!(extract.args(["--preset", "logmel"]).output().unwrap().status.success());
+    let svg = drawn(&out, &["--recording", "four", "--channels", "0,2"]);
+    assert!(
+        svg.contains(">four</text>") && svg.contains("channel 2") && !svg.contains("channel 1")
+    );
+    let refused = tool()
+        .arg("inspect")
+        .arg(&out)
+        .args(["--picture", "x.svg", "--recording", "five"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert!(text(&refused.stderr).contains("no recording 'five'; it has 1 (four)"));
 }
 
 #[test]
@@ -147,8 +268,8 @@ fn outputs_show_contents_configuration_and_outcomes() {
         assert_eq!(report["meta"]["shard"], "0/1");
         assert_eq!(report["statuses"], serde_json::json!({"corrupt": 1, "ok": 1}));
         assert_eq!(report["failed"][0]["id"], "bad");
-        let picture = inspect(&[&out, "--picture".as_ref(), &folder.path().join("p.png")]);
-        assert_eq!(picture.status.code(), Some(2));
+        let table = drawn(&out, &[]);
+        assert!(table.contains("recordings: 1, features: 168"), "{table}");
     }
     let members = text(&inspect(&[&folder.path().join("feats.npz")]).stdout);
     assert!(members.contains("1 row × 168 columns"), "{members}");

@@ -1,66 +1,46 @@
 //! `corsmal-feat inspect`: what a file holds and whether it is healthy.
 
 mod extracted;
+mod features;
+mod other;
 mod output;
-mod overview;
+mod picture;
 mod recording;
+mod several;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use corsmal_files::feature_file::FeatureFile;
 use corsmal_files::format::Content;
+use corsmal_files::layout;
 use serde::Serialize;
 
 use crate::failure::{FAILED_FILES, Failure};
+use picture::{Picture, PictureArgs};
 
 /// Arguments of `inspect`.
 #[derive(clap::Args)]
-#[command(
-    after_help = "Examples:\n  corsmal-feat inspect recording.wav --picture recording.png\n  corsmal-feat inspect feats.npz --json\n\nOf a recording: format, health, picture. Of an output of `extract`: contents, configuration, outcomes;\nof any other .npz: its members.\n\nClipping: at least three successive samples at the channel's own peak. Silence: share of 20 ms blocks\nbelow -60 dBFS. Exit code 1: its content cannot be read."
-)]
+#[command(after_help = "Examples:\n  \
+    corsmal-feat inspect recording.wav --picture recording.png\n  \
+    corsmal-feat inspect recordings/\n  \
+    corsmal-feat inspect recording.wav --picture part.pdf --channels 0,3 --start 2 --end 4\n  \
+    corsmal-feat inspect feats.npz --picture feats.png --recording dog_01\n  \
+    corsmal-feat inspect my.model\n\n\
+    Of a recording: format and health. Of folders and several recordings: a line for each. Of an output\n\
+    of `extract`: contents, configuration, outcomes; of any other .npz: its members. Of a model: what it\n\
+    was trained on. Of predictions: how many of each class.\n\n\
+    Clipping: at least three successive samples at the channel's own peak. Silence: share of 20 ms\n\
+    blocks below -60 dBFS. Exit code 1: some content cannot be read.")]
 pub struct Args {
-    /// The file; its content decides what it is, not its name.
-    file: PathBuf,
-    /// Also draw waveform and log-mel spectrogram of each channel, as .png or .svg.
-    #[arg(long, value_name = "FILE")]
-    picture: Option<PathBuf>,
+    /// Files and folders; their content decides what they are, not their names.
+    #[arg(required = true, value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    #[command(flatten)]
+    picture: PictureArgs,
     /// Print JSON instead of text, with the correlation of all channels or all members.
     #[arg(long)]
     json: bool,
-}
-
-/// Format of a picture, by its file name.
-#[derive(Clone, Copy)]
-enum PictureFormat {
-    Png,
-    Svg,
-}
-
-/// A picture to be written.
-struct Picture {
-    path: PathBuf,
-    format: PictureFormat,
-}
-
-impl Picture {
-    /// Refuses names and folders that cannot work before anything is read.
-    fn check(path: PathBuf) -> Result<Self, Failure> {
-        let extension = path.extension().map(|e| e.to_ascii_lowercase());
-        let format = match extension.as_deref().and_then(|e| e.to_str()) {
-            Some("png") => PictureFormat::Png,
-            Some("svg") => PictureFormat::Svg,
-            _ => {
-                let name = path.display();
-                return Err(Failure::new(format!("--picture {name}: must end in .png or .svg")));
-            }
-        };
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-        if folder.is_some_and(|folder| !folder.is_dir()) {
-            let name = path.display();
-            return Err(Failure::new(format!("--picture {name}: its folder does not exist")));
-        }
-        Ok(Self { path, format })
-    }
 }
 
 /// The JSON form of a refusal.
@@ -89,18 +69,61 @@ fn to_json(value: &impl Serialize) -> Result<String, Failure> {
     Ok(serde_json::to_string_pretty(value)? + "\n")
 }
 
-/// Prints what the file is.
+/// Prints what the files are.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
-    let picture = args.picture.map(Picture::check).transpose()?;
-    let content = Content::of(&args.file)
-        .map_err(|e| Failure::new(format!("{}: {e}", args.file.display())))?;
-    if content == Content::Other {
+    let picture = args.picture.check()?;
+    match args.paths.as_slice() {
+        [path] if !path.is_dir() => single(path, picture.as_ref(), args.json),
+        paths => {
+            if picture.is_some() {
+                return Err(Failure::new(
+                    "--picture: name one file to draw, not a folder or several",
+                ));
+            }
+            several::inspect(paths, args.json)
+        }
+    }
+}
+
+fn single(path: &Path, picture: Option<&Picture>, json: bool) -> Result<ExitCode, Failure> {
+    let content =
+        Content::of(path).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
+    if content != Content::Other {
+        let code = output::inspect(path, json)?;
+        if let (Some(picture), true) = (picture, code == ExitCode::SUCCESS) {
+            draw(path, picture)?;
+        }
+        return Ok(code);
+    }
+    match other::kind(path)? {
+        Some(_) if picture.is_some() => Err(Failure::new(format!(
+            "--picture: {} holds neither sound nor features",
+            path.display()
+        ))),
+        Some(other::Kind::Model) => other::model(path, json),
+        Some(other::Kind::Table) => other::table(path, json),
         // The audio readers say what is wrong with anything else.
-        return recording::inspect(&args.file, picture.as_ref(), args.json);
+        None => recording::inspect(path, picture, json),
     }
-    if picture.is_some() {
-        let name = args.file.display();
-        return Err(Failure::new(format!("--picture: {name} is no recording")));
+}
+
+/// The frames of a recording, or the rows of a summary.
+fn draw(path: &Path, picture: &Picture) -> Result<(), Failure> {
+    match FeatureFile::open(path)? {
+        FeatureFile::Npz(mut file) => {
+            if layout::is_ours(&file) && file.contains("__summary__") {
+                let (table, _) = layout::read_table(&mut file)?;
+                return features::draw_table(path, table.ids(), table.values(), picture);
+            }
+            features::draw_npz(&mut file, picture)
+        }
+        FeatureFile::Npy(file) => {
+            let values = file.components()?.mapv(|v| v as f32);
+            features::draw_array(path, values, picture)
+        }
+        FeatureFile::Parquet(file) => {
+            let (table, _) = file.table()?;
+            features::draw_table(path, table.ids(), table.values(), picture)
+        }
     }
-    output::inspect(&args.file, args.json)
 }

@@ -4,16 +4,13 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
-use corsmal_audio::{
-    AudioError, AudioSpec, BlockSource, ChannelHealth, Health, HealthMeter, ReadReport, open,
-};
-use corsmal_plot::{to_png, to_svg};
+use corsmal_audio::{AudioError, AudioSpec, BlockSource, Health, HealthMeter, ReadReport, open};
+use corsmal_report::Overview;
 use serde::Serialize;
 
-use super::overview::Overview;
-use super::{Picture, PictureFormat, Refusal, to_json};
+use super::picture::Picture;
+use super::{Refusal, to_json};
 use crate::failure::Failure;
-use corsmal_files::draft;
 
 /// Frames read at once.
 const BLOCK: usize = 8192;
@@ -41,10 +38,7 @@ pub fn inspect(path: &Path, picture: Option<&Picture>, json: bool) -> Result<Exi
     let spec = source.spec().clone();
     let channels = usize::from(spec.channels);
     let mut meter = HealthMeter::new(channels, spec.sample_rate);
-    let mut overview = match picture {
-        Some(_) => Some(Overview::new(channels, spec.sample_rate)?),
-        None => None,
-    };
+    let mut drawn = picture.map(|picture| Excerpt::new(picture, &spec)).transpose()?;
     let mut block = vec![0.0; BLOCK * channels];
     loop {
         let samples = match next(source.as_mut(), &mut block) {
@@ -53,8 +47,8 @@ pub fn inspect(path: &Path, picture: Option<&Picture>, json: bool) -> Result<Exi
             Err(error) => return refuse(&name, &error, json),
         };
         meter.push(samples);
-        if let Some(overview) = &mut overview {
-            overview.push(samples)?;
+        if let Some(drawn) = &mut drawn {
+            drawn.push(samples)?;
         }
     }
     let health = meter.finish();
@@ -63,17 +57,65 @@ pub fn inspect(path: &Path, picture: Option<&Picture>, json: bool) -> Result<Exi
     let report =
         Inspection { path: name, status: "ok", spec: &spec, seconds, reading, health: &health };
     print!("{}", if json { to_json(&report)? } else { report.text() });
-
-    if let (Some(overview), Some(picture)) = (overview, picture) {
-        let title = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let figure = overview.finish(title, report.facts())?;
-        let bytes = match picture.format {
-            PictureFormat::Png => to_png(&figure)?,
-            PictureFormat::Svg => to_svg(&figure)?.into_bytes(),
-        };
-        draft::write(&picture.path, &bytes)?;
+    if let Some(drawn) = drawn {
+        let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        drawn.save(file, report.facts())?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The stretch of a recording that is drawn, with the health of that stretch.
+struct Excerpt<'a> {
+    picture: &'a Picture,
+    overview: Overview,
+    meter: HealthMeter,
+    channels: usize,
+    /// Frames still to pass over, and then to take.
+    before: u64,
+    left: u64,
+}
+
+impl<'a> Excerpt<'a> {
+    fn new(picture: &'a Picture, spec: &AudioSpec) -> Result<Self, Failure> {
+        let channels = usize::from(spec.channels);
+        picture.check_channels(channels)?;
+        let rate = f64::from(spec.sample_rate);
+        // Beyond the largest whole number a conversion saturates, later than any recording ends.
+        let before = (picture.view.start * rate).round() as u64;
+        let left = picture.end.map_or(u64::MAX, |end| (end * rate).round() as u64 - before);
+        Ok(Self {
+            picture,
+            overview: Overview::new(channels, spec.sample_rate, picture.view.clone())?,
+            meter: HealthMeter::new(channels, spec.sample_rate),
+            channels,
+            before,
+            left,
+        })
+    }
+
+    fn push(&mut self, samples: &[f32]) -> Result<(), Failure> {
+        let frames = (samples.len() / self.channels) as u64;
+        let skip = self.before.min(frames);
+        let take = (frames - skip).min(self.left);
+        self.before -= skip;
+        self.left -= take;
+        let [skip, take] = [skip, take].map(|n| n as usize * self.channels);
+        let samples = &samples[skip..skip + take];
+        self.meter.push(samples);
+        self.overview.push(samples)?;
+        Ok(())
+    }
+
+    fn save(self, file: String, facts: String) -> Result<(), Failure> {
+        let health = self.meter.finish();
+        if health.frames == 0 && self.before > 0 {
+            let start = self.picture.view.start;
+            return Err(Failure::new(format!("--start {start}: {file} ends before that")));
+        }
+        let title = self.picture.title.clone().unwrap_or(file);
+        let figure = self.overview.finish(title, facts, |channel| health.notes(channel))?;
+        self.picture.save(&figure)
+    }
 }
 
 /// The next samples; none at the end.
@@ -93,9 +135,9 @@ impl Inspection<'_> {
         let AudioSpec { sample_rate, channels, format, .. } = self.spec;
         format!(
             "{format} · {} · {sample_rate} Hz · {:.3} s ({})",
-            counted((*channels).into(), "channel"),
+            plural((*channels).into(), "channel"),
             self.seconds,
-            counted(self.health.frames, "frame")
+            plural(self.health.frames, "frame")
         )
     }
 
@@ -115,12 +157,12 @@ impl Inspection<'_> {
         for (i, channel) in self.health.channels.iter().enumerate() {
             let silence = format!("{:.1}%", channel.silence * 100.0);
             let row = format!(
-                "  {i:>7}  {:>9}  {:>8}  {:>9.5}  {:>7}  {silence:>7}  {}",
+                "  {i:>7}  {:>9}  {:>8}  {:>9}  {:>7}  {silence:>7}  {}",
                 decibels(channel.peak_dbfs),
                 decibels(channel.rms_dbfs),
-                channel.dc_offset,
+                offset(channel.dc_offset),
                 channel.clipped_samples,
-                self.notes(i, channel)
+                self.health.notes(i).join(", ")
             );
             line(&mut out, format_args!("{}", row.trim_end()));
         }
@@ -128,23 +170,6 @@ impl Inspection<'_> {
             line(&mut out, format_args!("\n  {text}"));
         }
         out
-    }
-
-    fn notes(&self, i: usize, channel: &ChannelHealth) -> String {
-        let mut notes = Vec::new();
-        if channel.dead && self.health.frames > 0 {
-            notes.push("dead (constant)".to_owned());
-        }
-        if channel.clipped_runs > 0 {
-            notes.push(format!("clipped in {}", counted(channel.clipped_runs, "place")));
-        }
-        if let Some((first, _)) = self.health.duplicates.iter().find(|(_, second)| *second == i) {
-            notes.push(format!("same as channel {first}"));
-        }
-        if channel.non_finite > 0 {
-            notes.push(format!("{} not finite", counted(channel.non_finite, "sample")));
-        }
-        notes.join(", ")
     }
 
     /// The least and the most correlated pair of channels.
@@ -168,12 +193,29 @@ impl Inspection<'_> {
     }
 }
 
-fn counted(count: u64, what: &str) -> String {
+/// A count with its noun.
+pub fn plural(count: u64, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
-fn decibels(level: Option<f64>) -> String {
+/// Five decimals, without a sign where they are all zero.
+fn offset(mean: f64) -> String {
+    let text = format!("{mean:.5}");
+    if text == "-0.00000" { "0.00000".into() } else { text }
+}
+
+/// A level, `-inf` for none.
+pub fn decibels(level: Option<f64>) -> String {
     level.map_or("-inf".into(), |db| format!("{db:.2}"))
+}
+
+/// A length of time: seconds below a minute, then hours, minutes and seconds.
+pub fn length(seconds: f64) -> String {
+    if seconds < 60.0 {
+        return format!("{seconds:.2} s");
+    }
+    let whole = seconds.round() as u64;
+    format!("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60)
 }
 
 /// Writing to a string cannot fail.

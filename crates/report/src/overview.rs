@@ -1,24 +1,50 @@
 //! A recording of any length reduced to at most a thousand columns while it streams by.
 
 use corsmal_dsp::error::DspError;
-use corsmal_dsp::mel::{MelParams, SparseBank, hz_to_mel, mel_filter};
+use corsmal_dsp::mel::SparseBank;
 use corsmal_dsp::stft::{StftParams, spectrogram};
-use corsmal_plot::{ChannelPicture, RecordingPicture};
+use corsmal_plot::{ChannelPicture, RecordingPicture, WaveScale};
 use ndarray::{Array2, s};
+
+use crate::bands::FrequencyAxis;
 
 /// Most columns kept; beyond that, neighbours are merged and columns get twice as long.
 const MAX_COLUMNS: usize = 1000;
-/// Mel bands in the picture.
+/// Bands in the picture.
 const BANDS: usize = 64;
 /// Length of the window, rounded up to a power of two samples.
 const WINDOW_SECONDS: f64 = 0.02;
 /// Levels shown below the loudest one, in dB.
 const RANGE_DB: f32 = 80.0;
-/// Labelled frequencies in Hz.
-const FREQUENCIES: [f64; 9] =
-    [100.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0, 50_000.0, 100_000.0];
 
-/// Extremes and mel power of a stretch of time, per channel.
+/// What of a recording is shown, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    /// Channels, in the order in which they are drawn; all where empty.
+    pub channels: Vec<usize>,
+    /// Axis of frequency.
+    pub axis: FrequencyAxis,
+    /// Highest frequency in Hz; half the sample rate by default and at most.
+    pub fmax: Option<f64>,
+    /// Scale of the waveforms.
+    pub wave_scale: WaveScale,
+    /// Start of what is pushed, in seconds, for the axis of time.
+    pub start: f64,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self {
+            channels: Vec::new(),
+            axis: FrequencyAxis::default(),
+            fmax: None,
+            wave_scale: WaveScale::Shared,
+            start: 0.0,
+        }
+    }
+}
+
+/// Extremes and power of a stretch of time, per channel.
 #[derive(Clone)]
 struct Column {
     envelope: Vec<(f32, f32)>,
@@ -30,6 +56,10 @@ struct Column {
 /// its end (or, after merging, the mean of several), so that long recordings cost few transforms.
 pub struct Overview {
     sample_rate: u32,
+    view: View,
+    /// Channels of what is pushed.
+    pushed_channels: usize,
+    highest: f64,
     stft: StftParams,
     bank: SparseBank,
     /// The latest `n_fft` frames, `[channels, n_fft]`, zeros before the start. Columns take their
@@ -48,19 +78,34 @@ pub struct Overview {
 const NOTHING: (f32, f32) = (f32::INFINITY, f32::NEG_INFINITY);
 
 impl Overview {
-    /// An empty overview.
-    pub fn new(channels: usize, sample_rate: u32) -> Result<Self, DspError> {
+    /// An empty overview of a recording of so many channels. Channels of the view that the recording
+    /// does not have are left out.
+    ///
+    /// # Errors
+    /// [`DspError`] for a sample rate or a highest frequency that leaves nothing to show.
+    pub fn new(channels: usize, sample_rate: u32, view: View) -> Result<Self, DspError> {
         let window = (WINDOW_SECONDS * f64::from(sample_rate)) as usize;
         let n_fft = window.next_power_of_two().max(64);
-        let mel = MelParams { n_mels: BANDS, ..MelParams::new(sample_rate.into(), n_fft) };
+        let rate = f64::from(sample_rate);
+        let highest = view.fmax.map_or(rate / 2.0, |fmax| fmax.min(rate / 2.0));
+        let mut view = view;
+        if view.channels.is_empty() {
+            view.channels = (0..channels).collect();
+        }
+        view.channels.retain(|channel| *channel < channels);
+        let shown = view.channels.len();
+        let bank = view.axis.bank(BANDS, n_fft, rate, highest)?;
         Ok(Self {
             sample_rate,
+            view,
+            pushed_channels: channels,
+            highest,
             stft: StftParams { center: false, ..StftParams::new(n_fft, n_fft) },
-            bank: SparseBank::new(&mel_filter(&mel)?),
-            recent: Array2::zeros((channels, n_fft)),
+            bank: SparseBank::new(&bank),
+            recent: Array2::zeros((shown, n_fft)),
             length: n_fft / 8,
             columns: Vec::new(),
-            envelope: vec![NOTHING; channels],
+            envelope: vec![NOTHING; shown],
             filled: 0,
             entered: 0,
         })
@@ -71,15 +116,21 @@ impl Overview {
         self.stft.n_fft / 2
     }
 
-    /// Adds interleaved samples; non-finite ones count as zero.
+    /// Adds interleaved samples of all channels; non-finite ones count as zero.
+    ///
+    /// # Errors
+    /// [`DspError`] when a transform fails.
     pub fn push(&mut self, interleaved: &[f32]) -> Result<(), DspError> {
-        let channels = self.envelope.len();
+        let channels = self.pushed_channels;
         let delay = self.delay();
         let mut rest = interleaved;
         while !rest.is_empty() {
             let missing = (delay as u64).saturating_sub(self.entered) as usize;
             let step = if missing > 0 { missing } else { delay.min(self.length - self.filled) };
             let take = step.min(rest.len() / channels);
+            if take == 0 {
+                break;
+            }
             let (now, later) = rest.split_at(take * channels);
             rest = later;
             self.remember(now, take);
@@ -100,14 +151,16 @@ impl Overview {
         Ok(())
     }
 
-    /// Shifts `frames` (at most `n_fft`) frames into `recent`.
+    /// Shifts `frames` (at most `n_fft`) frames of the shown channels into `recent`.
     fn remember(&mut self, block: &[f32], frames: usize) {
-        let (channels, n) = self.recent.dim();
-        for (c, mut row) in self.recent.rows_mut().into_iter().enumerate() {
+        let n = self.recent.ncols();
+        let rows = self.recent.rows_mut().into_iter().zip(&self.view.channels);
+        for (mut row, channel) in rows {
             if let Some(row) = row.as_slice_mut() {
                 row.copy_within(frames.., 0);
-                for (to, x) in row[n - frames..].iter_mut().zip(block.chunks_exact(channels)) {
-                    *to = if x[c].is_finite() { x[c] } else { 0.0 };
+                let samples = block.chunks_exact(self.pushed_channels);
+                for (to, x) in row[n - frames..].iter_mut().zip(samples) {
+                    *to = if x[*channel].is_finite() { x[*channel] } else { 0.0 };
                 }
             }
         }
@@ -126,35 +179,43 @@ impl Overview {
         Ok(())
     }
 
-    /// The picture of everything that was pushed.
-    pub fn finish(mut self, title: String, subtitle: String) -> Result<RecordingPicture, DspError> {
+    /// The picture of everything that was pushed. `notes` gives what is odd about a channel.
+    ///
+    /// # Errors
+    /// [`DspError`] when a transform fails.
+    pub fn finish(
+        mut self,
+        title: String,
+        subtitle: String,
+        notes: impl Fn(usize) -> Vec<String>,
+    ) -> Result<RecordingPicture, DspError> {
         let frames = self.entered;
-        self.push(&vec![0.0; self.delay() * self.envelope.len()])?;
+        self.push(&vec![0.0; self.delay() * self.pushed_channels])?;
         if self.filled > 0 {
             self.finish_column()?;
         }
         let all = self.columns.iter().flat_map(|c| &c.power);
         let loudest = all.fold(0.0f32, |a, b| a.max(*b)).max(f32::MIN_POSITIVE);
         let decibels = |power: f32| 10.0 * (power / loudest).max(1e-12).log10();
-        let channel = |c: usize| {
-            let level = |(b, t): (usize, usize)| decibels(self.columns[t].power[[c, b]]);
+        let channel = |(row, number): (usize, &usize)| {
+            let level = |(b, t): (usize, usize)| decibels(self.columns[t].power[[row, b]]);
             ChannelPicture {
-                label: format!("ch {c}"),
-                envelope: self.columns.iter().map(|column| column.envelope[c]).collect(),
+                label: format!("ch {number}"),
+                notes: notes(*number),
+                envelope: self.columns.iter().map(|column| column.envelope[row]).collect(),
                 levels: Array2::from_shape_fn((BANDS, self.columns.len()), level),
             }
         };
-        let highest = f64::from(self.sample_rate) / 2.0;
-        let place = |hz: f64| hz_to_mel(hz, false) / hz_to_mel(highest, false);
-        let labelled = FREQUENCIES.iter().filter(|hz| **hz < highest);
+        let seconds = frames as f64 / f64::from(self.sample_rate);
         Ok(RecordingPicture {
             title,
             subtitle,
-            seconds: frames as f64 / f64::from(self.sample_rate),
-            frequencies: labelled.map(|&hz| (hz, place(hz))).collect(),
+            time: (self.view.start, self.view.start + seconds),
+            frequencies: self.view.axis.labelled(self.highest),
             level_range: (-RANGE_DB, 0.0),
-            level_label: "dB below the loudest band".into(),
-            channels: (0..self.envelope.len()).map(channel).collect(),
+            level_label: "dB re loudest band".into(),
+            wave_scale: self.view.wave_scale,
+            channels: self.view.channels.iter().enumerate().map(channel).collect(),
         })
     }
 }
@@ -182,17 +243,21 @@ mod tests {
     }
 
     fn picture(samples: &[f32], channels: usize, split: usize) -> RecordingPicture {
-        let mut overview = Overview::new(channels, 16_000).unwrap();
+        viewed(samples, channels, split, View::default())
+    }
+
+    fn viewed(samples: &[f32], channels: usize, split: usize, view: View) -> RecordingPicture {
+        let mut overview = Overview::new(channels, 16_000, view).unwrap();
         for block in samples.chunks(split * channels) {
             overview.push(block).unwrap();
         }
-        overview.finish("t".into(), "s".into()).unwrap()
+        overview.finish("t".into(), "s".into(), |c| vec![format!("note {c}")]).unwrap()
     }
 
     #[test]
     fn a_tone_lies_at_its_frequency_and_level() {
         let picture = picture(&tone(16_000, 2, 1000.0), 2, 500);
-        assert_eq!(picture.seconds, 1.0);
+        assert_eq!(picture.time, (0.0, 1.0));
         let (_, place) = picture.frequencies.iter().find(|(hz, _)| *hz == 1000.0).unwrap();
         let second = &picture.channels[1];
         assert_eq!(second.levels.nrows(), BANDS);
@@ -219,6 +284,28 @@ mod tests {
         let split = picture(&samples, 1, 12_345);
         assert_eq!(split.channels[0].envelope, whole.channels[0].envelope);
         assert_eq!(split.channels[0].levels, whole.channels[0].levels);
+    }
+
+    #[test]
+    fn a_view_has_its_channels_axis_and_start() {
+        let view = View {
+            channels: vec![2, 0, 7],
+            axis: FrequencyAxis::Linear,
+            fmax: Some(4000.0),
+            start: 3.5,
+            ..View::default()
+        };
+        let shown = viewed(&tone(16_000, 3, 1000.0), 3, 777, view);
+        let whole = picture(&tone(16_000, 3, 1000.0), 3, 500);
+        let labels: Vec<_> = shown.channels.iter().map(|c| c.label.as_str()).collect();
+        assert_eq!(labels, ["ch 2", "ch 0"]);
+        assert_eq!(shown.channels[0].notes, ["note 2"]);
+        assert_eq!(shown.channels[0].envelope, whole.channels[2].envelope);
+        assert_eq!(shown.time, (3.5, 4.5));
+        // A quarter of the way up to 4 kHz.
+        let column = shown.channels[1].levels.column(100);
+        let best = (0..BANDS).max_by(|a, b| column[*a].total_cmp(&column[*b])).unwrap();
+        assert!((15..=16).contains(&best), "{best}");
     }
 
     #[test]

@@ -1,0 +1,184 @@
+//! The lines of the tables: methods with their estimates.
+
+use super::added::Placed;
+use super::baselines::{Outcome, Variant};
+use super::interval::bootstrap;
+use super::results::{Estimate, PartScores, Rows, Target, score};
+use crate::dataset::{Filling, FillingLevel, FillingType, Subset};
+use crate::paper::Task;
+use crate::scores::ConfusionMatrix;
+use crate::submission::pseudo_random;
+use corsmal_report::{Cell, Source};
+
+/// A method with its estimates.
+pub(super) struct Method {
+    pub(super) name: String,
+    pub(super) inputs: String,
+    pub(super) protocol: String,
+    pub(super) source: Source,
+    /// Estimates of training recordings that were not trained on, by row number.
+    training: Vec<(usize, Estimate)>,
+    /// Estimates of each test part, where there are any.
+    tests: Vec<Option<Vec<Estimate>>>,
+}
+
+/// A part of the recordings.
+#[derive(Clone, Copy)]
+pub(super) enum Part {
+    Training,
+    Test(Subset),
+    Combined,
+}
+
+type Pairs<'a> = Vec<(&'a Target, &'a Estimate)>;
+
+impl Method {
+    /// The recordings of a part with their estimates; `None` where a part has none, or where only
+    /// one of two test parts is there to be combined.
+    fn pairs<'a>(&'a self, rows: &'a Rows, part: Part) -> Option<Pairs<'a>> {
+        let mut pairs: Pairs = Vec::new();
+        match part {
+            Part::Training => {
+                pairs.extend(self.training.iter().map(|(row, e)| (&rows.training[*row], e)));
+            }
+            Part::Test(_) | Part::Combined => {
+                for (test, estimates) in rows.tests.iter().zip(&self.tests) {
+                    if matches!(part, Part::Test(subset) if subset != test.subset) {
+                        continue;
+                    }
+                    pairs.extend(test.rows.iter().zip(estimates.as_ref()?));
+                }
+                // Only one of the two test parts is no combination.
+                if matches!(part, Part::Combined) && rows.tests.len() < 2 {
+                    return None;
+                }
+            }
+        }
+        Some(pairs)
+    }
+
+    /// Scores over the recordings of a part that `keep` takes; `None` where nothing is known.
+    pub(super) fn scores(
+        &self,
+        rows: &Rows,
+        part: Part,
+        seed: u64,
+        keep: &dyn Fn(&Target) -> bool,
+    ) -> Option<PartScores> {
+        let mut pairs = self.pairs(rows, part)?;
+        pairs.retain(|(target, _)| keep(target));
+        let (targets, estimates): (Vec<_>, Vec<_>) =
+            pairs.into_iter().map(|(t, e)| (t, e.clone())).unzip();
+        score(&targets, &estimates, seed)
+    }
+
+    /// The score of a task on a part, with its interval where it is a classification: by resampling
+    /// whole containers in the training part, recordings in the test parts, whose three containers
+    /// are too few.
+    pub(super) fn cell(&self, rows: &Rows, part: Part, task: Task, seed: u64) -> Cell {
+        let scores = self.scores(rows, part, seed, &|_| true);
+        match scores.and_then(|s| of_task(task, &s)) {
+            Some(value) => Cell::Score(value, self.interval(rows, part, task, seed)),
+            None => Cell::None,
+        }
+    }
+
+    fn interval(&self, rows: &Rows, part: Part, task: Task, seed: u64) -> Option<(f64, f64)> {
+        let pairs = self.pairs(rows, part)?;
+        let class = |(target, estimate): &(&Target, &Estimate)| {
+            let filling = target.filling?;
+            Some(match task {
+                Task::Level => (filling.level() as usize, estimate.level),
+                Task::Type => (filling.kind() as usize, estimate.kind),
+                Task::Capacity | Task::Mass => return None,
+            })
+        };
+        let classes: Vec<(usize, Option<usize>)> =
+            pairs.iter().map(class).collect::<Option<_>>()?;
+        let count =
+            if task == Task::Level { FillingLevel::ALL.len() } else { FillingType::ALL.len() };
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        match part {
+            Part::Training => {
+                let container = |t: &Target| t.recording.container.map_or(0, |c| c.number());
+                let mut numbers: Vec<u8> = pairs.iter().map(|(t, _)| container(t)).collect();
+                numbers.sort_unstable();
+                numbers.dedup();
+                for number in numbers {
+                    let of = |row: &usize| container(pairs[*row].0) == number;
+                    groups.push((0..pairs.len()).filter(of).collect());
+                }
+            }
+            Part::Test(_) | Part::Combined => groups.extend((0..pairs.len()).map(|row| vec![row])),
+        }
+        bootstrap(&groups, seed, |rows| {
+            let sample = rows.iter().map(|row| classes[*row]);
+            100.0 * ConfusionMatrix::new(count, sample).weighted_f1()
+        })
+    }
+}
+
+pub(super) fn of_task(task: Task, scores: &PartScores) -> Option<f64> {
+    match task {
+        Task::Level => scores.level,
+        Task::Type => scores.kind,
+        Task::Capacity => scores.capacity,
+        Task::Mass => scores.mass,
+    }
+}
+
+/// All methods: baselines, pseudo-random estimates, files that were added.
+pub(super) fn methods(
+    rows: &Rows,
+    outcomes: &[Outcome],
+    added: &[Placed],
+    seed: u64,
+) -> Vec<Method> {
+    let mut list: Vec<Method> = outcomes
+        .iter()
+        .map(|o| Method {
+            name: o.baseline.name(),
+            inputs: "audio".into(),
+            protocol: match o.variant {
+                Variant::Published => "published".into(),
+                Variant::Corrected => "corrected".into(),
+            },
+            source: Source::Ours,
+            training: o.held_out.clone(),
+            tests: o.tests.iter().cloned().map(Some).collect(),
+        })
+        .collect();
+    let random = |targets: &[Target]| -> Vec<Estimate> {
+        let keys: Vec<_> = targets.iter().map(|t| t.key).collect();
+        pseudo_random(&keys, seed).into_iter().map(Estimate::from).collect()
+    };
+    list.push(Method {
+        name: "Random".into(),
+        inputs: String::new(),
+        protocol: format!("seed {seed}"),
+        source: Source::Ours,
+        training: random(&rows.training).into_iter().enumerate().collect(),
+        tests: rows.tests.iter().map(|t| Some(random(&t.rows))).collect(),
+    });
+    list.extend(added.iter().filter(|a| a.is_any()).map(|a| Method {
+        name: a.name.clone(),
+        inputs: String::new(),
+        protocol: "given".into(),
+        source: Source::Added,
+        training: a.training.iter().flatten().cloned().enumerate().collect(),
+        tests: a.tests.clone(),
+    }));
+    list
+}
+
+pub(super) fn level_names() -> Vec<String> {
+    FillingLevel::ALL.map(|l| l.name().to_string()).to_vec()
+}
+
+pub(super) fn kind_names() -> Vec<String> {
+    FillingType::ALL.map(|k| k.name().to_string()).to_vec()
+}
+
+pub(super) fn joint_names() -> Vec<String> {
+    Filling::all().map(Filling::name).collect()
+}

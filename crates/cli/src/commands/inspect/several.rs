@@ -1,0 +1,159 @@
+//! Inspection of folders and of several recordings: a line for each, and what they have in common.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use corsmal_extract::inputs::{self, InputSource};
+use corsmal_report::{Look, ReportError, look};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::recording::{decibels, length, plural};
+use super::to_json;
+use crate::failure::{FAILED_FILES, Failure};
+
+/// What is said of one recording.
+#[derive(Serialize)]
+struct Line {
+    path: String,
+    status: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reason: Option<String>,
+    #[serde(flatten)]
+    sound: Option<Sound>,
+}
+
+/// What is known of a recording that can be read.
+#[derive(Serialize)]
+struct Sound {
+    format: String,
+    sample_rate: u32,
+    channels: u16,
+    seconds: f64,
+    peak_dbfs: Option<f64>,
+    /// Share of silent blocks in the least silent channel.
+    silence: f64,
+    repairs: usize,
+    notes: Vec<String>,
+}
+
+/// Prints a line for each recording that `paths` stand for.
+pub fn inspect(paths: &[PathBuf], json: bool) -> Result<ExitCode, Failure> {
+    let inputs = inputs::collect(paths)?;
+    let files: Vec<PathBuf> = inputs
+        .into_iter()
+        .filter_map(|input| match input.source {
+            InputSource::File(path) => Some(path),
+            InputSource::Stdin => None,
+        })
+        .collect();
+    let lines: Vec<Line> = files.par_iter().map(Line::of).collect();
+    let failed = lines.iter().filter(|line| line.sound.is_none()).count();
+    print!("{}", if json { to_json(&lines)? } else { text(&lines) });
+    Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
+}
+
+impl Line {
+    fn of(path: &PathBuf) -> Self {
+        let name = path.display().to_string();
+        match look(path, None) {
+            Ok(look) => {
+                Self { path: name, status: "ok", reason: None, sound: Some(Sound::of(look)) }
+            }
+            Err(error) => {
+                let status = match &error {
+                    ReportError::Audio { source, .. } => source.verdict().name(),
+                    _ => "error",
+                };
+                let text = error.to_string();
+                let reason = text.strip_prefix(&format!("{name}: ")).unwrap_or(&text).to_owned();
+                Self { path: name, status, reason: Some(reason), sound: None }
+            }
+        }
+    }
+}
+
+impl Sound {
+    fn of(look: Look) -> Self {
+        Self {
+            seconds: look.seconds(),
+            peak_dbfs: look.peak_dbfs(),
+            silence: look.health.channels.iter().map(|c| c.silence).fold(1.0, f64::min),
+            repairs: look.repairs,
+            notes: look.notes(),
+            sample_rate: look.spec.sample_rate,
+            channels: look.spec.channels,
+            format: look.spec.format,
+        }
+    }
+}
+
+fn text(lines: &[Line]) -> String {
+    let width = lines.iter().map(|l| l.path.chars().count()).max().unwrap_or(4).clamp(4, 60);
+    let mut out = format!(
+        "{:width$}  {:>9}  {:>6}  {:>2}  {:>9}  {:>7}  notes\n",
+        "file", "length", "Hz", "ch", "peak dBFS", "silence"
+    );
+    for line in lines {
+        let row = match (&line.sound, &line.reason) {
+            (Some(sound), _) => {
+                let mut notes = sound.notes.clone();
+                if sound.repairs > 0 {
+                    notes.push(format!("{} repaired", sound.repairs));
+                }
+                format!(
+                    "{:width$}  {:>9}  {:>6}  {:>2}  {:>9}  {:>7}  {}",
+                    line.path,
+                    length(sound.seconds),
+                    sound.sample_rate,
+                    sound.channels,
+                    decibels(sound.peak_dbfs),
+                    format!("{:.1}%", 100.0 * sound.silence),
+                    notes.join("; ")
+                )
+            }
+            (None, reason) => {
+                format!("{:width$}  {}", line.path, reason.as_deref().unwrap_or(line.status))
+            }
+        };
+        out.push_str(row.trim_end());
+        out.push('\n');
+    }
+    out + "\n" + &summary(lines)
+}
+
+/// How many, how long, and what differs among them.
+fn summary(lines: &[Line]) -> String {
+    let sounds: Vec<&Sound> = lines.iter().filter_map(|l| l.sound.as_ref()).collect();
+    let failed = lines.len() - sounds.len();
+    let mut counts: BTreeMap<(u32, u16), u64> = BTreeMap::new();
+    for sound in &sounds {
+        *counts.entry((sound.sample_rate, sound.channels)).or_default() += 1;
+    }
+    let kinds: Vec<String> = counts
+        .iter()
+        .map(|((rate, channels), n)| {
+            format!("{n} of {rate} Hz, {}", plural(u64::from(*channels), "channel"))
+        })
+        .collect();
+    let total: f64 = sounds.iter().map(|s| s.seconds).sum();
+    let shortest = sounds.iter().map(|s| s.seconds).fold(f64::INFINITY, f64::min);
+    let longest = sounds.iter().map(|s| s.seconds).fold(0.0, f64::max);
+    let noted = sounds.iter().filter(|s| !s.notes.is_empty()).count();
+    let mut out = format!("{}: {}", plural(sounds.len() as u64, "recording"), length(total));
+    if sounds.len() > 1 {
+        out.push_str(&format!(" in all, {} to {}", length(shortest), length(longest)));
+    }
+    out.push('\n');
+    if !kinds.is_empty() {
+        out.push_str(&format!("{}\n", kinds.join("; ")));
+    }
+    if noted > 0 {
+        out.push_str(&format!("{} with notes\n", plural(noted as u64, "recording")));
+    }
+    if failed > 0 {
+        out.push_str(&format!("{} cannot be read\n", plural(failed as u64, "file")));
+    }
+    out
+}
