@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use corsmal_files::draft;
 use corsmal_models::labels::Labels;
 use corsmal_models::model_file::{Model, ModelHeader};
 

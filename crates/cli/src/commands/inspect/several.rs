@@ -40,8 +40,12 @@ struct Sound {
 
 /// Prints a line for each recording that `paths` stand for.
 pub fn inspect(paths: &[PathBuf], json: bool) -> Result<ExitCode, Failure> {
-    let inputs = inputs::collect(paths)?;
-    let files: Vec<PathBuf> = inputs
+    let found = inputs::collect(paths)?;
+    if let Some(warning) = found.warning() {
+        eprintln!("warning: {warning}");
+    }
+    let files: Vec<PathBuf> = found
+        .inputs
         .into_iter()
         .filter_map(|input| match input.source {
             InputSource::File(path) => Some(path),
