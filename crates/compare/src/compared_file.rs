@@ -10,13 +10,22 @@ use corsmal_files::parquet::{NumericTable, ParquetFile};
 use corsmal_files::provenance::Provenance;
 use corsmal_files::table::{RESERVED, Table};
 use ndarray::ArrayD;
+use serde::Serialize;
 use serde_json::Value;
 
-use super::CompareError;
-use super::comparison::Refused;
+use super::error::CompareError;
 
 /// Name under which frame times are compared.
 const TIMES: &str = "frame times";
+
+/// An array that is there but not read.
+#[derive(Debug, Clone, Serialize)]
+pub struct Refused {
+    /// Its name.
+    pub array: String,
+    /// Why.
+    pub reason: String,
+}
 
 /// An array that can be loaded.
 #[derive(Debug)]

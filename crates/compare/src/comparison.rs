@@ -6,7 +6,7 @@ use ndarray::{Array3, ArrayD};
 use serde::Serialize;
 
 use super::causes::{self, Cause};
-use super::compared_file::{ArrayEntry, ComparedFile};
+use super::compared_file::{ArrayEntry, ComparedFile, Refused};
 use super::difference::{Difference, Tolerance};
 use super::matching::{ArrayMatch, Matching, TableMatch};
 use super::pair::{Axes, Pair, index_of};
@@ -44,15 +44,6 @@ pub struct FileReport {
     pub format: &'static str,
     /// Version of the tool that wrote it, where it is ours.
     pub tool_version: Option<String>,
-}
-
-/// An array that is there but not read.
-#[derive(Debug, Clone, Serialize)]
-pub struct Refused {
-    /// Its name.
-    pub array: String,
-    /// Why.
-    pub reason: String,
 }
 
 /// Two arrays of different shapes.

@@ -29,69 +29,23 @@ mod causes;
 mod compared_file;
 mod comparison;
 mod difference;
+mod error;
 mod matching;
 mod pair;
 mod settings;
 
-use std::path::{Path, PathBuf};
-
-use thiserror::Error;
-
-use corsmal_files::feature_file::FeatureFileError;
-use corsmal_files::layout::LayoutError;
-use corsmal_files::npz::NpzError;
-use corsmal_files::parquet::ParquetTableError;
+use std::path::Path;
 
 pub use causes::{Cause, CauseKind};
-pub use comparison::{Comparison, FeatureReport, FileReport, Finding, Refused, Shapes};
+pub use compared_file::Refused;
+pub use comparison::{Comparison, FeatureReport, FileReport, Finding, Shapes};
 pub use difference::{Difference, Extreme, Tolerance};
+pub use error::CompareError;
 pub use settings::{Setting, Settings};
 
 use compared_file::ComparedFile;
 use comparison::Collector;
 use matching::Matching;
-
-/// Why two files could not be compared.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum CompareError {
-    /// A file cannot be read.
-    #[error(transparent)]
-    File(#[from] FeatureFileError),
-    /// A member cannot be read.
-    #[error(transparent)]
-    Npz(#[from] NpzError),
-    /// An output of ours contradicts itself.
-    #[error(transparent)]
-    Layout(#[from] LayoutError),
-    /// A Parquet table cannot be read.
-    #[error(transparent)]
-    Parquet(#[from] ParquetTableError),
-    /// A name of `--map` that is not in its file.
-    #[error("{path}: no array {name:?} to map; there are {known}")]
-    Unmapped {
-        /// The file.
-        path: PathBuf,
-        /// The name.
-        name: String,
-        /// The arrays of the file.
-        known: String,
-    },
-    /// Nothing to compare.
-    #[error(
-        "no numeric arrays in common: {a} has {in_a}; {b} has {in_b} (pairs can be named: a=b)"
-    )]
-    NothingInCommon {
-        /// First file.
-        a: PathBuf,
-        /// Second file.
-        b: PathBuf,
-        /// Arrays of the first.
-        in_a: String,
-        /// Arrays of the second.
-        in_b: String,
-    },
-}
 
 /// What counts as equal, and which arrays belong together.
 #[derive(Debug, Clone, Default)]

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-use super::CompareError;
 use super::compared_file::{ArrayEntry, ComparedFile};
+use super::error::CompareError;
 use corsmal_files::parquet::NumericTable;
 
 /// Two arrays.

@@ -5,7 +5,7 @@ use std::path::Path;
 use corsmal_files::provenance::Provenance;
 use serde::{Deserialize, Serialize};
 
-use super::LedgerError;
+use super::error::LedgerError;
 
 /// Layout of the ledger; a run continues only ledgers of its own. 1 had no check sums.
 pub const VERSION: u32 = 2;

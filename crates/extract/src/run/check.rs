@@ -8,7 +8,7 @@ use corsmal_files::provenance::Provenance;
 use corsmal_files::{draft, identity};
 
 use super::error::RunError;
-use super::{MAX_JOBS, RunOptions, RunReport};
+use super::options::{MAX_JOBS, RunOptions, RunReport};
 use crate::config::Config;
 use crate::inputs::{Input, InputSource, list_hash};
 use crate::ledger::{self, Ledger};

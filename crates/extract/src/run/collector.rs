@@ -17,8 +17,10 @@ use corsmal_files::npz::Compression;
 use corsmal_files::outcome::{Outcome, Status};
 use rayon::Scope;
 
+use super::check::identity_of;
+use super::error::RunError;
+use super::options::Progress;
 use super::output::{Finished, Member, Output};
-use super::{Progress, RunError, identity_of};
 use crate::config::Config;
 use crate::engine::{Failed, Features, Planned, Plans, Recording, Span, Watch, reading};
 use crate::inputs::{Input, InputSource};

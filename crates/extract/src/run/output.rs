@@ -1,9 +1,9 @@
 //! The output of a run: recordings go in in the order of the inputs.
 
+use super::error::RunError;
 use crate::engine::{FeatureArray, Plan};
 use crate::inputs::Input;
 use crate::ledger::{Ledger, Record};
-use crate::run::RunError;
 use corsmal_files::format::OutputFormat;
 use corsmal_files::layout;
 use corsmal_files::npy::{DType, Header};

@@ -4,7 +4,7 @@ use std::io::{self, BufWriter, Write};
 
 use flate2::write::DeflateEncoder;
 
-use super::writer::Compression;
+use super::entry::Compression;
 
 /// Deflate level: numpy's and zlib's default.
 const LEVEL: u32 = 6;

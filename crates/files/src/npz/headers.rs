@@ -1,6 +1,6 @@
 //! The records of the zip format (PKWARE APPNOTE 6.3.10) that an archive of arrays needs.
 
-use super::writer::{Compression, EntryRecord};
+use super::entry::{Compression, EntryRecord};
 
 const LOCAL: u32 = 0x0403_4b50;
 const CENTRAL: u32 = 0x0201_4b50;

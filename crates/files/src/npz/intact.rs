@@ -3,8 +3,8 @@
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 
+use super::entry::EntryRecord;
 use super::headers::{self, Zip64};
-use super::writer::EntryRecord;
 
 const CHUNK: usize = 1 << 20;
 

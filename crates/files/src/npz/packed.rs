@@ -3,7 +3,7 @@
 use std::io::Write;
 
 use super::encoder::{Encoder, Totals};
-use super::writer::Compression;
+use super::entry::Compression;
 use crate::npy::Header;
 
 /// A deflated array, ready for [`super::NpzWriter::packed`]. Its entry has the same bytes as if the

@@ -14,8 +14,8 @@ use serde::de::DeserializeOwned;
 use zip::read::ZipFile;
 use zip::{CompressionMethod, ZipArchive};
 
-use super::NpzError;
-use super::writer::{Compression, EntryRecord};
+use super::entry::{Compression, EntryRecord};
+use super::error::NpzError;
 use crate::npy::{self, DType, Endian, Header, Kind, NpyError};
 use crate::quote::quoted;
 

@@ -9,50 +9,16 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
-
-use super::NpzError;
 use super::disk::DiskSync;
 use super::encoder::{Checked, Encoder};
+use super::entry::{Compression, EntryRecord};
+use super::error::NpzError;
 use super::headers::{self, Zip64};
 use super::packed::Packed;
 use crate::npy::{DType, Header};
 
 /// Bytes copied at a time from a stream.
 const CHUNK: usize = 1 << 20;
-
-/// How the entries of an archive are stored.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Compression {
-    /// As they are.
-    #[default]
-    Stored,
-    /// Deflated.
-    Deflated,
-}
-
-/// A completed entry: all that is needed to continue the archive behind it and to list it in the
-/// central directory.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct EntryRecord {
-    /// Name in the archive, `.npy` included.
-    pub name: String,
-    /// Byte of its local header.
-    pub offset: u64,
-    /// Byte behind its data.
-    pub end: u64,
-    /// CRC-32 of the member.
-    pub crc32: u32,
-    /// CRC-32 of the member as stored in the archive.
-    pub stored_crc32: u32,
-    /// Bytes of the member.
-    pub size: u64,
-    /// Bytes of the member as stored in the archive.
-    pub compressed: u64,
-    /// How it is stored.
-    pub compression: Compression,
-}
 
 /// Appends entries to an archive; [`NpzWriter::finish`] makes it complete.
 #[derive(Debug)]

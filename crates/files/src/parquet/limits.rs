@@ -10,10 +10,11 @@ use std::panic::{self, AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Once;
 
+use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 
+use super::error::{ParquetTableError, io as failed, layout};
 use super::thrift::{self, Fault};
-use super::{ParquetTableError, io as failed, layout};
 
 /// Values that a file of any size may hold.
 pub const MAX_VALUES: u64 = 1 << 23;
@@ -128,6 +129,23 @@ fn walk_pages(path: &Path, file: &File, start: u64, end: u64) -> Result<(), Parq
 fn read_at(mut file: &File, at: u64, out: &mut [u8]) -> io::Result<()> {
     file.seek(SeekFrom::Start(at))?;
     file.read_exact(out)
+}
+
+/// Takes the memory of a string from what is left.
+pub(super) fn spend<'a>(left: &mut u64, text: &'a str) -> Result<&'a str, ParquetError> {
+    let bytes = (size_of::<String>() + text.len()) as u64;
+    *left = left.checked_sub(bytes).ok_or_else(|| {
+        ParquetError::General("more text than a file of this size may hold".into())
+    })?;
+    Ok(text)
+}
+
+/// Pages may hold more than the metadata say.
+pub(super) fn require_rows(found: usize, rows: usize) -> Result<(), ParquetError> {
+    match found > rows {
+        true => Err(ParquetError::General(format!("a column has more than the {rows} rows"))),
+        false => Ok(()),
+    }
 }
 
 thread_local! {

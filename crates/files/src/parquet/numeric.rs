@@ -10,8 +10,9 @@ use parquet::data_type::{ByteArray, DataType};
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
-use super::reader::{require_rows, spend};
-use super::{ParquetTableError, ROWS, layer, layout};
+use super::error::{ParquetTableError, layer, layout};
+use super::keys::ROWS;
+use super::limits::{require_rows, spend};
 use crate::table::ID;
 
 /// The numbers of a table.

@@ -9,9 +9,10 @@ use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
-use super::limits::{self, shielded};
+use super::error::{ParquetTableError, io, layer, layout};
+use super::keys::{CONFIG, META, OUTCOMES, ROWS};
+use super::limits::{self, require_rows, shielded, spend};
 use super::numeric::{self, NumericTable};
-use super::{CONFIG, META, OUTCOMES, ParquetTableError, ROWS, io, layer, layout};
 use crate::layout::parse_outcomes;
 use crate::provenance::{LAYOUT_VERSION, Provenance};
 use crate::table::{ID, Table};
@@ -171,15 +172,6 @@ fn texts(
     Ok(texts)
 }
 
-/// Takes the memory of a string from what is left.
-pub(super) fn spend<'a>(left: &mut u64, text: &'a str) -> Result<&'a str, ParquetError> {
-    let bytes = (size_of::<String>() + text.len()) as u64;
-    *left = left.checked_sub(bytes).ok_or_else(|| {
-        ParquetError::General("more text than a file of this size may hold".into())
-    })?;
-    Ok(text)
-}
-
 fn floats(
     parts: impl Iterator<Item = Result<ColumnReader, ParquetError>>,
     rows: usize,
@@ -209,13 +201,5 @@ fn batches<T: DataType>(
             return Ok(());
         }
         require_rows(take(values)?, rows)?;
-    }
-}
-
-/// Pages may hold more than the metadata say.
-pub(super) fn require_rows(found: usize, rows: usize) -> Result<(), ParquetError> {
-    match found > rows {
-        true => Err(ParquetError::General(format!("a column has more than the {rows} rows"))),
-        false => Ok(()),
     }
 }

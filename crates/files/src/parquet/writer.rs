@@ -13,7 +13,8 @@ use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{ColumnPath, Type, TypePtr};
 
-use super::{CONFIG, META, OUTCOMES, ParquetTableError, ROWS, io, layer};
+use super::error::{ParquetTableError, io, layer};
+use super::keys::{CONFIG, META, OUTCOMES, ROWS};
 use crate::layout::json_lines;
 use crate::provenance::Provenance;
 use crate::table::{ID, Table};

@@ -1,0 +1,66 @@
+//! How to run, and what a run tells.
+
+use std::path::PathBuf;
+
+use corsmal_files::npz::Compression;
+use corsmal_files::outcome::Outcome;
+use corsmal_files::shard::Shard;
+
+/// Most worker threads.
+pub const MAX_JOBS: usize = 1024;
+
+/// How to run.
+#[derive(Debug, Clone)]
+pub struct RunOptions {
+    /// The output, `.npz` or `.parquet`.
+    pub out: PathBuf,
+    /// Compression of `.npz` members.
+    pub compression: Compression,
+    /// Worker threads, 1 to [`MAX_JOBS`].
+    pub jobs: usize,
+    /// Part of the inputs.
+    pub shard: Shard,
+    /// Continue an interrupted run.
+    pub resume: bool,
+    /// Replace an existing output and forget an interrupted run.
+    pub overwrite: bool,
+    /// Failed files after which to stop; `None` never stops.
+    pub max_errors: Option<usize>,
+}
+
+/// What happened to the inputs.
+#[derive(Debug, Clone, Default)]
+pub struct RunReport {
+    /// One row per input, in order.
+    pub outcomes: Vec<Outcome>,
+    /// Inputs taken over from an interrupted run.
+    pub resumed: usize,
+    /// The output was complete already.
+    pub up_to_date: bool,
+}
+
+impl RunReport {
+    /// Inputs without features.
+    pub fn failed(&self) -> usize {
+        self.outcomes.iter().filter(|o| !o.status.has_features()).count()
+    }
+}
+
+/// Told what goes on, from several threads.
+pub trait Progress: Sync {
+    /// The run begins: inputs in all, and those already done.
+    fn start(&self, inputs: usize, done: usize);
+    /// An input is written.
+    fn done(&self, outcome: &Outcome);
+    /// Something the user should know, once per run.
+    fn warning(&self, message: &str);
+}
+
+/// Tells nobody.
+pub struct Quiet;
+
+impl Progress for Quiet {
+    fn start(&self, _: usize, _: usize) {}
+    fn done(&self, _: &Outcome) {}
+    fn warning(&self, _: &str) {}
+}

@@ -1,0 +1,8 @@
+//! Where an output of ours keeps what is no column.
+
+pub(super) const META: &str = "corsmal.meta";
+pub(super) const CONFIG: &str = "corsmal.config";
+pub(super) const OUTCOMES: &str = "corsmal.outcomes";
+
+/// Rows written together, and read at a time.
+pub(super) const ROWS: usize = 1 << 16;
