@@ -1,0 +1,77 @@
+"""Runs librosa's own tests with corsmal_feat in its place and holds the result against `left.txt`.
+
+    python python/tests/librosa_suite/run.py FOLDER [TEST_FILE ...]
+
+FOLDER is where the source distribution of librosa 0.11.0 lies, or is put (`pip download`). Without
+TEST_FILEs the fixed list of CI runs. A test that passes without a call of ours does not count. A
+test that fails must stand in `left.txt`, and one that stands there and passes must go from it.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tarfile
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).resolve().parent
+#: What runs in CI.
+FIXED = (
+    "test_convert.py",
+    "test_effects.py",
+    "test_filters.py",
+    "test_failures.py",
+    "test_decompose.py",
+)
+#: Fewest functions of librosa that are replaced: the list may only grow.
+FEWEST = 88
+
+
+def source(folder: Path) -> Path:
+    """The unpacked source distribution."""
+    unpacked = folder / "librosa-0.11.0"
+    if not unpacked.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        download = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
+        subprocess.run(
+            [*download, "--no-binary", ":all:", "librosa==0.11.0", "-d", str(folder)], check=True
+        )
+        with tarfile.open(folder / "librosa-0.11.0.tar.gz") as archive:
+            archive.extractall(folder, filter="data")
+    return unpacked
+
+
+def main() -> int:
+    folder, files = Path(sys.argv[1]).resolve(), sys.argv[2:] or FIXED
+    sys.path.insert(0, str(HERE))
+    import replaced
+
+    if len(replaced.replaced) < FEWEST:
+        print(f"only {len(replaced.replaced)} functions are replaced, {FEWEST} were")
+        return 1
+    os.chdir(source(folder))
+    options = ["-q", "-o", "addopts=", "-p", "no:cacheprovider", "--tb=no", "-W", "ignore"]
+    pytest.main([*options, *(f"tests/{name}" for name in files)], plugins=[replaced])
+    left = set((HERE / "left.txt").read_text(encoding="utf-8").split("\n")) - {""}
+    # An error of the set-up is a recording that the source distribution does not hold.
+    failed = set(replaced.failed)
+    counts = Counter(
+        "counted" if test in replaced.counted else "without a call of ours"
+        for test in replaced.passed
+    )
+    print(f"\n{len(replaced.replaced)} functions replaced; passed: {dict(counts)}")
+    ran = replaced.failed | replaced.passed
+    new, mended = failed - left, (left & ran) - failed
+    for test in sorted(new):
+        print(f"fails: {test}")
+    for test in sorted(mended):
+        print(f"passes, but stands in left.txt: {test}")
+    return int(bool(new or mended or not counts["counted"]))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
