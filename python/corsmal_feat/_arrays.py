@@ -68,6 +68,12 @@ def floats(name: str, value: Any, min_ndim: int = 1) -> Floats:
     return array
 
 
+def spectrum(S: Any) -> Floats:
+    """A spectrogram `S` [shape=(..., d, t)]; whole numbers become double precision."""
+    array = np.asarray(S)
+    return floats("S", array.astype(np.float64) if array.dtype.kind in "iu" else array, 2)
+
+
 def audio(y: Any) -> Floats:
     """`y` [shape=(..., n)], finite."""
     array = floats("y", y)

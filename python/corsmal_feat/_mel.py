@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, channels, floats, room, rows, size, unrows
+from ._arrays import Floats, channels, floats, room, rows, size, spectrum, unrows
 from ._decibels import power_to_db
 from ._filters import Window, mel_params, warn_empty
 from ._spectrum import length_of, signal
@@ -59,7 +59,7 @@ def melspectrogram(
     (8, 128, 87)
     """
     if S is not None:
-        s = floats("S", S, 2)
+        s = spectrum(S)
         bank = mel_params(sr, length_of(s, n_fft), n_mels, fmin, fmax, htk, norm)
         result, empty = _core.apply_mel(rows(s, 2), bank)
         leading = s.shape[:-2]

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Complexes, Floats, Same, audio, channels, floats, rows, size, unrows
+from ._arrays import Complexes, Floats, Same, audio, channels, rows, size, spectrum, unrows
 from ._filters import Window, window_spec
 from ._params import StftParams
 from .errors import ParameterError
@@ -162,7 +162,7 @@ def length_of(s: Floats, n_fft: int) -> int:
 def spectra(y: Any, S: Any, n_fft: int, framing: Framing) -> Spectra:
     """Magnitudes, from `S` or by a transform of `y`."""
     if S is not None:
-        s = floats("S", S, 2)
+        s = spectrum(S)
         return Spectra(rows(s, 2), s.shape[:-2], length_of(s, n_fft), s.shape)
     y, params = signal(y, n_fft, *framing)
     return Spectra((channels(y), params), y.shape[:-1], n_fft, None)
@@ -182,7 +182,7 @@ def spectrogram(
     """`S`, or |stft(y)|**power by a transform in double precision where S is None, and the
     transform length it has (librosa.core.spectrum._spectrogram)."""
     if S is not None:
-        S = floats("S", S, 2)
+        S = spectrum(S)
         return S, length_of(S, n_fft)
     y, params = signal(y, n_fft, hop_length, win_length, window, center, pad_mode)
     return unrows(_core.spectrogram(channels(y), params, float(power)), y, 1), n_fft

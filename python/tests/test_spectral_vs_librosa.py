@@ -272,3 +272,13 @@ def test_onsets_of_a_recording() -> None:
     ours, theirs = both("onset.onset_detect", y=y, sr=22050, units="samples")
     assert np.array_equal(ours, theirs)
     assert np.array_equal(ours, want)
+
+
+def test_whole_numbers_are_spectra_too():
+    counts = np.array([[1, 3], [2, 1], [1, 2]])
+    for function in (
+        corsmal_feat.feature.spectral_flatness,
+        corsmal_feat.feature.spectral_centroid,
+        corsmal_feat.feature.melspectrogram,
+    ):
+        np.testing.assert_array_equal(function(S=counts), function(S=counts.astype(np.float64)))
