@@ -59,7 +59,7 @@ fn impossible_values_name_key_value_and_what_is_allowed() {
         ("+m3_spectrogram m3_spectrogram.n_fft=1000000000", &["n_fft", "at most"]),
         ("+spec9216 spec9216.fixed_len=9223372036854775807", &["fixed_len", "at most"]),
         ("nonsense", &["--set nonsense", "key=value"]),
-        ("rms.center=false", &["no feature rms", "mfcc.center=false?", "--add rms"]),
+        ("rms.center=false", &["no feature rms", "mfcc.center=false or", "--add rms"]),
         ("sr=16000", &["did you mean signal.sample_rate=16000?"]),
         ("n_mels=64", &["did you mean mfcc.n_mels=64?"]),
         ("mfcc.n_mel=64", &["features.mfcc.n_mel", "did you mean \"n_mels\"?"]),

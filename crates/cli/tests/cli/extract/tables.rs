@@ -111,13 +111,15 @@ fn windows_are_rows_with_the_labels_and_the_id_of_their_recording() {
     assert_eq!(found.values(), table(&at("h.npz")).values());
 
     // The hop is half a window unless it is given, as for `classify`.
-    let listed = extract(&at("list.csv"), &out, &["--window", "0.5", "--dry-run"]).with(0);
+    let listed =
+        extract(&at("list.csv"), &at("dry.npz"), &["--window", "0.5", "--dry-run"]).with(0);
     let listed: Vec<&str> =
         listed.stdout.lines().filter_map(|line| line.split('\t').next()).collect();
     assert_eq!(listed, ids);
     // A part of a recording is cut where it begins.
     std::fs::write(at("part.csv"), "path,start,end\nlong.wav,0.1,1.2\n").unwrap();
-    let listed = extract(&at("part.csv"), &out, &["--window", "0.5", "--dry-run"]).with(0);
+    let listed =
+        extract(&at("part.csv"), &at("dry.npz"), &["--window", "0.5", "--dry-run"]).with(0);
     assert!(listed.stdout.starts_with("long@0.1\t"), "{}", listed.stdout);
     assert_eq!(listed.stdout.lines().count(), 3);
 
