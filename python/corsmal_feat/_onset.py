@@ -126,6 +126,10 @@ def onset_strength_multi(
     aggregate : callable or False
         Instead of the mean over the bands of a group; False keeps every band.
 
+    Returns
+    -------
+    [shape=(..., groups, t)]
+
     Examples
     --------
     >>> y = np.zeros(44100, np.float32)

@@ -171,6 +171,10 @@ def cross_validate(
     seed : int
         Seed of the classifier and of shuffled folds.
 
+    Returns
+    -------
+    CrossValidation
+
     Raises
     ------
     ParameterError
@@ -229,6 +233,10 @@ def fuse(
     background : str, optional
         With a majority: this class wins only where no other has `least` windows.
 
+    Returns
+    -------
+    Predictions
+
     Raises
     ------
     ParameterError
@@ -267,10 +275,18 @@ def compare_predictions(
     resamples, seed : int
         Draws of the bootstrap, and its seed.
 
+    Returns
+    -------
+    Comparison
+
     Raises
     ------
     ParameterError
         Recordings that only one file has, other true classes, missing columns.
+
+    Examples
+    --------
+    >>> corsmal_feat.compare_predictions("forest.csv", "svm.csv")  # doctest: +SKIP
     """
     count = _whole("resamples", resamples, 1_000_001)
     text = _core.compare_predictions(
@@ -322,6 +338,10 @@ def score(
         The target is a number although all its values are whole.
     resamples, seed : int
         Draws of the bootstrap, and its seed.
+
+    Returns
+    -------
+    ScoreReport
 
     Raises
     ------
