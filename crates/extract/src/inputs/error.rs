@@ -1,0 +1,84 @@
+//! What can be wrong with the inputs of a run.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+/// What can be wrong with the inputs of a run.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum InputError {
+    /// Nothing has this name.
+    #[error("{path}: no such file or folder")]
+    Missing {
+        /// The name given.
+        path: PathBuf,
+    },
+    /// The operating system refused.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// Its reason.
+        source: io::Error,
+    },
+    /// A folder or glob without recordings.
+    #[error("{path}: no file with an audio extension ({extensions})")]
+    NoAudio {
+        /// The folder or glob.
+        path: PathBuf,
+        /// The extensions looked for.
+        extensions: String,
+    },
+    /// A glob that cannot be understood.
+    #[error("{pattern}: not a glob: {reason}")]
+    Glob {
+        /// The glob.
+        pattern: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A row of a manifest that cannot be used.
+    #[error("{path}, line {line}: {reason}")]
+    Manifest {
+        /// The manifest.
+        path: PathBuf,
+        /// Line, from 1.
+        line: u64,
+        /// What is wrong, and what is allowed.
+        reason: String,
+    },
+    /// The manifests together have too many labels.
+    #[error("{reason}")]
+    Labels {
+        /// How many, and how many are allowed.
+        reason: String,
+    },
+    /// A recording that cannot be cut into windows.
+    #[error("{id}: {reason}")]
+    Window {
+        /// Its id, or that of a window.
+        id: String,
+        /// Why.
+        reason: String,
+    },
+    /// Two inputs cannot be told apart.
+    #[error(
+        "{first} and {second} both have the id {id:?}; name each once, or give ids in a manifest"
+    )]
+    Duplicate {
+        /// The id.
+        id: String,
+        /// One input.
+        first: String,
+        /// The other.
+        second: String,
+    },
+}
+
+impl InputError {
+    pub(crate) fn io(path: &Path, source: io::Error) -> Self {
+        Self::Io { path: path.into(), source }
+    }
+}
