@@ -3,7 +3,7 @@
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING, Any
 
-from . import corsmal, decompose, display, effects, errors, feature, filters, onset, util
+from . import corsmal, decompose, display, effects, errors, feature, filters, onset, util, vision
 from ._audio import get_duration, get_samplerate, load, stream
 from ._core import __version__
 from ._decibels import amplitude_to_db, db_to_amplitude, db_to_power, magphase, power_to_db
@@ -185,6 +185,7 @@ __all__ = [
     "to_mono",
     "tuning_to_A4",
     "util",
+    "vision",
     "yin",
 ]
 

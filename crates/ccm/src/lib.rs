@@ -5,6 +5,7 @@
 //! `docs/benchmark.md` gives the overview.
 
 pub mod benchmark;
+pub mod capacity;
 pub mod citation;
 pub mod dataset;
 pub mod decision;

@@ -122,8 +122,18 @@ fn sequence_key(path: &Path, container: &str, sequence: &str) -> Result<RowKey> 
     })
 }
 
+/// The recording that a file of its images is named after, as M5 names them: `id10_0000.png`
+/// (container, sequence) or `id000000.png` (id of the flat release).
+pub(crate) fn file_key(file: &str) -> Option<RowKey> {
+    let stem = file.trim_start_matches("id").split('.').next().unwrap_or_default();
+    match stem.split_once('_') {
+        Some((c, s)) => c.parse().ok().zip(s.parse().ok()).map(|(c, s)| RowKey::Sequence(c, s)),
+        None => stem.parse().ok().map(RowKey::Id),
+    }
+}
+
 /// Capacity estimates by recording: columns `fileName` (`id10_0000.png`: container and sequence
-/// number) and `capacity[mL]`, as M5 published them; -1 is no estimate.
+/// number; `id000000.png`: id of the flat release) and `capacity[mL]`, as M5 published them; -1 is no estimate.
 ///
 /// # Errors
 /// [`CcmError`] with line and column for other values, and for recordings that occur twice.
@@ -134,12 +144,10 @@ pub fn read_capacities(path: &Path) -> Result<HashMap<RowKey, Option<f64>>> {
     let mut by_key = HashMap::new();
     let mut seen = HashSet::new();
     for row in 0..table.rows() {
-        let stem = table.text(row, file).trim_start_matches("id");
-        let stem = stem.split('.').next().unwrap_or_default();
-        let key = stem
-            .split_once('_')
-            .and_then(|(c, s)| Some(RowKey::Sequence(c.parse().ok()?, s.parse().ok()?)))
-            .ok_or_else(|| table.fault(row, file, "a name such as id10_0000.png"))?;
+        let key = file_key(table.text(row, file));
+        let key = key.ok_or_else(|| {
+            table.fault(row, file, "a name such as id10_0000.png or id000000.png")
+        })?;
         if !seen.insert(key) {
             return Err(table.fault(row, file, "a name that occurs once"));
         }

@@ -22,6 +22,7 @@ mod scoring;
 mod spectral;
 mod spectrum;
 mod time_domain;
+mod vision;
 
 use pyo3::prelude::*;
 
@@ -87,6 +88,11 @@ mod _core {
     use crate::spectrum::{all_finite, get_window, spectrogram, stft};
     #[pymodule_export]
     use crate::time_domain::{rms, rms_of_spectrogram, zero_crossing_rate};
+
+    #[pymodule_export]
+    use crate::vision::{
+        cuboid, load_calibration, load_depth, load_mask, lode, region, upright_box,
+    };
 
     #[pymodule_init]
     fn init(m: &Bound<'_, PyModule>) -> PyResult<()> {

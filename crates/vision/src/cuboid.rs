@@ -6,6 +6,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
 use crate::calibration::Camera;
+use crate::cloud::{self, DepthView};
 use crate::detections::Detection;
 use crate::error::{Result, VisionError};
 use crate::forest::inliers;
@@ -63,13 +64,7 @@ pub fn cuboid(
     outliers: Outliers,
     seed: u64,
 ) -> Result<Cuboid> {
-    if (depth.width, depth.height) != (mask.width, mask.height) {
-        return Err(VisionError::Request(format!(
-            "a depth image of {} by {} px and a mask of {} by {}; they must be equal",
-            depth.width, depth.height, mask.width, mask.height
-        )));
-    }
-    let mut points = cloud(depth, mask, camera)?;
+    let mut points = cloud::points(&DepthView { depth, mask, camera })?;
     if outliers != Outliers::Kept {
         points = filtered(points, outliers, seed);
     }
@@ -82,19 +77,6 @@ pub fn cuboid(
     let share = share_on_mask(low, high, mask, camera)?;
     let volume: f64 = (0..3).map(|i| high[i] - low[i]).product();
     Ok(Cuboid { low, high, share, capacity: volume * 1e6 * share, points: points.len() })
-}
-
-/// Points of the world, in m, of the pixels on the mask that have a depth.
-fn cloud(depth: &Depth, mask: &Mask, camera: &Camera) -> Result<Vec<[f64; 3]>> {
-    let back = camera
-        .back_projection()
-        .ok_or_else(|| VisionError::Request("the camera matrix cannot be inverted".into()))?;
-    let pixels = depth.data.iter().zip(&mask.data).enumerate();
-    let points = pixels.filter(|(_, (mm, inside))| **inside && **mm > 0).map(|(i, (&mm, _))| {
-        let (column, row) = ((i % depth.width) as f64, (i / depth.width) as f64);
-        back.point(column, row, f64::from(mm) / 1000.0)
-    });
-    Ok(points.collect())
 }
 
 /// What the forests keep: in space first, then in the planes xy, xz and yz of what is left.

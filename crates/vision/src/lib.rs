@@ -7,6 +7,7 @@
 
 mod calibration;
 pub mod category;
+pub mod cloud;
 mod coco;
 mod contour;
 pub mod cuboid;

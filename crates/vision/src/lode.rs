@@ -71,6 +71,31 @@ pub struct Dimensions {
     pub profile: Vec<[f64; 2]>,
 }
 
+impl Dimensions {
+    /// Widths in mm at a tenth of the height from the bottom and from the top: at the very ends the
+    /// circles of this method shrink.
+    pub fn end_widths(&self) -> [f64; 2] {
+        let width = |share: f64| {
+            let at = (self.profile.len().saturating_sub(1)) as f64 * share;
+            self.profile.get(at.round() as usize).map_or(0.0, |p| p[1] * 2000.0)
+        };
+        [width(0.1), width(0.9)]
+    }
+
+    /// Volume in mL of the circles' slices above a stem, where there is one: the narrowest place in the
+    /// middle of the object, narrower than two fifths of the widest (beyond the paper).
+    pub fn bowl_capacity(&self) -> f64 {
+        let n = self.profile.len();
+        let widest = self.profile.iter().map(|p| p[1]).fold(0.0, f64::max);
+        let middle = self.profile.iter().enumerate().skip(n / 7).take(n - 2 * (n / 7));
+        // The last of equals: a stem is straight.
+        let narrowest = middle.min_by(|(i, a), (j, b)| a[1].total_cmp(&b[1]).then(j.cmp(i)));
+        let from = narrowest.filter(|(_, p)| p[1] < 0.4 * widest).map_or(0, |(i, _)| i);
+        let slices = self.profile[from..].iter().map(|p| PI * p[1] * p[1]);
+        slices.sum::<f64>() * HEIGHTS.step() * 1e6
+    }
+}
+
 /// Capacity and what one pixel more or less on both masks makes of it, in mL.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Band {
@@ -316,6 +341,28 @@ mod tests {
         let error = dimensions(views, Variant::Published).unwrap_err().to_string();
         assert!(error.contains("beyond an image"), "{error}");
         assert_eq!(dimensions(views, Variant::Corrected).unwrap().capacity, d.capacity);
+    }
+
+    #[test]
+    fn a_stem_holds_nothing() {
+        let profile = |radius: &dyn Fn(f64) -> f64| -> Vec<[f64; 2]> {
+            (0..100).map(|i| [0.001 * f64::from(i), radius(f64::from(i))]).collect()
+        };
+        let of = |profile| Dimensions {
+            centre: [0.0; 3],
+            height: 100.0,
+            width: 60.0,
+            capacity: 0.0,
+            profile,
+        };
+        let slice = PI * 0.03 * 0.03 * HEIGHTS.step() * 1e6;
+        let tumbler = of(profile(&|_| 0.03));
+        assert!((tumbler.bowl_capacity() - 100.0 * slice).abs() < 1e-9);
+        let wine = of(profile(&|i| if (10.0..50.0).contains(&i) { 0.004 } else { 0.03 }));
+        let bowl = wine.bowl_capacity();
+        assert!((50.0 * slice..51.0 * slice).contains(&bowl), "{bowl}");
+        assert_eq!(wine.end_widths(), [8.0, 60.0]);
+        assert_eq!(of(vec![]).bowl_capacity(), 0.0);
     }
 
     #[test]

@@ -4,21 +4,22 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::array::MICROPHONES;
+use super::views::Shape;
 use super::{NOTICE, SAMPLE_RATE, Size, Take, capacity_ml, container_mass_g, density};
 use crate::dataset::Subset;
 use crate::error::{CcmError, Result};
 use crate::scores::DensityTable;
 
 /// States that everything here is synthetic.
-pub(super) fn write_notice(dir: &Path, size: Size, seed: u64) -> Result<()> {
+pub(super) fn write_notice(dir: &Path, size: Size, seed: u64, vision: bool) -> Result<()> {
     let text = format!(
         "SYNTHETIC RECORDINGS - NOT THE CORSMAL DATA SET\n\n\
          Made by `corsmal-feat synth` (size {size:?}, seed {seed}) by simple physics, in the folder\n\
          layout and naming of the CORSMAL Containers Manipulation data set, for demonstrations and\n\
          tests. No real recording is in here. Scores, features and models from these files mean\n\
          nothing about the real data set or about any method evaluated on it.\n\n\
-         Containers 1 to 9 have the published capacities and masses; dimensions, and everything\n\
-         about containers 10 to 15, are invented.\n\n\
+         Containers 1 to 9 have the published capacities and masses and nearly the published\n\
+         dimensions; everything about containers 10 to 15 is invented.\n\n\
          train/<container>/audio/       labelled by file name\n\
          test/<container>/audio/        numbered files, labels in ccm_test_pub_annotation.csv\n\
          test_private/<container>/audio/  the same, ccm_test_priv_annotation.csv (full size only)\n\
@@ -26,14 +27,22 @@ pub(super) fn write_notice(dir: &Path, size: Size, seed: u64) -> Result<()> {
          ccm_test_*_annotation.csv      official format of 2020 (container and file number)\n\
          man_annotations.csv            start and end of the action in seconds, -1 for empty\n"
     );
-    write(&dir.join(NOTICE), text.as_bytes())
+    let views = "\
+        calib/, rgb/, depth/           beside audio/: four views of two frames, by ray casting\n\
+        detections/                    what a detector would say: boxes, labels, masks\n";
+    write(&dir.join(NOTICE), (text + if vision { views } else { "" }).as_bytes())
+}
+
+/// Writes a file and the folders above it.
+pub(super) fn write_new(path: &Path, bytes: &[u8]) -> Result<()> {
+    if let Some(parent) = path.parent() {
+        std::fs::create_dir_all(parent).map_err(|e| CcmError::io(parent, e))?;
+    }
+    write(path, bytes)
 }
 
 /// Writes interleaved PCM16; the file appears only when complete.
 pub(super) fn write_wav(path: &Path, pcm: &[i16]) -> Result<()> {
-    if let Some(parent) = path.parent() {
-        std::fs::create_dir_all(parent).map_err(|e| CcmError::io(parent, e))?;
-    }
     let spec = hound::WavSpec {
         channels: MICROPHONES as u16,
         sample_rate: SAMPLE_RATE,
@@ -48,7 +57,7 @@ pub(super) fn write_wav(path: &Path, pcm: &[i16]) -> Result<()> {
         writer.finalize()
     });
     encoded.map_err(|e| CcmError::Request(format!("{}: {e}", path.display())))?;
-    write(path, bytes.get_ref())
+    write_new(path, bytes.get_ref())
 }
 
 /// Writes the annotation files of the parts that have recordings.
@@ -87,17 +96,18 @@ fn training<'a>(takes: impl Iterator<Item = &'a Take>) -> String {
     for (id, take) in takes.enumerate() {
         let (name, filling) = (take.name, take.name.filling);
         let (capacity, mass) = (capacity_ml(take.container), container_mass_g(take.container));
-        // A cylinder 1.3 times as high as wide.
-        let width = (4000.0 * capacity / (1.3 * std::f64::consts::PI)).cbrt().round();
+        let size = Shape::of(take.container).dimensions();
         let filled = filling_mass(take, &densities);
         let _ = writeln!(
             text,
-            "{id},{},{},{},{},{width},{width},{},-1,{capacity},{mass},{},{},{},{filled},{},-1,-1,-1",
+            "{id},{},{},{},{},{},{},{},-1,{capacity},{mass},{},{},{},{filled},{},-1,-1,-1",
             take.container.number(),
             name.scenario,
             name.background,
             name.illumination,
-            (1.3 * width).round(),
+            size.width_top,
+            size.width_bottom,
+            size.height,
             filling.kind() as u8,
             filling.level() as u8,
             density(filling),

@@ -5,6 +5,7 @@
 mod array;
 mod files;
 mod physics;
+mod views;
 
 use std::path::Path;
 
@@ -14,6 +15,8 @@ use rayon::prelude::*;
 
 use crate::dataset::{Category, Container, Filling, SequenceName, Subset};
 use crate::error::{CcmError, Result};
+
+pub use views::write_views;
 
 /// Sample rate of the recordings in Hz.
 pub const SAMPLE_RATE: u32 = 44_100;
@@ -59,6 +62,18 @@ struct Take {
 /// [`CcmError`] when `dir` holds files but no [`NOTICE`] of an earlier run, and when something
 /// cannot be written.
 pub fn generate(dir: &Path, size: Size, seed: u64) -> Result<Summary> {
+    make(dir, size, seed, false)
+}
+
+/// The same with views of every recording: colour and depth images, calibrations and detections.
+///
+/// # Errors
+/// As [`generate`].
+pub fn generate_with_views(dir: &Path, size: Size, seed: u64) -> Result<Summary> {
+    make(dir, size, seed, true)
+}
+
+fn make(dir: &Path, size: Size, seed: u64, vision: bool) -> Result<Summary> {
     let occupied =
         dir.exists() && std::fs::read_dir(dir).map_err(|e| CcmError::io(dir, e))?.next().is_some();
     if occupied && !dir.join(NOTICE).exists() {
@@ -68,9 +83,9 @@ pub fn generate(dir: &Path, size: Size, seed: u64) -> Result<Summary> {
         )));
     }
     std::fs::create_dir_all(dir).map_err(|e| CcmError::io(dir, e))?;
-    files::write_notice(dir, size, seed)?;
+    files::write_notice(dir, size, seed, vision)?;
     let mut takes = plan(size, seed);
-    takes.par_iter_mut().try_for_each(|take| take.record(dir, seed))?;
+    takes.par_iter_mut().try_for_each(|take| take.record(dir, seed, vision))?;
     files::write_annotations(dir, &takes)?;
     Ok(Summary { recordings: takes.len(), frames: takes.iter().map(|t| t.frames as u64).sum() })
 }
@@ -116,7 +131,7 @@ fn generator(seed: u64, container: Container, name: Option<SequenceName>) -> imp
 }
 
 impl Take {
-    fn record(&mut self, dir: &Path, seed: u64) -> Result<()> {
+    fn record(&mut self, dir: &Path, seed: u64, vision: bool) -> Result<()> {
         let mut rng = generator(seed, self.container, Some(self.name));
         let source = physics::Source {
             category: self.container.category(),
@@ -130,18 +145,33 @@ impl Take {
         let pcm = array::record(&sound.samples, distance, noise, &mut rng);
         self.frames = sound.samples.len();
         self.action = sound.action;
-        files::write_wav(&dir.join(self.path()), &pcm)
+        files::write_wav(&dir.join(self.path()), &pcm)?;
+        if vision {
+            let stem = match self.container.subset() {
+                Subset::Training => self.name.to_string(),
+                _ => format!("{:04}", self.number),
+            };
+            write_views(&dir.join(self.folder()), &stem, self.container, self.name, seed)?;
+        }
+        Ok(())
+    }
+
+    /// The container's folder below the data set's.
+    fn folder(&self) -> String {
+        let part = match self.container.subset() {
+            Subset::Training => "train",
+            Subset::Public => "test",
+            Subset::Private => "test_private",
+        };
+        format!("{part}/{}", self.container.number())
     }
 
     /// Path below the data set's folder.
     fn path(&self) -> String {
-        let container = self.container.number();
+        let folder = self.folder();
         match self.container.subset() {
-            Subset::Training => format!("train/{container}/audio/{}_audio.wav", self.name),
-            Subset::Public => format!("test/{container}/audio/{:04}_audio.wav", self.number),
-            Subset::Private => {
-                format!("test_private/{container}/audio/{:04}_audio.wav", self.number)
-            }
+            Subset::Training => format!("{folder}/audio/{}_audio.wav", self.name),
+            _ => format!("{folder}/audio/{:04}_audio.wav", self.number),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! One file per command: its arguments (`Args`) and what it does (`run`).
 
 mod benchmark;
+mod capacity;
 mod classifiers;
 mod classify;
 mod compare;
@@ -62,6 +63,8 @@ pub enum Command {
     Fuse(fuse::Args),
     /// Run the paper's audio baselines on a CCM data set and write the report.
     Benchmark(benchmark::Args),
+    /// Estimate capacities of containers from the views of a CORSMAL data set.
+    Capacity(capacity::Args),
     /// Print shell completions or the man page.
     Completions(completions::Args),
     /// Look at a CORSMAL data set on disk.
@@ -92,6 +95,7 @@ impl Command {
             Self::ComparePredictions(args) => compare_predictions::run(args),
             Self::Fuse(args) => fuse::run(args),
             Self::Benchmark(args) => benchmark::run(args),
+            Self::Capacity(args) => capacity::run(args),
             Self::Completions(args) => completions::run(args),
             Self::Dataset(args) => dataset::run(args),
             Self::Evaluate(args) => evaluate::run(args),

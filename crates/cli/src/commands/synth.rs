@@ -30,6 +30,10 @@ pub struct Args {
     /// All containers, scenarios, backgrounds and illuminations (1,140 recordings, about 1.4 GB).
     #[arg(long)]
     full: bool,
+    /// Views as well: colour and depth images of two frames in four views, calibrations, detections
+    /// (about 2 MB a recording).
+    #[arg(long)]
+    vision: bool,
     /// Print nothing.
     #[arg(long)]
     quiet: bool,
@@ -42,7 +46,8 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         (_, true) => Size::Full,
         _ => Size::Reduced,
     };
-    let summary = synth::generate(&args.out, size, args.seed)?;
+    let generate = if args.vision { synth::generate_with_views } else { synth::generate };
+    let summary = generate(&args.out, size, args.seed)?;
     if !args.quiet {
         println!(
             "{}: {} synthetic recordings, {:.0} s, 8 channels, {SAMPLE_RATE} Hz (seed {})",

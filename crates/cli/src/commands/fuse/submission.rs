@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::ValueEnum;
+use corsmal_ccm::capacity;
 use corsmal_ccm::dataset::{Annotations, Subset};
 use corsmal_ccm::decision::{Rule, decide, decide_joint};
-use corsmal_ccm::predictions::read_capacities;
 use corsmal_ccm::submission::{self, Prediction, RowKey, Submission, official_rows};
 
 use super::{Args, Format};
@@ -25,9 +25,13 @@ pub struct SubmissionArgs {
     /// With --feasible: food boxes are never filled with water.
     #[arg(long, requires = "feasible")]
     dry_boxes: bool,
-    /// Capacity estimates: fileName (id10_0000.png) and `capacity[mL]`.
+    /// Capacity estimates: a table of `capacity`, whose sizes and times go into the format of 2022, or
+    /// any with fileName (id10_0000.png) and `capacity[mL]`.
     #[arg(long, value_name = "CSV")]
     capacity: Option<PathBuf>,
+    /// Write the median mass of the training containers, 15 g, as every container's (2022 only).
+    #[arg(long)]
+    mass_prior: bool,
     /// Official annotations, to name recordings by id (2022) or container and sequence (2020).
     #[arg(long, value_name = "CSV")]
     annotations: Option<PathBuf>,
@@ -54,6 +58,7 @@ impl SubmissionArgs {
         let given = [
             ("--feasible", self.feasible),
             ("--capacity", self.capacity.is_some()),
+            ("--mass-prior", self.mass_prior),
             ("--annotations", self.annotations.is_some()),
             ("--part", self.part.is_some()),
         ];
@@ -100,16 +105,21 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
         (None, kind, level) => decide(kind.as_ref(), level.as_ref(), rule)?,
     };
     if let Some(path) = &options.capacity {
-        let mut capacities = read_capacities(path)?;
+        let mut capacities = capacity::read(path)?;
         for prediction in &mut predictions {
-            prediction.capacity_ml = capacities.remove(&prediction.key).ok_or_else(|| {
+            let measured = capacities.remove(&prediction.key).ok_or_else(|| {
                 Failure::new(format!("{}: has no line for {}", path.display(), prediction.key))
             })?;
+            measured.complete(prediction);
         }
         if let Some(extra) = capacities.keys().min() {
             let text = format!("{}: {extra} is among no predictions", path.display());
             return Err(Failure::new(text));
         }
+    }
+    if options.mass_prior {
+        let mass = Some(capacity::PRIOR_MASS_G);
+        predictions.iter_mut().for_each(|prediction| prediction.container_mass_g = mass);
     }
     let format = match options.format {
         Format::Y2020 => submission::Format::Y2020,

@@ -1,0 +1,59 @@
+//! One estimate from those of several frames.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use corsmal_files::draft;
+use corsmal_vision::lode::PRIOR_ML;
+
+use super::table::file_name;
+use crate::error::{CcmError, Result};
+use crate::predictions::read_capacities;
+use crate::submission::RowKey;
+
+/// Writes the mean of the files' estimates of each recording, `prior` where none has one; what equals M5's
+/// prior, or is -1, is no estimate. Returns the recordings and how many have the prior.
+///
+/// # Errors
+/// [`CcmError`] for unreadable files, recordings that a file lacks, a prior that is no number, and an output that
+/// cannot be written.
+pub fn combine_files(inputs: &[PathBuf], prior: f64, out: &Path) -> Result<(usize, usize)> {
+    if !prior.is_finite() {
+        return Err(CcmError::Request(format!("a prior of {prior}; expected a number in mL")));
+    }
+    let mut estimates: BTreeMap<RowKey, Vec<f64>> = BTreeMap::new();
+    let mut tables = Vec::with_capacity(inputs.len());
+    for path in inputs {
+        let table = read_capacities(path)?;
+        for (&key, &value) in &table {
+            let known = value.filter(|&v| v != PRIOR_ML && v != prior);
+            estimates.entry(key).or_default().extend(known);
+        }
+        tables.push((path, table));
+    }
+    for (path, table) in &tables {
+        let missing: Vec<_> = estimates.keys().filter(|key| !table.contains_key(key)).collect();
+        if let Some(first) = missing.first() {
+            return Err(CcmError::Rows {
+                path: path.to_path_buf(),
+                problem: "missing rows",
+                rows: format!("{first} ({} in all)", missing.len()),
+                expected: format!("{} recordings of the other files", estimates.len()),
+            });
+        }
+    }
+    let mut text = String::from("fileName,capacity[mL]\n");
+    let mut without = 0;
+    for (key, values) in &estimates {
+        let value = if values.is_empty() {
+            without += 1;
+            prior
+        } else {
+            values.iter().sum::<f64>() / values.len() as f64
+        };
+        let _ = writeln!(text, "{},{value}", file_name(*key));
+    }
+    draft::write(out, text.as_bytes()).map_err(CcmError::Write)?;
+    Ok((estimates.len(), without))
+}

@@ -1,0 +1,170 @@
+//! The table of estimates: one row per recording.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use corsmal_files::draft;
+
+use super::methods::Estimate;
+use super::views::Problem;
+use crate::dataset::Dimensions;
+use crate::error::{CcmError, Result};
+use crate::predictions::{file_key, read_capacities};
+use crate::submission::{Prediction, RowKey};
+use crate::table::Table;
+
+/// Columns of the table; the first two are those of M5's published files.
+const HEADER: [&str; 13] = [
+    "fileName",
+    "capacity[mL]",
+    "low[mL]",
+    "high[mL]",
+    "height[mm]",
+    "width[mm]",
+    "width top[mm]",
+    "width bottom[mm]",
+    "frames",
+    "execution[ms]",
+    "method",
+    "status",
+    "reason",
+];
+
+/// What became of a recording.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// The recording.
+    pub key: RowKey,
+    /// The estimate, or why there is none.
+    pub estimate: std::result::Result<Estimate, Problem>,
+    /// Time it took, in ms.
+    pub execution_ms: f64,
+}
+
+impl Row {
+    /// `ok`, `prior` for a substitute, `none` where nothing can be measured, `failed` for damaged files.
+    pub fn status(&self) -> &'static str {
+        match &self.estimate {
+            Ok(Estimate { substitute: None, .. }) => "ok",
+            Ok(_) => "prior",
+            Err(Problem::Missing(_)) => "none",
+            Err(Problem::Damaged(_)) => "failed",
+        }
+    }
+
+    /// Capacity in mL, -1 without an estimate.
+    pub fn capacity(&self) -> f64 {
+        self.estimate.as_ref().map_or(-1.0, |e| e.capacity)
+    }
+
+    fn cells(&self, method: &str) -> Vec<String> {
+        let number = |v: Option<f64>| v.map_or(String::new(), |v| v.to_string());
+        let estimate = self.estimate.as_ref().ok();
+        let sizes = estimate.and_then(|e| e.sizes);
+        let band = estimate.and_then(|e| e.band);
+        let reason = match &self.estimate {
+            Ok(estimate) => estimate.substitute.clone().unwrap_or_default(),
+            Err(Problem::Missing(reason) | Problem::Damaged(reason)) => reason.clone(),
+        };
+        vec![
+            file_name(self.key),
+            self.capacity().to_string(),
+            number(band.map(|b| b[0])),
+            number(band.map(|b| b[1])),
+            number(sizes.map(|s| s.height)),
+            number(sizes.map(|s| s.width)),
+            number(sizes.map(|s| s.width_top)),
+            number(sizes.map(|s| s.width_bottom)),
+            estimate.map_or("0".into(), |e| e.frames.to_string()),
+            format!("{:.1}", self.execution_ms),
+            method.into(),
+            self.status().into(),
+            reason,
+        ]
+    }
+}
+
+/// `id10_0003.png` as M5 names recordings, `id000123.png` for those of the flat release.
+pub(super) fn file_name(key: RowKey) -> String {
+    match key {
+        RowKey::Sequence(container, sequence) => format!("id{container}_{sequence:04}.png"),
+        RowKey::Id(id) => format!("id{id:06}.png"),
+    }
+}
+
+/// Median mass in g of the nine training containers: what is written where none is measured.
+pub const PRIOR_MASS_G: f64 = 15.0;
+
+/// What a table says of a recording; `None` where it has no estimate or no such column.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Measured {
+    /// Capacity in mL.
+    pub capacity_ml: Option<f64>,
+    /// Widths and height in mm.
+    pub dimensions: Option<Dimensions>,
+    /// Time it took, in ms.
+    pub execution_ms: Option<f64>,
+}
+
+impl Measured {
+    /// Fills in a recording's prediction.
+    pub fn complete(&self, prediction: &mut Prediction) {
+        prediction.capacity_ml = self.capacity_ml;
+        prediction.dimensions = self.dimensions;
+        prediction.execution_ms = self.execution_ms;
+    }
+}
+
+/// Reads a table of [`write`], or another with the columns `fileName` and `capacity[mL]`.
+///
+/// # Errors
+/// As [`read_capacities`], and for cells that are no numbers.
+pub fn read(path: &Path) -> Result<HashMap<RowKey, Measured>> {
+    let capacities = read_capacities(path)?;
+    let table = Table::read(path)?;
+    let has = |name: &str| table.header().iter().any(|h| h == name);
+    let names = ["width top[mm]", "width bottom[mm]", "height[mm]", "execution[ms]"];
+    let columns = if names.iter().all(|name| has(name)) {
+        let columns = names.map(|name| table.column(name));
+        Some(columns.into_iter().collect::<Result<Vec<_>>>()?)
+    } else {
+        None
+    };
+    let file = table.column("fileName")?;
+    let mut measured = HashMap::with_capacity(capacities.len());
+    for row in 0..table.rows() {
+        let Some(key) = file_key(table.text(row, file)) else { continue };
+        let capacity_ml = capacities.get(&key).copied().flatten();
+        let cell = |i: usize| match &columns {
+            Some(columns) if !table.text(row, columns[i]).is_empty() => {
+                table.number(row, columns[i]).map(Some)
+            }
+            _ => Ok(None),
+        };
+        let sizes = [cell(0)?, cell(1)?, cell(2)?];
+        let dimensions = match sizes {
+            [Some(width_top), Some(width_bottom), Some(height)] => {
+                Some(Dimensions { width_top, width_bottom, height })
+            }
+            _ => None,
+        };
+        measured.insert(key, Measured { capacity_ml, dimensions, execution_ms: cell(3)? });
+    }
+    Ok(measured)
+}
+
+/// Writes the table; the file appears only when complete.
+///
+/// # Errors
+/// [`CcmError`] when it cannot be written.
+pub fn write(path: &Path, method: &str, rows: &[Row]) -> Result<()> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let fault = |e: csv::Error| CcmError::Request(format!("{}: {e}", path.display()));
+    writer.write_record(HEADER).map_err(fault)?;
+    for row in rows {
+        writer.write_record(row.cells(method)).map_err(fault)?;
+    }
+    let bytes =
+        writer.into_inner().map_err(|e| CcmError::Request(format!("{}: {e}", path.display())))?;
+    draft::write(path, &bytes).map_err(CcmError::Write)
+}

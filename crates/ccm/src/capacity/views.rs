@@ -1,0 +1,217 @@
+//! The files of a recording's views.
+//!
+//! Tree of 2020: beside `audio/`, the folders `calib/<sequence>_c1_calib.pickle`,
+//! `depth/<sequence>/c1/0000.png`, `rgb/<sequence>/c1/0000.png` (extracted frames; PNG or JPEG),
+//! `masks/<sequence>/c1/0000.png` and `detections/<sequence>.csv` or `.json`. Flat release:
+//! `view1/calib/<id>.pickle`, `view1/depth/<id>/0000.png`, `view1/rgb/<id>/0000.png`,
+//! `view1/masks/<id>/0000.png`, and `detections/<id>.csv` or `.json`. Calibrations may be `.json`.
+
+use std::path::{Path, PathBuf};
+
+use corsmal_vision::{Calibration, Camera, Depth, Detection, Mask, VisionError, read_detections};
+
+use crate::dataset::Recording;
+
+/// Frames that are listed of one view at most.
+const MAX_FRAMES: usize = 100_000;
+
+/// Where the files of a recording's views are.
+#[derive(Clone, Debug)]
+pub struct Views {
+    /// Folder that holds `audio/`.
+    base: PathBuf,
+    /// What the recording's files are called.
+    stem: String,
+    /// Folder of tables of detections, where it is another one.
+    detections: Option<PathBuf>,
+    container: Option<u8>,
+}
+
+/// A frame of a view.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// Its number in the video, from 0.
+    pub number: u32,
+    /// The image.
+    pub path: PathBuf,
+}
+
+/// Why something could not be used.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Problem {
+    /// It is not there, or shows nothing to measure.
+    Missing(String),
+    /// It is there but damaged, or contradicts another file.
+    Damaged(String),
+}
+
+impl From<VisionError> for Problem {
+    fn from(error: VisionError) -> Self {
+        match error {
+            VisionError::Request(reason) => Self::Missing(reason),
+            other => Self::Damaged(other.to_string()),
+        }
+    }
+}
+
+impl Views {
+    /// The views of a recording; `detections` is a folder of tables, with sub-folders by container or
+    /// without.
+    pub fn of(recording: &Recording, detections: Option<&Path>) -> Self {
+        let stem = recording.path.file_stem().unwrap_or_default().to_string_lossy();
+        let stem = stem.strip_suffix("_audio").unwrap_or(&stem).to_string();
+        let folder = recording.path.parent().unwrap_or(Path::new(""));
+        let audio = folder.file_name().is_some_and(|name| name == "audio");
+        let base = if audio { folder.parent().unwrap_or(Path::new("")) } else { folder };
+        Self {
+            base: base.into(),
+            stem,
+            detections: detections.map(Into::into),
+            container: recording.container.map(|c| c.number()),
+        }
+    }
+
+    /// The colour camera of a view, 1 to 4.
+    ///
+    /// # Errors
+    /// There is no calibration, or it is damaged.
+    pub fn camera(&self, view: u8) -> Result<Camera, Problem> {
+        let Self { base, stem, .. } = self;
+        let candidates = ["pickle", "json"].into_iter().flat_map(|extension| {
+            [
+                base.join(format!("calib/{stem}_c{view}_calib.{extension}")),
+                base.join(format!("view{view}/calib/{stem}.{extension}")),
+            ]
+        });
+        let path = candidates.into_iter().find(|path| path.is_file()).ok_or_else(|| {
+            Problem::Missing(format!(
+                "no calibration of view {view} (calib/{stem}_c{view}_calib.pickle)"
+            ))
+        })?;
+        Ok(Calibration::load(&path)?.rgb)
+    }
+
+    /// The frames of a view of one kind: `depth`, `rgb` or `masks`; none where there is no folder.
+    ///
+    /// # Errors
+    /// The folder cannot be read.
+    pub fn frames(&self, kind: &str, view: u8) -> Result<Vec<Frame>, Problem> {
+        let Self { base, stem, .. } = self;
+        let folders = [
+            base.join(format!("{kind}/{stem}/c{view}")),
+            base.join(format!("view{view}/{kind}/{stem}")),
+        ];
+        let Some(folder) = folders.iter().find(|folder| folder.is_dir()) else {
+            return Ok(Vec::new());
+        };
+        let unreadable = |e| Problem::Damaged(format!("{}: {e}", folder.display()));
+        let mut frames = Vec::new();
+        for entry in std::fs::read_dir(folder).map_err(unreadable)? {
+            let path = entry.map_err(unreadable)?.path();
+            let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+            let image = matches!(extension.as_deref(), Some("png" | "jpg" | "jpeg"));
+            let number = path.file_stem().and_then(|s| s.to_string_lossy().parse().ok());
+            if let (true, Some(number)) = (image, number) {
+                frames.push(Frame { number, path });
+            }
+            if frames.len() > MAX_FRAMES {
+                let folder = folder.display();
+                return Err(Problem::Damaged(format!("{folder}: more than {MAX_FRAMES} frames")));
+            }
+        }
+        frames.sort_by(|a, b| (a.number, &a.path).cmp(&(b.number, &b.path)));
+        Ok(frames)
+    }
+
+    /// What a detector saw in all views; `None` where there is no table.
+    ///
+    /// # Errors
+    /// The table is damaged.
+    pub fn detections(&self) -> Result<Option<Vec<Detection>>, Problem> {
+        let own = self.base.join("detections");
+        let folder = self.detections.as_ref().unwrap_or(&own);
+        let mut folders = vec![folder.clone()];
+        if let (Some(container), true) = (self.container, self.detections.is_some()) {
+            folders.insert(0, folder.join(container.to_string()));
+        }
+        let tables = folders.iter().flat_map(|folder| {
+            ["csv", "json"].map(|extension| folder.join(format!("{}.{extension}", self.stem)))
+        });
+        match tables.into_iter().find(|path| path.is_file()) {
+            Some(path) => Ok(Some(read_detections(&path)?)),
+            None => Ok(None),
+        }
+    }
+
+    /// A depth image of a view.
+    ///
+    /// # Errors
+    /// It is not there, or damaged.
+    pub fn depth(&self, view: u8, frame: u32) -> Result<Depth, Problem> {
+        let frames = self.frames("depth", view)?;
+        let found = frames.iter().find(|f| f.number == frame).ok_or_else(|| {
+            Problem::Missing(format!("no depth image of view {view}, frame {frame}"))
+        })?;
+        Ok(Depth::read(&found.path)?)
+    }
+
+    /// The object's pixels in a frame: a mask's file, or else the most confident detection among
+    /// `labels` with at least `score`. `size` is that of the image.
+    ///
+    /// # Errors
+    /// There is neither, or it is damaged.
+    pub fn mask(
+        &self,
+        detections: &[Detection],
+        (view, frame): (u8, u32),
+        labels: &[&str],
+        score: f64,
+        size: Option<(usize, usize)>,
+    ) -> Result<Mask, Problem> {
+        if let Some(file) = self.frames("masks", view)?.into_iter().find(|f| f.number == frame) {
+            return Ok(Mask::read(&file.path)?);
+        }
+        let of_frame = detections
+            .iter()
+            .filter(|d| d.view == view && d.frame == frame && d.score >= score)
+            .filter(|d| labels.contains(&d.label.as_str()));
+        // The first of equals, as detectors list them.
+        let mut best: Option<&Detection> = None;
+        for detection in of_frame {
+            if best.is_none_or(|b| detection.score > b.score) {
+                best = Some(detection);
+            }
+        }
+        let missing = || Problem::Missing(format!("no container in view {view}, frame {frame}"));
+        best.ok_or_else(missing)?.mask(size)?.ok_or_else(|| {
+            Problem::Missing(format!("view {view}, frame {frame}: the detection has no mask"))
+        })
+    }
+
+    /// Numbers of the frames in which every one of `views` has a mask or a detection.
+    ///
+    /// # Errors
+    /// A folder cannot be read.
+    pub fn numbers(&self, detections: &[Detection], views: &[u8]) -> Result<Vec<u32>, Problem> {
+        let mut common: Option<Vec<u32>> = None;
+        for &view in views {
+            let mut numbers: Vec<u32> = detections
+                .iter()
+                .filter(|d| d.view == view)
+                .map(|d| d.frame)
+                .chain(self.frames("masks", view)?.into_iter().map(|f| f.number))
+                .chain(self.frames("rgb", view)?.into_iter().map(|f| f.number))
+                .collect();
+            numbers.sort_unstable();
+            numbers.dedup();
+            common = Some(match common {
+                None => numbers,
+                Some(mut all) => {
+                    all.retain(|n| numbers.binary_search(n).is_ok());
+                    all
+                }
+            });
+        }
+        Ok(common.unwrap_or_default())
+    }
+}

@@ -1,0 +1,214 @@
+//! Capacities from synthetic views, and what damaged or missing files become.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use corsmal_ccm::capacity::{self, CapacityModel, Method, Options, Row};
+use corsmal_ccm::dataset::{
+    Annotations, Container, Filling, FillingLevel, FillingType, SequenceName,
+};
+use corsmal_ccm::predictions::read_capacities;
+use corsmal_ccm::scores::{RuleSet, evaluate};
+use corsmal_ccm::submission::{RowKey, Submission, pseudo_random};
+use corsmal_ccm::synth::write_views;
+use corsmal_vision::cuboid::Outliers;
+use corsmal_vision::lode::{PRIOR_ML, Variant};
+
+/// Two recordings of each training container, on the table and in the hand, with views.
+fn data(dir: &Path) {
+    for container in Container::all().take(9) {
+        for scenario in [0, 1] {
+            let filling = Filling::new(FillingType::Pasta, FillingLevel::Half).unwrap();
+            let name = SequenceName { scenario, filling, background: 0, illumination: 0 };
+            let base = dir.join(format!("train/{}", container.number()));
+            std::fs::create_dir_all(base.join("audio")).unwrap();
+            std::fs::write(base.join(format!("audio/{name}_audio.wav")), b"").unwrap();
+            write_views(&base, &name.to_string(), container, name, 5).unwrap();
+        }
+    }
+}
+
+fn options(dir: &Path, method: Method) -> Options {
+    Options {
+        data: dir.into(),
+        detections: None,
+        method,
+        variant: Variant::Corrected,
+        outliers: Outliers::Published,
+        model: None,
+        jobs: 2,
+        seed: 1,
+    }
+}
+
+fn run(options: &Options) -> Vec<Row> {
+    capacity::run(options, &|_, _| {}, &AtomicBool::new(false)).unwrap()
+}
+
+/// Mean of exp(-relative error) by category and overall.
+fn score(rows: &[Row]) -> [f64; 4] {
+    let of = |category: Option<usize>| {
+        let scores: Vec<f64> = rows
+            .iter()
+            .filter_map(|row| {
+                let RowKey::Sequence(container, _) = row.key else { return None };
+                let kind = usize::from((container - 1) / 3);
+                category.is_none_or(|c| c == kind).then_some(())?;
+                let truth = Container::new(container)?.capacity_ml()?;
+                let estimate = row.capacity();
+                let relative = (estimate - truth).abs() / truth;
+                Some(if estimate < 0.0 { 0.0 } else { (-relative).exp() })
+            })
+            .collect();
+        scores.iter().sum::<f64>() / scores.len() as f64
+    };
+    [of(Some(0)), of(Some(1)), of(Some(2)), of(None)]
+}
+
+#[test]
+fn methods_measure_synthetic_views_and_faults_are_rows() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path();
+    data(root);
+    let mut scores = Vec::new();
+    for method in [Method::M5, Method::M4] {
+        let rows = run(&options(root, method));
+        assert_eq!(rows.len(), 18);
+        scores.push((method.name(), score(&rows)));
+    }
+    let published = Options { variant: Variant::Published, ..options(root, Method::M5) };
+    scores.push(("m5 published", score(&run(&published))));
+    for outliers in [Outliers::Corrected, Outliers::Kept] {
+        let rows = run(&Options { outliers, ..options(root, Method::M4) });
+        scores.push(("m4 other", score(&rows)));
+    }
+    let stop = AtomicBool::new(false);
+    for method in [Method::M3, Method::Fused] {
+        let (learned, held_out) =
+            capacity::train(&options(root, method), &|_, _| {}, &stop).unwrap();
+        println!("{held_out:.3?}");
+        let path = root.join("model.json");
+        learned.write(&path).unwrap();
+        let model = CapacityModel::read(&path).unwrap();
+        assert_eq!(model, learned);
+        if let Some(fusion) = &model.fusion {
+            for (category, of) in &fusion.methods {
+                println!("{category:?} {of:?} {:?}", fusion.priors[category]);
+            }
+        }
+        let rows = run(&Options { model: Some(model), ..options(root, method) });
+        for row in &rows {
+            let (low, high) = row.estimate.as_ref().unwrap().band.map(|b| (b[0], b[1])).unwrap();
+            assert!(low < row.capacity() && row.capacity() < high, "{row:?}");
+        }
+        scores.push((method.name(), score(&rows)));
+    }
+    for (name, score) in &scores {
+        println!("{name}: {score:.3?}");
+    }
+    let error = capacity::run(&options(root, Method::M3), &|_, _| {}, &stop).unwrap_err();
+    assert!(error.to_string().contains("capacity train --method m3"), "{error}");
+
+    // One file of each kind is damaged or gone.
+    let path = |c: u8, file: &str| root.join(format!("train/{c}/{file}"));
+    let name = "s0_fi1_fu1_b0_l0";
+    std::fs::write(path(1, &format!("calib/{name}_c1_calib.pickle")), b"cos\nsystem\n.").unwrap();
+    std::fs::remove_file(path(2, &format!("calib/{name}_c2_calib.pickle"))).unwrap();
+    std::fs::write(path(3, &format!("detections/{name}.json")), b"[{").unwrap();
+    std::fs::remove_file(path(4, &format!("detections/{name}.json"))).unwrap();
+    for frame in ["0000", "0008"] {
+        let depth = path(5, &format!("depth/{name}/c1/{frame}.png"));
+        let half = std::fs::read(&depth).unwrap();
+        std::fs::write(&depth, &half[..half.len() / 2]).unwrap();
+    }
+    let status = |rows: &[Row], container: u8| {
+        let row = rows
+            .iter()
+            .find(|r| matches!(r.key, RowKey::Sequence(c, s) if c == container && s < 7));
+        let row = row.unwrap();
+        (row.status(), row.capacity())
+    };
+    let m5 = run(&options(root, Method::M5));
+    assert_eq!(status(&m5, 1), ("failed", -1.0));
+    assert_eq!(status(&m5, 2), ("none", -1.0));
+    assert_eq!(status(&m5, 3), ("failed", -1.0));
+    assert_eq!(status(&m5, 4), ("prior", PRIOR_ML));
+    let m4 = run(&options(root, Method::M4));
+    assert_eq!(status(&m4, 5), ("failed", -1.0));
+    let out = root.join("capacity.csv");
+    capacity::write(&out, "m4", &m4).unwrap();
+    let read = read_capacities(&out).unwrap();
+    assert_eq!(read.len(), 18);
+    assert_eq!(
+        read.values().filter(|v| v.is_none()).count(),
+        m4.iter().filter(|r| r.capacity() < 0.0).count()
+    );
+}
+
+/// Capacities that the printed scores of two methods imply: inferred, not official.
+const IMPLIED: [(u8, f64); 3] = [(10, 641.0), (11, 469.0), (12, 1668.0)];
+
+#[test]
+fn public_capacity_files_score_as_printed() {
+    let Some(data) = shared() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("annotation.csv");
+    let mut text = String::from(
+        "Container ID,Sequence,Scenario,Background,Illumination,Container Capacity [mL],Container mass \
+         [g],Filling type,Filling density [g/mL],Filling level,Filling mass [g]\n",
+    );
+    for (number, capacity) in IMPLIED {
+        for sequence in 0..Container::new(number).unwrap().recordings() {
+            text += &format!("{number},{sequence},s0,b0,l0,{capacity},10,0,0,0,0\n");
+        }
+    }
+    std::fs::write(&path, text).unwrap();
+    let annotations = Annotations::read(&path).unwrap();
+    for (file, printed) in [
+        ("other_predictions/m2_submission_public.csv", [66.02, 69.14, 65.08]),
+        ("m5_predictions/submission_public_test.csv", [60.71, 62.43, 57.71]),
+    ] {
+        let submission = Submission::read(&data.join(file)).unwrap();
+        let stand_in = pseudo_random(&submission.keys, 1);
+        let stand_in = Submission::from_predictions("random", submission.format, &stand_in);
+        for ((container, _), printed) in IMPLIED.into_iter().zip(printed) {
+            let only = [container];
+            let scores =
+                evaluate(&submission, &annotations, &stand_in, RuleSet::Paper, Some(&only))
+                    .unwrap();
+            let score = scores.get("T3").unwrap();
+            assert!((score - printed).abs() < 0.1, "{file}, {container}: {score} not {printed}");
+        }
+    }
+}
+
+#[test]
+fn stored_frames_combine_to_the_published_file() {
+    let Some(data) = shared() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str| data.join(format!("m5_predictions/capacity_estimation_{name}.csv"));
+    let out = dir.path().join("combined.csv");
+    let frames = [file("1_public_test"), file("20_public_test")];
+    assert_eq!(capacity::combine_files(&frames, PRIOR_ML, &out).unwrap(), (228, 81));
+    let (own, published) =
+        (read_capacities(&out).unwrap(), read_capacities(&file("combination_public_test")));
+    for (key, value) in published.unwrap() {
+        assert!((own[&key].unwrap() - value.unwrap()).abs() < 1e-9, "{key}");
+    }
+}
+
+/// Folder `ccm` of the reference data; says so when it is not there.
+fn shared() -> Option<PathBuf> {
+    let root = std::env::var_os("CORSMAL_SHARED").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"),
+        PathBuf::from,
+    );
+    let path = root.join("data/ccm");
+    if !path.exists() {
+        eprintln!("skipped: {} is absent (set CORSMAL_SHARED)", path.display());
+        return None;
+    }
+    Some(path)
+}

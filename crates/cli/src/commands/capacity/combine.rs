@@ -1,0 +1,42 @@
+//! `corsmal-feat capacity combine`: one estimate from those of several frames.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use corsmal_ccm::capacity::combine_files;
+use corsmal_vision::lode::PRIOR_ML;
+
+use crate::failure::Failure;
+use crate::publish;
+
+/// Arguments of `capacity combine`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Example, M5's combination of its two frames:
+  corsmal-feat capacity combine --in capacity_estimation_1_public_test.csv \\
+      capacity_estimation_20_public_test.csv --out combined.csv
+
+The estimate of a recording is the mean of those that the files have, the prior where none has. An estimate
+that equals the prior is none, as in the published program.")]
+pub struct Args {
+    /// Tables with the columns fileName and `capacity[mL]`.
+    #[arg(long = "in", value_name = "CSV", num_args = 1.., required = true)]
+    inputs: Vec<PathBuf>,
+    /// Table to write.
+    #[arg(long, value_name = "CSV")]
+    out: PathBuf,
+    /// What stands where there is no estimate, in mL; -1 for none.
+    #[arg(long, value_name = "ML", default_value_t = PRIOR_ML, allow_negative_numbers = true)]
+    prior: f64,
+    /// Replace an existing output.
+    #[arg(long)]
+    overwrite: bool,
+}
+
+/// Combines and writes.
+pub fn run(args: &Args) -> Result<ExitCode, Failure> {
+    publish::check(&args.out, args.overwrite)?;
+    let (rows, without) = combine_files(&args.inputs, args.prior, &args.out)?;
+    println!("{}: {rows} recordings, {without} with the prior", args.out.display());
+    Ok(ExitCode::SUCCESS)
+}

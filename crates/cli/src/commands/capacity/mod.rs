@@ -1,0 +1,209 @@
+//! `corsmal-feat capacity`: capacities of containers from the views of a data set.
+
+mod combine;
+mod train;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Subcommand, ValueEnum};
+use corsmal_ccm::CcmError;
+use corsmal_ccm::capacity::{self, CapacityModel, Method, Options, Row};
+use corsmal_vision::cuboid::Outliers;
+use corsmal_vision::lode::Variant;
+
+use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
+use crate::publish;
+
+/// Arguments of `capacity`.
+#[derive(clap::Args)]
+#[command(
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    after_help = "\
+Examples:
+  corsmal-feat capacity --method m5 --data ~/CCM --out capacity.csv
+  corsmal-feat capacity train --method fused --data ~/CCM --out fused.capacity
+  corsmal-feat capacity --method fused --model fused.capacity --data ~/CCM --out capacity.csv
+  corsmal-feat fuse --joint joint.csv --capacity capacity.csv --out submission.csv
+
+The output has one row per recording: estimate in mL (-1: none), uncertainty, sizes, frames used, status
+(ok, prior, none, failed) and the reason where there is no estimate. `fuse --capacity` and
+`benchmark --add` read it. Which files are looked for is in docs/vision.md.
+
+Exit codes: 0 all fine, 1 some recordings have damaged files, 2 could not run, 130 interrupted."
+)]
+pub struct Args {
+    #[command(subcommand)]
+    command: Option<Sub>,
+    #[command(flatten)]
+    estimate: Option<Estimate>,
+}
+
+#[derive(Subcommand)]
+enum Sub {
+    /// Learn what a method needs from the training recordings of a data set.
+    Train(train::Args),
+    /// One estimate from those of several frames, as M5 combines its two.
+    Combine(combine::Args),
+}
+
+/// Arguments of an estimate.
+#[derive(clap::Args)]
+struct Estimate {
+    /// The method.
+    #[arg(long, value_enum)]
+    method: MethodName,
+    #[command(flatten)]
+    source: Source,
+    /// How faithfully a published method is followed.
+    #[arg(long, value_enum, default_value = "corrected")]
+    variant: VariantName,
+    /// How m4 drops outliers; by default as --variant says.
+    #[arg(long, value_enum)]
+    outliers: Option<OutliersName>,
+    /// What `capacity train` learned, for m3 and fused.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Table to write.
+    #[arg(long, value_name = "CSV")]
+    out: PathBuf,
+    /// Replace an existing output.
+    #[arg(long)]
+    overwrite: bool,
+    /// Print nothing.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Where recordings and detections are.
+#[derive(clap::Args)]
+struct Source {
+    /// Folder of the data set.
+    #[arg(long, value_name = "DIR")]
+    data: PathBuf,
+    /// Folder of tables of detections (SEQUENCE.csv or .json, by container or not); by default
+    /// `detections/` beside each recording's audio folder.
+    #[arg(long, value_name = "DIR")]
+    detections: Option<PathBuf>,
+    /// Seed of votes and isolation forests.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Recordings at a time; by default one for each core.
+    #[arg(long, value_name = "N", env = "CORSMAL_FEAT_JOBS", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum MethodName {
+    /// Gaussian processes on the sizes of detected regions in four views.
+    M3,
+    /// Cuboid around the points of the first view's depth image.
+    M4,
+    /// LoDE: circles that fit the masks of both side views.
+    M5,
+    /// All that there is, weighted by measured reliability (beyond the paper).
+    Fused,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum VariantName {
+    /// As the published program computes, its quirks included.
+    Published,
+    /// Without its defects.
+    Corrected,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum OutliersName {
+    /// Four isolation forests, of which the last has no effect.
+    Published,
+    /// Four isolation forests.
+    Corrected,
+    /// No point is dropped.
+    Kept,
+}
+
+impl MethodName {
+    fn method(self) -> Method {
+        match self {
+            Self::M3 => Method::M3,
+            Self::M4 => Method::M4,
+            Self::M5 => Method::M5,
+            Self::Fused => Method::Fused,
+        }
+    }
+}
+
+impl Source {
+    fn options(self, method: Method, variant: VariantName) -> Options {
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        let published = variant == VariantName::Published;
+        Options {
+            data: self.data,
+            detections: self.detections,
+            method,
+            variant: if published { Variant::Published } else { Variant::Corrected },
+            outliers: if published { Outliers::Published } else { Outliers::Corrected },
+            model: None,
+            jobs: self.jobs.map_or_else(cores, usize::from),
+            seed: self.seed,
+        }
+    }
+}
+
+/// Estimates, learns or combines.
+pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    match (args.command, args.estimate) {
+        (Some(Sub::Train(args)), _) => train::run(args),
+        (Some(Sub::Combine(args)), _) => combine::run(&args),
+        (None, Some(args)) => estimate(args),
+        (None, None) => Err(Failure::new("capacity needs --method, --data and --out; see --help")),
+    }
+}
+
+fn estimate(args: Estimate) -> Result<ExitCode, Failure> {
+    publish::check(&args.out, args.overwrite)?;
+    let method = args.method.method();
+    let mut options = args.source.options(method, args.variant);
+    if let Some(outliers) = args.outliers {
+        options.outliers = match outliers {
+            OutliersName::Published => Outliers::Published,
+            OutliersName::Corrected => Outliers::Corrected,
+            OutliersName::Kept => Outliers::Kept,
+        };
+    }
+    options.model = args.model.as_deref().map(CapacityModel::read).transpose()?;
+    let rows = match capacity::run(&options, &|_, _| {}, crate::interrupt::flag()) {
+        Err(error @ CcmError::Interrupted) => {
+            eprintln!("{error}");
+            return Ok(ExitCode::from(INTERRUPTED));
+        }
+        rows => rows?,
+    };
+    capacity::write(&args.out, method.name(), &rows)?;
+    let count = |status: &str| rows.iter().filter(|r| r.status() == status).count();
+    let failed = count("failed");
+    if !args.quiet {
+        println!(
+            "{}: {} recordings: {} measured, {} with the prior, {} without an estimate, {failed} failed",
+            args.out.display(),
+            rows.len(),
+            count("ok"),
+            count("prior"),
+            count("none"),
+        );
+    }
+    if let Some((name, reason)) = first_failure(&rows) {
+        eprintln!("{failed} recordings failed; the first, {name}: {reason}");
+        return Ok(ExitCode::from(FAILED_FILES));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn first_failure(rows: &[Row]) -> Option<(String, String)> {
+    rows.iter().find_map(|row| match &row.estimate {
+        Err(capacity::Problem::Damaged(reason)) => Some((row.key.to_string(), reason.clone())),
+        _ => None,
+    })
+}

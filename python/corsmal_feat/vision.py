@@ -1,0 +1,301 @@
+"""Capacity of a container from calibrated views: masks, depth images, no network needed.
+
+Lengths are in mm and capacities in mL unless said otherwise. `docs/vision.md` says what is
+published, what is corrected and what is our reading.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, TypedDict
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from .errors import ParameterError
+
+__all__ = [
+    "Calibration",
+    "Camera",
+    "Cuboid",
+    "LodeEstimate",
+    "Region",
+    "UprightBox",
+    "cuboid",
+    "load_calibration",
+    "load_depth",
+    "load_mask",
+    "lode",
+    "region",
+    "upright_box",
+]
+
+StrPath = str | os.PathLike[str]
+_Doubles = npt.NDArray[np.float64]
+_Mask = StrPath | npt.NDArray[np.bool_]
+_Depth = StrPath | npt.NDArray[np.uint16]
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A camera without lens distortion.
+
+    Attributes
+    ----------
+    intrinsic : ndarray [3, 3], focal lengths and principal point in px
+    rotation : ndarray [3, 3], world to camera (the data set calls it `rvec`)
+    translation : ndarray [3], world to camera, in m
+    projection : ndarray [3, 4], world to pixels, homogeneous
+    """
+
+    intrinsic: _Doubles
+    rotation: _Doubles
+    translation: _Doubles
+    projection: _Doubles
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """The cameras of one view: colour, and infrared where the file has them."""
+
+    rgb: Camera
+    ir1: Camera | None = None
+    ir2: Camera | None = None
+
+
+class LodeEstimate(TypedDict):
+    """What `lode` measures."""
+
+    height: float
+    width: float
+    capacity: float
+    capacity_low: float | None
+    capacity_high: float | None
+    centre: _Doubles
+    profile: _Doubles
+
+
+class Cuboid(TypedDict):
+    """What `cuboid` measures."""
+
+    capacity: float
+    low: _Doubles
+    high: _Doubles
+    share: float
+    points: int
+
+
+class UprightBox(TypedDict):
+    """What `upright_box` measures."""
+
+    volume: float
+    sides: _Doubles
+    points: int
+
+
+class Region(TypedDict):
+    """What `region` finds."""
+
+    bounds: tuple[int, int, int, int]
+    image: npt.NDArray[np.float32]
+    size: tuple[float, float]
+
+
+def load_calibration(path: StrPath) -> Calibration:
+    """Reads a calibration file of the data set, or the same as JSON.
+
+    A pickle is not executed: lists, dictionaries, strings, numbers and numpy arrays are read,
+    anything else is refused.
+
+    Raises
+    ------
+    ParameterError
+        The file cannot be read, does more than make arrays, or lacks the colour camera.
+    """
+    return Calibration(**{name: _camera(n) for name, n in _core.load_calibration(os.fspath(path))})
+
+
+def load_mask(path: StrPath) -> npt.NDArray[np.bool_]:
+    """Reads a mask's PNG, [height, width]: True where its first channel is not 0."""
+    return _core.load_mask(os.fspath(path))
+
+
+def load_depth(path: StrPath) -> npt.NDArray[np.uint16]:
+    """Reads a 16-bit depth PNG, [height, width] in mm, 0 where nothing was measured."""
+    return _core.load_depth(os.fspath(path))
+
+
+def lode(
+    masks: Sequence[_Mask],
+    calibrations: Sequence[Calibration | StrPath],
+    *,
+    variant: Literal["published", "corrected"] = "corrected",
+) -> LodeEstimate:
+    """Measures an object from its masks in two views (LoDE, as M5 uses it).
+
+    Parameters
+    ----------
+    masks : two paths of PNGs or boolean arrays [height, width]
+    calibrations : the two views' calibrations, or their files
+    variant : {"corrected", "published"}
+        "published" keeps the quirks of the published program: indices left of or above an image
+        wrap, a circle that reaches beyond it ends the estimate, gaps in the profile count as
+        height.
+
+    Returns
+    -------
+    dict
+        `height` and largest `width` in mm, `capacity` in mL; `capacity_low` and `capacity_high`
+        with masks one pixel smaller and larger (None where nothing is left); `centre` [3] and
+        `profile` [circles, 2] (height above the world's origin and radius) in m.
+
+    Raises
+    ------
+    ParameterError
+        There is no estimate: an empty mask, no circle on both masks, a circle outside an image.
+
+    Examples
+    --------
+    >>> lode(["c1.png", "c2.png"], ["c1.pickle", "c2.pickle"])["capacity"]  # doctest: +SKIP
+    571.2
+    """
+    if variant not in ("published", "corrected"):
+        raise ParameterError(
+            f"variant = {variant} is not possible: one of 'published', 'corrected'"
+        )
+    if len(masks) != 2 or len(calibrations) != 2:
+        raise ParameterError(
+            f"{len(masks)} masks and {len(calibrations)} calibrations: lode takes two of each"
+        )
+    first, second = (_mask(m) for m in masks)
+    left, right = (_numbers(c) for c in calibrations)
+    height, width, capacity, low, high, profile, centre = _core.lode(
+        (first, second), (left, right), variant == "published"
+    )
+    return {
+        "height": height,
+        "width": width,
+        "capacity": capacity,
+        "capacity_low": low,
+        "capacity_high": high,
+        "centre": np.array(centre),
+        "profile": np.array(profile).reshape(-1, 2),
+    }
+
+
+def cuboid(
+    depth: _Depth,
+    mask: _Mask,
+    calibration: Calibration | StrPath,
+    *,
+    outliers: Literal["published", "corrected", "kept"] = "corrected",
+    seed: int = 1,
+) -> Cuboid:
+    """M4's capacity: the box around an object's points times its share on the mask.
+
+    Parameters
+    ----------
+    depth : path of a 16-bit PNG, or array of uint16 in mm, aligned with the colour camera
+    mask : path of a PNG, or boolean array of the same shape
+    outliers : {"corrected", "published", "kept"}
+        Points are dropped by four isolation forests; the last has no effect as published.
+    seed : int
+        Seed of the forests.
+    """
+    if not 0 <= int(seed) < 2**64:
+        raise ParameterError(f"seed = {seed} is not possible: a whole number from 0 to 2**64 - 1")
+    low, high, share, capacity, points = _core.cuboid(
+        _depth(depth), _mask(mask), _numbers(calibration), outliers, int(seed)
+    )
+    return {
+        "capacity": capacity,
+        "low": np.array(low),
+        "high": np.array(high),
+        "share": share,
+        "points": points,
+    }
+
+
+def upright_box(
+    depths: Sequence[_Depth],
+    masks: Sequence[_Mask],
+    calibrations: Sequence[Calibration | StrPath],
+) -> UprightBox:
+    """The smallest upright box around an object's points from the depth of several views.
+
+    Returns
+    -------
+    dict
+        `volume` in mL, `sides` [3]: longer and shorter side of the ground plan and height in m,
+        `points`.
+    """
+    if not len(depths) == len(masks) == len(calibrations):
+        raise ParameterError(
+            f"{len(depths)} depth images, {len(masks)} masks, {len(calibrations)} calibrations: "
+            "each view has one of each"
+        )
+    views = [
+        (_depth(d), _mask(m), _numbers(c))
+        for d, m, c in zip(depths, masks, calibrations, strict=True)
+    ]
+    sides, volume, points = _core.upright_box(views)
+    return {"volume": volume, "sides": np.array(sides), "points": points}
+
+
+def region(depth: _Depth) -> Region | None:
+    """M2's region of interest in a depth image; None where nothing near is large enough.
+
+    Returns
+    -------
+    dict
+        `bounds` (first column, first row, column and row after the last), `image` [112, 112]
+        (depth over 700 mm, resized) and `size` (height over 720, width over 1280): the inputs of
+        M2's network.
+    """
+    found = _core.region(_depth(depth))
+    if found is None:
+        return None
+    (left, top, right, bottom), image, (height, width) = found
+    return {"bounds": (left, top, right, bottom), "image": image, "size": (height, width)}
+
+
+def _camera(numbers: Sequence[float]) -> Camera:
+    n = np.array(numbers)
+    return Camera(n[:9].reshape(3, 3), n[9:18].reshape(3, 3), n[18:21], n[21:].reshape(3, 4))
+
+
+def _numbers(calibration: Calibration | StrPath) -> list[float]:
+    if not isinstance(calibration, Calibration):
+        calibration = load_calibration(calibration)
+    camera = calibration.rgb
+    parts = (camera.intrinsic, camera.rotation, camera.translation, camera.projection)
+    numbers = np.concatenate([np.asarray(part, dtype=np.float64).ravel() for part in parts])
+    if numbers.size != 33:
+        raise ParameterError(
+            f"a camera of {numbers.size} numbers; expected matrices of 3 by 3, 3 by 3, 3, 3 by 4"
+        )
+    return [float(n) for n in numbers]
+
+
+def _mask(mask: _Mask) -> npt.NDArray[np.bool_]:
+    if isinstance(mask, np.ndarray):
+        if mask.dtype != np.bool_ or mask.ndim != 2:
+            raise ParameterError(
+                f"a mask of {mask.dtype} with shape {mask.shape}; expected booleans [height, width]"
+            )
+        return mask
+    return load_mask(mask)
+
+
+def _depth(depth: _Depth) -> npt.NDArray[np.uint16]:
+    if isinstance(depth, np.ndarray):
+        if depth.dtype != np.uint16 or depth.ndim != 2:
+            raise ParameterError(
+                f"a depth image of {depth.dtype} with shape {depth.shape}; expected uint16 "
+                "[height, width] in mm"
+            )
+        return depth
+    return load_depth(depth)

@@ -1,0 +1,95 @@
+"""Capacity from calibrated views."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from corsmal_feat import vision
+from corsmal_feat.errors import ParameterError
+
+SHARED = Path(os.environ.get("CORSMAL_SHARED", "../shared"))
+
+
+def calibration(path: Path, around: float) -> Path:
+    """A camera 1 m from the origin, 5 cm above it, that looks horizontally."""
+    s, c = np.sin(around), np.cos(around)
+    rotation = [[-s, c, 0.0], [0.0, 0.0, -1.0], [-c, -s, 0.0]]
+    intrinsic = [[900.0, 0.0, 320.0], [0.0, 900.0, 320.0], [0.0, 0.0, 1.0]]
+    camera = {"rvec": rotation, "tvec": [[0.0], [0.05], [1.0]]}
+    path.write_text(json.dumps({"intrinsic": {"rgb": intrinsic}, "extrinsic": {"rgb": camera}}))
+    return path
+
+
+def cylinder() -> np.ndarray:
+    """The view of a cylinder of 60 mm width and 100 mm height on the origin: nearly a rectangle."""
+    mask = np.zeros((700, 640), dtype=bool)
+    mask[275:366, 293:348] = True
+    return mask
+
+
+def test_lode_measures_a_cylinder(tmp_path: Path) -> None:
+    files = [calibration(tmp_path / f"{i}.json", i * np.pi / 2) for i in range(2)]
+    mask = cylinder()
+    found = vision.lode([mask, mask], files)
+    assert found["width"] == pytest.approx(60.0, abs=2.0)
+    assert found["height"] == pytest.approx(100.0, abs=6.0)
+    assert found["capacity"] == pytest.approx(np.pi * 9.0 * 10.0, rel=0.12)
+    assert found["capacity_low"] is not None and found["capacity_high"] is not None
+    assert found["capacity_low"] < found["capacity"] < found["capacity_high"]
+    assert found["profile"].shape[1] == 2
+    read = [vision.load_calibration(file) for file in files]
+    assert vision.lode([mask, mask], read)["capacity"] == found["capacity"]
+    assert read[0].rgb.projection.shape == (3, 4) and read[0].ir1 is None
+
+
+def test_the_real_pair_gives_the_published_size() -> None:
+    data = SHARED / "data" / "lode"
+    if not data.exists():
+        pytest.skip(f"{data} is absent (set CORSMAL_SHARED)")
+    masks = [data / "masks" / f"mask_c{i}.png" for i in (1, 2)]
+    files = [data / "calib" / f"calib_S1_c{i}.pickle" for i in (1, 2)]
+    found = vision.lode(masks, files, variant="published")
+    assert found["height"] == pytest.approx(317.63527054108215, abs=1e-6)
+    assert found["width"] == pytest.approx(76.49305555555556, abs=1e-6)
+    assert found["capacity"] == pytest.approx(571.2434776186, abs=1e-6)
+
+
+def test_depth_gives_boxes_and_a_region(tmp_path: Path) -> None:
+    file = calibration(tmp_path / "c.json", 0.0)
+    mask = cylinder()
+    depth = np.where(mask, 970, 0).astype(np.uint16)
+    box = vision.cuboid(depth, mask, file, outliers="kept")
+    assert box["points"] == mask.sum() and 0.9 < box["share"] <= 1.0
+    assert box["high"] - box["low"] == pytest.approx([0.0, 0.0593, 0.0982], abs=0.02)
+    upright = vision.upright_box([depth], [mask], [file])
+    assert upright["sides"][2] == pytest.approx(0.095, abs=0.01)
+    assert vision.region(depth) is None
+    near = np.zeros((720, 1280), dtype=np.uint16)
+    near[300:500, 600:720] = 500
+    found = vision.region(near)
+    assert found is not None
+    assert found["bounds"] == (597, 295, 723, 505)
+    assert found["image"].shape == (112, 112) and found["image"].dtype == np.float32
+
+
+def test_refusals_say_what_is_possible(tmp_path: Path) -> None:
+    file = calibration(tmp_path / "c.json", 0.0)
+    mask = cylinder()
+    with pytest.raises(ParameterError, match="the mask of view 1 is empty"):
+        vision.lode([np.zeros_like(mask), mask], [file, file])
+    with pytest.raises(ParameterError, match="two of each"):
+        vision.lode([mask], [file])
+    with pytest.raises(ParameterError, match="expected booleans"):
+        vision.lode([mask.astype(np.uint8), mask], [file, file])  # type: ignore[list-item]
+    with pytest.raises(ParameterError, match="expected uint16"):
+        vision.region(mask.astype(np.float64))  # type: ignore[arg-type]
+    evil = tmp_path / "evil.pickle"
+    evil.write_bytes(b"cos\nsystem\n(S'true'\ntR.")
+    with pytest.raises(ParameterError, match=r"os\.system"):
+        vision.load_calibration(evil)
+    with pytest.raises(ParameterError, match=r"none\.png"):
+        vision.load_mask(tmp_path / "none.png")
