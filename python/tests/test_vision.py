@@ -11,7 +11,7 @@ import pytest
 from corsmal_feat import vision
 from corsmal_feat.errors import ParameterError
 
-SHARED = Path(os.environ.get("CORSMAL_SHARED", "../shared"))
+SHARED = Path(os.environ.get("CORSMAL_SHARED", Path(__file__).parents[3] / "shared"))
 
 
 def calibration(path: Path, around: float) -> Path:
@@ -61,10 +61,14 @@ def test_the_real_pair_gives_the_published_size() -> None:
 def test_depth_gives_boxes_and_a_region(tmp_path: Path) -> None:
     file = calibration(tmp_path / "c.json", 0.0)
     mask = cylinder()
-    depth = np.where(mask, 970, 0).astype(np.uint16)
+    # The front of the cylinder recedes to both sides.
+    away = 970 + np.abs(np.arange(640) - 320)
+    depth = np.where(mask, away[None, :], 0).astype(np.uint16)
     box = vision.cuboid(depth, mask, file, outliers="kept")
-    assert box["points"] == mask.sum() and 0.9 < box["share"] <= 1.0
-    assert box["high"] - box["low"] == pytest.approx([0.0, 0.0593, 0.0982], abs=0.02)
+    assert box["points"] == mask.sum() and 0.5 < box["share"] <= 1.0
+    assert box["high"] - box["low"] == pytest.approx([0.027, 0.0598, 0.0997], abs=0.003)
+    volume = np.prod(box["high"] - box["low"]) * 1e6
+    assert box["capacity"] == pytest.approx(volume * box["share"])
     upright = vision.upright_box([depth], [mask], [file])
     assert upright["sides"][2] == pytest.approx(0.095, abs=0.01)
     assert vision.region(depth) is None

@@ -51,12 +51,13 @@ impl Detection {
         match &self.mask {
             Segmentation::None => Ok(None),
             Segmentation::File(path) => Mask::read(path).map(Some),
-            Segmentation::Coco(json) => coco::mask(json, size).map(Some).map_err(|reason| {
-                VisionError::Request(format!(
-                    "frame {}, view {}, '{}': {reason}",
-                    self.frame, self.view, self.label
-                ))
-            }),
+            Segmentation::Coco(json) => match coco::mask(json, size) {
+                Ok(mask) => Ok(Some(mask)),
+                Err(reason) => {
+                    let Self { frame, view, .. } = *self;
+                    Err(VisionError::Mask { frame, view, label: self.label.clone(), reason })
+                }
+            },
         }
     }
 

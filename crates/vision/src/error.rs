@@ -37,7 +37,19 @@ pub enum VisionError {
         /// The largest size that is read.
         limit: u64,
     },
-    /// Arguments that do not fit together.
+    /// A detection's mask is not what it should be.
+    #[error("mask of '{label}' in frame {frame}, view {view}: {reason}")]
+    Mask {
+        /// Number of the frame.
+        frame: u32,
+        /// View, 1 to 4.
+        view: u8,
+        /// What was detected.
+        label: String,
+        /// What was found and what is expected.
+        reason: String,
+    },
+    /// Arguments that do not fit together, or nothing that could be measured.
     #[error("{0}")]
     Request(String),
 }

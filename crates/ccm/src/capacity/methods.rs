@@ -8,7 +8,7 @@ use corsmal_vision::cuboid::{self, Outliers};
 use corsmal_vision::lode::{self, Variant, View};
 use corsmal_vision::{Camera, Depth, Detection, Mask};
 
-use super::views::{Problem, Views};
+use super::views::{IMAGE_SIZE, Problem, Views};
 
 /// Labels that M5 takes for a container.
 const M5_LABELS: [&str; 5] = ["bottle", "wine glass", "cup", "book", "vase"];
@@ -124,7 +124,8 @@ fn lode_frames(
     let (mut found, mut problems) = (Vec::new(), Vec::new());
     for frame in wanted {
         let estimate = || -> Result<Lode, Problem> {
-            let mask = |view| views.mask(detections, (view, frame), &M5_LABELS, M5_SCORE, None);
+            let mask =
+                |view| views.mask(detections, (view, frame), &M5_LABELS, M5_SCORE, IMAGE_SIZE);
             let masks = [mask(1)?, mask(2)?];
             let pair = [0, 1].map(|i| View { mask: &masks[i], camera: &cameras[i] });
             let dimensions = lode::dimensions(pair, variant)?;
@@ -181,12 +182,23 @@ pub(super) fn region_sizes(vote: &Vote) -> Vec<Option<f64>> {
     vote.sizes.iter().flat_map(|size| [size.map(|s| s[0]), size.map(|s| s[1])]).collect()
 }
 
-/// All estimates of the methods that need no training, by name, and LoDE's sizes.
+/// What the methods find that need no training.
+#[derive(Debug, Default)]
+pub(super) struct Geometry {
+    /// Capacities in mL by method.
+    pub(super) estimates: BTreeMap<String, f64>,
+    /// Sizes from LoDE.
+    pub(super) sizes: Option<Sizes>,
+    /// Frames of the method that used most.
+    pub(super) frames: usize,
+}
+
+/// All estimates of the methods that need no training.
 pub(super) fn geometry(
     views: &Views,
     detections: &[Detection],
     seed: u64,
-) -> Result<(BTreeMap<String, f64>, Option<Sizes>, usize), Problem> {
+) -> Result<Geometry, Problem> {
     let mut estimates = BTreeMap::new();
     let mut measured = None;
     let mut frames = 0;
@@ -225,7 +237,7 @@ pub(super) fn geometry(
         }
         Err(problem) => missing(problem)?,
     }
-    Ok((estimates, measured, frames))
+    Ok(Geometry { estimates, sizes: measured, frames })
 }
 
 /// Volume of the upright box around the depth of the side views, over the first frames that have it.
@@ -237,7 +249,7 @@ fn upright(views: &Views, detections: &[Detection]) -> Result<(f64, usize), Prob
         for view in [1, 2] {
             let part = || -> Result<_, Problem> {
                 let depth = views.depth(view, frame)?;
-                let size = Some((depth.width, depth.height));
+                let size = (depth.width, depth.height);
                 let mask = views.mask(detections, (view, frame), &LABELS, 0.0, size)?;
                 Ok((depth, mask, views.camera(view)?))
             };

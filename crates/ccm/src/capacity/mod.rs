@@ -143,8 +143,8 @@ fn estimate(views: &Views, options: &Options) -> std::result::Result<Estimate, P
             let model = options.model.as_ref().ok_or_else(without_model)?;
             let fusion = model.fusion.as_ref().ok_or_else(without_model)?;
             let vote = methods::vote(&detections, options.seed)?;
-            let (mut estimates, sizes, frames) =
-                methods::geometry(views, &detections, options.seed)?;
+            let found = methods::geometry(views, &detections, options.seed)?;
+            let (mut estimates, sizes, frames) = (found.estimates, found.sizes, found.frames);
             if let Ok(normal) = model.m3.predict(&vote) {
                 estimates.insert("m3".into(), normal.mean.exp());
             }
@@ -183,12 +183,8 @@ pub fn train(
         let capacity = annotated.or(container.capacity_ml())?;
         let views = Views::of(recording, options.detections.as_deref());
         let detections = methods::table(&views).ok()?;
-        let estimates = if fused {
-            methods::geometry(&views, &detections, options.seed)
-                .map_or_else(|_| Default::default(), |g| g.0)
-        } else {
-            Default::default()
-        };
+        let geometry = || methods::geometry(&views, &detections, options.seed).unwrap_or_default();
+        let estimates = if fused { geometry().estimates } else { Default::default() };
         Some(Sample {
             container: container.number(),
             category: methods::category_of(container.category()),

@@ -12,6 +12,8 @@ use corsmal_vision::{Calibration, Camera, Depth, Detection, Mask, VisionError, r
 
 use crate::dataset::Recording;
 
+/// Columns and rows of the data set's images.
+pub(super) const IMAGE_SIZE: (usize, usize) = (1280, 720);
 /// Frames that are listed of one view at most.
 const MAX_FRAMES: usize = 100_000;
 
@@ -156,7 +158,7 @@ impl Views {
     }
 
     /// The object's pixels in a frame: a mask's file, or else the most confident detection among
-    /// `labels` with at least `score`. `size` is that of the image.
+    /// `labels` with at least `score`. `size` is that of the image, for polygons.
     ///
     /// # Errors
     /// There is neither, or it is damaged.
@@ -166,7 +168,7 @@ impl Views {
         (view, frame): (u8, u32),
         labels: &[&str],
         score: f64,
-        size: Option<(usize, usize)>,
+        size: (usize, usize),
     ) -> Result<Mask, Problem> {
         if let Some(file) = self.frames("masks", view)?.into_iter().find(|f| f.number == frame) {
             return Ok(Mask::read(&file.path)?);
@@ -183,7 +185,7 @@ impl Views {
             }
         }
         let missing = || Problem::Missing(format!("no container in view {view}, frame {frame}"));
-        best.ok_or_else(missing)?.mask(size)?.ok_or_else(|| {
+        best.ok_or_else(missing)?.mask(Some(size))?.ok_or_else(|| {
             Problem::Missing(format!("view {view}, frame {frame}: the detection has no mask"))
         })
     }
