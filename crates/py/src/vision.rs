@@ -60,7 +60,10 @@ fn depth(array: &PyReadonlyArray2<'_, u16>) -> PyResult<Depth> {
 
 /// Cameras of a calibration file by name.
 #[pyfunction]
-pub(crate) fn load_calibration(py: Python<'_>, path: PathBuf) -> PyResult<Vec<(&'static str, Numbers)>> {
+pub(crate) fn load_calibration(
+    py: Python<'_>,
+    path: PathBuf,
+) -> PyResult<Vec<(&'static str, Numbers)>> {
     let read = compute(py, || Calibration::load(&path))?.map_err(value_error)?;
     let cameras = [("rgb", Some(read.rgb)), ("ir1", read.ir1), ("ir2", read.ir2)];
     Ok(cameras.into_iter().filter_map(|(name, c)| Some((name, numbers(&c?)))).collect())
@@ -149,7 +152,10 @@ pub(crate) fn upright_box(
 
 /// Bounds, input image and relative size of M2's region of interest.
 #[pyfunction]
-pub(crate) fn region<'py>(py: Python<'py>, depth_mm: PyReadonlyArray2<'py, u16>) -> PyResult<Found<'py>> {
+pub(crate) fn region<'py>(
+    py: Python<'py>,
+    depth_mm: PyReadonlyArray2<'py, u16>,
+) -> PyResult<Found<'py>> {
     let depth = depth(&depth_mm)?;
     let Some(found) = compute(py, || find_region::region(&depth))? else { return Ok(None) };
     let side = find_region::INPUT_SIDE;
