@@ -3,7 +3,19 @@
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING, Any
 
-from . import corsmal, decompose, display, effects, errors, feature, filters, onset, util, vision
+from . import (
+    corsmal,
+    decompose,
+    display,
+    effects,
+    errors,
+    feature,
+    filters,
+    nets,
+    onset,
+    util,
+    vision,
+)
 from ._audio import get_duration, get_samplerate, load, stream
 from ._core import __version__
 from ._decibels import amplitude_to_db, db_to_amplitude, db_to_power, magphase, power_to_db
@@ -162,6 +174,7 @@ __all__ = [
     "mel_to_hz",
     "midi_to_hz",
     "multi_frequency_weighting",
+    "nets",
     "note_to_hz",
     "note_to_midi",
     "octs_to_hz",

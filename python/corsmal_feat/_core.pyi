@@ -24,10 +24,12 @@ from ._params import (
 )
 
 __all__ = [
+    "Network",
     "Recording",
     "Signal",
     "Signals",
     "TrainedModel",
+    "TrainedNetwork",
     "__version__",
     "a34_short",
     "a34f136",
@@ -66,6 +68,8 @@ __all__ = [
     "mel",
     "melspectrogram",
     "mfcc",
+    "network_recipe",
+    "networks_published",
     "onset_backtrack",
     "onset_detect",
     "onset_rises",
@@ -78,6 +82,7 @@ __all__ = [
     "pitch_tuning",
     "poly_features",
     "power_to_db",
+    "read_weights",
     "resample",
     "rms",
     "rms_of_spectrogram",
@@ -94,6 +99,7 @@ __all__ = [
     "stft",
     "to_mono",
     "tonnetz",
+    "write_weights",
     "zero_crossing_rate",
 ]
 
@@ -328,3 +334,59 @@ def upright_box(
 def region(
     depth_mm: npt.NDArray[np.uint16],
 ) -> tuple[tuple[int, int, int, int], npt.NDArray[np.float32], tuple[float, float]] | None: ...
+
+@final
+class Network:
+    @staticmethod
+    def build(name: str, outputs: int | None, seed: int) -> Network: ...
+    def name(self) -> str: ...
+    def num_parameters(self) -> int: ...
+    def layers(self) -> list[tuple[str, str]]: ...
+    def inputs(self) -> list[tuple[str, str]]: ...
+    def outputs(self) -> int: ...
+    def state(self) -> dict[str, _Singles]: ...
+    def load_state(self, state: list[tuple[str, _Singles]]) -> None: ...
+    def forward(self, arrays: list[_Singles], lengths: list[int] | None) -> _Singles: ...
+    def features(self, arrays: list[_Singles]) -> _Singles: ...
+    def train_steps(
+        self,
+        arrays: list[_Singles],
+        classes: list[int] | None,
+        numbers: list[float] | None,
+        steps: int,
+        recipe: str,
+        dropout: int | None,
+        lengths: list[int] | None,
+    ) -> tuple[list[float], dict[str, float]]: ...
+
+def networks_published() -> list[tuple[str, str]]: ...
+def network_recipe(name: str, changes: str) -> str: ...
+def read_weights(path: str | os.PathLike[str]) -> dict[str, _Singles]: ...
+def write_weights(path: str | os.PathLike[str], state: list[tuple[str, _Singles]]) -> None: ...
+
+@final
+class TrainedNetwork:
+    @staticmethod
+    def fit(
+        name: str,
+        columns: list[tuple[_Singles, list[int]]],
+        classes: list[int],
+        train: list[int],
+        watched: list[int],
+        labels: list[str],
+        recipe: str,
+        checkpoint: str | None,
+        provenance: str,
+        progress: Any,
+    ) -> TrainedNetwork: ...
+    def predict_proba(
+        self, columns: list[tuple[_Singles, list[int]]]
+    ) -> npt.NDArray[np.float64]: ...
+    def header(self) -> str: ...
+    def state(self) -> dict[str, _Singles]: ...
+    def to_bytes(self) -> bytes: ...
+    @staticmethod
+    def from_bytes(bytes: bytes) -> TrainedNetwork: ...
+    def save(self, path: str | os.PathLike[str]) -> None: ...
+    @staticmethod
+    def load(path: str | os.PathLike[str]) -> TrainedNetwork: ...

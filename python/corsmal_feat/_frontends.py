@@ -77,7 +77,7 @@ def m2_mfcc(y: npt.ArrayLike, sr: float, *, padded: bool = True, librosa: str = 
 
 
 def m3_spectrogram(
-    y: npt.ArrayLike, sr: float, *, n_fft: int = 512, hop_length: int = 256
+    y: npt.ArrayLike, sr: float, *, n_fft: int = 1124, hop_length: int = 3087
 ) -> Singles:
     """M3: magnitudes [shape=(1 + n_fft/2, frames)] of the last 32,000 samples at 16,600 Hz. Window
     and hop are our choice, the paper gives none."""

@@ -13,6 +13,7 @@ mod extract;
 mod frontends;
 mod harmonic;
 mod mel;
+mod nets;
 mod onset;
 mod pcen;
 mod pool;
@@ -67,6 +68,10 @@ mod _core {
     };
     #[pymodule_export]
     use crate::mel::{apply_mel, delta, mel, melspectrogram, mfcc, power_to_db};
+    #[pymodule_export]
+    use crate::nets::{
+        PyNetwork, PyTrainedNetwork, network_recipe, networks_published, read_weights, write_weights,
+    };
     #[pymodule_export]
     use crate::onset::{detrend, onset_backtrack, onset_detect, onset_rises, onset_strength};
     #[pymodule_export]

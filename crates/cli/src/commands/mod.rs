@@ -16,6 +16,7 @@ mod features;
 mod fuse;
 mod inspect;
 mod merge;
+mod nets;
 mod pca;
 mod presets;
 mod score;
@@ -45,6 +46,8 @@ pub enum Command {
     Compare(compare::Args),
     /// Show the main job end to end on synthetic recordings.
     Demo(demo::Args),
+    /// List and explain the networks of the paper.
+    Nets(nets::Args),
     /// Fit principal components to training features, for `extract --project`.
     Pca(pca::Args),
     /// List the classifiers and explain their parameters.
@@ -86,6 +89,7 @@ impl Command {
             Self::Inspect(args) => inspect::run(args),
             Self::Compare(args) => compare::run(args),
             Self::Demo(args) => demo::run(args),
+            Self::Nets(args) => nets::run(args),
             Self::Pca(args) => pca::run(args),
             Self::Classifiers(args) => classifiers::run(args),
             Self::Score(args) => score::run(args),

@@ -12,8 +12,9 @@ const SAMPLES: usize = 32_000;
 
 /// Magnitude spectrogram of the last 32,000 samples of the mean channel at 16,600 Hz.
 ///
-/// The paper gives neither window nor hop and there is no code. Frames of 512 samples without
-/// overlapping the ends, a hop of 256 and zeros in front of shorter recordings are choices of ours.
+/// The paper gives neither window nor hop and there is no code. Its perceptrons take 6193 values, as
+/// their number of parameters shows, which is 563 bins of 11 frames: frames of 1124 samples within
+/// the ends, every 3087. That, and zeros in front of shorter recordings, are choices of ours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct M3Spectrogram {
     /// Length of the transform in samples.
@@ -24,12 +25,12 @@ pub struct M3Spectrogram {
 
 impl Default for M3Spectrogram {
     fn default() -> Self {
-        Self { n_fft: 512, hop_length: 256 }
+        Self { n_fft: 1124, hop_length: 3087 }
     }
 }
 
 impl M3Spectrogram {
-    /// `[n_fft / 2 + 1, frames]` (257 x 124) of `y [channels, samples]`.
+    /// `[n_fft / 2 + 1, frames]` (563 x 11) of `y [channels, samples]`.
     ///
     /// # Errors
     /// Impossible rates or parameters, non-finite samples.

@@ -1,0 +1,112 @@
+//! Scores on items that a network was not trained on.
+
+use std::path::Path;
+
+use crate::error::{NetError, Result};
+use crate::fit::{self, History, Progress, Task};
+use crate::items::Items;
+use crate::networks::Definition;
+use crate::random::Stream;
+use crate::recipe::{Recipe, Select};
+
+/// Items trained on and items held out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fold {
+    /// its name
+    pub name: String,
+    /// items trained on
+    pub train: Vec<usize>,
+    /// items held out
+    pub test: Vec<usize>,
+}
+
+/// What a fold found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FoldResult {
+    /// the fold's name
+    pub name: String,
+    /// items held out
+    pub test: Vec<usize>,
+    /// probability of each class for each of them
+    pub probabilities: Vec<Vec<f64>>,
+    /// what became of the training
+    pub history: History,
+    /// group held out of the training items to choose the epoch by
+    pub validation: Option<String>,
+}
+
+/// Data of a cross-validation.
+#[derive(Clone, Copy, Debug)]
+pub struct Data<'a> {
+    /// all items
+    pub items: &'a Items,
+    /// class of each
+    pub classes: &'a [usize],
+    /// how many classes there are
+    pub n_classes: usize,
+    /// group of each item, for a validation group of whole groups
+    pub groups: Option<&'a [String]>,
+}
+
+/// Trains a network for each fold and classifies what the fold holds out, in its order. Checkpoints
+/// go to files in `folder`, `progress` is told fold by fold.
+///
+/// # Errors
+/// As [`fit::fit`]; a validation group without groups.
+pub fn cross_validate(
+    definition: &Definition,
+    data: Data<'_>,
+    folds: &[Fold],
+    recipe: &Recipe,
+    folder: Option<&Path>,
+    score: impl Fn(&[usize], &[usize]) -> f64,
+    mut progress: impl FnMut(&Fold, Progress<'_>) -> bool,
+) -> Result<Vec<FoldResult>> {
+    let mut results = Vec::new();
+    for (number, fold) in folds.iter().enumerate() {
+        let mut network = definition.build(Some(data.n_classes), recipe.seed)?;
+        let (train, watched, validation) = watched(data, fold, recipe)?;
+        let task =
+            Task { items: data.items, classes: data.classes, train: &train, watched: &watched };
+        let path = folder.map(|f| f.join(format!("fold-{number}.safetensors")));
+        let tell = |told: Progress<'_>| progress(fold, told);
+        let history = fit::fit(&mut network, task, recipe, path.as_deref(), &score, tell)?;
+        let probabilities = fit::probabilities(&network, data.items, &fold.test, recipe)?;
+        let (name, test) = (fold.name.clone(), fold.test.clone());
+        results.push(FoldResult { name, test, probabilities, history, validation });
+    }
+    Ok(results)
+}
+
+/// Items trained on, items that choose the epoch, and the group that these are.
+fn watched(
+    data: Data<'_>,
+    fold: &Fold,
+    recipe: &Recipe,
+) -> Result<(Vec<usize>, Vec<usize>, Option<String>)> {
+    match recipe.select {
+        Select::Last => Ok((fold.train.clone(), Vec::new(), None)),
+        Select::Published => Ok((fold.train.clone(), fold.test.clone(), None)),
+        Select::Validation => {
+            let refuse = || {
+                NetError::Targets(
+                    "select = validation holds a group of the training items out: it needs groups, \
+                     two of them in training at least"
+                        .into(),
+                )
+            };
+            let groups = data.groups.ok_or_else(refuse)?;
+            let mut names: Vec<&String> = fold.train.iter().map(|&i| &groups[i]).collect();
+            names.sort_unstable();
+            names.dedup();
+            if names.len() < 2 {
+                return Err(refuse());
+            }
+            let stream = Stream::new(recipe.seed, &format!("validation group of {}", fold.name));
+            let chosen = names[stream.below(0, names.len())];
+            let (held, train): (Vec<usize>, Vec<usize>) =
+                fold.train.iter().partition(|&&i| groups[i] == *chosen);
+            Ok((train, held, Some(chosen.clone())))
+        }
+    }
+}

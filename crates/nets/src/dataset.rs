@@ -1,0 +1,222 @@
+//! Items and their columns from an `.npz`.
+//!
+//! | member | what |
+//! |---|---|
+//! | `X` `[rows, numbers]` with `offsets` `[items + 1]` | sequences one after another |
+//! | `X` `[items, …]` without `offsets` | items of one shape, in PyTorch's layout |
+//! | `view` `[items]` | which input of the network an item is; those of one recording are joined |
+//! | any other of one dimension, one value for each item | a column |
+//!
+//! Ids are the member `ids`, else `container/sequence` where both are there, else numbers.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use corsmal_files::npy::Kind;
+use corsmal_files::npz::{NpzError, NpzFile};
+use thiserror::Error;
+
+use crate::batch::{Batch, Shape};
+use crate::error::NetError;
+use crate::items::{Column, Items};
+use crate::network::Network;
+
+/// Items with the columns that came with them.
+#[derive(Clone, Debug)]
+pub struct Dataset {
+    /// one for each item, all different
+    pub ids: Vec<String>,
+    /// columns as text
+    pub columns: Vec<(String, Vec<String>)>,
+    /// what the network takes
+    pub items: Items,
+}
+
+/// Why a file is no data set for a network.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum DatasetError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Npz(#[from] NpzError),
+    /// Its members are not what is expected.
+    #[error("{path}: {reason}")]
+    Content {
+        /// the file
+        path: String,
+        /// why
+        reason: String,
+    },
+    /// The network does not take them.
+    #[error("{path}: {source}")]
+    Items {
+        /// the file
+        path: String,
+        /// why
+        source: NetError,
+    },
+}
+
+impl Dataset {
+    /// Reads the items of a network.
+    ///
+    /// # Errors
+    /// [`DatasetError`].
+    pub fn read(path: &Path, network: &Network) -> Result<Self, DatasetError> {
+        let mut npz = NpzFile::open(path)?;
+        let refuse =
+            |reason: String| DatasetError::Content { path: path.display().to_string(), reason };
+        if !npz.contains("X") {
+            return Err(refuse(format!("no member X: there are {}", npz.names().join(", "))));
+        }
+        let array = npz.f32("X")?;
+        let shape = array.shape().to_vec();
+        let values: Vec<f32> = array.as_standard_layout().iter().copied().collect();
+        let ends = match npz.contains("offsets") {
+            true => Some(offsets(&mut npz, shape.first().copied().unwrap_or(0)).map_err(refuse)?),
+            false => None,
+        };
+        let count = ends.as_ref().map_or(shape.first().copied().unwrap_or(0), |e| e.len() - 1);
+        let mut columns = columns(&mut npz, count)?;
+        let column = match ends {
+            Some(ends) => {
+                let numbers: usize = shape[1..].iter().product();
+                let taken = network.inputs()[0].shape.numbers();
+                if numbers != taken {
+                    let name = network.name();
+                    return Err(refuse(format!(
+                        "X has {numbers} numbers a row, {name} takes {taken}"
+                    )));
+                }
+                Column { values, offsets: ends.into_iter().map(|e| e * numbers).collect() }
+            }
+            None => fixed(&shape, &values, network).map_err(refuse)?,
+        };
+        let items = match columns.iter().position(|(name, _)| name == "view") {
+            Some(at) if network.inputs().len() > 1 => {
+                let views = columns.remove(at).1;
+                views_of(&column, &views, &mut columns, network.inputs().len()).map_err(refuse)?
+            }
+            _ => Items { columns: vec![column] },
+        };
+        items
+            .check(network)
+            .map_err(|source| DatasetError::Items { path: path.display().to_string(), source })?;
+        let ids = ids(&columns, items.len());
+        let mut seen = std::collections::HashSet::new();
+        if let Some(twice) = ids.iter().find(|id| !seen.insert(id.as_str())) {
+            return Err(refuse(format!("id {twice:?} occurs twice")));
+        }
+        Ok(Self { ids, columns, items })
+    }
+
+    /// A column by name.
+    pub fn column(&self, name: &str) -> Option<&[String]> {
+        self.columns.iter().find(|(n, _)| n == name).map(|(_, values)| values.as_slice())
+    }
+}
+
+fn offsets(npz: &mut NpzFile, rows: usize) -> Result<Vec<usize>, String> {
+    let raw = npz.integers("offsets").map_err(|e| e.to_string())?;
+    let ends: Vec<usize> = raw
+        .iter()
+        .map(|&v| usize::try_from(v).map_err(|_| format!("offsets: {v} is no row")))
+        .collect::<Result<_, _>>()?;
+    let ascending = ends.windows(2).all(|w| w[0] < w[1]);
+    if ends.len() < 2 || ends[0] != 0 || !ascending || ends.last() != Some(&rows) {
+        return Err(format!("offsets: expected numbers that rise from 0 to {rows}, the rows of X"));
+    }
+    Ok(ends)
+}
+
+/// Members of one dimension and this many values.
+fn columns(npz: &mut NpzFile, count: usize) -> Result<Vec<(String, Vec<String>)>, DatasetError> {
+    let mut columns = Vec::new();
+    for name in npz.names().to_vec() {
+        if name == "X" || name == "offsets" {
+            continue;
+        }
+        let Ok(header) = npz.header(&name) else { continue };
+        if header.shape != [count as u64] {
+            continue;
+        }
+        let values = match header.dtype.kind {
+            Kind::Complex => continue,
+            Kind::Text | Kind::Bytes => npz.strings(&name)?,
+            // With a point: 1.0 is no class.
+            Kind::Float => npz.f64(&name)?.iter().map(|v| format!("{v:?}")).collect(),
+            _ => npz.integers(&name)?.iter().map(i128::to_string).collect(),
+        };
+        columns.push((name, values));
+    }
+    Ok(columns)
+}
+
+/// Items of one shape, channels last.
+fn fixed(shape: &[usize], values: &[f32], network: &Network) -> Result<Column, String> {
+    let input = &network.inputs()[0];
+    let items = shape.first().copied().unwrap_or(0);
+    let each: usize = shape.iter().skip(1).product();
+    let values = match input.shape {
+        image @ Shape::Image { height, width, channels } => {
+            if shape.len() != 4 || shape[1..] != [channels, height, width] {
+                return Err(format!(
+                    "X has shape {shape:?}, expected [items, {channels}, {height}, {width}]"
+                ));
+            }
+            Batch::from_channels_first(values, image).values.into_values()
+        }
+        _ => values.to_vec(),
+    };
+    Ok(Column { values, offsets: (0..=items).map(|i| i * each).collect() })
+}
+
+/// One column for each view; recordings are told apart by all the other columns.
+fn views_of(
+    all: &Column,
+    views: &[String],
+    columns: &mut [(String, Vec<String>)],
+    inputs: usize,
+) -> Result<Items, String> {
+    let mut places: HashMap<Vec<String>, usize> = HashMap::new();
+    let mut first: Vec<usize> = Vec::new();
+    let mut found: Vec<Vec<Option<usize>>> = Vec::new();
+    for (row, view) in views.iter().enumerate() {
+        let key: Vec<String> = columns.iter().map(|(_, values)| values[row].clone()).collect();
+        let place = *places.entry(key).or_insert_with(|| {
+            first.push(row);
+            found.push(vec![None; inputs]);
+            first.len() - 1
+        });
+        let number = view.parse::<usize>().ok().filter(|n| (1..=inputs).contains(n));
+        let number = number.ok_or_else(|| format!("view {view}: expected 1 to {inputs}"))?;
+        if found[place][number - 1].replace(row).is_some() {
+            return Err(format!("row {row}: view {view} of its recording is there twice"));
+        }
+    }
+    for (name, values) in columns.iter_mut() {
+        *values = first.iter().map(|&row| values[row].clone()).collect();
+        debug_assert!(name != "view");
+    }
+    let mut result = vec![Column { values: Vec::new(), offsets: vec![0] }; inputs];
+    for (recording, rows) in found.iter().enumerate() {
+        for (view, (row, column)) in rows.iter().zip(&mut result).enumerate() {
+            let row =
+                row.ok_or_else(|| format!("recording {recording} has no view {}", view + 1))?;
+            column.values.extend_from_slice(&all.values[all.offsets[row]..all.offsets[row + 1]]);
+            column.offsets.push(column.values.len());
+        }
+    }
+    Ok(Items { columns: result })
+}
+
+fn ids(columns: &[(String, Vec<String>)], count: usize) -> Vec<String> {
+    let find = |name: &str| columns.iter().find(|(n, _)| n == name).map(|(_, v)| v);
+    match (find("ids"), find("container"), find("sequence")) {
+        (Some(ids), ..) => ids.clone(),
+        (None, Some(containers), Some(sequences)) => {
+            containers.iter().zip(sequences).map(|(c, s)| format!("{c}/{s}")).collect()
+        }
+        _ => (0..count).map(|i| i.to_string()).collect(),
+    }
+}

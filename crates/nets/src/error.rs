@@ -1,0 +1,112 @@
+//! What this crate refuses, and why.
+
+use thiserror::Error;
+
+/// A refusal. Texts name the place, what was found and what would be accepted.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum NetError {
+    /// A name outside the registry.
+    #[error("there is no network {name}: {allowed}")]
+    UnknownNetwork {
+        /// the name given
+        name: String,
+        /// the names there are
+        allowed: String,
+    },
+    /// Inputs that do not have the shape the network takes.
+    #[error("{network}: input {input} has shape {actual}, expected {expected}")]
+    InputShape {
+        /// the network
+        network: String,
+        /// which of its inputs
+        input: String,
+        /// shape expected
+        expected: String,
+        /// shape given
+        actual: String,
+    },
+    /// Another number of inputs than the network takes.
+    #[error("{network} takes {expected} inputs, {actual} were given")]
+    InputCount {
+        /// the network
+        network: String,
+        /// inputs it takes
+        expected: usize,
+        /// inputs given
+        actual: usize,
+    },
+    /// Layers that do not fit one another.
+    #[error("layer {layer}: cannot take {input}")]
+    LayerInput {
+        /// the layer
+        layer: String,
+        /// what it was offered
+        input: String,
+    },
+    /// Weights of another architecture.
+    #[error("these weights do not fit {network}: {}", differences.join("; "))]
+    Weights {
+        /// the network
+        network: String,
+        /// each name or shape that differs
+        differences: Vec<String>,
+    },
+    /// A loss or a gradient that is not a number.
+    #[error(
+        "training step {step}: {what} is {value}; a smaller learning rate or clip_grad_norm may help, and inputs must be finite"
+    )]
+    Diverged {
+        /// step, counted from 1
+        step: u64,
+        /// loss, or the parameter whose gradient it is
+        what: String,
+        /// its value
+        value: f32,
+    },
+    /// A number that is not finite among the inputs.
+    #[error("input {input}, item {item}: {value} is not a finite number")]
+    NonFinite {
+        /// the input
+        input: String,
+        /// index of the item
+        item: usize,
+        /// the number
+        value: f32,
+    },
+    /// A checkpoint that cannot be read or written, or is another training's.
+    #[error("checkpoint {0}")]
+    Checkpoint(#[from] crate::weights::WeightsError),
+    /// Training was ended from outside.
+    #[error("stopped after {epochs} epochs")]
+    Stopped {
+        /// epochs done
+        epochs: usize,
+    },
+    /// Targets that do not fit the inputs or the loss.
+    #[error("{0}")]
+    Targets(String),
+    /// A recipe's key or value.
+    #[error("recipe: {key} = {value} is not possible: {allowed}")]
+    Recipe {
+        /// the key
+        key: String,
+        /// the value given
+        value: String,
+        /// what it may be
+        allowed: String,
+    },
+    /// Something asked of a network that it does not have.
+    #[error("{network} has no {what}: {hint}")]
+    Missing {
+        /// the network
+        network: String,
+        /// what was asked for
+        what: &'static str,
+        /// what there is instead
+        hint: String,
+    },
+}
+
+/// Result of this crate.
+pub type Result<T> = std::result::Result<T, NetError>;

@@ -1,0 +1,160 @@
+//! What a layer is.
+
+use std::collections::HashMap;
+use std::fmt::Debug;
+
+use crate::batch::{Batch, Shape};
+use crate::error::Result;
+use crate::matrix::Matrix;
+use crate::parameters::{Declared, Parameters};
+use crate::random::Stream;
+
+/// A step of a network. Layers hold their settings; their numbers lie in [`Parameters`].
+pub trait Layer: Debug + Send + Sync {
+    /// Name and settings, for people.
+    fn describe(&self) -> String;
+
+    /// Its parameters under PyTorch's names.
+    fn parameters(&self) -> Vec<Declared> {
+        Vec::new()
+    }
+
+    /// Shape of an item after it.
+    ///
+    /// # Errors
+    /// [`crate::NetError::LayerInput`] for a shape that it cannot take.
+    fn output(&self, input: Shape) -> Result<Shape>;
+
+    /// Numbers after it. In training it leaves on the tape what [`Layer::backward`] needs.
+    fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch;
+
+    /// From the gradient by its output to the gradient by its input; gradients by its parameters go
+    /// to `pass`.
+    fn backward(&self, gradient: Batch, pass: &mut Backward<'_>) -> Batch;
+}
+
+/// Layers one after another.
+pub type Chain = Vec<Box<dyn Layer>>;
+
+/// A way through the network.
+#[derive(Debug)]
+pub struct Pass<'a> {
+    /// the network's numbers
+    pub parameters: &'a Parameters,
+    /// inputs beyond the first
+    pub others: &'a [Batch],
+    /// set in training
+    pub training: Option<Training>,
+}
+
+/// What training keeps of a way through the network.
+#[derive(Debug)]
+pub struct Training {
+    /// random numbers of dropout in this step; none: dropout is off
+    pub dropout: Option<Stream>,
+    dropouts: u64,
+    tape: Vec<Saved>,
+    /// new running statistics
+    pub running: Vec<(String, Vec<f32>)>,
+}
+
+impl Training {
+    /// An empty tape.
+    pub fn new(dropout: Option<Stream>) -> Self {
+        Self { dropout, dropouts: 0, tape: Vec::new(), running: Vec::new() }
+    }
+
+    /// Random numbers of the next dropout layer, when dropout is on.
+    pub fn next_dropout(&mut self) -> Option<Stream> {
+        self.dropouts += 1;
+        self.dropout.map(|d| d.part(self.dropouts))
+    }
+}
+
+impl<'a> Pass<'a> {
+    /// For results alone.
+    pub fn evaluate(parameters: &'a Parameters, others: &'a [Batch]) -> Self {
+        Self { parameters, others, training: None }
+    }
+
+    /// Keeps something for the way back, in training.
+    pub fn save(&mut self, saved: impl FnOnce() -> Saved) {
+        if let Some(training) = &mut self.training {
+            training.tape.push(saved());
+        }
+    }
+
+    /// Through all layers of a chain.
+    pub fn chain(&mut self, layers: &[Box<dyn Layer>], input: Batch) -> Batch {
+        layers.iter().fold(input, |x, layer| layer.forward(x, self))
+    }
+}
+
+/// What a layer keeps for the way back.
+#[derive(Debug)]
+pub enum Saved {
+    /// a batch: input or output
+    Batch(Batch),
+    /// matrices of a layer's own
+    Matrices(Vec<Matrix>),
+    /// indices or flags
+    Bytes(Vec<u8>, Shape),
+    /// only the shape and the lengths
+    Shape(Shape, Option<Vec<usize>>),
+    /// a recurrent layer's states
+    Recurrent(Box<crate::layers::recurrent::Trace>),
+}
+
+/// The way back.
+#[derive(Debug)]
+pub struct Backward<'a> {
+    /// the network's numbers
+    pub parameters: &'a Parameters,
+    tape: Vec<Saved>,
+    /// gradients by the parameters' names
+    pub gradients: HashMap<String, Matrix>,
+    /// whether anything needs the gradient by the input of the layer at work
+    pub wanted: bool,
+}
+
+impl<'a> Backward<'a> {
+    /// After a forward pass.
+    pub fn new(parameters: &'a Parameters, training: Training) -> Self {
+        Self { parameters, tape: training.tape, gradients: HashMap::new(), wanted: true }
+    }
+
+    /// What the layer saved last.
+    ///
+    /// # Panics
+    /// When forward saved less than backward takes: a fault of the layer.
+    pub fn saved(&mut self) -> Saved {
+        match self.tape.pop() {
+            Some(saved) => saved,
+            None => unreachable!("a layer saved less than it takes back"),
+        }
+    }
+
+    /// Adds to a parameter's gradient.
+    pub fn add(&mut self, name: String, gradient: Matrix) {
+        match self.gradients.entry(name) {
+            std::collections::hash_map::Entry::Vacant(place) => {
+                place.insert(gradient);
+            }
+            std::collections::hash_map::Entry::Occupied(mut sum) => {
+                crate::kernels::add(sum.get_mut().values_mut(), gradient.values());
+            }
+        }
+    }
+
+    /// Back through a chain; `wanted`: whether the gradient by its input is needed.
+    pub fn chain(&mut self, layers: &[Box<dyn Layer>], gradient: Batch, wanted: bool) -> Batch {
+        let outer = self.wanted;
+        let mut gradient = gradient;
+        for (i, layer) in layers.iter().enumerate().rev() {
+            self.wanted = wanted || i > 0;
+            gradient = layer.backward(gradient, self);
+        }
+        self.wanted = outer;
+        gradient
+    }
+}

@@ -1,0 +1,74 @@
+//! Fully connected layer.
+
+use super::uniform_by;
+use crate::batch::{Batch, Shape};
+use crate::error::{NetError, Result};
+use crate::kernels;
+use crate::layer::{Backward, Layer, Pass, Saved};
+use crate::matrix::Matrix;
+use crate::parameters::Declared;
+
+/// `y = x W^T + b` at every place.
+#[derive(Clone, Debug)]
+pub struct Linear {
+    name: String,
+    inputs: usize,
+    outputs: usize,
+}
+
+impl Linear {
+    /// `name.weight` `[outputs, inputs]` and `name.bias`.
+    pub fn new(name: impl Into<String>, inputs: usize, outputs: usize) -> Self {
+        Self { name: name.into(), inputs, outputs }
+    }
+}
+
+impl Layer for Linear {
+    fn describe(&self) -> String {
+        format!("{}: linear {} to {}", self.name, self.inputs, self.outputs)
+    }
+
+    fn parameters(&self) -> Vec<Declared> {
+        let initial = uniform_by(self.inputs);
+        let (weight, bias) = (format!("{}.weight", self.name), format!("{}.bias", self.name));
+        vec![
+            Declared::trained(weight, &[self.outputs, self.inputs], initial),
+            Declared::trained(bias, &[self.outputs], initial),
+        ]
+    }
+
+    fn output(&self, input: Shape) -> Result<Shape> {
+        let fits = input.numbers() == self.inputs && !matches!(input, Shape::Image { .. });
+        let refusal = || NetError::LayerInput { layer: self.describe(), input: input.to_string() };
+        fits.then(|| input.with_numbers(self.outputs)).ok_or_else(refusal)
+    }
+
+    fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch {
+        let weight = pass.parameters.get(&format!("{}.weight", self.name));
+        let bias = pass.parameters.get(&format!("{}.bias", self.name));
+        let mut values = input.values.dot_t(weight);
+        kernels::add_to_rows(values.values_mut(), bias.values());
+        let shape = input.shape.with_numbers(self.outputs);
+        let lengths = input.lengths.clone();
+        pass.save(|| Saved::Batch(input));
+        Batch { values, shape, lengths }
+    }
+
+    fn backward(&self, gradient: Batch, pass: &mut Backward<'_>) -> Batch {
+        let Saved::Batch(input) = pass.saved() else { unreachable!("linear saves its input") };
+        let weight = format!("{}.weight", self.name);
+        pass.add(weight.clone(), gradient.values.t_dot(&input.values));
+        let sums = kernels::column_sums(gradient.values.values(), self.outputs);
+        pass.add(format!("{}.bias", self.name), column(sums));
+        if !pass.wanted {
+            return gradient;
+        }
+        let values = gradient.values.dot(pass.parameters.get(&weight));
+        Batch { values, shape: input.shape, lengths: input.lengths }
+    }
+}
+
+/// Sums as the gradient of a vector.
+pub(crate) fn column(sums: Vec<f64>) -> Matrix {
+    Matrix::new(sums.len(), 1, sums.into_iter().map(|s| s as f32).collect())
+}

@@ -1,0 +1,214 @@
+//! Recurrent layers over PyTorch's stacked gates.
+//!
+//! Sequences are packed: step after step, longest sequence first, so that no work is done on
+//! padding. All products by the input are one product for each layer; the gates of a step are one
+//! pass over the numbers.
+
+mod cell;
+mod packing;
+
+use super::uniform_by;
+use crate::batch::{Batch, Shape};
+use crate::error::{NetError, Result};
+use crate::kernels;
+use crate::layer::{Backward, Layer, Pass, Saved};
+use crate::layers::dropout;
+use crate::layers::linear::column;
+use crate::matrix::Matrix;
+use crate::parameters::{Declared, Parameters};
+use cell::{Cell, Gradients, States};
+use packing::Packing;
+
+/// GRU or LSTM layers, each over the outputs of the one before.
+#[derive(Clone, Debug)]
+pub struct Recurrent {
+    name: String,
+    cell: Cell,
+    inputs: usize,
+    hidden: usize,
+    layers: usize,
+    dropout: f32,
+}
+
+/// What recurrent layers keep for the way back.
+#[derive(Debug)]
+pub struct Trace {
+    packing: Packing,
+    layers: Vec<LayerTrace>,
+}
+
+#[derive(Debug)]
+struct LayerTrace {
+    input: Matrix,
+    states: States,
+    /// dropout of the input, when it is on
+    kept: Vec<u8>,
+}
+
+impl Recurrent {
+    /// `name.weight_ih_l0`, `name.weight_hh_l0`, `name.bias_ih_l0`, `name.bias_hh_l0`, …; gates
+    /// reset, update, new.
+    pub fn gru(name: impl Into<String>, inputs: usize, hidden: usize, layers: usize) -> Self {
+        Self { name: name.into(), cell: Cell::Gru, inputs, hidden, layers, dropout: 0.0 }
+    }
+
+    /// The same names; gates input, forget, cell, output.
+    pub fn lstm(name: impl Into<String>, inputs: usize, hidden: usize, layers: usize) -> Self {
+        Self { name: name.into(), cell: Cell::Lstm, inputs, hidden, layers, dropout: 0.0 }
+    }
+
+    /// Dropout between the layers.
+    pub fn dropout(mut self, probability: f32) -> Self {
+        self.dropout = probability;
+        self
+    }
+
+    fn key(&self, what: &str, layer: usize) -> String {
+        format!("{}.{what}_l{layer}", self.name)
+    }
+
+    fn forward_layer(
+        &self,
+        layer: usize,
+        input: &Matrix,
+        packing: &Packing,
+        parameters: &Parameters,
+    ) -> States {
+        let get = |what| parameters.get(&self.key(what, layer));
+        let mut gates = input.dot_t(get("weight_ih"));
+        kernels::add_to_rows(gates.values_mut(), get("bias_ih").values());
+        let mut states = States::new(self.cell, gates, self.hidden);
+        let recurrent = get("weight_hh");
+        for step in 0..packing.steps() {
+            let products = (step > 0).then(|| {
+                let (before, n) = (packing.rows(step - 1).start, packing.rows(step).len());
+                let rows = before * self.hidden..(before + n) * self.hidden;
+                let state = Matrix::new(n, self.hidden, states.hidden.values()[rows].to_vec());
+                state.dot_t(recurrent)
+            });
+            let before = step.checked_sub(1).map(|s| packing.rows(s).start);
+            states.step(packing.rows(step), before, products.as_ref(), get("bias_hh").values());
+        }
+        states
+    }
+
+    fn backward_layer(
+        &self,
+        layer: usize,
+        trace: &LayerTrace,
+        gradient: &Matrix,
+        packing: &Packing,
+        pass: &mut Backward<'_>,
+    ) -> Matrix {
+        let hidden = self.hidden;
+        let parameters = pass.parameters;
+        let get = |what| parameters.get(&self.key(what, layer));
+        let recurrent = get("weight_hh");
+        let mut gradients = Gradients::new(self.cell, packing.total(), hidden);
+        // by the hidden state, from the step after
+        let mut carried = vec![0.0; packing.items() * hidden];
+        for step in (0..packing.steps()).rev() {
+            let rows = packing.rows(step);
+            let before = step.checked_sub(1).map(|s| packing.rows(s).start);
+            let n = rows.len();
+            gradients.step(&trace.states, rows, before, gradient, &mut carried);
+            if before.is_some() {
+                let products = gradients.recurrent_rows(n).dot(recurrent);
+                kernels::add(&mut carried[..n * hidden], products.values());
+            }
+        }
+        let (by_gates, by_recurrent) = gradients.finish();
+        let first = packing.rows(0).len();
+        let states = packing.states_before(trace.states.hidden.values(), hidden);
+        let by_recurrent = by_recurrent.as_ref().unwrap_or(&by_gates);
+        pass.add(self.key("weight_ih", layer), by_gates.t_dot(&trace.input));
+        pass.add(self.key("weight_hh", layer), by_recurrent.t_dot_from(first, &states));
+        let sums = |m: &Matrix| column(kernels::column_sums(m.values(), m.cols()));
+        pass.add(self.key("bias_ih", layer), sums(&by_gates));
+        pass.add(self.key("bias_hh", layer), sums(by_recurrent));
+        if layer == 0 && !pass.wanted {
+            return Matrix::zeros(0, self.inputs);
+        }
+        by_gates.dot(get("weight_ih"))
+    }
+}
+
+impl Layer for Recurrent {
+    fn describe(&self) -> String {
+        let Self { name, inputs, hidden, layers, .. } = self;
+        let mut text =
+            format!("{name}: {layers} {} layers, {inputs} to {hidden}", self.cell.name());
+        if self.dropout > 0.0 {
+            text += &format!(", dropout {} between", self.dropout);
+        }
+        text
+    }
+
+    fn parameters(&self) -> Vec<Declared> {
+        let (initial, gates) = (uniform_by(self.hidden), self.cell.gates() * self.hidden);
+        let one = |layer| {
+            let inputs = if layer == 0 { self.inputs } else { self.hidden };
+            [
+                Declared::trained(self.key("weight_ih", layer), &[gates, inputs], initial),
+                Declared::trained(self.key("weight_hh", layer), &[gates, self.hidden], initial),
+                Declared::trained(self.key("bias_ih", layer), &[gates], initial),
+                Declared::trained(self.key("bias_hh", layer), &[gates], initial),
+            ]
+        };
+        (0..self.layers).flat_map(one).collect()
+    }
+
+    fn output(&self, input: Shape) -> Result<Shape> {
+        match input {
+            Shape::Sequence { numbers, .. } if numbers == self.inputs => {
+                Ok(input.with_numbers(self.hidden))
+            }
+            _ => Err(NetError::LayerInput { layer: self.describe(), input: input.to_string() }),
+        }
+    }
+
+    fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch {
+        let (steps, items) = (input.shape.places(), input.items());
+        let packing = Packing::new(items, steps, input.lengths.as_deref());
+        let mut values = packing.pack(input.values.values(), self.inputs);
+        let mut layers = Vec::new();
+        for layer in 0..self.layers {
+            let mut kept = Vec::new();
+            if layer > 0 && self.dropout > 0.0 {
+                let stream = pass.training.as_mut().and_then(|t| t.next_dropout());
+                if let Some(stream) = stream {
+                    kept = dropout::kept(stream, self.dropout, values.values().len());
+                    dropout::apply(values.values_mut(), &kept, self.dropout);
+                }
+            }
+            let states = self.forward_layer(layer, &values, &packing, pass.parameters);
+            let output = states.hidden.clone();
+            if pass.training.is_some() {
+                layers.push(LayerTrace { input: values, states, kept });
+            }
+            values = output;
+        }
+        let out = packing.unpack(values.values(), self.hidden);
+        pass.save(|| Saved::Recurrent(Box::new(Trace { packing, layers })));
+        let shape = input.shape.with_numbers(self.hidden);
+        Batch { values: out, shape, lengths: input.lengths }
+    }
+
+    fn backward(&self, gradient: Batch, pass: &mut Backward<'_>) -> Batch {
+        let Saved::Recurrent(trace) = pass.saved() else { unreachable!("saves its states") };
+        let packing = &trace.packing;
+        let mut values = packing.pack(gradient.values.values(), self.hidden);
+        for (layer, states) in trace.layers.iter().enumerate().rev() {
+            values = self.backward_layer(layer, states, &values, packing, pass);
+            if !states.kept.is_empty() {
+                dropout::apply(values.values_mut(), &states.kept, self.dropout);
+            }
+        }
+        if !pass.wanted {
+            return gradient;
+        }
+        let shape = gradient.shape.with_numbers(self.inputs);
+        let values = packing.unpack(values.values(), self.inputs);
+        Batch { values, shape, lengths: gradient.lengths }
+    }
+}

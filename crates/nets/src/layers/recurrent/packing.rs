@@ -1,0 +1,106 @@
+//! Sequences step after step, without their padding.
+
+use std::ops::Range;
+
+use crate::matrix::Matrix;
+
+/// Where each step of each sequence lies.
+#[derive(Debug)]
+pub(super) struct Packing {
+    /// items, longest first; equal ones in their order
+    order: Vec<usize>,
+    /// row of the first item of each step, and the end
+    starts: Vec<usize>,
+    /// steps of the padded batch
+    padded: usize,
+}
+
+impl Packing {
+    /// Without lengths every item has all steps; none has fewer than one.
+    pub(super) fn new(items: usize, padded: usize, lengths: Option<&[usize]>) -> Self {
+        let length = |i: usize| lengths.map_or(padded, |l| l[i].clamp(1, padded));
+        let mut order: Vec<usize> = (0..items).collect();
+        order.sort_by_key(|&i| std::cmp::Reverse(length(i)));
+        let longest = order.first().map_or(0, |&i| length(i));
+        let mut starts = vec![0];
+        let mut active = items;
+        for step in 0..longest {
+            while active > 0 && length(order[active - 1]) <= step {
+                active -= 1;
+            }
+            starts.push(starts[step] + active);
+        }
+        Self { order, starts, padded }
+    }
+
+    pub(super) fn items(&self) -> usize {
+        self.order.len()
+    }
+
+    pub(super) fn steps(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// Rows of a step.
+    pub(super) fn rows(&self, step: usize) -> Range<usize> {
+        self.starts[step]..self.starts[step + 1]
+    }
+
+    pub(super) fn total(&self) -> usize {
+        self.starts[self.steps()]
+    }
+
+    /// `[items * padded, n]` to packed rows.
+    pub(super) fn pack(&self, values: &[f32], n: usize) -> Matrix {
+        let mut out = Vec::with_capacity(self.total() * n);
+        for step in 0..self.steps() {
+            for &item in &self.order[..self.rows(step).len()] {
+                let at = (item * self.padded + step) * n;
+                out.extend_from_slice(&values[at..at + n]);
+            }
+        }
+        Matrix::new(self.total(), n, out)
+    }
+
+    /// Packed rows to `[items * padded, n]`, zeros where there is nothing.
+    pub(super) fn unpack(&self, values: &[f32], n: usize) -> Matrix {
+        let mut out = Matrix::zeros(self.items() * self.padded, n);
+        let all = out.values_mut();
+        for step in 0..self.steps() {
+            let rows = self.rows(step);
+            for (row, &item) in rows.clone().zip(&self.order) {
+                let at = (item * self.padded + step) * n;
+                all[at..at + n].copy_from_slice(&values[row * n..(row + 1) * n]);
+            }
+        }
+        out
+    }
+
+    /// For each row after the first step, the row of the step before.
+    pub(super) fn states_before(&self, hidden: &[f32], n: usize) -> Matrix {
+        let first = self.rows(0).len();
+        let mut out = Vec::with_capacity((self.total() - first) * n);
+        for step in 1..self.steps() {
+            let before = self.rows(step - 1).start;
+            out.extend_from_slice(&hidden[before * n..(before + self.rows(step).len()) * n]);
+        }
+        Matrix::new(self.total() - first, n, out)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packing_and_unpacking_give_back_all_but_the_padding() {
+        let packing = Packing::new(3, 4, Some(&[2, 4, 1]));
+        assert_eq!((packing.steps(), packing.total()), (4, 7));
+        let values: Vec<f32> = (0..12).map(|i| i as f32).collect();
+        let packed = packing.pack(&values, 1);
+        assert_eq!(packed.values(), [4.0, 0.0, 8.0, 5.0, 1.0, 6.0, 7.0]);
+        let expected = [0.0, 1.0, 0.0, 0.0, 4.0, 5.0, 6.0, 7.0, 8.0, 0.0, 0.0, 0.0];
+        assert_eq!(packing.unpack(packed.values(), 1).values(), expected);
+        assert_eq!(packing.states_before(packed.values(), 1).values(), [4.0, 0.0, 5.0, 6.0]);
+    }
+}

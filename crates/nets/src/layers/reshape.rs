@@ -1,0 +1,151 @@
+//! Layers that only rearrange numbers.
+
+use crate::batch::{Batch, Shape};
+use crate::error::{NetError, Result};
+use crate::layer::{Backward, Layer, Pass, Saved};
+use crate::matrix::Matrix;
+
+/// Images become vectors in PyTorch's order: channel, row, column.
+#[derive(Clone, Copy, Debug)]
+pub struct Flatten;
+
+impl Layer for Flatten {
+    fn describe(&self) -> String {
+        "flatten".into()
+    }
+
+    fn output(&self, input: Shape) -> Result<Shape> {
+        match input {
+            Shape::Image { .. } => Ok(Shape::Vector(input.len())),
+            _ => Err(NetError::LayerInput { layer: self.describe(), input: input.to_string() }),
+        }
+    }
+
+    fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch {
+        let (items, shape) = (input.items(), input.shape);
+        let values = Matrix::new(items, shape.len(), input.channels_first());
+        pass.save(|| Saved::Shape(shape, None));
+        Batch { values, shape: Shape::Vector(shape.len()), lengths: None }
+    }
+
+    fn backward(&self, gradient: Batch, pass: &mut Backward<'_>) -> Batch {
+        let Saved::Shape(shape, _) = pass.saved() else { unreachable!("flatten saves its shape") };
+        Batch::from_channels_first(gradient.values.values(), shape)
+    }
+}
+
+/// Images become vectors pixel by pixel: row, column, channel.
+#[derive(Clone, Copy, Debug)]
+pub struct FlattenPixels;
+
+impl Layer for FlattenPixels {
+    fn describe(&self) -> String {
+        "flatten pixel by pixel".into()
+    }
+
+    fn output(&self, input: Shape) -> Result<Shape> {
+        Flatten.output(input)
+    }
+
+    fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch {
+        let (items, shape) = (input.items(), input.shape);
+        pass.save(|| Saved::Shape(shape, None));
+        let values = input.values.reshaped(items, shape.len());
+        Batch { values, shape: Shape::Vector(shape.len()), lengths: None }
+    }
+
+    fn backward(&self, gradient: Batch, pass: &mut Backward<'_>) -> Batch {
+        let Saved::Shape(shape, _) = pass.saved() else { unreachable!("flatten saves its shape") };
+        let rows = gradient.values.rows() * shape.places();
+        Batch { values: gradient.values.reshaped(rows, shape.numbers()), shape, lengths: None }
+    }
+}
+
+/// The last step of every sequence.
+#[derive(Clone, Copy, Debug)]
+pub struct LastStep;
+
+impl Layer for LastStep {
+    fn describe(&self) -> String {
+        "last step".into()
+    }
+
+    fn output(&self, input: Shape) -> Result<Shape> {
+        match input {
+            Shape::Sequence { numbers, .. } => Ok(Shape::Vector(numbers)),
+            _ => Err(NetError::LayerInput { layer: self.describe(), input: input.to_string() }),
+        }
+    }
+
+    fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch {
+        let (steps, n) = (input.shape.places(), input.shape.numbers());
+        let items = input.items();
+        let values = input.values.values();
+        let mut last = Vec::with_capacity(items * n);
+        for i in 0..items {
+            let at = (i * steps + last_of(&input.lengths, i, steps)) * n;
+            last.extend_from_slice(&values[at..at + n]);
+        }
+        pass.save(|| Saved::Shape(input.shape, input.lengths));
+        Batch { values: Matrix::new(items, n, last), shape: Shape::Vector(n), lengths: None }
+    }
+
+    fn backward(&self, gradient: Batch, pass: &mut Backward<'_>) -> Batch {
+        let Saved::Shape(shape, lengths) = pass.saved() else {
+            unreachable!("last step saves its shape")
+        };
+        let (steps, n, items) = (shape.places(), shape.numbers(), gradient.items());
+        let mut values = Matrix::zeros(items * steps, n);
+        let all = values.values_mut();
+        for (i, row) in gradient.values.values().chunks_exact(n).enumerate() {
+            let at = (i * steps + last_of(&lengths, i, steps)) * n;
+            all[at..at + n].copy_from_slice(row);
+        }
+        Batch { values, shape, lengths }
+    }
+}
+
+/// Index of the last step of item `i`; of the last padded step when lengths are not known.
+fn last_of(lengths: &Option<Vec<usize>>, i: usize, steps: usize) -> usize {
+    lengths.as_ref().map_or(steps, |l| l[i]).max(1) - 1
+}
+
+/// Appends the numbers of another input of the network.
+#[derive(Clone, Copy, Debug)]
+pub struct Join {
+    /// which of the inputs beyond the first
+    pub other: usize,
+    /// its numbers
+    pub numbers: usize,
+}
+
+impl Layer for Join {
+    fn describe(&self) -> String {
+        format!("append the {} numbers of input {}", self.numbers, self.other + 2)
+    }
+
+    fn output(&self, input: Shape) -> Result<Shape> {
+        match input {
+            Shape::Vector(n) => Ok(Shape::Vector(n + self.numbers)),
+            _ => Err(NetError::LayerInput { layer: self.describe(), input: input.to_string() }),
+        }
+    }
+
+    fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch {
+        let (n, extra) = (input.shape.numbers(), self.numbers);
+        let mut values = Vec::with_capacity(input.items() * (n + extra));
+        let added = pass.others[self.other].values.values().chunks_exact(extra);
+        for (row, added) in input.values.values().chunks_exact(n).zip(added) {
+            values.extend_from_slice(row);
+            values.extend_from_slice(added);
+        }
+        Batch::new(values, Shape::Vector(n + extra))
+    }
+
+    fn backward(&self, gradient: Batch, _: &mut Backward<'_>) -> Batch {
+        let n = gradient.shape.numbers();
+        let rows = gradient.values.values().chunks_exact(n);
+        let kept = rows.flat_map(|row| &row[..n - self.numbers]).copied().collect();
+        Batch::new(kept, Shape::Vector(n - self.numbers))
+    }
+}

@@ -1,0 +1,60 @@
+//! A block whose input is added to its output.
+
+use crate::batch::{Batch, Shape};
+use crate::error::{NetError, Result};
+use crate::kernels;
+use crate::layer::{Backward, Chain, Layer, Pass};
+use crate::parameters::Declared;
+
+/// `main(x) + shortcut(x)`; an empty shortcut passes `x` on.
+#[derive(Debug)]
+pub struct Residual {
+    main: Chain,
+    shortcut: Chain,
+}
+
+impl Residual {
+    /// From the two ways.
+    pub fn new(main: Chain, shortcut: Chain) -> Self {
+        Self { main, shortcut }
+    }
+}
+
+impl Layer for Residual {
+    fn describe(&self) -> String {
+        let names =
+            |chain: &Chain| chain.iter().map(|l| l.describe()).collect::<Vec<_>>().join("; ");
+        match self.shortcut.is_empty() {
+            true => format!("input + ({})", names(&self.main)),
+            false => format!("({}) + ({})", names(&self.shortcut), names(&self.main)),
+        }
+    }
+
+    fn parameters(&self) -> Vec<Declared> {
+        self.main.iter().chain(&self.shortcut).flat_map(|l| l.parameters()).collect()
+    }
+
+    fn output(&self, input: Shape) -> Result<Shape> {
+        let through = |chain: &Chain| chain.iter().try_fold(input, |s, l| l.output(s));
+        let (main, shortcut) = (through(&self.main)?, through(&self.shortcut)?);
+        let refusal = || NetError::LayerInput { layer: self.describe(), input: input.to_string() };
+        (main == shortcut).then_some(main).ok_or_else(refusal)
+    }
+
+    fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch {
+        let short = pass.chain(&self.shortcut, input.clone());
+        let mut out = pass.chain(&self.main, input);
+        kernels::add(out.values.values_mut(), short.values.values());
+        out
+    }
+
+    fn backward(&self, gradient: Batch, pass: &mut Backward<'_>) -> Batch {
+        let wanted = pass.wanted;
+        let mut main = pass.chain(&self.main, gradient.clone(), wanted);
+        let short = pass.chain(&self.shortcut, gradient, wanted);
+        if wanted {
+            kernels::add(main.values.values_mut(), short.values.values());
+        }
+        main
+    }
+}

@@ -1,0 +1,123 @@
+//! A trained network on disk: a safetensors file whose text entry says everything else.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::error::{NetError, Result};
+use crate::fit::{self, History};
+use crate::items::Items;
+use crate::network::Network;
+use crate::networks;
+use crate::recipe::Recipe;
+use crate::weights::{self, State, WeightsError};
+
+/// Text entry of the file.
+const ENTRY: &str = "corsmal-feat";
+/// Version of that entry.
+const FORMAT: u32 = 1;
+
+/// What the file says about its network.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Header {
+    /// version of this entry
+    pub format: u32,
+    /// name in the registry
+    pub network: String,
+    /// label names in the order of the outputs
+    pub labels: Vec<String>,
+    /// what is predicted
+    pub target: String,
+    /// how it was trained
+    pub recipe: Recipe,
+    /// what became of the training
+    pub history: History,
+    /// configuration of the features it was trained on; null when they came from elsewhere
+    pub feature_config: Value,
+    /// where it was learned: files, rows, folds
+    pub provenance: Value,
+    /// version of the program that wrote it
+    pub tool_version: String,
+}
+
+/// A trained network with what is needed to use it.
+#[derive(Debug)]
+pub struct NetModel {
+    /// what the file says
+    pub header: Header,
+    /// the network
+    pub network: Network,
+}
+
+impl NetModel {
+    /// From its parts.
+    ///
+    /// # Errors
+    /// [`NetError::Targets`] when the labels are not as many as the outputs.
+    pub fn new(mut header: Header, network: Network) -> Result<Self> {
+        if header.labels.len() != network.outputs() {
+            let (labels, outputs) = (header.labels.len(), network.outputs());
+            return Err(NetError::Targets(format!("{labels} labels for {outputs} outputs")));
+        }
+        header.format = FORMAT;
+        Ok(Self { header, network })
+    }
+
+    /// Probability of each class.
+    ///
+    /// # Errors
+    /// Items that the network does not take.
+    pub fn predict_proba(&self, items: &Items) -> Result<Vec<Vec<f64>>> {
+        items.check(&self.network)?;
+        let rows: Vec<usize> = (0..items.len()).collect();
+        fit::probabilities(&self.network, items, &rows, &self.header.recipe)
+    }
+
+    /// The bytes of the file.
+    ///
+    /// # Errors
+    /// A text.
+    pub fn to_bytes(&self) -> std::result::Result<Vec<u8>, String> {
+        let header = serde_json::to_string(&self.header).map_err(|e| e.to_string())?;
+        let all = self.network.parameters().iter();
+        let state: State =
+            all.map(|(d, v)| (d.name.clone(), d.shape.clone(), v.to_vec())).collect();
+        weights::to_safetensors(&state, Some(HashMap::from([(ENTRY.to_owned(), header)])))
+    }
+
+    /// From the bytes of a file, whoever wrote them.
+    ///
+    /// # Errors
+    /// A text when it is no trained network of ours, or its parts do not fit.
+    pub fn from_bytes(bytes: &[u8]) -> std::result::Result<Self, String> {
+        let text = weights::safetensors_text(bytes, ENTRY)?
+            .ok_or("weights alone: no network of corsmal-feat was trained into this file")?;
+        let value: Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
+        let format = value.get("format").and_then(Value::as_u64);
+        if format != Some(FORMAT.into()) {
+            let found = format.map_or("none".into(), |f| f.to_string());
+            return Err(format!("format version {found}: this program reads version {FORMAT}"));
+        }
+        let header: Header = serde_json::from_value(value).map_err(|e| e.to_string())?;
+        header.recipe.check().map_err(|e| e.to_string())?;
+        let definition = networks::named(&header.network).map_err(|e| e.to_string())?;
+        let mut network =
+            definition.build(Some(header.labels.len()), 0).map_err(|e| e.to_string())?;
+        let state = weights::from_safetensors(bytes)?;
+        network.load_state(&state).map_err(|e| e.to_string())?;
+        Self::new(header, network).map_err(|e| e.to_string())
+    }
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`WeightsError`].
+    pub fn load(path: &Path) -> std::result::Result<Self, WeightsError> {
+        let bytes = weights::bytes(path)?;
+        Self::from_bytes(&bytes)
+            .map_err(|reason| WeightsError::Content { path: path.into(), reason })
+    }
+}

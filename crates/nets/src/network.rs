@@ -1,0 +1,369 @@
+//! A network: inputs, layers, numbers.
+
+use std::collections::HashMap;
+
+use crate::batch::{Batch, Shape};
+use crate::error::{NetError, Result};
+use crate::layer::{Backward, Chain, Layer, Pass, Training};
+use crate::loss::{Loss, Targets};
+use crate::matrix::Matrix;
+use crate::parameters::{Initial, Parameters};
+use crate::random::Stream;
+
+/// One of a network's inputs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Input {
+    /// its name
+    pub name: String,
+    /// shape of an item; sequences have 0 steps here, as many as there are in a batch
+    pub shape: Shape,
+}
+
+impl Input {
+    /// A named input.
+    pub fn new(name: impl Into<String>, shape: Shape) -> Self {
+        Self { name: name.into(), shape }
+    }
+}
+
+/// The layers between inputs and outputs.
+#[derive(Debug)]
+pub enum Body {
+    /// one chain from the first input; [`crate::layers::Join`] takes in the others
+    Chain(Chain),
+    /// a chain for each input; their outputs are summed
+    Sum(Vec<Chain>),
+}
+
+impl Body {
+    fn chains(&self) -> &[Chain] {
+        match self {
+            Self::Chain(chain) => std::slice::from_ref(chain),
+            Self::Sum(chains) => chains,
+        }
+    }
+
+    /// All layers.
+    pub fn layers(&self) -> impl Iterator<Item = &dyn Layer> {
+        self.chains().iter().flatten().map(Box::as_ref)
+    }
+}
+
+/// An architecture before it has numbers.
+#[derive(Debug)]
+pub struct Architecture {
+    /// what it takes
+    pub inputs: Vec<Input>,
+    /// its layers
+    pub body: Body,
+    /// layers of the first chain whose output is the network's features
+    pub features: Option<usize>,
+    /// whether the last layer is an activation of the outputs, and no part of the loss
+    pub activation: bool,
+}
+
+/// A network with its numbers.
+#[derive(Debug)]
+pub struct Network {
+    name: String,
+    architecture: Architecture,
+    outputs: usize,
+    parameters: Parameters,
+    through_activation: bool,
+}
+
+/// Loss and gradients of a batch.
+#[derive(Debug)]
+pub struct Gradients {
+    /// the loss
+    pub loss: f64,
+    /// gradient by each trained parameter
+    pub by_parameter: HashMap<String, Matrix>,
+    /// new running statistics
+    pub running: Vec<(String, Vec<f32>)>,
+    /// the network's outputs
+    pub outputs: Batch,
+}
+
+impl Network {
+    /// With initial numbers of this seed. Checks that the layers fit one another.
+    ///
+    /// # Errors
+    /// [`NetError::LayerInput`].
+    pub fn new(name: impl Into<String>, architecture: Architecture, seed: u64) -> Result<Self> {
+        let mut outputs = None;
+        for (chain, input) in architecture.body.chains().iter().zip(&architecture.inputs) {
+            let shape = chain.iter().try_fold(input.shape, |s, layer| layer.output(s))?;
+            let fits =
+                matches!(shape, Shape::Vector(_)) && outputs.is_none_or(|o| o == shape.len());
+            if !fits {
+                let (layer, input) = ("the network's end".into(), shape.to_string());
+                return Err(NetError::LayerInput { layer, input });
+            }
+            outputs = Some(shape.len());
+        }
+        let declared = architecture.body.layers().flat_map(|layer| layer.parameters()).collect();
+        let parameters = Parameters::new(declared, seed);
+        let (name, outputs) = (name.into(), outputs.unwrap_or(0));
+        Ok(Self { name, architecture, outputs, parameters, through_activation: true })
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What it takes.
+    pub fn inputs(&self) -> &[Input] {
+        &self.architecture.inputs
+    }
+
+    /// Numbers it gives for an item.
+    pub fn outputs(&self) -> usize {
+        self.outputs
+    }
+
+    /// Its numbers.
+    pub fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
+    /// Its numbers, to be trained.
+    pub fn parameters_mut(&mut self) -> &mut Parameters {
+        &mut self.parameters
+    }
+
+    /// Replaces all numbers; see [`Parameters::load`].
+    ///
+    /// # Errors
+    /// [`NetError::Weights`].
+    pub fn load_state(&mut self, state: &[(String, Vec<usize>, Vec<f32>)]) -> Result<()> {
+        self.parameters.load(&self.name, state)
+    }
+
+    /// Layers with the shape after each, chain by chain, for people.
+    pub fn describe(&self) -> Vec<(String, String)> {
+        let mut lines = Vec::new();
+        for (chain, input) in self.architecture.body.chains().iter().zip(self.inputs()) {
+            lines.push((format!("input {}", input.name), input.shape.to_string()));
+            let mut shape = input.shape;
+            for layer in chain {
+                if let Ok(next) = layer.output(shape) {
+                    shape = next;
+                }
+                lines.push((layer.describe(), shape.to_string()));
+            }
+        }
+        lines
+    }
+
+    /// Refuses inputs of other shapes.
+    ///
+    /// # Errors
+    /// [`NetError::InputShape`], [`NetError::InputCount`].
+    pub fn check(&self, inputs: &[Batch]) -> Result<()> {
+        let expected = self.inputs();
+        if inputs.len() != expected.len() {
+            let (expected, actual) = (expected.len(), inputs.len());
+            return Err(NetError::InputCount { network: self.name.clone(), expected, actual });
+        }
+        let items = inputs.first().map_or(0, Batch::items);
+        for (given, input) in inputs.iter().zip(expected) {
+            let same = match (given.shape, input.shape) {
+                (Shape::Sequence { steps, numbers }, Shape::Sequence { numbers: wanted, .. }) => {
+                    numbers == wanted && steps > 0
+                }
+                (given, wanted) => given == wanted,
+            };
+            let lengths = given.lengths.as_ref().is_none_or(|l| {
+                l.len() == given.items() && l.iter().all(|&n| n > 0 && n <= given.shape.places())
+            });
+            if !same || !lengths || given.items() != items || items == 0 {
+                return Err(NetError::InputShape {
+                    network: self.name.clone(),
+                    input: input.name.clone(),
+                    expected: format!("{} x {}", items.max(1), input.shape),
+                    actual: format!("{} x {}", given.items(), given.shape),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Arrays in PyTorch's layouts as this network's inputs: `[items, channels, height, width]`,
+    /// `[items, steps, numbers]`, `[items, numbers]`. Several inputs of one kind may come as one
+    /// array whose second axis counts them.
+    ///
+    /// # Errors
+    /// [`NetError::InputShape`], [`NetError::InputCount`].
+    pub fn batches(&self, arrays: &[(Vec<usize>, Vec<f32>)]) -> Result<Vec<Batch>> {
+        let inputs = self.inputs();
+        let refusal = |input: &str, expected: String, actual: &[usize]| NetError::InputShape {
+            network: self.name.clone(),
+            input: input.into(),
+            expected,
+            actual: format!("{actual:?}"),
+        };
+        if let ([(shape, values)], true) = (arrays, inputs.len() > 1) {
+            let [items, count, steps, numbers] = shape[..] else {
+                let expected = format!("[items, {}, steps, numbers]", inputs.len());
+                return Err(refusal("array", expected, shape));
+            };
+            if count != inputs.len()
+                || values.len() != shape.iter().product::<usize>()
+                || steps == 0
+            {
+                let expected = format!("[items, {}, steps, numbers]", inputs.len());
+                return Err(refusal("array", expected, shape));
+            }
+            let each = steps * numbers;
+            let view = |v: usize| {
+                let items = (0..items).map(|i| &values[(i * count + v) * each..][..each]);
+                (vec![shape[0], steps, numbers], items.flatten().copied().collect())
+            };
+            return self.batches(&(0..count).map(view).collect::<Vec<_>>());
+        }
+        if arrays.len() != inputs.len() {
+            let (network, expected, actual) = (self.name.clone(), inputs.len(), arrays.len());
+            return Err(NetError::InputCount { network, expected, actual });
+        }
+        let one = |(input, (shape, values)): (&Input, &(Vec<usize>, Vec<f32>))| {
+            let refuse = || {
+                let expected = match input.shape {
+                    Shape::Vector(n) => format!("[items, {n}]"),
+                    Shape::Image { height, width, channels } => {
+                        format!("[items, {channels}, {height}, {width}]")
+                    }
+                    Shape::Sequence { numbers, .. } => format!("[items, steps, {numbers}]"),
+                };
+                refusal(&input.name, expected, shape)
+            };
+            let fits = match (input.shape, &shape[..]) {
+                (Shape::Vector(n), &[_, m]) => n == m,
+                (Shape::Image { height, width, channels }, &[_, c, h, w]) => {
+                    (c, h, w) == (channels, height, width)
+                }
+                (Shape::Sequence { numbers, .. }, &[_, steps, m]) => numbers == m && steps > 0,
+                _ => false,
+            };
+            if !fits || values.len() != shape.iter().product::<usize>() || values.is_empty() {
+                return Err(refuse());
+            }
+            Ok(match input.shape {
+                Shape::Image { .. } => Batch::from_channels_first(values, input.shape),
+                Shape::Sequence { numbers, .. } => {
+                    Batch::new(values.clone(), Shape::Sequence { steps: shape[1], numbers })
+                }
+                Shape::Vector(_) => Batch::new(values.clone(), input.shape),
+            })
+        };
+        inputs.iter().zip(arrays).map(one).collect()
+    }
+
+    /// Outputs `[items, outputs]` in evaluation mode.
+    ///
+    /// # Errors
+    /// Inputs of other shapes.
+    pub fn forward(&self, inputs: &[Batch]) -> Result<Batch> {
+        self.check(inputs)?;
+        let mut pass = Pass::evaluate(&self.parameters, &inputs[1..]);
+        Ok(self.run(inputs, &mut pass, true))
+    }
+
+    /// The same without the activation of the outputs.
+    ///
+    /// # Errors
+    /// Inputs of other shapes.
+    pub fn logits(&self, inputs: &[Batch]) -> Result<Batch> {
+        self.check(inputs)?;
+        let mut pass = Pass::evaluate(&self.parameters, &inputs[1..]);
+        Ok(self.run(inputs, &mut pass, false))
+    }
+
+    /// Whether the loss sees the outputs after their activation, as some published code has it.
+    pub fn train_through_activation(&mut self, through: bool) {
+        self.through_activation = through;
+    }
+
+    /// The numbers that the network's last layers work on.
+    ///
+    /// # Errors
+    /// Inputs of other shapes; a network without such a place.
+    pub fn features(&self, inputs: &[Batch]) -> Result<Batch> {
+        self.check(inputs)?;
+        let Some(layers) = self.architecture.features else {
+            let hint = "m4_type has them".into();
+            return Err(NetError::Missing { network: self.name.clone(), what: "features", hint });
+        };
+        let mut pass = Pass::evaluate(&self.parameters, &inputs[1..]);
+        let chain = &self.architecture.body.chains()[0][..layers];
+        Ok(pass.chain(chain, inputs[0].clone()))
+    }
+
+    /// The layers of a chain, with or without the activation at its end.
+    fn layers<'a>(&self, chain: &'a Chain, activation: bool) -> &'a [Box<dyn Layer>] {
+        let last = usize::from(self.architecture.activation && !activation);
+        &chain[..chain.len() - last]
+    }
+
+    fn run(&self, inputs: &[Batch], pass: &mut Pass<'_>, activation: bool) -> Batch {
+        let chains = self.architecture.body.chains();
+        let mut out = pass.chain(self.layers(&chains[0], activation), inputs[0].clone());
+        for (chain, input) in chains.iter().zip(inputs).skip(1) {
+            let more = pass.chain(self.layers(chain, activation), input.clone());
+            crate::kernels::add(out.values.values_mut(), more.values.values());
+        }
+        out
+    }
+
+    /// Loss and gradients of a batch in training mode; `dropout`: its random numbers, or off.
+    ///
+    /// # Errors
+    /// Inputs or targets that do not fit.
+    pub fn gradients(
+        &self,
+        inputs: &[Batch],
+        targets: &Targets,
+        loss: &Loss,
+        class_weights: &[f32],
+        dropout: Option<Stream>,
+    ) -> Result<Gradients> {
+        self.check(inputs)?;
+        let mut pass = Pass {
+            parameters: &self.parameters,
+            others: &inputs[1..],
+            training: Some(Training::new(dropout)),
+        };
+        let outputs = self.run(inputs, &mut pass, self.through_activation);
+        let (loss, gradient) = loss.of(&outputs, targets, class_weights)?;
+        let Some(mut training) = pass.training else { unreachable!("set above") };
+        let running = std::mem::take(&mut training.running);
+        let mut backward = Backward::new(&self.parameters, training);
+        for chain in self.architecture.body.chains().iter().rev() {
+            let layers = self.layers(chain, self.through_activation);
+            backward.chain(layers, gradient.clone(), false);
+        }
+        Ok(Gradients { loss, by_parameter: backward.gradients, running, outputs })
+    }
+
+    /// Starts all parameters anew.
+    pub fn start(&mut self, seed: u64) {
+        self.parameters = Parameters::new(self.parameters.declared().to_vec(), seed);
+    }
+
+    /// Starts every matrix and kernel anew, uniform by the sum of the numbers it takes and gives
+    /// (Xavier, Glorot); vectors stay as they are, or become zero.
+    pub fn start_xavier(&mut self, seed: u64, zero_vectors: bool) {
+        let mut declared = self.parameters.declared().to_vec();
+        for d in declared.iter_mut().filter(|d| d.trained) {
+            if d.shape.len() >= 2 {
+                let field: usize = d.shape[2..].iter().product();
+                let sum = (d.shape[0] + d.shape[1]) * field;
+                d.initial = Initial::Uniform((6.0 / sum as f32).sqrt());
+            } else if zero_vectors && !matches!(d.initial, Initial::Constant(_)) {
+                d.initial = Initial::Constant(0.0);
+            }
+        }
+        self.parameters = Parameters::new(declared, seed);
+    }
+}

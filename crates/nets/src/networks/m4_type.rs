@@ -1,0 +1,45 @@
+use super::Definition;
+use crate::batch::Shape;
+use crate::layer::Chain;
+use crate::layers::{BatchNorm, Conv2d, Dropout, Flatten, Linear, MaxPool, Relu, Softmax};
+use crate::network::{Architecture, Body, Input};
+use crate::recipe::Recipe;
+
+/// HVRL's network for the type of a window.
+pub(super) const M4_TYPE: Definition = Definition {
+    name: "m4_type",
+    about: "M4 (HVRL), type: thirteen convolutions over windows of 64 frames x 64 mel x 8 channels",
+    outputs: 4,
+    classifies: true,
+    architecture,
+    recipe: Recipe { weight_decay: 1e-5, ..Recipe::adam(1e-5, 32, 200) },
+};
+
+const BLOCKS: [&[usize]; 5] =
+    [&[32, 32], &[64, 64], &[128, 128, 128], &[256, 256, 256], &[256, 256, 256]];
+
+fn architecture(outputs: usize) -> Architecture {
+    let window = Shape::Image { height: 64, width: 64, channels: 8 };
+    let mut layers: Chain = Vec::new();
+    let mut channels = 8;
+    for (b, widths) in BLOCKS.iter().enumerate() {
+        for (k, &width) in widths.iter().enumerate() {
+            let name = format!("conv{}_{}", b + 1, k + 1);
+            layers.push(Box::new(Conv2d::same3(name, channels, width)));
+            layers.push(Box::new(Relu));
+            channels = width;
+        }
+        layers.push(Box::new(BatchNorm::new(format!("bn{}", b + 1), channels)));
+        layers.push(Box::new(MaxPool::new(2)));
+    }
+    layers.push(Box::new(Flatten));
+    let features = Some(layers.len());
+    for (name, inputs) in [("fc1", 1024), ("fc2", 512)] {
+        layers.push(Box::new(Linear::new(name, inputs, 512)));
+        layers.push(Box::new(Relu));
+        layers.push(Box::new(Dropout(0.5)));
+    }
+    layers.push(Box::new(Linear::new("fc3", 512, outputs)));
+    layers.push(Box::new(Softmax));
+    Architecture { inputs: vec![Input::new("window", window)], body: Body::Chain(layers), features, activation: true }
+}

@@ -1,0 +1,149 @@
+//! The numbers of a network, under PyTorch's names and in PyTorch's layouts.
+
+use std::collections::HashMap;
+
+use crate::error::{NetError, Result};
+use crate::matrix::Matrix;
+use crate::random::Stream;
+
+/// How a parameter starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Initial {
+    /// uniform within plus and minus this
+    Uniform(f32),
+    /// one value
+    Constant(f32),
+}
+
+/// A parameter as a layer declares it.
+#[derive(Clone, Debug)]
+pub struct Declared {
+    /// PyTorch's name, such as `conv1.weight`
+    pub name: String,
+    /// PyTorch's shape
+    pub shape: Vec<usize>,
+    /// first values
+    pub initial: Initial,
+    /// whether training changes it by its gradient (running statistics it does not)
+    pub trained: bool,
+}
+
+impl Declared {
+    /// A trained parameter.
+    pub fn trained(name: String, shape: &[usize], initial: Initial) -> Self {
+        Self { name, shape: shape.to_vec(), initial, trained: true }
+    }
+
+    /// A running statistic.
+    pub fn running(name: String, n: usize, value: f32) -> Self {
+        Self { name, shape: vec![n], initial: Initial::Constant(value), trained: false }
+    }
+
+    /// Numbers.
+    pub fn len(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    /// Whether it has no numbers.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// All parameters of a network in the order of its layers.
+#[derive(Clone, Debug)]
+pub struct Parameters {
+    declared: Vec<Declared>,
+    /// `[first dimension, product of the others]`
+    values: Vec<Matrix>,
+    index: HashMap<String, usize>,
+}
+
+impl Parameters {
+    /// Initial values of this seed.
+    pub fn new(declared: Vec<Declared>, seed: u64) -> Self {
+        let values = declared
+            .iter()
+            .map(|d| {
+                let stream = Stream::new(seed, &d.name);
+                let value = |i: usize| match d.initial {
+                    Initial::Uniform(bound) => (2.0 * stream.uniform(i as u64) - 1.0) * bound,
+                    Initial::Constant(value) => value,
+                };
+                matrix_of(d, (0..d.len()).map(value).collect())
+            })
+            .collect();
+        let index = declared.iter().enumerate().map(|(i, d)| (d.name.clone(), i)).collect();
+        Self { declared, values, index }
+    }
+
+    /// What each parameter is.
+    pub fn declared(&self) -> &[Declared] {
+        &self.declared
+    }
+
+    /// A parameter that a layer of this network declared.
+    ///
+    /// # Panics
+    /// When no layer did.
+    pub(crate) fn get(&self, name: &str) -> &Matrix {
+        &self.values[self.index[name]]
+    }
+
+    pub(crate) fn get_mut(&mut self, name: &str) -> &mut Matrix {
+        &mut self.values[self.index[name]]
+    }
+
+    /// Parameters with their values.
+    pub fn iter(&self) -> impl Iterator<Item = (&Declared, &[f32])> {
+        self.declared.iter().zip(self.values.iter().map(Matrix::values))
+    }
+
+    /// Numbers that training changes; running statistics are not counted, as in PyTorch.
+    pub fn count(&self) -> usize {
+        self.declared.iter().filter(|d| d.trained).map(Declared::len).sum()
+    }
+
+    /// Replaces all values by those given under PyTorch's names. `num_batches_tracked` may be there.
+    ///
+    /// # Errors
+    /// [`NetError::Weights`] with every name and shape that differs; nothing is changed then.
+    pub fn load(&mut self, network: &str, state: &[(String, Vec<usize>, Vec<f32>)]) -> Result<()> {
+        let mut differences = Vec::new();
+        let mut given: HashMap<&str, (&[usize], &[f32])> = HashMap::new();
+        for (name, shape, values) in state {
+            if name.ends_with("num_batches_tracked") {
+                continue;
+            }
+            if !self.index.contains_key(name) {
+                differences.push(format!("{name} {shape:?} is not one of its parameters"));
+            } else if values.len() != shape.iter().product::<usize>() {
+                differences.push(format!("{name} has {} values for {shape:?}", values.len()));
+            } else if let Some(i) = values.iter().position(|v| !v.is_finite()) {
+                differences.push(format!("{name}: value {i} is {}", values[i]));
+            }
+            given.insert(name, (shape, values));
+        }
+        for d in &self.declared {
+            match given.get(d.name.as_str()) {
+                None => differences.push(format!("{} {:?} is missing", d.name, d.shape)),
+                Some((shape, _)) if *shape != d.shape => {
+                    differences.push(format!("{} is {shape:?}, expected {:?}", d.name, d.shape));
+                }
+                Some(_) => (),
+            }
+        }
+        if !differences.is_empty() {
+            return Err(NetError::Weights { network: network.into(), differences });
+        }
+        for (d, value) in self.declared.iter().zip(&mut self.values) {
+            *value = matrix_of(d, given[d.name.as_str()].1.to_vec());
+        }
+        Ok(())
+    }
+}
+
+fn matrix_of(declared: &Declared, values: Vec<f32>) -> Matrix {
+    let rows = declared.shape.first().copied().unwrap_or(1);
+    Matrix::new(rows, values.len() / rows.max(1), values)
+}

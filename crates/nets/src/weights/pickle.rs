@@ -1,0 +1,377 @@
+//! The part of pickle that state dictionaries of PyTorch use. Nothing is called: the few classes
+//! and functions that occur are known by name, everything else is refused.
+
+use super::Kind;
+
+/// A value on the pickle machine's stack.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Value {
+    None,
+    Bool(bool),
+    Int(i64),
+    Float,
+    Text(String),
+    Tuple(Vec<Value>),
+    List(Vec<Value>),
+    Dict(Vec<(Value, Value)>),
+    Global(Global),
+    Storage(Storage),
+    Tensor(Tensor),
+    Mark,
+}
+
+/// The names that are known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Global {
+    OrderedDict,
+    RebuildTensor,
+    RebuildParameter,
+    Storage(Kind),
+}
+
+/// Where a tensor's numbers lie in the archive.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Storage {
+    pub(super) kind: Kind,
+    pub(super) key: String,
+    pub(super) len: usize,
+}
+
+/// A view of a storage.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Tensor {
+    pub(super) storage: Storage,
+    pub(super) offset: usize,
+    pub(super) shape: Vec<usize>,
+    pub(super) strides: Vec<usize>,
+}
+
+/// Longest stack and memo accepted.
+const MAX_VALUES: usize = 1 << 20;
+
+/// Reads one pickle.
+pub(super) fn read(bytes: &[u8]) -> Result<Value, String> {
+    let mut machine = Machine { bytes, at: 0, stack: Vec::new(), memo: Vec::new(), work: 0 };
+    loop {
+        if let Some(value) = machine.step()? {
+            return Ok(value);
+        }
+    }
+}
+
+struct Machine<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    stack: Vec<Value>,
+    memo: Vec<Value>,
+    /// values copied so far
+    work: usize,
+}
+
+impl Machine<'_> {
+    fn take(&mut self, n: usize) -> Result<&[u8], String> {
+        let end = self.at.checked_add(n).filter(|&e| e <= self.bytes.len());
+        let end = end.ok_or_else(|| format!("the pickle ends within byte {}", self.at))?;
+        let taken = &self.bytes[self.at..end];
+        self.at = end;
+        Ok(taken)
+    }
+
+    fn array<const N: usize>(&mut self) -> Result<[u8; N], String> {
+        let taken = self.take(N)?;
+        taken.try_into().map_err(|_| "the pickle ends too early".into())
+    }
+
+    fn line(&mut self) -> Result<String, String> {
+        let rest = &self.bytes[self.at..];
+        let end = rest.iter().position(|&b| b == b'\n').ok_or("the pickle ends within a name")?;
+        let text = String::from_utf8_lossy(&rest[..end]).into_owned();
+        self.at += end + 1;
+        Ok(text)
+    }
+
+    fn text(&mut self, n: usize) -> Result<(), String> {
+        let text =
+            std::str::from_utf8(self.take(n)?).map_err(|e| format!("a name: {e}"))?.to_owned();
+        self.push(Value::Text(text))
+    }
+
+    fn push(&mut self, value: Value) -> Result<(), String> {
+        if self.stack.len() >= MAX_VALUES {
+            return Err(format!("more than {MAX_VALUES} values"));
+        }
+        self.stack.push(value);
+        Ok(())
+    }
+
+    fn pop(&mut self) -> Result<Value, String> {
+        self.stack.pop().ok_or_else(|| format!("byte {}: nothing to take", self.at))
+    }
+
+    fn since_mark(&mut self) -> Result<Vec<Value>, String> {
+        let mark = self.stack.iter().rposition(|v| *v == Value::Mark);
+        let mark = mark.ok_or_else(|| format!("byte {}: no mark", self.at))?;
+        let items = self.stack.split_off(mark + 1);
+        self.stack.pop();
+        Ok(items)
+    }
+
+    fn remember(&mut self, index: usize) -> Result<(), String> {
+        if index >= MAX_VALUES {
+            return Err(format!("more than {MAX_VALUES} values"));
+        }
+        let value = self.stack.last().cloned().ok_or("nothing to remember")?;
+        self.count(&value)?;
+        if self.memo.len() <= index {
+            self.memo.resize(index + 1, Value::None);
+        }
+        self.memo[index] = value;
+        Ok(())
+    }
+
+    fn recall(&mut self, index: usize) -> Result<(), String> {
+        let value = self.memo.get(index).cloned().ok_or("an unknown memory is recalled")?;
+        self.count(&value)?;
+        self.push(value)
+    }
+
+    /// Copies are counted: a pickle of a few bytes could double its values again and again.
+    fn count(&mut self, value: &Value) -> Result<(), String> {
+        self.work += size(value, 0)?;
+        if self.work > 16 * MAX_VALUES { Err("too many values".into()) } else { Ok(()) }
+    }
+
+    fn step(&mut self) -> Result<Option<Value>, String> {
+        let code = self.array::<1>()?[0];
+        match code {
+            0x80 => {
+                let version = self.array::<1>()?[0];
+                if version > 5 {
+                    return Err(format!("pickle protocol {version} is not known"));
+                }
+            }
+            0x95 => {
+                self.array::<8>()?;
+            }
+            b'(' => self.push(Value::Mark)?,
+            b'.' => return self.pop().map(Some),
+            b'N' => self.push(Value::None)?,
+            0x88 => self.push(Value::Bool(true))?,
+            0x89 => self.push(Value::Bool(false))?,
+            b'K' => {
+                let n = self.array::<1>()?[0];
+                self.push(Value::Int(n.into()))?;
+            }
+            b'M' => {
+                let n = u16::from_le_bytes(self.array()?);
+                self.push(Value::Int(n.into()))?;
+            }
+            b'J' => {
+                let n = i32::from_le_bytes(self.array()?);
+                self.push(Value::Int(n.into()))?;
+            }
+            0x8a => {
+                let n = usize::from(self.array::<1>()?[0]);
+                if n > 8 {
+                    return Err("a whole number beyond 64 bits".into());
+                }
+                let mut all = [0u8; 8];
+                all[..n].copy_from_slice(self.take(n)?);
+                let negative = n > 0 && all[n - 1] & 0x80 != 0;
+                if negative {
+                    all[n..].fill(0xff);
+                }
+                self.push(Value::Int(i64::from_le_bytes(all)))?;
+            }
+            b'G' => {
+                self.array::<8>()?;
+                self.push(Value::Float)?;
+            }
+            b'X' => {
+                let n = u32::from_le_bytes(self.array()?) as usize;
+                self.text(n)?;
+            }
+            0x8c => {
+                let n = usize::from(self.array::<1>()?[0]);
+                self.text(n)?;
+            }
+            b'U' => {
+                let n = usize::from(self.array::<1>()?[0]);
+                self.text(n)?;
+            }
+            b')' => self.push(Value::Tuple(Vec::new()))?,
+            b't' => {
+                let items = self.since_mark()?;
+                self.push(Value::Tuple(items))?;
+            }
+            0x85..=0x87 => {
+                let n = usize::from(code - 0x84);
+                let at = self.stack.len().checked_sub(n).ok_or("nothing to take")?;
+                let items = self.stack.split_off(at);
+                self.push(Value::Tuple(items))?;
+            }
+            b']' => self.push(Value::List(Vec::new()))?,
+            b'}' => self.push(Value::Dict(Vec::new()))?,
+            b'a' | b'e' => {
+                let items = if code == b'a' { vec![self.pop()?] } else { self.since_mark()? };
+                match self.stack.last_mut() {
+                    Some(Value::List(list)) => list.extend(items),
+                    _ => return Err("a value is appended to what is no list".into()),
+                }
+            }
+            b's' | b'u' => {
+                let items = if code == b's' {
+                    let value = self.pop()?;
+                    vec![self.pop()?, value]
+                } else {
+                    self.since_mark()?
+                };
+                let Some(Value::Dict(dict)) = self.stack.last_mut() else {
+                    return Err("a value is set in what is no dictionary".into());
+                };
+                let mut items = items.into_iter();
+                while let (Some(key), Some(value)) = (items.next(), items.next()) {
+                    dict.push((key, value));
+                }
+            }
+            b'c' => {
+                let (module, name) = (self.line()?, self.line()?);
+                self.push(Value::Global(global(&module, &name)?))?;
+            }
+            0x93 => {
+                let (name, module) = (self.pop()?, self.pop()?);
+                let (Value::Text(module), Value::Text(name)) = (module, name) else {
+                    return Err("a class without a name".into());
+                };
+                self.push(Value::Global(global(&module, &name)?))?;
+            }
+            b'R' => {
+                let (arguments, function) = (self.pop()?, self.pop()?);
+                let value = call(function, arguments)?;
+                self.push(value)?;
+            }
+            b'b' => {
+                // State of an object: an OrderedDict's attributes (PyTorch's `_metadata`).
+                self.pop()?;
+                if !matches!(self.stack.last(), Some(Value::Dict(_))) {
+                    return Err("an object of a class that is not known".into());
+                }
+            }
+            b'Q' => {
+                let id = self.pop()?;
+                self.push(storage(id)?)?;
+            }
+            b'q' => {
+                let n = usize::from(self.array::<1>()?[0]);
+                self.remember(n)?;
+            }
+            b'r' => {
+                let n = u32::from_le_bytes(self.array()?) as usize;
+                self.remember(n)?;
+            }
+            0x94 => self.remember(self.memo.len())?,
+            b'h' => {
+                let n = usize::from(self.array::<1>()?[0]);
+                self.recall(n)?;
+            }
+            b'j' => {
+                let n = u32::from_le_bytes(self.array()?) as usize;
+                self.recall(n)?;
+            }
+            b'0' => {
+                self.pop()?;
+            }
+            other => {
+                return Err(format!("byte {}: pickle code {other:#04x} is not read", self.at - 1));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// Values in a value; refuses nesting beyond what weights have.
+fn size(value: &Value, depth: usize) -> Result<usize, String> {
+    if depth > 16 {
+        return Err("values nested too deep".into());
+    }
+    let add = |n: usize, item: &Value| Ok::<_, String>(n + size(item, depth + 1)?);
+    match value {
+        Value::Tuple(items) | Value::List(items) => items.iter().try_fold(1, add),
+        Value::Dict(items) => items.iter().flat_map(|(k, v)| [k, v]).try_fold(1, add),
+        _ => Ok(1),
+    }
+}
+
+fn global(module: &str, name: &str) -> Result<Global, String> {
+    Ok(match (module, name) {
+        ("collections", "OrderedDict") => Global::OrderedDict,
+        ("torch._utils", "_rebuild_tensor_v2") => Global::RebuildTensor,
+        ("torch._utils", "_rebuild_parameter") => Global::RebuildParameter,
+        ("torch", "FloatStorage") => Global::Storage(Kind::F32),
+        ("torch", "DoubleStorage") => Global::Storage(Kind::F64),
+        ("torch", "HalfStorage") => Global::Storage(Kind::F16),
+        ("torch", "BFloat16Storage") => Global::Storage(Kind::Bf16),
+        ("torch", "LongStorage") => Global::Storage(Kind::I64),
+        ("torch", "IntStorage") => Global::Storage(Kind::I32),
+        _ => {
+            return Err(format!(
+                "asks for {module}.{name}; only dictionaries of tensors are read, and nothing in a \
+                 pickle is run: save net.state_dict()"
+            ));
+        }
+    })
+}
+
+fn call(function: Value, arguments: Value) -> Result<Value, String> {
+    let Value::Tuple(arguments) = arguments else { return Err("a call without arguments".into()) };
+    match (function, &arguments[..]) {
+        (Value::Global(Global::OrderedDict), []) => Ok(Value::Dict(Vec::new())),
+        (
+            Value::Global(Global::RebuildTensor),
+            [
+                Value::Storage(storage),
+                Value::Int(offset),
+                Value::Tuple(shape),
+                Value::Tuple(strides),
+                ..,
+            ],
+        ) if shape.len() == strides.len() => {
+            let sizes = |all: &[Value]| -> Result<Vec<usize>, String> {
+                let one = |v: &Value| match v {
+                    Value::Int(n) => usize::try_from(*n).map_err(|_| "a negative size".to_string()),
+                    _ => Err("a size that is no number".into()),
+                };
+                all.iter().map(one).collect()
+            };
+            let offset = usize::try_from(*offset).map_err(|_| "a negative offset")?;
+            Ok(Value::Tensor(Tensor {
+                storage: storage.clone(),
+                offset,
+                shape: sizes(shape)?,
+                strides: sizes(strides)?,
+            }))
+        }
+        (Value::Global(Global::RebuildParameter), [Value::Tensor(tensor), ..]) => {
+            Ok(Value::Tensor(tensor.clone()))
+        }
+        _ => Err("a call of what is no known function, or with other arguments".into()),
+    }
+}
+
+/// `('storage', type, key, location, count)`.
+fn storage(id: Value) -> Result<Value, String> {
+    let Value::Tuple(parts) = id else { return Err("a storage without a description".into()) };
+    match &parts[..] {
+        [
+            Value::Text(word),
+            Value::Global(Global::Storage(kind)),
+            Value::Text(key),
+            Value::Text(_),
+            Value::Int(len),
+        ] if word == "storage" => {
+            let len = usize::try_from(*len).map_err(|_| "a storage of negative size")?;
+            Ok(Value::Storage(Storage { kind: *kind, key: key.clone(), len }))
+        }
+        _ => Err("a storage that is not described as PyTorch does".into()),
+    }
+}

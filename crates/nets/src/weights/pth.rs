@@ -1,0 +1,126 @@
+//! `.pth`: PyTorch's zip archive of a pickle and raw numbers.
+
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+use zip::ZipArchive;
+
+use super::pickle::{self, Tensor, Value};
+use super::{MAX_FILE, State, numbers};
+
+/// Longest pickle read.
+const MAX_PICKLE: u64 = 64 << 20;
+/// Keys under which training scripts keep the weights beside other things.
+const INNER: [&str; 3] = ["state_dict", "model_state_dict", "model"];
+
+pub(super) fn read(path: &Path) -> Result<State, String> {
+    let file = File::open(path).map_err(|e| e.to_string())?;
+    let length = file.metadata().map_err(|e| e.to_string())?.len();
+    let mut archive = ZipArchive::new(BufReader::new(file)).map_err(|e| {
+        format!(
+            "no archive as torch.save has written since PyTorch 1.6 ({e}); load it with PyTorch and \
+             save net.state_dict() again"
+        )
+    })?;
+    let names: Vec<String> = archive
+        .file_names()
+        .map(|name| name.map(|n| n.into_owned()).map_err(|e| e.to_string()))
+        .collect::<Result<_, _>>()?;
+    let pickle = names
+        .iter()
+        .find(|n| n.as_str() == "data.pkl" || n.ends_with("/data.pkl"))
+        .ok_or("there is no data.pkl in it")?;
+    let root = pickle.strip_suffix("data.pkl").unwrap_or("").to_owned();
+    if let Ok(order) = member(&mut archive, &format!("{root}byteorder"), 16)
+        && order != b"little"
+    {
+        return Err("its numbers are big-endian; only little-endian ones are read".into());
+    }
+    let bytes = member(&mut archive, pickle, MAX_PICKLE)?;
+    let entries = entries(pickle::read(&bytes)?)?;
+    let mut state = State::new();
+    let mut total = 0u64;
+    for (name, tensor) in entries {
+        let wrong = |reason: String| format!("{name}: {reason}");
+        // A storage may be shared; what all tensors together take is bounded by the file.
+        let count = count(&tensor).ok_or_else(|| wrong("its shape is too large".into()))?;
+        total = total.saturating_add(count as u64 * tensor.storage.kind.size() as u64);
+        if total > length.saturating_mul(2) {
+            return Err(wrong("the tensors are larger than the file".into()));
+        }
+        let key = format!("{root}data/{}", tensor.storage.key);
+        let raw = member(&mut archive, &key, MAX_FILE.min(length)).map_err(wrong)?;
+        let values = numbers(tensor.storage.kind, &raw);
+        if values.len() < tensor.storage.len {
+            return Err(wrong(format!("{} numbers of {}", values.len(), tensor.storage.len)));
+        }
+        let values = view(&tensor, count, &values)
+            .ok_or_else(|| wrong("its shape reaches beyond its numbers".into()))?;
+        state.push((name, tensor.shape, values));
+    }
+    Ok(state)
+}
+
+fn member(
+    archive: &mut ZipArchive<BufReader<File>>,
+    name: &str,
+    most: u64,
+) -> Result<Vec<u8>, String> {
+    let member = archive.by_name(name).map_err(|e| format!("{name}: {e}"))?;
+    let mut bytes = Vec::new();
+    member.take(most + 1).read_to_end(&mut bytes).map_err(|e| format!("{name}: {e}"))?;
+    if bytes.len() as u64 > most {
+        return Err(format!("{name} has more than {most} bytes"));
+    }
+    Ok(bytes)
+}
+
+/// Tensors by name, from the dictionary itself or from one of its known keys.
+fn entries(value: Value) -> Result<Vec<(String, Tensor)>, String> {
+    let Value::Dict(dict) = value else { return Err("it holds no dictionary of tensors".into()) };
+    let mut tensors = Vec::new();
+    let mut inner = None;
+    for (key, value) in dict {
+        match (key, value) {
+            (Value::Text(name), Value::Tensor(tensor)) => tensors.push((name, tensor)),
+            (Value::Text(name), value @ Value::Dict(_)) if INNER.contains(&name.as_str()) => {
+                inner = Some(value);
+            }
+            _ => (),
+        }
+    }
+    match inner {
+        Some(inner) if tensors.is_empty() => entries(inner),
+        _ if tensors.is_empty() => Err("it holds no dictionary of tensors".into()),
+        _ => Ok(tensors),
+    }
+}
+
+fn count(tensor: &Tensor) -> Option<usize> {
+    tensor.shape.iter().try_fold(1usize, |n, &s| n.checked_mul(s))
+}
+
+/// The tensor's numbers in C order.
+fn view(tensor: &Tensor, count: usize, values: &[f32]) -> Option<Vec<f32>> {
+    if count > values.len() {
+        return None;
+    }
+    let mut out = Vec::with_capacity(count);
+    let mut index = vec![0usize; tensor.shape.len()];
+    for _ in 0..count {
+        let mut at = tensor.offset;
+        for (i, stride) in index.iter().zip(&tensor.strides) {
+            at = at.checked_add(i.checked_mul(*stride)?)?;
+        }
+        out.push(*values.get(at)?);
+        for (i, &size) in index.iter_mut().zip(&tensor.shape).rev() {
+            *i += 1;
+            if *i < size {
+                break;
+            }
+            *i = 0;
+        }
+    }
+    Some(out)
+}

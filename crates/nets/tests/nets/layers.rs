@@ -1,0 +1,219 @@
+//! Gradients against differences of the loss, threads, lengths, dropout.
+
+use corsmal_nets::batch::{Batch, Shape};
+use corsmal_nets::layer::Chain;
+use corsmal_nets::layers::{
+    AveragePool, BatchNorm, Conv2d, Dropout, FlattenPixels, LastStep, Linear, MaxPool, Recurrent,
+    Relu, Residual,
+};
+use corsmal_nets::loss::{Loss, Targets};
+use corsmal_nets::network::{Architecture, Body, Input, Network};
+use corsmal_nets::optimiser::OptimiserSpec;
+use corsmal_nets::random::Stream;
+use corsmal_nets::trainer::{StepSettings, Trainer};
+use corsmal_nets::{NetError, networks};
+
+fn network(shape: Shape, chain: Chain) -> Network {
+    let inputs = vec![Input::new("x", shape)];
+    Network::new(
+        "test",
+        Architecture { inputs, body: Body::Chain(chain), features: None, activation: false },
+        3,
+    )
+    .unwrap()
+}
+
+fn noise(seed: u64, n: usize) -> Vec<f32> {
+    let stream = Stream::new(seed, "noise");
+    (0..n as u64).map(|i| 2.0 * stream.uniform(i) - 1.0).collect()
+}
+
+/// Every parameter's gradient along a random direction against a central difference.
+fn check_gradients(network: &mut Network, x: &Batch) {
+    let targets = Targets::Classes((0..x.items()).map(|i| i % network.outputs()).collect());
+    let run = |network: &Network| {
+        let inputs = std::slice::from_ref(x);
+        network.gradients(inputs, &targets, &Loss::CrossEntropy, &[], None).unwrap()
+    };
+    let found = run(network);
+    let state: Vec<_> = network
+        .parameters()
+        .iter()
+        .map(|(d, v)| (d.name.clone(), d.shape.clone(), v.to_vec()))
+        .collect();
+    for i in 0..state.len() {
+        let Some(gradient) = found.by_parameter.get(&state[i].0) else { continue };
+        let direction = noise(i as u64, state[i].2.len());
+        let along: f64 = gradient
+            .values()
+            .iter()
+            .zip(&direction)
+            .map(|(g, d)| f64::from(*g) * f64::from(*d))
+            .sum();
+        let mut at = |step: f32| {
+            let mut moved = state.clone();
+            moved[i].2.iter_mut().zip(&direction).for_each(|(v, d)| *v += step * d);
+            network.load_state(&moved).unwrap();
+            run(network).loss
+        };
+        let step = 1e-2 / (direction.len() as f32).sqrt();
+        let difference = (at(step) - at(-step)) / (2.0 * f64::from(step));
+        let scale = along.abs().max(difference.abs()).max(0.02);
+        assert!(
+            (along - difference).abs() < 0.03 * scale,
+            "{}: {along} by backward, {difference} by differences",
+            state[i].0
+        );
+    }
+}
+
+#[test]
+fn a_residual_network_has_right_gradients() {
+    let image = Shape::Image { height: 9, width: 8, channels: 2 };
+    let mut network = network(
+        image,
+        vec![
+            Box::new(Conv2d::new("first", 2, 4, (3, 3)).stride(2).padding(1).unbiased()),
+            Box::new(BatchNorm::new("bn", 4)),
+            Box::new(Relu),
+            Box::new(MaxPool::new(3).stride(2).padding(1)),
+            Box::new(Residual::new(
+                vec![
+                    Box::new(Conv2d::same3("a", 4, 6)),
+                    Box::new(BatchNorm::new("abn", 6)),
+                    Box::new(Relu),
+                    Box::new(Conv2d::same3("b", 6, 6)),
+                ],
+                vec![Box::new(Conv2d::new("short", 4, 6, (1, 1)))],
+            )),
+            Box::new(Residual::new(vec![Box::new(Conv2d::same3("c", 6, 6))], vec![])),
+            Box::new(AveragePool),
+            Box::new(Linear::new("out", 6, 3)),
+        ],
+    );
+    check_gradients(&mut network, &Batch::new(noise(1, 5 * image.len()), image));
+}
+
+#[test]
+fn pixels_are_flattened_in_their_order_and_back() {
+    let image = Shape::Image { height: 2, width: 3, channels: 2 };
+    let mut network = network(
+        image,
+        vec![
+            Box::new(Conv2d::same3("a", 2, 2)),
+            Box::new(FlattenPixels),
+            Box::new(Linear::new("out", 12, 2)),
+        ],
+    );
+    check_gradients(&mut network, &Batch::new(noise(1, 3 * image.len()), image));
+    // VGGish's size follows from its layers.
+    let vggish = networks::named("vggish").unwrap();
+    let layers = (vggish.architecture)(128).body;
+    let count: usize = layers.layers().flat_map(|l| l.parameters()).map(|d| d.len()).sum();
+    assert_eq!(count, 72_141_184);
+}
+
+#[test]
+fn recurrent_networks_have_right_gradients_with_lengths() {
+    let shape = Shape::Sequence { steps: 0, numbers: 3 };
+    for recurrent in [Recurrent::gru("r", 3, 5, 2), Recurrent::lstm("r", 3, 5, 2)] {
+        let mut network = network(
+            shape,
+            vec![Box::new(recurrent), Box::new(LastStep), Box::new(Linear::new("out", 5, 2))],
+        );
+        let steps = Shape::Sequence { steps: 6, numbers: 3 };
+        let mut x = Batch::new(noise(2, 4 * 6 * 3), steps);
+        x.lengths = Some(vec![2, 6, 1, 4]);
+        check_gradients(&mut network, &x);
+    }
+}
+
+#[test]
+fn padding_does_not_count_where_lengths_are_known() {
+    let network = networks::named("m5-vggish-level").unwrap().build(None, 5).unwrap();
+    let (short, long) = (noise(3, 4 * 128), noise(4, 9 * 128));
+    let one = |values: &[f32]| {
+        let shape = Shape::Sequence { steps: values.len() / 128, numbers: 128 };
+        network.forward(&[Batch::new(values.to_vec(), shape)]).unwrap().values.into_values()
+    };
+    let mut values = short.clone();
+    values.resize(9 * 128, -10.0);
+    values.extend(&long);
+    let mut both = Batch::new(values, Shape::Sequence { steps: 9, numbers: 128 });
+    both.lengths = Some(vec![4, 9]);
+    let both = network.forward(&[both]).unwrap().values.into_values();
+    for (got, want) in both.iter().zip([one(&short), one(&long)].concat()) {
+        assert!((got - want).abs() < 1e-5, "{got} {want}");
+    }
+}
+
+fn settings(dropout: Option<u64>) -> StepSettings {
+    StepSettings {
+        optimiser: OptimiserSpec::Adam { lr: 1e-3, weight_decay: 0.0 },
+        clip_grad_norm: Some(0.5),
+        loss: Loss::CrossEntropy,
+        class_weights: Vec::new(),
+        dropout,
+    }
+}
+
+/// Losses and the last outputs of three steps, with dropout.
+fn train(threads: usize, seed: u64) -> (Vec<f64>, Vec<f32>) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| {
+        let image = Shape::Image { height: 24, width: 24, channels: 1 };
+        let mut network = network(
+            image,
+            vec![
+                Box::new(Conv2d::same3("a", 1, 8)),
+                Box::new(BatchNorm::new("bn", 8)),
+                Box::new(Relu),
+                Box::new(Dropout(0.3)),
+                Box::new(Conv2d::same3("b", 8, 16)),
+                Box::new(MaxPool::new(3)),
+                Box::new(AveragePool),
+                Box::new(Linear::new("out", 16, 3)),
+            ],
+        );
+        let x = [Batch::new(noise(9, 7 * image.len()), image)];
+        let targets = Targets::Classes(vec![0, 1, 2, 0, 1, 2, 0]);
+        let mut trainer = Trainer::new(&mut network, settings(Some(seed)));
+        let losses = (0..3).map(|_| trainer.step(&x, &targets).unwrap().loss).collect();
+        (losses, network.forward(&x).unwrap().values.into_values())
+    })
+}
+
+#[test]
+fn training_has_the_same_bits_for_any_number_of_threads() {
+    assert_eq!(train(1, 0), train(2, 0));
+    assert_eq!(train(1, 0), train(5, 0));
+    assert_ne!(train(1, 0), train(1, 1));
+}
+
+#[test]
+fn training_that_diverges_is_refused_and_changes_nothing() {
+    let mut network = networks::named("m3_mlp").unwrap().build(None, 0).unwrap();
+    let x = [Batch::new(vec![f32::MAX; 2 * 6193], Shape::Vector(6193))];
+    let before = network.parameters().iter().next().unwrap().1.to_vec();
+    let mut trainer = Trainer::new(&mut network, settings(None));
+    let error = trainer.step(&x, &Targets::Classes(vec![0, 1])).unwrap_err();
+    assert!(matches!(error, NetError::Diverged { step: 1, .. }), "{error}");
+    assert_eq!(network.parameters().iter().next().unwrap().1, before);
+}
+
+#[test]
+fn inputs_and_targets_that_do_not_fit_are_refused() {
+    let network = networks::named("m5_r21d_type").unwrap().build(None, 0).unwrap();
+    let text = |arrays: &[(Vec<usize>, Vec<f32>)]| network.batches(arrays).unwrap_err().to_string();
+    let error = text(&[(vec![1, 3, 2, 512], vec![0.0; 3 * 1024])]);
+    assert!(error.contains("[items, 4, steps, numbers]") && error.contains("[1, 3, 2, 512]"));
+    let error = text(&vec![(vec![1, 2, 511], vec![0.0; 1022]); 4]);
+    assert!(error.contains("c1") && error.contains("[items, steps, 512]"), "{error}");
+    let x = network.batches(&[(vec![1, 4, 2, 512], vec![0.5; 4096])]).unwrap();
+    let run = |targets| network.gradients(&x, &targets, &Loss::CrossEntropy, &[], None);
+    let error = run(Targets::Classes(vec![4])).unwrap_err().to_string();
+    assert!(error.contains("class 4 for a network of 4 classes"), "{error}");
+    let error = run(Targets::Classes(vec![0, 1])).unwrap_err().to_string();
+    assert!(error.contains("2 targets for 1 items"), "{error}");
+    assert!(networks::named("m7").unwrap_err().to_string().contains("m6_shaking"));
+}

@@ -1,0 +1,132 @@
+//! Weights on disk: what is written comes back, what is hostile is refused.
+
+use std::io::Write;
+use std::path::Path;
+
+use corsmal_nets::weights::{self, State};
+use corsmal_nets::{NetError, networks};
+
+fn state() -> State {
+    let network = networks::named("m4_level").unwrap().build(None, 1).unwrap();
+    let all = network.parameters().iter();
+    all.map(|(d, v)| (d.name.clone(), d.shape.clone(), v.to_vec())).collect()
+}
+
+#[test]
+fn npz_and_safetensors_give_back_every_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut state = state();
+    for name in ["w.npz", "w.safetensors"] {
+        let path = folder.path().join(name);
+        weights::write(&path, &state).unwrap();
+        let mut back = weights::read(&path).unwrap();
+        back.sort_by(|a, b| a.0.cmp(&b.0));
+        state.sort_by(|a, b| a.0.cmp(&b.0));
+        assert!(back == state, "{name}");
+    }
+}
+
+#[test]
+fn weights_of_another_architecture_are_named() {
+    let mut network = networks::named("m5_vggish_level").unwrap().build(None, 0).unwrap();
+    let before = network.parameters().iter().next().unwrap().1.to_vec();
+    let mut other = state();
+    other.push(("fc.bias2".into(), vec![1], vec![0.0]));
+    let NetError::Weights { differences, .. } = network.load_state(&other).unwrap_err() else {
+        panic!("refused as weights");
+    };
+    let text = differences.join("\n");
+    for expected in [
+        "lstm.weight_ih_l0 [1024, 1024] is not one of its parameters",
+        "rnn.weight_ih_l4 [1536, 512] is missing",
+        "fc.weight is [3, 256], expected [3, 512]",
+        "fc.bias2",
+    ] {
+        assert!(text.contains(expected), "{expected}\n{text}");
+    }
+    assert_eq!(network.parameters().iter().next().unwrap().1, before);
+}
+
+/// A `.pth` as `torch.save(state_dict)` writes it, of one tensor `w` of shape `[2, 3]`.
+fn pth(path: &Path, pickle: &[u8], numbers: &[u8]) {
+    let mut zip = zip::ZipWriter::new(std::fs::File::create(path).unwrap());
+    let options =
+        zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+    for (name, bytes) in [("net/data.pkl", pickle), ("net/data/0", numbers)] {
+        zip.start_file(name, options).unwrap();
+        zip.write_all(bytes).unwrap();
+    }
+    zip.finish().unwrap();
+}
+
+/// Protocol 2: an ordered dictionary with one tensor of these sizes and strides.
+fn pickle(shape: [u8; 2], strides: [u8; 2], len: u8) -> Vec<u8> {
+    let mut p = b"\x80\x02ccollections\nOrderedDict\nq\x00)Rq\x01(X\x01\x00\x00\x00w".to_vec();
+    p.extend(b"ctorch._utils\n_rebuild_tensor_v2\nq\x02((X\x07\x00\x00\x00storagectorch\n");
+    p.extend(b"FloatStorage\nX\x01\x00\x00\x000X\x03\x00\x00\x00cpuK");
+    p.push(len);
+    p.extend(b"tQK\x00");
+    p.extend([b'K', shape[0], b'K', shape[1], 0x86, b'K', strides[0], b'K', strides[1], 0x86]);
+    p.extend(b"\x89h\x00)RtRu.");
+    p
+}
+
+fn six() -> Vec<u8> {
+    (0..6u8).flat_map(|v| f32::from(v).to_le_bytes()).collect()
+}
+
+#[test]
+fn a_state_dict_of_pytorch_is_read_without_running_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("net.pth");
+    pth(&path, &pickle([2, 3], [3, 1], 6), &six());
+    let expected = ("w".to_owned(), vec![2, 3], vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+    assert_eq!(weights::read(&path).unwrap(), [expected]);
+    // A transposed view of the same numbers.
+    pth(&path, &pickle([2, 3], [1, 2], 6), &six());
+    assert_eq!(weights::read(&path).unwrap()[0].2, [0.0, 2.0, 4.0, 1.0, 3.0, 5.0]);
+}
+
+#[test]
+fn hostile_pickles_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("net.pth");
+    let refuse = |pickle: &[u8], numbers: &[u8], expected: &str| {
+        pth(&path, pickle, numbers);
+        let text = weights::read(&path).unwrap_err().to_string();
+        assert!(text.contains(expected) && text.contains("net.pth"), "{text}");
+    };
+    refuse(b"\x80\x02cposix\nsystem\nX\x04\x00\x00\x00ls -\x85R.", &six(), "posix.system");
+    refuse(&pickle([200, 200], [200, 1], 6), &six(), "larger than the file");
+    refuse(&pickle([2, 3], [9, 1], 6), &six(), "beyond its numbers");
+    refuse(&pickle([2, 3], [3, 1], 6), &six()[..20], "5 numbers of 6");
+    refuse(&pickle([2, 3], [3, 1], 6)[..40], &six(), "ends");
+    refuse(b"\x80\x02]q\x00(h\x00e.", &six(), "no dictionary");
+    // Each recall doubles the list: 2^40 values from a few hundred bytes.
+    let mut bomb = b"\x80\x02]q\x00K\x01a".to_vec();
+    for _ in 0..40 {
+        bomb.extend(b"q\x00(h\x00h\x00l");
+    }
+    bomb.push(b'.');
+    pth(&path, &bomb, &six());
+    assert!(weights::read(&path).is_err());
+    std::fs::write(&path, b"\x80\x02K\x01.").unwrap();
+    let text = weights::read(&path).unwrap_err().to_string();
+    assert!(text.contains("since PyTorch 1.6"), "{text}");
+}
+
+#[test]
+fn damaged_files_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("w.safetensors");
+    weights::write(&path, &state()).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    for cut in [4, 100, bytes.len() - 1] {
+        std::fs::write(&path, &bytes[..cut]).unwrap();
+        let text = weights::read(&path).unwrap_err().to_string();
+        assert!(text.contains("w.safetensors"), "{text}");
+    }
+    let other = folder.path().join("w.bin");
+    std::fs::write(&other, b"").unwrap();
+    assert!(weights::read(&other).unwrap_err().to_string().contains(".safetensors"));
+}

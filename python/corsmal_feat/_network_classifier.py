@@ -1,0 +1,168 @@
+"""A network of the paper as a scikit-learn classifier."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Sequence
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._classifier import class_labels
+from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
+from ._validation import labels_of
+from .errors import ParameterError
+
+#: values of one input of all items, and where each item begins
+_Column = tuple[npt.NDArray[np.float32], list[int]]
+
+
+class NetworkClassifier(ClassifierMixin, BaseEstimator):
+    """A network of the paper, trained by its published recipe.
+
+    `X` is an array [items, ...] in the layout of `nets.build(network).forward`, or a list with an
+    array for each item, whose lengths may differ: [steps, numbers] for recurrent networks, and a
+    list of four such arrays for each item of M5's R(2+1)D networks.
+
+    Parameters
+    ----------
+    network : a name of `nets.names()`
+    recipe : keys of the recipe that are not as published, such as {"epochs": 3, "batch": 8}
+    random_state : seed; the recipe's own if None
+    checkpoint : file in which the training is kept after each epoch, and from which it goes on
+    progress : called with epochs done, epochs in all, last loss, last score and seconds left
+    """
+
+    _model: _core.TrainedNetwork
+    classes_: npt.NDArray[Any]
+    history_: dict[str, Any]
+
+    def __init__(
+        self,
+        network: str = "m5_vggish_level",
+        *,
+        recipe: dict[str, Any] | None = None,
+        random_state: int | None = None,
+        checkpoint: str | os.PathLike[str] | None = None,
+        progress: Callable[[int, int, float | None, float | None, float], None] | None = None,
+    ) -> None:
+        self.network = network
+        self.recipe = recipe
+        self.random_state = random_state
+        self.checkpoint = checkpoint
+        self.progress = progress
+
+    def __sklearn_is_fitted__(self) -> bool:
+        return hasattr(self, "_model")
+
+    def fit(self, X: Any, y: Any, *, watched: Sequence[int] | None = None) -> Self:
+        """Trains on `X` and `y`, a label for each item.
+
+        `watched` are indices of items that are not trained on: their score after each epoch is in
+        `history_`, and with the recipe's `select` it chooses the epoch that is kept.
+        """
+        columns = self._columns(X)
+        count = len(columns[0][1]) - 1
+        classes, positions = labels_of(y, count, type(self).__name__)
+        held = {int(i) for i in watched or ()}
+        changes = dict(self.recipe or {})
+        if self.random_state is not None:
+            changes["seed"] = int(self.random_state)
+        try:
+            recipe = _core.network_recipe(self.network, json.dumps(changes))
+        except TypeError as error:
+            raise ParameterError(f"recipe: {error}") from error
+        self._model = _core.TrainedNetwork.fit(
+            self.network,
+            columns,
+            positions.tolist(),
+            [i for i in range(count) if i not in held],
+            sorted(held),
+            [str(c) for c in classes.tolist()],
+            recipe,
+            None if self.checkpoint is None else os.fspath(self.checkpoint),
+            json.dumps({"rows": count - len(held), "label_kind": classes.dtype.kind}),
+            self.progress,
+        )
+        self.classes_ = classes
+        self.history_ = json.loads(self._model.header())["history"]
+        return self
+
+    def predict_proba(self, X: Any) -> npt.NDArray[np.float64]:
+        """Probabilities [shape=(items, classes)], columns in the order of `classes_`."""
+        if not hasattr(self, "_model"):
+            raise not_fitted(self)
+        return self._model.predict_proba(self._columns(X))
+
+    def predict(self, X: Any) -> npt.NDArray[Any]:
+        """The label of each item of `X`."""
+        labels: npt.NDArray[Any] = self.classes_[self.predict_proba(X).argmax(axis=1)]
+        return labels
+
+    def state_dict(self) -> dict[str, npt.NDArray[np.float32]]:
+        """The trained numbers under PyTorch's names."""
+        if not hasattr(self, "_model"):
+            raise not_fitted(self)
+        return self._model.state()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the model file, whole or not at all. It is a safetensors file."""
+        if not hasattr(self, "_model"):
+            raise not_fitted(self)
+        self._model.save(os.fspath(path))
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Reads a model file."""
+        model = _core.TrainedNetwork.load(os.fspath(path))
+        header = json.loads(model.header())
+        estimator = cls(header["network"], recipe=header["recipe"])
+        estimator._model = model
+        estimator.classes_ = class_labels(header)
+        estimator.history_ = header["history"]
+        return estimator
+
+    def _columns(self, X: Any) -> list[_Column]:
+        network = _core.Network.build(self.network, None, 0)
+        inputs = len(network.inputs())
+        items = list(X)
+        if not items:
+            raise ParameterError("X has no items")
+        if inputs == 1:
+            return [_column(items, self._channels(network))]
+        if any(len(item) != inputs for item in items):
+            raise ParameterError(
+                f"{self.network}: each item of X is {inputs} arrays, one for each input"
+            )
+        return [_column([item[k] for item in items], 1) for k in range(inputs)]
+
+    @staticmethod
+    def _channels(network: _core.Network) -> int:
+        shape = network.inputs()[0][1].split(" x ")
+        return int(shape[0]) if len(shape) == 3 else 1
+
+    def __getstate__(self) -> dict[str, Any]:
+        state = dict(self.__dict__)
+        if "_model" in state:
+            state["_model"] = state["_model"].to_bytes()
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        if "_model" in state:
+            state = state | {"_model": _core.TrainedNetwork.from_bytes(state["_model"])}
+        self.__dict__.update(state)
+
+
+def _column(items: list[Any], channels: int) -> _Column:
+    """Items one after another, images channels last."""
+    arrays = []
+    for item in items:
+        array = np.asarray(item, dtype=np.float32)
+        if channels > 1 and array.ndim == 3:
+            array = np.moveaxis(array, 0, -1)
+        arrays.append(array.ravel())
+    offsets = np.concatenate([[0], np.cumsum([a.size for a in arrays])])
+    return np.concatenate(arrays), offsets.astype(int).tolist()

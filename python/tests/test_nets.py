@@ -1,0 +1,146 @@
+"""Networks: golden values, published weights, refusals."""
+
+import os
+import pickle
+import subprocess
+import sys
+import wave
+from pathlib import Path
+
+import numpy as np
+import pytest
+from corsmal_feat import corsmal, nets
+from corsmal_feat.errors import ParameterError
+
+SHARED = Path(os.environ.get("CORSMAL_SHARED", Path(__file__).parents[3] / "shared"))
+
+
+def shared(path: str) -> Path:
+    if not (SHARED / path).exists():
+        pytest.skip(f"{SHARED / path} is not there")
+    return SHARED / path
+
+
+def test_all_eleven_networks_give_pytorchs_numbers() -> None:
+    checker = shared("parity/nets/check_nets.py")
+    command = [sys.executable, checker, shared("parity/nets/nets.json")]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert run.stdout.splitlines()[-1:] == ["11 of 11"], run.stdout + run.stderr
+
+
+def test_m2_sees_that_the_container_of_the_real_recording_is_empty() -> None:
+    weights = np.load(shared("data/ccm/weights/m2_filling_type_cnn.npz"))
+    recording = shared("data/ccm/audio/s1_fi0_fu0_b1_l0_audio.wav")
+    with wave.open(str(recording)) as file:
+        sr, channels = file.getframerate(), file.getnchannels()
+        samples = np.frombuffer(file.readframes(file.getnframes()), "<i2")
+    y = samples.reshape(-1, channels).T.astype(np.float32) / 32768
+    mfcc = corsmal.m2_mfcc(y, sr)
+    net = nets.build("m2-type")
+    net.load_state_dict(weights)
+    logits = net.forward(np.reshape(mfcc, (1, 1, 1501, 40)))[0]
+    p = np.exp(logits - logits.max())
+    p /= p.sum()
+    assert p.argmax() == 0
+    assert abs(p[0] - 0.9998) < 1e-3
+
+
+def test_names_say_what_there_is() -> None:
+    assert len(nets.names()) == 14
+    assert nets.build("M4_Type").num_parameters == 4_472_580
+    assert nets.build("m3-mlp", outputs=4).forward(np.zeros((2, 6193))).shape == (2, 4)
+    assert "m6_action" in repr(nets.build("m6_action"))
+    with pytest.raises(ParameterError, match="m6_shaking"):
+        nets.build("m9")
+
+
+def test_seeds_give_numbers() -> None:
+    one, same, other = (nets.build("m4_level", seed=s).state_dict() for s in (1, 1, 2))
+    assert all(np.array_equal(one[k], same[k]) for k in one)
+    assert not np.array_equal(one["fc.weight"], other["fc.weight"])
+
+
+def test_weights_and_inputs_that_do_not_fit_are_named() -> None:
+    net = nets.build("m5_vggish_level")
+    state = net.state_dict()
+    missing = {k: v for k, v in state.items() if k != "rnn.bias_hh_l2"}
+    with pytest.raises(ParameterError, match=r"rnn\.bias_hh_l2 \[1536\] is missing"):
+        net.load_state_dict(missing)
+    with pytest.raises(ParameterError, match=r"fc\.weight is \[4, 512\], expected \[3, 512\]"):
+        net.load_state_dict(state | {"fc.weight": np.zeros((4, 512))})
+    with pytest.raises(ParameterError, match=r"expected \[items, steps, 128\]"):
+        net.forward(np.zeros((2, 5, 127)))
+    with pytest.raises(ParameterError, match="finite"):
+        net.forward(np.full((1, 2, 128), np.nan))
+    with pytest.raises(ParameterError, match="features"):
+        net.features(np.zeros((1, 2, 128)))
+    x = np.zeros((2, 5, 128), np.float32)
+    with pytest.raises(ParameterError, match="adam"):
+        net.train_steps([x], np.array([0, 1]), 1, {"optimizer": "rmsprop", "lr": 0.1})
+    with pytest.raises(ParameterError, match="learning_rate"):
+        net.train_steps([x], np.array([0, 1]), 1, {"optimizer": "adam", "learning_rate": 0.1})
+    with pytest.raises(ParameterError, match="class 7"):
+        net.train_steps([x], np.array([0, 7]), 1, {"optimizer": "adam", "lr": 0.1})
+
+
+def test_lengths_leave_the_padding_out() -> None:
+    net = nets.build("m5_vggish_type", seed=3)
+    x = np.random.default_rng(0).random((2, 6, 128), np.float32)
+    x[0, 4:] = -10
+    alone = net.forward(x[:1, :4])
+    assert np.allclose(net.forward(x, lengths=[4, 6])[:1], alone, atol=1e-6)
+    assert not np.allclose(net.forward(x)[:1], alone, atol=1e-3)
+
+
+def sequences(count: int) -> tuple[list[np.ndarray], list[str]]:
+    """Sequences of different lengths whose mean tells two classes apart."""
+    rng = np.random.default_rng(1)
+    labels = ["full" if i % 2 else "empty" for i in range(count)]
+    x = [rng.random((2 + i % 5, 128), np.float32) + (i % 2) for i in range(count)]
+    return x, labels
+
+
+def test_a_network_is_an_estimator(tmp_path: Path) -> None:
+    x, y = sequences(12)
+    told: list[tuple[object, ...]] = []
+    recipe = {"epochs": 3, "batch": 6}
+    model = nets.NetworkClassifier(
+        "m5-vggish-level", recipe=recipe, progress=lambda *now: told.append(now)
+    ).fit(x, y, watched=[10, 11])
+    assert [now[0] for now in told] == [0, 1, 2, 3]
+    assert model.classes_.tolist() == ["empty", "full"]
+    assert model.history_["epochs"][-1]["loss"] < model.history_["epochs"][0]["loss"]
+    proba = model.predict_proba(x)
+    assert proba.shape == (12, 2)
+    assert np.allclose(proba.sum(axis=1), 1)
+    assert model.predict(x).tolist() == y
+
+    path = tmp_path / "level.safetensors"
+    model.save(path)
+    back = nets.NetworkClassifier.load(path)
+    assert np.array_equal(back.predict_proba(x), proba)
+    assert np.array_equal(pickle.loads(pickle.dumps(model)).predict_proba(x), proba)
+    weights = nets.read_weights(path)
+    assert weights.keys() == model.state_dict().keys()
+
+
+def test_an_impossible_training_is_refused() -> None:
+    x, y = sequences(4)
+    with pytest.raises(ParameterError, match=r"epoch.*epochs"):
+        nets.NetworkClassifier("m5-vggish-level", recipe={"epoch": 3}).fit(x, y)
+    with pytest.raises(ParameterError, match="2 classes"):
+        nets.NetworkClassifier("m5-vggish-level", recipe={"epochs": 1}).fit(x, ["a"] * 4)
+    with pytest.raises(ParameterError, match="4 arrays"):
+        nets.NetworkClassifier("m5-r21d-type").fit([[a, a] for a in x], y)
+    with pytest.raises(ParameterError, match="item 1"):
+        nets.NetworkClassifier("m5-vggish-level").fit([x[0], x[1] * np.nan], ["a", "b"])
+
+
+def test_ctrl_c_and_errors_of_progress_end_the_training() -> None:
+    x, y = sequences(4)
+
+    def fails(*_: object) -> None:
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        nets.NetworkClassifier("m5-vggish-level", progress=fails).fit(x, y)
