@@ -9,6 +9,8 @@ mod failure;
 mod help;
 mod interrupt;
 mod made;
+#[cfg(feature = "nets")]
+mod networks;
 mod output;
 mod paragraphs;
 mod progress;

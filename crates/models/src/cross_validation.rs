@@ -156,7 +156,34 @@ impl CrossValidation {
         }
     }
 
-    fn of(folds: Vec<FoldOutcome>, data: &Data<'_>) -> Result<Self> {
+    /// From what other code predicted: name, rows and probabilities `[rows, classes]` of each fold.
+    ///
+    /// # Errors
+    /// Probabilities that do not fit rows or classes.
+    pub fn of_probabilities(
+        folds: impl IntoIterator<Item = (String, Vec<usize>, Array2<f64>)>,
+        classes: &Classes,
+    ) -> Result<Self> {
+        let (y, n_classes) = (classes.indices(), classes.n_classes());
+        let truth = |rows: &[usize]| rows.iter().map(|&row| y[row]).collect::<Vec<_>>();
+        let outcomes = folds.into_iter().map(|(name, rows, proba)| {
+            if proba.dim() != (rows.len(), n_classes) {
+                let (expected, actual) = (rows.len() * n_classes, proba.len());
+                return Err(ModelError::Length { what: "probabilities", expected, actual });
+            }
+            let predicted: Vec<usize> = proba.outer_iter().map(|row| argmax(row.iter())).collect();
+            let scores = Scores::new(&truth(&rows), &predicted, n_classes)?;
+            let (proba, inner) = (Some(proba), Vec::new());
+            Ok(FoldOutcome { name, rows, predicted, proba, scores, chosen: 0, inner })
+        });
+        Self::of(outcomes.collect::<Result<_>>()?, truth, n_classes)
+    }
+
+    fn of(
+        folds: Vec<FoldOutcome>,
+        truth: impl Fn(&[usize]) -> Vec<usize>,
+        n_classes: usize,
+    ) -> Result<Self> {
         let rows: Vec<usize> = folds.iter().flat_map(|f| f.rows.iter().copied()).collect();
         let predicted: Vec<usize> =
             folds.iter().flat_map(|f| f.predicted.iter().copied()).collect();
@@ -164,7 +191,7 @@ impl CrossValidation {
             Spread::of(&folds.iter().map(|f| score(&f.scores)).collect::<Vec<_>>())
         };
         Ok(Self {
-            pooled: Scores::new(&data.scored(&rows), &predicted, data.scored_classes())?,
+            pooled: Scores::new(&truth(&rows), &predicted, n_classes)?,
             accuracy: spread(|s| s.accuracy),
             weighted_f1: spread(|s| s.weighted_f1),
             macro_f1: spread(|s| s.macro_f1),
@@ -184,7 +211,7 @@ pub fn cross_validate(
 ) -> Result<CrossValidation> {
     data.check(folds)?;
     let outcomes = folds.iter().map(|fold| run_fold(data, fold, spec)).collect::<Result<_>>()?;
-    CrossValidation::of(outcomes, data)
+    CrossValidation::of(outcomes, |rows| data.scored(rows), data.scored_classes())
 }
 
 fn run_fold(data: &Data<'_>, fold: &Fold, spec: &PipelineSpec) -> Result<FoldOutcome> {
@@ -228,7 +255,7 @@ pub fn nested_cross_validate(
         let outcome = run_fold(data, fold, &candidates[chosen])?;
         outcomes.push(FoldOutcome { chosen, inner: scores, ..outcome });
     }
-    CrossValidation::of(outcomes, data)
+    CrossValidation::of(outcomes, |rows| data.scored(rows), data.scored_classes())
 }
 
 /// The candidate with the best mean weighted F1 over inner folds of `rows`, and all the means.

@@ -79,7 +79,10 @@ pub fn cross_validate(
 }
 
 /// Items trained on, items that choose the epoch, and the group that these are.
-fn watched(
+///
+/// # Errors
+/// A validation group without groups.
+pub fn watched(
     data: Data<'_>,
     fold: &Fold,
     recipe: &Recipe,

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-use corsmal_models::metrics::Scores;
+use corsmal_models::scores::Scores;
 use corsmal_nets::fit::{self, Progress, Task};
 use corsmal_nets::items::{Column, Items};
 use corsmal_nets::model::{self, NetModel};

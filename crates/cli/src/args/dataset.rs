@@ -104,7 +104,7 @@ pub struct DatasetArgs {
 
 impl DatasetArgs {
     /// The feature file.
-    fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         self.table.as_deref().or(self.features.as_deref()).unwrap_or(Path::new(""))
     }
 
@@ -112,9 +112,7 @@ impl DatasetArgs {
     /// the name of the column to learn, too.
     pub fn load(&self) -> Result<(LabelledTable, String), Failure> {
         let mut table = LabelledTable::read(self.path(), &self.members.names())?;
-        if let Some(source) = self.labels.source(self.target.as_deref())? {
-            table.add_labels(&source)?;
-        }
+        let target = self.label(&mut table)?;
         let constant = table.check()?;
         if let Some(&first) = constant.first() {
             eprintln!(
@@ -125,8 +123,15 @@ impl DatasetArgs {
                 table.feature_name(first)
             );
         }
-        let target = self.target(&table)?;
         Ok((table, target))
+    }
+
+    /// Adds the labels to a table, and names the column to learn.
+    pub fn label(&self, table: &mut LabelledTable) -> Result<String, Failure> {
+        if let Some(source) = self.labels.source(self.target.as_deref())? {
+            table.add_labels(&source)?;
+        }
+        self.target(table)
     }
 
     fn target(&self, table: &LabelledTable) -> Result<String, Failure> {

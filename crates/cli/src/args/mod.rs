@@ -2,11 +2,13 @@
 
 mod dataset;
 mod jobs;
+mod network;
 mod pipeline;
 mod vote;
 
 pub use dataset::{DatasetArgs, LabelArgs, MemberArgs};
 pub use jobs::Jobs;
+pub use network::NetworkArgs;
 pub use pipeline::PipelineArgs;
 pub use vote::VoteArgs;
 

@@ -1,7 +1,9 @@
 //! Which classifier is trained, with which steps before it.
 
+use corsmal_models::params::key_values;
 use corsmal_models::pipeline::PipelineSpec;
 use corsmal_models::recipe::Recipe;
+use serde_json::{Map, Value};
 
 use crate::failure::Failure;
 
@@ -30,6 +32,11 @@ pub struct PipelineArgs {
 }
 
 impl PipelineArgs {
+    /// What --set says, key by key.
+    pub fn changes(&self) -> Result<Map<String, Value>, Failure> {
+        Ok(key_values(&self.parameters)?)
+    }
+
     /// The pipelines to choose from: one, unless something is tuned.
     pub fn candidates(&self) -> Result<Vec<PipelineSpec>, Failure> {
         let recipe = Recipe {

@@ -12,7 +12,7 @@ use corsmal_models::spread::Spread;
 use corsmal_models::validation::validate;
 
 use super::score::print_classes;
-use crate::args::{DatasetArgs, Jobs, PipelineArgs};
+use crate::args::{DatasetArgs, Jobs, NetworkArgs, PipelineArgs};
 use crate::failure::Failure;
 use crate::publish;
 use crate::text_table::{TextTable, percent};
@@ -36,6 +36,8 @@ pub struct Args {
     dataset: DatasetArgs,
     #[command(flatten)]
     pipeline: PipelineArgs,
+    #[command(flatten)]
+    network: NetworkArgs,
     /// What is held out: N or k=N folds (of whole groups with --groups, else stratified),
     /// group=COLUMN (each group once), lists=1,4,7/2,5,8/3,6,9 of --groups, or fold=COLUMN. Default:
     /// each group of --groups, or of a label column container or group, or 5 folds.
@@ -65,6 +67,9 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 fn cross_validate(args: &Args) -> Result<ExitCode, Failure> {
     if let Some(path) = &args.predictions {
         publish::check(path, args.overwrite)?;
+    }
+    if let Some(name) = &args.network.net {
+        return validate_network(args, name);
     }
     let candidates = args.pipeline.candidates()?;
     let (table, target) = args.dataset.load()?;
@@ -108,6 +113,45 @@ fn cross_validate(args: &Args) -> Result<ExitCode, Failure> {
         println!("\nnext: corsmal-feat score {}", path.display());
     }
     Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(feature = "nets")]
+fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
+    let Args { dataset, pipeline, network, quiet, .. } = args;
+    let request = crate::networks::Request { dataset, pipeline, network, quiet: *quiet };
+    let found = request.cross_validate(name, args.cv.as_ref())?;
+    let held_out = args.predictions.as_deref().unwrap_or(Path::new("the held-out predictions"));
+    let ids = &found.table.ids;
+    let predictions = found.result.predictions(ids, &found.labels, &found.classes, held_out);
+    if let Some(path) = &args.predictions {
+        draft::write(path, &predictions.to_csv()?)?;
+    }
+    if args.json {
+        let report = serde_json::json!({
+            "target": found.target,
+            "labels": found.labels,
+            "folds_by": found.folds.description,
+            "training": found.report,
+            "result": found.result,
+        });
+        println!("{}", serde_json::to_string_pretty(&report)?);
+    } else if !quiet {
+        println!("features  {}: {} items", found.table.path.display(), ids.len());
+        println!("target    {}, {} classes", found.target, found.labels.len());
+        println!("network   {name}");
+        println!("held out  {}\n", found.folds.description);
+        print_folds(&found.result, &[], &found.folds);
+        if let ScoreReport::Classes(report) = predictions.score(&Scoring::default())? {
+            println!();
+            print_classes(&report);
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(not(feature = "nets"))]
+fn validate_network(_: &Args, _: &str) -> Result<ExitCode, Failure> {
+    Err(super::nets::absent())
 }
 
 fn print_folds(result: &CrossValidation, candidates: &[PipelineSpec], folds: &Folds) {

@@ -73,8 +73,14 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 /// Says how to get them.
 #[cfg(not(feature = "nets"))]
 pub fn run(_: Args) -> Result<ExitCode, Failure> {
-    Err(Failure::new(
+    Err(absent())
+}
+
+/// How to get networks.
+#[cfg(not(feature = "nets"))]
+pub fn absent() -> Failure {
+    Failure::new(
         "this build has no networks; `cargo install --path crates/cli --features nets` makes one \
          that has them, and so has the Python package",
-    ))
+    )
 }

@@ -10,7 +10,7 @@ use corsmal_models::model_file::{Model, ModelHeader};
 use linfa::traits::Fit;
 use serde_json::{Map, Value, json};
 
-use crate::args::{DatasetArgs, Jobs, PipelineArgs};
+use crate::args::{DatasetArgs, Jobs, NetworkArgs, PipelineArgs};
 use crate::failure::Failure;
 use crate::publish;
 
@@ -34,6 +34,8 @@ pub struct Args {
     dataset: DatasetArgs,
     #[command(flatten)]
     pipeline: PipelineArgs,
+    #[command(flatten)]
+    network: NetworkArgs,
     /// Model file to write.
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
@@ -57,6 +59,9 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 
 fn train(args: &Args) -> Result<ExitCode, Failure> {
     publish::check(&args.out, args.overwrite)?;
+    if let Some(name) = &args.network.net {
+        return train_network(args, name);
+    }
     let candidates = args.pipeline.candidates()?;
     let (table, target) = args.dataset.load()?;
     let (labels, classes) = table.classes(&target)?;
@@ -145,6 +150,29 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
         );
     }
     Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(feature = "nets")]
+fn train_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
+    let Args { dataset, pipeline, network, quiet, .. } = args;
+    let request = crate::networks::Request { dataset, pipeline, network, quiet: *quiet };
+    let (model, summary) = request.train(name)?;
+    let bytes = model.to_bytes().map_err(Failure::new)?;
+    corsmal_files::draft::write(&args.out, &bytes)?;
+    let (out, header) = (args.out.display(), &model.header);
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&summary)?);
+    } else if !quiet {
+        let (name, target) = (&header.network, &header.target);
+        println!("{out}: {name}, {} numbers", model.network.parameters().count());
+        println!("{target}: {}; epoch {} kept", header.labels.join(", "), header.history.kept + 1);
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(not(feature = "nets"))]
+fn train_network(_: &Args, _: &str) -> Result<ExitCode, Failure> {
+    Err(super::nets::absent())
 }
 
 fn counts(labels: &Labels, y: &[usize]) -> Vec<(String, usize)> {

@@ -99,6 +99,20 @@ impl LabelledTable {
         }
     }
 
+    /// A table of label columns alone, for items that are no rows of numbers.
+    pub fn of_columns(path: &Path, ids: Vec<String>, columns: Vec<(String, Vec<String>)>) -> Self {
+        Self {
+            path: path.into(),
+            x: Array2::zeros((ids.len(), 0)),
+            feature_names: Vec::new(),
+            ids,
+            outcomes: Vec::new(),
+            config: Value::Null,
+            config_hash: String::new(),
+            columns,
+        }
+    }
+
     /// The table of an extraction; `path` is named in messages about it.
     ///
     /// # Errors
