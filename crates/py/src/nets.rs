@@ -275,7 +275,7 @@ impl PyTrainedNetwork {
         let proba = compute(py, || self.0.predict_proba(&items))?.map_err(value_error)?;
         let shape = vec![items.len(), self.0.network.outputs()];
         let flat: Vec<f64> = proba.into_iter().flatten().collect();
-        Ok(flat.into_pyarray(py).reshape(shape)?)
+        flat.into_pyarray(py).reshape(shape)
     }
 
     /// What the file says, as JSON.
@@ -373,5 +373,5 @@ fn inputs(
 
 fn numpy(py: Python<'_>, batch: batch::Batch) -> PyResult<Bound<'_, PyArrayDyn<f32>>> {
     let shape = vec![batch.items(), batch.shape.len()];
-    Ok(batch.values.into_values().into_pyarray(py).reshape(shape)?)
+    batch.values.into_values().into_pyarray(py).reshape(shape)
 }

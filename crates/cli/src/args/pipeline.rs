@@ -33,6 +33,7 @@ pub struct PipelineArgs {
 
 impl PipelineArgs {
     /// What --set says, key by key.
+    #[cfg_attr(not(feature = "nets"), expect(dead_code, reason = "for networks"))]
     pub fn changes(&self) -> Result<Map<String, Value>, Failure> {
         Ok(key_values(&self.parameters)?)
     }

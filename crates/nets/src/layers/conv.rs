@@ -167,10 +167,12 @@ impl Layer for Conv2d {
         let weight = self.matrix(pass.parameters.get(&self.key("weight")));
         let (places, n, group) = (g.out_places(), self.outputs, g.group());
         let wanted = pass.wanted;
-        let mut by_input = Matrix::zeros(if wanted { input.values.rows() } else { 0 }, self.inputs);
+        let mut by_input = wanted.then(|| Matrix::zeros(input.values.rows(), self.inputs));
         // One slice for each group, empty where the gradient by the input is not wanted.
-        let mut slices: Vec<&mut [f32]> =
-            by_input.values_mut().chunks_mut(group * g.input_len()).collect();
+        let mut slices: Vec<&mut [f32]> = match &mut by_input {
+            Some(all) => all.values_mut().chunks_mut(group * g.input_len()).collect(),
+            None => Vec::new(),
+        };
         slices.resize_with(input.items().div_ceil(group), Default::default);
         let parts: Vec<Matrix> = slices
             .into_par_iter()
@@ -199,10 +201,10 @@ impl Layer for Conv2d {
             let sums = kernels::column_sums(gradient.values.values(), n);
             pass.add(self.key("bias"), column(sums));
         }
-        if !wanted {
-            return gradient;
+        match by_input {
+            Some(values) => Batch { values, shape: input.shape, lengths: None },
+            None => gradient,
         }
-        Batch { values: by_input, shape: input.shape, lengths: None }
     }
 }
 

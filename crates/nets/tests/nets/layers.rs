@@ -125,6 +125,8 @@ fn recurrent_networks_have_right_gradients_with_lengths() {
         let mut x = Batch::new(noise(2, 4 * 6 * 3), steps);
         x.lengths = Some(vec![2, 6, 1, 4]);
         check_gradients(&mut network, &x);
+        let one = Shape::Sequence { steps: 1, numbers: 3 };
+        check_gradients(&mut network, &Batch::new(noise(5, 4 * 3), one));
     }
 }
 

@@ -1,5 +1,7 @@
 //! `corsmal-feat classify`: recordings, a live stream or features in, predictions out.
 
+#[cfg(feature = "nets")]
+mod network;
 mod whole;
 mod windows;
 
@@ -150,6 +152,10 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         publish::check(&args.out, args.overwrite)?;
     }
     let place = args.model.display();
+    #[cfg(feature = "nets")]
+    if corsmal_nets::model::is_model(&args.model) {
+        return network::run(&args, &corsmal_nets::model::NetModel::load(&args.model)?);
+    }
     let model = Model::load(&args.model).map_err(|e| match e {
         e @ ModelFileError::Io { .. } => Failure::from(e),
         e => Failure::new(format!("{place}: {e}")),

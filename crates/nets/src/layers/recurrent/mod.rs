@@ -121,13 +121,17 @@ impl Recurrent {
         let first = packing.rows(0).len();
         let states = packing.states_before(trace.states.hidden.values(), hidden);
         let by_recurrent = by_recurrent.as_ref().unwrap_or(&by_gates);
+        let by_weight = match states {
+            Some(states) => by_recurrent.t_dot_from(first, &states),
+            None => Matrix::zeros(by_recurrent.cols(), hidden),
+        };
         pass.add(self.key("weight_ih", layer), by_gates.t_dot(&trace.input));
-        pass.add(self.key("weight_hh", layer), by_recurrent.t_dot_from(first, &states));
+        pass.add(self.key("weight_hh", layer), by_weight);
         let sums = |m: &Matrix| column(kernels::column_sums(m.values(), m.cols()));
         pass.add(self.key("bias_ih", layer), sums(&by_gates));
         pass.add(self.key("bias_hh", layer), sums(by_recurrent));
         if layer == 0 && !pass.wanted {
-            return Matrix::zeros(0, self.inputs);
+            return by_gates;
         }
         by_gates.dot(get("weight_ih"))
     }

@@ -76,15 +76,19 @@ impl Packing {
         out
     }
 
-    /// For each row after the first step, the row of the step before.
-    pub(super) fn states_before(&self, hidden: &[f32], n: usize) -> Matrix {
+    /// For each row after the first step, the row of the step before; none where all sequences
+    /// have one step.
+    pub(super) fn states_before(&self, hidden: &[f32], n: usize) -> Option<Matrix> {
         let first = self.rows(0).len();
+        if self.total() == first {
+            return None;
+        }
         let mut out = Vec::with_capacity((self.total() - first) * n);
         for step in 1..self.steps() {
             let before = self.rows(step - 1).start;
             out.extend_from_slice(&hidden[before * n..(before + self.rows(step).len()) * n]);
         }
-        Matrix::new(self.total() - first, n, out)
+        Some(Matrix::new(self.total() - first, n, out))
     }
 }
 
@@ -101,6 +105,9 @@ mod tests {
         assert_eq!(packed.values(), [4.0, 0.0, 8.0, 5.0, 1.0, 6.0, 7.0]);
         let expected = [0.0, 1.0, 0.0, 0.0, 4.0, 5.0, 6.0, 7.0, 8.0, 0.0, 0.0, 0.0];
         assert_eq!(packing.unpack(packed.values(), 1).values(), expected);
-        assert_eq!(packing.states_before(packed.values(), 1).values(), [4.0, 0.0, 5.0, 6.0]);
+        let before = packing.states_before(packed.values(), 1).unwrap();
+        assert_eq!(before.values(), [4.0, 0.0, 5.0, 6.0]);
+        let short = Packing::new(2, 1, None);
+        assert!(short.states_before(&[1.0, 2.0], 1).is_none());
     }
 }
