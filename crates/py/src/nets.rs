@@ -335,7 +335,10 @@ pub(crate) fn read_weights<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Boun
 
 /// Writes weights, `.npz` or `.safetensors`.
 #[pyfunction]
-pub(crate) fn write_weights(path: PathBuf, state: Vec<(String, PyReadonlyArrayDyn<'_, f32>)>) -> PyResult<()> {
+pub(crate) fn write_weights(
+    path: PathBuf,
+    state: Vec<(String, PyReadonlyArrayDyn<'_, f32>)>,
+) -> PyResult<()> {
     weights::write(&path, &state_of(&state)?).map_err(model_error)
 }
 

@@ -14,4 +14,6 @@ mod hostile;
 mod inspect;
 mod live;
 mod models;
+#[cfg(feature = "nets")]
+mod networks;
 mod scoring;
