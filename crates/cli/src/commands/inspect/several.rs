@@ -1,7 +1,7 @@
 //! Inspection of folders and of several recordings: a line for each, and what they have in common.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use corsmal_extract::inputs::{self, InputSource};
@@ -52,14 +52,14 @@ pub fn inspect(paths: &[PathBuf], json: bool) -> Result<ExitCode, Failure> {
             InputSource::Stdin => None,
         })
         .collect();
-    let lines: Vec<Line> = files.par_iter().map(Line::of).collect();
+    let lines: Vec<Line> = files.par_iter().map(|path| Line::of(path)).collect();
     let failed = lines.iter().filter(|line| line.sound.is_none()).count();
     print!("{}", if json { to_json(&lines)? } else { text(&lines) });
     Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
 }
 
 impl Line {
-    fn of(path: &PathBuf) -> Self {
+    fn of(path: &Path) -> Self {
         let name = path.display().to_string();
         match look(path, None) {
             Ok(look) => {
