@@ -79,6 +79,12 @@ pub enum Repair {
         /// How many there are in all.
         bytes: u64,
     },
+    /// Behind the samples of a WAV file there are more: a second data chunk, or another WAV file.
+    /// They were not read.
+    MoreData {
+        /// Where that chunk or file begins.
+        offset: u64,
+    },
 }
 
 impl Repair {
@@ -97,6 +103,7 @@ impl Repair {
             Self::Concatenated { .. } => "concatenated",
             Self::TimeJump { .. } => "time_jump",
             Self::ForeignBytes { .. } => "foreign_bytes",
+            Self::MoreData { .. } => "more_data",
         }
     }
 }
@@ -138,6 +145,9 @@ impl fmt::Display for Repair {
             }
             Self::ForeignBytes { offset, bytes } => {
                 write!(f, "{bytes} bytes between frames, from byte {offset} on, left out")
+            }
+            Self::MoreData { offset } => {
+                write!(f, "more samples behind the first data chunk, at byte {offset}, not read")
             }
         }
     }

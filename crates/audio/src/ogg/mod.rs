@@ -80,13 +80,16 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn BlockSource>, AudioError>
     }
     let (mut partial, mut packets) = (None, Vec::new());
     let link = Link::open(&mut input, &mut page, &mut partial, &mut packets)?;
-    let declared = page::last_granule(&mut input, link.serial)?;
+    // Positions count what is dropped at the start.
+    let declared = page::last_granule(&mut input, link.serial)?
+        .and_then(|end| u64::try_from(end).ok()?.checked_sub(link.skip))
+        .filter(|frames| *frames < 1 << 40);
     let spec = AudioSpec {
         sample_rate: link.sample_rate,
         channels: link.channels,
         format: link.name.into(),
         encoding: link.encoding(),
-        declared_frames: declared.and_then(|n| u64::try_from(n).ok()).filter(|n| *n < 1 << 40),
+        declared_frames: declared,
     };
     let sequence = page.sequence;
     let place = Place { skip: link.skip, ..Place::default() };

@@ -93,6 +93,7 @@ struct PcmSource {
     /// Bytes of samples; `None`: to the end of a pipe.
     data_len: Option<u64>,
     declared_len: Option<u64>,
+    is_wav: bool,
     /// Bytes of samples handed out or passed by seeking.
     done: u64,
     ended: bool,
@@ -110,6 +111,7 @@ impl PcmSource {
             data_start: header.extent.start,
             data_len: header.extent.len,
             declared_len: header.extent.declared,
+            is_wav: matches!(header.container, "wav" | "rifx" | "rf64" | "bw64"),
             done: 0,
             ended: false,
             report,
@@ -134,6 +136,17 @@ impl PcmSource {
         }
         if rest > 0 {
             self.report.note(Repair::PartialFrame { bytes: rest });
+        }
+        // A pipe may stay open behind its samples.
+        let Some(size) = self.declared_len.filter(|_| self.is_wav && self.seekable()) else {
+            return;
+        };
+        let more = self.input.skip(rest).and_then(|_| {
+            let is_behind = self.done + rest == size;
+            if is_behind { wav::more_data(&mut self.input, size, self.endian) } else { Ok(None) }
+        });
+        if let Ok(Some(offset)) = more {
+            self.report.note(Repair::MoreData { offset });
         }
     }
 }

@@ -149,6 +149,33 @@ fn is_unpadded(next: &[u8; 5]) -> bool {
     !known(after) && (known(here) || (printable(here) && !printable(after)))
 }
 
+/// The byte at which more samples begin, in another data chunk or another WAV file; the input shows
+/// the byte behind the samples, `size` bytes of them.
+pub(super) fn more_data(
+    input: &mut Input,
+    size: u64,
+    endian: Endian,
+) -> Result<Option<u64>, AudioError> {
+    let is_padded = input.peek(5)?.first_chunk::<5>().is_some_and(|next| !is_unpadded(next));
+    if size % 2 == 1 && is_padded {
+        input.consume(1);
+    }
+    for _ in 0..MAX_CHUNKS {
+        let at = input.position();
+        let shown = input.peek(12)?;
+        let Some(&[i0, i1, i2, i3, s0, s1, s2, s3, ..]) = shown.first_chunk::<12>() else { break };
+        let (id, size) = ([i0, i1, i2, i3], endian.u32([s0, s1, s2, s3]));
+        if (is_wav(shown) && shown[8..].starts_with(b"WAVE")) || (&id == b"data" && size > 0) {
+            return Ok(Some(at));
+        }
+        let named = id.iter().all(|b| (0x20..0x7f).contains(b));
+        if !named || !input.skip(8 + u64::from(size) + u64::from(size % 2))? {
+            break;
+        }
+    }
+    Ok(None)
+}
+
 /// A data size of 0 is meant if nothing follows, or (where the input can be looked through) if
 /// chunks follow that end exactly with the file. Otherwise it was never filled in.
 fn is_really_empty(input: &mut Input, endian: Endian) -> Result<bool, AudioError> {

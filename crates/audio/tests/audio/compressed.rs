@@ -68,6 +68,7 @@ fn channels_of_ogg_are_apart_and_in_the_order_of_wav() {
     for bytes in LEVELS {
         let got = read_file(bytes.to_vec()).unwrap();
         assert!(got.report.repairs.is_empty());
+        assert_eq!(got.declared_frames, Some((got.samples.len() / got.channels) as u64));
         assert_eq!(got.samples, read_pipe(bytes.to_vec()).unwrap().samples);
         // Encoders cut the low-frequency channel off below the sine.
         let is_low = |channel: &usize| *channel == 3 && got.channels == 6;

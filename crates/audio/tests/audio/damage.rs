@@ -133,6 +133,28 @@ fn recordings_in_one_file_are_all_read() {
 }
 
 #[test]
+fn samples_of_wav_that_are_not_read_are_said() {
+    let first = Wav::pcm16(1, &[1, 2, 3]).bytes();
+    let plain = read_both(&first);
+    let second = [b"data\x04\0\0\0", &[1, 0, 2, 0][..]].concat();
+    let list = b"LIST\x03\0\0\0abc\0";
+    for (bytes, at) in [
+        ([first.as_slice(), &first].concat(), first.len()),
+        ([first.as_slice(), &second].concat(), first.len()),
+        ([first.as_slice(), list, &second].concat(), first.len() + list.len()),
+    ] {
+        let got = read_file(bytes.clone()).unwrap();
+        assert_eq!(got.report.repairs, [Repair::MoreData { offset: at as u64 }]);
+        assert_eq!(got.samples, plain.samples);
+        // A pipe may stay open, so nothing is looked for behind its samples.
+        assert_eq!(read_pipe(bytes).unwrap().samples, plain.samples);
+    }
+    for tail in [list.as_slice(), b"data\0\0\0\0", b"da"] {
+        assert_eq!(read_both(&[first.as_slice(), tail].concat()).repairs(), Vec::<&str>::new());
+    }
+}
+
+#[test]
 fn damaged_frames_of_mp3_are_silence_of_their_length() {
     let frames = mp3_frames();
     // One of a variable bit rate, and two of those that have the same one.
