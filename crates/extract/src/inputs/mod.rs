@@ -21,7 +21,8 @@ mod wildcard;
 use std::collections::{BTreeMap, HashSet};
 use std::ffi::OsStr;
 use std::fmt;
-use std::io;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use walkdir::WalkDir;
@@ -68,7 +69,8 @@ pub struct Input {
 pub struct Collected {
     /// The recordings.
     pub inputs: Vec<Input>,
-    /// Files in folders whose names are those of recordings, of formats that are not read.
+    /// Files in folders whose names are those of recordings, of formats that are not read, and
+    /// metadata of macOS (`._x.wav`) wherever it is named.
     pub skipped: Vec<PathBuf>,
 }
 
@@ -99,6 +101,11 @@ pub fn collect<S: AsRef<OsStr>>(names: &[S]) -> Result<Collected, InputError> {
     }
     skipped.sort_unstable();
     skipped.dedup();
+    // Where nothing but such files was named, the first of them says so.
+    if let (true, Some(path)) = (found.is_empty(), skipped.first()) {
+        let extensions = corsmal_audio::EXTENSIONS.join(", ");
+        return Err(InputError::NoAudio { path: path.clone(), extensions });
+    }
     let ids = ids::assign(&found)?;
     let mut columns: Vec<String> = Vec::new();
     let mut known = HashSet::new();
@@ -192,7 +199,11 @@ fn find(
             walk(path, &mut files, skipped)?;
             push_sorted(path, path, files, found)
         }
-        Ok(_) if has_extension(path, &manifest::EXTENSIONS) => find_manifest(path, found),
+        Ok(_) if is_apple_double(path) => {
+            skipped.push(path.into());
+            Ok(())
+        }
+        Ok(_) if has_extension(path, &manifest::EXTENSIONS) => find_manifest(path, found, skipped),
         Ok(_) => {
             let relative = path.file_name().map_or_else(|| path.into(), PathBuf::from);
             found.push(Found::file(path.into(), relative));
@@ -208,12 +219,20 @@ fn find(
     }
 }
 
-fn find_manifest(path: &Path, found: &mut Vec<Found>) -> Result<(), InputError> {
+fn find_manifest(
+    path: &Path,
+    found: &mut Vec<Found>,
+    skipped: &mut Vec<PathBuf>,
+) -> Result<(), InputError> {
     for entry in manifest::read(path)? {
         let wrong = |reason| InputError::Manifest { path: path.into(), line: entry.line, reason };
         match std::fs::metadata(&entry.path) {
             Ok(meta) if meta.is_dir() => {
                 return Err(wrong(format!("{} is a folder", entry.path.display())));
+            }
+            Ok(_) if is_apple_double(&entry.path) => {
+                skipped.push(entry.path);
+                continue;
             }
             Ok(_) => {}
             Err(error) => return Err(wrong(format!("{}: {error}", entry.path.display()))),
@@ -283,6 +302,16 @@ fn walk(
 /// Whether an entry below a folder that was named is skipped.
 fn is_hidden(entry: &walkdir::DirEntry) -> bool {
     entry.depth() > 0 && entry.file_name().as_encoded_bytes().starts_with(b".")
+}
+
+/// Whether a file holds what macOS puts beside another one, `._x.wav` beside `x.wav`: by name and by
+/// content, since a recording may have such a name, too.
+fn is_apple_double(path: &Path) -> bool {
+    let is_named = path.file_name().is_some_and(|n| n.as_encoded_bytes().starts_with(b"._"));
+    let mut mark = [0; 4];
+    is_named
+        && File::open(path).and_then(|mut file| file.read_exact(&mut mark)).is_ok()
+        && mark == *b"\0\x05\x16\x07"
 }
 
 /// Passes over links back to a folder that is being searched, and links to nothing.

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 use corsmal_extract::config::Config;
-use corsmal_extract::inputs;
+use corsmal_extract::inputs::{self, Input};
 use corsmal_extract::run::{self, Progress, Quiet, RunError, RunOptions, RunReport};
 use corsmal_files::npz::Compression;
 use corsmal_files::outcome::{Outcome, Status};
@@ -33,6 +33,16 @@ fn run(
     change: impl Fn(&mut RunOptions),
 ) -> Result<RunReport, RunError> {
     let found = inputs::collect(&[text(&folder.join("audio")).to_string()]).unwrap().inputs;
+    run_on(&found, folder, preset, progress, change)
+}
+
+fn run_on(
+    found: &[Input],
+    folder: &Path,
+    preset: &str,
+    progress: &dyn Progress,
+    change: impl Fn(&mut RunOptions),
+) -> Result<RunReport, RunError> {
     let config = Arc::new(Config::preset(preset).unwrap());
     let mut options = RunOptions {
         out: folder.join("out.npz"),
@@ -44,7 +54,7 @@ fn run(
         max_errors: None,
     };
     change(&mut options);
-    run::run(&found, &config, &options, progress, &Arc::new(AtomicBool::new(false)))
+    run::run(found, &config, &options, progress, &Arc::new(AtomicBool::new(false)))
 }
 
 fn statuses(report: &RunReport) -> Vec<Status> {
@@ -249,4 +259,22 @@ fn a_strict_run_goes_on_once_the_file_is_repaired() {
     let resumed = std::fs::read(folder.path().join("out.npz")).unwrap();
     run(folder.path(), "logmel", &Quiet, |o| o.overwrite = true).unwrap();
     assert!(std::fs::read(folder.path().join("out.npz")).unwrap() == resumed);
+}
+
+#[test]
+fn stretches_beyond_the_end_are_said() {
+    let folder = folder();
+    wav(&folder.path().join("audio/a.wav"), 8000, 8000);
+    let manifest = folder.path().join("m.csv");
+    let rows = "path,start,end\naudio/a.wav,0.25,1\naudio/a.wav,0.25,9\naudio/a.wav,5,6\n";
+    std::fs::write(&manifest, rows).unwrap();
+    let found = inputs::collect(&[text(&manifest)]).unwrap().inputs;
+    let report = run_on(&found, folder.path(), "mfcc-zcr", &Quiet, |_| {}).unwrap();
+    let [inside, end, start] = report.outcomes.as_slice() else { panic!("{report:?}") };
+    // The same samples, and that there are fewer than were asked for.
+    assert_eq!((inside.status, inside.decoded_frames, inside.repairs.len()), (Status::Ok, 6000, 0));
+    assert_eq!((end.status, end.decoded_frames), (Status::Ok, 6000));
+    assert_eq!(end.repairs, ["end_beyond_recording"]);
+    let expected = "the stretch begins at 5 s, behind the end of the recording";
+    assert_eq!((start.status, start.reason.as_str()), (Status::Empty, expected));
 }

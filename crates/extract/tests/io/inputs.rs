@@ -204,6 +204,24 @@ fn recordings_of_other_formats_are_counted() {
 }
 
 #[test]
+fn metadata_of_macos_is_skipped_wherever_it_is_named() {
+    let dir = folder(&["x.wav", "._own.wav", "notes/._x.wav"]);
+    let mac = dir.path().join("._x.wav");
+    fs::write(&mac, b"\0\x05\x16\x07\0\x02\0\0Mac OS X").unwrap();
+    let csv = dir.path().join("m.csv");
+    // What is no metadata by its content may have such a name.
+    fs::write(&csv, "path,label\nx.wav,a\n._x.wav,a\n._own.wav,b\n").unwrap();
+    let found = inputs::collect(&[text(&csv)]).unwrap();
+    let ids: Vec<_> = found.inputs.iter().map(|input| input.id.as_str()).collect();
+    assert_eq!((ids, found.skipped.as_slice()), (vec!["x", "._own"], [mac.clone()].as_slice()));
+    assert!(found.warning().unwrap().contains("._x.wav"));
+    let found = inputs::collect(&[text(&mac), text(&dir.path().join("x.wav"))]).unwrap();
+    assert_eq!((found.inputs.len(), found.skipped), (1, vec![mac.clone()]));
+    let error = inputs::collect(&[text(&mac)]).unwrap_err().to_string();
+    assert!(error.contains("._x.wav: no file with an audio extension"), "{error}");
+}
+
+#[test]
 fn manifest_errors_name_the_line() {
     let dir = folder(&["a.wav"]);
     let cases = [
