@@ -108,7 +108,6 @@ pub fn run(options: &Options, progress: &dyn Fn(&str), stop: &Arc<AtomicBool>) -
         }
     }
     files::write_random(&options.out, &rows, options.seed)?;
-    progress("report");
     let made = &options.made;
     let report = report::report(&set, &rows, &outcomes, &added, options.seed, made)?;
     let figures = options.out.join("figures");
