@@ -115,7 +115,7 @@ impl Measured {
     }
 }
 
-/// Reads a table of [`write`], or another with the columns `fileName` and `capacity[mL]`.
+/// Reads a table of [`write()`], or another with the columns `fileName` and `capacity[mL]`.
 ///
 /// # Errors
 /// As [`read_capacities`], and for cells that are no numbers.

@@ -12,6 +12,5 @@ pub struct NetworkArgs {
     pub net: Option<String>,
     /// Folder in which the training is kept after each epoch, and from which it goes on.
     #[arg(long, value_name = "FOLDER", requires = "net")]
-    #[cfg_attr(not(feature = "nets"), expect(dead_code, reason = "for networks"))]
     pub checkpoints: Option<PathBuf>,
 }
