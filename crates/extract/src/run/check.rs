@@ -26,7 +26,7 @@ pub struct Checked {
 /// Everything that a run refuses before it starts.
 ///
 /// # Errors
-/// As [`run`], in what concerns the output, the inputs as a whole and the number of jobs.
+/// As [`run`](super::run()), in what concerns the output, the inputs as a whole and the number of jobs.
 pub fn check(inputs: &[Input], config: &Config, options: &RunOptions) -> Result<Checked, RunError> {
     let format = check_output(options, config)?;
     let out = &draft::destination(&options.out);

@@ -27,7 +27,7 @@ pub(super) struct Kind {
 static KINDS: RwLock<Vec<&'static Kind>> = RwLock::new(Vec::new());
 
 /// Adds a classifier to those that [`ClassifierSpec::new`](super::ClassifierSpec::new) knows, by the
-/// name [`Parameters::OWNER`]; `about` is one line for people. A program that reads model files with
+/// name [`OWNER`](crate::params::Parameters::OWNER); `about` is one line for people. A program that reads model files with
 /// it registers it first, under the same name.
 ///
 /// # Errors
