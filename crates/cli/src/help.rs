@@ -17,10 +17,11 @@ const GROUPS: [(&str, &[&str]); 4] = [
             "compare-predictions",
             "fuse",
             "classifiers",
+            "nets",
         ],
     ),
     ("Files", &["compare", "merge", "completions"]),
-    ("CORSMAL", &["benchmark", "evaluate", "dataset", "synth"]),
+    ("CORSMAL", &["benchmark", "capacity", "evaluate", "dataset", "synth"]),
 ];
 
 const EXIT_CODES: &str = "\

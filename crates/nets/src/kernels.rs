@@ -249,7 +249,8 @@ mod tests {
 
     #[test]
     fn sums_do_not_depend_on_the_number_of_threads() {
-        let values: Vec<f32> = (0..300_000).map(|i| ((i * 7919) % 1000) as f32 * 0.37).collect();
+        let values: Vec<f32> =
+            (0_u32..300_000).map(|i| ((i * 7919) % 1000) as f32 * 0.37).collect();
         let run = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| (column_sums(&values, 3), squares(&values)))

@@ -28,6 +28,8 @@ fn models_of_0_1_0_predict_what_they_did() {
     for table in ["table.npz", "table.parquet"] {
         let (model, table) = (kept("pitch.model"), kept(table));
         let classify = ["classify", "--model", text(&model), "--features", text(&table)];
+        assert!(refused(&classify).contains("--any-rate"));
+        let classify = [&classify[..], &["--any-rate"]].concat();
         assert_eq!(done(&[&classify[..], &["--out", "-"]].concat()), expected);
     }
 }

@@ -147,7 +147,8 @@ fn an_interrupted_stream_keeps_its_lines() {
     }
     let begun = || {
         let entries = std::fs::read_dir(trained.folder.path()).unwrap().map(|e| e.unwrap());
-        let mut parts = entries.filter(|e| e.file_name().to_string_lossy().starts_with(".tmp"));
+        let mut parts =
+            entries.filter(|e| e.file_name().to_string_lossy().starts_with(".live.csv"));
         parts.any(|e| e.metadata().unwrap().len() > 0)
     };
     for _ in 0..600 {
@@ -327,7 +328,7 @@ fn failed_windows_of_a_vote_are_said() {
     let line: Vec<_> = table.lines().nth(1).unwrap().split(',').skip(2).collect();
     assert_eq!(line[..3], ["non_finite", "3", "tone"], "{table}");
     let message = String::from_utf8_lossy(&output.stderr);
-    assert!(message.contains("1 windows failed, the first: NaN"), "{message}");
+    assert!(message.contains("1 window failed, the first: NaN"), "{message}");
 }
 
 #[test]
@@ -371,7 +372,7 @@ fn what_is_no_window_is_refused() {
     assert_eq!(output.status.code(), Some(1));
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(message.contains("empty: empty: no samples"));
-    assert!(message.contains("1 predictions of kind, 1 failed"), "{message}");
+    assert!(message.contains("1 prediction of kind, 1 failed"), "{message}");
     let table = std::fs::read_to_string(&out).unwrap();
     assert_eq!(table.lines().count(), 3);
     assert!(table.lines().nth(1).unwrap().ends_with(",,,empty,,,"), "{table}");

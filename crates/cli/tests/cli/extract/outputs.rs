@@ -203,7 +203,7 @@ fn a_shard_without_recordings_says_so() {
 #[test]
 fn every_command_has_help_with_an_example_and_a_manual_page() {
     let commands = ended(tool().arg("--help")).with(0).stdout;
-    let commands = commands.split("Commands:").nth(1).unwrap().split("Options:").next().unwrap();
+    let commands = commands.split("Usage:").nth(1).unwrap().split("Options:").next().unwrap();
     let commands: Vec<&str> =
         commands.lines().filter_map(|l| l.strip_prefix("  ")?.split(' ').next()).collect();
     for command in commands.into_iter().filter(|c| !c.is_empty() && *c != "help") {
