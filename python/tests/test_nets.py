@@ -119,7 +119,7 @@ def test_a_network_is_an_estimator(tmp_path: Path) -> None:
     model.save(path)
     back = nets.NetworkClassifier.load(path)
     assert np.array_equal(back.predict_proba(x), proba)
-    assert np.array_equal(pickle.loads(pickle.dumps(model)).predict_proba(x), proba)
+    assert np.array_equal(pickle.loads(pickle.dumps(back)).predict_proba(x), proba)
     weights = nets.read_weights(path)
     assert weights.keys() == model.state_dict().keys()
 
