@@ -6,8 +6,8 @@
 
 Needs numpy here, the peers in the interpreter named by --python (librosa, pyAudioAnalysis, scipy),
 and valgrind for `instructions`. The corpus is made on the first run; --corpus takes another.
-Results gather in --results until `report` writes them between the markers of docs/benchmarks.md and
-draws docs/benchmarks.svg. Every timed command runs in a process of its own, contenders in turn;
+Results gather in --results until `report` writes them between the markers of docs/speed.md and
+draws docs/speed.svg. Every timed command runs in a process of its own, contenders in turn;
 --prefix puts a command before each, for example one that keeps the machine quiet meanwhile.
 """
 

@@ -1,4 +1,4 @@
-"""Tables and chart of the macro benchmarks in docs/benchmarks.md and docs/benchmarks.svg."""
+"""Tables and chart of the macro benchmarks in docs/speed.md and docs/speed.svg."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 def write(results: dict[str, Any], docs: pathlib.Path) -> None:
     """Replaces what stands between `<!-- NAME -->` and `<!-- /NAME -->`, and draws the chart."""
-    page = docs / "benchmarks.md"
+    page = docs / "speed.md"
     text = page.read_text()
     for name, section in SECTIONS.items():
         if name not in results:
@@ -26,7 +26,7 @@ def write(results: dict[str, Any], docs: pathlib.Path) -> None:
         text = pattern.sub(lambda m, r=replacement: m[1] + r + m[2], text)
     page.write_text(text)
     if "peers" in results:
-        (docs / "benchmarks.svg").write_text(chart(results["peers"]))
+        (docs / "speed.svg").write_text(chart(results["peers"]))
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:

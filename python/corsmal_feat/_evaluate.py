@@ -54,7 +54,7 @@ def evaluate(
     annotations : path
         Official annotation file.
     rules : {"paper", "toolkit-2020-10", "toolkit-2021-11", "toolkit"}
-        Rule set; docs/benchmark.md describes each with its quirks.
+        Rule set; docs/ccm.md describes each with its quirks.
     baseline : path, optional
         Submission that stands in, in the filling mass only, for tasks that are not addressed; by
         default the official random1.csv or random123.csv, which come with this package.

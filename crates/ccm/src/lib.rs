@@ -2,7 +2,7 @@
 //! scores, synthetic recordings, the published results and the report.
 //!
 //! Facts about the data set and the official evaluators are documented where they are used;
-//! `docs/benchmark.md` gives the overview.
+//! `docs/ccm.md` gives the overview.
 
 pub mod benchmark;
 pub mod capacity;

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use corsmal_ccm::benchmark::{Baseline, FeatureSet, Made, Options};
+use corsmal_ccm::benchmark::{Baseline, BenchmarkOptions, FeatureSet, Made};
 use corsmal_ccm::synth::{self, Size};
 use corsmal_extract::engine::{Features, Signals};
 use corsmal_files::npz::NpzFile;
@@ -56,8 +56,8 @@ fn vector(set: FeatureSet, wav: &Path) -> Vec<f32> {
     }
 }
 
-fn options(data: &Path, out: &Path, baselines: Vec<Baseline>) -> Options {
-    Options {
+fn options(data: &Path, out: &Path, baselines: Vec<Baseline>) -> BenchmarkOptions {
+    BenchmarkOptions {
         data: data.into(),
         out: out.into(),
         baselines,
@@ -71,7 +71,7 @@ fn options(data: &Path, out: &Path, baselines: Vec<Baseline>) -> Options {
     }
 }
 
-fn run(options: &Options) -> corsmal_ccm::Result<Report> {
+fn run(options: &BenchmarkOptions) -> corsmal_ccm::Result<Report> {
     corsmal_ccm::benchmark::run(options, &|_| {}, &Arc::new(AtomicBool::new(false)))
 }
 
@@ -223,7 +223,7 @@ fn a_test_part_of_one_recording_is_classified() {
 
 #[test]
 fn one_name_is_not_added_twice() {
-    let options = Options {
+    let options = BenchmarkOptions {
         data: "nowhere".into(),
         out: "nowhere".into(),
         baselines: Vec::new(),
@@ -240,7 +240,7 @@ fn an_unusable_file_to_add_stops_before_the_work() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("p.csv");
     std::fs::write(&file, "a,b\n1,2\n").unwrap();
-    let options = Options {
+    let options = BenchmarkOptions {
         data: dir.path().join("nowhere"),
         out: dir.path().join("report"),
         baselines: Vec::new(),
@@ -284,7 +284,7 @@ impl Adding {
     fn run(&self, lines: &[String]) -> (corsmal_ccm::Result<Report>, Vec<String>) {
         let path = self.dir.path().join("p.csv");
         std::fs::write(&path, format!("{BY_SEQUENCE}\n{}\n", lines.join("\n"))).unwrap();
-        let options = Options {
+        let options = BenchmarkOptions {
             data: self.dir.path().join("data"),
             out: self.dir.path().join("report"),
             baselines: Vec::new(),
@@ -354,7 +354,7 @@ fn a_file_of_ids_is_about_the_part_that_it_fits() {
         let format = corsmal_ccm::submission::Format::Y2022;
         let _ = std::fs::remove_file(&path);
         corsmal_ccm::submission::Submission::write(&path, format, &estimates, &keys).unwrap();
-        let options = Options {
+        let options = BenchmarkOptions {
             data: adding.dir.path().join("data"),
             out: adding.dir.path().join("report"),
             baselines: Vec::new(),

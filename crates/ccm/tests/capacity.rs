@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use corsmal_ccm::capacity::{self, CapacityModel, Method, Options, Row};
+use corsmal_ccm::capacity::{self, CapacityModel, CapacityOptions, Method, Row};
 use corsmal_ccm::dataset::{
     Annotations, Container, Filling, FillingLevel, FillingType, SequenceName,
 };
@@ -30,8 +30,8 @@ fn data(dir: &Path) {
     }
 }
 
-fn options(dir: &Path, method: Method) -> Options {
-    Options {
+fn options(dir: &Path, method: Method) -> CapacityOptions {
+    CapacityOptions {
         data: dir.into(),
         detections: None,
         method,
@@ -43,7 +43,7 @@ fn options(dir: &Path, method: Method) -> Options {
     }
 }
 
-fn run(options: &Options) -> Vec<Row> {
+fn run(options: &CapacityOptions) -> Vec<Row> {
     capacity::run(options, &|_, _| {}, &AtomicBool::new(false)).unwrap()
 }
 
@@ -78,10 +78,10 @@ fn methods_measure_synthetic_views_and_faults_are_rows() {
         assert_eq!(rows.len(), 18);
         scores.push((method.name(), score(&rows)));
     }
-    let published = Options { variant: Variant::Published, ..options(root, Method::M5) };
+    let published = CapacityOptions { variant: Variant::Published, ..options(root, Method::M5) };
     scores.push(("m5 published", score(&run(&published))));
     for outliers in [Outliers::Corrected, Outliers::Kept] {
-        let rows = run(&Options { outliers, ..options(root, Method::M4) });
+        let rows = run(&CapacityOptions { outliers, ..options(root, Method::M4) });
         scores.push(("m4 other", score(&rows)));
     }
     let stop = AtomicBool::new(false);
@@ -98,7 +98,7 @@ fn methods_measure_synthetic_views_and_faults_are_rows() {
                 println!("{category:?} {of:?} {:?}", fusion.priors[category]);
             }
         }
-        let rows = run(&Options { model: Some(model), ..options(root, method) });
+        let rows = run(&CapacityOptions { model: Some(model), ..options(root, method) });
         for row in &rows {
             let (low, high) = row.estimate.as_ref().unwrap().band.map(|b| (b[0], b[1])).unwrap();
             assert!(low < row.capacity() && row.capacity() < high, "{row:?}");

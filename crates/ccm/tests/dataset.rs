@@ -172,7 +172,7 @@ fn annotation_files_must_not_contradict_each_other() {
     assert!(!findings.sound() && odd.path == copy, "{odd:?}");
     assert!(odd.what.contains("of id 0 than") && odd.what.contains(path.to_str().unwrap()));
     let error = corsmal_ccm::benchmark::run(
-        &corsmal_ccm::benchmark::Options {
+        &corsmal_ccm::benchmark::BenchmarkOptions {
             data: dir.path().into(),
             out: dir.path().join("report"),
             baselines: Vec::new(),

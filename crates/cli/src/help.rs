@@ -2,7 +2,7 @@
 
 use clap::{Command, CommandFactory, FromArgMatches};
 
-use crate::Cli;
+use crate::commands::Cli;
 
 /// Commands by what they are about. A command in none of them is listed last.
 const GROUPS: [(&str, &[&str]); 4] = [

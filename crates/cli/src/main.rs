@@ -19,21 +19,9 @@ mod text_table;
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
-use commands::Command;
-
-/// Features of multi-channel recordings, classifiers, and the CORSMAL benchmark.
-#[derive(Parser)]
-#[command(name = "corsmal-feat", version, about, propagate_version = true)]
-struct Cli {
-    #[command(subcommand)]
-    command: Command,
-}
-
 fn main() -> ExitCode {
     let cli = help::parse();
-    match cli.command.run() {
+    match cli.run() {
         Ok(code) => code,
         Err(failure) => {
             eprintln!("error: {failure}");

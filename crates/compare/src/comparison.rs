@@ -90,13 +90,13 @@ pub struct FeatureReport {
 }
 
 /// Puts a report together, a pair at a time.
-pub(super) struct Collector {
+pub(super) struct ComparisonBuilder {
     tolerance: Tolerance,
     features: Vec<FeatureReport>,
     places: HashMap<String, usize>,
 }
 
-impl Collector {
+impl ComparisonBuilder {
     pub(super) fn new(tolerance: Tolerance) -> Self {
         Self { tolerance, features: Vec::new(), places: HashMap::new() }
     }

@@ -44,7 +44,7 @@ pub use error::CompareError;
 pub use settings::{Setting, Settings};
 
 use compared_file::ComparedFile;
-use comparison::Collector;
+use comparison::ComparisonBuilder;
 use matching::Matching;
 
 /// What counts as equal, and which arrays belong together.
@@ -63,13 +63,13 @@ pub struct Criteria {
 pub fn compare(a: &Path, b: &Path, criteria: &Criteria) -> Result<Comparison, CompareError> {
     let (mut a, mut b) = (ComparedFile::open(a)?, ComparedFile::open(b)?);
     let matching = Matching::new(&a, &b, &criteria.map)?;
-    let mut collector = Collector::new(criteria.tolerance);
+    let mut builder = ComparisonBuilder::new(criteria.tolerance);
     for found in &matching.arrays {
         let values = (a.load(found.a)?, b.load(found.b)?);
-        collector.arrays(found, &a.arrays()[found.a], &b.arrays()[found.b], values);
+        builder.arrays(found, &a.arrays()[found.a], &b.arrays()[found.b], values);
     }
     for found in &matching.tables {
-        collector.table(found, a.table(), b.table());
+        builder.table(found, a.table(), b.table());
     }
-    Ok(collector.finish(&a, &b, matching))
+    Ok(builder.finish(&a, &b, matching))
 }

@@ -104,12 +104,12 @@ fn open(path: &Path) -> Result<BufReader<Short<File>>, InputError> {
 
 /// The columns of a manifest: which are labels, in order, and where the others are.
 #[derive(Default)]
-struct Columns {
+struct ManifestColumns {
     places: HashMap<String, usize>,
     labels: Vec<(usize, String)>,
 }
 
-impl Columns {
+impl ManifestColumns {
     /// Takes note of a column, unless it is there already.
     fn place(&mut self, name: &str) -> Result<usize, String> {
         if let Some(place) = self.places.get(name) {
@@ -171,7 +171,7 @@ fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
         wrong(path, line, error.to_string())
     };
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(open(path)?);
-    let mut columns = Columns::default();
+    let mut columns = ManifestColumns::default();
     let names = match reader.headers().cloned() {
         Ok(names) => names,
         Err(error) => return Err(failed(error, &reader)),
@@ -212,7 +212,7 @@ fn is_index(name: &str) -> bool {
 }
 
 fn json_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
-    let mut columns = Columns::default();
+    let mut columns = ManifestColumns::default();
     let mut rows = Vec::new();
     for (line, text) in (1..).zip(open(path)?.lines()) {
         let text = text.map_err(|e| wrong(path, line, e.to_string()))?;

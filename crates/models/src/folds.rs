@@ -4,11 +4,12 @@ use std::collections::HashMap;
 use std::fmt;
 use std::str::FromStr;
 
-use crate::dataset::{LabelledTable, Result, count};
+use crate::dataset::{LabelledTable, Result};
 use crate::error::ModelError;
 use crate::labels::Labels;
 use crate::splits::{self, Fold};
 use crate::targets::Classes;
+use crate::words::count;
 
 /// Inner folds of a choice, and folds without groups, unless there are fewer groups.
 const FOLDS: usize = 5;

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use ndarray::{Array1, ArrayView1, ArrayViewMut1};
 
 /// When to stop.
-pub(crate) struct Options {
+pub(crate) struct Stopping {
     /// largest absolute component of the gradient
     pub tol: f64,
     /// most steps
@@ -20,7 +20,7 @@ const CURVATURE: f64 = 0.9;
 /// Minimises `f`, which returns the value and writes the gradient.
 pub(crate) fn minimise(
     start: Array1<f64>,
-    options: &Options,
+    stopping: &Stopping,
     mut f: impl FnMut(ArrayView1<'_, f64>, ArrayViewMut1<'_, f64>) -> f64,
 ) -> Array1<f64> {
     let mut evaluate = |x: Array1<f64>| {
@@ -30,8 +30,8 @@ pub(crate) fn minimise(
     };
     let mut now = evaluate(start);
     let mut memory: VecDeque<(Array1<f64>, Array1<f64>)> = VecDeque::with_capacity(MEMORY);
-    for _ in 0..options.max_iter {
-        if now.gradient.iter().all(|g| g.abs() <= options.tol) {
+    for _ in 0..stopping.max_iter {
+        if now.gradient.iter().all(|g| g.abs() <= stopping.tol) {
             break;
         }
         let mut direction = towards(&now.gradient, &memory);

@@ -15,7 +15,6 @@
 //! | … | payload, postcard |
 //! | 32 | BLAKE3 |
 
-use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -29,8 +28,11 @@ use thiserror::Error;
 
 use crate::classifiers::Predicted;
 use crate::error::{ModelError, Result};
+use crate::formats::hertz;
 use crate::labels::Labels;
 use crate::pipeline::{Pipeline, PipelineSpec};
+
+pub use crate::formats::{FormatRule, TrainedOn};
 
 const MAGIC: &[u8; 8] = b"CORSMDL\0";
 /// Version of the file format written.
@@ -65,83 +67,6 @@ pub struct ModelHeader {
     pub trained_on: Option<TrainedOn>,
     /// version of the program that wrote it
     pub tool_version: String,
-}
-
-/// Formats of the recordings that a model was trained on.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TrainedOn {
-    /// sampling rates in Hz, ascending
-    pub sample_rates: Vec<u32>,
-    /// channel counts, ascending
-    pub channels: Vec<u32>,
-}
-
-impl TrainedOn {
-    /// The formats of some recordings, given as (rate, channels); `None` unless all are known.
-    pub fn of(formats: impl IntoIterator<Item = (Option<u32>, Option<u32>)>) -> Option<Self> {
-        let (mut rates, mut channels) = (BTreeSet::new(), BTreeSet::new());
-        for (rate, count) in formats {
-            rates.insert(rate?);
-            channels.insert(count?);
-        }
-        let known = !rates.is_empty();
-        let (sample_rates, channels) =
-            (rates.into_iter().collect(), channels.into_iter().collect());
-        known.then_some(Self { sample_rates, channels })
-    }
-}
-
-/// Which recordings a model may be applied to, as far as their format matters to its features.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct FormatRule {
-    sample_rates: Option<Vec<u32>>,
-    channels: Option<Vec<u32>>,
-}
-
-impl FormatRule {
-    /// Refuses a recording of another format in words that say what to do; what is unknown passes.
-    ///
-    /// # Errors
-    /// The refusal.
-    pub fn check(
-        &self,
-        sample_rate: Option<u32>,
-        channels: Option<u32>,
-    ) -> std::result::Result<(), String> {
-        if let (Some(known), Some(rate)) = (&self.sample_rates, sample_rate)
-            && !known.contains(&rate)
-        {
-            let trained = known.iter().map(|rate| hertz(*rate)).collect::<Vec<_>>().join(", ");
-            let resample = known[0];
-            return Err(format!(
-                "{}; the model was trained on {trained}: --set signal.sample_rate={resample} \
-                 resamples it, --any-rate takes it as it is",
-                hertz(rate)
-            ));
-        }
-        if let (Some(known), Some(count)) = (&self.channels, channels)
-            && !known.contains(&count)
-        {
-            let trained: Vec<String> = known.iter().map(u32::to_string).collect();
-            let remedy = match known.as_slice() {
-                [1] => "--set signal.channels=mean mixes them",
-                _ => "features with signal.channels=mean or summary.average_channels=true take any",
-            };
-            return Err(format!(
-                "{}; the model was trained on recordings of {}: {remedy}",
-                crate::dataset::count(count as usize, "channel"),
-                trained.join(", ")
-            ));
-        }
-        Ok(())
-    }
-}
-
-/// `44,100 Hz`
-fn hertz(rate: u32) -> String {
-    let (thousands, rest) = (rate / 1000, rate % 1000);
-    if thousands == 0 { format!("{rest} Hz") } else { format!("{thousands},{rest:03} Hz") }
 }
 
 /// A trained model with everything needed to use it.

@@ -6,10 +6,11 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::fit::{Epoch, Task};
+use crate::history::Epoch;
 use crate::network::Network;
 use crate::parameters::Parameters;
 use crate::recipe::Recipe;
+use crate::task::Task;
 use crate::trainer::Trainer;
 use crate::weights::{self, State, WeightsError};
 

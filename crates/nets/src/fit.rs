@@ -3,8 +3,6 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use serde::{Deserialize, Serialize};
-
 use crate::checkpoint;
 use crate::error::{NetError, Result};
 use crate::items::Items;
@@ -15,55 +13,11 @@ use crate::random::Stream;
 use crate::recipe::{Activation, InitialKind, Recipe, Select};
 use crate::trainer::{StepSettings, Trainer};
 
+pub use crate::history::{Epoch, History, Progress};
+pub use crate::task::Task;
+
 /// Items classified together where nothing asks for another number; M5's predictions depend on it.
 const TOGETHER: usize = 64;
-
-/// What became of an epoch.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Epoch {
-    /// mean loss of its steps
-    pub loss: f64,
-    /// score on the rows watched, where there are some
-    pub score: Option<f64>,
-}
-
-/// What became of a training.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct History {
-    /// epoch by epoch
-    pub epochs: Vec<Epoch>,
-    /// the epoch whose numbers were kept, from 0
-    pub kept: usize,
-}
-
-/// Where a training is.
-#[derive(Clone, Copy, Debug)]
-pub struct Progress<'a> {
-    /// epochs done
-    pub epochs: &'a [Epoch],
-    /// epochs in all
-    pub total: usize,
-    /// time since the start
-    pub elapsed: Duration,
-    /// time that is left, as the part done lets expect; before the first epoch from a trial step
-    pub left: Duration,
-}
-
-/// Rows and classes of a training.
-#[derive(Clone, Copy, Debug)]
-pub struct Task<'a> {
-    /// all items
-    pub items: &'a Items,
-    /// class of each item
-    pub classes: &'a [usize],
-    /// items trained on
-    pub train: &'a [usize],
-    /// items whose score is watched after each epoch: a validation group, or the test fold as
-    /// published; empty: none
-    pub watched: &'a [usize],
-}
 
 /// Trains a network from initial values of the recipe's seed. `score` rates classes against
 /// predicted ones, more is better; `progress` is told before the first epoch and after each, and

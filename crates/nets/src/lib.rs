@@ -9,6 +9,7 @@ pub mod cross_validation;
 pub mod dataset;
 pub mod error;
 pub mod fit;
+mod history;
 pub mod items;
 mod kernels;
 pub mod layer;
@@ -22,6 +23,7 @@ pub mod optimiser;
 pub mod parameters;
 pub mod random;
 pub mod recipe;
+mod task;
 pub mod trainer;
 pub mod weights;
 

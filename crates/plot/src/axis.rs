@@ -2,7 +2,7 @@
 
 use crate::color::{Paint, sequential};
 use crate::drawing::{Anchor, Drawing, Pixels, Rect, TextStyle};
-use crate::export::PlotError;
+use crate::error::PlotError;
 use crate::ticks::{labels, ticks};
 
 /// Where a value lies between the ends of an axis, 0 to 1; the middle of an empty axis.

@@ -4,7 +4,8 @@ use ndarray::Array2;
 
 use crate::color::Paint;
 use crate::drawing::{Anchor, Drawing, Rect, TextStyle};
-use crate::export::{Figure, PlotError};
+use crate::error::PlotError;
+use crate::export::Figure;
 use crate::font;
 
 /// Counts of estimated against true classes. Shades are shares of the row: what is right in one

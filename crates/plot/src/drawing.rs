@@ -3,8 +3,9 @@
 use std::fmt::Write;
 
 use crate::color::{Paint, Rgb};
-use crate::export::{PlotError, png_of_rgb};
+use crate::error::PlotError;
 use crate::font;
+use crate::raster::png_of_rgb;
 
 /// Position of a text relative to its point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,10 +2,11 @@
 
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg;
-use thiserror::Error;
 
 use crate::drawing::Drawing;
+use crate::error::PlotError;
 use crate::font;
+use crate::raster::png_of_rgb;
 
 /// Largest picture, in pixels.
 const MAX_PIXELS: usize = 100 << 20;
@@ -13,34 +14,6 @@ const MAX_PIXELS: usize = 100 << 20;
 const UNITS_PER_INCH: f64 = 96.0;
 /// Resolution of a PNG unless another is asked for: two pixels for each of the figure.
 pub const DEFAULT_DPI: u16 = 192;
-
-/// Why a picture could not be made.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum PlotError {
-    /// The picture would have more pixels than is sensible.
-    #[error(
-        "a picture of {width} x {height} pixels is too large (at most {limit} in all); ask for a \
-         lower resolution, fewer channels or SVG"
-    )]
-    TooLarge {
-        /// Pixels across.
-        width: usize,
-        /// Pixels down.
-        height: usize,
-        /// Largest product of both.
-        limit: usize,
-    },
-    /// The PNG encoder failed.
-    #[error("cannot encode PNG: {0}")]
-    Png(#[from] png::EncodingError),
-    /// The SVG of a figure could not be read back.
-    #[error("cannot read the drawing: {0}")]
-    Svg(String),
-    /// The PDF writer failed.
-    #[error("cannot write PDF: {0}")]
-    Pdf(String),
-}
 
 /// A picture of known size.
 pub trait Figure {
@@ -111,31 +84,4 @@ pub fn to_pdf(figure: &dyn Figure) -> Result<Vec<u8>, PlotError> {
     let page = svg2pdf::PageOptions { dpi: UNITS_PER_INCH as f32 };
     svg2pdf::to_pdf(&tree, svg2pdf::ConversionOptions::default(), page)
         .map_err(|e| PlotError::Pdf(e.to_string()))
-}
-
-/// A PNG of `width * height` RGB pixels.
-pub(crate) fn png_of_rgb(
-    width: usize,
-    height: usize,
-    rgb: &[u8],
-    dpi: Option<u16>,
-) -> Result<Vec<u8>, PlotError> {
-    let mut file = Vec::new();
-    // Sizes are bounded by MAX_PIXELS or by an image in memory; larger ones fail in the encoder.
-    let [w, h] = [width, height].map(|v| u32::try_from(v).unwrap_or(u32::MAX));
-    let mut encoder = png::Encoder::new(&mut file, w, h);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    if let Some(dpi) = dpi {
-        let per_metre = (f64::from(dpi) / 0.0254).round() as u32;
-        encoder.set_pixel_dims(Some(png::PixelDimensions {
-            xppu: per_metre,
-            yppu: per_metre,
-            unit: png::Unit::Meter,
-        }));
-    }
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(rgb)?;
-    writer.finish()?;
-    Ok(file)
 }

@@ -5,7 +5,8 @@ use ndarray::Array2;
 use crate::axis::{below, color_bar, range_of, share};
 use crate::color::{Paint, sequential};
 use crate::drawing::{Anchor, Drawing, Pixels, Rect, TextStyle};
-use crate::export::{Figure, PlotError};
+use crate::error::PlotError;
+use crate::export::Figure;
 use crate::font;
 use crate::ticks::{apart, labels, ticks};
 

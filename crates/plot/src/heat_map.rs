@@ -5,7 +5,8 @@ use ndarray::Array2;
 use crate::axis::share;
 use crate::color::{Paint, sequential};
 use crate::drawing::{Anchor, Drawing, Rect, TextStyle};
-use crate::export::{Figure, PlotError};
+use crate::error::PlotError;
+use crate::export::Figure;
 use crate::font;
 
 /// A value for each row and column.

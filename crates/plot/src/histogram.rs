@@ -3,7 +3,8 @@
 use crate::axis::{below, left};
 use crate::color::Paint;
 use crate::drawing::{Drawing, Rect, TextStyle};
-use crate::export::{Figure, PlotError};
+use crate::error::PlotError;
+use crate::export::Figure;
 use crate::font;
 
 /// Counts of values in bins of equal width.

@@ -3,7 +3,8 @@
 use crate::axis::{below, range_of, share};
 use crate::color::Paint;
 use crate::drawing::{Anchor, Drawing, Rect, TextStyle};
-use crate::export::{Figure, PlotError};
+use crate::error::PlotError;
+use crate::export::Figure;
 use crate::{font, legend};
 
 /// A value of a row.

@@ -10,9 +10,9 @@ use numpy::{
 };
 use pyo3::prelude::*;
 
+use crate::errors::value_error;
 use crate::pool::compute;
-use crate::spectrum::Transform;
-use crate::value_error;
+use crate::transform::Transform;
 
 /// A contiguous float array from Python, in the precision it came in.
 #[derive(FromPyObject)]
@@ -23,7 +23,7 @@ pub enum Floats<'py> {
     F64(PyReadonlyArrayDyn<'py, f64>),
 }
 
-/// `array` as `[channels, samples]`; the front end has made it two-dimensional and contiguous.
+/// `array` as `[channels, samples]`; the Python package has made it two-dimensional and contiguous.
 pub fn view2<'a, T: Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> PyResult<ArrayView2<'a, T>> {
     let shape = array.shape();
     let &[rows, columns] = shape else {
@@ -145,13 +145,13 @@ macro_rules! each_precision {
             $crate::arrays::Floats::F32($array) => {
                 let $array = $view(&$array)?;
                 let result =
-                    $crate::pool::compute($py, || $result)?.map_err($crate::value_error)?;
+                    $crate::pool::compute($py, || $result)?.map_err($crate::errors::value_error)?;
                 $crate::arrays::into_numpy($py, result)
             }
             $crate::arrays::Floats::F64($array) => {
                 let $array = $view(&$array)?;
                 let result =
-                    $crate::pool::compute($py, || $result)?.map_err($crate::value_error)?;
+                    $crate::pool::compute($py, || $result)?.map_err($crate::errors::value_error)?;
                 $crate::arrays::into_numpy($py, result)
             }
         }
@@ -167,13 +167,13 @@ macro_rules! each_spectra {
             $crate::arrays::Floats::F32(array) => {
                 let $source = $crate::arrays::spectra(&array, stft.as_ref())?;
                 let result =
-                    $crate::pool::compute($py, || $result)?.map_err($crate::value_error)?;
+                    $crate::pool::compute($py, || $result)?.map_err($crate::errors::value_error)?;
                 $crate::arrays::into_numpy($py, result)
             }
             $crate::arrays::Floats::F64(array) => {
                 let $source = $crate::arrays::spectra(&array, stft.as_ref())?;
                 let result =
-                    $crate::pool::compute($py, || $result)?.map_err($crate::value_error)?;
+                    $crate::pool::compute($py, || $result)?.map_err($crate::errors::value_error)?;
                 $crate::arrays::into_numpy($py, result)
             }
         }

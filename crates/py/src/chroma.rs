@@ -12,10 +12,10 @@ use numpy::{Element, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, each_precision, into_numpy, view2, view3};
+use crate::errors::value_error;
 use crate::pool::compute;
-use crate::value_error;
 
-/// `PitchParams` of the front end.
+/// `PitchParams` of the Python package.
 #[derive(FromPyObject)]
 pub(crate) struct Tracker {
     sr: f64,
@@ -31,7 +31,7 @@ impl From<Tracker> for PitchParams {
     }
 }
 
-/// `ChromaParams` of the front end; `norm` is librosa's number.
+/// `ChromaParams` of the Python package; `norm` is librosa's number.
 #[derive(FromPyObject)]
 pub(crate) struct Bank {
     sr: f64,
@@ -143,7 +143,7 @@ pub(crate) fn pitch_tuning(
     .map_err(value_error)
 }
 
-/// The filter bank in double precision; the front end rounds it.
+/// The filter bank in double precision; the Python package rounds it.
 #[pyfunction]
 pub(crate) fn chroma_filter(py: Python<'_>, params: Bank) -> PyResult<Bound<'_, PyAny>> {
     let params = params.params()?;

@@ -10,8 +10,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::arrays::{into_numpy, view2};
+use crate::errors::{model_error, value_error};
 use crate::pool::compute;
-use crate::{model_error, value_error};
 
 /// A trained model, of any classifier, as it is kept in a file.
 #[pyclass(frozen, name = "TrainedModel", module = "corsmal_feat._core")]

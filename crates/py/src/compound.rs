@@ -10,8 +10,8 @@ use numpy::PyReadonlyArrayDyn;
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, Matrix, into_numpy, view2};
+use crate::errors::value_error;
 use crate::pool::compute;
-use crate::value_error;
 
 type Doubles<'py> = PyReadonlyArrayDyn<'py, f64>;
 
@@ -20,7 +20,7 @@ pub(crate) fn paa_fbank(py: Python<'_>, sr: f64, num_fft: usize) -> PyResult<Bou
     into_numpy(py, dsp_paa_fbank(sr, num_fft).map_err(value_error)?)
 }
 
-/// `PaaFrames` of the front end: windows and steps in samples.
+/// `PaaFrames` of the Python package: windows and steps in samples.
 #[derive(FromPyObject)]
 pub(crate) struct Frames {
     window: usize,

@@ -7,8 +7,8 @@ use corsmal_ccm::scores::{RuleSet, evaluate as ccm_evaluate};
 use corsmal_ccm::submission::{Submission, stand_in};
 use pyo3::prelude::*;
 
+use crate::errors::value_error;
 use crate::pool::compute;
-use crate::value_error;
 
 pub(crate) type Scored = (Vec<(&'static str, f64)>, usize, Vec<String>);
 

@@ -20,8 +20,8 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
 use crate::arrays::{into_numpy, view2};
+use crate::errors::{ConfigError, RunError, value_error};
 use crate::pool::{self, compute};
-use crate::{ConfigError, RunError, value_error};
 
 /// How often a run asks whether Python has a signal for us.
 const POLL: Duration = Duration::from_millis(50);

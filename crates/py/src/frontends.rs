@@ -9,9 +9,9 @@ use numpy::PyReadonlyArrayDyn;
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, into_numpy, view2, view3};
+use crate::errors::value_error;
 use crate::pool::compute;
-use crate::spectrum::named;
-use crate::value_error;
+use crate::transform::named;
 
 type Singles<'py> = PyReadonlyArrayDyn<'py, f32>;
 

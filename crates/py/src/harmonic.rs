@@ -18,9 +18,9 @@ use pyo3::prelude::*;
 
 use crate::arrays::{Floats, each_precision, into_numpy, view2, view3};
 use crate::chroma::norm_of;
+use crate::errors::value_error;
 use crate::pool::compute;
-use crate::spectrum::{Transform, WindowSpec, named};
-use crate::value_error;
+use crate::transform::{Transform, WindowSpec, named};
 
 /// A contiguous complex array from Python, in the precision it came in.
 #[derive(FromPyObject)]
@@ -49,7 +49,7 @@ pub(crate) fn istft<'py>(
     }
 }
 
-/// `HpssParams` of the front end.
+/// `HpssParams` of the Python package.
 #[derive(FromPyObject)]
 pub(crate) struct Separation {
     kernel_harmonic: usize,
@@ -123,7 +123,7 @@ pub(crate) fn separate<'py>(
     }
 }
 
-/// `CqtParams` of the front end.
+/// `CqtParams` of the Python package.
 #[derive(FromPyObject)]
 pub(crate) struct ConstantQ<'py> {
     sr: f64,
@@ -170,7 +170,7 @@ pub(crate) fn cqt<'py>(
     each_precision!(py, view2(y), dsp_cqt(y, &params))
 }
 
-/// `CqtChromaParams` of the front end.
+/// `CqtChromaParams` of the Python package.
 #[derive(FromPyObject)]
 pub(crate) struct Folding {
     bins_per_octave: usize,

@@ -1,13 +1,14 @@
 //! The private extension module `corsmal_feat._core`.
 //!
 //! Functions take contiguous `[channels, samples]` or `[channels, rows, frames]` arrays; the typed
-//! Python front end (`python/corsmal_feat/`) checks, reshapes and gives librosa's signatures. One
+//! Python package (`python/corsmal_feat/`) checks, reshapes and gives librosa's signatures. One
 //! file per family, exported below. The GIL is released while we compute.
 
 mod arrays;
 mod chroma;
 mod classifiers;
 mod compound;
+mod errors;
 mod evaluate;
 mod extract;
 mod frontends;
@@ -23,25 +24,10 @@ mod scoring;
 mod spectral;
 mod spectrum;
 mod time_domain;
+mod transform;
 mod vision;
 
 use pyo3::prelude::*;
-
-pyo3::import_exception!(corsmal_feat.errors, ConfigError);
-pyo3::import_exception!(corsmal_feat.errors, DecodeError);
-pyo3::import_exception!(corsmal_feat.errors, ModelError);
-pyo3::import_exception!(corsmal_feat.errors, ParameterError);
-pyo3::import_exception!(corsmal_feat.errors, RunError);
-
-/// A refused model file.
-pub(crate) fn model_error(error: impl std::fmt::Display) -> PyErr {
-    ModelError::new_err(error.to_string())
-}
-
-/// Any of our refusals as `ParameterError` (a `ValueError`).
-pub(crate) fn value_error(error: impl std::fmt::Display) -> PyErr {
-    ParameterError::new_err(error.to_string())
-}
 
 #[pymodule]
 mod _core {

@@ -9,10 +9,10 @@ use ndarray::Array1;
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, each_precision, into_numpy, signal, view1, view2, view3};
-use crate::spectrum::{Transform, named};
-use crate::value_error;
+use crate::errors::value_error;
+use crate::transform::{Transform, named};
 
-/// `MelParams` of the front end; `norm` is "slaney", "none" or a number in words.
+/// `MelParams` of the Python package; `norm` is "slaney", "none" or a number in words.
 #[derive(FromPyObject)]
 pub(crate) struct Bank {
     sr: f64,

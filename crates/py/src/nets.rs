@@ -16,8 +16,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde::Deserialize;
 
+use crate::errors::{model_error, value_error};
 use crate::pool::compute;
-use crate::{model_error, value_error};
 
 /// A network with its numbers.
 #[pyclass(name = "Network", module = "corsmal_feat._core")]
@@ -189,7 +189,7 @@ impl PyNetwork {
 pub(crate) struct PyTrainedNetwork(NetModel);
 
 /// Numbers of all items of an input, and where each begins.
-type Columns<'py> = Vec<(PyReadonlyArrayDyn<'py, f32>, Vec<usize>)>;
+type ItemColumns<'py> = Vec<(PyReadonlyArrayDyn<'py, f32>, Vec<usize>)>;
 
 /// The recipe of a network with some keys replaced, as JSON.
 #[pyfunction]
@@ -209,7 +209,7 @@ impl PyTrainedNetwork {
     fn fit(
         py: Python<'_>,
         name: &str,
-        columns: Columns<'_>,
+        columns: ItemColumns<'_>,
         classes: Vec<usize>,
         train: Vec<usize>,
         watched: Vec<usize>,
@@ -269,7 +269,7 @@ impl PyTrainedNetwork {
     fn predict_proba<'py>(
         &self,
         py: Python<'py>,
-        columns: Columns<'py>,
+        columns: ItemColumns<'py>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let items = items(&columns)?;
         let proba = compute(py, || self.0.predict_proba(&items))?.map_err(value_error)?;
@@ -312,7 +312,7 @@ impl PyTrainedNetwork {
     }
 }
 
-fn items(columns: &Columns<'_>) -> PyResult<Items> {
+fn items(columns: &ItemColumns<'_>) -> PyResult<Items> {
     let columns = columns
         .iter()
         .map(|(values, offsets)| {

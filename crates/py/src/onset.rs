@@ -11,10 +11,10 @@ use numpy::{Element, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, each_precision, into_numpy, view2, view3};
+use crate::errors::value_error;
 use crate::pool::compute;
-use crate::value_error;
 
-/// `PeakParams` of the front end; what is missing is librosa's for the sample rate and hop.
+/// `PeakParams` of the Python package; what is missing is librosa's for the sample rate and hop.
 #[derive(FromPyObject)]
 pub(crate) struct Peaks {
     pre_max: Option<usize>,

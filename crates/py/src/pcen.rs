@@ -6,10 +6,10 @@ use numpy::{Element, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, into_numpy, view2, view3};
+use crate::errors::value_error;
 use crate::pool::compute;
-use crate::value_error;
 
-/// Parameters of the front end, in librosa's names.
+/// Parameters of the Python package, in librosa's names.
 #[derive(FromPyObject)]
 pub(crate) struct PcenKeys {
     sr: f64,

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::value_error;
+use crate::errors::value_error;
 
 const VARIABLE: &str = "CORSMAL_FEAT_JOBS";
 

@@ -9,7 +9,7 @@ use ndarray::Array2;
 use pyo3::prelude::*;
 
 use crate::arrays::into_numpy;
-use crate::{DecodeError, value_error};
+use crate::errors::{DecodeError, value_error};
 
 /// Frames decoded at a time: what a header promises is not taken as a size.
 const BLOCK: usize = 1 << 16;

@@ -4,9 +4,9 @@ use corsmal_dsp::resample::{ResType, resample as dsp_resample};
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, Matrix, view2};
+use crate::errors::value_error;
 use crate::pool::compute;
-use crate::spectrum::named;
-use crate::value_error;
+use crate::transform::named;
 
 #[pyfunction]
 pub(crate) fn resample<'py>(

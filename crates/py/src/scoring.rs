@@ -13,8 +13,8 @@ use corsmal_models::validation::validate;
 use corsmal_models::voting::VotingRule;
 use pyo3::prelude::*;
 
+use crate::errors::value_error;
 use crate::pool::compute;
-use crate::value_error;
 
 /// Where labels come from.
 #[derive(FromPyObject)]

@@ -7,7 +7,7 @@ use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, Source, each_precision, each_spectra, into_numpy, view2, view3};
-use crate::value_error;
+use crate::errors::value_error;
 
 /// Row frequencies of a spectrogram: `[bins]`, or `[channels, bins, frames]`.
 fn frequencies<'a>(freq: &'a PyReadonlyArrayDyn<'_, f64>) -> PyResult<Frequencies<'a>> {

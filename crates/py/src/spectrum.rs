@@ -1,64 +1,14 @@
 //! Windows and the short-time Fourier transform.
 
-use std::str::FromStr;
-
 use corsmal_dsp::real::all_finite as dsp_all_finite;
-use corsmal_dsp::stft::{PadMode, StftParams, spectrogram_into, stft_into};
-use corsmal_dsp::window::{Window, get_window as dsp_get_window};
-use numpy::PyReadonlyArray1;
+use corsmal_dsp::stft::{spectrogram_into, stft_into};
+use corsmal_dsp::window::get_window as dsp_get_window;
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, filled, into_numpy, signal, view1};
+use crate::errors::value_error;
 use crate::pool::compute;
-use crate::value_error;
-
-/// The choice that a text from Python names.
-pub(crate) fn named<T: FromStr<Err: std::fmt::Display>>(name: &str) -> PyResult<T> {
-    name.parse().map_err(value_error)
-}
-
-/// A window by its name with parameters, or as values.
-#[derive(FromPyObject)]
-pub(crate) enum WindowSpec<'py> {
-    Name(String),
-    Samples(PyReadonlyArray1<'py, f64>),
-}
-
-impl WindowSpec<'_> {
-    pub(crate) fn window(&self) -> PyResult<Window> {
-        match self {
-            Self::Name(name) => named(name),
-            Self::Samples(values) => Ok(Window::Samples(values.as_slice()?.to_vec().into())),
-        }
-    }
-}
-
-/// `StftParams` of the front end, all resolved.
-#[derive(FromPyObject)]
-pub(crate) struct Transform<'py> {
-    n_fft: usize,
-    hop_length: usize,
-    win_length: usize,
-    window: WindowSpec<'py>,
-    center: bool,
-    pad_mode: String,
-}
-
-impl Transform<'_> {
-    /// The checked parameters.
-    pub(crate) fn params(&self) -> PyResult<StftParams> {
-        let params = StftParams {
-            n_fft: self.n_fft,
-            hop_length: self.hop_length,
-            win_length: self.win_length,
-            window: self.window.window()?,
-            center: self.center,
-            pad_mode: named::<PadMode>(&self.pad_mode)?,
-        };
-        params.check().map_err(value_error)?;
-        Ok(params)
-    }
-}
+use crate::transform::{Transform, WindowSpec};
 
 #[pyfunction]
 pub(crate) fn get_window<'py>(

@@ -7,9 +7,9 @@ use corsmal_dsp::time_domain::{
 use pyo3::prelude::*;
 
 use crate::arrays::{Floats, each_precision, signal, view3};
-use crate::spectrum::named;
+use crate::transform::named;
 
-/// `FrameParams` of the front end.
+/// `FrameParams` of the Python package.
 #[derive(FromPyObject)]
 pub(crate) struct Frames {
     frame_length: usize,

@@ -10,14 +10,14 @@ use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
+use crate::errors::value_error;
 use crate::pool::compute;
-use crate::value_error;
 
 /// Intrinsic, rotation, translation and projection of a camera, row by row.
 pub(crate) type Numbers = [f64; 33];
 pub(crate) type Sizes = (f64, f64, f64, Option<f64>, Option<f64>, Vec<[f64; 2]>, [f64; 3]);
 pub(crate) type Box3 = ([f64; 3], [f64; 3], f64, f64, usize);
-pub(crate) type Found<'py> = Option<([usize; 4], Bound<'py, PyArray2<f32>>, [f32; 2])>;
+pub(crate) type FoundRegion<'py> = Option<([usize; 4], Bound<'py, PyArray2<f32>>, [f32; 2])>;
 
 fn numbers(camera: &Camera) -> Numbers {
     let mut all = camera
@@ -155,7 +155,7 @@ pub(crate) fn upright_box(
 pub(crate) fn region<'py>(
     py: Python<'py>,
     depth_mm: PyReadonlyArray2<'py, u16>,
-) -> PyResult<Found<'py>> {
+) -> PyResult<FoundRegion<'py>> {
     let depth = depth(&depth_mm)?;
     let Some(found) = compute(py, || find_region::region(&depth))? else { return Ok(None) };
     let side = find_region::INPUT_SIDE;

@@ -53,3 +53,6 @@ pub enum ReportError {
         source: corsmal_plot::PlotError,
     },
 }
+
+/// Result with this crate's error.
+pub type Result<T> = std::result::Result<T, ReportError>;

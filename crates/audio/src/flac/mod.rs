@@ -60,7 +60,7 @@ struct Part {
 }
 
 /// What the search for a frame came to.
-enum Found {
+enum Candidate {
     /// A frame, now decoded, of so many bytes.
     Frame(Header, usize),
     /// The magic number of another recording.
@@ -112,22 +112,22 @@ pub(crate) fn codec_of(start: &[u8]) -> Option<Result<(Codec, u16, u32), Refusal
 
 impl FlacStream {
     /// Goes to the next frame and decodes it into `samples`.
-    fn find(&mut self, samples: &mut Vec<f32>) -> Result<Found, AudioError> {
+    fn find(&mut self, samples: &mut Vec<f32>) -> Result<Candidate, AudioError> {
         loop {
             let shown = self.input.peek(info::SHOWN)?;
             if info::continues(shown) {
-                return Ok(Found::Part);
+                return Ok(Candidate::Part);
             }
             if let Some(header) = Header::parse(shown).filter(|h| self.info.admits(h)) {
                 if let Some(length) = self.measure(&header, samples)? {
                     self.part.is_broken = false;
-                    return Ok(Found::Frame(header, length));
+                    return Ok(Candidate::Frame(header, length));
                 }
                 self.part.is_broken = true;
             }
             let shown = self.input.peek(SEARCH)?;
             if shown.len() <= info::SHOWN {
-                return Ok(Found::End);
+                return Ok(Candidate::End);
             }
             let mut places = 1..shown.len() - 1;
             let is_start = |at: usize| frame::may_start(&shown[at..]) || info::starts(&shown[at..]);
@@ -292,7 +292,7 @@ impl Stream for FlacStream {
             return Ok(Next::Samples);
         }
         match self.find(samples)? {
-            Found::Frame(header, length) => {
+            Candidate::Frame(header, length) => {
                 self.input.consume(length);
                 let gap = self.gap(&header, report);
                 self.given += gap + u64::from(header.block);
@@ -301,8 +301,8 @@ impl Stream for FlacStream {
                     return Ok(Next::Silence(gap));
                 }
             }
-            Found::Part => self.next_part(report)?,
-            Found::End => {
+            Candidate::Part => self.next_part(report)?,
+            Candidate::End => {
                 self.finish(report)?;
                 return Ok(Next::End);
             }

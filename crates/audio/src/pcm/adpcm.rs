@@ -1,6 +1,5 @@
 //! Blocks of 4-bit differences: IMA (DVI) ADPCM and Microsoft's, as they stand in WAV.
 
-use super::header::Header;
 use crate::error::AudioError;
 use crate::input::Input;
 use crate::report::{ReadReport, Repair};
@@ -64,9 +63,16 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    pub(super) fn new(input: Input, adpcm: Adpcm, header: &Header) -> Self {
-        let declared = header.extent.declared.map(|bytes| header.format.frames_in(bytes));
-        let (channels, left) = (usize::from(header.format.channels), header.extent.len);
+    /// Blocks from the position of `input` on: `left` bytes, or to the end of a pipe; `declared`
+    /// frames by the header.
+    pub(super) fn new(
+        input: Input,
+        adpcm: Adpcm,
+        channels: u16,
+        left: Option<u64>,
+        declared: Option<u64>,
+    ) -> Self {
+        let channels = channels.into();
         Self { input, adpcm, channels, left, declared, given: 0, is_over: false }
     }
 }

@@ -76,7 +76,8 @@ pub(crate) fn open(
     let truncated = header.repairs.iter().any(|r| matches!(r, Repair::Truncated { .. }));
     let report = ReadReport { decoded_frames: 0, truncated, repairs: header.repairs.clone() };
     if let Encoding::Adpcm(adpcm) = format.encoding {
-        let blocks = adpcm::Blocks::new(input, adpcm, &header);
+        let left = header.extent.len;
+        let blocks = adpcm::Blocks::new(input, adpcm, format.channels, left, declared_frames);
         return Ok(Box::new(StreamSource::new(blocks, spec, report)));
     }
     Ok(Box::new(PcmSource::new(input, &header, spec, report)))

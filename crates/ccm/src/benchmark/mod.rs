@@ -6,6 +6,7 @@ mod baselines;
 mod features;
 mod files;
 mod interval;
+mod made;
 mod matrix;
 mod method;
 mod report;
@@ -19,6 +20,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub use added::Added;
 pub use baselines::{Baseline, Learner, Variant};
 pub use features::FeatureSet;
+pub use made::Made;
 
 use crate::dataset::DataSet;
 use crate::error::{CcmError, Result};
@@ -27,7 +29,7 @@ use matrix::Store;
 
 /// What to run.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct BenchmarkOptions {
     /// Folder of the data set.
     pub data: PathBuf,
     /// Folder for everything that is written.
@@ -44,15 +46,6 @@ pub struct Options {
     pub made: Made,
 }
 
-/// When and how a run was started.
-#[derive(Clone, Debug, Default)]
-pub struct Made {
-    /// The date.
-    pub on: Option<String>,
-    /// The command line.
-    pub command: Option<String>,
-}
-
 /// Runs the benchmark and writes `report.html`, `report.json`, `tables/`, `figures/`,
 /// `submissions/`, `models/` and `features/` below the output folder.
 ///
@@ -64,7 +57,11 @@ pub struct Made {
 /// [`crate::CcmError`] when the data set has no labelled training recordings, when a file to add is
 /// unusable or covers a part of the data set only partly, when annotation files contradict each other,
 /// when a recording cannot be read, when something cannot be written, and when stopped.
-pub fn run(options: &Options, progress: &dyn Fn(&str), stop: &Arc<AtomicBool>) -> Result<Report> {
+pub fn run(
+    options: &BenchmarkOptions,
+    progress: &dyn Fn(&str),
+    stop: &Arc<AtomicBool>,
+) -> Result<Report> {
     let mut names = HashSet::new();
     if let Some((name, _)) = options.added.iter().find(|(name, _)| !names.insert(name)) {
         return Err(CcmError::Request(format!("{name}: added twice, names must differ")));

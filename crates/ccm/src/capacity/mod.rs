@@ -54,7 +54,7 @@ impl Method {
 
 /// What to estimate, and how.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct CapacityOptions {
     /// Folder of the data set.
     pub data: PathBuf,
     /// Folder of tables of detections; `None` for those beside the recordings.
@@ -78,7 +78,7 @@ pub struct Options {
 /// # Errors
 /// [`CcmError`] when the data set cannot be opened, a model is missing, or the work is stopped.
 pub fn run(
-    options: &Options,
+    options: &CapacityOptions,
     progress: &(dyn Fn(usize, usize) + Sync),
     interrupted: &AtomicBool,
 ) -> Result<Vec<Row>> {
@@ -129,7 +129,7 @@ fn each<T: Send>(
     })
 }
 
-fn estimate(views: &Views, options: &Options) -> std::result::Result<Estimate, Problem> {
+fn estimate(views: &Views, options: &CapacityOptions) -> std::result::Result<Estimate, Problem> {
     let detections = methods::table(views)?;
     let without_model = || Problem::Missing("no model".into());
     match options.method {
@@ -169,7 +169,7 @@ fn estimate(views: &Views, options: &Options) -> std::result::Result<Estimate, P
 /// # Errors
 /// [`CcmError`] when the data set cannot be opened, nothing can be learned, or the work is stopped.
 pub fn train(
-    options: &Options,
+    options: &CapacityOptions,
     progress: &(dyn Fn(usize, usize) + Sync),
     interrupted: &AtomicBool,
 ) -> Result<(CapacityModel, Option<HeldOut>)> {

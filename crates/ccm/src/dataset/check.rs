@@ -6,8 +6,9 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::container::{Container, Subset};
-use super::layout::{DataSet, Oddity};
+use super::layout::DataSet;
 use super::name::SequenceName;
+use super::oddity::Oddity;
 
 /// Shortest and longest recording of the real data set, in seconds, with room.
 const DURATION_S: std::ops::RangeInclusive<f64> = 0.9..=200.0;

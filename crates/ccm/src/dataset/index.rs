@@ -6,16 +6,17 @@ use std::path::Path;
 
 use super::annotation::{Annotation, Annotations};
 use super::container::{Container, Subset};
-use super::layout::{Oddity, Recording};
+use super::oddity::Oddity;
+use super::recording::Recording;
 
 /// A row and the file that it is in.
-type Found<'a> = (&'a Path, &'a Annotation);
+type AnnotatedRow<'a> = (&'a Path, &'a Annotation);
 
 /// Annotated rows by id within their part, whose numbers start at 0 each, and by container and
 /// sequence.
 pub(super) struct Index<'a> {
-    by_id: HashMap<(Subset, u32), Found<'a>>,
-    by_sequence: HashMap<(u8, u16), Found<'a>>,
+    by_id: HashMap<(Subset, u32), AnnotatedRow<'a>>,
+    by_sequence: HashMap<(u8, u16), AnnotatedRow<'a>>,
     /// Files that say different things about one recording, one entry for each two of them.
     pub(super) contradictions: Vec<Oddity>,
 }
@@ -70,10 +71,10 @@ impl<'a> Index<'a> {
 
 /// Keeps what is there already, and gives it back.
 fn insert<'a, K: Hash + Eq>(
-    map: &mut HashMap<K, Found<'a>>,
+    map: &mut HashMap<K, AnnotatedRow<'a>>,
     key: K,
-    found: Found<'a>,
-) -> Option<Found<'a>> {
+    found: AnnotatedRow<'a>,
+) -> Option<AnnotatedRow<'a>> {
     let kept = *map.entry(key).or_insert(found);
     (!std::ptr::eq(kept.1, found.1)).then_some(kept)
 }

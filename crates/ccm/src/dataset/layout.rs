@@ -10,47 +10,15 @@ use std::path::{Path, PathBuf};
 
 use super::annotation::{Annotation, Annotations};
 use super::container::{Container, Subset};
-use super::filling::Filling;
 use super::index::Index;
 use super::name::SequenceName;
+use super::oddity::Oddity;
+use super::recording::Recording;
 use crate::error::{CcmError, Result};
 use crate::submission::RowKey;
 
 /// Folders deeper than this are not searched.
 const MAX_DEPTH: usize = 6;
-
-/// One recording on disk.
-#[derive(Clone, Debug)]
-pub struct Recording {
-    /// The file.
-    pub path: PathBuf,
-    /// Part of the data set.
-    pub part: Subset,
-    /// Container; `None` for a flat file that no annotation explains.
-    pub container: Option<Container>,
-    /// Flat number (2021 release).
-    pub id: Option<u32>,
-    /// Sequence number within the container (2020 order), or the file number of a test recording.
-    pub sequence: Option<u16>,
-    /// Settings and filling, where known.
-    pub name: Option<SequenceName>,
-}
-
-impl Recording {
-    /// Type and level, where known.
-    pub fn filling(&self) -> Option<Filling> {
-        self.name.map(|n| n.filling)
-    }
-}
-
-/// Something that is not as it should be.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct Oddity {
-    /// The file.
-    pub path: PathBuf,
-    /// What is odd about it.
-    pub what: String,
-}
 
 /// A data set on disk.
 #[derive(Debug)]

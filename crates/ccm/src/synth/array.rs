@@ -4,8 +4,7 @@ use std::f64::consts::TAU;
 
 use rand::Rng;
 
-use super::SAMPLE_RATE;
-use super::physics::{SOUND, gaussian};
+use super::physics::{SAMPLE_RATE, SOUND, gaussian};
 
 /// Number of microphones.
 pub(super) const MICROPHONES: usize = 8;

@@ -4,11 +4,16 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::array::MICROPHONES;
+use super::objects::{capacity_ml, container_mass_g, density};
+use super::physics::SAMPLE_RATE;
+use super::take::{Size, Take};
 use super::views::Shape;
-use super::{NOTICE, SAMPLE_RATE, Size, Take, capacity_ml, container_mass_g, density};
 use crate::dataset::Subset;
 use crate::error::{CcmError, Result};
 use crate::scores::DensityTable;
+
+/// The file that marks a folder as synthetic.
+pub const NOTICE: &str = "SYNTHETIC.txt";
 
 /// States that everything here is synthetic.
 pub(super) fn write_notice(dir: &Path, size: Size, seed: u64, vision: bool) -> Result<()> {

@@ -10,8 +10,10 @@ use std::f64::consts::{PI, TAU};
 
 use rand::Rng;
 
-use super::SAMPLE_RATE;
 use crate::dataset::{Category, Filling, FillingType};
+
+/// Sample rate of the recordings in Hz.
+pub const SAMPLE_RATE: u32 = 44_100;
 
 /// Speed of sound in m/s.
 pub(super) const SOUND: f64 = 343.0;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use corsmal_ccm::CcmError;
-use corsmal_ccm::benchmark::{self, Baseline, Made, Options};
+use corsmal_ccm::benchmark::{self, Baseline, BenchmarkOptions, Made};
 use corsmal_report::{Cell, Report, Row, Source};
 
 use crate::args::Jobs;
@@ -61,7 +61,7 @@ fn named_file(text: &str) -> Result<(String, PathBuf), String> {
 /// Runs the baselines and writes the report.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let baselines = if args.baselines.is_empty() { Baseline::all() } else { args.baselines };
-    let options = Options {
+    let options = BenchmarkOptions {
         data: args.data,
         out: args.out,
         baselines,

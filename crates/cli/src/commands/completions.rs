@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use clap::{Command, CommandFactory, ValueEnum};
+use clap::{Command, ValueEnum};
 use clap_complete::Shell;
 use clap_mangen::Man;
 
@@ -33,9 +33,8 @@ pub struct Args {
     command: Option<String>,
 }
 
-/// Prints the completion script or page to standard output.
-pub fn run(args: Args) -> Result<ExitCode, Failure> {
-    let mut command = crate::Cli::command();
+/// Prints the completion script or page of `command`, the whole tool, to standard output.
+pub fn run(args: Args, mut command: Command) -> Result<ExitCode, Failure> {
     let mut text = Vec::new();
     let shell = match args.target {
         Target::Bash => Shell::Bash,

@@ -4,9 +4,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use clap::Parser;
-
-use crate::Cli;
 use crate::failure::Failure;
 
 /// Arguments of `demo`.
@@ -23,8 +20,11 @@ pub struct Args {
     out: PathBuf,
 }
 
-/// Runs the commands, showing each before it runs.
-pub fn run(args: Args) -> Result<ExitCode, Failure> {
+/// Runs the commands by `execute`, showing each before it runs.
+pub fn run(
+    args: Args,
+    execute: &dyn Fn(&[&str]) -> Result<ExitCode, Failure>,
+) -> Result<ExitCode, Failure> {
     let started = Instant::now();
     std::fs::create_dir_all(&args.out).map_err(|e| {
         Failure::new(format!("--out {}: cannot be created: {e}", args.out.display()))
@@ -104,9 +104,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     ];
     for (about, words) in steps {
         println!("\n# {about}\n$ corsmal-feat {}", shown(words));
-        let words = std::iter::once("corsmal-feat").chain(words.iter().copied());
-        let cli = Cli::try_parse_from(words).map_err(|e| Failure::new(e.to_string()))?;
-        let code = cli.command.run()?;
+        let code = execute(words)?;
         if code != ExitCode::SUCCESS {
             return Ok(code);
         }

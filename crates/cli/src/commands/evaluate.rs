@@ -36,7 +36,7 @@ enum Format {
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  corsmal-feat evaluate --submission team.csv --annotations \
                         ccm_train_annotation.csv --rules toolkit\n\n\
-                        Quirks of each rule set are described in docs/benchmark.md.")]
+                        Quirks of each rule set are described in docs/ccm.md.")]
 pub struct Args {
     /// Submissions in the official 2020 or 2022 format.
     #[arg(long, required = true, num_args = 1.., value_name = "CSV")]

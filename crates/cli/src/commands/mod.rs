@@ -25,13 +25,34 @@ mod train;
 
 use std::process::ExitCode;
 
-use clap::Subcommand;
+use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::failure::Failure;
 
+/// Features of multi-channel recordings, classifiers, and the CORSMAL benchmark.
+#[derive(Parser)]
+#[command(name = "corsmal-feat", version, about, propagate_version = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+impl Cli {
+    /// Runs the command to its exit code.
+    pub fn run(self) -> Result<ExitCode, Failure> {
+        self.command.run()
+    }
+}
+
+/// Runs a command given as words, without the name of the program.
+fn run_words(words: &[&str]) -> Result<ExitCode, Failure> {
+    let words = std::iter::once("corsmal-feat").chain(words.iter().copied());
+    Cli::try_parse_from(words).map_err(|e| Failure::new(e.to_string()))?.run()
+}
+
 /// Registration: a command is its file, a variant here and a line in `run`.
 #[derive(Subcommand)]
-pub enum Command {
+enum Command {
     /// Recordings in, feature tensors or tables out.
     Extract(extract::Args),
     /// Join the outputs of all shards of a run.
@@ -79,8 +100,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// Runs the command to its exit code.
-    pub fn run(self) -> Result<ExitCode, Failure> {
+    fn run(self) -> Result<ExitCode, Failure> {
         match self {
             Self::Extract(args) => extract::run(args),
             Self::Merge(args) => merge::run(args),
@@ -88,7 +108,7 @@ impl Command {
             Self::Features(args) => features::run(args),
             Self::Inspect(args) => inspect::run(args),
             Self::Compare(args) => compare::run(args),
-            Self::Demo(args) => demo::run(args),
+            Self::Demo(args) => demo::run(args, &run_words),
             Self::Nets(args) => nets::run(args),
             Self::Pca(args) => pca::run(args),
             Self::Classifiers(args) => classifiers::run(args),
@@ -100,7 +120,7 @@ impl Command {
             Self::Fuse(args) => fuse::run(args),
             Self::Benchmark(args) => benchmark::run(args),
             Self::Capacity(args) => capacity::run(args),
-            Self::Completions(args) => completions::run(args),
+            Self::Completions(args) => completions::run(args, Cli::command()),
             Self::Dataset(args) => dataset::run(args),
             Self::Evaluate(args) => evaluate::run(args),
             Self::Synth(args) => synth::run(args),

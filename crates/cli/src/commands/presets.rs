@@ -120,7 +120,7 @@ fn plan(config: &Arc<Config>, channels: usize) -> Result<Plan, Failure> {
     Ok(Plan::new(config, rate, channels)?)
 }
 
-/// Keys of the front end that are not at their defaults.
+/// Keys of `[signal]` that are not at their defaults.
 fn signal_changes(config: &Config) -> Option<String> {
     let (set, default) = (config.to_value(), serde_json::json!(SignalConfig::default()));
     let changed = set["signal"].as_object()?.iter().filter(|(key, value)| default[*key] != **value);

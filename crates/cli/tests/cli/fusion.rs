@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::command::{done, refused, run, shared, text};
 
-/// The command of docs/benchmark.md: type, level and capacity of every row are M5's.
+/// The command of docs/ccm.md: type, level and capacity of every row are M5's.
 #[test]
 fn the_winning_submission_is_rebuilt() {
     let Some(dir) = shared("data/ccm/m5_predictions") else { return };

@@ -1,10 +1,9 @@
 //! Real transform of power-of-two length on rows.
 
-use std::f64::consts::PI;
-
 use pulp::{Arch, Simd, WithSimd};
 
 use super::complex::{C, Dft, Pair, Points, add, load, mul, store, sub};
+use super::twiddles::{radices, reversed, turn, twiddles};
 use super::{Frames, Row, registers};
 use crate::error::{DspError, Result};
 
@@ -35,24 +34,6 @@ pub struct LaneFft {
 enum Stage {
     Four(Vec<[[f32; 2]; 4]>),
     Eight(Vec<[[f32; 2]; 8]>),
-}
-
-/// `exp(-2 pi i k / n)`.
-fn turn(k: usize, n: usize) -> [f64; 2] {
-    let angle = -2.0 * PI * (k % n) as f64 / n as f64;
-    [angle.cos(), angle.sin()]
-}
-
-fn twiddles<const R: usize>(size: usize, scale: f64) -> Vec<[[f32; 2]; R]> {
-    let column = |j| std::array::from_fn(|q| turn(j * q, size).map(|x| (scale * x) as f32));
-    (0..size / R).map(column).collect()
-}
-
-/// Radices of the passes over `points` (8 or more) values: fours until the rest is eights.
-fn radices(points: usize) -> Vec<usize> {
-    let bits = points.trailing_zeros() as usize;
-    let fours = [0, 2, 1][bits % 3];
-    [vec![4; fours], vec![8; (bits - 2 * fours) / 3]].concat()
 }
 
 impl LaneFft {
@@ -144,26 +125,6 @@ impl LaneFft {
     fn first_pass(&self, source: impl Source, work: &mut [Row]) {
         assert_eq!(work.len(), self.n_fft);
         self.arch.dispatch(FirstPass { plan: self, source, work });
-    }
-}
-
-/// Fills `position[p]` for the sub-transform that starts at `start` and holds the values
-/// `offset, offset + stride, ...`.
-fn reversed(position: &mut [u32], radices: &[usize], start: usize, offset: usize, stride: usize) {
-    let size: usize = radices.iter().product();
-    match radices {
-        // Leaves leave their output in natural order.
-        [] | [_] => {
-            for k in 0..size {
-                position[offset + k * stride] = (start + k) as u32;
-            }
-        }
-        [radix, rest @ ..] => {
-            for q in 0..*radix {
-                let start = start + q * size / radix;
-                reversed(position, rest, start, offset + q * stride, stride * radix);
-            }
-        }
     }
 }
 

@@ -11,6 +11,7 @@ mod decibel;
 mod fft;
 mod gather;
 mod spectrum;
+mod twiddles;
 mod weighted;
 
 pub use decibel::power_to_decibel;

@@ -6,16 +6,16 @@ use super::{Row, registers};
 
 /// For each `(first, weights)` the sum of `weights[i] * rows[first + i]` into a row of `out`.
 pub fn weighted_sums(bands: &[(usize, Vec<f32>)], rows: &[Row], out: &mut [Row]) {
-    Arch::new().dispatch(Kernel { bands, rows, out });
+    Arch::new().dispatch(WeightedSums { bands, rows, out });
 }
 
-struct Kernel<'a> {
+struct WeightedSums<'a> {
     bands: &'a [(usize, Vec<f32>)],
     rows: &'a [Row],
     out: &'a mut [Row],
 }
 
-impl WithSimd for Kernel<'_> {
+impl WithSimd for WeightedSums<'_> {
     type Output = ();
 
     #[inline(always)]

@@ -5,9 +5,11 @@
 //! bits: a whole array ([`resample`]), a stream in blocks of any size ([`ResampleStream`]), and any
 //! range of outputs of a long recording ([`ResamplePlan::segment`]).
 
+mod check;
 mod converter;
 mod design;
 mod kernel;
+mod low_pass;
 mod sinc;
 mod stage;
 mod stream;
@@ -19,9 +21,10 @@ use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::error::{DspError, Result, from_name};
+use crate::error::{Result, from_name};
 use crate::real::{Real, all_finite, require_finite};
 use crate::tiles::planar;
+use check::{check_interleaved, check_rates};
 use stage::{Frames, Stage};
 
 pub use converter::{Converter, ConverterStream};
@@ -52,23 +55,6 @@ from_name!(
 /// Largest growth of a recording whose rate comes from its file: a header that says 1 Hz would turn
 /// a small file into billions of samples.
 pub const MAX_EXPANSION: f64 = 100.0;
-
-/// The largest ratio of two rates in either direction.
-const MAX_RATIO: f64 = 65536.0;
-
-pub(crate) fn check_rates(orig_sr: f64, target_sr: f64) -> Result<()> {
-    for (name, value) in [("orig_sr", orig_sr), ("target_sr", target_sr)] {
-        if !(value.is_finite() && value > 0.0) {
-            return Err(DspError::parameter(name, value, "a positive number of hertz"));
-        }
-    }
-    let ratio = target_sr / orig_sr;
-    if !(1.0 / MAX_RATIO..=MAX_RATIO).contains(&ratio) {
-        let allowed = format!("within a factor of {MAX_RATIO} of orig_sr ({orig_sr})");
-        return Err(DspError::parameter("target_sr", target_sr, allowed));
-    }
-    Ok(())
-}
 
 /// The filters that convert one rate to another.
 ///
@@ -178,17 +164,6 @@ fn covering(channels: usize, range: &Range<i64>, input: &[f32], start: i64) -> V
         data[at..at + source.len()].copy_from_slice(source);
     }
     data
-}
-
-fn check_interleaved(channels: usize, input: &[f32]) -> Result<()> {
-    if channels == 0 || !input.len().is_multiple_of(channels) {
-        return Err(DspError::Shape {
-            name: "input",
-            expected: format!("whole frames of {channels} channels"),
-            actual: vec![input.len()],
-        });
-    }
-    Ok(())
 }
 
 /// `y [channels, samples]` at another rate (librosa 0.11 `resample`). Equal rates copy `y`.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use ndarray::{Array2, ArrayView2};
 
-use super::{check_interleaved, check_rates};
+use super::check::{check_interleaved, check_rates};
 use crate::error::{DspError, Result};
 use crate::real::Real;
 use crate::window::bessel_i0;
@@ -14,17 +14,17 @@ use crate::window::bessel_i0;
 const PRECISION: usize = 512;
 
 /// The right half of a Kaiser-windowed sinc.
-struct Kernel {
+struct KaiserSinc {
     zeros: usize,
     rolloff: f64,
     beta: f64,
 }
 
-const KAISER_BEST: Kernel =
-    Kernel { zeros: 64, rolloff: 0.9475937167399596, beta: 14.769656459379492 };
-const KAISER_FAST: Kernel = Kernel { zeros: 16, rolloff: 0.85, beta: 8.555504641634386 };
+const KAISER_BEST: KaiserSinc =
+    KaiserSinc { zeros: 64, rolloff: 0.9475937167399596, beta: 14.769656459379492 };
+const KAISER_FAST: KaiserSinc = KaiserSinc { zeros: 16, rolloff: 0.85, beta: 8.555504641634386 };
 
-impl Kernel {
+impl KaiserSinc {
     fn half(&self) -> Vec<f64> {
         let n = PRECISION * self.zeros;
         let gain = self.rolloff / bessel_i0(self.beta);

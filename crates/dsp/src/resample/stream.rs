@@ -3,8 +3,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::ResamplePlan;
+use super::check::check_interleaved;
 use super::stage::Frames;
-use super::{ResamplePlan, check_interleaved};
 use crate::error::Result;
 
 /// Converts interleaved frames as they come; the outputs do not depend on how the input is cut into

@@ -1,17 +1,17 @@
-//! The one configuration: front end, features, summary. It travels through everything and is stored,
+//! The one configuration: signal, features, summary. It travels through everything and is stored,
 //! with its hash, in every output.
 
-mod chain;
 mod librosa;
 mod preset;
 mod set;
+mod signal;
 #[cfg(test)]
 mod tests;
 
 pub use crate::params::ConfigError;
-pub use chain::{Channels, Normalize, SignalConfig};
 pub use corsmal_dsp::resample::ResType;
 pub use preset::{PRESETS, Preset};
+pub use signal::{Channels, Normalize, SignalConfig};
 
 use std::path::Path;
 
@@ -29,7 +29,7 @@ pub const SCHEMA: u32 = 1;
 /// A checked configuration.
 #[derive(Debug, Clone)]
 pub struct Config {
-    /// Front end, in the order in which its steps run.
+    /// How the signal is prepared, in the order in which the steps run.
     pub signal: SignalConfig,
     /// Features in their order of output.
     pub features: Vec<FeatureConfig>,

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::chain::SignalConfig;
+use super::signal::SignalConfig;
 use crate::features;
 use crate::params::ConfigError;
 use crate::summary::SummaryConfig;

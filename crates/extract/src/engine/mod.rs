@@ -9,13 +9,13 @@
 
 mod extractor;
 mod failed;
-mod front_end;
 mod live;
 mod plan;
 mod plans;
 pub(crate) mod reading;
 mod recording;
 mod signal;
+mod signal_chain;
 mod store;
 mod stream;
 mod watch;
@@ -23,11 +23,11 @@ mod windows;
 
 pub use extractor::{Extractor, Refused, Span};
 pub use failed::{Failed, FinishError};
-pub use front_end::{FrontEnd, channels_out};
 pub use plan::{Plan, PlannedFeature};
 pub use plans::{Planned, Plans};
 pub use recording::{FeatureArray, Features, Recording};
 pub use signal::{Signal, SignalError, Signals};
+pub use signal_chain::{SignalChain, channels_out};
 pub use store::Store;
 pub use watch::Watch;
 pub use windows::{Window, Windowing, Windows};

@@ -69,7 +69,7 @@ pub struct Plan {
 
 impl Plan {
     /// Plans `config` for signals of `sample_rate` Hz and `channels` channels (as features see
-    /// them, after the front end).
+    /// them, after the signal chain).
     ///
     /// # Errors
     /// A feature whose parameters are impossible at this rate, or coefficients that it has not.

@@ -7,8 +7,8 @@ use corsmal_audio::AudioSpec;
 use corsmal_dsp::resample::Converter;
 use corsmal_dsp::resample::MAX_EXPANSION;
 
-use super::front_end::channels_out;
 use super::plan::Plan;
+use super::signal_chain::channels_out;
 use crate::config::Config;
 
 /// What a recording is computed with.
@@ -21,7 +21,7 @@ pub struct Planned {
 }
 
 impl Planned {
-    /// Frames to take at a time of recordings at `sample_rate` Hz, so that the front end makes about
+    /// Frames to take at a time of recordings at `sample_rate` Hz, so that the signal chain makes about
     /// `frames` of them at most.
     pub fn step(&self, frames: usize, sample_rate: u32) -> usize {
         let ratio = (self.plan.sample_rate / f64::from(sample_rate)).max(1.0);

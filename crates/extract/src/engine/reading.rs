@@ -1,4 +1,4 @@
-//! One span of one recording: opened, read, pushed through front end and extractor.
+//! One span of one recording: opened, read, pushed through signal chain and extractor.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -9,9 +9,9 @@ use corsmal_files::outcome::{Outcome, Status};
 
 use super::extractor::{Extractor, Span};
 use super::failed::Failed;
-use super::front_end::FrontEnd;
 use super::live::Live;
 use super::plans::Planned;
+use super::signal_chain::SignalChain;
 use crate::config::SignalConfig;
 use crate::inputs::{Input, InputSource};
 
@@ -61,7 +61,7 @@ pub fn spans(source: &dyn BlockSource, planned: &Planned, crop: &Range<u64>) -> 
     let whole = 0..u64::MAX;
     let separable = source.seekable()
         && !planned.plan.needs_whole()
-        && FrontEnd::is_pointwise(&planned.plan.config.signal, planned.resample.is_some());
+        && SignalChain::is_pointwise(&planned.plan.config.signal, planned.resample.is_some());
     let Some(most) = source.most_frames().filter(|_| separable) else {
         return vec![whole];
     };
@@ -91,7 +91,7 @@ pub fn compute(
     let plan = &planned.plan;
     let config = &plan.config.signal;
     let channels = usize::from(source.spec().channels);
-    let mut front = FrontEnd::new(config, channels, planned.resample.clone(), plan.sample_rate)
+    let mut front = SignalChain::new(config, channels, planned.resample.clone(), plan.sample_rate)
         .map_err(|e| Failed::new(Status::Unsupported, e))?;
     // Padding by reflection may reach back twice the padding of a frame.
     let (before, after) = plan.context();

@@ -9,15 +9,15 @@ use thiserror::Error;
 
 use super::extractor::Extractor;
 use super::failed::Failed;
-use super::front_end::FrontEnd;
 use super::plan::Plan;
 use super::plans::{Planned, Plans};
 use super::reading;
 use super::recording::{Features, Recording};
+use super::signal_chain::SignalChain;
 use crate::config::Config;
 use corsmal_files::outcome::Status;
 
-/// Frames that come out of the front end at a time.
+/// Frames that come out of the signal chain at a time.
 const BLOCK: usize = 1 << 14;
 
 /// Why a signal has no features.
@@ -70,7 +70,7 @@ impl Signals {
         let step = planned.step(BLOCK, sample_rate);
         let Planned { plan, resample } = planned;
         let config = &plan.config.signal;
-        let front = FrontEnd::new(config, usize::from(channels), resample, plan.sample_rate)
+        let front = SignalChain::new(config, usize::from(channels), resample, plan.sample_rate)
             .map_err(refuse)?;
         Ok(Signal {
             front,
@@ -89,7 +89,7 @@ impl Signals {
 /// One signal. Any split into blocks gives the same bits.
 pub struct Signal {
     plan: Arc<Plan>,
-    front: FrontEnd,
+    front: SignalChain,
     extractor: Extractor,
     /// Input frames that count.
     crop: Range<u64>,
@@ -98,7 +98,7 @@ pub struct Signal {
     step: usize,
     /// Input frames pushed.
     position: u64,
-    /// What the front end gave for a block.
+    /// What the signal chain gave for a block.
     held: Vec<f32>,
     folder: PathBuf,
 }

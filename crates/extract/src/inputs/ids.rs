@@ -4,7 +4,9 @@ use std::collections::HashMap;
 use std::ffi::OsStr;
 use std::path::{Component, Path};
 
-use super::{Found, InputError, InputSource, Naming};
+use super::error::InputError;
+use super::found::{Found, Naming};
+use super::input::InputSource;
 use corsmal_files::quote::quoted;
 use corsmal_files::table::RESERVED;
 

@@ -15,54 +15,23 @@
 //! would begin with `__`, the prefix of an output's own arrays, get `./` in front.
 
 mod error;
+mod folder;
+mod found;
 mod ids;
+mod input;
 mod wildcard;
 
 use std::collections::{BTreeMap, HashSet};
 use std::ffi::OsStr;
-use std::fmt;
-use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 
-use walkdir::WalkDir;
-
 use crate::manifest;
+use folder::{has_extension, is_apple_double, walk};
+use found::{Found, Naming};
 
 pub use error::InputError;
-
-/// Where the bytes of a recording come from.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum InputSource {
-    /// A file.
-    File(PathBuf),
-    /// Standard input.
-    Stdin,
-}
-
-impl fmt::Display for InputSource {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::File(path) => path.display().fmt(f),
-            Self::Stdin => f.write_str("-"),
-        }
-    }
-}
-
-/// One recording, or a stretch of it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Input {
-    /// Unique in the run.
-    pub id: String,
-    /// Where its bytes come from.
-    pub source: InputSource,
-    /// Start of the stretch in seconds.
-    pub start: Option<f64>,
-    /// End of the stretch in seconds.
-    pub end: Option<f64>,
-    /// Label columns as (name, value); every input of a run has the same names in the same order.
-    pub labels: Vec<(String, String)>,
-}
+pub use input::{Input, InputSource, list_hash};
 
 /// What names stand for.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -129,56 +98,6 @@ pub fn collect<S: AsRef<OsStr>>(names: &[S]) -> Result<Collected, InputError> {
         }
     });
     Ok(Collected { inputs: inputs.collect(), skipped })
-}
-
-/// BLAKE3 (hex) over ids, paths, stretches and labels of all inputs: equal for equal lists only.
-pub fn list_hash(inputs: &[Input]) -> String {
-    let mut hasher = blake3::Hasher::new();
-    let mut put = |text: &str| {
-        hasher.update(&(text.len() as u64).to_le_bytes());
-        hasher.update(text.as_bytes());
-    };
-    for input in inputs {
-        put(&input.id);
-        put(&input.source.to_string());
-        for time in [input.start, input.end] {
-            put(&time.map(|t| t.to_string()).unwrap_or_default());
-        }
-        put(&input.labels.len().to_string());
-        for (column, value) in &input.labels {
-            put(column);
-            put(value);
-        }
-    }
-    hasher.finalize().to_hex().to_string()
-}
-
-/// An input before it has its final id.
-struct Found {
-    source: InputSource,
-    naming: Naming,
-    start: Option<f64>,
-    end: Option<f64>,
-    labels: Vec<(String, String)>,
-}
-
-/// What the id is made of.
-enum Naming {
-    Given(String),
-    /// Path relative to the root.
-    Derived(PathBuf),
-}
-
-impl Found {
-    fn file(path: PathBuf, relative: PathBuf) -> Self {
-        Self {
-            source: InputSource::File(path),
-            naming: Naming::Derived(relative),
-            start: None,
-            end: None,
-            labels: Vec::new(),
-        }
-    }
 }
 
 fn find(
@@ -263,68 +182,6 @@ fn find_glob(
     push_sorted(Path::new(pattern), &wildcard::root(pattern), files, found)
 }
 
-/// Appends the audio files at or below `path`, and to `skipped` those whose formats are not read.
-fn walk(
-    path: &Path,
-    files: &mut Vec<PathBuf>,
-    skipped: &mut Vec<PathBuf>,
-) -> Result<(), InputError> {
-    let is_audio = |path: &Path| has_extension(path, &corsmal_audio::EXTENSIONS);
-    let visible = |entry: &walkdir::DirEntry| !is_hidden(entry);
-    for entry in WalkDir::new(path).follow_links(true).into_iter().filter_entry(visible) {
-        match entry {
-            Ok(entry) if entry.file_type().is_file() && is_audio(entry.path()) => {
-                files.push(entry.into_path());
-            }
-            Ok(entry) => {
-                let is_other = has_extension(entry.path(), &corsmal_audio::OTHER_EXTENSIONS);
-                if entry.file_type().is_file() && is_other {
-                    skipped.push(entry.into_path());
-                }
-            }
-            Err(error) => {
-                let at = error.path().map(Path::to_path_buf);
-                let is_loop = error.loop_ancestor().is_some();
-                let below = error.depth() > 0;
-                match unless_harmless(path, error) {
-                    // A dangling link to a recording, which will fail on its own.
-                    Ok(()) => files.extend(at.filter(|at| !is_loop && is_audio(at))),
-                    // So will a folder that cannot be read: the others do not have to wait for it.
-                    Err(_) if below => files.extend(at),
-                    Err(error) => return Err(error),
-                }
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Whether an entry below a folder that was named is skipped.
-fn is_hidden(entry: &walkdir::DirEntry) -> bool {
-    entry.depth() > 0 && entry.file_name().as_encoded_bytes().starts_with(b".")
-}
-
-/// Whether a file holds what macOS puts beside another one, `._x.wav` beside `x.wav`: by name and by
-/// content, since a recording may have such a name, too.
-fn is_apple_double(path: &Path) -> bool {
-    let is_named = path.file_name().is_some_and(|n| n.as_encoded_bytes().starts_with(b"._"));
-    let mut mark = [0; 4];
-    is_named
-        && File::open(path).and_then(|mut file| file.read_exact(&mut mark)).is_ok()
-        && mark == *b"\0\x05\x16\x07"
-}
-
-/// Passes over links back to a folder that is being searched, and links to nothing.
-fn unless_harmless(folder: &Path, error: walkdir::Error) -> Result<(), InputError> {
-    let at = error.path().unwrap_or(folder).to_path_buf();
-    let is_loop = error.loop_ancestor().is_some();
-    match io::Error::from(error) {
-        _ if is_loop => Ok(()),
-        error if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        error => Err(InputError::io(&at, error)),
-    }
-}
-
 fn push_sorted(
     name: &Path,
     root: &Path,
@@ -345,8 +202,4 @@ fn push_sorted(
         found.push(Found::file(path, relative));
     }
     Ok(())
-}
-
-fn has_extension(path: &Path, extensions: &[&str]) -> bool {
-    path.extension().is_some_and(|e| extensions.iter().any(|x| e.eq_ignore_ascii_case(x)))
 }

@@ -7,7 +7,8 @@ use std::path::{Component, Path, PathBuf};
 use glob::{MatchOptions, Pattern};
 use walkdir::WalkDir;
 
-use super::{InputError, is_hidden};
+use super::error::InputError;
+use super::folder::{is_hidden, unless_harmless};
 
 const OPTIONS: MatchOptions = MatchOptions {
     case_sensitive: true,
@@ -82,7 +83,7 @@ fn folders(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), InputError> {
                 found.push(folder.join(below));
             }
             Ok(_) => {}
-            Err(error) => super::unless_harmless(folder, error)?,
+            Err(error) => unless_harmless(folder, error)?,
         }
     }
     Ok(())

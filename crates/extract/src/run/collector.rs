@@ -6,8 +6,7 @@
 //! waits: threads without a job lend a hand to the jobs that split their work, or sleep. Inputs are
 //! taken only a few ahead of the one being written, so memory stays bounded.
 
-use std::collections::{BTreeMap, VecDeque};
-use std::ops::Range;
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,17 +16,15 @@ use corsmal_files::npz::Compression;
 use corsmal_files::outcome::{Outcome, Status};
 use rayon::Scope;
 
-use super::check::identity_of;
 use super::error::RunError;
 use super::options::Progress;
-use super::output::{Finished, Member, Output};
+use super::output::{Finished, Output};
+use super::queue::{Partial, Queue, Work};
+use super::work::{self, Opened, Parts, SpanJob, outcome_of};
 use crate::config::Config;
-use crate::engine::{Failed, Features, Planned, Plans, Recording, Span, Watch, reading};
+use crate::engine::{Failed, Planned, Plans, Recording, Watch, reading};
 use crate::inputs::{Input, InputSource};
 use crate::survey::Survey;
-
-/// Inputs in work or waiting to be written, per thread.
-const AHEAD: usize = 4;
 
 /// How much is done at a time, and how much may fail.
 #[derive(Clone, Copy)]
@@ -50,54 +47,8 @@ pub struct Collector<'a> {
     plans: Plans<'a>,
     /// Folder of temporary files: that of the output.
     folder: PathBuf,
-    state: Mutex<State>,
+    queue: Mutex<Queue>,
     output: Mutex<Output>,
-}
-
-#[derive(Default)]
-struct State {
-    /// Jobs at work.
-    running: usize,
-    next: usize,
-    written: usize,
-    spans: VecDeque<SpanJob>,
-    partial: BTreeMap<usize, Partial>,
-    ready: BTreeMap<usize, Finished>,
-    failed: usize,
-    /// Whether a recording shorter than a transform was met.
-    warned: bool,
-    error: Option<RunError>,
-}
-
-/// A span of a recording that was cut.
-struct SpanJob {
-    input: usize,
-    index: usize,
-    span: Range<u64>,
-    planned: Planned,
-    watch: Watch,
-}
-
-/// What a recording gives: arrays, or a row of the table; and its samples.
-type Parts = (Vec<Member>, Option<Vec<f32>>, u64);
-
-/// A recording of which not all spans are there.
-struct Partial {
-    outcome: Outcome,
-    planned: Planned,
-    watch: Watch,
-    /// Number of spans, and of those that are added.
-    spans: usize,
-    added: usize,
-    /// Spans computed before their turn, each in parts.
-    early: BTreeMap<usize, Result<Vec<Span>, Failed>>,
-    /// `None` while a job adds to it.
-    recording: Option<Result<Recording, Failed>>,
-}
-
-enum Work {
-    Input(usize),
-    Span(SpanJob),
 }
 
 impl<'a> Collector<'a> {
@@ -113,7 +64,7 @@ impl<'a> Collector<'a> {
         output: Output,
     ) -> Self {
         let failed = output.outcomes().iter().filter(|o| !o.status.has_features()).count();
-        let state = State { next: output.next, written: output.next, failed, ..State::default() };
+        let queue = Queue::new(inputs.len(), output.next, failed);
         Self {
             inputs,
             limits,
@@ -122,7 +73,7 @@ impl<'a> Collector<'a> {
             stop,
             plans: Plans::new(config.clone(), |warning| progress.warning(warning)),
             folder,
-            state: Mutex::new(state),
+            queue: Mutex::new(queue),
             output: Mutex::new(output),
         }
     }
@@ -135,22 +86,22 @@ impl<'a> Collector<'a> {
             .build()
             .map_err(|e| RunError::Jobs { jobs, why: e.to_string() })?;
         pool.scope(|scope| self.start(scope));
-        let state = self.state.into_inner().unwrap_or_else(|e| e.into_inner());
-        match state.error {
+        let queue = self.queue.into_inner().unwrap_or_else(|e| e.into_inner());
+        match queue.error {
             Some(error) => Err(error),
             None => Ok(self.output.into_inner().unwrap_or_else(|e| e.into_inner())),
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(|e| e.into_inner())
+    fn lock(&self) -> MutexGuard<'_, Queue> {
+        self.queue.lock().unwrap_or_else(|e| e.into_inner())
     }
 
     /// Starts as many jobs as can be at work now.
     fn start<'s>(&'s self, scope: &Scope<'s>) {
-        let mut state = self.lock();
-        while let Some(work) = self.next(&mut state) {
-            state.running += 1;
+        let mut queue = self.lock();
+        while let Some(work) = self.next(&mut queue) {
+            queue.running += 1;
             scope.spawn(move |scope| {
                 self.job(work, scope);
                 self.lock().running -= 1;
@@ -180,62 +131,32 @@ impl<'a> Collector<'a> {
     /// A fault of this program costs the recording at which it happened, not the run.
     fn broken<'s>(&'s self, input: usize, span: Option<usize>, scope: &Scope<'s>) {
         let failed = broken();
-        let mut state = self.lock();
-        if let (Some(span), Some(partial)) = (span, state.partial.get_mut(&input)) {
+        let mut queue = self.lock();
+        if let (Some(span), Some(partial)) = (span, queue.partial.get_mut(&input)) {
             partial.early.insert(span, Err(failed));
-            drop(state);
+            drop(queue);
             return self.join(input, scope);
         }
-        drop(state);
+        drop(queue);
         let source = &self.inputs[input];
-        let mut outcome = Outcome::new(&source.id, source.source.to_string(), Status::Ok, "");
-        outcome.identity = identity_of(source);
-        self.fail(input, outcome, failed);
+        self.fail(input, outcome_of(source), failed);
     }
 
     /// The next thing to do; none while enough are at work or too much is unwritten.
-    fn next(&self, state: &mut State) -> Option<Work> {
-        let full = state.running >= self.limits.jobs;
-        if full || self.stop.load(Ordering::Relaxed) || state.error.is_some() {
-            return None;
-        }
-        // Spans wait for those before them, so they are not computed far ahead either.
-        let ahead = state.spans.front().is_some_and(|job| {
-            let added = state.partial.get(&job.input).map_or(0, |partial| partial.added);
-            job.index >= added + AHEAD * self.limits.jobs
-        });
-        if !ahead && let Some(job) = state.spans.pop_front() {
-            return Some(Work::Span(job));
-        }
-        let room = state.next < state.written + AHEAD * self.limits.jobs;
-        if state.next >= self.inputs.len() || !room {
-            return None;
-        }
-        state.next += 1;
-        Some(Work::Input(state.next - 1))
+    fn next(&self, queue: &mut Queue) -> Option<Work> {
+        if self.stop.load(Ordering::Relaxed) { None } else { queue.next(self.limits.jobs) }
     }
 
     /// Opens an input; computes it, or cuts it and computes its first span.
     fn input(&self, index: usize) {
         let input = &self.inputs[index];
-        let mut outcome = Outcome::new(&input.id, input.source.to_string(), Status::Ok, "");
         let watch = Watch::begin(input);
-        outcome.identity = identity_of(input);
-        let mut source = match watch.settle(reading::open(input, self.stop)) {
-            Ok(source) => source,
+        let mut outcome = outcome_of(input);
+        let opened = work::open(input, &watch, (&self.plans, self.survey), self.stop, &mut outcome);
+        let Opened { mut source, planned, crop, spans } = match opened {
+            Ok(opened) => opened,
             Err(failed) => return self.fail(index, outcome, failed),
         };
-        reading::describe(&mut outcome, source.as_ref());
-        if let Some(reason) = self.survey.refusal(source.spec().channels) {
-            return self.fail(index, outcome, Failed::new(Status::Mismatch, reason));
-        }
-        let planned = match self.plans.of(source.spec()) {
-            Ok(planned) => planned,
-            Err(e) => return self.fail(index, outcome, Failed::new(Status::Unsupported, e)),
-        };
-        let signal = &planned.plan.config.signal;
-        let crop = reading::crop(signal, (input.start, input.end), source.spec().sample_rate);
-        let spans = reading::spans(source.as_ref(), &planned, &crop);
         let mut recording = Recording::new(planned.plan.clone(), &self.folder);
         if let [span] = spans.as_slice() {
             let decoded = &mut outcome.decoded_frames;
@@ -260,9 +181,9 @@ impl<'a> Collector<'a> {
             early: BTreeMap::new(),
             recording: Some(Ok(recording)),
         };
-        let mut state = self.lock();
-        state.partial.insert(index, partial);
-        state.spans.extend(spans.into_iter().enumerate().map(|(i, span)| SpanJob {
+        let mut queue = self.lock();
+        queue.partial.insert(index, partial);
+        queue.spans.extend(spans.into_iter().enumerate().map(|(i, span)| SpanJob {
             input: index,
             index: i,
             span,
@@ -273,48 +194,28 @@ impl<'a> Collector<'a> {
 
     /// Computes one span of a recording that was cut.
     fn span<'s>(&'s self, job: SpanJob, scope: &Scope<'s>) {
-        let input = &self.inputs[job.input];
-        let mut parts = Vec::new();
-        let mut last = None;
-        let mut decoded = 0;
-        let computed = reading::open(input, self.stop).and_then(|source| {
-            // The spans before this one were read from the file as it was then.
-            job.watch.check()?;
-            let signal = &job.planned.plan.config.signal;
-            let crop = reading::crop(signal, (input.start, input.end), source.spec().sample_rate);
-            let source = last.insert(source).as_mut();
-            let (span, decoded) = ((&crop, &job.span), &mut decoded);
-            reading::compute(source, &job.planned, span, self.stop, decoded, |part| {
-                parts.push(part);
-                Ok(())
-            })
-        });
-        let result = match job.watch.settle(computed) {
-            Ok(false) => return,
-            Ok(true) => Ok(parts),
-            Err(failed) => Err(failed),
-        };
-        let mut state = self.lock();
-        if let Some(partial) = state.partial.get_mut(&job.input) {
-            if let Some(source) = last {
+        let Some(done) = job.compute(&self.inputs[job.input], self.stop) else { return };
+        let mut queue = self.lock();
+        if let Some(partial) = queue.partial.get_mut(&job.input) {
+            if let Some(source) = done.source {
                 reading::describe(&mut partial.outcome, source.as_ref());
             }
-            partial.outcome.decoded_frames += decoded;
-            partial.early.insert(job.index, result);
+            partial.outcome.decoded_frames += done.decoded;
+            partial.early.insert(job.index, done.parts);
         }
-        drop(state);
+        drop(queue);
         self.join(job.input, scope);
     }
 
     /// Adds the spans whose turn it is to their recording, unless another job is at it.
     fn join<'s>(&'s self, index: usize, scope: &Scope<'s>) {
-        let mut state = self.lock();
+        let mut queue = self.lock();
         loop {
-            let Some(partial) = state.partial.get_mut(&index) else { return };
+            let Some(partial) = queue.partial.get_mut(&index) else { return };
             let Some(recording) = partial.recording.take() else { return };
             if partial.added == partial.spans {
-                if let Some(partial) = state.partial.remove(&index) {
-                    drop(state);
+                if let Some(partial) = queue.partial.remove(&index) {
+                    drop(queue);
                     let with = (&partial.planned, &partial.watch);
                     self.complete(index, partial.outcome, with, recording);
                 }
@@ -325,7 +226,7 @@ impl<'a> Collector<'a> {
                 return;
             };
             // Adding writes to a temporary file: not under the lock.
-            drop(state);
+            drop(queue);
             let add = || match (recording, span) {
                 (Ok(mut recording), Ok(parts)) => parts
                     .into_iter()
@@ -335,14 +236,14 @@ impl<'a> Collector<'a> {
                 (Ok(_), Err(failed)) | (Err(failed), _) => Err(failed),
             };
             let recording = catch_unwind(AssertUnwindSafe(add)).unwrap_or_else(|_| Err(broken()));
-            state = self.lock();
-            if let Some(partial) = state.partial.get_mut(&index) {
+            queue = self.lock();
+            if let Some(partial) = queue.partial.get_mut(&index) {
                 partial.recording = Some(recording);
                 partial.added += 1;
             }
-            drop(state);
+            drop(queue);
             self.start(scope);
-            state = self.lock();
+            queue = self.lock();
         }
     }
 
@@ -354,26 +255,10 @@ impl<'a> Collector<'a> {
         (planned, watch): (&Planned, &Watch),
         recording: Result<Recording, Failed>,
     ) {
+        let (input, compression) = (&self.inputs[index], self.limits.compression);
         let plan = &planned.plan;
-        let stretch =
-            reading::check_stretch(&self.inputs[index], &plan.config.signal, &mut outcome);
-        let finish = || -> Result<Parts, Failed> {
-            let recording = recording?;
-            watch.check_content(&outcome.identity)?;
-            stretch?;
-            let total = recording.total();
-            Ok(match recording.complete()? {
-                Features::Summary(row) => (Vec::new(), Some(row), total),
-                Features::Frames(arrays) => {
-                    let compression = self.limits.compression;
-                    let id = &self.inputs[index].id;
-                    let members = Member::of(id, plan, arrays, compression);
-                    (members.map_err(Failed::temporary)?, None, total)
-                }
-            })
-        };
-        match finish() {
-            Ok((arrays, row, total)) => {
+        match work::finish(input, (planned, watch), recording, compression, &mut outcome) {
+            Ok(Parts { arrays, row, total }) => {
                 if let Some(longest) = plan.longest_transform()
                     && total < longest as u64
                     && !std::mem::replace(&mut self.lock().warned, true)
@@ -428,12 +313,12 @@ impl<'a> Collector<'a> {
             };
             loop {
                 let index = output.next;
-                let mut state = self.lock();
-                if state.error.is_some() {
+                let mut queue = self.lock();
+                if queue.error.is_some() {
                     return;
                 }
-                let Some(finished) = state.ready.remove(&index) else { break };
-                drop(state);
+                let Some(finished) = queue.ready.remove(&index) else { break };
+                drop(queue);
                 match output.write(&self.inputs[index], finished) {
                     Ok(outcome) => {
                         self.written(&outcome);
@@ -456,16 +341,16 @@ impl<'a> Collector<'a> {
 
     fn written(&self, outcome: &Outcome) {
         self.progress.done(outcome);
-        let mut state = self.lock();
-        state.written += 1;
+        let mut queue = self.lock();
+        queue.written += 1;
         if !outcome.status.has_features() {
-            state.failed += 1;
+            queue.failed += 1;
             if let Some(limit) = self.limits.max_errors
-                && state.failed > limit
+                && queue.failed > limit
             {
                 let (failed, last) =
-                    (state.failed, format!("{}: {}", outcome.path, outcome.reason));
-                state.error = Some(RunError::TooManyErrors { failed, limit, last });
+                    (queue.failed, format!("{}: {}", outcome.path, outcome.reason));
+                queue.error = Some(RunError::TooManyErrors { failed, limit, last });
             }
         }
     }

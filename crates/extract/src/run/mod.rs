@@ -5,6 +5,8 @@ mod collector;
 mod error;
 mod options;
 mod output;
+mod queue;
+mod work;
 
 use std::cell::RefCell;
 use std::path::Path;

@@ -1,6 +1,11 @@
 //! The dictionary literal of a `.npy` header.
 
-use super::{DType, Header, MAX_AXES, NpyError, Order, malformed};
+use super::dtype::DType;
+use super::error::{NpyError, malformed};
+use super::header::{Header, Order};
+
+/// numpy's limit on the number of axes.
+const MAX_AXES: usize = 64;
 
 /// Reads the dictionary that `text` holds; it begins at byte `start` of the stream.
 pub(super) fn header(text: &[u8], start: u64) -> Result<Header, NpyError> {

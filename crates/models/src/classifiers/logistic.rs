@@ -53,8 +53,8 @@ impl Train for LogisticParams {
             outputs,
         };
         let start = Array1::zeros(outputs * (x.ncols() + 1));
-        let options = lbfgs::Options { tol: self.tol, max_iter: self.max_iter };
-        let found = lbfgs::minimise(start, &options, |at, gradient| objective.at(at, gradient));
+        let stopping = lbfgs::Stopping { tol: self.tol, max_iter: self.max_iter };
+        let found = lbfgs::minimise(start, &stopping, |at, gradient| objective.at(at, gradient));
         if !found.iter().all(|v| v.is_finite()) {
             return Err(ModelError::Numerical {
                 owner: Self::OWNER,

@@ -8,7 +8,6 @@ use serde::de::{DeserializeOwned, Error as _};
 use serde::ser::{Error as _, SerializeTuple};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::spec::CLASSIFIERS;
 use super::{Classify, Train, decision_tree, knn};
 use crate::error::{ModelError, Result};
 use crate::params::{Parameter, Values};
@@ -26,13 +25,11 @@ pub(super) struct Kind {
 
 static KINDS: RwLock<Vec<&'static Kind>> = RwLock::new(Vec::new());
 
-/// Adds a classifier to those that [`ClassifierSpec::new`](super::ClassifierSpec::new) knows, by the
-/// name [`OWNER`](crate::params::Parameters::OWNER); `about` is one line for people. A program that reads model files with
-/// it registers it first, under the same name.
+/// Adds a classifier of another crate, by the name [`OWNER`](crate::params::Parameters::OWNER).
 ///
 /// # Errors
-/// [`ModelError::NameTaken`].
-pub fn register<P>(about: &'static str) -> Result<()>
+/// [`ModelError::NameTaken`] for the name of another one, or of a model that is stored by name.
+pub(super) fn add<P>(about: &'static str) -> Result<()>
 where
     P: Train,
     P::Fitted: Classify + Serialize + DeserializeOwned + 'static,
@@ -40,8 +37,7 @@ where
     let name = P::OWNER;
     let mut kinds = KINDS.write().unwrap_or_else(PoisonError::into_inner);
     let reserved = [decision_tree::STORED_NAME, knn::STORED_NAME];
-    let built_in = CLASSIFIERS.iter().map(|(name, _)| *name).chain(reserved);
-    if built_in.chain(kinds.iter().map(|kind| kind.name)).any(|taken| taken == name) {
+    if reserved.into_iter().chain(kinds.iter().map(|kind| kind.name)).any(|taken| taken == name) {
         return Err(ModelError::NameTaken { name });
     }
     // Kept for the life of the program, as the table of the built-in ones is.
@@ -60,15 +56,10 @@ where
     Ok(())
 }
 
-/// Names and descriptions of all classifiers, registered ones last.
-pub fn classifiers() -> Vec<(&'static str, &'static str)> {
+/// Names and descriptions of the registered classifiers.
+pub(super) fn registered() -> Vec<(&'static str, &'static str)> {
     let kinds = KINDS.read().unwrap_or_else(PoisonError::into_inner);
-    let registered = kinds.iter().map(|kind| (kind.name, kind.about));
-    CLASSIFIERS.iter().copied().chain(registered).collect()
-}
-
-pub(super) fn names() -> Vec<&'static str> {
-    classifiers().into_iter().map(|(name, _)| name).collect()
+    kinds.iter().map(|kind| (kind.name, kind.about)).collect()
 }
 
 pub(super) fn find(name: &str) -> Option<&'static Kind> {

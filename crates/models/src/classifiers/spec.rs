@@ -3,7 +3,7 @@
 use linfa::DatasetBase;
 use linfa::traits::Fit;
 use ndarray::{Array1, ArrayBase, ArrayView2, Data, Ix2};
-use serde::de::Error as _;
+use serde::de::{DeserializeOwned, Error as _};
 use serde::ser::SerializeStruct;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
@@ -16,7 +16,7 @@ use super::logistic::LogisticParams;
 use super::random_forest::RandomForestParams;
 use super::registry::{self, RegisteredSpec};
 use super::svm::SvmParams;
-use super::{Classifier, Train};
+use super::{Classifier, Classify, MAX_CLASSES, Train};
 use crate::error::{ModelError, Result};
 use crate::params::{Parameter, Parameters, key_of};
 use crate::table::{check_features, check_labels, check_varied, class_counts};
@@ -48,7 +48,7 @@ macro_rules! built_in {
                         None => Err(ModelError::UnknownName {
                             kind: "classifier",
                             name: name.into(),
-                            allowed: corsmal_names::choices(name, registry::names()),
+                            allowed: corsmal_names::choices(name, classifiers().into_iter().map(|(name, _)| name)),
                         }),
                     },
                 }
@@ -138,6 +138,28 @@ built_in! {
     Logistic, "logistic", LogisticParams => Fitted::Logistic, "logistic regression (multinomial, L2)";
 }
 
+/// Names and descriptions of all classifiers, registered ones last.
+pub fn classifiers() -> Vec<(&'static str, &'static str)> {
+    CLASSIFIERS.iter().copied().chain(registry::registered()).collect()
+}
+
+/// Adds a classifier to those that [`ClassifierSpec::new`] knows, by the name
+/// [`OWNER`](Parameters::OWNER); `about` is one line for people. A program that reads model files
+/// with it registers it first, under the same name.
+///
+/// # Errors
+/// [`ModelError::NameTaken`].
+pub fn register<P>(about: &'static str) -> Result<()>
+where
+    P: Train,
+    P::Fitted: Classify + Serialize + DeserializeOwned + 'static,
+{
+    if CLASSIFIERS.iter().any(|(name, _)| *name == P::OWNER) {
+        return Err(ModelError::NameTaken { name: P::OWNER });
+    }
+    registry::add::<P>(about)
+}
+
 impl ClassifierSpec {
     /// The classifier of this name with default parameters.
     ///
@@ -192,6 +214,21 @@ impl ClassifierSpec {
             }
             _ => Ok(self.clone()),
         }
+    }
+}
+
+/// linfa's way in: the number of classes is the largest label plus one.
+impl<D: Data<Elem = f64>> Fit<ArrayBase<D, Ix2>, Array1<usize>, ModelError> for ClassifierSpec {
+    type Object = Classifier;
+
+    fn fit(&self, dataset: &DatasetBase<ArrayBase<D, Ix2>, Array1<usize>>) -> Result<Classifier> {
+        let y = dataset.targets.to_vec();
+        let n_classes = y.iter().max().map_or(0, |c| c.saturating_add(1));
+        if n_classes > MAX_CLASSES {
+            let row = y.iter().position(|&c| c + 1 == n_classes).unwrap_or(0);
+            return Err(ModelError::ClassOutOfRange { row, class: y[row], n_classes: MAX_CLASSES });
+        }
+        self.train(dataset.records.view(), &y, n_classes)
     }
 }
 

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::Classify;
-use super::cart::{Columns, Growth, Sample, Tree};
+use super::cart::{FeatureColumns, Growth, Sample, Tree};
 use crate::error::{ModelError, Result};
 use crate::params::ClassWeight;
 
@@ -123,7 +123,7 @@ impl Trees {
                 reason: format!("{} rows x {} features are too many", x.nrows(), x.ncols()),
             });
         }
-        let columns = Columns::new(x)?;
+        let columns = FeatureColumns::new(x)?;
         let per_class = plan.class_weight.per_class(y, n_classes)?;
         let labels: Vec<u32> = y.iter().map(|&c| c as u32).collect();
         let mut seeds = Xoshiro256PlusPlus::seed_from_u64(plan.seed);

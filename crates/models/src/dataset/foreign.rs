@@ -8,7 +8,8 @@ use corsmal_files::npz::{NpzError, NpzFile};
 use ndarray::Ix2;
 use serde_json::Value;
 
-use super::{DatasetError, LabelledTable, Result};
+use super::error::{DatasetError, Result};
+use super::table::LabelledTable;
 
 /// Where features and ids are in an `.npz` of another program.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use super::{DatasetError, Result};
+use super::error::{DatasetError, Result};
+use crate::words::count;
 
 /// Where labels come from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -178,11 +179,6 @@ impl LabelFile {
         let stem = || file.file_stem().and_then(|n| n.to_str()).and_then(get);
         by_path.or_else(|| get(id)).or_else(name).or_else(stem)
     }
-}
-
-/// A number with its noun.
-pub(crate) fn count(n: usize, noun: &str) -> String {
-    if n == 1 { format!("1 {noun}") } else { format!("{n} {noun}s") }
 }
 
 #[cfg(test)]

@@ -177,7 +177,7 @@ impl<K> PredictionTable<K> {
             Some(at) => {
                 let (row, empty) =
                     (&self.rows[at].cells[0], values.iter().filter(|v| v.is_empty()));
-                let lines = crate::dataset::count(empty.count(), "such line");
+                let lines = crate::words::count(empty.count(), "such line");
                 Err(self.content(format!("{row}: has no true class ({name} is empty; {lines})")))
             }
         }

@@ -52,14 +52,14 @@ impl PredictionTable {
         if lines.is_empty() {
             return Err(content(path, "has no predictions"));
         }
-        Columns::find(path, &header, &lines)?.table(path, &header, &lines)
+        PredictionColumns::find(path, &header, &lines)?.table(path, &header, &lines)
     }
 }
 
 type Lines = [(u64, csv::StringRecord)];
 
 /// Columns by what they hold.
-struct Columns {
+struct PredictionColumns {
     naming: Vec<usize>,
     others: Vec<usize>,
     /// one per class; none in files without probabilities
@@ -68,7 +68,7 @@ struct Columns {
     labels: Vec<String>,
 }
 
-impl Columns {
+impl PredictionColumns {
     fn find(path: &Path, header: &[String], lines: &Lines) -> Result<Self> {
         let find = |name: &str| header.iter().position(|h| h.eq_ignore_ascii_case(name));
         let container = ["Object", "container", "Container ID"].iter().find_map(|n| find(n));

@@ -1,49 +1,17 @@
 //! Weights on disk: `.npz`, `.safetensors`, `.pth`, under PyTorch's names and in its layouts.
 
+mod error;
 mod npz;
+mod numbers;
 mod pickle;
 mod pth;
 mod safetensors;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use thiserror::Error;
-
+pub use error::WeightsError;
+pub use numbers::{MAX_FILE, State};
 pub use safetensors::{from_safetensors, safetensors_text, to_safetensors};
-
-/// Names, shapes and numbers of a network or a part of one.
-pub type State = Vec<(String, Vec<usize>, Vec<f32>)>;
-
-/// Largest file of weights read.
-pub const MAX_FILE: u64 = 8 << 30;
-
-/// Why weights could not be read or written.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum WeightsError {
-    /// Reading or writing failed.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// the file
-        path: PathBuf,
-        /// why
-        source: std::io::Error,
-    },
-    /// The file's ending is none of those known.
-    #[error("{}: weights end in .npz, .safetensors, .pth or .pt", path.display())]
-    Ending {
-        /// the file
-        path: PathBuf,
-    },
-    /// The content is not what the ending says, or holds something else than weights.
-    #[error("{}: {reason}", path.display())]
-    Content {
-        /// the file
-        path: PathBuf,
-        /// why
-        reason: String,
-    },
-}
 
 /// Reads weights, the format by the file's ending. Nothing in the file is run.
 ///
@@ -96,41 +64,4 @@ pub fn write(path: &Path, state: &State) -> Result<(), WeightsError> {
 
 fn ending(path: &Path) -> Option<&str> {
     path.extension().and_then(|e| e.to_str())
-}
-
-/// Little-endian numbers of PyTorch's types in single precision.
-fn numbers(kind: Kind, bytes: &[u8]) -> Vec<f32> {
-    match kind {
-        Kind::F16 => each(bytes, |b| half::f16::from_le_bytes(b).to_f32()),
-        Kind::Bf16 => each(bytes, |b| half::bf16::from_le_bytes(b).to_f32()),
-        Kind::F32 => each(bytes, f32::from_le_bytes),
-        Kind::F64 => each(bytes, |b| f64::from_le_bytes(b) as f32),
-        Kind::I64 => each(bytes, |b| i64::from_le_bytes(b) as f32),
-        Kind::I32 => each(bytes, |b| i32::from_le_bytes(b) as f32),
-    }
-}
-
-fn each<const N: usize>(bytes: &[u8], number: impl Fn([u8; N]) -> f32) -> Vec<f32> {
-    bytes.as_chunks::<N>().0.iter().map(|b| number(*b)).collect()
-}
-
-/// Types of numbers that are read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    F16,
-    Bf16,
-    F32,
-    F64,
-    I64,
-    I32,
-}
-
-impl Kind {
-    fn size(self) -> usize {
-        match self {
-            Self::F16 | Self::Bf16 => 2,
-            Self::F32 | Self::I32 => 4,
-            Self::F64 | Self::I64 => 8,
-        }
-    }
 }

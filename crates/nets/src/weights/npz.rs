@@ -5,7 +5,7 @@ use std::path::Path;
 use corsmal_files::draft::Draft;
 use corsmal_files::npz::{Compression, NpzFile, NpzWriter};
 
-use super::State;
+use super::numbers::State;
 
 pub(super) fn read(path: &Path) -> Result<State, String> {
     let mut file = NpzFile::open(path).map_err(|e| e.to_string())?;

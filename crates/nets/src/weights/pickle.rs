@@ -1,7 +1,7 @@
 //! The part of pickle that state dictionaries of PyTorch use. Nothing is called: the few classes
 //! and functions that occur are known by name, everything else is refused.
 
-use super::Kind;
+use super::numbers::Kind;
 
 /// A value on the pickle machine's stack.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use zip::ZipArchive;
 
+use super::numbers::{MAX_FILE, State, numbers};
 use super::pickle::{self, Tensor, Value};
-use super::{MAX_FILE, State, numbers};
 
 /// Longest pickle read.
 const MAX_PICKLE: u64 = 64 << 20;

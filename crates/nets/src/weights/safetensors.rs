@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 
-use super::{Kind, State, numbers};
+use super::numbers::{Kind, State, numbers};
 
 /// Weights from a file's bytes.
 ///

@@ -1,28 +1,16 @@
 //! The page.
 
+mod escape;
+mod tables;
+
 use std::fmt::Write;
 
-mod tables;
+use escape::escape;
 
 use crate::{Fact, Figure, Report, Section};
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
-
-/// Text for HTML, in elements and attributes.
-pub(crate) fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            c => out.push(c),
-        }
-    }
-    out
-}
 
 /// The whole page.
 pub(crate) fn page(report: &Report) -> String {

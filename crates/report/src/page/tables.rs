@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::escape;
+use super::escape::escape;
 use crate::table::{Cell, Row, Source, Table};
 
 /// Columns beyond which a table is set closer, without bars.

@@ -14,8 +14,9 @@ use corsmal_vision::{Camera, Depth, Mask, Rgb, compress};
 use rand::Rng;
 use serde_json::json;
 
+use super::files;
 use super::physics::gaussian;
-use super::{files, generator};
+use super::take::generator;
 use crate::dataset::{Category, Container, FillingType, SequenceName};
 use crate::error::{CcmError, Result};
 use scene::{Ellipsoid, Part, SIZE, Scene, Seen};

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::super::capacity_ml;
+use super::super::objects::capacity_ml;
 use crate::dataset::{Category, Container, Dimensions};
 
 /// Thickness of walls in m.

@@ -1,6 +1,7 @@
 //! `corsmal-feat capacity`: capacities of containers from the views of a data set.
 
 mod combine;
+mod source;
 mod train;
 
 use std::path::PathBuf;
@@ -8,12 +9,12 @@ use std::process::ExitCode;
 
 use clap::{Subcommand, ValueEnum};
 use corsmal_ccm::CcmError;
-use corsmal_ccm::capacity::{self, CapacityModel, Method, Options, Row};
+use corsmal_ccm::capacity::{self, CapacityModel, Method, Row};
 use corsmal_vision::cuboid::Outliers;
-use corsmal_vision::lode::Variant;
 
 use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
 use crate::publish;
+use source::{Source, VariantName};
 
 /// Arguments of `capacity`.
 #[derive(clap::Args)]
@@ -76,24 +77,6 @@ struct Estimate {
     quiet: bool,
 }
 
-/// Where recordings and detections are.
-#[derive(clap::Args)]
-struct Source {
-    /// Folder of the data set.
-    #[arg(long, value_name = "DIR")]
-    data: PathBuf,
-    /// Folder of tables of detections (SEQUENCE.csv or .json, by container or not); by default
-    /// `detections/` beside each recording's audio folder.
-    #[arg(long, value_name = "DIR")]
-    detections: Option<PathBuf>,
-    /// Seed of votes and isolation forests.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Recordings at a time; by default one for each core.
-    #[arg(long, value_name = "N", env = "CORSMAL_FEAT_JOBS", value_parser = clap::value_parser!(u16).range(1..))]
-    jobs: Option<u16>,
-}
-
 #[derive(Clone, Copy, ValueEnum)]
 enum MethodName {
     /// Gaussian processes on the sizes of detected regions in four views.
@@ -104,14 +87,6 @@ enum MethodName {
     M5,
     /// All that there is, weighted by measured reliability (beyond the paper).
     Fused,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum VariantName {
-    /// As the published program computes, its quirks included.
-    Published,
-    /// Without its defects.
-    Corrected,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -131,23 +106,6 @@ impl MethodName {
             Self::M4 => Method::M4,
             Self::M5 => Method::M5,
             Self::Fused => Method::Fused,
-        }
-    }
-}
-
-impl Source {
-    fn options(self, method: Method, variant: VariantName) -> Options {
-        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-        let published = variant == VariantName::Published;
-        Options {
-            data: self.data,
-            detections: self.detections,
-            method,
-            variant: if published { Variant::Published } else { Variant::Corrected },
-            outliers: if published { Outliers::Published } else { Outliers::Corrected },
-            model: None,
-            jobs: self.jobs.map_or_else(cores, usize::from),
-            seed: self.seed,
         }
     }
 }

@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use corsmal_ccm::CcmError;
 use corsmal_ccm::capacity::{self, HeldOut, Method};
 
-use super::{Source, VariantName};
+use super::source::{Source, VariantName};
 use crate::failure::{Failure, INTERRUPTED};
 use crate::publish;
 

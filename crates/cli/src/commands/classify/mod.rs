@@ -1,150 +1,23 @@
 //! `corsmal-feat classify`: recordings, a live stream or features in, predictions out.
 
+mod args;
 #[cfg(feature = "nets")]
 mod network;
+mod records;
 mod whole;
 mod windows;
 
-use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
-use std::sync::Arc;
 
-use corsmal_extract::config::Config;
-use corsmal_extract::inputs::{self, Input};
 use corsmal_models::dataset::LabelledTable;
-use corsmal_models::model_file::{FormatRule, Model, ModelFileError};
-use corsmal_models::predictions::{Form, RecordWriter, Unit};
+use corsmal_models::model_file::{Model, ModelFileError};
 
-use crate::args::{Jobs, MemberArgs, VoteArgs};
+pub use args::Args;
+
 use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
-use crate::output::Output;
 use crate::publish;
-
-/// Arguments of `classify`.
-#[derive(clap::Args)]
-#[command(after_help = "\
-Examples:
-  corsmal-feat classify -m type.model audio/ -o predictions.csv
-  corsmal-feat classify --model type.model --features feats.npz --out -
-  corsmal-feat classify -m type.model audio/ --reject 0.6 -o predictions.csv
-  arecord -f cd -t wav | corsmal-feat classify --model type.model --in - --window 2 --hop 0.5
-  corsmal-feat classify --model type.model --in audio/ --window 1 --vote majority --out votes.csv
-
-One line per recording: id, path, status, label columns of a manifest (the one that the model predicts
-is called true), predicted, and p_<label> for each class. Recordings that could not be read, or differ
-in sample rate or channels from those that the model was trained on, have a status other than ok and no
-prediction. With --window one line per
-window, with its start and end in seconds, written as soon as the window is complete; memory does
-not grow with the stream.
-
-Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 interrupted.")]
-pub struct Args {
-    /// Model file of `corsmal-feat train`, or one of `corsmal-feat benchmark`.
-    #[arg(long, short, value_name = "FILE")]
-    model: PathBuf,
-    /// Recordings: files, folders, globs, manifests, or - for one WAV stream on standard input.
-    #[arg(value_name = "PATH", required_unless_present_any = ["features", "inputs"])]
-    paths: Vec<String>,
-    /// The same by name.
-    #[arg(long = "in", short = 'i', value_name = "PATH", num_args = 1.., conflicts_with = "paths")]
-    inputs: Vec<String>,
-    /// Features instead of recordings.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["paths", "inputs", "window"])]
-    features: Option<PathBuf>,
-    #[command(flatten)]
-    members: MemberArgs,
-    /// Bring recordings to the format that the model was trained on: signal.sample_rate=44100
-    /// resamples them, signal.channels=mean mixes their channels.
-    #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with = "features")]
-    overrides: Vec<String>,
-    /// Take recordings of any sample rate and channel count as they are, whatever the model was
-    /// trained on.
-    #[arg(long)]
-    any_rate: bool,
-    /// Predictions with a highest probability below P are unknown.
-    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = crate::args::share)]
-    reject: f64,
-    /// Predict windows of so many seconds instead of whole recordings.
-    #[arg(long, value_name = "SECONDS")]
-    window: Option<f64>,
-    /// Seconds from one window to the next; default half a window.
-    #[arg(long, value_name = "SECONDS", requires = "window")]
-    hop: Option<f64>,
-    #[command(flatten)]
-    vote: VoteArgs,
-    /// File of predictions; - is standard output.
-    #[arg(long, short, value_name = "FILE", default_value = "-")]
-    out: PathBuf,
-    /// Form of the predictions.
-    #[arg(long, value_enum, default_value = "csv")]
-    format: Format,
-    /// The same as --format jsonl: a JSON object a line.
-    #[arg(long, conflicts_with = "format")]
-    json: bool,
-    /// Replace an existing output.
-    #[arg(long)]
-    overwrite: bool,
-    #[command(flatten)]
-    jobs: Jobs,
-    /// Only errors on standard error.
-    #[arg(long, short)]
-    quiet: bool,
-}
-
-/// How lines are written.
-#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Format {
-    /// A header, then a line each.
-    Csv,
-    /// A JSON object a line.
-    #[value(alias = "json")]
-    Jsonl,
-}
-
-/// The writer of this command.
-type Records = RecordWriter<Output>;
-
-impl Args {
-    fn form(&self) -> Form {
-        if self.json || self.format == Format::Jsonl { Form::JsonLines } else { Form::Csv }
-    }
-
-    /// Recordings, however they were named.
-    fn names(&self) -> &[String] {
-        if self.paths.is_empty() { &self.inputs } else { &self.paths }
-    }
-
-    /// A writer for records with these label columns.
-    fn records(&self, model: &Model, columns: &[String]) -> Result<Records, Failure> {
-        let labels = &model.header().labels;
-        let unit = match (self.window, self.vote.rule(labels)?) {
-            (None, _) => Unit::Recording,
-            (Some(_), None) => Unit::Window,
-            (Some(_), Some(_)) => Unit::Vote,
-        };
-        let target = (columns, model.header().target.as_str());
-        let output = Output::open(&self.out)?;
-        Ok(RecordWriter::new(output, (self.form(), unit), labels, target, self.reject))
-    }
-
-    /// Which recordings the model may be applied to.
-    fn rule(&self, model: &Model, config: &serde_json::Value) -> Result<FormatRule, Failure> {
-        if self.any_rate {
-            return Ok(FormatRule::default());
-        }
-        let place = self.model.display();
-        model.format_rule(config).map_err(|e| Failure::new(format!("{place}: {e}")))
-    }
-}
-
-/// How the work ended.
-enum End {
-    Done,
-    Interrupted,
-    /// Whoever reads standard output has seen enough.
-    Unread,
-}
+use records::End;
 
 /// Predicts and writes the table.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
@@ -203,69 +76,4 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         (_, 0) => ExitCode::SUCCESS,
         _ => ExitCode::from(FAILED_FILES),
     })
-}
-
-/// The model's own feature configuration.
-fn configuration(args: &Args, model: &Model) -> Result<Arc<Config>, Failure> {
-    let header = model.header();
-    let place = args.model.display();
-    if header.feature_config.is_null() {
-        return Err(Failure::new(format!(
-            "{place}: was trained on features of another program and cannot make them from \
-             recordings; give --features"
-        )));
-    }
-    let config = Config::from_value(header.feature_config.clone())?;
-    // A configuration of another version of the tool may mean something else.
-    if config.hash() != header.feature_config_hash {
-        return Err(Failure::new(format!(
-            "{place}: its feature configuration was written by version {} and reads differently in \
-             this version: extract and train again",
-            header.tool_version
-        )));
-    }
-    if args.overrides.is_empty() {
-        return Ok(Arc::new(config));
-    }
-    const FORMAT: [&str; 2] = ["signal.sample_rate", "signal.channels"];
-    let key = |text: &String| text.split('=').next().unwrap_or_default().trim().to_string();
-    if let Some(other) = args.overrides.iter().find(|text| !FORMAT.contains(&key(text).as_str())) {
-        return Err(Failure::new(format!(
-            "--set {other}: the model's features are fixed; only signal.sample_rate and \
-             signal.channels may bring recordings to the format that it was trained on"
-        )));
-    }
-    let changed = Config::from_tree(header.feature_config.clone(), &args.overrides)?;
-    Ok(Arc::new(changed))
-}
-
-/// The recordings named.
-fn recordings(args: &Args) -> Result<Vec<Input>, Failure> {
-    let is_table = |name: &&String| {
-        let extension = Path::new(name.as_str()).extension();
-        extension
-            .is_some_and(|e| e.eq_ignore_ascii_case("npz") || e.eq_ignore_ascii_case("parquet"))
-    };
-    if let Some(name) = args.names().iter().find(is_table) {
-        return Err(Failure::new(format!("{name} is a feature file: give it as --features")));
-    }
-    let collected = inputs::collect(args.names())?;
-    if let Some(skipped) = collected.warning() {
-        eprintln!("warning: {skipped}");
-    }
-    let found = collected.inputs;
-    if found.is_empty() {
-        let names = args.names().join(" ");
-        return Err(Failure::new(format!("{names}: no recordings found")));
-    }
-    Ok(found)
-}
-
-/// Whether a write went through; `false` where nobody reads any more.
-fn delivered(written: std::io::Result<()>) -> Result<bool, Failure> {
-    match written {
-        Ok(()) => Ok(true),
-        Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(false),
-        Err(e) => Err(e.into()),
-    }
 }

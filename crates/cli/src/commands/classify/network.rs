@@ -9,7 +9,8 @@ use corsmal_nets::dataset::Dataset;
 use corsmal_nets::fit;
 use corsmal_nets::model::NetModel;
 
-use super::{Args, delivered};
+use super::args::Args;
+use super::records::delivered;
 use crate::failure::Failure;
 use crate::output::Output;
 

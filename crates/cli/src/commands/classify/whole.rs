@@ -14,7 +14,8 @@ use corsmal_models::predictions::Record;
 use linfa::traits::Predict;
 use ndarray::Axis;
 
-use super::{Args, End, Records, configuration, delivered, recordings};
+use super::args::{Args, configuration, recordings};
+use super::records::{End, Records, delivered};
 use crate::failure::Failure;
 use crate::progress::{LogFormat, Meter};
 

@@ -15,7 +15,8 @@ use linfa::traits::Predict;
 use ndarray::ArrayView2;
 use rayon::prelude::*;
 
-use super::{Args, End, Records, configuration, delivered, recordings};
+use super::args::{Args, configuration, recordings};
+use super::records::{End, Records, delivered};
 use crate::failure::Failure;
 
 /// Recordings of each worker whose lines wait to be written in order.

@@ -4,72 +4,13 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::ValueEnum;
 use corsmal_ccm::capacity;
 use corsmal_ccm::dataset::{Annotations, Subset};
 use corsmal_ccm::decision::{Rule, decide, decide_joint};
 use corsmal_ccm::submission::{self, Prediction, RowKey, Submission, official_rows};
 
-use super::{Args, Format};
+use super::args::{Args, Format, Part};
 use crate::failure::{FAILED_FILES, Failure};
-
-/// Arguments about submissions.
-#[derive(clap::Args)]
-pub struct SubmissionArgs {
-    /// Official format of the submission; 2022 has class probabilities.
-    #[arg(long, value_enum, default_value = "2020")]
-    format: Format,
-    /// Decide type and level together: level empty goes with type none only.
-    #[arg(long)]
-    feasible: bool,
-    /// With --feasible: food boxes are never filled with water.
-    #[arg(long, requires = "feasible")]
-    dry_boxes: bool,
-    /// Capacity estimates: a table of `capacity`, whose sizes and times go into the format of 2022, or
-    /// any with fileName (id10_0000.png) and `capacity[mL]`.
-    #[arg(long, value_name = "CSV")]
-    capacity: Option<PathBuf>,
-    /// Write the median mass of the training containers, 15 g, as every container's (2022 only).
-    #[arg(long)]
-    mass_prior: bool,
-    /// Official annotations, to name recordings by id (2022) or container and sequence (2020).
-    #[arg(long, value_name = "CSV")]
-    annotations: Option<PathBuf>,
-    /// Refuse a submission that has not exactly the recordings of this part, and write them in the
-    /// official order.
-    #[arg(long, value_enum)]
-    part: Option<Part>,
-}
-
-/// A part of the data set.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Part {
-    /// Containers 1 to 9, 684 recordings.
-    Training,
-    /// Containers 10 to 12, 228 recordings.
-    Public,
-    /// Containers 13 to 15, 228 recordings.
-    Private,
-}
-
-impl SubmissionArgs {
-    /// These go with --type, --level and --joint.
-    pub fn refuse_without_submission(&self) -> Result<(), Failure> {
-        let given = [
-            ("--feasible", self.feasible),
-            ("--capacity", self.capacity.is_some()),
-            ("--mass-prior", self.mass_prior),
-            ("--annotations", self.annotations.is_some()),
-            ("--part", self.part.is_some()),
-        ];
-        match given.iter().find(|(_, given)| *given) {
-            Some((name, _)) => {
-                Err(Failure::new(format!("{name} is for submissions, made of --type and --level")))
-            }
-            None => Ok(()),
-        }
-    }
-}
 
 /// Decides, checks and writes.
 pub fn run(args: &Args) -> Result<ExitCode, Failure> {

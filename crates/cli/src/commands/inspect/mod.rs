@@ -6,6 +6,7 @@ mod other;
 mod output;
 mod picture;
 mod recording;
+mod refusal;
 mod several;
 
 use std::path::{Path, PathBuf};
@@ -14,9 +15,8 @@ use std::process::ExitCode;
 use corsmal_files::feature_file::FeatureFile;
 use corsmal_files::format::Content;
 use corsmal_files::layout;
-use serde::Serialize;
 
-use crate::failure::{FAILED_FILES, Failure};
+use crate::failure::Failure;
 use picture::{Picture, PictureArgs};
 
 /// Arguments of `inspect`.
@@ -41,32 +41,6 @@ pub struct Args {
     /// Print JSON instead of text, with the correlation of all channels or all members.
     #[arg(long)]
     json: bool,
-}
-
-/// The JSON form of a refusal.
-#[derive(Serialize)]
-struct Refusal<'a> {
-    path: &'a str,
-    status: &'static str,
-    byte: Option<u64>,
-    reason: &'a str,
-}
-
-impl Refusal<'_> {
-    /// Says why a file cannot be shown.
-    fn print(&self, json: bool) -> Result<ExitCode, Failure> {
-        if json {
-            print!("{}", to_json(self)?);
-        } else {
-            let reason = self.reason.strip_prefix(&format!("{}: ", self.path));
-            eprintln!("{}: {}", self.path, reason.unwrap_or(self.reason));
-        }
-        Ok(ExitCode::from(FAILED_FILES))
-    }
-}
-
-fn to_json(value: &impl Serialize) -> Result<String, Failure> {
-    Ok(serde_json::to_string_pretty(value)? + "\n")
 }
 
 /// Prints what the files are.

@@ -10,7 +10,7 @@ use corsmal_models::model_file::{Model, ModelHeader};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::{Refusal, to_json};
+use super::refusal::{Refusal, to_json};
 use crate::failure::Failure;
 
 /// First bytes of a model file.

@@ -16,7 +16,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::extracted::{Recordings, differences, shapes};
-use super::{Refusal, to_json};
+use super::refusal::{Refusal, to_json};
 use crate::failure::Failure;
 use crate::progress::{counts, failure_line};
 

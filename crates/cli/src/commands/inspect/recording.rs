@@ -9,7 +9,7 @@ use corsmal_report::Overview;
 use serde::Serialize;
 
 use super::picture::Picture;
-use super::{Refusal, to_json};
+use super::refusal::{Refusal, to_json};
 use crate::failure::Failure;
 
 /// Frames read at once.

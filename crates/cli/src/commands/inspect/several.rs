@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::recording::{decibels, length, plural};
-use super::to_json;
+use super::refusal::to_json;
 use crate::failure::{FAILED_FILES, Failure};
 
 /// What is said of one recording.

@@ -5,12 +5,12 @@ use ndarray::{Array2, ArrayView2, Axis};
 use crate::error::{ModelError, Result};
 
 /// Training rows by column, in single precision.
-pub(in crate::classifiers) struct Columns {
+pub(in crate::classifiers) struct FeatureColumns {
     /// `[features, rows]`
     values: Array2<f32>,
 }
 
-impl Columns {
+impl FeatureColumns {
     /// # Errors
     /// [`ModelError::NonFinite`] for values beyond the range of single precision.
     pub(in crate::classifiers) fn new(x: ArrayView2<'_, f64>) -> Result<Self> {

@@ -3,14 +3,16 @@
 //! Features are compared in single precision, as in scikit-learn. Leaves keep class fractions.
 
 mod columns;
+mod sample;
 mod split;
 mod tally;
 mod tree;
 
 use serde::{Deserialize, Serialize};
 
-pub(super) use columns::Columns;
-pub(super) use tree::{Sample, Tree};
+pub(super) use columns::FeatureColumns;
+pub(super) use sample::Sample;
+pub(super) use tree::Tree;
 
 /// Measure of class impurity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

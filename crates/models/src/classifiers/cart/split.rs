@@ -5,9 +5,9 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 
 use super::Growth;
-use super::columns::Columns;
+use super::columns::FeatureColumns;
+use super::sample::Sample;
 use super::tally::Tally;
-use super::tree::Sample;
 
 /// Values to be sorted above which the features of one node are shared among threads.
 const PARALLEL_WORK: usize = 200_000;
@@ -21,7 +21,7 @@ pub(super) struct Split {
 
 /// The search for the best split of one node.
 pub(super) struct Search<'a> {
-    pub columns: &'a Columns,
+    pub columns: &'a FeatureColumns,
     pub sample: &'a Sample<'a>,
     pub growth: &'a Growth,
     /// rows of the node, class after class

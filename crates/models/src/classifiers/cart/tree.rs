@@ -5,7 +5,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
 use super::Growth;
-use super::columns::Columns;
+use super::columns::FeatureColumns;
+use super::sample::Sample;
 use super::split::Search;
 use crate::error::{ModelError, Result};
 
@@ -29,21 +30,6 @@ pub(in crate::classifiers) struct Tree {
     leaves: Vec<f32>,
 }
 
-/// The labels and weights a tree grows on.
-pub(in crate::classifiers) struct Sample<'a> {
-    pub y: &'a [u32],
-    /// how often each row counts; rows that count zero times are left out
-    pub times: &'a [u32],
-    /// how much a row of each class counts
-    pub class_weights: &'a [f64],
-}
-
-impl Sample<'_> {
-    pub(super) fn weight(&self, row: usize) -> f64 {
-        f64::from(self.times[row]) * self.class_weights[self.y[row] as usize]
-    }
-}
-
 /// A node waiting to be split: its rows are `start..end` of the row list.
 struct Open {
     node: usize,
@@ -55,7 +41,7 @@ struct Open {
 impl Tree {
     /// Grows a tree; the same seed gives the same tree.
     pub(in crate::classifiers) fn grow(
-        columns: &Columns,
+        columns: &FeatureColumns,
         sample: &Sample<'_>,
         growth: &Growth,
         seed: u64,

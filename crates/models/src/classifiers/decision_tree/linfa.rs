@@ -10,12 +10,13 @@ use linfa_trees::{DecisionTree, SplitQuality, TreeNode};
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
-use super::DecisionTreeParams;
-use crate::classifiers::cart::{FeatureRule, MaxFeatures};
-use crate::classifiers::{Classify, Criterion, TreeSolver};
+use crate::classifiers::cart::{FeatureRule, Growth, MaxFeatures};
+use crate::classifiers::{Classify, Criterion};
 use crate::error::{ModelError, Result};
-use crate::params::{ClassWeight, Parameters};
+use crate::params::ClassWeight;
 use crate::table::argmax;
+
+const OWNER: &str = "tree";
 
 /// The name by which model files know this tree.
 pub(in crate::classifiers) const STORED_NAME: &str = "linfa-trees";
@@ -27,25 +28,22 @@ const MAX_VALUES: usize = 20_000_000;
 const MAX_DEPTH: usize = 512;
 
 /// Refuses parameters that linfa-trees does not have.
-pub(super) fn check(params: &DecisionTreeParams) -> Result<()> {
-    if params.solver == TreeSolver::Own {
-        return Ok(());
-    }
+pub(super) fn check(growth: &Growth, class_weight: &ClassWeight) -> Result<()> {
     let lacks = |key, value: String, allowed: &str| {
         Err(ModelError::ParameterValue {
-            owner: DecisionTreeParams::OWNER,
+            owner: OWNER,
             key,
             value,
             allowed: format!("solver = linfa has {allowed} only"),
         })
     };
-    if params.max_features != MaxFeatures::Rule(FeatureRule::All) {
-        return lacks("max_features".into(), format!("{:?}", params.max_features), "all");
+    if growth.max_features != MaxFeatures::Rule(FeatureRule::All) {
+        return lacks("max_features".into(), format!("{:?}", growth.max_features), "all");
     }
-    if params.class_weight != ClassWeight::Equal {
-        return lacks("class_weight".into(), format!("{:?}", params.class_weight), "null");
+    if *class_weight != ClassWeight::Equal {
+        return lacks("class_weight".into(), format!("{class_weight:?}"), "null");
     }
-    if let Some(depth) = params.max_depth.filter(|&depth| depth > MAX_DEPTH) {
+    if let Some(depth) = growth.max_depth.filter(|&depth| depth > MAX_DEPTH) {
         return lacks("max_depth".into(), depth.to_string(), "1 to 512");
     }
     Ok(())
@@ -75,12 +73,12 @@ pub struct LinfaTree {
 
 impl LinfaTree {
     pub(super) fn train(
-        params: &DecisionTreeParams,
+        growth: &Growth,
         x: ArrayView2<'_, f64>,
         y: &[usize],
         n_classes: usize,
     ) -> Result<Self> {
-        let failed = |reason: String| ModelError::Numerical { owner: "tree", reason };
+        let failed = |reason: String| ModelError::Numerical { owner: OWNER, reason };
         if x.len() > MAX_VALUES {
             let (rows, features) = x.dim();
             return Err(failed(format!(
@@ -88,16 +86,16 @@ impl LinfaTree {
                  {MAX_VALUES} values): use solver = own"
             )));
         }
-        let quality = match params.criterion {
+        let quality = match growth.criterion {
             Criterion::Gini => SplitQuality::Gini,
             Criterion::Entropy => SplitQuality::Entropy,
         };
         let data = DatasetBase::new(x, Array1::from(y.to_vec()));
         let tree = DecisionTree::params()
             .split_quality(quality)
-            .max_depth(Some(params.max_depth.unwrap_or(MAX_DEPTH)))
-            .min_weight_split(params.min_samples_split as f32)
-            .min_weight_leaf(params.min_samples_leaf as f32)
+            .max_depth(Some(growth.max_depth.unwrap_or(MAX_DEPTH)))
+            .min_weight_split(growth.min_samples_split as f32)
+            .min_weight_leaf(growth.min_samples_leaf as f32)
             .fit(&data)
             .map_err(|e| failed(format!("linfa-trees: {e}")))?;
         let mut fitted = Self { n_features: x.ncols(), n_classes, nodes: Vec::new() };
@@ -137,7 +135,7 @@ impl LinfaTree {
     /// Appends a node and all below it.
     fn copy(&mut self, root: &TreeNode<f64, usize>) -> Result<()> {
         let broken = || ModelError::Numerical {
-            owner: "tree",
+            owner: OWNER,
             reason: "linfa-trees gave a node without children".into(),
         };
         // A right child knows whose it is.
@@ -172,7 +170,7 @@ impl Classify for LinfaTree {
 
     fn predict_proba(&self, _: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
         Err(ModelError::NoProbability {
-            owner: "tree",
+            owner: OWNER,
             remedy: "linfa-trees keeps one class per leaf; train with solver=own",
         })
     }

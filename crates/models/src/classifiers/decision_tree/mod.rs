@@ -43,7 +43,10 @@ tree_parameters! {
     }
     random_thresholds: false;
     check(this) {
-        linfa::check(this)
+        match this.solver {
+            TreeSolver::Own => Ok(()),
+            TreeSolver::Linfa => linfa::check(&this.growth(), &this.class_weight),
+        }
     }
 }
 
@@ -59,7 +62,7 @@ impl Train for DecisionTreeParams {
 
     fn train(&self, x: ArrayView2<'_, f64>, y: &[usize], n_classes: usize) -> Result<FittedTree> {
         if self.solver == TreeSolver::Linfa {
-            return LinfaTree::train(self, x, y, n_classes).map(FittedTree::Linfa);
+            return LinfaTree::train(&self.growth(), x, y, n_classes).map(FittedTree::Linfa);
         }
         let plan = Plan {
             growth: self.growth(),

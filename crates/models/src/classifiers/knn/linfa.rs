@@ -10,10 +10,9 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::nearest::Nearest;
-use super::{KNearest, KNearestParams, Metric, Search, check_lengths, squared_lengths};
+use super::{KNearest, Metric, OWNER, check_lengths, squared_lengths};
 use crate::classifiers::Classify;
 use crate::error::{ModelError, Result};
-use crate::params::Parameters;
 
 /// The name by which model files know these neighbours.
 pub(in crate::classifiers) const STORED_NAME: &str = "linfa-nn";
@@ -25,16 +24,14 @@ const MOST_TREE_FEATURES: usize = 16;
 const LONGEST: f64 = 1e280;
 
 /// Refuses distances that linfa-nn does not have.
-pub(super) fn check(params: &KNearestParams) -> Result<()> {
-    let available =
-        matches!(params.metric, Metric::Euclidean | Metric::Manhattan | Metric::Chebyshev);
-    if params.algorithm == Search::Brute || available {
+pub(super) fn check(metric: Metric) -> Result<()> {
+    if matches!(metric, Metric::Euclidean | Metric::Manhattan | Metric::Chebyshev) {
         return Ok(());
     }
     Err(ModelError::ParameterValue {
-        owner: KNearestParams::OWNER,
+        owner: OWNER,
         key: "metric".into(),
-        value: format!("{:?}", params.metric).to_lowercase(),
+        value: format!("{:?}", metric).to_lowercase(),
         allowed: "algorithm = linfa has euclidean, manhattan and chebyshev only".into(),
     })
 }
@@ -118,7 +115,7 @@ fn check_range(squared_lengths: &[f64]) -> Result<()> {
     match squared_lengths.iter().position(|length| *length > LONGEST) {
         None => Ok(()),
         Some(row) => Err(ModelError::Numerical {
-            owner: KNearestParams::OWNER,
+            owner: OWNER,
             reason: format!(
                 "the features of row {row} are too large for algorithm = linfa: standardize them"
             ),
@@ -127,5 +124,5 @@ fn check_range(squared_lengths: &[f64]) -> Result<()> {
 }
 
 fn failed(error: impl std::fmt::Display) -> ModelError {
-    ModelError::Numerical { owner: KNearestParams::OWNER, reason: format!("linfa-nn: {error}") }
+    ModelError::Numerical { owner: OWNER, reason: format!("linfa-nn: {error}") }
 }

@@ -7,6 +7,7 @@
 
 mod linfa;
 mod nearest;
+mod params;
 mod screen;
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
@@ -17,10 +18,13 @@ use nearest::Nearest;
 use screen::Screen;
 
 pub(super) use linfa::{LinfaNeighbours, STORED_NAME};
+pub(super) use params::FittedNeighbours;
+pub use params::{KNearestParams, Search};
 
-use super::{Classify, Train};
+use super::Classify;
 use crate::error::{ModelError, Result};
-use crate::params::{Parameters, parameters};
+
+const OWNER: &str = "knn";
 
 /// How near two rows are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -48,42 +52,6 @@ pub enum Weights {
     Distance,
 }
 
-/// Who finds the neighbours.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Search {
-    /// this crate, by exhaustive search
-    #[default]
-    Brute,
-    /// linfa-nn: a k-d tree up to 16 features, else its linear search
-    Linfa,
-}
-
-impl Search {
-    fn is_brute(&self) -> bool {
-        *self == Self::Brute
-    }
-}
-
-parameters! {
-    /// Parameters of k nearest neighbours.
-    KNearestParams, "knn" {
-        k: usize = 5, "a whole number from 1 to the number of training rows", "neighbours that vote";
-        weights: Weights = Weights::Uniform, "uniform or distance", "how votes count";
-        metric: Metric = Metric::Euclidean,
-            "euclidean, manhattan, cosine, chebyshev or minkowski", "distance between rows";
-        p: f64 = 2.0, "a number of at least 1", "exponent of the minkowski metric";
-        #[serde(skip_serializing_if = "Search::is_brute")]
-        algorithm: Search = Search::Brute, "brute or linfa",
-            "who finds the neighbours: this program, or linfa-nn";
-    }
-    check(this) {
-        Self::require(this.k >= 1, "k", this.k)?;
-        Self::require(this.p.is_finite() && this.p >= 1.0, "p", this.p)?;
-        linfa::check(this)
-    }
-}
-
 /// The training rows, ready to be searched.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct KNearest {
@@ -97,56 +65,6 @@ pub struct KNearest {
     y: Vec<usize>,
     /// squared row lengths
     norms: Vec<f64>,
-}
-
-/// Training rows of either search.
-pub enum FittedNeighbours {
-    Own(KNearest),
-    Linfa(LinfaNeighbours),
-}
-
-impl Train for KNearestParams {
-    type Fitted = FittedNeighbours;
-    const FEWEST_CLASSES: usize = 1;
-
-    fn train(
-        &self,
-        x: ArrayView2<'_, f64>,
-        y: &[usize],
-        n_classes: usize,
-    ) -> Result<FittedNeighbours> {
-        if self.k > x.nrows() {
-            return Err(ModelError::ParameterValue {
-                owner: Self::OWNER,
-                key: "k".into(),
-                value: self.k.to_string(),
-                allowed: format!("there are {} training rows", x.nrows()),
-            });
-        }
-        check_lengths(x)?;
-        let (x, norms) = match self.metric {
-            Metric::Cosine => {
-                let x = unit_rows(x);
-                let norms = squared_lengths(x.view());
-                (x, norms)
-            }
-            _ => copied(x),
-        };
-        let rows = KNearest {
-            k: self.k,
-            weights: self.weights,
-            metric: self.metric,
-            p: self.p,
-            n_classes,
-            x,
-            y: y.to_vec(),
-            norms,
-        };
-        match self.algorithm {
-            Search::Brute => Ok(FittedNeighbours::Own(rows)),
-            Search::Linfa => LinfaNeighbours::new(rows).map(FittedNeighbours::Linfa),
-        }
-    }
 }
 
 /// Most query rows of one block: enough to keep the matrix product busy, small enough for the cache.
@@ -323,7 +241,7 @@ fn check_lengths(x: ArrayView2<'_, f64>) -> Result<()> {
     match squared_lengths(x).iter().position(|norm| !norm.is_finite()) {
         None => Ok(()),
         Some(row) => Err(ModelError::Numerical {
-            owner: KNearestParams::OWNER,
+            owner: OWNER,
             reason: format!(
                 "the features of row {row} are too large for distances: standardize them"
             ),

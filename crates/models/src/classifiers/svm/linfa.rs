@@ -8,9 +8,7 @@ use linfa::traits::Fit;
 use ndarray::{Array1, ArrayView2, Axis};
 
 use super::kernel::Function;
-use super::{Pair, Svm, SvmParams, compact};
 use crate::error::{ModelError, Result};
-use crate::params::Parameters;
 use crate::table::class_counts;
 
 /// Most memory for the kernel matrix of a pair of classes.
@@ -19,15 +17,28 @@ const MAX_KERNEL_BYTES: usize = 1 << 30;
 /// Coefficients that linfa-svm itself takes for zero.
 const ZERO: f64 = 100.0 * f64::EPSILON;
 
+/// The machine of two classes; the first is on the positive side.
+pub(super) struct Solved {
+    pub first: usize,
+    pub second: usize,
+    /// training rows that are support vectors
+    pub rows: Vec<u32>,
+    /// α·y of each
+    pub coefficients: Vec<f64>,
+    pub rho: f64,
+}
+
+/// The machines of every two classes. `costs` are the factors of the classes' slack, `tol` the
+/// tolerance of the optimality conditions.
 pub(super) fn train(
-    params: &SvmParams,
     x: ArrayView2<'_, f64>,
     y: &[usize],
-    weights: &[f64],
+    costs: &[f64],
     function: Function,
-) -> Result<Svm> {
-    let n_classes = weights.len();
-    let failed = |reason: String| ModelError::Numerical { owner: SvmParams::OWNER, reason };
+    tol: f64,
+) -> Result<Vec<Solved>> {
+    let n_classes = costs.len();
+    let failed = |reason: String| ModelError::Numerical { owner: "svm", reason };
     let mut counts = class_counts(y, n_classes);
     counts.sort_unstable_by(|a, b| b.cmp(a));
     let most: usize = counts.iter().take(2).sum();
@@ -46,8 +57,8 @@ pub(super) fn train(
             let positive: Array1<bool> = rows.iter().map(|&row| y[row] == first).collect();
             let data = DatasetBase::new(x.select(Axis(0), &rows), positive);
             let solver = linfa_svm::Svm::<f64, bool>::params()
-                .pos_neg_weights(params.C * weights[first], params.C * weights[second])
-                .eps(params.tol);
+                .pos_neg_weights(costs[first], costs[second])
+                .eps(tol);
             // linfa's width is the reciprocal of gamma.
             let solver = match function {
                 Function::Rbf { gamma } => solver.gaussian_kernel(1.0 / gamma),
@@ -62,9 +73,8 @@ pub(super) fn train(
             let kept = rows.iter().zip(&solved.alpha).filter(|(_, alpha)| alpha.abs() > ZERO);
             let (rows, coefficients) = kept.map(|(&row, &alpha)| (row as u32, alpha)).unzip();
             let rho = solved.rho;
-            pairs.push(Pair { first, second, rows, coefficients, rho, sigmoid: None });
+            pairs.push(Solved { first, second, rows, coefficients, rho });
         }
     }
-    let support = compact(&mut pairs, x);
-    Ok(Svm { n_classes, function, support, pairs })
+    Ok(pairs)
 }

@@ -16,6 +16,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use self::kernel::{Function, Gram};
+use self::linfa::Solved;
 use self::probability::Sigmoid;
 use super::{Classify, Train};
 use crate::error::{ModelError, Result};
@@ -25,7 +26,7 @@ use crate::table::argmax;
 /// How two rows are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kernel {
+pub enum SvmKernel {
     /// exp(−γ‖a − b‖²)
     Rbf,
     /// a·b
@@ -74,7 +75,7 @@ parameters! {
     #[allow(non_snake_case, reason = "C is its name everywhere")]
     SvmParams, "svm" {
         C: f64 = 1.0, "a positive number", "cost of a training row on the wrong side";
-        kernel: Kernel = Kernel::Rbf, "rbf or linear", "how rows are compared";
+        kernel: SvmKernel = SvmKernel::Rbf, "rbf or linear", "how rows are compared";
         gamma: Gamma = Gamma::Rule(GammaRule::Scale), "scale, auto or a positive number",
             "width of the rbf kernel";
         class_weight: ClassWeight = ClassWeight::Equal,
@@ -105,7 +106,7 @@ impl SvmParams {
     fn function(&self, x: ArrayView2<'_, f64>) -> Function {
         let features = x.ncols() as f64;
         match (self.kernel, self.gamma) {
-            (Kernel::Linear, _) => Function::Linear,
+            (SvmKernel::Linear, _) => Function::Linear,
             (_, Gamma::Value(gamma)) => Function::Rbf { gamma },
             (_, Gamma::Rule(GammaRule::Auto)) => Function::Rbf { gamma: 1.0 / features },
             (_, Gamma::Rule(GammaRule::Scale)) => {
@@ -216,7 +217,19 @@ impl Train for SvmParams {
         let function = self.function(x);
         let x = x.as_standard_layout();
         if self.solver == SvmSolver::Linfa {
-            return linfa::train(self, x.view(), y, &weights, function);
+            let costs: Vec<f64> = weights.iter().map(|weight| self.C * weight).collect();
+            let solved = linfa::train(x.view(), y, &costs, function, self.tol)?;
+            let pair = |Solved { first, second, rows, coefficients, rho }| Pair {
+                first,
+                second,
+                rows,
+                coefficients,
+                rho,
+                sigmoid: None,
+            };
+            let mut pairs: Vec<Pair> = solved.into_iter().map(pair).collect();
+            let support = compact(&mut pairs, x.view());
+            return Ok(Svm { n_classes, function, support, pairs });
         }
         let budget = self.cache_mb.saturating_mul(1 << 20);
         let gram = Gram::new(x.view(), function, budget)?;

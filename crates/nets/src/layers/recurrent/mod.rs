@@ -6,6 +6,7 @@
 
 mod cell;
 mod packing;
+mod trace;
 
 use super::uniform_by;
 use crate::batch::{Batch, Shape};
@@ -18,6 +19,9 @@ use crate::matrix::Matrix;
 use crate::parameters::{Declared, Parameters};
 use cell::{Cell, Gradients, States};
 use packing::Packing;
+use trace::LayerTrace;
+
+pub use trace::Trace;
 
 /// GRU or LSTM layers, each over the outputs of the one before.
 #[derive(Clone, Debug)]
@@ -28,21 +32,6 @@ pub struct Recurrent {
     hidden: usize,
     layers: usize,
     dropout: f32,
-}
-
-/// What recurrent layers keep for the way back.
-#[derive(Debug)]
-pub struct Trace {
-    packing: Packing,
-    layers: Vec<LayerTrace>,
-}
-
-#[derive(Debug)]
-struct LayerTrace {
-    input: Matrix,
-    states: States,
-    /// dropout of the input, when it is on
-    kept: Vec<u8>,
 }
 
 impl Recurrent {

@@ -1,4 +1,4 @@
-//! The front end: from what a file holds to the signal that features see.
+//! How a recording becomes the signal that features are computed from.
 
 use corsmal_dsp::resample::ResType;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -62,7 +62,7 @@ pub enum Normalize {
     Rms,
 }
 
-/// The front end, in the order in which its steps run.
+/// How the signal is prepared, in the order in which the steps run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SignalConfig {

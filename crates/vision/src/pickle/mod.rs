@@ -1,7 +1,15 @@
 //! A reader of text pickles (protocol 0) that hold lists, dictionaries, strings, numbers and numpy
 //! arrays of floats. Nothing is called: a pickle that names any other function is refused.
 
+mod array;
+mod literal;
+
 use std::collections::HashMap;
+
+use array::array;
+use literal::{number, string, unicode};
+
+pub(crate) use array::Array;
 
 /// Place of a value in a [`Pickle`].
 pub(crate) type Id = usize;
@@ -22,13 +30,6 @@ pub(crate) enum Value {
         double: bool,
         little: bool,
     },
-}
-
-/// Array in C order.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Array {
-    pub(crate) shape: Vec<usize>,
-    pub(crate) data: Vec<f64>,
 }
 
 /// The three names of numpy that an array needs.
@@ -286,40 +287,6 @@ impl<'a> Machine<'a> {
     }
 }
 
-fn array(
-    shape: Vec<usize>,
-    raw: &[u8],
-    double: bool,
-    little: bool,
-    fortran: bool,
-) -> Result<Array, String> {
-    let width = if double { 8 } else { 4 };
-    let count = shape.iter().try_fold(1usize, |n, &m| n.checked_mul(m));
-    if count.and_then(|n| n.checked_mul(width)) != Some(raw.len()) {
-        return Err(format!("an array of shape {shape:?} with {} bytes", raw.len()));
-    }
-    if fortran && shape.len() > 2 {
-        return Err("an array in Fortran order with more than two axes".into());
-    }
-    let element = |bytes: &[u8]| {
-        let mut copy = [0u8; 8];
-        copy[..width].copy_from_slice(bytes);
-        if !little {
-            copy[..width].reverse();
-        }
-        if double {
-            f64::from_le_bytes(copy)
-        } else {
-            f64::from(f32::from_le_bytes([copy[0], copy[1], copy[2], copy[3]]))
-        }
-    };
-    let mut data: Vec<f64> = raw.chunks_exact(width).map(element).collect();
-    if let (true, [rows, columns]) = (fortran, shape.as_slice()) {
-        data = (0..rows * columns).map(|i| data[i % columns * rows + i / columns]).collect();
-    }
-    Ok(Array { shape, data })
-}
-
 fn callable(module: &[u8], name: &[u8]) -> Result<Callable, String> {
     match (module, name) {
         (b"numpy.core.multiarray" | b"numpy._core.multiarray", b"_reconstruct") => {
@@ -333,56 +300,6 @@ fn callable(module: &[u8], name: &[u8]) -> Result<Callable, String> {
             String::from_utf8_lossy(&name[..name.len().min(40)])
         )),
     }
-}
-
-fn number(line: &[u8]) -> Option<f64> {
-    let text = std::str::from_utf8(line).ok()?;
-    text.strip_suffix('L').unwrap_or(text).trim().parse().ok()
-}
-
-/// The content of a Python 2 string literal.
-fn string(line: &[u8]) -> Option<Vec<u8>> {
-    let (&quote, rest) = line.split_first()?;
-    let (&last, body) = rest.split_last()?;
-    if quote != last || !matches!(quote, b'\'' | b'"') {
-        return None;
-    }
-    let mut out = Vec::with_capacity(body.len());
-    let mut bytes = body.iter().copied();
-    while let Some(b) = bytes.next() {
-        if b != b'\\' {
-            out.push(b);
-            continue;
-        }
-        out.push(match bytes.next()? {
-            b'n' => b'\n',
-            b'r' => b'\r',
-            b't' => b'\t',
-            b'x' => hexadecimal(&mut bytes, 2)? as u8,
-            same @ (b'\\' | b'\'' | b'"') => same,
-            _ => return None,
-        });
-    }
-    Some(out)
-}
-
-fn unicode(line: &[u8]) -> Option<Vec<u8>> {
-    let mut out = String::new();
-    let mut bytes = line.iter().copied();
-    while let Some(b) = bytes.next() {
-        // Raw bytes are latin-1, escapes are \uXXXX.
-        let code = match b {
-            b'\\' if bytes.next()? == b'u' => hexadecimal(&mut bytes, 4)?,
-            b'\\' => return None,
-            b => u32::from(b),
-        };
-        out.push(char::from_u32(code)?);
-    }
-    Some(out.into_bytes())
-}
-
-fn hexadecimal(bytes: &mut impl Iterator<Item = u8>, digits: usize) -> Option<u32> {
-    (0..digits).try_fold(0, |n, _| Some(16 * n + char::from(bytes.next()?).to_digit(16)?))
 }
 
 #[cfg(test)]

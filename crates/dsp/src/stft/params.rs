@@ -1,16 +1,11 @@
-//! Short-time Fourier transform of whole arrays (librosa 0.11 `stft`, `istft` conventions).
+//! What a short-time Fourier transform is asked for.
 
-use ndarray::{Array3, ArrayView2, ArrayViewMut3, Axis};
+use ndarray::ArrayView2;
 use num_complex::Complex;
-use num_traits::Zero;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{DspError, Result, from_name, room_for};
-use crate::lanes::{LANES, Row};
 use crate::real::Real;
-use crate::simd::vectorized;
-use crate::tiles::{LanePlan, for_each_tile, neighbours, planar, write_columns};
-use crate::transform::Forward;
 use crate::window::Window;
 
 /// Longest transform; bounds the memory that a length from outside can take.
@@ -173,158 +168,9 @@ impl StftParams {
     }
 }
 
-/// Complex spectrogram `[channels, n_fft / 2 + 1, frames]` of `y [channels, samples]` (librosa 0.11
-/// `stft`). `f32` signals are transformed in single precision (within 1e-6 of the largest value of
-/// a frame), `f64` signals in double precision.
-///
-/// # Errors
-/// Impossible parameters, or a signal too short for one frame.
-///
-/// ```
-/// use corsmal_dsp::stft::{StftParams, stft};
-///
-/// let y = ndarray::Array2::<f64>::ones((1, 4096));
-/// let spectrum = stft(y.view(), &StftParams::new(1024, 256))?;
-/// assert_eq!(spectrum.dim(), (1, 513, 17));
-/// assert!((spectrum[[0, 0, 8]].re - 512.0).abs() < 1e-9); // the sum of the window
-/// # Ok::<(), corsmal_dsp::DspError>(())
-/// ```
-pub fn stft<T: Real>(y: ArrayView2<T>, p: &StftParams) -> Result<Array3<Complex<T>>> {
-    let mut out = Array3::zeros(p.shape_of(y)?);
-    stft_into(y, p, out.view_mut())?;
-    Ok(out)
-}
-
-/// [`stft`] written into `out`, whose shape is [`StftParams::shape_of`].
-///
-/// # Errors
-/// As [`stft`], or another shape.
-pub fn stft_into<T: Real>(
-    y: ArrayView2<T>,
-    p: &StftParams,
-    mut out: ArrayViewMut3<Complex<T>>,
-) -> Result<()> {
-    check_out(&out, p.shape_of(y)?)?;
-    let y = planar(y);
-    if T::SINGLE {
-        let plan = LanePlan::new(p)?;
-        let state = || (plan.frames(), vec![Row::ZERO; 2 * p.n_bins()]);
-        for_each_tile(out.view_mut(), state, |(frames, spectrum), mut tile| {
-            let y = single(y.view(), tile.channel);
-            for (b, mut block) in tile.out.axis_chunks_iter_mut(Axis(1), LANES).enumerate() {
-                frames.complex(y, tile.first + b * LANES, spectrum);
-                let rows = block.outer_iter_mut().zip(spectrum.as_chunks().0);
-                for (row, [re, im]) in rows {
-                    let row = neighbours(row);
-                    vectorized(
-                        #[inline(always)]
-                        || {
-                            for (slot, (re, im)) in row.iter_mut().zip(re.0.iter().zip(&im.0)) {
-                                let (re, im) = (f64::from(*re), f64::from(*im));
-                                *slot = Complex::new(T::of(re), T::of(im));
-                            }
-                        },
-                    );
-                }
-            }
-        });
-        Ok(())
-    } else {
-        each_spectrum(y.view(), p, out, |z| z)
-    }
-}
-
-fn check_out<R>(out: &ArrayViewMut3<R>, shape: (usize, usize, usize)) -> Result<()> {
-    if out.dim() == shape && out.is_standard_layout() {
-        return Ok(());
-    }
-    let expected = format!("{shape:?} in C order");
-    Err(DspError::Shape { name: "out", expected, actual: out.shape().to_vec() })
-}
-
-/// Channel `c` of a contiguous single-precision signal.
-pub(crate) fn single<'a, T: Real>(y: ArrayView2<'a, T>, c: usize) -> &'a [f32] {
-    let row = y.index_axis_move(Axis(0), c).to_slice().and_then(T::as_f32);
-    row.expect("contiguous and of single precision")
-}
-
-/// `|stft|^power` as `[channels, n_fft / 2 + 1, frames]` (librosa 0.11 `_spectrogram`), by a
-/// transform in double precision whatever `T` is, as features need that amplify its rounding.
-///
-/// # Errors
-/// As [`stft`].
-pub fn spectrogram<T: Real>(y: ArrayView2<T>, p: &StftParams, power: f64) -> Result<Array3<T>> {
-    let mut out = Array3::zeros(p.shape_of(y)?);
-    spectrogram_into(y, p, power, out.view_mut())?;
-    Ok(out)
-}
-
-/// [`spectrogram`] written into `out`, whose shape is [`StftParams::shape_of`].
-///
-/// # Errors
-/// As [`stft`], or another shape.
-pub fn spectrogram_into<T: Real>(
-    y: ArrayView2<T>,
-    p: &StftParams,
-    power: f64,
-    out: ArrayViewMut3<T>,
-) -> Result<()> {
-    check_out(&out, p.shape_of(y)?)?;
-    let y = planar(y);
-    match power {
-        1.0 => each_spectrum(y.view(), p, out, magnitude),
-        2.0 => each_spectrum(y.view(), p, out, |z| magnitude(z) * magnitude(z)),
-        _ => each_spectrum(y.view(), p, out, |z| magnitude(z).powf(T::of(power))),
-    }
-}
-
-/// Magnitude of a bin as librosa has it: of the value rounded to `T`.
-#[inline(always)]
-pub(crate) fn magnitude<T: Real>(z: Complex<T>) -> T {
-    if T::SINGLE {
-        let (re, im) = (z.re.wide(), z.im.wide());
-        T::of((re * re + im * im).sqrt())
-    } else {
-        z.norm()
-    }
-}
-
-/// Fills `out` with `value` of every bin, transformed in double precision and rounded to `T`.
-fn each_spectrum<T: Real, R: Copy + Send + Zero>(
-    y: ArrayView2<T>,
-    p: &StftParams,
-    out: ArrayViewMut3<R>,
-    value: impl Fn(Complex<T>) -> R + Sync,
-) -> Result<()> {
-    let forward = Forward::<f64>::new(p)?;
-    let bins = p.n_bins();
-    let state = || (forward.scratch(), vec![R::zero(); LANES * bins]);
-    for_each_tile(out, state, |(scratch, columns), mut tile| {
-        let y = y.row(tile.channel);
-        let y = y.to_slice().expect("contiguous");
-        for (b, block) in tile.out.axis_chunks_iter_mut(Axis(1), LANES).enumerate() {
-            let first = tile.first + b * LANES;
-            for (t, column) in columns.chunks_exact_mut(bins).take(block.ncols()).enumerate() {
-                let spectrum = forward.spectrum(y, first + t, scratch);
-                vectorized(
-                    #[inline(always)]
-                    || {
-                        for (slot, z) in column.iter_mut().zip(spectrum) {
-                            *slot = value(Complex::new(T::of(z.re), T::of(z.im)));
-                        }
-                    },
-                );
-            }
-            write_columns(columns, block);
-        }
-    });
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ndarray::Array2;
 
     #[test]
     fn frame_counts_follow_librosa() {
@@ -335,24 +181,6 @@ mod tests {
         let plain = StftParams { center: false, ..StftParams::new(512, 128) };
         assert_eq!(plain.n_frames(511), 0);
         assert_eq!(plain.n_frames(512), 1);
-    }
-
-    #[test]
-    fn constant_signal_has_the_window_sum_at_dc() {
-        let y = Array2::<f64>::ones((1, 4096));
-        let d = stft(y.view(), &StftParams::new(1024, 256)).unwrap();
-        assert!((d[[0, 0, 8]].re - 512.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn results_of_another_shape_or_order_are_refused() {
-        let (y, p) = (Array2::<f32>::zeros((2, 1000)), StftParams::new(256, 64));
-        let (channels, bins, frames) = p.shape_of(y.view()).unwrap();
-        let mut short = Array3::zeros((channels, bins, frames - 1));
-        assert!(stft_into(y.view(), &p, short.view_mut()).is_err());
-        let mut turned = Array3::zeros((frames, bins, channels));
-        let turned = turned.view_mut().reversed_axes();
-        assert!(spectrogram_into(y.view(), &p, 1.0, turned).is_err());
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The front end: decoded blocks to the signal that features see, in the order of
+//! The signal chain: decoded blocks to the signal that features see, in the order of
 //! [`SignalConfig`].
 
 use corsmal_dsp::corsmal::downmix_71_weights;
@@ -32,7 +32,7 @@ pub fn channels_out(rule: &Channels, channels: usize) -> Result<usize, String> {
 }
 
 /// Channels, resampling, pre-emphasis and length, block by block.
-pub struct FrontEnd {
+pub struct SignalChain {
     rule: Channels,
     channels_in: usize,
     channels: usize,
@@ -47,8 +47,8 @@ pub struct FrontEnd {
     mixed: Vec<f32>,
 }
 
-impl FrontEnd {
-    /// The front end for recordings of `channels_in` channels whose features run at `sample_rate`.
+impl SignalChain {
+    /// The chain for recordings of `channels_in` channels whose features run at `sample_rate`.
     ///
     /// # Errors
     /// A sentence, where the configuration does not fit the recording.
@@ -238,7 +238,7 @@ mod tests {
     fn run(config: &SignalConfig, channels: usize, input: &[f32], block: usize) -> Vec<f32> {
         let plan = (config.sample_rate > 0.0)
             .then(|| Converter::new(44100.0, config.sample_rate, config.res_type).unwrap());
-        let mut front = FrontEnd::new(config, channels, plan, 100.0).unwrap();
+        let mut front = SignalChain::new(config, channels, plan, 100.0).unwrap();
         let mut out = Vec::new();
         input.chunks(block * channels).for_each(|b| front.push(b, &mut out));
         let whole = front.finish(|block| {

@@ -1,0 +1,51 @@
+//! Where recordings and detections are, and how faithfully a method is followed.
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use corsmal_ccm::capacity::{CapacityOptions, Method};
+use corsmal_vision::cuboid::Outliers;
+use corsmal_vision::lode::Variant;
+
+/// Where recordings and detections are.
+#[derive(clap::Args)]
+pub(super) struct Source {
+    /// Folder of the data set.
+    #[arg(long, value_name = "DIR")]
+    data: PathBuf,
+    /// Folder of tables of detections (SEQUENCE.csv or .json, by container or not); by default
+    /// `detections/` beside each recording's audio folder.
+    #[arg(long, value_name = "DIR")]
+    detections: Option<PathBuf>,
+    /// Seed of votes and isolation forests.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Recordings at a time; by default one for each core.
+    #[arg(long, value_name = "N", env = "CORSMAL_FEAT_JOBS", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum VariantName {
+    /// As the published program computes, its quirks included.
+    Published,
+    /// Without its defects.
+    Corrected,
+}
+
+impl Source {
+    pub(super) fn options(self, method: Method, variant: VariantName) -> CapacityOptions {
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        let published = variant == VariantName::Published;
+        CapacityOptions {
+            data: self.data,
+            detections: self.detections,
+            method,
+            variant: if published { Variant::Published } else { Variant::Corrected },
+            outliers: if published { Outliers::Published } else { Outliers::Corrected },
+            model: None,
+            jobs: self.jobs.map_or_else(cores, usize::from),
+            seed: self.seed,
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! What the command line says.
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use corsmal_ccm::predictions::{self, RecordingPredictions};
+use corsmal_models::labels::Labels;
+
+use crate::args::VoteArgs;
+use crate::failure::Failure;
+
+/// Arguments of `fuse`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  corsmal-feat fuse rf.csv svm.csv --weights 2,1 -o mean.csv
+  corsmal-feat fuse windows.csv --vote majority --background none --least 6 -o recordings.csv
+  corsmal-feat fuse --type type_rf.csv type_gru.csv --level level_rf.csv level_gru.csv \\
+    --capacity capacities.csv --format 2020 --part public --out submission.csv
+  corsmal-feat fuse --joint joint.csv --format 2022 --annotations ccm_train_annotation.csv \\
+    --out submission.csv
+
+Prediction files are those of `classify` and `cross-validate --predictions`, or have columns
+Object,Sequence,p0,p1,… True classes, folds and labels are carried along. Files are averaged (--weights: one for each, in their order). --type, --level
+and --joint are for recordings of the CORSMAL data set and write an official submission, -1 where
+something is not estimated.
+
+Exit codes: 0 all fine, 1 some recordings have no prediction, 2 could not run.")]
+pub struct Args {
+    /// Prediction files of the same recordings and classes.
+    #[arg(value_name = "CSV", conflicts_with_all = ["kind", "level", "joint"])]
+    pub(super) files: Vec<PathBuf>,
+    /// The same by name.
+    #[arg(long, value_name = "CSV", num_args = 1.., conflicts_with = "files")]
+    pub(super) predictions: Vec<PathBuf>,
+    /// Prediction files of the filling type.
+    #[arg(long = "type", value_name = "CSV", num_args = 1.., conflicts_with_all = ["predictions", "joint"])]
+    pub(super) kind: Vec<PathBuf>,
+    /// Prediction files of the filling level.
+    #[arg(long, value_name = "CSV", num_args = 1.., conflicts_with_all = ["predictions", "joint"])]
+    pub(super) level: Vec<PathBuf>,
+    /// Prediction files of type and level together (target joint).
+    #[arg(long, value_name = "CSV", num_args = 1.., conflicts_with = "predictions")]
+    pub(super) joint: Vec<PathBuf>,
+    /// Weight of each file of --predictions or --joint; equal by default.
+    #[arg(long, value_name = "W,…", value_delimiter = ',', conflicts_with_all = ["kind", "level"])]
+    pub(super) weights: Option<Vec<f64>>,
+    /// Weight of each file of --type.
+    #[arg(long, value_name = "W,…", value_delimiter = ',', requires = "kind")]
+    pub(super) type_weights: Option<Vec<f64>>,
+    /// Weight of each file of --level.
+    #[arg(long, value_name = "W,…", value_delimiter = ',', requires = "level")]
+    pub(super) level_weights: Option<Vec<f64>>,
+    #[command(flatten)]
+    pub(super) vote: VoteArgs,
+    #[command(flatten)]
+    pub(super) submission: SubmissionArgs,
+    /// File to write; - is standard output (not for submissions).
+    #[arg(long, short, value_name = "FILE")]
+    pub(super) out: PathBuf,
+    /// Replace an existing output.
+    #[arg(long)]
+    pub(super) overwrite: bool,
+    /// Print nothing.
+    #[arg(long, short)]
+    pub(super) quiet: bool,
+}
+
+/// Form of a submission.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Format {
+    /// Container ID, Sequence, type, level, capacity.
+    #[value(name = "2020")]
+    Y2020,
+    /// Configuration ID and 19 more columns, with class probabilities.
+    #[value(name = "2022")]
+    Y2022,
+}
+
+impl Args {
+    /// One table from several: windows are voted on, then files averaged.
+    pub(super) fn fused(
+        &self,
+        paths: &[PathBuf],
+        weights: Option<&[f64]>,
+    ) -> Result<RecordingPredictions, Failure> {
+        if paths.len() > 1 || weights.is_some() {
+            self.vote.refuse_background("an average of files")?;
+        }
+        let mut tables = Vec::with_capacity(paths.len());
+        for path in paths {
+            let mut table = predictions::read(path)?;
+            if let Some(rule) = self.vote.rule(&Labels::new(table.labels.clone())?)? {
+                table = table.vote(rule)?;
+            }
+            tables.push(table);
+        }
+        match (tables.len(), weights) {
+            // Votes stand as they are: their shares may have another maximum.
+            (1, None) => {
+                let table = tables.remove(0);
+                table.check_once_each()?;
+                Ok(table.of_recordings())
+            }
+            _ => Ok(RecordingPredictions::average(&tables, weights)?),
+        }
+    }
+}
+
+/// Arguments about submissions.
+#[derive(clap::Args)]
+pub(super) struct SubmissionArgs {
+    /// Official format of the submission; 2022 has class probabilities.
+    #[arg(long, value_enum, default_value = "2020")]
+    pub(super) format: Format,
+    /// Decide type and level together: level empty goes with type none only.
+    #[arg(long)]
+    pub(super) feasible: bool,
+    /// With --feasible: food boxes are never filled with water.
+    #[arg(long, requires = "feasible")]
+    pub(super) dry_boxes: bool,
+    /// Capacity estimates: a table of `capacity`, whose sizes and times go into the format of 2022, or
+    /// any with fileName (id10_0000.png) and `capacity[mL]`.
+    #[arg(long, value_name = "CSV")]
+    pub(super) capacity: Option<PathBuf>,
+    /// Write the median mass of the training containers, 15 g, as every container's (2022 only).
+    #[arg(long)]
+    pub(super) mass_prior: bool,
+    /// Official annotations, to name recordings by id (2022) or container and sequence (2020).
+    #[arg(long, value_name = "CSV")]
+    pub(super) annotations: Option<PathBuf>,
+    /// Refuse a submission that has not exactly the recordings of this part, and write them in the
+    /// official order.
+    #[arg(long, value_enum)]
+    pub(super) part: Option<Part>,
+}
+
+/// A part of the data set.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Part {
+    /// Containers 1 to 9, 684 recordings.
+    Training,
+    /// Containers 10 to 12, 228 recordings.
+    Public,
+    /// Containers 13 to 15, 228 recordings.
+    Private,
+}
+
+impl SubmissionArgs {
+    /// These go with --type, --level and --joint.
+    pub(super) fn refuse_without_submission(&self) -> Result<(), Failure> {
+        let given = [
+            ("--feasible", self.feasible),
+            ("--capacity", self.capacity.is_some()),
+            ("--mass-prior", self.mass_prior),
+            ("--annotations", self.annotations.is_some()),
+            ("--part", self.part.is_some()),
+        ];
+        match given.iter().find(|(_, given)| *given) {
+            Some((name, _)) => {
+                Err(Failure::new(format!("{name} is for submissions, made of --type and --level")))
+            }
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! What a job does with a recording: open it, compute a span of it, finish it.
+
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use corsmal_audio::BlockSource;
+use corsmal_files::npz::Compression;
+use corsmal_files::outcome::{Outcome, Status};
+
+use super::check::identity_of;
+use super::output::Member;
+use crate::engine::{Failed, Features, Planned, Plans, Recording, Span, Watch, reading};
+use crate::inputs::Input;
+use crate::survey::Survey;
+
+/// The outcome of an input before anything is known of it but what its bytes are.
+pub(super) fn outcome_of(input: &Input) -> Outcome {
+    let mut outcome = Outcome::new(&input.id, input.source.to_string(), Status::Ok, "");
+    outcome.identity = identity_of(input);
+    outcome
+}
+
+/// A recording that is open, and how it is cut.
+pub(super) struct Opened {
+    pub source: Box<dyn BlockSource>,
+    pub planned: Planned,
+    /// The frames that are wanted.
+    pub crop: Range<u64>,
+    pub spans: Vec<Range<u64>>,
+}
+
+/// Opens a recording that the run takes.
+pub(super) fn open(
+    input: &Input,
+    watch: &Watch,
+    (plans, survey): (&Plans<'_>, &Survey),
+    stop: &Arc<AtomicBool>,
+    outcome: &mut Outcome,
+) -> Result<Opened, Failed> {
+    let source = watch.settle(reading::open(input, stop))?;
+    reading::describe(outcome, source.as_ref());
+    if let Some(reason) = survey.refusal(source.spec().channels) {
+        return Err(Failed::new(Status::Mismatch, reason));
+    }
+    let planned = plans.of(source.spec()).map_err(|e| Failed::new(Status::Unsupported, e))?;
+    let signal = &planned.plan.config.signal;
+    let crop = reading::crop(signal, (input.start, input.end), source.spec().sample_rate);
+    let spans = reading::spans(source.as_ref(), &planned, &crop);
+    Ok(Opened { source, planned, crop, spans })
+}
+
+/// A span of a recording that was cut.
+pub(super) struct SpanJob {
+    pub input: usize,
+    pub index: usize,
+    pub span: Range<u64>,
+    pub planned: Planned,
+    pub watch: Watch,
+}
+
+/// What computing a span gave.
+pub(super) struct SpanDone {
+    pub source: Option<Box<dyn BlockSource>>,
+    /// Frames decoded for it.
+    pub decoded: u64,
+    pub parts: Result<Vec<Span>, Failed>,
+}
+
+impl SpanJob {
+    /// Reads and computes the span; `None` where the run was stopped.
+    pub(super) fn compute(&self, input: &Input, stop: &Arc<AtomicBool>) -> Option<SpanDone> {
+        let mut parts = Vec::new();
+        let mut last = None;
+        let mut decoded = 0;
+        let computed = reading::open(input, stop).and_then(|source| {
+            // The spans before this one were read from the file as it was then.
+            self.watch.check()?;
+            let signal = &self.planned.plan.config.signal;
+            let crop = reading::crop(signal, (input.start, input.end), source.spec().sample_rate);
+            let source = last.insert(source).as_mut();
+            let (span, decoded) = ((&crop, &self.span), &mut decoded);
+            reading::compute(source, &self.planned, span, stop, decoded, |part| {
+                parts.push(part);
+                Ok(())
+            })
+        });
+        let parts = match self.watch.settle(computed) {
+            Ok(false) => return None,
+            Ok(true) => Ok(parts),
+            Err(failed) => Err(failed),
+        };
+        Some(SpanDone { source: last, decoded, parts })
+    }
+}
+
+/// What a recording gives: arrays, or a row of the table; and its samples.
+pub(super) struct Parts {
+    pub arrays: Vec<Member>,
+    pub row: Option<Vec<f32>>,
+    pub total: u64,
+}
+
+/// Finishes a recording whose spans are all added.
+pub(super) fn finish(
+    input: &Input,
+    (planned, watch): (&Planned, &Watch),
+    recording: Result<Recording, Failed>,
+    compression: Compression,
+    outcome: &mut Outcome,
+) -> Result<Parts, Failed> {
+    let plan = &planned.plan;
+    let stretch = reading::check_stretch(input, &plan.config.signal, outcome);
+    let recording = recording?;
+    watch.check_content(&outcome.identity)?;
+    stretch?;
+    let total = recording.total();
+    Ok(match recording.complete()? {
+        Features::Summary(row) => Parts { arrays: Vec::new(), row: Some(row), total },
+        Features::Frames(arrays) => {
+            let arrays = Member::of(&input.id, plan, arrays, compression);
+            Parts { arrays: arrays.map_err(Failed::temporary)?, row: None, total }
+        }
+    })
+}

@@ -1,0 +1,110 @@
+//! A fitted classifier of any kind.
+
+use linfa::traits::PredictInplace;
+use ndarray::{Array2, ArrayBase, ArrayView2, Axis, Data, Ix2};
+use serde::{Deserialize, Serialize};
+
+use super::fitted::Fitted;
+use crate::error::{ModelError, Result};
+use crate::table::check_query;
+
+/// What a model says of some rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Predicted {
+    /// class index of each row
+    pub classes: Vec<usize>,
+    /// probabilities `[rows, classes]`; absent for classifiers without them
+    pub proba: Option<Array2<f64>>,
+}
+
+impl Predicted {
+    /// Joins classes with probabilities that a classifier may not have.
+    pub(crate) fn new(classes: Vec<usize>, proba: Result<Array2<f64>>) -> Result<Self> {
+        match proba {
+            Ok(proba) => Ok(Self { classes, proba: Some(proba) }),
+            Err(ModelError::NoProbability { .. }) => Ok(Self { classes, proba: None }),
+            Err(error) => Err(error),
+        }
+    }
+}
+
+/// A fitted classifier of any kind.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Classifier {
+    /// classes that had rows, ascending; the method knows them as 0, 1, …
+    pub(super) present: Vec<usize>,
+    pub(super) n_classes: usize,
+    pub(super) fitted: Fitted,
+}
+
+impl Classifier {
+    /// Features per row.
+    pub fn n_features(&self) -> usize {
+        self.fitted.as_classify().n_features()
+    }
+
+    /// Classes in the label table.
+    pub fn n_classes(&self) -> usize {
+        self.n_classes
+    }
+
+    /// Class indices of `[rows, features]`.
+    ///
+    /// # Errors
+    /// Another number of features than in training, or features that are not finite.
+    pub fn predict(&self, x: ArrayView2<'_, f64>) -> Result<Vec<usize>> {
+        check_query(x, self.n_features())?;
+        let labels = self.fitted.as_classify().predict(x)?;
+        let class = |c| self.present.get(c).copied();
+        let classes: Option<Vec<usize>> = labels.into_iter().map(class).collect();
+        classes.ok_or_else(|| ModelError::Inconsistent("a class beyond the class table".into()))
+    }
+
+    /// Probabilities `[rows, classes]`, every row summing to one.
+    ///
+    /// # Errors
+    /// As [`Classifier::predict`]; [`ModelError::NoProbability`] for a classifier without them.
+    pub fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
+        check_query(x, self.n_features())?;
+        let known = self.fitted.as_classify().predict_proba(x)?;
+        if known.dim() != (x.nrows(), self.present.len()) {
+            return Err(ModelError::Inconsistent("probabilities of another shape".into()));
+        }
+        if self.present.len() == self.n_classes {
+            return Ok(known);
+        }
+        let mut all = Array2::zeros((x.nrows(), self.n_classes));
+        for (column, &class) in known.axis_iter(Axis(1)).zip(&self.present) {
+            all.column_mut(class).assign(&column);
+        }
+        Ok(all)
+    }
+
+    /// Whether the parts fit together, for models read from files.
+    pub(crate) fn validate(&self) -> Result<()> {
+        let ascending = self.present.windows(2).all(|w| w[0] < w[1]);
+        let inside = self.present.last().is_some_and(|&c| c < self.n_classes);
+        // Far above any label table, far below what could exhaust memory for one row.
+        let bounded = self.n_classes <= MAX_CLASSES;
+        let inner = self.fitted.as_classify();
+        if !(ascending && inside && bounded) || inner.n_classes() != self.present.len() {
+            return Err(ModelError::Inconsistent("class table".into()));
+        }
+        inner.validate()
+    }
+}
+
+/// Most classes a model file may have.
+pub const MAX_CLASSES: usize = 1 << 16;
+
+/// linfa's way out. The result may be a refusal: of rows that are not those of the training.
+impl<D: Data<Elem = f64>> PredictInplace<ArrayBase<D, Ix2>, Result<Predicted>> for Classifier {
+    fn predict_inplace<'a>(&'a self, x: &'a ArrayBase<D, Ix2>, y: &mut Result<Predicted>) {
+        let x = x.view();
+        *y = self.predict(x).and_then(|classes| Predicted::new(classes, self.predict_proba(x)));
+    }
+
+    fn default_target(&self, _: &ArrayBase<D, Ix2>) -> Result<Predicted> {
+        Ok(Predicted { classes: Vec::new(), proba: None })
+    }
+}

@@ -1,0 +1,220 @@
+//! Features of recordings with labels.
+
+use std::path::{Path, PathBuf};
+
+use corsmal_files::outcome::Outcome;
+use corsmal_files::table::Table;
+use linfa::DatasetBase;
+use ndarray::{Array2, ArrayView2};
+use serde_json::Value;
+
+use super::error::{DatasetError, Result};
+use super::label_file::{LabelFile, LabelSource};
+use crate::formats::TrainedOn;
+use crate::labels::Labels;
+use crate::targets::Classes;
+
+/// A feature file in memory.
+#[derive(Clone, Debug)]
+pub struct LabelledTable {
+    /// the file
+    pub path: PathBuf,
+    /// `[rows, features]`
+    pub x: Array2<f64>,
+    /// name of each feature; empty when the file has none
+    pub feature_names: Vec<String>,
+    /// one per row, all different
+    pub ids: Vec<String>,
+    /// one per input of the extraction, failed ones included; empty for files of other programs
+    pub outcomes: Vec<Outcome>,
+    /// feature configuration; null for files of other programs
+    pub config: Value,
+    /// its hash; empty for files of other programs
+    pub config_hash: String,
+    pub(super) columns: Vec<(String, Vec<String>)>,
+}
+
+impl LabelledTable {
+    /// A table of label columns alone, for items that are no rows of numbers.
+    pub fn of_columns(path: &Path, ids: Vec<String>, columns: Vec<(String, Vec<String>)>) -> Self {
+        Self {
+            path: path.into(),
+            x: Array2::zeros((ids.len(), 0)),
+            feature_names: Vec::new(),
+            ids,
+            outcomes: Vec::new(),
+            config: Value::Null,
+            config_hash: String::new(),
+            columns,
+        }
+    }
+
+    /// The table of an extraction; `path` is named in messages about it.
+    ///
+    /// # Errors
+    /// [`DatasetError::Content`] for a table without statistics.
+    pub fn of_extraction(
+        path: &Path,
+        table: &Table,
+        config: Value,
+        config_hash: String,
+    ) -> Result<Self> {
+        if table.feature_names().is_empty() && !table.ids().is_empty() {
+            return Err(DatasetError::content(
+                path,
+                "has frame-level features only; extract with a configuration that has a \
+                 [summary], such as --preset esc26",
+            ));
+        }
+        Ok(Self {
+            path: path.into(),
+            x: table.values().mapv(f64::from),
+            feature_names: table.feature_names().to_vec(),
+            ids: table.ids().to_vec(),
+            outcomes: table.outcomes().to_vec(),
+            config,
+            config_hash,
+            columns: table.labels().map(|(name, c)| (name.to_string(), c.to_vec())).collect(),
+        })
+    }
+
+    /// Refuses a table without rows or with values that cannot be learned from; gives the features
+    /// that have one value in all rows.
+    ///
+    /// # Errors
+    /// [`DatasetError::Content`] naming the recording and the feature.
+    pub fn check(&self) -> Result<Vec<usize>> {
+        let fault = |reason: String| Err(DatasetError::content(&self.path, reason));
+        if self.ids.is_empty() {
+            return fault("has no recordings with features".into());
+        }
+        if let Some(&(row, feature)) = self.non_finite().first() {
+            let (id, name) = (&self.ids[row], self.feature_name(feature));
+            let (value, count) = (self.x[[row, feature]], self.non_finite().len());
+            let rows = if count == 1 { "1 row is" } else { &format!("{count} rows are") };
+            return fault(format!("{id}: feature {name} is {value} ({rows} not finite)"));
+        }
+        let columns = self.x.columns().into_iter().enumerate();
+        Ok(columns.filter(|(_, c)| c.iter().all(|v| *v == c[0])).map(|(i, _)| i).collect())
+    }
+
+    /// Adds labels from a source; its columns hide columns of the same name.
+    ///
+    /// # Errors
+    /// [`DatasetError::Content`] for recordings without labels and labels without recording.
+    pub fn add_labels(&mut self, source: &LabelSource) -> Result<()> {
+        let columns = match source {
+            LabelSource::Folders { column } => vec![(column.clone(), self.folders()?)],
+            LabelSource::File { path, key } => {
+                let file = LabelFile::read(path, key.as_deref())?;
+                let pairs = |with_features: bool| -> Vec<(&str, &str)> {
+                    let of = |o: &&Outcome| o.status.has_features() == with_features;
+                    let wanted = self.outcomes.iter().filter(of);
+                    wanted.map(|o| (o.id.as_str(), o.path.as_str())).collect()
+                };
+                let recordings = if self.outcomes.is_empty() {
+                    self.ids.iter().map(|id| (id.as_str(), id.as_str())).collect()
+                } else {
+                    pairs(true)
+                };
+                file.for_recordings(&recordings, &pairs(false), &self.path)?
+            }
+        };
+        self.columns.splice(0..0, columns);
+        Ok(())
+    }
+
+    /// The folder in which each recording lies.
+    fn folders(&self) -> Result<Vec<String>> {
+        let paths = self.outcomes.iter().filter(|o| o.status.has_features());
+        let folder = |path: &str| {
+            let folder = Path::new(path).parent().and_then(Path::file_name);
+            folder.and_then(|name| name.to_str()).map(String::from)
+        };
+        let found: Option<Vec<String>> = paths.map(|o| folder(&o.path)).collect();
+        found.filter(|found| found.len() == self.ids.len()).ok_or_else(|| {
+            DatasetError::content(
+                &self.path,
+                "its recordings lie in no folders that could be their classes; give --labels a CSV",
+            )
+        })
+    }
+
+    /// Label columns by name, one value per row.
+    pub fn columns(&self) -> &[(String, Vec<String>)] {
+        &self.columns
+    }
+
+    /// A label column as text, one value per row. `joint` is type and level together where there is
+    /// no such column.
+    ///
+    /// # Errors
+    /// [`DatasetError::Content`] listing the columns that there are.
+    pub fn column(&self, name: &str) -> Result<Vec<String>> {
+        let find = |name: &str| self.columns.iter().find(|(column, _)| column == name);
+        if let Some((_, values)) = find(name) {
+            return Ok(values.clone());
+        }
+        if name == "joint"
+            && let (Some((_, kind)), Some((_, level))) = (find("type"), find("level"))
+        {
+            return Ok(kind.iter().zip(level).map(|(t, l)| format!("{t}-{l}")).collect());
+        }
+        let known = self.columns.iter().map(|(name, _)| name.as_str());
+        let choices = match self.columns.is_empty() {
+            true => "there are none; --labels adds them from a CSV or from class folders".into(),
+            false => corsmal_names::choices(name, known),
+        };
+        Err(DatasetError::content(&self.path, format!("no label column {name:?}: {choices}")))
+    }
+
+    /// The classes of a label column. Empty and decimal values are no labels.
+    ///
+    /// # Errors
+    /// [`DatasetError::Content`] naming the recording, or fewer than two classes.
+    pub fn classes(&self, name: &str) -> Result<(Labels, Classes)> {
+        let values = self.column(name)?;
+        for (id, value) in self.ids.iter().zip(&values) {
+            let why = if value.is_empty() {
+                "is empty"
+            } else if value.parse::<f64>().is_ok() && value.parse::<i128>().is_err() {
+                "is a decimal number; classes are whole numbers or names"
+            } else {
+                continue;
+            };
+            let reason = format!("{id}: label {name} = {value:?} {why}");
+            return Err(DatasetError::content(&self.path, reason));
+        }
+        let (labels, indices) = Labels::of(&values);
+        if labels.len() < 2 {
+            let only = labels.names().join(", ");
+            let reason = format!("all rows have {name} = {only}; at least 2 classes are needed");
+            return Err(DatasetError::content(&self.path, reason));
+        }
+        let classes = Classes::new(indices, labels.len())?;
+        Ok((labels, classes))
+    }
+
+    /// linfa's data set of these rows with some targets.
+    pub fn dataset(&self, classes: Classes) -> DatasetBase<ArrayView2<'_, f64>, Classes> {
+        DatasetBase::new(self.x.view(), classes).with_feature_names(self.feature_names.clone())
+    }
+
+    /// What the rows were made from, for a model to know; `None` for files of other programs.
+    pub fn trained_on(&self) -> Option<TrainedOn> {
+        let with_features = self.outcomes.iter().filter(|o| o.status.has_features());
+        TrainedOn::of(with_features.map(|o| (o.sample_rate, o.channels)))
+    }
+
+    /// Name of a feature, or its number.
+    pub fn feature_name(&self, feature: usize) -> String {
+        self.feature_names.get(feature).cloned().unwrap_or_else(|| feature.to_string())
+    }
+
+    /// Rows with a value that is not finite, each with the first such feature.
+    pub fn non_finite(&self) -> Vec<(usize, usize)> {
+        let rows = self.x.outer_iter().enumerate();
+        rows.filter_map(|(i, row)| row.iter().position(|v| !v.is_finite()).map(|f| (i, f)))
+            .collect()
+    }
+}

@@ -1,0 +1,45 @@
+//! A report as a page and as files.
+
+use std::path::Path;
+
+use corsmal_files::draft;
+
+use crate::error::{ReportError, Result};
+use crate::report::Report;
+use crate::{latex, page};
+
+impl Report {
+    /// The page: no other file is needed to read it.
+    pub fn html(&self) -> String {
+        page::page(self)
+    }
+
+    /// Writes `report.html`, `report.json`, `tables/NAME.csv`, `tables/NAME.tex`,
+    /// `figures/NAME.svg` and `figures/NAME.pdf` below `dir`.
+    ///
+    /// # Errors
+    /// [`ReportError`] when something cannot be written.
+    pub fn write(&self, dir: &Path) -> Result<()> {
+        let folder = |name: &str| {
+            let path = dir.join(name);
+            std::fs::create_dir_all(&path)
+                .map_err(|source| ReportError::Folder { path: path.clone(), source })?;
+            Ok::<_, ReportError>(path)
+        };
+        let (tables, figures) = (folder("tables")?, folder("figures")?);
+        let put = |path: &Path, bytes: &[u8]| draft::write(path, bytes).map_err(ReportError::Write);
+        for table in self.sections.iter().flat_map(|s| &s.tables) {
+            put(&tables.join(format!("{}.csv", table.name)), table.csv()?.as_bytes())?;
+            put(&tables.join(format!("{}.tex", table.name)), latex::table(table).as_bytes())?;
+        }
+        for section in &self.sections {
+            let grouped = section.groups.iter().flat_map(|g| &g.figures);
+            for figure in section.figures.iter().chain(grouped) {
+                figure.write(&figures)?;
+            }
+        }
+        let json = serde_json::to_string_pretty(self)?;
+        put(&dir.join("report.json"), json.as_bytes())?;
+        put(&dir.join("report.html"), self.html().as_bytes())
+    }
+}
