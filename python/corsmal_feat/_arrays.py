@@ -26,9 +26,9 @@ MOST = 1 << 40
 def size(name: str, value: Any, least: int = 1) -> int:
     """A number from outside that becomes a size."""
     if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
-        raise ParameterError(f"{name} = {value!r} is not possible: a whole number")
+        raise ParameterError(f"{name} must be a whole number, not {value!r}")
     if not least <= value <= MOST:
-        raise ParameterError(f"{name} = {value} is not possible: {least} to {MOST}")
+        raise ParameterError(f"{name} must be {least} to {MOST}, not {value}")
     return int(value)
 
 
@@ -45,7 +45,7 @@ def room(what: str, *shape: int) -> None:
     except MemoryError:
         pass
     sizes = " x ".join(map(str, shape))
-    raise ParameterError(f"{what} of {sizes} values is not possible: there is no memory for it")
+    raise ParameterError(f"there is no memory for {what} of {sizes} values")
 
 
 def floats(name: str, value: Any, min_ndim: int = 1) -> Floats:

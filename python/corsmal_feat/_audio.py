@@ -33,20 +33,20 @@ def _open(path: Source) -> _core.Recording:
         content = path.read()
         if isinstance(content, bytes):
             return _core.Recording.from_bytes(content)
-    raise ParameterError(f"path = {path!r} is not possible: a path, or a file opened as binary")
+    raise ParameterError(f"path must be a path or a file opened as binary, not {path!r}")
 
 
 def _dtype(dtype: npt.DTypeLike) -> np.dtype[Any]:
     kind = np.dtype(dtype)
     if kind not in (np.float32, np.float64):
-        raise ParameterError(f"dtype = {dtype} is not possible: float32 or float64")
+        raise ParameterError(f"dtype must be float32 or float64, not {dtype}")
     return kind
 
 
 def _seconds(name: str, value: float, rate: int) -> int:
     """Seconds as frames, cut as librosa does."""
     if not 0 <= value * rate <= 2**53:
-        raise ParameterError(f"{name} = {value} is not possible: seconds, 0 or more")
+        raise ParameterError(f"{name} must be 0 or more seconds, not {value}")
     return int(value * rate)
 
 
@@ -157,7 +157,7 @@ def stream(
         size(name, value)
     if hop_length > frame_length:
         raise ParameterError(
-            f"hop_length = {hop_length} is not possible: at most frame_length ({frame_length})"
+            f"hop_length must be at most frame_length ({frame_length}), not {hop_length}"
         )
     kind = _dtype(dtype)
     recording = _open(path)
@@ -251,7 +251,7 @@ def get_duration(
         frames = recording.declared_frames
         return (recording.count() if frames is None else frames) / recording.sample_rate
     if not sr > 0:
-        raise ParameterError(f"sr = {sr} is not possible: a positive sample rate in Hz")
+        raise ParameterError(f"sr must be a positive sample rate in Hz, not {sr}")
     if y is not None:
         return float(np.shape(y)[-1]) / sr
     if S is None:

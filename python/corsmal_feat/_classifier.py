@@ -43,7 +43,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
             for number in value if isinstance(value, list) else [value]:
                 if isinstance(number, float) and not math.isfinite(number):
                     raise ParameterError(
-                        f"{type(self).__name__}: {name} = {number} is not possible: a finite number"
+                        f"{type(self).__name__}: {name} must be a finite number, not {number}"
                     )
             if value is not None:
                 result[self._renamed.get(name, name)] = value

@@ -124,7 +124,7 @@ def pca_project(
     """`X` [shape=(rows, columns)] on fitted components [shape=(k, columns)], each coordinate
     divided by its standard deviation if `whiten`."""
     if whiten and variance is None:
-        raise ParameterError("variance = None is not possible with whiten=True")
+        raise ParameterError("variance is needed with whiten=True")
     x = np.ascontiguousarray(_doubles("X", X, 2))
     components = np.ascontiguousarray(_doubles("components", components, 2))
     scale = _doubles("variance", variance, 1).ravel().tolist() if whiten else None

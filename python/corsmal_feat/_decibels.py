@@ -87,7 +87,7 @@ def amplitude_to_db(
             "amplitude_to_db was called on complex input: phase is discarded", stacklevel=2
         )
     if amin <= 0:
-        raise ParameterError(f"amin = {amin} is not possible: above 0")
+        raise ParameterError(f"amin must be above 0, not {amin}")
     magnitude = np.abs(S)
     reference = float(abs(ref(magnitude) if callable(ref) else ref))
     squares: Any = np.square(magnitude)

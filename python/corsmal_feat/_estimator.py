@@ -120,8 +120,8 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         effective, _ = _core.effective_config(config, overrides)
         if json.loads(effective)["summary"] is None:
             raise ParameterError(
-                "summary = None is not possible for FeatureExtractor: one row for each recording "
-                'needs it; set={"summary.stats": ["mean", "std"]} adds one'
+                "FeatureExtractor gives one row for each recording, which needs a summary; "
+                'set={"summary.stats": ["mean", "std"]} adds one'
             )
         return config, overrides
 
@@ -139,7 +139,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         names = [os.fspath(path) for path in paths]
         # The same file may be in X twice, as in a bootstrap.
         if self.errors not in ("raise", "nan"):
-            raise ParameterError(f"errors = {self.errors!r} is not possible: 'raise' or 'nan'")
+            raise ParameterError(f"errors must be 'raise' or 'nan', not {self.errors!r}")
         different = list(dict.fromkeys(names))
         preset = "esc26" if self.preset is None and self.config is None else self.preset
         found = extract(
@@ -169,7 +169,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
     def _of_signals(self, signals: list[Any], by: _core.Signals) -> tuple[list[str], Matrix]:
         rate = whole_rate(self.sr)
         if self.jobs is not None and not 1 <= self.jobs <= MOST_JOBS:
-            raise ParameterError(f"jobs = {self.jobs} is not possible: 1 to {MOST_JOBS}")
+            raise ParameterError(f"jobs must be 1 to {MOST_JOBS}, not {self.jobs}")
 
         def row(position: int) -> tuple[list[str], Any]:
             samples = _signal(signals[position], position)

@@ -79,7 +79,7 @@ def evaluate(
     """
     chosen = None if containers is None else [int(container) for container in containers]
     if seed is not None and not 0 <= int(seed) < 2**64:
-        raise ParameterError(f"seed = {seed} is not possible: a whole number from 0 to 2**64 - 1")
+        raise ParameterError(f"seed must be a whole number from 0 to 2**64 - 1, not {seed}")
     for container in chosen or ():
         if not 0 <= container <= 255:
             raise ParameterError(f"containers: {container} is no container: 0 to 255")

@@ -68,16 +68,16 @@ def extract(
 
     Raises
     ------
-    ParameterError : the configuration is impossible
+    ParameterError : the configuration is refused
     RunError : no such recordings, or an output that cannot be written
     """
     chosen, overrides = configuration(preset, config, set)
     names = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
     if not names:
-        raise ParameterError("paths = [] is not possible: at least one recording is needed")
+        raise ParameterError("paths must name at least one recording")
     inputs = [os.fspath(name) for name in names]
     if jobs is not None and not 1 <= jobs <= MOST_JOBS:
-        raise ParameterError(f"jobs = {jobs} is not possible: 1 to {MOST_JOBS}")
+        raise ParameterError(f"jobs must be 1 to {MOST_JOBS}, not {jobs}")
     if out is not None:
         return _run(inputs, chosen, overrides, os.fspath(out), jobs, resume, overwrite, progress)
     if resume or overwrite:
@@ -115,7 +115,7 @@ def configuration(
 ) -> tuple[tuple[str, str], list[str]]:
     """A configuration and its overrides as the Rust side takes them."""
     if preset is not None and config is not None:
-        raise ParameterError("preset and config are not possible together: one of them")
+        raise ParameterError("give either preset or config, not both")
     overrides = [f"{key}={_toml(key, value)}" for key, value in (set or {}).items()]
     if config is None:
         return ("preset", preset or "logmel"), overrides
@@ -137,13 +137,13 @@ def _exists(text: str) -> bool:
 def _plain(value: Any) -> Any:
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
-    raise TypeError(f"{value!r} is not possible: numbers, text, booleans, lists and tables are")
+    raise TypeError(f"expected numbers, text, booleans, lists or tables, not {value!r}")
 
 
 def _toml(key: str, value: Any) -> str:
     """A value as TOML: for what is allowed here its JSON is the same."""
     if value is None or isinstance(value, Mapping):
-        raise ParameterError(f"{key} = {value!r} is not possible: a number, text, boolean or list")
+        raise ParameterError(f"{key} must be a number, text, boolean or list, not {value!r}")
     try:
         return json.dumps(value, default=_plain)
     except TypeError as error:
@@ -170,7 +170,7 @@ class SignalExtractor:
         set: Mapping[str, Any] | None = None,
     ) -> None:
         if not 1 <= channels < 1 << 16:
-            raise ParameterError(f"channels = {channels} is not possible: 1 to {(1 << 16) - 1}")
+            raise ParameterError(f"channels must be 1 to {(1 << 16) - 1}, not {channels}")
         signals = _core.Signals(*configuration(preset, config, set))
         self._signal = signals.start(whole_rate(sr), channels)
         self._channels = channels
@@ -201,7 +201,7 @@ class SignalExtractor:
 def whole_rate(sr: Any) -> int:
     """A sample rate as files have it."""
     if sr is None or not 1 <= sr < 2**32 or int(sr) != sr:
-        raise ParameterError(f"sr = {sr} is not possible: a whole number of Hz, at least 1")
+        raise ParameterError(f"sr must be a whole number of Hz of at least 1, not {sr}")
     return int(sr)
 
 

@@ -31,7 +31,7 @@ def window_spec(window: Window, length: int) -> WindowSpec:
         return ":".join([window[0], ",".join(_parameters(window))])
     if callable(window):
         if not 0 < length <= _LONGEST:
-            raise ParameterError(f"a window of {length} points is not possible: 1 to {_LONGEST}")
+            raise ParameterError(f"a window must have 1 to {_LONGEST} points, not {length}")
         window = window(length)
     try:
         values = np.ascontiguousarray(window, dtype=np.float64)
@@ -39,8 +39,8 @@ def window_spec(window: Window, length: int) -> WindowSpec:
         values = np.empty(())
     if values.ndim != 1:
         raise ParameterError(
-            f"window = {window!r} is not possible: a name, a tuple of a name and parameters, a"
-            " number (the beta of a Kaiser window), values, or a function of the length"
+            "window must be a name, a tuple of a name and parameters, a number (the beta of a"
+            f" Kaiser window), values, or a function of the length, not {window!r}"
         )
     if len(values) != length:
         raise ParameterError(f"Window size mismatch: {len(values)} != {length}")
@@ -53,8 +53,8 @@ def wavelet_window(window: Window) -> WindowSpec:
     """A window for filters of many lengths, which only a formula has."""
     if callable(window) or not isinstance(window, (str, tuple, int, float, np.number)):
         raise ParameterError(
-            f"window = {window!r} is not possible here: a name, a tuple of a name and parameters,"
-            " or a number, since the filters differ in length"
+            "window must be a name, a tuple of a name and parameters, or a number, since the"
+            f" filters differ in length, not {window!r}"
         )
     return window_spec(window, 1)
 
@@ -67,7 +67,7 @@ def _parameters(window: tuple[Any, ...]) -> list[str]:
         try:
             words += ["none" if one is None else repr(float(one)) for one in several]
         except (TypeError, ValueError) as error:
-            raise ParameterError(f"window = {window!r} is not possible: {error}") from error
+            raise ParameterError(f"window {window!r}: {error}") from error
     return words
 
 
@@ -94,7 +94,7 @@ def get_window(window: Window, Nx: int, *, fftbins: bool = True) -> npt.NDArray[
     array([0. , 0.5, 1. , 0.5])
     """
     if not 0 <= Nx <= _LONGEST:
-        raise ParameterError(f"Nx = {Nx} is not possible: 0 to {_LONGEST}")
+        raise ParameterError(f"Nx must be 0 to {_LONGEST}, not {Nx}")
     return _core.get_window(window_spec(window, int(Nx)), int(Nx), bool(fftbins))
 
 

@@ -28,7 +28,7 @@ def _pair(value: Any) -> tuple[Any, Any]:
     """A value for the harmonic and one for the percussive side."""
     if isinstance(value, tuple | list):
         if len(value) < 2:
-            raise ParameterError(f"{value!r} is not possible: a number or a pair")
+            raise ParameterError(f"expected a number or a pair, not {value!r}")
         return value[0], value[1]
     return value, value
 
@@ -393,7 +393,7 @@ def cqt(
         warnings.warn("res_type=None stands for 'soxr_hq'", FutureWarning, stacklevel=2)
     elif res_type not in CONVERTERS:
         names = ", ".join(CONVERTERS)
-        raise ParameterError(f"res_type = {res_type!r} is not possible: one of {names}")
+        raise ParameterError(f"res_type must be one of {names}, not {res_type!r}")
     if tuning is None:
         tuning = estimate_tuning(y=y, sr=sr, bins_per_octave=bins_per_octave)
     params = _cqt_params(
@@ -454,7 +454,7 @@ def chroma_cqt(
     np.int64(9)
     """
     if cqt_mode != "full":
-        raise ParameterError(f"cqt_mode = {cqt_mode!r} is not possible: 'full'")
+        raise ParameterError(f"cqt_mode must be 'full', not {cqt_mode!r}")
     n_chroma = size("n_chroma", n_chroma)
     room("a chromagram", n_chroma)
     bins_per_octave = n_chroma if bins_per_octave is None else bins_per_octave

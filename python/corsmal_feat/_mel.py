@@ -116,14 +116,14 @@ def mfcc(
     (8, 13, 87)
     """
     if norm not in ("ortho", None):
-        raise ParameterError(f"norm = {norm!r} is not possible: 'ortho' or None")
+        raise ParameterError(f"norm must be 'ortho' or None, not {norm!r}")
     n_mfcc = size("n_mfcc", n_mfcc)
     if S is None:
         S = power_to_db(melspectrogram(y=y, sr=sr, norm=mel_norm, **kwargs))
     s: Floats = floats("S", S, 2)
     kind = size("dct_type", dct_type)
     if kind > 3:
-        raise ParameterError(f"dct_type = {dct_type} is not possible: 1, 2 or 3")
+        raise ParameterError(f"dct_type must be 1, 2 or 3, not {dct_type}")
     return unrows(_core.mfcc(rows(s, 2), n_mfcc, kind, norm == "ortho", float(lifter)), s, 2)
 
 
@@ -153,7 +153,7 @@ def delta(
     array([1., 1., 1., 1., 1., 1., 1., 1., 1., 1.])
     """
     if width < 3 or width % 2 == 0:
-        raise ParameterError(f"width = {width} is not possible: an odd number, at least 3")
+        raise ParameterError(f"width must be an odd number of at least 3, not {width}")
     width, order = size("width", width), size("order", order)
     room("a filter", width)
     array = floats("data", data)

@@ -50,8 +50,7 @@ def stack_memory(
     reach = (int(n_steps) - 1) * abs(int(delay))
     if array.size * int(n_steps) > MOST or reach > MOST:
         raise ParameterError(
-            f"n_steps = {n_steps}, delay = {delay} are not possible: a result of up to"
-            f" {MOST} values"
+            f"n_steps and delay must give at most {MOST} values, not {n_steps} and {delay}"
         )
     kwargs.setdefault("mode", "constant")
     widths = [(0, 0)] * array.ndim

@@ -20,7 +20,7 @@ from .util import fix_frames
 
 def _count(name: str, value: Any) -> int:
     if not isinstance(value, (int, np.integer)) or value < 1:
-        raise ParameterError(f"{name} = {value} is not possible: an integer, at least 1")
+        raise ParameterError(f"{name} must be an integer of at least 1, not {value}")
     return int(value)
 
 
@@ -78,8 +78,7 @@ def onset_strength(
     """
     if aggregate is False:
         raise ParameterError(
-            "aggregate = False is not possible: a function or None; onset_strength_multi gives "
-            "every band"
+            "aggregate must be a function or None, not False; onset_strength_multi gives every band"
         )
     lag, max_size = _count("lag", lag), _count("max_size", max_size)
     n_fft, hop_length = _count("n_fft", n_fft), _count("hop_length", hop_length)
@@ -194,7 +193,7 @@ def _groups(channels: Sequence[int] | Sequence[slice] | None) -> list[slice]:
         edges = sorted({int(channel) for channel in channels if not isinstance(channel, slice)})
         groups = [slice(a, b) for a, b in pairwise(edges)]
     if not groups:
-        raise ParameterError(f"channels = {channels!r} is not possible: two bands or one slice")
+        raise ParameterError(f"channels must be two bands or one slice, not {channels!r}")
     return groups
 
 
@@ -249,7 +248,7 @@ def onset_detect(
     array([10, 40])
     """
     if units not in ("frames", "samples", "time"):
-        raise ParameterError(f"units = {units!r} is not possible: 'frames', 'samples' or 'time'")
+        raise ParameterError(f"units must be 'frames', 'samples' or 'time', not {units!r}")
     hop_length = _count("hop_length", hop_length)
     if onset_envelope is None:
         if y is None:
@@ -263,7 +262,7 @@ def onset_detect(
             f"onset_envelope has {envelope.ndim} dimensions: sparse=True allows only one"
         )
     if backtrack and not sparse:
-        raise ParameterError("backtrack = True is not possible with sparse=False")
+        raise ParameterError("backtrack=True needs sparse=True")
     peaks = PeakParams(
         pre_max=_frames("pre_max", pre_max),
         post_max=_frames("post_max", post_max),

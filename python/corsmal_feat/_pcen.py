@@ -69,11 +69,11 @@ def pcen(
     s: Any = floats("S", S)
     time = axis % s.ndim if -s.ndim <= axis < s.ndim else None
     if time is None:
-        raise ParameterError(f"axis = {axis} is not possible: S has {s.ndim} dimensions")
+        raise ParameterError(f"axis must be an axis of S, which has {s.ndim} dimensions, not {axis}")
     places = [time]
     if max_size > 1 and ref is None:
         if s.ndim == 1:
-            raise ParameterError("max_size is not possible for S of one dimension")
+            raise ParameterError("max_size must be 1 for S of one dimension")
         if max_axis is None and s.ndim != 2:
             raise ParameterError(f"S has {s.ndim} dimensions: give max_axis, the axis of bands")
         bands = (1 - time) % 2 if max_axis is None else max_axis % s.ndim

@@ -34,7 +34,7 @@ def _tracked(
 ) -> tuple[Floats, Floats | None, PitchParams]:
     """The spectrogram, its reference levels and the tracker's parameters."""
     if S is None and n_fft is None:
-        raise ParameterError("n_fft = None is not possible: a number is needed with y")
+        raise ParameterError("n_fft must be a number when y is given, not None")
     if np.iscomplexobj(S):
         S = np.abs(S)
     s, n_fft = spectrogram(y, S, n_fft or 0, hop_length, win_length, window, center, pad_mode, 1.0)

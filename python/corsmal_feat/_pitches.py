@@ -289,7 +289,7 @@ def note_to_midi(note: Any, *, round_midi: bool = True) -> Any:
         return np.array([note_to_midi(one, round_midi=round_midi) for one in note])
     found = _NOTE.match(note)
     if found is None:
-        raise ParameterError(f"note = {note!r} is not possible: a name such as 'C4' or 'F#3+20'")
+        raise ParameterError(f"note must be a name such as 'C4' or 'F#3+20', not {note!r}")
     shift = sum(_ACCIDENTALS[sign] for sign in found["accidental"])
     octave, cents = int(found["octave"] or 0), int(found["cents"] or 0)
     value = 12 * (octave + 1) + _PITCHES[found["note"].upper()] + shift + cents * 0.01
@@ -341,7 +341,7 @@ def fft_frequencies(*, sr: float = 22050, n_fft: int = 2048) -> Doubles:
     """
     if not sr > 0 or not 0 < n_fft <= _MOST_BINS:
         raise ParameterError(
-            f"sr = {sr}, n_fft = {n_fft} are not possible: above 0, and n_fft up to {_MOST_BINS}"
+            f"sr must be above 0 and n_fft 1 to {_MOST_BINS}, not {sr} and {n_fft}"
         )
     return np.asarray(np.fft.rfftfreq(int(n_fft), 1.0 / sr), dtype=np.float64)
 
@@ -352,7 +352,7 @@ _MOST_BINS = 1 << 26
 
 def _count(name: str, value: int) -> int:
     if not 0 <= value <= _MOST_BINS:
-        raise ParameterError(f"{name} = {value} is not possible: 0 to {_MOST_BINS}")
+        raise ParameterError(f"{name} must be 0 to {_MOST_BINS}, not {value}")
     return int(value)
 
 
@@ -436,7 +436,7 @@ def tempo_frequencies(n_bins: int, *, hop_length: int = 512, sr: float = 22050) 
     """
     count = _count("n_bins", n_bins)
     if count == 0:
-        raise ParameterError("n_bins = 0 is not possible: at least 1")
+        raise ParameterError("n_bins must be at least 1, not 0")
     tempi = 60.0 * sr / (hop_length * np.arange(1.0, count))
     return np.concatenate([[np.inf], tempi])
 

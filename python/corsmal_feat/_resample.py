@@ -71,17 +71,17 @@ def resample(
     """
     y = audio(y)
     if not -y.ndim <= axis < y.ndim:
-        raise ParameterError(f"axis = {axis} is not possible: y has {y.ndim} dimensions")
+        raise ParameterError(f"axis must be an axis of y, which has {y.ndim} dimensions, not {axis}")
     name = "soxr_hq" if res_type in _AS_SOXR_HQ else str(res_type)
     if name not in CONVERTERS:
         names = ", ".join(CONVERTERS)
-        raise ParameterError(f"res_type = {res_type!r} is not possible: one of {names}")
+        raise ParameterError(f"res_type must be one of {names}, not {res_type!r}")
     if not (np.isfinite([orig_sr, target_sr]).all() and orig_sr > 0 and target_sr > 0):
         raise ParameterError(
-            f"orig_sr = {orig_sr}, target_sr = {target_sr} are not possible: positive rates in Hz"
+            f"orig_sr and target_sr must be positive rates in Hz, not {orig_sr} and {target_sr}"
         )
     if y.shape[axis] * (target_sr / orig_sr) > MOST:
-        raise ParameterError(f"target_sr = {target_sr} is not possible: a result of {MOST} samples")
+        raise ParameterError(f"target_sr must give at most {MOST} samples, not {target_sr}")
     if orig_sr == target_sr:
         return y
     moved = np.moveaxis(y, axis, -1)
@@ -135,16 +135,16 @@ def _polyphase(y: Floats, orig_sr: float, target_sr: float) -> Any:
     """A windowed sinc of the rates' ratio in whole numbers (scipy.signal.resample_poly)."""
     if int(orig_sr) != orig_sr or int(target_sr) != target_sr:
         raise ParameterError(
-            f"orig_sr = {orig_sr}, target_sr = {target_sr} are not possible with polyphase:"
-            " whole numbers of Hz"
+            "orig_sr and target_sr must be whole numbers of Hz with polyphase,"
+            f" not {orig_sr} and {target_sr}"
         )
     common = gcd(int(orig_sr), int(target_sr))
     up, down = int(target_sr) // common, int(orig_sr) // common
     widest = max(up, down)
     if widest > _MOST_PHASES:
         raise ParameterError(
-            f"{up} / {down} is not possible with polyphase: terms up to {_MOST_PHASES}; soxr_hq"
-            " takes any ratio"
+            f"polyphase takes ratios with terms up to {_MOST_PHASES}, not {up} / {down};"
+            " soxr_hq takes any ratio"
         )
     half = 10 * widest
     taps = np.sinc(np.arange(-half, half + 1) / widest) * np.kaiser(2 * half + 1, 5.0)

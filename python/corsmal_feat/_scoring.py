@@ -178,7 +178,7 @@ def cross_validate(
     Raises
     ------
     ParameterError
-        A file cannot be read, labels do not fit the recordings, or a parameter is not possible.
+        A file cannot be read, labels do not fit the recordings, or a parameter is outside its range.
 
     Examples
     --------
@@ -354,7 +354,7 @@ def score(
     0.93
     """
     if not 0.0 <= reject <= 1.0:
-        raise ParameterError(f"reject = {reject} is not possible: a probability from 0 to 1")
+        raise ParameterError(f"reject must be a probability from 0 to 1, not {reject}")
     if labels is not None and os.fspath(labels) == FOLDERS and target is None:
         target = "class"
     text = _core.score(
@@ -400,7 +400,7 @@ def _value(value: Any) -> str:
 
 def _whole(name: str, value: int, limit: int) -> int:
     if not 0 <= int(value) < limit:
-        raise ParameterError(f"{name} = {value} is not possible: a whole number below {limit}")
+        raise ParameterError(f"{name} must be a whole number below {limit}, not {value}")
     return int(value)
 
 

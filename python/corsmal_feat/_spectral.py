@@ -287,7 +287,7 @@ def spectral_contrast(
     framing = (hop_length, win_length, window, center, pad_mode)
     s = _spectra(y, S, n_fft, framing)
     if not isinstance(n_bands, (int, np.integer)) or n_bands < 1:
-        raise ParameterError(f"n_bands = {n_bands} is not possible: an integer, at least 1")
+        raise ParameterError(f"n_bands must be an integer of at least 1, not {n_bands}")
     room("a contrast", n_bands)
     at = np.atleast_1d(_frequencies(freq, sr, s))
     if at.ndim != 1:

@@ -88,7 +88,7 @@ def stft(
     result: Any = unrows(_core.stft(channels(y), params), y, 1)
     if dtype is not None:
         if np.dtype(dtype).kind != "c":
-            raise ParameterError(f"dtype = {dtype} is not possible: a complex type")
+            raise ParameterError(f"dtype must be a complex type, not {dtype}")
         result = result.astype(dtype, copy=False)
     spectrum: Complexes = result if out is None else _put(result, out)
     return spectrum

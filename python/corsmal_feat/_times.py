@@ -20,13 +20,13 @@ def _offset(n_fft: int | None) -> int:
 
 def _hop(hop_length: int) -> int:
     if hop_length < 1:
-        raise ParameterError(f"hop_length = {hop_length} is not possible: at least 1")
+        raise ParameterError(f"hop_length must be at least 1, not {hop_length}")
     return int(hop_length)
 
 
 def _rate(sr: float) -> float:
     if not sr > 0:
-        raise ParameterError(f"sr = {sr} is not possible: a positive sample rate in Hz")
+        raise ParameterError(f"sr must be a positive sample rate in Hz, not {sr}")
     return float(sr)
 
 

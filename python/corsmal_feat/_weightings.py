@@ -200,7 +200,7 @@ def frequency_weighting(
     """
     name = kind.upper() if isinstance(kind, str) else kind
     if name not in _KINDS:
-        raise ParameterError(f"kind = {kind!r} is not possible: 'A', 'B', 'C', 'D', 'Z' or None")
+        raise ParameterError(f"kind must be 'A', 'B', 'C', 'D', 'Z' or None, not {kind!r}")
     weights: Doubles = _KINDS[name](frequencies, **kwargs)
     return weights
 

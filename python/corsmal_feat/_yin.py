@@ -65,7 +65,7 @@ def yin(
     signal = audio(y)
     hop = frame_length // 4 if hop_length is None else int(hop_length)
     if pad_mode not in _PADDINGS:
-        raise ParameterError(f"pad_mode = {pad_mode!r} is not possible: one of {_PADDINGS}")
+        raise ParameterError(f"pad_mode must be one of {_PADDINGS}, not {pad_mode!r}")
     if center:
         widths = [(0, 0)] * signal.ndim
         widths[-1] = (frame_length // 2, frame_length // 2)
@@ -86,7 +86,7 @@ def yin(
 
 def _check(sr: float, fmin: float, fmax: float, frame_length: int) -> None:
     if not 1 <= frame_length <= 1 << 24:
-        raise ParameterError(f"frame_length = {frame_length} is not possible: 1 to {1 << 24}")
+        raise ParameterError(f"frame_length must be 1 to {1 << 24}, not {frame_length}")
     if fmax > sr / 2:
         raise ParameterError(f"fmax={fmax:.3f} cannot exceed Nyquist frequency {sr / 2}")
     if fmin >= fmax:

@@ -115,7 +115,7 @@ def specshow(
         if axis in _PLAIN or axis in _CLASSES:
             return np.arange(count)
         names = ", ".join(str(name) for name in (*_TIMES, *_HERTZ, *_CLASSES, *_PLAIN))
-        raise ParameterError(f"axis = {axis!r} is not possible: one of {names}")
+        raise ParameterError(f"axis must be one of {names}, not {axis!r}")
 
     x = positions(x_axis, values.shape[1], x_coords)
     y = positions(y_axis, values.shape[0], y_coords)
@@ -204,7 +204,7 @@ def waveshow(
     if signal.ndim > 2 or not signal.size:
         raise ParameterError(f"y has shape {np.shape(y)}, expected (n,) or (channels, n)")
     if max_points < 1:
-        raise ParameterError(f"max_points = {max_points} is not possible: at least 1")
+        raise ParameterError(f"max_points must be at least 1, not {max_points}")
     plot = _pyplot()
     axes = plot.gca() if ax is None else ax
     samples = signal.shape[1]

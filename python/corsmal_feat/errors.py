@@ -23,7 +23,7 @@ class ParameterError(CorsmalFeatError, ValueError):
 
 
 class ConfigError(ParameterError):
-    """A configuration of `extract` is not possible."""
+    """A configuration of `extract` is refused."""
 
 
 class ModelError(ParameterError):

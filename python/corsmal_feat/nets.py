@@ -57,7 +57,7 @@ def build(name: str, *, outputs: int | None = None, seed: int = 0) -> Network:
     seed : of the initial numbers
     """
     if outputs is not None and outputs < 1:
-        raise ParameterError(f"outputs = {outputs} is not possible: at least 1")
+        raise ParameterError(f"outputs must be at least 1, not {outputs}")
     return Network(_core.Network.build(name, outputs, _seed(seed)))
 
 
@@ -160,7 +160,7 @@ class Network:
         else:
             numbers = targets.astype(np.float32).ravel().tolist()
         if steps < 0:
-            raise ParameterError(f"steps = {steps} is not possible: at least 0")
+            raise ParameterError(f"steps must be at least 0, not {steps}")
         losses, norms = self._network.train_steps(
             [_single(x) for x in arrays],
             classes,
@@ -190,14 +190,14 @@ def _lengths(lengths: Sequence[int] | None) -> list[int] | None:
 
 def _seed(seed: int) -> int:
     if not 0 <= seed < 1 << 64:
-        raise ParameterError(f"seed = {seed} is not possible: 0 to 2**64 - 1")
+        raise ParameterError(f"seed must be 0 to 2**64 - 1, not {seed}")
     return int(seed)
 
 
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    raise ParameterError(f"recipe: a {type(value).__name__} is not possible")
+    raise ParameterError(f"a recipe cannot hold a {type(value).__name__}")
 
 
 def __getattr__(name: str) -> Any:

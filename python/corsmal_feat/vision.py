@@ -164,7 +164,7 @@ def lode(
     """
     if variant not in ("published", "corrected"):
         raise ParameterError(
-            f"variant = {variant} is not possible: one of 'published', 'corrected'"
+            f"variant must be 'published' or 'corrected', not {variant!r}"
         )
     if len(masks) != 2 or len(calibrations) != 2:
         raise ParameterError(
@@ -206,7 +206,7 @@ def cuboid(
         Seed of the forests.
     """
     if not 0 <= int(seed) < 2**64:
-        raise ParameterError(f"seed = {seed} is not possible: a whole number from 0 to 2**64 - 1")
+        raise ParameterError(f"seed must be a whole number from 0 to 2**64 - 1, not {seed}")
     low, high, share, capacity, points = _core.cuboid(
         _depth(depth), _mask(mask), _numbers(calibration), outliers, int(seed)
     )

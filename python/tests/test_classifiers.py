@@ -127,10 +127,10 @@ def test_bytes_are_no_labels() -> None:
 
 def test_parameters_must_be_finite() -> None:
     x, y = clouds()
-    with pytest.raises(ParameterError, match="SVC: C = nan is not possible: a finite number"):
+    with pytest.raises(ParameterError, match="SVC: C must be a finite number, not nan"):
         classifiers.SVC(C=float("nan")).fit(x, y)
     weights = {"full": float("inf")}
-    with pytest.raises(ParameterError, match="class_weight = inf is not possible"):
+    with pytest.raises(ParameterError, match="class_weight must be a finite number, not inf"):
         classifiers.SVC(class_weight=weights).fit(x, y)
 
 

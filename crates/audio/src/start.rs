@@ -55,7 +55,7 @@ const OTHERS: [(usize, &[u8], &str); 25] = [
 ];
 
 /// Goes to the first byte of the audio: behind tags and, where nothing known starts the file, behind
-/// what is no audio. `None` where no format is recognised.
+/// what is not audio. `None` where no format is recognised.
 pub(crate) fn find(input: &mut Input) -> Result<Option<Format>, AudioError> {
     tags::skip(input)?;
     if let Some(format) = at_start(input.peek(SHOWN)?) {

@@ -133,7 +133,7 @@ pub(crate) fn file_key(file: &str) -> Option<RowKey> {
 }
 
 /// Capacity estimates by recording: columns `fileName` (`id10_0000.png`: container and sequence
-/// number; `id000000.png`: id of the flat release) and `capacity[mL]`, as M5 published them; -1 is no estimate.
+/// number; `id000000.png`: id of the flat release) and `capacity[mL]`, as M5 published them; -1 is not an estimate.
 ///
 /// # Errors
 /// [`CcmError`] with line and column for other values, and for recordings that occur twice.

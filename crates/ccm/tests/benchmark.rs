@@ -232,7 +232,7 @@ fn one_name_is_not_added_twice() {
         seed: 1,
         made: Made::default(),
     };
-    assert_eq!(run(&options).unwrap_err().to_string(), "x: added twice, names must differ");
+    assert_eq!(run(&options).unwrap_err().to_string(), "x: added twice; names must differ");
 }
 
 #[test]

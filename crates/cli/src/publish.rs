@@ -10,7 +10,7 @@ use crate::failure::Failure;
 /// not there.
 pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
     if path.exists() && !path.is_file() {
-        return Err(Failure::new(format!("{} exists and is no regular file", path.display())));
+        return Err(Failure::new(format!("{} exists and is not a regular file", path.display())));
     }
     if path.exists() && !overwrite {
         return Err(Failure::new(format!("{} exists; --overwrite replaces it", path.display())));

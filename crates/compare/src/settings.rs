@@ -56,7 +56,7 @@ impl Settings {
     }
 }
 
-/// Every setting with its dotted path. Text that is no JSON has none: the hash tells them apart.
+/// Every setting with its dotted path. Text that is not JSON has none: the hash tells them apart.
 fn flattened(config: &str) -> Vec<(String, Value)> {
     let mut keys = Vec::new();
     if let Ok(value) = serde_json::from_str(config) {

@@ -119,7 +119,7 @@ fn convert_rows(values: &mut [f32], amin: f32, offset: f32) -> f32 {
     let mut peak = [f32::NEG_INFINITY; LANES];
     for part in values.chunks_mut(ROWS * LANES) {
         if part.len() < ROWS * LANES {
-            // What is left of the row becomes the floor, which is no peak.
+            // What is left of the row becomes the floor, which is not a peak.
             rows = [Row::ZERO; ROWS];
         }
         for (row, values) in rows.iter_mut().zip(part.chunks(LANES)) {

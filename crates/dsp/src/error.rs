@@ -9,8 +9,8 @@ pub type Result<T> = std::result::Result<T, DspError>;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum DspError {
-    /// A parameter has an impossible value.
-    #[error("{name} = {value} is not possible: {allowed}")]
+    /// A parameter has a value outside its range.
+    #[error("{name} must be {allowed}, not {value}")]
     Parameter {
         /// Name of the parameter, in librosa's vocabulary.
         name: &'static str,
@@ -30,7 +30,7 @@ pub enum DspError {
         actual: Vec<usize>,
     },
     /// An array holds NaN or infinite values.
-    #[error("{name} holds a non-finite value at index {index}")]
+    #[error("{name} must be finite: the value at index {index} is not")]
     NonFinite {
         /// Name of the array argument.
         name: &'static str,
@@ -38,7 +38,7 @@ pub enum DspError {
         index: usize,
     },
     /// The signal is too short for one frame.
-    #[error("{name} has {actual} samples, at least {needed} are needed for one frame")]
+    #[error("{name} has {actual} samples; one frame needs at least {needed}")]
     TooShort {
         /// Name of the array argument.
         name: &'static str,
@@ -83,7 +83,7 @@ pub fn room_for<T>(name: &'static str, shape: &[usize]) -> Result<()> {
     if fits {
         return Ok(());
     }
-    let expected = "a shape that memory has room for".into();
+    let expected = "a shape that fits in memory".into();
     Err(DspError::Shape { name, expected, actual: shape.to_vec() })
 }
 

@@ -33,7 +33,13 @@ pub fn istft<T: Real>(
     let whole = (frames - 1)
         .checked_mul(p.hop_length)
         .and_then(|n| n.checked_add(p.n_fft))
-        .ok_or_else(|| DspError::parameter("hop_length", p.hop_length, "an addressable signal"))?;
+        .ok_or_else(|| {
+            DspError::parameter(
+                "hop_length",
+                p.hop_length,
+                "so small that the signal fits in memory",
+            )
+        })?;
     let n = length.unwrap_or(whole - 2 * p.pad());
     let mut y = Array2::zeros((channels, n));
     let mut scratch = inverse.scratch();

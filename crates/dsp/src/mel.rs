@@ -60,11 +60,11 @@ impl<'de> Deserialize<'de> for MelNorm {
             Raw::Name(n) if n == "inf" => Ok(Self::P(f64::INFINITY)),
             Raw::Number(p) if p > 0.0 => Ok(Self::P(p)),
             Raw::Name(n) => Err(serde::de::Error::custom(format!(
-                "norm = \"{n}\" is not possible: \"slaney\", \"none\", \"inf\" or a positive number"
+                "norm must be \"slaney\", \"none\", \"inf\" or a positive number, not \"{n}\""
             ))),
-            Raw::Number(p) => Err(serde::de::Error::custom(format!(
-                "norm = {p} is not possible: a positive number"
-            ))),
+            Raw::Number(p) => {
+                Err(serde::de::Error::custom(format!("norm must be a positive number, not {p}")))
+            }
         }
     }
 }

@@ -84,7 +84,7 @@ pub fn mfcc_matrix(n_mels: usize, p: &MfccParams) -> Result<Array2<f64>> {
         return Err(DspError::parameter("dct_type", p.dct_type, "1, 2 or 3"));
     }
     if p.dct_type == 1 && n_mels < 2 {
-        return Err(DspError::parameter("dct_type", 1, "2 or 3 for a single mel band"));
+        return Err(DspError::parameter("dct_type", 1, "2 or 3 if there is one mel band"));
     }
     if p.n_mfcc == 0 {
         return Err(DspError::parameter("n_mfcc", 0, "at least 1"));
@@ -93,7 +93,7 @@ pub fn mfcc_matrix(n_mels: usize, p: &MfccParams) -> Result<Array2<f64>> {
         return Err(DspError::parameter("lifter", p.lifter, "0 or more"));
     }
     if p.lifter > 0.0 && p.n_mfcc > n_mels {
-        let allowed = format!("at most n_mels ({n_mels}) with a lifter");
+        let allowed = format!("at most n_mels ({n_mels}) when lifter is set");
         return Err(DspError::parameter("n_mfcc", p.n_mfcc, allowed));
     }
     let lift = |k: usize| {

@@ -14,7 +14,7 @@ const MAX_LAG: usize = 1 << 24;
 pub struct OnsetParams {
     /// Frames between a spectrum and the one it is compared with.
     pub lag: usize,
-    /// Bands of the maximum filter over the earlier spectrum; 1 is no filter.
+    /// Bands of the maximum filter over the earlier spectrum; 1: no filter.
     pub max_size: usize,
     /// Frames by which the analysis is centred, `n_fft / (2 * hop_length)`: the envelope is
     /// delayed by as many and cut to the frames of the spectrogram. `None` does neither.

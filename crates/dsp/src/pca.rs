@@ -108,7 +108,13 @@ impl Eigen {
         require_finite("X, squared", &gram)?;
         let (values, vectors) = gram
             .eigh_into()
-            .map_err(|e| DspError::parameter("X", e, "data whose eigenvectors converge"))?
+            .map_err(|e| {
+                DspError::parameter(
+                    "X",
+                    format!("these ({e})"),
+                    "data whose eigenvectors can be computed",
+                )
+            })?
             .sort_eig_desc();
         Ok(Self { mean, centred, values, vectors })
     }

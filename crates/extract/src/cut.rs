@@ -83,7 +83,7 @@ fn of_recording(
         Some(rest) => rest / hop + 1,
     };
     if count + windows.len() as u64 > MOST {
-        return Err(refuse(format!("more than {MOST} windows in all: a longer hop makes fewer")));
+        return Err(refuse(format!("more than {MOST} windows in all; use a longer hop")));
     }
     for number in 0..count {
         let first = base + number * hop;

@@ -63,7 +63,7 @@ pub(crate) fn require_cells(rows: usize, columns: usize) -> Result<(), String> {
     match rows.checked_mul(columns) {
         Some(cells) if cells <= MAX_CELLS => Ok(()),
         _ => Err(format!(
-            "{rows} rows with {columns} label columns are too much: at most {MAX_CELLS} label values"
+            "{rows} rows with {columns} label columns are too many: at most {MAX_CELLS} label values"
         )),
     }
 }
@@ -150,7 +150,7 @@ impl ManifestColumns {
         let start = seconds(START, given(START))?;
         let end = seconds(END, given(END))?;
         if let Some(end) = end.filter(|&end| end <= start.unwrap_or(0.0)) {
-            let reason = format!("end = {end} is not behind start = {}", start.unwrap_or(0.0));
+            let reason = format!("end = {end} is not after start = {}", start.unwrap_or(0.0));
             return Err(wrong(manifest, line, reason));
         }
         let id = given(ID);
@@ -181,7 +181,11 @@ fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
     for (index, name) in names.iter().enumerate().filter(|(_, name)| !is_index(name)) {
         let place = columns.place(name).map_err(|reason| wrong(path, 1, reason))?;
         if place != cells.len() {
-            let reason = format!("column {} ({}) has no name of its own", index + 1, quoted(name));
+            let reason = format!(
+                "column {} ({}) must have a name that no other column has",
+                index + 1,
+                quoted(name)
+            );
             return Err(wrong(path, 1, reason));
         }
         cells.push(index);
@@ -267,7 +271,9 @@ impl<'de> Deserialize<'de> for Object {
                 while let Some((name, value)) = map.next_entry::<String, Value>()? {
                     if name.is_empty() || !names.insert(name.clone()) {
                         let name = quoted(&name);
-                        return Err(A::Error::custom(format!("key {name} has no name of its own")));
+                        return Err(A::Error::custom(format!(
+                            "key {name} is empty or given twice"
+                        )));
                     }
                     fields.push((name, value));
                 }

@@ -91,7 +91,7 @@ impl Projection {
         }
         let config: Value = serde_json::from_str(&provenance.config).unwrap_or_default();
         if config.get("projection").is_some_and(|p| !p.is_null()) {
-            return Err(content(features, "holds values that are projected already"));
+            return Err(content(features, "holds values that are already projected"));
         }
         let pca = Pca::fit(table.values().mapv(f64::from).view(), n_components)
             .map_err(|source| ProjectionError::Fit { path: features.into(), source })?;
@@ -224,29 +224,32 @@ impl ProjectionConfig {
         let table: Map<String, Value> = match value {
             Value::Object(table) => table,
             other => {
-                let message = format!("= {other}: expected a table with the key file");
+                let message = format!("must be a table with the key file, not {other}");
                 return Err(ConfigError::key("projection", message));
             }
         };
         let mut keys: Keys = typed("projection", &table)?;
         let refuse = |message: String| ConfigError::key("projection.file", message);
         if !summarised {
-            let message = "projects statistics, but the configuration has no [summary]";
+            let message = "needs a [summary], whose statistics it projects";
             return Err(ConfigError::key("projection", message));
         }
         let path = Path::new(&keys.file);
-        let bytes = std::fs::read(path).map_err(|e| refuse(format!("= {}: {e}", keys.file)))?;
+        let bytes = std::fs::read(path).map_err(|e| refuse(format!("{}: {e}", keys.file)))?;
         let content = blake3::hash(&bytes).to_hex().to_string();
         if !keys.hash.is_empty() && keys.hash != content {
-            let message = format!("= {}: is {content}, expected {}", keys.file, keys.hash);
+            let message = format!(
+                "{} has changed: its hash is {content}, the configuration has {}",
+                keys.file, keys.hash
+            );
             return Err(refuse(message));
         }
         keys.hash = content;
-        let projection = Projection::load(path).map_err(|e| refuse(format!("= {e}")))?;
+        let projection = Projection::load(path).map_err(|e| refuse(e.to_string()))?;
         let fitted = &projection.meta.config_hash;
         if fitted != hash {
             return Err(refuse(format!(
-                "= {}: was fitted on features of configuration {fitted}, these have {hash}",
+                "{} was fitted on features of configuration {fitted}; these have {hash}",
                 keys.file
             )));
         }

@@ -114,7 +114,7 @@ impl SummaryConfig {
     /// Refuses an empty list, and columns that would have the same name.
     pub fn check(&self) -> Result<(), ConfigError> {
         if self.stats.is_empty() {
-            return Err(ConfigError::key("summary.stats", format!("is empty: {STATS}")));
+            return Err(ConfigError::key("summary.stats", format!("must not be empty: {STATS}")));
         }
         for (index, stat) in self.stats.iter().enumerate() {
             if self.stats[..index].contains(stat) {

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 /// A shard that cannot be.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("shard {value:?} is not possible: expected i/n with 0 <= i < n, as 0/4 to 3/4")]
+#[error("shard must be i/n with 0 <= i < n, such as 0/4 or 3/4, not {value:?}")]
 pub struct ShardError {
     /// The text given.
     pub value: String,

@@ -17,7 +17,7 @@ pub enum ModelError {
         allowed: String,
     },
     /// A parameter value of the wrong type or outside its range.
-    #[error("{owner}: {key} = {value} is not possible: {allowed}")]
+    #[error("{owner}: {key} must be {allowed}, not {value}")]
     ParameterValue {
         /// classifier or step
         owner: &'static str,
@@ -27,6 +27,16 @@ pub enum ModelError {
         value: String,
         /// what it may be
         allowed: String,
+    },
+    /// A parameter that is given twice.
+    #[error("{owner}: {key} is given twice: {remedy}")]
+    GivenTwice {
+        /// classifier or step
+        owner: &'static str,
+        /// the key
+        key: String,
+        /// what to do
+        remedy: String,
     },
     /// A name outside a table (classifier, step, metric).
     #[error("there is no {kind} {name}: {allowed}")]
@@ -53,7 +63,7 @@ pub enum ModelError {
         features: usize,
     },
     /// NaN or infinity among the features.
-    #[error("row {row}, feature {feature} is {value}: only finite features can be used")]
+    #[error("row {row}, feature {feature} is {value}: features must be finite")]
     NonFinite {
         /// first row concerned
         row: usize,
@@ -64,7 +74,7 @@ pub enum ModelError {
     },
     /// A column without any variation where that is refused.
     #[error(
-        "feature {feature} has the same value in all {rows} rows ({count} features of {features} do)"
+        "feature {feature} has the same value in all {rows} rows (so do {count} of {features} features)"
     )]
     ConstantFeature {
         /// first column concerned
@@ -76,8 +86,8 @@ pub enum ModelError {
         /// columns in all
         features: usize,
     },
-    /// Two things that must have as many entries have not.
-    #[error("{what}: {actual} where {expected} are needed")]
+    /// Two things that must have the same number of entries do not.
+    #[error("{what}: expected {expected} entries, found {actual}")]
     Length {
         /// what is counted
         what: &'static str,
@@ -87,7 +97,7 @@ pub enum ModelError {
         actual: usize,
     },
     /// A class index outside the label table.
-    #[error("row {row} has class {class}, and there are {n_classes} classes")]
+    #[error("row {row} has class {class}, but there are only {n_classes} classes")]
     ClassOutOfRange {
         /// row
         row: usize,
@@ -97,7 +107,7 @@ pub enum ModelError {
         n_classes: usize,
     },
     /// Fewer different classes in the training rows than the method needs.
-    #[error("{owner} needs rows of at least 2 classes: these {rows} rows have {classes}")]
+    #[error("{owner} needs rows of at least 2 classes; the {rows} rows have {classes}")]
     TooFewClasses {
         /// classifier
         owner: &'static str,
@@ -107,7 +117,7 @@ pub enum ModelError {
         classes: usize,
     },
     /// A class with fewer rows than asked for.
-    #[error("class {class} has {rows} rows, and {needed} are needed for {purpose}")]
+    #[error("class {class} has {rows} rows; {purpose} needs {needed}")]
     TooFewRows {
         /// class index
         class: usize,
@@ -119,7 +129,7 @@ pub enum ModelError {
         purpose: &'static str,
     },
     /// Fewer groups than folds.
-    #[error("{groups} groups cannot make {folds} folds")]
+    #[error("{groups} groups are too few for {folds} folds")]
     TooFewGroups {
         /// different groups
         groups: usize,
@@ -146,7 +156,7 @@ pub enum ModelError {
         /// the name
         name: &'static str,
     },
-    /// An iterative method that did not get there.
+    /// A numerical method that failed.
     #[error("{owner}: {reason}")]
     Numerical {
         /// classifier or step

@@ -115,7 +115,9 @@ pub fn permutation_importance(
 ) -> Result<Vec<Importance>> {
     setting.check()?;
     if repeats == 0 {
-        return Err(ModelError::Folds { reason: "no repetition of the permutation asked".into() });
+        return Err(ModelError::Folds {
+            reason: "at least 1 repetition of the permutation is needed".into(),
+        });
     }
     let beyond = families.iter().flat_map(|f| &f.columns).find(|c| **c >= setting.x.ncols());
     if let Some(column) = beyond {
@@ -183,7 +185,8 @@ pub fn learning_curve(
 ) -> Result<Vec<LearningPoint>> {
     setting.check()?;
     if let Some(share) = shares.iter().find(|share| !(**share > 0.0 && **share <= 1.0)) {
-        let reason = format!("a share of {share} of the training rows; above 0 and up to 1");
+        let reason =
+            format!("the share of training rows must be above 0 and at most 1, not {share}");
         return Err(ModelError::Folds { reason });
     }
     let mut random = RandomState::new(seed);

@@ -120,7 +120,7 @@ impl Folds {
             (CvPlan::Lists(lists), Some(g)) => splits::group_lists(g, lists)?,
             (CvPlan::K(k), None) => stratified(labels, y, *k, seed)?,
             _ => {
-                let reason = "lists of which column? Name it as the groups (--groups)".into();
+                let reason = "the lists hold values of which column? Name it with --groups".into();
                 return Err(ModelError::Folds { reason }.into());
             }
         };
@@ -162,7 +162,7 @@ impl Folds {
             if fewest < 2 {
                 let name = &self.names[class];
                 let reason =
-                    format!("class {name} has 1 row to choose parameters by, 2 are needed");
+                    format!("class {name} has 1 row for choosing parameters; 2 are needed");
                 return Err(ModelError::Folds { reason });
             }
             return splits::stratified_k_fold(&inside, fewest.min(FOLDS), Some(self.seed));

@@ -111,7 +111,7 @@ pub enum ModelFileError {
         limit: u64,
     },
     /// The file is shorter or longer than it says.
-    #[error("model file of {found} bytes where its lengths say {expected}")]
+    #[error("the model file has {found} bytes; its lengths add up to {expected}")]
     Length {
         /// bytes by its lengths
         expected: u64,

@@ -113,12 +113,8 @@ fn canonical(
     for (word, value) in object {
         let key = key_of(table, word);
         if renamed.insert(key.to_string(), value.clone()).is_some() {
-            return Err(ModelError::ParameterValue {
-                owner,
-                key: key.into(),
-                value: value.to_string(),
-                allowed: format!("{key} is given twice (scikit-learn calls it {word})"),
-            });
+            let remedy = format!("{word} is scikit-learn's name of it; keep one of them");
+            return Err(ModelError::GivenTwice { owner, key: key.into(), remedy });
         }
     }
     Ok(renamed)

@@ -93,8 +93,8 @@ impl Recipe {
 }
 
 fn twice(classifier: &ClassifierSpec, key: String, value: String) -> ModelError {
-    let allowed = format!("{key} is given twice; set it or tune it once");
-    ModelError::ParameterValue { owner: classifier.name(), key, value, allowed }
+    let remedy = format!("once as {value}; either set it or tune it");
+    ModelError::GivenTwice { owner: classifier.name(), key, remedy }
 }
 
 impl PipelineSpec {

@@ -37,7 +37,7 @@ fn at_least_two(folds: usize) -> Result<()> {
     if folds >= 2 {
         return Ok(());
     }
-    Err(ModelError::Folds { reason: format!("{folds} asked, at least 2 are needed") })
+    Err(ModelError::Folds { reason: format!("{folds} requested; at least 2 are needed") })
 }
 
 /// Folds with the same class proportions (`StratifiedKFold`); shuffled within each class when a

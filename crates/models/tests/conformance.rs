@@ -154,7 +154,7 @@ fn constant_features_do_no_harm() {
     }
 }
 
-/// Rows that are all the same cannot be told apart, one row alone is no such table.
+/// Rows that are all the same cannot be told apart, one row alone is not such a table.
 #[test]
 fn tables_without_any_variation_are_refused() {
     for spec in all() {
@@ -224,11 +224,11 @@ fn parameters_are_checked_by_name() {
     );
     assert_eq!(
         refuse("knn", &["k=0"]),
-        "knn: k = 0 is not possible: a whole number from 1 to the number of training rows"
+        "knn: k must be a whole number from 1 to the number of training rows, not 0"
     );
     assert_eq!(
         refuse("svm", &["C=1", "gamma=wide"]),
-        "svm: gamma = \"wide\" is not possible: scale, auto or a positive number"
+        "svm: gamma must be scale, auto or a positive number, not \"wide\""
     );
     assert!(refuse("rf", &["max_features=0.0"]).contains("max_features"));
     assert!(refuse("forest", &[]).contains("knn, svm, tree, rf, et, logistic"));

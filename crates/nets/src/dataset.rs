@@ -32,7 +32,7 @@ pub struct Dataset {
     pub items: Items,
 }
 
-/// Why a file is no data set for a network.
+/// Why a file is not a data set for a network.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum DatasetError {
@@ -143,7 +143,7 @@ fn columns(npz: &mut NpzFile, count: usize) -> Result<Vec<(String, Vec<String>)>
         let values = match header.dtype.kind {
             Kind::Complex => continue,
             Kind::Text | Kind::Bytes => npz.strings(&name)?,
-            // With a point: 1.0 is no class.
+            // With a point: 1.0 is not a class.
             Kind::Float => npz.f64(&name)?.iter().map(|v| format!("{v:?}")).collect(),
             _ => npz.integers(&name)?.iter().map(i128::to_string).collect(),
         };

@@ -87,7 +87,7 @@ pub enum NetError {
     #[error("{0}")]
     Targets(String),
     /// A recipe's key or value.
-    #[error("recipe: {key} = {value} is not possible: {allowed}")]
+    #[error("recipe: {key} must be {allowed}, not {value}")]
     Recipe {
         /// the key
         key: String,
@@ -95,6 +95,14 @@ pub enum NetError {
         value: String,
         /// what it may be
         allowed: String,
+    },
+    /// A key that recipes do not have.
+    #[error("recipe: there is no key {key}: {choices}")]
+    RecipeKey {
+        /// the key
+        key: String,
+        /// the key that was probably meant, and the known ones
+        choices: String,
     },
     /// Something asked of a network that it does not have.
     #[error("{network} has no {what}: {hint}")]

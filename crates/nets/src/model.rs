@@ -99,7 +99,7 @@ impl NetModel {
     /// From the bytes of a file, whoever wrote them.
     ///
     /// # Errors
-    /// A text when it is no trained network of ours, or its parts do not fit.
+    /// A text when it is not a trained network of ours, or its parts do not fit.
     pub fn from_bytes(bytes: &[u8]) -> std::result::Result<Self, String> {
         let text = weights::safetensors_text(bytes, ENTRY)?
             .ok_or("weights alone: no network of corsmal-feat was trained into this file")?;

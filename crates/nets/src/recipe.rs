@@ -144,17 +144,18 @@ impl Recipe {
         for (key, value) in changes {
             let known: Vec<String> = all.keys().cloned().collect();
             let Some(place) = all.get_mut(key) else {
-                let allowed = format!("the keys are {}", known.join(", "));
-                return Err(refuse(key, value, allowed));
+                let known = known.iter().map(String::as_str);
+                let choices = corsmal_names::choices(key, known);
+                return Err(NetError::RecipeKey { key: key.clone(), choices });
             };
             *place = value.clone();
             // One key at a time, so that the refusal names it.
             if let Err(error) = serde_json::from_value::<Self>(Value::Object(all.clone())) {
-                return Err(refuse(key, value, error.to_string()));
+                return Err(refuse(key, value, allowed(&error)));
             }
         }
         let recipe: Self = serde_json::from_value(Value::Object(all))
-            .map_err(|e| refuse("recipe", &Value::Null, e.to_string()))?;
+            .map_err(|e| refuse("recipe", &Value::Null, allowed(&e)))?;
         recipe.check()?;
         Ok(recipe)
     }
@@ -174,7 +175,7 @@ impl Recipe {
         ];
         for (key, value) in numbers {
             if !(value.is_finite() && value >= 0.0) {
-                return refuse(key, value.to_string(), "a number, at least 0");
+                return refuse(key, value.to_string(), "a number of at least 0");
             }
         }
         if !(self.lr.is_finite() && self.lr > 0.0) {
@@ -196,5 +197,17 @@ impl Recipe {
             OptimizerKind::Adam => OptimiserSpec::Adam { lr, weight_decay },
             OptimizerKind::Sgd => OptimiserSpec::Sgd { lr, momentum, weight_decay },
         }
+    }
+}
+
+/// What a value must be, by serde's message about another one.
+fn allowed(error: &serde_json::Error) -> String {
+    let message = error.to_string();
+    let message = message.split(" at line ").next().unwrap_or(&message);
+    match message.split_once(", expected ").map(|(_, expected)| expected) {
+        Some("f64" | "f32") => "a number".into(),
+        Some("usize" | "u64" | "u32") => "a whole number of at least 0".into(),
+        Some(other) => other.replace('`', ""),
+        None => message.into(),
     }
 }

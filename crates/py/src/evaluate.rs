@@ -26,7 +26,7 @@ pub(crate) fn evaluate(
 ) -> PyResult<Scored> {
     let rules = RuleSet::ALL.into_iter().find(|set| set.name() == rules).ok_or_else(|| {
         let names = RuleSet::ALL.map(RuleSet::name).join(", ");
-        value_error(format!("rules = {rules} is not possible: one of {names}"))
+        value_error(format!("rules must be one of {names}, not {rules}"))
     })?;
     let scores = compute(py, || {
         let submission = Submission::read(&submission)?;

@@ -102,7 +102,7 @@ pub(crate) fn extract(
 ) -> PyResult<Vec<String>> {
     let config = config_of((&config.0, &config.1), &overrides)?;
     let jobs = match jobs {
-        Some(0) => return Err(value_error("jobs = 0 is not possible: at least 1")),
+        Some(0) => return Err(value_error("jobs must be at least 1, not 0")),
         Some(jobs) => jobs,
         None => pool::jobs()?,
     };

@@ -51,7 +51,7 @@ impl Recipe {
     fn settings(self, dropout: Option<u64>) -> PyResult<StepSettings> {
         let Self { lr, momentum, weight_decay, .. } = self;
         let refuse = |key: &str, value: &str, allowed: &str| {
-            Err(value_error(format!("recipe: {key} = {value:?} is not possible: {allowed}")))
+            Err(value_error(format!("recipe: {key} must be {allowed}, not {value:?}")))
         };
         let numbers = [("lr", lr), ("momentum", momentum), ("weight_decay", weight_decay)];
         for (key, value) in

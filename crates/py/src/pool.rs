@@ -22,7 +22,7 @@ pub(crate) fn jobs() -> PyResult<usize> {
     match std::env::var(VARIABLE) {
         Err(_) => Ok(std::thread::available_parallelism().map_or(1, usize::from)),
         Ok(text) => text.parse().ok().filter(|jobs| *jobs > 0).ok_or_else(|| {
-            value_error(format!("{VARIABLE} = {text} is not possible: a number, at least 1"))
+            value_error(format!("{VARIABLE} must be a whole number of at least 1, not {text}"))
         }),
     }
 }

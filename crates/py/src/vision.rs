@@ -121,7 +121,7 @@ pub(crate) fn cuboid(
         "kept" => Outliers::Kept,
         other => {
             return Err(value_error(format!(
-                "outliers = {other} is not possible: one of published, corrected, kept"
+                "outliers must be one of published, corrected, kept, not {other}"
             )));
         }
     };

@@ -110,7 +110,7 @@ pub(crate) fn mask(json: &Json, size: Option<(usize, usize)>) -> Result<Mask, St
                 Some(Json::String(text)) => decompress(text)?,
                 Some(Json::Array(counts)) => counts
                     .iter()
-                    .map(|c| c.as_u64().ok_or("a run length that is no whole number"))
+                    .map(|c| c.as_u64().ok_or("a run length that is not a whole number"))
                     .collect::<Result<_, _>>()?,
                 _ => return Err("a mask without \"counts\"".into()),
             };
@@ -126,7 +126,7 @@ pub(crate) fn mask(json: &Json, size: Option<(usize, usize)>) -> Result<Mask, St
                     .filter(|p| p.len() >= 6 && p.len() % 2 == 0);
                 let numbers = numbers.filter(|n| polygon.as_array().map(Vec::len) == Some(n.len()));
                 let numbers = numbers
-                    .ok_or("a polygon is no list of x, y, x, y, … with three points or more")?;
+                    .ok_or("a polygon must be a list x, y, x, y, … of three points or more")?;
                 fill(&numbers, &mut out);
             }
             Ok(out)

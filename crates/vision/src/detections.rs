@@ -123,7 +123,7 @@ fn from_csv(bytes: &[u8], path: &Path) -> Result<Vec<Detection>> {
             None | Some("") => Segmentation::None,
             Some(json) if json.starts_with(['{', '[']) => Segmentation::Coco(
                 serde_json::from_str(json)
-                    .map_err(|e| place(format!("a mask that is no readable JSON: {e}")))?,
+                    .map_err(|e| place(format!("a mask that is not readable as JSON: {e}")))?,
             ),
             Some(file) => Segmentation::File(beside(path, file)),
         };
@@ -145,29 +145,29 @@ fn detection(
     let shown = |value: &Option<String>| value.clone().unwrap_or_else(|| "nothing".into());
     let frame = text("frame");
     let number = frame.as_ref().and_then(|f| f.parse().ok()).filter(|&f| f <= MAX_FRAME);
-    let frame = number.ok_or_else(|| format!("'{}' is no frame number", shown(&frame)))?;
+    let frame = number.ok_or_else(|| format!("'{}' is not a frame number", shown(&frame)))?;
     let view = text("view");
     let number = view.as_ref().and_then(|v| v.trim_start_matches('c').parse().ok());
     let view = number
         .filter(|v| (1..=4).contains(v))
-        .ok_or_else(|| format!("'{}' is no view (1 to 4, or c1 to c4)", shown(&view)))?;
+        .ok_or_else(|| format!("'{}' is not a view (1 to 4, or c1 to c4)", shown(&view)))?;
     let label = text("label").filter(|l| !l.is_empty()).ok_or("no label")?;
     let label = match label.parse() {
         Ok(number) => coco::category_name(number)
-            .ok_or_else(|| format!("{number} is no COCO category (1 to 90)"))?
+            .ok_or_else(|| format!("{number} is not a COCO category (1 to 90)"))?
             .to_string(),
         Err(_) => label.to_lowercase(),
     };
     let score = text("score");
     let value = score.as_ref().and_then(|s| s.parse().ok()).filter(|s| (0.0..=1.0).contains(s));
-    let score = value.ok_or_else(|| format!("'{}' is no score from 0 to 1", shown(&score)))?;
+    let score = value.ok_or_else(|| format!("'{}' is not a score from 0 to 1", shown(&score)))?;
     let mut sides = [0.0; 4];
     for (side, text) in sides.iter_mut().zip(&bounds) {
         *side = text
             .as_ref()
             .and_then(|t| t.parse().ok())
             .filter(|v: &f64| v.abs() <= 1e6)
-            .ok_or_else(|| format!("'{}' is no edge of a box in px", shown(text)))?;
+            .ok_or_else(|| format!("'{}' is not an edge of a box in px", shown(text)))?;
     }
     if sides[0] > sides[2] || sides[1] > sides[3] {
         return Err(format!("a box {sides:?} whose right or lower edge comes first"));
@@ -215,9 +215,9 @@ mod tests {
     #[test]
     fn faults_give_the_line() {
         for (row, part) in [
-            ("x,1,cup,1,0,0,1,1,", "line 2: 'x' is no frame number"),
+            ("x,1,cup,1,0,0,1,1,", "line 2: 'x' is not a frame number"),
             ("1,5,cup,1,0,0,1,1,", "no view"),
-            ("1,1,12,1,0,0,1,1,", "12 is no COCO category"),
+            ("1,1,12,1,0,0,1,1,", "12 is not a COCO category"),
             ("1,1,cup,1.5,0,0,1,1,", "no score"),
             ("1,1,cup,nan,0,0,1,1,", "no score"),
             ("1,1,cup,1,0,0,inf,1,", "no edge"),

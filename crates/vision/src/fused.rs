@@ -1,4 +1,4 @@
-//! An estimate from what there is: several methods and the category's prior, weighted by how well
+//! An estimate from the methods at hand: several of them and the category's prior, weighted by how well
 //! each did on known containers.
 //!
 //! This is beyond the paper. Every method's estimates are compared with known capacities, category by

@@ -136,7 +136,8 @@ struct Png {
 }
 
 fn decode_png(bytes: &[u8], path: &Path, to_bytes: bool) -> Result<Png> {
-    let damaged = |e: png::DecodingError| VisionError::file(path, format!("no readable PNG: {e}"));
+    let damaged =
+        |e: png::DecodingError| VisionError::file(path, format!("not a readable PNG: {e}"));
     let limits = png::Limits { bytes: MAX_PIXELS * 8 };
     let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), limits);
     decoder.set_transformations(if to_bytes {
@@ -198,7 +199,7 @@ fn decode_jpeg(bytes: &[u8], path: &Path) -> Result<Rgb> {
         .set_max_height(MAX_SIDE)
         .jpeg_set_out_colorspace(ColorSpace::RGB);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
-    let damaged = |e| VisionError::file(path, format!("no readable JPEG: {e}"));
+    let damaged = |e| VisionError::file(path, format!("not a readable JPEG: {e}"));
     decoder.decode_headers().map_err(damaged)?;
     let (width, height) =
         decoder.dimensions().ok_or_else(|| VisionError::file(path, "a JPEG without a size"))?;
@@ -217,7 +218,9 @@ fn encode_png(
     depth: png::BitDepth,
     bytes: &[u8],
 ) -> Result<Vec<u8>> {
-    let fault = |e: png::EncodingError| VisionError::Request(format!("no PNG of this image: {e}"));
+    let fault = |e: png::EncodingError| {
+        VisionError::Request(format!("cannot write this image as PNG: {e}"))
+    };
     let mut out = Vec::new();
     let mut encoder = png::Encoder::new(&mut out, width as u32, height as u32);
     encoder.set_color(color);

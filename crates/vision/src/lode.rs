@@ -220,8 +220,7 @@ fn profile(views: [View<'_>; 2], centre: [f64; 3], variant: Variant) -> Result<P
                     Seen::Partly => inside = false,
                     Seen::Beyond => {
                         return Err(VisionError::Request(format!(
-                            "a circle of {:.1} mm at height {:.0} mm reaches beyond an image, \
-                             where the published program ends",
+                            "a circle of {:.1} mm at height {:.0} mm reaches beyond an image, where the published program stops",
                             RADII.get(r) * 1000.0,
                             HEIGHTS.get(h) * 1000.0
                         )));

@@ -1,4 +1,4 @@
-//! Where frames begin: in front of, between and behind what is no audio.
+//! Where frames begin: in front of, between and behind what is not audio.
 
 use super::header::{HEADER, Header, MAX_FRAME};
 use crate::tags;

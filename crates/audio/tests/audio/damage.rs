@@ -125,7 +125,7 @@ fn recordings_in_one_file_are_all_read() {
         let got = read_both(&[bytes, &id3v2(100), bytes].concat());
         assert_eq!(got.samples.len(), 2 * once.samples.len());
     }
-    // Ogg calls that a chain; it is no deviation.
+    // Ogg calls that a chain; it is not a deviation.
     let got = read_both(&[OGG, OGG].concat());
     assert_eq!((got.samples.len(), got.repairs()), (2 * read_both(OGG).samples.len(), vec![]));
     // Another number of channels would be another recording.
@@ -168,7 +168,7 @@ fn damaged_frames_of_mp3_are_silence_of_their_length() {
         }
         let got = read_both(&damaged.concat());
         assert_eq!(got.samples.len(), plain.samples.len());
-        // The tag is no frame of audio; delay of encoder and decoder are dropped.
+        // The tag is not a frame of audio; delay of encoder and decoder are dropped.
         let before = if trimmed > 0 { at - 1 } else { at };
         let (first, end) = (before * 1152 - trimmed, (before + count) * 1152 - trimmed);
         let lost = Repair::LostFrames { first: first as u64, count: (end - first) as u64 };

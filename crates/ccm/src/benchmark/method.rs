@@ -48,7 +48,7 @@ impl Method {
                     }
                     pairs.extend(test.rows.iter().zip(estimates.as_ref()?));
                 }
-                // Only one of the two test parts is no combination.
+                // Only one of the two test parts is not a combination.
                 if matches!(part, Part::Combined) && rows.tests.len() < 2 {
                     return None;
                 }

@@ -64,7 +64,7 @@ pub fn run(
 ) -> Result<Report> {
     let mut names = HashSet::new();
     if let Some((name, _)) = options.added.iter().find(|(name, _)| !names.insert(name)) {
-        return Err(CcmError::Request(format!("{name}: added twice, names must differ")));
+        return Err(CcmError::Request(format!("{name}: added twice; names must differ")));
     }
     let mut slugs = HashSet::new();
     if let Some(twice) = options.baselines.iter().find(|b| !slugs.insert(b.slug())) {

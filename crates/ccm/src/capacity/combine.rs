@@ -13,10 +13,10 @@ use crate::predictions::read_capacities;
 use crate::submission::RowKey;
 
 /// Writes the mean of the files' estimates of each recording, `prior` where none has one; what equals M5's
-/// prior, or is -1, is no estimate. Returns the recordings and how many have the prior.
+/// prior, or is -1, is not an estimate. Returns the recordings and how many have the prior.
 ///
 /// # Errors
-/// [`CcmError`] for unreadable files, recordings that a file lacks, a prior that is no number, and an output that
+/// [`CcmError`] for unreadable files, recordings that a file lacks, a prior that is not a number, and an output that
 /// cannot be written.
 pub fn combine_files(inputs: &[PathBuf], prior: f64, out: &Path) -> Result<(usize, usize)> {
     if !prior.is_finite() {

@@ -219,7 +219,7 @@ impl CapacityModel {
         let bytes = std::fs::read(path).map_err(|e| CcmError::io(path, e))?;
         let model: Self = serde_json::from_slice(&bytes).map_err(|e| {
             CcmError::Request(format!(
-                "{}: no model of `capacity train --method m3` or `fused`: {e}",
+                "{}: not a model of `capacity train --method m3` or `fused`: {e}",
                 path.display()
             ))
         })?;

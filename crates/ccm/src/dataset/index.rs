@@ -51,7 +51,7 @@ impl<'a> Index<'a> {
                     && !told.contains(&other)
                 {
                     told.push(other);
-                    let what = format!("says something else of {which} than {}", other.display());
+                    let what = format!("contradicts {} about {which}", other.display());
                     index.contradictions.push(Oddity { path: file.path.clone(), what });
                 }
             }

@@ -76,7 +76,7 @@ impl DataSet {
                     let key =
                         (recording.part, recording.container, recording.sequence, recording.id);
                     if !seen.insert(key) {
-                        let what = "the same recording is there twice".into();
+                        let what = "the same recording is present twice".into();
                         set.odd.push(Oddity { path, what });
                         continue;
                     }
@@ -89,7 +89,7 @@ impl DataSet {
         set.contradictions = contradictions;
         if set.recordings.is_empty() {
             return Err(CcmError::Request(format!(
-                "{}: no recording of the data set in here; expected files such as \
+                "{}: contains no recording of the data set; expected files such as \
                  train/1/audio/s0_fi0_fu0_b0_l0_audio.wav or train/audio/000000.wav",
                 root.display()
             )));
@@ -224,7 +224,7 @@ fn place(root: &Path, path: &Path, index: &Index<'_>) -> std::result::Result<Rec
             })
         }
         (None, Some(_), _) => Err("no folder above it is a container number".into()),
-        _ => Err("its name is none of the data set's".into()),
+        _ => Err("its name is not one of the data set's".into()),
     }
 }
 

@@ -23,7 +23,7 @@ pub struct SequenceName {
 impl SequenceName {
     /// Reads a name; what follows it (`_audio.wav`, `_c2`) is ignored.
     ///
-    /// `None` where the text is no such name or names an infeasible filling.
+    /// `None` where the text is not such a name or names an infeasible filling.
     pub fn parse(text: &str) -> Option<Self> {
         let mut parts = text.split(['_', '.']);
         let mut field = |prefix: &str, below: u8| {

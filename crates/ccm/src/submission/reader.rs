@@ -27,7 +27,7 @@ impl Submission {
     /// Reads a submission in either official format.
     ///
     /// # Errors
-    /// [`CcmError`] for an unreadable table, a missing column, a value that is no number or no
+    /// [`CcmError`] for an unreadable table, a missing column, a value that is not a number or no
     /// label, and duplicate rows.
     pub fn read(path: &Path) -> Result<Self> {
         Self::from_table(&Table::read(path)?)

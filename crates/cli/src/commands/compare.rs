@@ -54,7 +54,7 @@ pub struct Args {
 fn number(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
-        _ => Err("expected a number from 0 on".into()),
+        _ => Err("expected a number of at least 0".into()),
     }
 }
 
@@ -110,7 +110,8 @@ fn text(report: &Comparison) -> String {
     lines.push(match (report.within, differing) {
         (true, _) => "\nequal within the tolerance".into(),
         (false, 0) => {
-            "\nwhat is in both is equal within the tolerance; the files do not hold the same".into()
+            "\nwhat both files hold is equal within the tolerance; the rest is in one of them only"
+                .into()
         }
         (false, n) => {
             format!("\n{n} of {} differ by more than the tolerance", report.features.len())

@@ -183,9 +183,8 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
             Ok(ExitCode::from(INTERRUPTED))
         }
         Err(error @ RunError::TooManyErrors { .. }) => {
-            let message = format!(
-                "{error}; --resume continues the run, once they are repaired or more are allowed"
-            );
+            let message =
+                format!("{error}; repair them or allow more, then --resume continues the run");
             Meter::stopped(args.log_format, "error", &message);
             Ok(ExitCode::from(FAILED_FILES))
         }

@@ -24,7 +24,7 @@ fn from_synthetic_recordings_to_the_report() {
     std::fs::write(data.join("train/1/audio/odd.wav"), "x").unwrap();
     let checked = run(&["dataset", "check", text(&data)]);
     assert_eq!(checked.status.code(), Some(1));
-    assert!(lines(&checked.stdout).contains("odd.wav: its name is none of the data set's"));
+    assert!(lines(&checked.stdout).contains("odd.wav: its name is not one of the data set's"));
 
     let (data, out_dir) = (text(&data), text(&out));
     let names = ["zcr-mfcc-knn", "zcr-mfcc-rf"];

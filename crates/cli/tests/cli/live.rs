@@ -339,7 +339,7 @@ fn what_is_no_window_is_refused() {
     let by = |extra: &[&str]| refused(&[&["classify", "--model", text(&model)], extra].concat());
     let file = ["--in", text(&wav)];
     for (extra, message) in [
-        (&["--window", "0"][..], "--window 0 --hop 0: 0.01 to 600 seconds are possible"),
+        (&["--window", "0"][..], "--window and --hop must be 0.01 to 600 seconds, not 0 and 0"),
         (&["--window", "NaN"], "0.01 to 600 seconds"),
         (&["--window", "1", "--hop", "700"], "--hop 700"),
         (&["--vote", "majority"], "--vote decides over windows: give --window"),
@@ -352,7 +352,7 @@ fn what_is_no_window_is_refused() {
     }
     assert!(by(&["--features", text(&feats), "--window", "1"]).contains("--window"));
 
-    // A silent file too short for anything, and one that is no audio: lines with a reason.
+    // A silent file too short for anything, and one that is not audio: lines with a reason.
     let odd = trained.path("odd");
     std::fs::create_dir(&odd).unwrap();
     recording(&odd.join("empty.wav"), &[]);

@@ -320,11 +320,11 @@ fn what_is_no_regular_file_is_not_replaced() {
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     let train = ["train", "--features", text(&file), "--target", "type", "--classifier", "knn"];
     let out = ["--out", text(&pipe), "--overwrite"];
-    assert!(refused(&[&train[..], &out].concat()).contains("pipe.npz exists and is no regular"));
+    assert!(refused(&[&train[..], &out].concat()).contains("pipe.npz exists and is not a regular"));
     let wav = folder.path().join("a.wav");
     std::fs::write(&wav, "RIFF").unwrap();
     let extract = ["extract", "--in", text(&wav), "--preset", "esc26"];
-    assert!(refused(&[&extract[..], &out].concat()).contains("pipe.npz: is no regular file"));
+    assert!(refused(&[&extract[..], &out].concat()).contains("pipe.npz: is not a regular file"));
     assert!(std::fs::metadata(&pipe).unwrap().file_type().is_fifo());
 }
 

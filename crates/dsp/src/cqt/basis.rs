@@ -115,7 +115,7 @@ impl Basis {
         let longest = range.clone().map(|k| wavelets.length(k, sr)).fold(0.0, f64::max);
         if !(0.5..=LONGEST_FILTER).contains(&longest) {
             let allowed = format!(
-                "filters of 1 to {LONGEST_FILTER} samples, but it makes the longest {longest:.3}"
+                "such that the longest filter has 1 to {LONGEST_FILTER} samples (it has {longest:.3})"
             );
             return Err(DspError::parameter("filter_scale", p.filter_scale, allowed));
         }

@@ -47,7 +47,7 @@ impl Default for ChromaCqtParams {
 /// classes; of the parameters only the shape of the matrix counts, not threshold and norm.
 ///
 /// # Errors
-/// `bins_per_octave` that is no multiple of `n_chroma`, or an impossible `fmin`.
+/// `bins_per_octave` that is not a multiple of `n_chroma`, or an impossible `fmin`.
 pub fn cq_to_chroma(n_input: usize, p: &ChromaCqtParams) -> Result<Array2<f32>> {
     if p.n_chroma == 0 {
         return Err(DspError::parameter("n_chroma", 0, "at least 1"));

@@ -66,7 +66,7 @@ impl CqtPlan {
         let (cutoff, nyquist) = (wavelets.cutoff(&p.window)?, p.sr / 2.0);
         if !(cutoff <= nyquist && wavelets.frequencies[0] > 0.0) {
             let allowed = format!(
-                "filters up to sr / 2 = {nyquist} Hz, but the highest reaches {cutoff:.1} Hz"
+                "so few that all filters end below sr / 2 = {nyquist} Hz (the highest reaches {cutoff:.1} Hz)"
             );
             return Err(DspError::parameter("n_bins", p.n_bins, allowed));
         }

@@ -8,7 +8,7 @@ const MAX_RATIO: f64 = 65536.0;
 pub(super) fn check_rates(orig_sr: f64, target_sr: f64) -> Result<()> {
     for (name, value) in [("orig_sr", orig_sr), ("target_sr", target_sr)] {
         if !(value.is_finite() && value > 0.0) {
-            return Err(DspError::parameter(name, value, "a positive number of hertz"));
+            return Err(DspError::parameter(name, value, "a positive rate in Hz"));
         }
     }
     let ratio = target_sr / orig_sr;

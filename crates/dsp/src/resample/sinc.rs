@@ -65,7 +65,7 @@ impl SincPlan {
         let stride = (scale * PRECISION as f64) as usize;
         if stride == 0 {
             let least = orig_sr / PRECISION as f64;
-            let allowed = format!("at least {least} hertz with a windowed sinc");
+            let allowed = format!("at least {least} Hz with a windowed sinc");
             return Err(DspError::parameter("target_sr", target_sr, allowed));
         }
         let kernel = if fast { KAISER_FAST } else { KAISER_BEST };

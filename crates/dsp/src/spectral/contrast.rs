@@ -75,7 +75,9 @@ impl Contrast {
         for k in 0..=n_bands {
             let (low, high) = (if k == 0 { 0.0 } else { edge(k - 1) }, edge(k));
             if low >= 0.5 * sr {
-                let allowed = format!("bands below sr / 2, but band {k} starts at {low} Hz");
+                let allowed = format!(
+                    "so few that all bands start below sr / 2 (band {k} starts at {low} Hz)"
+                );
                 return Err(DspError::parameter("n_bands", n_bands, allowed));
             }
             bands.push(Self::band(freqs, low, high, k, params)?);
@@ -96,7 +98,8 @@ impl Contrast {
                 member[last + 1..].fill(true);
             }
         } else if k > 0 {
-            let allowed = format!("bins in every octave, but none lies in {low} to {high} Hz");
+            let allowed =
+                format!("such that every octave has a bin (none lies in {low} to {high} Hz)");
             return Err(DspError::parameter("fmin", p.fmin, allowed));
         }
         let mut bins: Vec<usize> = (0..freqs.len()).filter(|i| member[*i]).collect();

@@ -105,7 +105,7 @@ impl<'a, T: Real> Spectra<'a, T> {
         let Self::Given(s) = self else { return Ok(()) };
         match s.iter().find(|s| **s < T::zero()) {
             None => Ok(()),
-            Some(s) => Err(DspError::parameter("S", s.wide(), "magnitudes, 0 or more")),
+            Some(s) => Err(DspError::parameter("S", s.wide(), "0 or more everywhere")),
         }
     }
 

@@ -37,7 +37,9 @@ impl Poly {
             power.iter_mut().zip(freqs).for_each(|(p, f)| *p *= f);
             let length = norm(&columns[degree]);
             if !(length.is_finite() && length > 0.0) {
-                let allowed = format!("finite non-zero powers of freq, not those of {degree}");
+                let allowed = format!(
+                    "so small that the powers of freq stay finite and above 0 (those of {degree} do not)"
+                );
                 return Err(DspError::parameter("order", order, allowed));
             }
         }

@@ -16,20 +16,24 @@ pub fn get_window(window: &Window, nx: usize, fftbins: bool) -> Result<Vec<f64>>
     if nx > MAX_LENGTH {
         return Err(DspError::parameter("Nx", nx, format!("at most {MAX_LENGTH}")));
     }
-    let refuse = |allowed: String| Err(DspError::parameter("window", window, allowed));
     match *window {
         Window::Samples(ref values) if values.len() != nx => {
-            return refuse(format!("Window size mismatch: {} != {nx}", values.len()));
+            return Err(DspError::parameter("window", window, format!("{nx} values")));
         }
         Window::Samples(ref values) => return Ok(values.to_vec()),
-        Window::KaiserBesselDerived(_) if fftbins || !nx.is_multiple_of(2) => {
-            return refuse("symmetric and of even length only".into());
+        Window::KaiserBesselDerived(_) if fftbins => {
+            let allowed = "False for kaiser_bessel_derived, which is defined as symmetric only";
+            return Err(DspError::parameter("fftbins", "True", allowed));
         }
-        Window::Exponential(Some(_), _) if !fftbins => {
-            return refuse("no centre for a symmetric window".into());
+        Window::KaiserBesselDerived(_) if !nx.is_multiple_of(2) => {
+            return Err(DspError::parameter("Nx", nx, "even for kaiser_bessel_derived"));
+        }
+        Window::Exponential(Some(center), _) if !fftbins => {
+            let allowed = "left out when the window is symmetric (fftbins=False)";
+            return Err(DspError::parameter("center", center, allowed));
         }
         Window::Dpss(nw) if nx > 1 && 2.0 * nw >= nx as f64 => {
-            return refuse(format!("NW below half of the {nx} points"));
+            return Err(DspError::parameter("NW", nw, format!("below half of the {nx} points")));
         }
         _ => {}
     }

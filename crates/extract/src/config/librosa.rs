@@ -20,7 +20,7 @@ pub fn resolve(tree: &mut Value) -> Result<(), ConfigError> {
     // TOML and --set may give a number.
     let name = value.as_str().map_or_else(|| value.to_string(), str::to_string);
     let version: LibrosaVersion = serde_json::from_value(Value::String(name)).map_err(|_| {
-        ConfigError::key("librosa", format!("= {value}: expected \"0.8\" or \"0.11\""))
+        ConfigError::key("librosa", format!("must be \"0.8\" or \"0.11\", not {value}"))
     })?;
     if let Some(signal) = object.entry("signal").or_insert_with(|| json!({})).as_object_mut() {
         let of = |v: LibrosaVersion| json!(v.res_type());
@@ -58,7 +58,7 @@ fn fill(
     if *own == of(other) {
         let (own, version, other) = (&*own, json!(version), json!(other));
         let message = format!(
-            "= {own} is librosa {other}'s and librosa = {version} leaves it so: leave one of them out"
+            "{own} is the value of librosa {other}, but the configuration has librosa = {version}: remove one of the two keys"
         );
         return Err(ConfigError::key(key, message));
     }

@@ -111,7 +111,10 @@ impl Config {
                 None => {}
                 Some(v) if v == SCHEMA => {}
                 Some(v) => {
-                    return Err(ConfigError::key("schema", format!("{v}, expected {SCHEMA}")));
+                    return Err(ConfigError::key(
+                        "schema",
+                        format!("must be {SCHEMA}, not {v}: it was written by another version"),
+                    ));
                 }
             }
             // Outputs say "frames" where no summary was asked for.
@@ -125,7 +128,7 @@ impl Config {
         let signal: SignalConfig = typed("signal", &raw.signal)?;
         signal.check()?;
         if raw.features.is_empty() {
-            let message = format!("is empty, at least one of {}", features::kinds().join(", "));
+            let message = format!("must name at least one of {}", features::kinds().join(", "));
             return Err(ConfigError::key("features", message));
         }
         let features = raw
@@ -144,7 +147,7 @@ impl Config {
                 Some(summary)
             }
             Some(value) => {
-                let message = format!("= {value}: expected a table with the key stats");
+                let message = format!("must be a table with the key stats, not {value}");
                 return Err(ConfigError::key("summary", message));
             }
         };
@@ -190,7 +193,10 @@ const TABLES: [&str; 5] = ["description", "signal", "features", "summary", "proj
 /// Refuses outermost keys that are none, and a configuration without features.
 fn check_tables(tree: &Value) -> Result<(), ConfigError> {
     let Some(tables) = tree.as_object() else {
-        return Err(ConfigError::key("configuration", format!("= {tree}: expected tables")));
+        return Err(ConfigError::key(
+            "configuration",
+            format!("must consist of tables, not {tree}"),
+        ));
     };
     for key in tables.keys() {
         if features::find(key).is_some() {
@@ -205,7 +211,7 @@ fn check_tables(tree: &Value) -> Result<(), ConfigError> {
     match tables.get("features") {
         Some(_) => Ok(()),
         None => {
-            let message = "are missing: at least one table, such as [features.mfcc]";
+            let message = "must have at least one table, such as [features.mfcc]";
             Err(ConfigError::key("features", message))
         }
     }

@@ -88,12 +88,12 @@ fn add(tree: &mut Value, feature: &str) -> Result<(), ConfigError> {
         let choices = corsmal_names::choices(kind, features::kinds());
         return Err(ConfigError::key(
             format!("--add {feature}"),
-            format!("is no feature: {choices}"),
+            format!("there is no such feature: {choices}"),
         ));
     }
     if feature_kind(tree, name).is_some() {
         let message = format!(
-            "the configuration has {name} already: --set {name}.KEY=VALUE changes it, \
+            "the configuration already has {name}: --set {name}.KEY=VALUE changes it, \
              --add NEW_NAME={kind} adds another one"
         );
         return Err(ConfigError::key(format!("--add {feature}"), message));
@@ -264,7 +264,7 @@ mod tests {
         assert_eq!(tree["features"]["mfcc"], json!({"kind": "mfcc", "n_mels": 64}));
         assert_eq!(tree["features"]["quiet"]["kind"], "rms");
         let refusal = apply(&mut tree, "+rms").unwrap_err().to_string();
-        assert!(refusal.contains("has rms already"), "{refusal}");
+        assert!(refusal.contains("already has rms"), "{refusal}");
         let refusal = apply(&mut tree, "+mfc").unwrap_err().to_string();
         assert!(refusal.contains("did you mean \"mfcc\"?"), "{refusal}");
         let mut empty = json!({});

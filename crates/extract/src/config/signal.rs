@@ -107,19 +107,31 @@ impl SignalConfig {
             if value.is_finite() && (low..=high).contains(&value) {
                 Ok(())
             } else {
-                Err(ConfigError::key(format!("signal.{key}"), format!("= {value}: {allowed}")))
+                Err(ConfigError::key(
+                    format!("signal.{key}"),
+                    format!("must be {allowed}, not {value}"),
+                ))
             }
         };
-        let seconds = "seconds, 0 or more";
+        let seconds = "0 or more seconds";
         range("start", self.start, 0.0, 1e9, seconds)?;
         range("end", self.end, 0.0, 1e9, seconds)?;
         range("length", self.length, 0.0, 1e6, seconds)?;
-        range("preemphasis", self.preemphasis, -1.0, 1.0, "between -1 and 1, 0 for none")?;
+        range("preemphasis", self.preemphasis, -1.0, 1.0, "-1 to 1 (0 for none)")?;
         if self.sample_rate != 0.0 {
-            range("sample_rate", self.sample_rate, 1.0, 768_000.0, "0 or 1 to 768000 Hz")?;
+            range(
+                "sample_rate",
+                self.sample_rate,
+                1.0,
+                768_000.0,
+                "0 (keep the rate of the recording) or 1 to 768000 Hz",
+            )?;
         }
         if self.end != 0.0 && self.end <= self.start {
-            let message = format!("= {}: above signal.start ({}), or 0", self.end, self.start);
+            let message = format!(
+                "must be 0 (to the end) or above signal.start ({}), not {}",
+                self.start, self.end
+            );
             return Err(ConfigError::key("signal.end", message));
         }
         Ok(())

@@ -72,7 +72,7 @@ impl Plan {
     /// them, after the signal chain).
     ///
     /// # Errors
-    /// A feature whose parameters are impossible at this rate, or coefficients that it has not.
+    /// A feature whose parameters are impossible at this rate, or coefficients beyond the last.
     pub fn new(
         config: &Arc<Config>,
         sample_rate: f64,

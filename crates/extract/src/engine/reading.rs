@@ -224,7 +224,7 @@ pub fn check_stretch(
     let Some(rate) = outcome.sample_rate else { return Ok(()) };
     let crop = crop(signal, (input.start, input.end), rate);
     if let Some(start) = input.start.filter(|_| crop.start > 0 && outcome.decoded_frames == 0) {
-        let reason = format!("the stretch begins at {start} s, behind the end of the recording");
+        let reason = format!("the stretch begins at {start} s, after the end of the recording");
         return Err(Failed::new(Status::Empty, reason));
     }
     let is_end = input.end.is_some_and(|end| crop.end == frame_at(end, rate));

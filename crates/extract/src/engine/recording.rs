@@ -109,7 +109,7 @@ impl Recording {
         }
         if self.fewest_frames() == 0 {
             let needed = self.plan.shortest();
-            let reason = format!("{total} samples, at least {needed} make one frame");
+            let reason = format!("{total} samples; one frame needs at least {needed}");
             return Err(Failed::new(Status::TooShort, reason));
         }
         let plan = self.plan.clone();

@@ -56,7 +56,9 @@ impl Signals {
     pub fn start(&self, sample_rate: u32, channels: u16) -> Result<Signal, SignalError> {
         let refuse = |reason: String| Failed::new(Status::Unsupported, reason);
         if sample_rate == 0 || !(1..=64).contains(&channels) {
-            let reason = format!("{channels} channels at {sample_rate} Hz: 1 to 64, above 0 Hz");
+            let reason = format!(
+                "{channels} channels at {sample_rate} Hz; expected 1 to 64 channels at more than 0 Hz"
+            );
             return Err(refuse(reason).into());
         }
         let spec = AudioSpec {

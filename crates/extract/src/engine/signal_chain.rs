@@ -19,13 +19,13 @@ pub fn channels_out(rule: &Channels, channels: usize) -> Result<usize, String> {
         Channels::All => Ok(channels),
         Channels::Mean => Ok(1),
         Channels::Downmix71 if channels == 8 => Ok(1),
-        Channels::Downmix71 => {
-            Err(format!("signal.channels = downmix-7.1 needs 8 channels, there are {channels}"))
-        }
+        Channels::Downmix71 => Err(format!(
+            "signal.channels = downmix-7.1 needs 8 channels; the recording has {channels}"
+        )),
         Channels::List(list) => match list.iter().find(|c| **c >= channels) {
             None => Ok(list.len()),
             Some(c) => Err(format!(
-                "signal.channels asks for channel {c}, there are {channels} (counted from 0)"
+                "signal.channels asks for channel {c}; the recording has {channels}, counted from 0"
             )),
         },
     }

@@ -42,7 +42,7 @@ impl Watch {
             |what: String| Err(Failed::new(Status::Changed, format!("{what} while it was read")));
         let now = match Stamp::of_path(path) {
             Ok(Some(now)) => now,
-            Ok(None) => return changed("was replaced by something that is no file".into()),
+            Ok(None) => return changed("was replaced by something other than a file".into()),
             Err(e) if e.kind() == io::ErrorKind::NotFound => return changed("was removed".into()),
             Err(e) => return changed(format!("became unreadable ({e})")),
         };

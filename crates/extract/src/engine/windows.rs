@@ -260,7 +260,7 @@ mod tests {
             number += 1;
         }
         assert_eq!(number, 41);
-        // A third of a second is no whole number of nanoseconds.
+        // A third of a second is not a whole number of nanoseconds.
         for frame in [14_700, 14_701, 123_457] {
             let seconds: f64 = format!("{:.9}", f64::from(frame) / 44_100.0).parse().unwrap();
             assert_eq!(reading::frame_at(seconds, 44_100), frame as u64);

@@ -59,7 +59,7 @@ impl FeatureKind for A34Short {
             if (1.0..=1e7).contains(&samples) {
                 return Ok(samples as usize);
             }
-            Err(DspError::parameter(name, seconds, "seconds that make 1 to 10000000 samples"))
+            Err(DspError::parameter(name, seconds, "a time in seconds of 1 to 10000000 samples"))
         };
         let (window, step) = (samples("window", self.window)?, samples("step", self.step)?);
         let mut labels = short_names();

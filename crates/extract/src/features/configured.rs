@@ -33,24 +33,24 @@ impl FeatureConfig {
     pub fn parse(name: &str, value: Value) -> Result<Self, ConfigError> {
         let prefix = format!("features.{name}");
         if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c)) {
-            let message = "is not a possible name: letters, digits, _ and - only";
+            let message = "a name consists of letters, digits, _ and - only";
             return Err(ConfigError::key(prefix, message));
         }
         let Value::Object(mut table) = value else {
-            return Err(ConfigError::key(prefix, format!("= {value}: expected a table")));
+            return Err(ConfigError::key(prefix, format!("must be a table, not {value}")));
         };
         let kind = match table.remove("kind") {
             None => name.to_string(),
             Some(Value::String(kind)) => kind,
             Some(other) => {
                 let message =
-                    format!("= {other}: expected one of {}", registry::kinds().join(", "));
+                    format!("must be one of {}, not {other}", registry::kinds().join(", "));
                 return Err(ConfigError::key(format!("{prefix}.kind"), message));
             }
         };
         let Some(entry) = registry::find(&kind) else {
             let message = format!(
-                "= \"{kind}\" is unknown: {}",
+                "\"{kind}\" is unknown: {}",
                 corsmal_names::choices(&kind, registry::kinds())
             );
             return Err(ConfigError::key(format!("{prefix}.kind"), message));
@@ -60,7 +60,7 @@ impl FeatureConfig {
             Some(value) => match serde_json::from_value::<[usize; 2]>(value.clone()) {
                 Ok([a, b]) if a < b => Some([a, b]),
                 _ => {
-                    let message = format!("= {value}: expected [first, end) with first < end");
+                    let message = format!("must be [first, end] with first < end, not {value}");
                     return Err(ConfigError::key(format!("{prefix}.coefficients"), message));
                 }
             },
@@ -71,7 +71,7 @@ impl FeatureConfig {
     }
 
     /// Refuses what is impossible at the sample rate `sr`, where that is configured; a feature whose
-    /// source is missing, comes later or cannot be read; coefficients that a feature has not.
+    /// source is missing, comes later or cannot be read; coefficients beyond the last.
     ///
     /// # Errors
     /// The key and what is allowed.
@@ -96,12 +96,13 @@ impl FeatureConfig {
                     let earlier = all[..i].iter().map(|f| f.name.as_str());
                     let choices = corsmal_names::choices(of, earlier);
                     let message =
-                        format!("= \"{of}\": expected the name of an earlier feature: {choices}");
+                        format!("\"{of}\" is not the name of an earlier feature: {choices}");
                     ConfigError::key(key(".of"), message)
                 })?;
                 match &known[at] {
                     Some((_, true)) => {
-                        let message = format!("= \"{of}\": has complex values; expected real ones");
+                        let message =
+                            format!("must name a feature of real values; \"{of}\" is complex");
                         return Err(ConfigError::key(key(".of"), message));
                     }
                     Some((labels, false)) => source.clone_from(labels),
@@ -114,7 +115,7 @@ impl FeatureConfig {
             let mut labels = planned.output_labels(&source);
             if let Some([first, end]) = feature.coefficients {
                 if end > labels.len() {
-                    let message = format!("= [{first}, {end}]: at most {}", labels.len());
+                    let message = format!("must end at {} or before, not at {end}", labels.len());
                     return Err(ConfigError::key(key(".coefficients"), message));
                 }
                 labels = labels[first..end].to_vec();

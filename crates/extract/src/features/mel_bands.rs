@@ -58,8 +58,7 @@ impl SpectrumKernel for MelKernel {
     fn warning(&self) -> Option<String> {
         let (first, last) = (self.empty.first()?, self.empty.last()?);
         Some(format!(
-            "{} of {} mel filters are empty (between {first} and {last}): fewer n_mels or a longer \
-             n_fft avoids that",
+            "{} of {} mel filters are empty (between {first} and {last}): use fewer n_mels or a longer n_fft",
             self.empty.len(),
             self.bank.bands().len()
         ))

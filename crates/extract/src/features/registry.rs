@@ -95,7 +95,7 @@ impl Entry {
         self.keys.iter().copied().flatten().map(|(name, _)| *name)
     }
 
-    /// What a key of its table means; `None` for a key that it has not.
+    /// What a key of its table means; `None` for an unknown key.
     pub fn explain(&self, key: &str) -> Option<&'static str> {
         let mut all = self.keys.iter().copied().flatten();
         all.find(|(name, _)| *name == key).map(|(_, about)| *about)
@@ -122,7 +122,7 @@ impl Entry {
 
 /// A feature that cannot be registered.
 #[derive(Debug, Error)]
-#[error("there is a feature \"{kind}\" already: give the new one a name of its own")]
+#[error("there is already a feature \"{kind}\": give the new one another name")]
 pub struct Taken {
     /// The name.
     pub kind: &'static str,

@@ -104,7 +104,7 @@ impl FeatureKind for SpectralContrast {
         let stft = self.stft.params()?;
         let contrast = Contrast::new(&fft_frequencies(sr, stft.n_fft)?, sr, &self.params())?;
         if contrast.lowest_is_empty() {
-            let allowed = "a lowest band, 0 to fmin Hz, of two bins at least";
+            let allowed = "so high that at least two bins lie below it";
             return Err(DspError::parameter("fmin", self.fmin, allowed));
         }
         let rows = contrast.rows();

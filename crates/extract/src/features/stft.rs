@@ -78,7 +78,7 @@ impl FeatureKind for Stft {
         };
         let complex = self.output == Output::Complex;
         if complex && self.scale != Scale::Linear {
-            let allowed = "linear for complex output";
+            let allowed = "linear when the output is complex";
             return Err(corsmal_dsp::DspError::parameter("scale", "decibels", allowed));
         }
         let kernel: Box<dyn SpectrumKernel> = match self.scale {

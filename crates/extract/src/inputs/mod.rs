@@ -52,8 +52,8 @@ impl Collected {
         let more = if self.skipped.len() > SHOWN { ", ..." } else { "" };
         let files = match self.skipped.len() {
             0 => return None,
-            1 => "1 file was skipped, whose format is".to_string(),
-            n => format!("{n} files were skipped, whose formats are"),
+            1 => "1 file was skipped because its format is".to_string(),
+            n => format!("{n} files were skipped because their formats are"),
         };
         Some(format!("{files} not read: {}{more}", names.join(", ")))
     }

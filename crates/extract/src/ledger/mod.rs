@@ -69,7 +69,7 @@ impl Ledger {
     ///
     /// # Errors
     /// As [`Ledger::create`]; [`LedgerError::Differs`] when the interrupted run is another one;
-    /// [`LedgerError::Header`] when the file is no ledger.
+    /// [`LedgerError::Header`] when the file is not a ledger.
     pub fn resume<R: Done>(
         out: &Path,
         header: &Header,
@@ -94,7 +94,7 @@ impl Ledger {
                 Next::Wrong(_) => None,
             };
             let Some(record) = record else {
-                dropped = Some(format!("{}: its check sum does not fit", place(&records)));
+                dropped = Some(format!("{}: its checksum does not match", place(&records)));
                 break;
             };
             records.push(record);
@@ -104,7 +104,7 @@ impl Ledger {
         if intact < records.len() {
             records.truncate(intact);
             let part = part_path(&ledger.out);
-            let what = format!("{} does not hold what it says", part.display());
+            let what = format!("{} does not match it", part.display());
             dropped = Some(format!("{}: {what}", place(&records)));
         }
         let given_up = records.iter().enumerate().position(|(i, r)| !keep(i, r));
@@ -233,7 +233,7 @@ impl Ledger {
             }
             Err(e) if whole => Err(LedgerError::Header { path: path(), reason: e.to_string() }),
             _ => {
-                let reason = "the check sum of its first line does not fit".into();
+                let reason = "the checksum of its first line does not match".into();
                 Err(LedgerError::Header { path: path(), reason })
             }
         }

@@ -96,8 +96,8 @@ impl DbSpec {
         };
         Decibel { reference, amin, top_db }.check()?;
         if power(amin) < f64::from(f32::MIN_POSITIVE) {
-            let allowed = "at least 1.2e-38, its square too where values are amplitudes (features \
-                           are single precision)";
+            let allowed = "at least 1.2e-38 (for amplitudes, its square too), since features are \
+                           single precision";
             return Err(corsmal_dsp::DspError::parameter("amin", amin, allowed));
         }
         Ok(Decibel { reference: power(reference), amin: power(amin), top_db })

@@ -32,29 +32,33 @@ where
         });
         match wrong {
             Some((key, value, e)) => {
-                let expected = expected(value, &e.to_string());
-                ConfigError::key(format!("{prefix}.{key}"), format!("= {value}: {expected}"))
+                let message = refusal(value, &e.to_string());
+                ConfigError::key(format!("{prefix}.{key}"), message)
             }
             None => ConfigError::key(prefix, error),
         }
     })
 }
 
-/// Serde's message about a value as one for users: what was expected, and the word that was meant.
-fn expected(value: &Value, message: &str) -> String {
+/// Serde's message about a value as one for users: what it must be, and the word that was meant.
+fn refusal(value: &Value, message: &str) -> String {
     let message = message.split(" at line ").next().unwrap_or(message);
     if message.starts_with("unknown variant") {
         let quoted: Vec<&str> = message.split('`').skip(3).step_by(2).collect();
         let given = value.as_str().unwrap_or_default();
-        return corsmal_names::choices(given, quoted);
+        return format!("{value} is unknown: {}", corsmal_names::choices(given, quoted));
     }
-    let Some((_, expected)) = message.split_once(", expected ") else { return message.into() };
+    let expected = message.strip_prefix("expected ");
+    let Some(expected) = expected.or_else(|| message.split_once(", expected ").map(|(_, e)| e))
+    else {
+        return message.into();
+    };
     let plain = match expected {
-        "usize" | "u8" | "u32" | "u64" => "a whole number, 0 or more",
+        "usize" | "u8" | "u32" | "u64" => "a whole number of at least 0",
         "f64" | "f32" => "a number",
         "a boolean" => "true or false",
         "a sequence" => "a list such as [1, 2]",
         other => other,
     };
-    format!("expected {plain}")
+    format!("must be {plain}, not {value}")
 }

@@ -1,4 +1,4 @@
-//! A number, or one word that stands for what is no number.
+//! A number, or one word in its place.
 
 use serde::{Deserialize, Deserializer};
 

@@ -56,7 +56,7 @@ pub fn check(inputs: &[Input], config: &Config, options: &RunOptions) -> Result<
 pub(super) fn require_jobs(jobs: usize) -> Result<(), RunError> {
     match (1..=MAX_JOBS).contains(&jobs) {
         true => Ok(()),
-        false => Err(RunError::Jobs { jobs, why: format!("1 to {MAX_JOBS}") }),
+        false => Err(RunError::Jobs { jobs, why: format!("jobs must be 1 to {MAX_JOBS}") }),
     }
 }
 
@@ -74,7 +74,7 @@ fn check_output(options: &RunOptions, config: &Config) -> Result<OutputFormat, R
         return refuse("is a folder".into());
     }
     if out.exists() && !out.is_file() {
-        return refuse("is no regular file".into());
+        return refuse("is not a regular file".into());
     }
     let target = draft::destination(out);
     let folder = draft::folder(&target);

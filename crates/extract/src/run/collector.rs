@@ -264,7 +264,7 @@ impl<'a> Collector<'a> {
                     && !std::mem::replace(&mut self.lock().warned, true)
                 {
                     self.progress.warning(&format!(
-                        "{}: {total} samples are shorter than n_fft = {longest}; said once a run",
+                        "{}: {total} samples are fewer than n_fft = {longest} (reported once per run)",
                         outcome.id
                     ));
                 }

@@ -34,7 +34,9 @@ pub enum RunError {
     #[error("a table holds statistics: the configuration needs a [summary]")]
     NoSummary,
     /// An input of the interrupted run cannot be read any more.
-    #[error("{path} cannot be read, which the interrupted run could; --resume once it can")]
+    #[error(
+        "{path} cannot be read now, but the interrupted run read it; make it readable, then --resume"
+    )]
     Unreadable {
         /// The input.
         path: String,
@@ -86,12 +88,12 @@ pub enum RunError {
         /// The reason.
         source: std::io::Error,
     },
-    /// So many workers are not possible.
-    #[error("jobs = {jobs} is not possible: {why}")]
+    /// The pool of threads could not be started.
+    #[error("cannot run {jobs} jobs: {why}")]
     Jobs {
         /// Number asked for.
         jobs: usize,
-        /// What is possible, or what the system says.
+        /// What is allowed, or what the system says.
         why: String,
     },
 }

@@ -162,8 +162,7 @@ impl Output {
                 Err(TableError::Renamed { expected, actual, .. }) => {
                     finished.outcome.status = Status::Mismatch;
                     finished.outcome.reason = format!(
-                        "gives {actual} numbers, the recordings before it {expected}: \
-                         another number of channels"
+                        "gives {actual} numbers, earlier recordings gave {expected}: it has another number of channels"
                     );
                 }
                 Err(other) => return Err(other.into()),

@@ -275,6 +275,6 @@ fn stretches_beyond_the_end_are_said() {
     assert_eq!((inside.status, inside.decoded_frames, inside.repairs.len()), (Status::Ok, 6000, 0));
     assert_eq!((end.status, end.decoded_frames), (Status::Ok, 6000));
     assert_eq!(end.repairs, ["end_beyond_recording"]);
-    let expected = "the stretch begins at 5 s, behind the end of the recording";
+    let expected = "the stretch begins at 5 s, after the end of the recording";
     assert_eq!((start.status, start.reason.as_str()), (Status::Empty, expected));
 }

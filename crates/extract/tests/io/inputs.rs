@@ -209,7 +209,7 @@ fn metadata_of_macos_is_skipped_wherever_it_is_named() {
     let mac = dir.path().join("._x.wav");
     fs::write(&mac, b"\0\x05\x16\x07\0\x02\0\0Mac OS X").unwrap();
     let csv = dir.path().join("m.csv");
-    // What is no metadata by its content may have such a name.
+    // What is not metadata by its content may have such a name.
     fs::write(&csv, "path,label\nx.wav,a\n._x.wav,a\n._own.wav,b\n").unwrap();
     let found = inputs::collect(&[text(&csv)]).unwrap();
     let ids: Vec<_> = found.inputs.iter().map(|input| input.id.as_str()).collect();
@@ -226,7 +226,11 @@ fn manifest_errors_name_the_line() {
     let dir = folder(&["a.wav"]);
     let cases = [
         ("m.csv", "file\na.wav\n", "line 1: the first line names no column `path`: file"),
-        ("m.csv", "path,x,x\na.wav,1,2\n", "line 1: column 3 (\"x\") has no name of its own"),
+        (
+            "m.csv",
+            "path,x,x\na.wav,1,2\n",
+            "line 1: column 3 (\"x\") must have a name that no other column has",
+        ),
         ("m.csv", "path,x\na.wav,1\na.wav\n", "line 3: "),
         ("m.csv", "path\na.wav\nb.wav\n", "line 3: "),
         ("m.csv", "path,start\na.wav,soon\n", "line 2: start = \"soon\" is not a time in seconds"),
@@ -276,7 +280,7 @@ fn manifests_have_limits_that_are_named() {
         ),
         ("m.jsonl", format!("{{\"path\":\"a.wav\"{}}}\n", keys(60_000)), "more than 4096"),
         ("m.jsonl", sparse(20_000), "line 4095: more than 4096 different columns"),
-        ("m.csv", tall, "4195 rows with 4000 label columns are too much: at most 16777216"),
+        ("m.csv", tall, "4195 rows with 4000 label columns are too many: at most 16777216"),
         ("m.csv", format!("path,id\na.wav,1\n{long}\n"), "line 3: longer than 1048576 bytes"),
         ("m.jsonl", format!("{{\"path\":\"a.wav\"}}\n{long}"), "line 2: longer than 1048576 bytes"),
         ("m.csv", format!("path,start\na.wav,{}\n", &long[..1 << 19]), "is not a time"),

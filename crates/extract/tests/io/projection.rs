@@ -76,7 +76,7 @@ fn recordings_get_the_coordinates_of_the_fitted_components() {
     let projected = config(PLAIN, &[format!("projection.file={}", text(&file))]).unwrap();
     let again = Config::from_value(projected.to_value()).unwrap();
     assert_eq!(again.hash(), projected.hash());
-    // Where the file lies is no part of the configuration's identity, what it holds is.
+    // Where the file lies is not a part of the configuration's identity, what it holds is.
     let moved = folder.path().join("moved.npz");
     std::fs::copy(&file, &moved).unwrap();
     let elsewhere = config(PLAIN, &[format!("projection.file={}", text(&moved))]).unwrap();

@@ -211,7 +211,7 @@ fn bytes_of_the_archive_that_changed_are_written_again_and_it_is_said() {
         fs::write(part_path(&out), part).unwrap();
         let (ledger, resumed) = Ledger::resume(&out, &header(), |_, _: &Record| true).unwrap();
         assert_eq!(resumed.records.len(), INPUTS - 1, "{compression:?}");
-        assert!(resumed.dropped.unwrap().ends_with("feats.npz.part does not hold what it says"));
+        assert!(resumed.dropped.unwrap().ends_with("feats.npz.part does not match it"));
         drop(ledger);
         work(&out, compression, usize::MAX);
         assert!(fs::read(&out).unwrap() == expected);

@@ -352,7 +352,7 @@ fn members_that_share_bytes_are_refused() {
     assert!(error.contains("members \"träning/0.npy\" and \"träning/1.npy\" share"), "{error}");
 }
 
-/// An archive by another writer, with a header that need not be true and a member that is no array.
+/// An archive by another writer, with a header that need not be true and a member that is not an array.
 fn foreign(path: &Path, header: &Header, data: &[u8]) {
     let mut archive = ::zip::ZipWriter::new(fs::File::create(path).unwrap());
     let options = ::zip::write::SimpleFileOptions::default();

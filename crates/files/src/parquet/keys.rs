@@ -1,4 +1,4 @@
-//! Where an output of ours keeps what is no column.
+//! Where an output of ours keeps everything but its columns.
 
 pub(super) const META: &str = "corsmal.meta";
 pub(super) const CONFIG: &str = "corsmal.config";

@@ -52,7 +52,7 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
         if header.shape == [x.nrows() as u64] && header.dtype.kind != Kind::Complex {
             let values = match header.dtype.kind {
                 Kind::Text | Kind::Bytes => npz.strings(&name)?,
-                // With a point: 1.0 is no class.
+                // With a point: 1.0 is not a class.
                 Kind::Float => npz.f64(&name)?.iter().map(|v| format!("{v:?}")).collect(),
                 _ => npz.integers(&name)?.iter().map(i128::to_string).collect(),
             };

@@ -46,7 +46,7 @@ impl LabelFile {
     /// file name without extension. Without it a column `id` counts, else `path`.
     ///
     /// # Errors
-    /// [`DatasetError::Content`] for a file that is no table, has no such column, names a column
+    /// [`DatasetError::Content`] for a file that is not a table, has no such column, names a column
     /// twice, or names a recording twice.
     pub fn read(path: &Path, key: Option<&str>) -> Result<Self> {
         let fault = |e: csv::Error| DatasetError::content(path, e.to_string());

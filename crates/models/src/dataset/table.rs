@@ -135,7 +135,7 @@ impl LabelledTable {
         found.filter(|found| found.len() == self.ids.len()).ok_or_else(|| {
             DatasetError::content(
                 &self.path,
-                "its recordings lie in no folders that could be their classes; give --labels a CSV",
+                "its recordings are not in folders that could be classes; give --labels a CSV",
             )
         })
     }

@@ -56,7 +56,7 @@ pub enum PredictionError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// The file is no table, or has no predictions.
+    /// The file is not a table, or has no predictions.
     #[error("{path}: {reason}")]
     Content {
         /// The file.
@@ -197,7 +197,7 @@ impl<K> PredictionTable<K> {
                     folder.and_then(|name| name.to_str()).map(String::from)
                 };
                 let folders: Option<Vec<String>> = self.rows.iter().map(folder).collect();
-                let remedy = "its paths lead through no class folders; give --labels a CSV";
+                let remedy = "its paths have no class folders; give --labels a CSV";
                 vec![(column.clone(), folders.ok_or_else(|| self.content(remedy))?)]
             }
             LabelSource::File { path: file, key } => {

@@ -17,7 +17,7 @@ impl PredictionTable {
     /// `Object` or `container` with `sequence` name a recording together.
     ///
     /// # Errors
-    /// [`PredictionError`] for a file that is no table, missing columns, no lines, probabilities
+    /// [`PredictionError`] for a file that is not a table, missing columns, no lines, probabilities
     /// that are not 0 to 1 with sum 1, and predictions that are no class.
     pub fn read(path: &Path) -> Result<Self> {
         let io = |source| PredictionError::Io { path: path.into(), source };
@@ -159,7 +159,7 @@ impl PredictionColumns {
             }
             let sum: f64 = proba.iter().sum();
             if (sum - 1.0).abs() > SUM_TOLERANCE {
-                let reason = format!("line {line}: the probabilities have the sum {sum}, not 1");
+                let reason = format!("line {line}: the probabilities add up to {sum}, not 1");
                 return Err(content(path, reason));
             }
         }

@@ -31,7 +31,7 @@ impl ColumnsParams {
                 owner: Self::OWNER,
                 key: "keep".into(),
                 value: outside.to_string(),
-                allowed: format!("there are {} features", x.ncols()),
+                allowed: format!("numbers of features, 0 to {}", x.ncols().saturating_sub(1)),
             });
         }
         Ok(Columns { n_inputs: x.ncols(), keep: self.keep.clone() })

@@ -60,7 +60,7 @@ impl PcaParams {
                 owner: Self::OWNER,
                 key: "n_components".into(),
                 value: n.to_string(),
-                allowed: format!("{rows} rows x {features} features give at most {most}"),
+                allowed: format!("at most {most} for {rows} rows x {features} features"),
             });
         }
         let failed = |e: DspError| ModelError::Numerical {

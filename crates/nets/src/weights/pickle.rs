@@ -105,7 +105,7 @@ impl Machine<'_> {
     }
 
     fn pop(&mut self) -> Result<Value, String> {
-        self.stack.pop().ok_or_else(|| format!("byte {}: nothing to take", self.at))
+        self.stack.pop().ok_or_else(|| format!("byte {}: the stack is empty", self.at))
     }
 
     fn since_mark(&mut self) -> Result<Vec<Value>, String> {
@@ -120,7 +120,7 @@ impl Machine<'_> {
         if index >= MAX_VALUES {
             return Err(format!("more than {MAX_VALUES} values"));
         }
-        let value = self.stack.last().cloned().ok_or("nothing to remember")?;
+        let value = self.stack.last().cloned().ok_or("the stack is empty")?;
         self.count(&value)?;
         if self.memo.len() <= index {
             self.memo.resize(index + 1, Value::None);
@@ -130,7 +130,8 @@ impl Machine<'_> {
     }
 
     fn recall(&mut self, index: usize) -> Result<(), String> {
-        let value = self.memo.get(index).cloned().ok_or("an unknown memory is recalled")?;
+        let value =
+            self.memo.get(index).cloned().ok_or("a value is recalled that was never stored")?;
         self.count(&value)?;
         self.push(value)
     }
@@ -206,7 +207,7 @@ impl Machine<'_> {
             }
             0x85..=0x87 => {
                 let n = usize::from(code - 0x84);
-                let at = self.stack.len().checked_sub(n).ok_or("nothing to take")?;
+                let at = self.stack.len().checked_sub(n).ok_or("the stack is empty")?;
                 let items = self.stack.split_off(at);
                 self.push(Value::Tuple(items))?;
             }
@@ -216,7 +217,7 @@ impl Machine<'_> {
                 let items = if code == b'a' { vec![self.pop()?] } else { self.since_mark()? };
                 match self.stack.last_mut() {
                     Some(Value::List(list)) => list.extend(items),
-                    _ => return Err("a value is appended to what is no list".into()),
+                    _ => return Err("a value is appended to something that is not a list".into()),
                 }
             }
             b's' | b'u' => {
@@ -227,7 +228,7 @@ impl Machine<'_> {
                     self.since_mark()?
                 };
                 let Some(Value::Dict(dict)) = self.stack.last_mut() else {
-                    return Err("a value is set in what is no dictionary".into());
+                    return Err("a value is set in something that is not a dictionary".into());
                 };
                 let mut items = items.into_iter();
                 while let (Some(key), Some(value)) = (items.next(), items.next()) {
@@ -339,7 +340,7 @@ fn call(function: Value, arguments: Value) -> Result<Value, String> {
             let sizes = |all: &[Value]| -> Result<Vec<usize>, String> {
                 let one = |v: &Value| match v {
                     Value::Int(n) => usize::try_from(*n).map_err(|_| "a negative size".to_string()),
-                    _ => Err("a size that is no number".into()),
+                    _ => Err("a size that is not a number".into()),
                 };
                 all.iter().map(one).collect()
             };
@@ -354,7 +355,7 @@ fn call(function: Value, arguments: Value) -> Result<Value, String> {
         (Value::Global(Global::RebuildParameter), [Value::Tensor(tensor), ..]) => {
             Ok(Value::Tensor(tensor.clone()))
         }
-        _ => Err("a call of what is no known function, or with other arguments".into()),
+        _ => Err("a call of an unknown function, or with other arguments".into()),
     }
 }
 

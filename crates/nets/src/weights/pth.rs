@@ -19,7 +19,7 @@ pub(super) fn read(path: &Path) -> Result<State, String> {
     let length = file.metadata().map_err(|e| e.to_string())?.len();
     let mut archive = ZipArchive::new(BufReader::new(file)).map_err(|e| {
         format!(
-            "no archive as torch.save has written since PyTorch 1.6 ({e}); load it with PyTorch and \
+            "not an archive as torch.save writes it since PyTorch 1.6 ({e}); load it with PyTorch and \
              save net.state_dict() again"
         )
     })?;
@@ -78,7 +78,9 @@ fn member(
 
 /// Tensors by name, from the dictionary itself or from one of its known keys.
 fn entries(value: Value) -> Result<Vec<(String, Tensor)>, String> {
-    let Value::Dict(dict) = value else { return Err("it holds no dictionary of tensors".into()) };
+    let Value::Dict(dict) = value else {
+        return Err("it does not hold a dictionary of tensors".into());
+    };
     let mut tensors = Vec::new();
     let mut inner = None;
     for (key, value) in dict {
@@ -92,7 +94,7 @@ fn entries(value: Value) -> Result<Vec<(String, Tensor)>, String> {
     }
     match inner {
         Some(inner) if tensors.is_empty() => entries(inner),
-        _ if tensors.is_empty() => Err("it holds no dictionary of tensors".into()),
+        _ if tensors.is_empty() => Err("it does not hold a dictionary of tensors".into()),
         _ => Ok(tensors),
     }
 }

@@ -9,9 +9,10 @@ use super::numbers::{Kind, State, numbers};
 /// Weights from a file's bytes.
 ///
 /// # Errors
-/// A text when it is no such file, or holds numbers of a kind that is not read.
+/// A text when it is not such a file, or holds numbers of a kind that is not read.
 pub fn from_safetensors(bytes: &[u8]) -> Result<State, String> {
-    let file = SafeTensors::deserialize(bytes).map_err(|e| format!("no safetensors file: {e}"))?;
+    let file =
+        SafeTensors::deserialize(bytes).map_err(|e| format!("not a safetensors file: {e}"))?;
     let mut state = file
         .iter()
         .map(|(name, view)| {
@@ -34,10 +35,10 @@ pub fn from_safetensors(bytes: &[u8]) -> Result<State, String> {
 /// A text entry of a file, from its bytes.
 ///
 /// # Errors
-/// A text when it is no such file.
+/// A text when it is not such a file.
 pub fn safetensors_text(bytes: &[u8], entry: &str) -> Result<Option<String>, String> {
     let (_, metadata) =
-        SafeTensors::read_metadata(bytes).map_err(|e| format!("no safetensors file: {e}"))?;
+        SafeTensors::read_metadata(bytes).map_err(|e| format!("not a safetensors file: {e}"))?;
     Ok(metadata.metadata().as_ref().and_then(|texts| texts.get(entry).cloned()))
 }
 

@@ -125,14 +125,22 @@ impl<'a> Machine<'a> {
                     let item = self.pop()?;
                     match self.top()? {
                         Value::List(items) => items.push(item),
-                        _ => return Err("something is appended to what is no list".into()),
+                        _ => {
+                            return Err(
+                                "a value is appended to something that is not a list".into()
+                            );
+                        }
                     }
                 }
                 b's' => {
                     let (value, key) = (self.pop()?, self.pop()?);
                     match self.top()? {
                         Value::Dict(pairs) => pairs.push((key, value)),
-                        _ => return Err("an entry is set in what is no dictionary".into()),
+                        _ => {
+                            return Err(
+                                "an entry is set in something that is not a dictionary".into()
+                            );
+                        }
                     }
                 }
                 b'p' => {
@@ -242,10 +250,10 @@ impl<'a> Machine<'a> {
                     Some(Value::Bytes(b)) if b == b"f4" => {
                         Value::Type { double: false, little: true }
                     }
-                    _ => return Err("an array of other elements than floats (f4, f8)".into()),
+                    _ => return Err("an array whose elements are not floats (f4, f8)".into()),
                 }
             }
-            _ => return Err("a call of something else than numpy's array constructor".into()),
+            _ => return Err("a call of something other than numpy's array constructor".into()),
         };
         self.push(made);
         Ok(())
@@ -255,7 +263,7 @@ impl<'a> Machine<'a> {
     fn build(&mut self) -> Result<(), String> {
         let state = self.pop()?;
         let Value::List(state) = self.values[state].clone() else {
-            return Err("the state of an array is no tuple".into());
+            return Err("the state of an array is not a tuple".into());
         };
         let part = |i: usize| state.get(i).map(|&id| &self.values[id]);
         let built = match (self.values[self.top_id()?].clone(), part(1), part(2), part(3), part(4))
@@ -274,7 +282,7 @@ impl<'a> Machine<'a> {
                     Value::Number(n) if (0.0..=1e6).contains(&n) && n.fract() == 0.0 => {
                         Ok(n as usize)
                     }
-                    _ => Err("the size of an array is no small whole number"),
+                    _ => Err("the size of an array is not a small whole number"),
                 };
                 let shape = shape.iter().map(size).collect::<Result<Vec<_>, _>>()?;
                 let array = array(shape, raw, double, little, fortran != 0.0)?;

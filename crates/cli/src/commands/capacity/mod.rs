@@ -85,7 +85,7 @@ enum MethodName {
     M4,
     /// LoDE: circles that fit the masks of both side views.
     M5,
-    /// All that there is, weighted by measured reliability (beyond the paper).
+    /// All available methods, weighted by measured reliability (beyond the paper).
     Fused,
 }
 

@@ -102,7 +102,7 @@ pub fn of_features(
     Ok((End::Done, Some(records)))
 }
 
-/// What is said of a recording.
+/// The line of a recording.
 #[derive(Clone)]
 struct Prediction {
     status: Status,
@@ -189,8 +189,7 @@ fn check_features(model: &Model, table: &LabelledTable, args: &Args) -> Result<b
         let channels = table.outcomes.iter().find_map(|o| o.channels);
         let channels = channels.map_or(String::new(), |n| format!(", of {n} channels"));
         let reason = format!(
-            "gives {given} features{channels}; the model was trained on {known}, so on recordings of \
-             another number of channels"
+            "gives {given} features{channels}; the model was trained on {known}, on recordings with another number of channels"
         );
         table.ids.iter().for_each(|id| refuse(args, id, &reason));
         return Ok(false);

@@ -31,7 +31,9 @@ pub fn run(
 ) -> Result<(End, Option<Records>), Failure> {
     let hop = args.hop.unwrap_or(window / 2.0);
     let windowing = Windowing::new(window, hop).ok_or_else(|| {
-        Failure::new(format!("--window {window} --hop {hop}: 0.01 to 600 seconds are possible"))
+        Failure::new(format!(
+            "--window and --hop must be 0.01 to 600 seconds, not {window} and {hop}"
+        ))
     })?;
     let config = configuration(args, model)?;
     let formats = args.rule(model, &config.to_value())?;
@@ -216,8 +218,7 @@ impl Predictor<'_> {
         let known = self.model.n_features();
         if row.len() != known {
             let reason = format!(
-                "gives {} features; the model was trained on {known}, so on recordings of another \
-                 number of channels",
+                "gives {} features; the model was trained on {known}, on recordings with another number of channels",
                 row.len()
             );
             return refuse(Status::Mismatch, reason);

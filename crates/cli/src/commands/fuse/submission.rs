@@ -54,7 +54,8 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
             measured.complete(prediction);
         }
         if let Some(extra) = capacities.keys().min() {
-            let text = format!("{}: {extra} is among no predictions", path.display());
+            let text =
+                format!("{}: has a line for {extra}, which has no prediction", path.display());
             return Err(Failure::new(text));
         }
     }

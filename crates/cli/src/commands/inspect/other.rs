@@ -103,7 +103,7 @@ fn flatten(key: &str, value: &Value, lines: &mut Vec<String>) {
     }
 }
 
-/// What is said of a table.
+/// What is shown of a table.
 #[derive(Serialize)]
 struct Contents {
     path: String,

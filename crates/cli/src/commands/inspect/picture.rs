@@ -70,7 +70,7 @@ struct Channels(Vec<usize>);
 
 fn channels(text: &str) -> Result<Channels, String> {
     let fault =
-        || format!("expected channel numbers from 0 on, such as 0,3 or 0-3, found '{text}'");
+        || format!("expected channel numbers, counted from 0, such as 0,3 or 0-3, found '{text}'");
     let mut list = Vec::new();
     for part in text.split(',') {
         let (first, last) = part.split_once('-').unwrap_or((part, part));

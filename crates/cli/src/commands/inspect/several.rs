@@ -13,7 +13,7 @@ use super::recording::{decibels, length, plural};
 use super::refusal::to_json;
 use crate::failure::{FAILED_FILES, Failure};
 
-/// What is said of one recording.
+/// The line of one recording.
 #[derive(Serialize)]
 struct Line {
     path: String,

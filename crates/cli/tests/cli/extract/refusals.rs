@@ -42,7 +42,7 @@ fn impossible_values_name_key_value_and_what_is_allowed() {
         ("mfcc.amin=0", &["amin", "0"]),
         ("mfcc.power=3", &["power", "3", "1 or 2"]),
         ("mfcc.coefficients=[5,5]", &["coefficients", "first < end"]),
-        ("mfcc.coefficients=[0,21]", &["coefficients", "21", "at most 20"]),
+        ("mfcc.coefficients=[0,21]", &["coefficients", "21", "20 or before"]),
         ("+delta delta.of=nothing", &["features.delta.of", "nothing", "earlier"]),
         ("nonsense.kind=nonsense", &["nonsense", "mfcc"]),
         ("signal.sample_rate=-1", &["signal.sample_rate", "-1", "768000"]),
@@ -68,7 +68,7 @@ fn impossible_values_name_key_value_and_what_is_allowed() {
         ("signal.res_type=soxr", &["signal.res_type", "did you mean \"soxr_hq\"?"]),
         ("summary.stats=men", &["did you mean \"mean\"?"]),
         ("summary=3", &["expected a dotted key"]),
-        ("+mfcc", &["has mfcc already"]),
+        ("+mfcc", &["already has mfcc"]),
         ("+mfc", &["did you mean \"mfcc\"?"]),
     ] {
         let mut more = vec!["--preset", "mfcc-zcr"];

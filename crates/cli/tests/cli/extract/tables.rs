@@ -7,7 +7,7 @@ use corsmal_files::outcome::Status;
 use super::support::{ended, extract, spec, table, wav};
 use crate::command::{done, text, tool};
 
-/// A mono recording first in the list, three of four channels, and what is no recording.
+/// A mono recording first in the list, three of four channels, and what is not a recording.
 fn mixed(folder: &Path) {
     wav(&folder.join("a_mono.wav"), 1, 8000, 1);
     for (name, seed) in [("b.wav", 2), ("c.wav", 3), ("d.wav", 4)] {

@@ -94,7 +94,7 @@ pub(super) fn chroma_bins(sr: f64, num_fft: usize) -> Result<Vec<ChromaBin>> {
     let (low, high) = (semitones[0], semitones[num_fft - 1]);
     if high >= n || low < -n {
         let allowed = format!(
-            "at least {} samples: the chroma code needs more bins than semitones",
+            "at least {} samples, since the chroma code needs more bins than semitones",
             2 * high.max(-low).max(0) + 2
         );
         return Err(DspError::parameter("window", 2 * num_fft, allowed));

@@ -34,7 +34,7 @@ pub(super) fn check(growth: &Growth, class_weight: &ClassWeight) -> Result<()> {
             owner: OWNER,
             key,
             value,
-            allowed: format!("solver = linfa has {allowed} only"),
+            allowed: format!("{allowed} with solver=linfa"),
         })
     };
     if growth.max_features != MaxFeatures::Rule(FeatureRule::All) {

@@ -32,7 +32,7 @@ pub(super) fn check(metric: Metric) -> Result<()> {
         owner: OWNER,
         key: "metric".into(),
         value: format!("{:?}", metric).to_lowercase(),
-        allowed: "algorithm = linfa has euclidean, manhattan and chebyshev only".into(),
+        allowed: "euclidean, manhattan or chebyshev with algorithm=linfa".into(),
     })
 }
 

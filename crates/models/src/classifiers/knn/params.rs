@@ -69,7 +69,7 @@ impl Train for KNearestParams {
                 owner: Self::OWNER,
                 key: "k".into(),
                 value: self.k.to_string(),
-                allowed: format!("there are {} training rows", x.nrows()),
+                allowed: format!("at most the number of training rows ({})", x.nrows()),
             });
         }
         check_lengths(x)?;
