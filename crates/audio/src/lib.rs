@@ -5,22 +5,26 @@
 //! Nothing in a file can make a reader panic or allocate more than a fixed amount; what is
 //! accepted, repaired and refused is the table in `docs/reading.md`.
 //!
-//! ```no_run
-//! let mut source = corsmal_audio::open("recording.wav".as_ref())?;
+//! ```
+//! # // A WAV file of two channels and three frames.
+//! # let mut bytes = b"RIFF\x30\0\0\0WAVEfmt \x10\0\0\0\x01\0\x02\0\x40\x1f\0\0\0\x7d\0\0\x04\0\x10\0data\x0c\0\0\0".to_vec();
+//! # [0_i16, 0, 16384, -16384, 0, 0].iter().for_each(|sample| bytes.extend(sample.to_le_bytes()));
+//! // `open` takes a path, `from_reader` anything that gives bytes.
+//! let mut source = corsmal_audio::from_reader(std::io::Cursor::new(bytes))?;
 //! let channels = usize::from(source.spec().channels);
 //! let mut block = vec![0.0; 4096 * channels];
+//! let mut peak = 0.0_f32;
 //! loop {
 //!     let frames = source.read(&mut block)?;
 //!     if frames == 0 {
 //!         break;
 //!     }
 //!     let interleaved = &block[..frames * channels];
-//!     // use the samples
-//! #   let _ = interleaved;
+//!     peak = interleaved.iter().fold(peak, |peak, x| peak.max(x.abs()));
 //! }
-//! for repair in &source.health().repairs {
-//!     eprintln!("{repair}");
-//! }
+//! assert_eq!((channels, peak), (2, 0.5));
+//! // What was repaired on the way; nothing here.
+//! assert!(source.health().repairs.is_empty());
 //! # Ok::<(), corsmal_audio::AudioError>(())
 //! ```
 

@@ -13,8 +13,6 @@ use ndarray::ArrayD;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::error::CompareError;
-
 /// Name under which frame times are compared.
 const TIMES: &str = "frame times";
 
@@ -50,7 +48,7 @@ pub(super) struct ComparedFile {
 
 impl ComparedFile {
     /// Opens a file by its content and lists what it holds.
-    pub(super) fn open(path: &Path) -> Result<Self, CompareError> {
+    pub(super) fn open(path: &Path) -> Result<Self, FeatureFileError> {
         match FeatureFile::open(path)? {
             FeatureFile::Npz(npz) => Self::npz(npz),
             FeatureFile::Npy(npy) => Ok(Self::npy(npy)),
@@ -58,7 +56,7 @@ impl ComparedFile {
         }
     }
 
-    fn npz(mut npz: NpzFile) -> Result<Self, CompareError> {
+    fn npz(mut npz: NpzFile) -> Result<Self, FeatureFileError> {
         let (mut table, mut provenance, mut features) = (None, None, Vec::new());
         if layout::is_ours(&npz) {
             let (found, made) = layout::read_table(&mut npz)?;
@@ -95,7 +93,7 @@ impl ComparedFile {
         Self { source, arrays, table: None, provenance: None, refused: vec![] }
     }
 
-    fn parquet(parquet: ParquetFile) -> Result<Self, CompareError> {
+    fn parquet(parquet: ParquetFile) -> Result<Self, FeatureFileError> {
         let table = parquet.numbers()?;
         let reason = "a nested column, or not of numbers";
         let refused =
@@ -139,12 +137,12 @@ impl ComparedFile {
     }
 
     /// The values of an array; complex ones with a first axis of real and imaginary parts.
-    pub(super) fn load(&mut self, index: usize) -> Result<ArrayD<f64>, CompareError> {
+    pub(super) fn load(&mut self, index: usize) -> Result<ArrayD<f64>, FeatureFileError> {
         match &mut self.source {
             FeatureFile::Npz(npz) => Ok(npz.components(&self.arrays[index].name)?),
             FeatureFile::Npy(npy) => npy
                 .components()
-                .map_err(|source| FeatureFileError::Npy { path: npy.path().into(), source }.into()),
+                .map_err(|source| FeatureFileError::Npy { path: npy.path().into(), source }),
             FeatureFile::Parquet(_) => unreachable!("a Parquet file lists no arrays"),
         }
     }

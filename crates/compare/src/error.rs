@@ -3,9 +3,6 @@
 use std::path::PathBuf;
 
 use corsmal_files::feature_file::FeatureFileError;
-use corsmal_files::layout::LayoutError;
-use corsmal_files::npz::NpzError;
-use corsmal_files::parquet::ParquetTableError;
 use thiserror::Error;
 
 /// Why two files could not be compared.
@@ -15,15 +12,6 @@ pub enum CompareError {
     /// A file cannot be read.
     #[error(transparent)]
     File(#[from] FeatureFileError),
-    /// A member cannot be read.
-    #[error(transparent)]
-    Npz(#[from] NpzError),
-    /// An output of ours contradicts itself.
-    #[error(transparent)]
-    Layout(#[from] LayoutError),
-    /// A Parquet table cannot be read.
-    #[error(transparent)]
-    Parquet(#[from] ParquetTableError),
     /// A name of `--map` that is not in its file.
     #[error("{path}: no array {name:?} to map; there are {known}")]
     Unmapped {

@@ -2,6 +2,20 @@
 //!
 //! Everything of burn stays in this crate. [`layer::Layer`] is what a network is made of,
 //! [`network::Network`] an architecture with its numbers, [`networks`] the published ones.
+//!
+//! ```
+//! use corsmal_nets::networks;
+//!
+//! // M1's network for two classes, with initial numbers of seed 0, on three items.
+//! let network = networks::named("m1")?.build(Some(2), 0)?;
+//! let inputs = network.batches(&[(vec![3, 2050], vec![0.5; 3 * 2050])])?;
+//! let outputs = network.forward(&inputs)?;
+//! assert_eq!((outputs.items(), network.outputs()), (3, 2));
+//! # Ok::<(), corsmal_nets::NetError>(())
+//! ```
+//!
+//! [`fit`] trains a network by a [`recipe`], [`cross_validation`] scores it on held-out items,
+//! [`weights`] reads and writes PyTorch's numbers.
 
 pub mod batch;
 mod checkpoint;

@@ -8,6 +8,7 @@ use corsmal_extract::engine::{Plan, PlannedFeature, channels_out};
 
 use crate::failure::Failure;
 use crate::paragraphs::wrapped;
+use crate::text_table::TextTable;
 
 /// Arguments of `presets`.
 #[derive(clap::Args)]
@@ -68,7 +69,8 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 
 /// A table: what each preset computes of what, and how much.
 fn list() -> Result<(), Failure> {
-    let mut rows = vec![["preset", "channels", "rate", "output of a recording"].map(String::from)];
+    let heads = ["preset", "channels", "rate", "output of a recording"];
+    let mut table = TextTable::new(heads).left(&[1, 2, 3]);
     for preset in PRESETS {
         let config = Arc::new(Config::preset(preset.name)?);
         let channels = match &config.signal.channels {
@@ -81,19 +83,14 @@ fn list() -> Result<(), Failure> {
             0.0 => "its own".into(),
             rate => format!("{rate} Hz"),
         };
-        rows.push([preset.name.into(), channels, rate, size(&config)?]);
+        table.row([preset.name.into(), channels, rate, size(&config)?]);
     }
-    let width = |column: usize| rows.iter().map(|row| row[column].len()).max().unwrap_or(0);
-    let widths = [width(0), width(1), width(2)];
-    for [name, channels, rate, output] in &rows {
-        let [a, b, c] = widths;
-        println!("{name:<a$}  {channels:<b$}  {rate:<c$}  {output}");
-    }
-    println!();
+    println!("{}\n", table.text());
+    let width = PRESETS.iter().map(|preset| preset.name.len()).max().unwrap_or(0);
     for preset in PRESETS {
-        let indent = " ".repeat(widths[0] + 2);
+        let indent = " ".repeat(width + 2);
         let description = wrapped(&Config::preset(preset.name)?.description, &indent);
-        println!("{:<width$}  {}", preset.name, description.trim_start(), width = widths[0]);
+        println!("{:<width$}  {}", preset.name, description.trim_start());
     }
     Ok(())
 }

@@ -33,6 +33,7 @@ mod onset_strength;
 mod pcen;
 mod poly_features;
 mod registry;
+mod rise;
 mod rms;
 mod spec9216;
 mod spectral_bandwidth;

@@ -1,8 +1,7 @@
 //! `onset_strength`: how much the spectrum rises from frame to frame.
 
-use corsmal_dsp::DspError;
 use corsmal_dsp::decibel::Decibel;
-use corsmal_dsp::mel::{MelNorm, SparseBank, mel_filter};
+use corsmal_dsp::mel::{SparseBank, mel_filter};
 use corsmal_dsp::onset::{OnsetParams, onset_strength};
 use corsmal_dsp::stft::{StftParams, spectrogram};
 use ndarray::{Array2, ArrayView2};
@@ -11,24 +10,15 @@ use serde::{Deserialize, Serialize};
 use super::kernel::{Extent, Feature, WholeKernel};
 use super::kind::FeatureKind;
 use super::mel_bands::check_n_mels;
-use crate::params::{Keys, MelSpec, StftSpec};
+use super::rise::{Rise, RiseSpec};
+use crate::params::Keys;
 
 /// Parameters of `onset_strength`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct OnsetStrength {
     #[serde(flatten)]
-    stft: StftSpec,
-    #[serde(flatten)]
-    mel: MelSpec,
-    lag: usize,
-    max_size: usize,
-}
-
-impl Default for OnsetStrength {
-    fn default() -> Self {
-        Self { stft: StftSpec::default(), mel: MelSpec::default(), lag: 1, max_size: 1 }
-    }
+    rise: RiseSpec,
 }
 
 struct Envelope {
@@ -55,30 +45,15 @@ impl FeatureKind for OnsetStrength {
     const ABOUT: &'static str = "Mean rise over lag frames of the mel bands in dB \
         (librosa.onset.onset_strength), 80 dB below the maximum of each channel. Holds the whole \
         recording in memory.";
-    const KEYS: &'static [Keys] = &[
-        StftSpec::KEYS,
-        MelSpec::KEYS,
-        &[
-            ("lag", "Frames to look back."),
-            ("max_size", "Bands of the maximum filter over the earlier frame; 1: no filter."),
-        ],
-    ];
+    const KEYS: &'static [Keys] = RiseSpec::KEYS;
     const PYTHON: &'static str = "onset.onset_strength";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
-        let stft = self.stft.params()?;
-        check_n_mels(self.mel.n_mels)?;
-        let bank = SparseBank::new(&mel_filter(&self.mel.params(sr, stft.n_fft, MelNorm::Slaney))?);
-        let defaults = OnsetParams::new(stft.n_fft, stft.hop_length)?;
-        let params = OnsetParams { lag: self.lag, max_size: self.max_size, ..defaults };
-        if params.lag == 0 {
-            return Err(DspError::parameter("lag", 0, "at least 1"));
-        }
-        if params.max_size == 0 {
-            return Err(DspError::parameter("max_size", 0, "at least 1"));
-        }
+        let Rise { stft, mel, onset } = self.rise.params(sr)?;
+        check_n_mels(mel.n_mels)?;
+        let bank = SparseBank::new(&mel_filter(&mel)?);
         let extent = Extent::Frames(stft.hop_length as f64);
-        let kernel = Envelope { stft, bank, params };
+        let kernel = Envelope { stft, bank, params: onset };
         Ok(Feature::whole(extent, kernel, vec![String::new()]))
     }
 }

@@ -3,8 +3,7 @@
 use std::collections::VecDeque;
 
 use corsmal_dsp::decibel::Decibel;
-use corsmal_dsp::mel::MelNorm;
-use corsmal_dsp::onset::{OnsetParams, max_filter};
+use corsmal_dsp::onset::max_filter;
 use serde::{Deserialize, Serialize};
 
 use super::derived::{Derived, FrameShape, InTime, TooFewFrames};
@@ -13,24 +12,15 @@ use super::kernel::Feature;
 use super::kind::FeatureKind;
 use super::labels::indices;
 use super::mel_bands::DecibelFinish;
-use crate::params::{DbSpec, Keys, MelSpec, Scale, StftSpec};
+use super::rise::{Rise, RiseSpec};
+use crate::params::{DbSpec, Keys, Scale};
 
 /// Parameters of `spectral_flux`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct SpectralFlux {
     #[serde(flatten)]
-    stft: StftSpec,
-    #[serde(flatten)]
-    mel: MelSpec,
-    lag: usize,
-    max_size: usize,
-}
-
-impl Default for SpectralFlux {
-    fn default() -> Self {
-        Self { stft: StftSpec::default(), mel: MelSpec::default(), lag: 1, max_size: 1 }
-    }
+    rise: RiseSpec,
 }
 
 /// Rises over `lag` frames, as late as the analysis is centred.
@@ -105,30 +95,18 @@ impl FeatureKind for SpectralFlux {
     const ABOUT: &'static str = "Rise over lag frames of each of n_mels mel bands in dB, 80 dB below \
         the maximum of each channel, 0 where a band falls: what onset_strength averages \
         (librosa.onset.onset_strength_multi with aggregate=False).";
-    const KEYS: &'static [Keys] = &[
-        StftSpec::KEYS,
-        MelSpec::KEYS,
-        &[
-            ("lag", "Frames to look back."),
-            ("max_size", "Bands of the maximum filter over the earlier frame; 1: no filter."),
-        ],
-    ];
+    const KEYS: &'static [Keys] = RiseSpec::KEYS;
     const PYTHON: &'static str = "onset.onset_strength_multi";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
-        let stft = self.stft.params()?;
-        let defaults = OnsetParams::new(stft.n_fft, stft.hop_length)?;
-        let params = OnsetParams { lag: self.lag, max_size: self.max_size, ..defaults };
-        params.check()?;
-        let bands = self.mel.params(sr, stft.n_fft, MelNorm::Slaney);
-        let db = DbSpec::default();
+        let Rise { stft, mel, onset } = self.rise.params(sr)?;
         let unit = Unit::Decibel(Decibel { top_db: None, ..Decibel::default() });
-        let before = self.lag.saturating_add(params.center.unwrap_or(0));
-        let rises = Rises { lag: self.lag, before, max_size: self.max_size };
+        let before = onset.lag.saturating_add(onset.center.unwrap_or(0));
+        let rises = Rises { lag: onset.lag, before, max_size: onset.max_size };
         Ok(Feature {
-            finish: DecibelFinish::of(Scale::PowerToDb, &db, self.mel.n_mels),
+            finish: DecibelFinish::of(Scale::PowerToDb, &DbSpec::default(), mel.n_mels),
             derived: Some(Box::new(rises)),
-            ..Feature::exact(stft, ExactMel::new(&bands, 2.0, unit)?, indices(self.mel.n_mels))
+            ..Feature::exact(stft, ExactMel::new(&mel, 2.0, unit)?, indices(mel.n_mels))
         })
     }
 }
