@@ -69,7 +69,9 @@ def pcen(
     s: Any = floats("S", S)
     time = axis % s.ndim if -s.ndim <= axis < s.ndim else None
     if time is None:
-        raise ParameterError(f"axis must be an axis of S, which has {s.ndim} dimensions, not {axis}")
+        raise ParameterError(
+            f"axis must be an axis of S, which has {s.ndim} dimensions, not {axis}"
+        )
     places = [time]
     if max_size > 1 and ref is None:
         if s.ndim == 1:

@@ -71,7 +71,9 @@ def resample(
     """
     y = audio(y)
     if not -y.ndim <= axis < y.ndim:
-        raise ParameterError(f"axis must be an axis of y, which has {y.ndim} dimensions, not {axis}")
+        raise ParameterError(
+            f"axis must be an axis of y, which has {y.ndim} dimensions, not {axis}"
+        )
     name = "soxr_hq" if res_type in _AS_SOXR_HQ else str(res_type)
     if name not in CONVERTERS:
         names = ", ".join(CONVERTERS)

@@ -178,7 +178,7 @@ def cross_validate(
     Raises
     ------
     ParameterError
-        A file cannot be read, labels do not fit the recordings, or a parameter is outside its range.
+        A file cannot be read, labels do not fit the recordings, or a parameter is out of range.
 
     Examples
     --------

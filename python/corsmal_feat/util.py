@@ -17,7 +17,9 @@ Array = npt.NDArray[Any]
 
 def _along(x: Array, axis: int) -> int:
     if not -x.ndim <= axis < x.ndim:
-        raise ParameterError(f"axis must be an axis of the array, which has {x.ndim} dimensions, not {axis}")
+        raise ParameterError(
+            f"axis must be an axis of the array, which has {x.ndim} dimensions, not {axis}"
+        )
     return int(x.shape[axis])
 
 
@@ -62,8 +64,8 @@ def frame(
     length = _along(array, axis)
     if frame_length < 1 or length < frame_length:
         raise ParameterError(
-            f"Input is too short (n={length}) for frame_length={frame_length}: frame_length must be 1 to"
-            f" {length}"
+            f"Input is too short (n={length}) for frame_length={frame_length}:"
+            f" frame_length must be 1 to {length}"
         )
     if hop_length < 1:
         raise ParameterError(f"Invalid hop_length: {hop_length}; it must be at least 1")

@@ -163,9 +163,7 @@ def lode(
     571.2
     """
     if variant not in ("published", "corrected"):
-        raise ParameterError(
-            f"variant must be 'published' or 'corrected', not {variant!r}"
-        )
+        raise ParameterError(f"variant must be 'published' or 'corrected', not {variant!r}")
     if len(masks) != 2 or len(calibrations) != 2:
         raise ParameterError(
             f"{len(masks)} masks and {len(calibrations)} calibrations: lode takes two of each"
