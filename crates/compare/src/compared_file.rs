@@ -187,7 +187,9 @@ fn columns(table: &Table) -> NumericTable {
     NumericTable {
         ids: Some(table.ids().to_vec()),
         names: table.feature_names().to_vec(),
+        types: vec!["float32"; table.feature_names().len()],
         values: table.values().mapv(f64::from),
+        texts: Vec::new(),
         skipped: Vec::new(),
     }
 }

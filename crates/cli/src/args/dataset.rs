@@ -17,14 +17,15 @@ const FOLDER_COLUMN: &str = "class";
 /// Label columns that are groups rather than something to predict.
 const NO_TARGETS: [&str; 4] = ["fold", "group", "container", "recording"];
 
-/// How to read an `.npz` that `extract` did not write.
+/// How to read a file that `extract` did not write.
 #[derive(clap::Args, Clone)]
 pub struct MemberArgs {
     /// In an .npz of another program: the member with the features, rows x features. Its
     /// one-dimensional members of that many rows are label columns.
     #[arg(long, value_name = "MEMBER", default_value = "X")]
     x: String,
-    /// In an .npz of another program: the member with the ids; else rows are numbered from 0.
+    /// In a file of another program: the member or column with the ids; else the column id of a
+    /// Parquet table; else rows are numbered from 0.
     #[arg(long, value_name = "MEMBER")]
     ids: Option<String>,
 }

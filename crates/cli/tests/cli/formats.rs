@@ -151,3 +151,36 @@ fn labels_of_a_manifest_reach_the_score() {
         assert!(told.contains(&format!("{unknown} of them unknown")), "{told}");
     }
 }
+
+/// As pandas and polars leave it: the same columns, without what `extract` says of them.
+#[test]
+fn a_table_that_another_tool_wrote_is_trained_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let mut manifest = "path,kind,take\n".to_string();
+    for n in 0..6 {
+        let (low, high) = (path(&format!("low{n}.wav")), path(&format!("high{n}.wav")));
+        tone(&low, 16_000, 1, 300.0 + 10.0 * n as f32);
+        tone(&high, 16_000, 1, 3000.0 + 10.0 * n as f32);
+        manifest += &format!("low{n}.wav,low,{n}\nhigh{n}.wav,high,{n}\n");
+    }
+    let (list, ours, other) = (path("list.csv"), path("ours.parquet"), path("other.parquet"));
+    std::fs::write(&list, manifest).unwrap();
+    done(&["extract", "--in", text(&list), "--out", text(&ours), "--preset", "mfcc-zcr", "-q"]);
+    let mut bytes = std::fs::read(&ours).unwrap();
+    let (mark, writer) = (b"corsmal-feat", b"parquet-cpp-");
+    let places: Vec<usize> =
+        bytes.windows(mark.len()).enumerate().filter(|(_, w)| w == mark).map(|(i, _)| i).collect();
+    for at in places {
+        bytes[at..at + mark.len()].copy_from_slice(writer);
+    }
+    std::fs::write(&other, bytes).unwrap();
+    let model = path("m.model");
+    let train = ["train", text(&other), "--target", "kind", "-o", text(&model)];
+    let trained = done(&[&train[..], &["--classifier", "knn"]].concat());
+    assert!(trained.contains("kind: high (6), low (6)"), "{trained}");
+    let found = done(&["inspect", text(&other)]);
+    assert!(found.contains("kind") && found.contains("mfcc[0].mean"), "{found}");
+    let refusal = refused(&["train", text(&other), "--target", "sort", "-o", text(&model)]);
+    assert!(refusal.contains("kind"), "{refusal}");
+}

@@ -1,4 +1,4 @@
-//! The numeric columns of any Parquet table, ours or another tool's.
+//! The columns of numbers and text of any Parquet table, ours or another tool's.
 
 use std::fs::File;
 use std::path::Path;
@@ -15,16 +15,20 @@ use super::keys::ROWS;
 use super::limits::{require_rows, spend};
 use crate::table::ID;
 
-/// The numbers of a table.
+/// The numbers of a table, and its texts.
 #[derive(Debug)]
 pub struct NumericTable {
     /// The text column `id`, where there is one.
     pub ids: Option<Vec<String>>,
     /// Names of the numeric columns.
     pub names: Vec<String>,
+    /// Their types: `float32`, `float64`, `int32`, `int64` or `bool`.
+    pub types: Vec<&'static str>,
     /// `[rows, columns]`; nulls are NaN.
     pub values: Array2<f64>,
-    /// NumericTable that are neither numbers nor text.
+    /// The other text columns; nulls are empty.
+    pub texts: Vec<(String, Vec<String>)>,
+    /// Columns that are neither numbers nor text.
     pub skipped: Vec<String>,
 }
 
@@ -36,46 +40,53 @@ pub(super) fn read(
     mut text: u64,
 ) -> Result<NumericTable, ParquetTableError> {
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
-    let (mut ids, mut names, mut skipped) = (None, Vec::new(), Vec::new());
+    let (mut ids, mut labels) = (None, Vec::new());
+    let (mut names, mut types, mut skipped) = (Vec::new(), Vec::new(), Vec::new());
     let mut series: Vec<Vec<f64>> = Vec::new();
     for (index, column) in schema.columns().iter().enumerate() {
         let name = column.path().string();
         let levels = column.max_def_level();
         let mut parts = (0..reader.num_row_groups())
             .map(|group| reader.get_row_group(group)?.get_column_reader(index));
-        let numeric = matches!(
-            column.physical_type(),
-            Physical::FLOAT
-                | Physical::DOUBLE
-                | Physical::INT32
-                | Physical::INT64
-                | Physical::BOOLEAN
-        );
-        if numeric && column.max_rep_level() == 0 {
+        let numeric = type_of(column.physical_type()).filter(|_| column.max_rep_level() == 0);
+        if let Some(kind) = numeric {
             let values = parts
                 .try_fold(Vec::new(), |values, part| numbers(part?, levels, rows, values))
                 .map_err(|e| layer(path, e))?;
             names.push(name);
+            types.push(kind);
             series.push(values);
         } else if column.physical_type() == Physical::BYTE_ARRAY && column.max_rep_level() == 0 {
-            if name == ID {
-                let values = parts
-                    .try_fold(Vec::new(), |values, part| {
-                        texts(part?, levels, (rows, &mut text), values)
-                    })
-                    .map_err(|e| layer(path, e))?;
-                ids = Some(values);
-            }
+            let values = parts
+                .try_fold(Vec::new(), |values, part| {
+                    texts(part?, levels, (rows, &mut text), values)
+                })
+                .map_err(|e| layer(path, e))?;
+            if name == ID { ids = Some(values) } else { labels.push((name, values)) }
         } else {
             skipped.push(name);
         }
     }
-    let rows = ids.as_ref().map(Vec::len).or(series.first().map(Vec::len)).unwrap_or(0);
-    if let Some(other) = series.iter().find(|column| column.len() != rows) {
-        return Err(layout(path, format!("{rows} rows in each column"), other.len()));
+    let found = ids.iter().map(Vec::len).chain(series.iter().map(Vec::len));
+    let mut lengths = found.chain(labels.iter().map(|(_, column): &(_, Vec<String>)| column.len()));
+    let rows = lengths.next().unwrap_or(0);
+    if let Some(other) = lengths.find(|length| *length != rows) {
+        return Err(layout(path, format!("{rows} rows in each column"), other));
     }
     let values = Array2::from_shape_fn((rows, series.len()), |(row, column)| series[column][row]);
-    Ok(NumericTable { ids, names, values, skipped })
+    Ok(NumericTable { ids, names, types, values, texts: labels, skipped })
+}
+
+/// The type of a column of numbers, in numpy's words.
+fn type_of(column: Physical) -> Option<&'static str> {
+    Some(match column {
+        Physical::FLOAT => "float32",
+        Physical::DOUBLE => "float64",
+        Physical::INT32 => "int32",
+        Physical::INT64 => "int64",
+        Physical::BOOLEAN => "bool",
+        _ => return None,
+    })
 }
 
 fn numbers(
@@ -199,7 +210,12 @@ mod tests {
 
         let found = crate::parquet::ParquetFile::open(&path).unwrap().numbers().unwrap();
         assert_eq!(found.ids.unwrap(), ["a", "b", "c"]);
-        assert_eq!(found.names, ["x", "n"]);
+        assert_eq!(
+            (found.names, found.types),
+            (vec!["x".into(), "n".into()], vec!["float64", "int64"])
+        );
+        let note = ["one", "two", "three"].map(String::from).to_vec();
+        assert_eq!(found.texts, [("note".to_string(), note)]);
         assert_eq!(found.values.column(1).to_vec(), [7.0, 8.0, 9.0]);
         let x = found.values.column(0);
         assert_eq!([x[0], x[2]], [0.5, -2.0]);

@@ -10,7 +10,7 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
 use super::error::{ParquetTableError, io, layer, layout};
-use super::keys::{CONFIG, META, OUTCOMES, ROWS};
+use super::keys::{CONFIG, META, OUTCOMES, ROWS, WRITER};
 use super::limits::{self, require_rows, shielded, spend};
 use super::numeric::{self, NumericTable};
 use crate::layout::parse_outcomes;
@@ -53,9 +53,10 @@ impl ParquetFile {
         &self.path
     }
 
-    /// Whether this tool wrote it.
+    /// Whether this tool wrote it. One that another tool wrote over, keeping our metadata, is not.
     pub fn is_ours(&self) -> bool {
-        self.find(META).is_some()
+        let writer = self.reader.metadata().file_metadata().created_by();
+        writer.is_some_and(|name| name.starts_with(WRITER)) && self.find(META).is_some()
     }
 
     /// How an output of ours was made.
@@ -82,7 +83,7 @@ impl ParquetFile {
         shielded(&self.path, || self.read_table())
     }
 
-    /// The numeric columns of any table: floats, integers and booleans that are not nested.
+    /// The columns of any table that are not nested: floats, integers, booleans and texts.
     ///
     /// # Errors
     /// [`ParquetTableError`].

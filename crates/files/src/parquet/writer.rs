@@ -14,7 +14,7 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{ColumnPath, Type, TypePtr};
 
 use super::error::{ParquetTableError, io, layer};
-use super::keys::{CONFIG, META, OUTCOMES, ROWS};
+use super::keys::{CONFIG, META, OUTCOMES, ROWS, WRITER};
 use crate::layout::json_lines;
 use crate::provenance::Provenance;
 use crate::table::{ID, Table};
@@ -51,7 +51,7 @@ fn write_to(file: File, table: &Table, provenance: &Provenance) -> Result<(), Pa
     ];
     let metadata = metadata.into_iter().map(|(key, value)| KeyValue::new(key.into(), value));
     let mut properties = WriterProperties::builder()
-        .set_created_by(format!("corsmal-feat {}", env!("CARGO_PKG_VERSION")))
+        .set_created_by(format!("{WRITER} {}", env!("CARGO_PKG_VERSION")))
         .set_compression(Compression::SNAPPY)
         // Floats hardly ever repeat; ids and labels do.
         .set_dictionary_enabled(false)

@@ -1,22 +1,26 @@
-//! An `.npz` that `extract` did not write.
+//! An `.npz` or a Parquet table that `extract` did not write, or that another program wrote over.
 
 use std::collections::HashSet;
 use std::path::Path;
 
+use corsmal_files::feature_file::FeatureFileError;
 use corsmal_files::npy::{Kind, NpyError};
 use corsmal_files::npz::{NpzError, NpzFile};
-use ndarray::Ix2;
+use corsmal_files::parquet::{NumericTable, ParquetFile};
+use corsmal_files::table::RESERVED;
+use ndarray::{Axis, Ix2};
 use serde_json::Value;
 
 use super::error::{DatasetError, Result};
 use super::table::LabelledTable;
 
-/// Where features and ids are in an `.npz` of another program.
+/// Where features and ids are in a file of another program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemberNames {
-    /// the member with the features, rows x features
+    /// in an `.npz`, the member with the features, rows x features
     pub x: String,
-    /// the member with one id per row; else rows are numbered from 0
+    /// the member or the column with one id per row; else the column `id` of a Parquet table; else
+    /// rows are numbered from 0
     pub ids: Option<String>,
 }
 
@@ -66,10 +70,7 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
             None => return Err(fault(format!("no member {name:?} (--ids) with one id per row"))),
         },
     };
-    let mut seen = HashSet::new();
-    if let Some(twice) = ids.iter().find(|id| !seen.insert(id.as_str())) {
-        return Err(fault(format!("id {twice:?} occurs twice")));
-    }
+    require_unique(path, &ids)?;
     let names_fit =
         npz.contains("feature_names") && npz.header("feature_names")?.shape == [x.ncols() as u64];
     let feature_names = if names_fit { npz.strings("feature_names")? } else { Vec::new() };
@@ -83,4 +84,64 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
         config_hash: String::new(),
         columns,
     })
+}
+
+/// Columns of decimal numbers are features, all others label columns: so pandas and polars leave a
+/// table of ours.
+pub(super) fn read_parquet(
+    path: &Path,
+    parquet: &ParquetFile,
+    members: &MemberNames,
+) -> Result<LabelledTable> {
+    let fault = |reason: String| DatasetError::content(path, reason);
+    let NumericTable { ids, names, types, values, mut texts, .. } =
+        parquet.numbers().map_err(FeatureFileError::from)?;
+    // pandas keeps its index in such a column.
+    texts.retain(|(name, _)| !name.starts_with(RESERVED));
+    let mut features = Vec::new();
+    for (at, (name, kind)) in names.iter().zip(&types).enumerate() {
+        if name.starts_with(RESERVED) {
+        } else if kind.starts_with("float") {
+            features.push(at);
+        } else {
+            let whole = |v: &f64| if v.is_nan() { String::new() } else { format!("{v:.0}") };
+            texts.push((name.clone(), values.column(at).iter().map(whole).collect()));
+        }
+    }
+    if features.is_empty() {
+        let columns = names.iter().chain(texts.iter().map(|(name, _)| name)).map(String::as_str);
+        let found = columns.take(8).collect::<Vec<_>>().join(", ");
+        return Err(fault(format!(
+            "no column of decimal numbers, which would be features: {found}"
+        )));
+    }
+    let ids = match (&members.ids, ids) {
+        (None, Some(ids)) => ids,
+        (None, None) => (0..values.nrows()).map(|row| row.to_string()).collect(),
+        (Some(name), _) => match texts.iter().find(|(column, _)| column == name) {
+            Some((_, ids)) => ids.clone(),
+            None => {
+                return Err(fault(format!("no column {name:?} (--ids) of text or whole numbers")));
+            }
+        },
+    };
+    require_unique(path, &ids)?;
+    Ok(LabelledTable {
+        path: path.into(),
+        x: values.select(Axis(1), &features),
+        feature_names: features.iter().map(|at| names[*at].clone()).collect(),
+        ids,
+        outcomes: Vec::new(),
+        config: Value::Null,
+        config_hash: String::new(),
+        columns: texts,
+    })
+}
+
+fn require_unique(path: &Path, ids: &[String]) -> Result<()> {
+    let mut seen = HashSet::new();
+    match ids.iter().find(|id| !seen.insert(id.as_str())) {
+        Some(twice) => Err(DatasetError::content(path, format!("id {twice:?} occurs twice"))),
+        None => Ok(()),
+    }
 }

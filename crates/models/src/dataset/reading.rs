@@ -10,7 +10,7 @@ use super::foreign::{self, MemberNames};
 use super::table::LabelledTable;
 
 impl LabelledTable {
-    /// Reads an `.npz` or `.parquet` of `extract`, or an `.npz` of another program.
+    /// Reads an `.npz` or `.parquet` of `extract` or of another program.
     ///
     /// # Errors
     /// [`DatasetError`] for a file that cannot be read or has no matrix of features.
@@ -18,6 +18,9 @@ impl LabelledTable {
         match FeatureFile::open(path)? {
             FeatureFile::Npz(mut npz) if !layout::is_ours(&npz) => {
                 foreign::read(path, &mut npz, members)
+            }
+            FeatureFile::Parquet(parquet) if !parquet.is_ours() => {
+                foreign::read_parquet(path, &parquet, members)
             }
             mut ours => {
                 let FeatureTable { table, provenance, .. } = ours.table()?;

@@ -95,6 +95,12 @@ fn draw(path: &Path, picture: &Picture) -> Result<(), Failure> {
             let values = file.components()?.mapv(|v| v as f32);
             features::draw_array(path, values, picture)
         }
+        FeatureFile::Parquet(file) if !file.is_ours() => {
+            let table = file.numbers()?;
+            let rows = 0..table.values.nrows();
+            let ids = table.ids.unwrap_or_else(|| rows.map(|row| row.to_string()).collect());
+            features::draw_table(path, &ids, table.values.mapv(|v| v as f32).view(), picture)
+        }
         FeatureFile::Parquet(file) => {
             let (table, _) = file.table()?;
             features::draw_table(path, table.ids(), table.values(), picture)

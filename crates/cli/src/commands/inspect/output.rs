@@ -117,6 +117,9 @@ fn npz(mut file: NpzFile) -> Result<Contents, Failed> {
 
 /// A summary table.
 fn parquet(file: &ParquetFile) -> Result<Contents, Failed> {
+    if !file.is_ours() {
+        return foreign_parquet(file);
+    }
     let found = file.table()?;
     let table = &found.0;
     let column = |name: &str, kind: &str| Member {
@@ -130,6 +133,24 @@ fn parquet(file: &ParquetFile) -> Result<Contents, Failed> {
     let path = file.path().display().to_string();
     let run = Some(Run::new(found)?);
     Ok(Contents { path, format: "parquet", members, run, projection: None })
+}
+
+/// A table of another tool.
+fn foreign_parquet(file: &ParquetFile) -> Result<Contents, Failed> {
+    let table = file.numbers()?;
+    let rows = table.values.nrows() as u64;
+    let column = |name: &str, kind: &str| Member {
+        name: name.to_owned(),
+        kind: kind.to_owned(),
+        shape: vec![rows],
+    };
+    let ids = table.ids.iter().map(|_| column("id", "text"));
+    let texts = table.texts.iter().map(|(name, _)| column(name, "text"));
+    let numbers = table.names.iter().zip(&table.types).map(|(name, kind)| column(name, kind));
+    let others = table.skipped.iter().map(|name| column(name, "other"));
+    let members = ids.chain(texts).chain(numbers).chain(others).collect();
+    let path = file.path().display().to_string();
+    Ok(Contents { path, format: "parquet", members, run: None, projection: None })
 }
 
 /// Prints what is found in a file.
