@@ -88,12 +88,13 @@ impl Meter {
         let elapsed = self.started.elapsed();
         let seconds = *self.seconds.lock().unwrap_or_else(|e| e.into_inner());
         let statuses = counts(&report.outcomes);
+        let repairs = repairs(&report.outcomes);
         if self.format == LogFormat::Json {
             eprintln!(
                 "{}",
                 json!({
                     "event": "finished", "out": out.display().to_string(), "statuses": statuses,
-                    "resumed": report.resumed, "up_to_date": report.up_to_date,
+                    "repairs": repairs, "resumed": report.resumed, "up_to_date": report.up_to_date,
                     "elapsed_s": elapsed.as_secs_f64(), "audio_s": seconds,
                 })
             );
@@ -120,6 +121,11 @@ impl Meter {
                 String::new()
             },
         );
+        if !repairs.is_empty() {
+            let repaired = report.outcomes.iter().filter(|o| !o.repairs.is_empty()).count();
+            let each: Vec<_> = repairs.iter().map(|(name, n)| format!("{n} {name}")).collect();
+            eprintln!("{}: {repaired} repaired: {}", out.display(), each.join(", "));
+        }
     }
 }
 
@@ -190,6 +196,15 @@ pub fn counts(outcomes: &[Outcome]) -> BTreeMap<&'static str, usize> {
     let mut counts = BTreeMap::new();
     for outcome in outcomes {
         *counts.entry(outcome.status.name()).or_default() += 1;
+    }
+    counts
+}
+
+/// Number of inputs by repair.
+fn repairs(outcomes: &[Outcome]) -> BTreeMap<&str, usize> {
+    let mut counts = BTreeMap::new();
+    for name in outcomes.iter().flat_map(|outcome| &outcome.repairs) {
+        *counts.entry(name.as_str()).or_default() += 1;
     }
     counts
 }

@@ -217,3 +217,18 @@ fn every_command_has_help_with_an_example_and_a_manual_page() {
     let unknown = ended(tool().args(["completions", "man", "nope"])).with(2);
     assert!(unknown.stderr.contains("nope") && unknown.stderr.contains("extract"));
 }
+
+#[test]
+fn repairs_are_counted_at_the_end() {
+    let folder = tempfile::tempdir().unwrap();
+    wav(&folder.path().join("a.wav"), 1, 8000, 1);
+    let (list, out) = (folder.path().join("list.csv"), folder.path().join("out.npz"));
+    std::fs::write(&list, "path,start,end\na.wav,0,0.2\na.wav,0.3,9\n").unwrap();
+    let run = extract(&list, &out, &["--preset", "mfcc-zcr"]).with(0);
+    assert!(run.stderr.contains(": 1 repaired: 1 end_beyond_recording\n"), "{}", run.stderr);
+    assert_eq!(table(&out).outcomes()[1].repairs, ["end_beyond_recording"]);
+    let run = extract(&list, &out, &["--overwrite", "--log-format", "json"]).with(0);
+    let last = run.stderr.lines().last().unwrap();
+    let event: serde_json::Value = serde_json::from_str(last).unwrap();
+    assert_eq!(event["repairs"], serde_json::json!({"end_beyond_recording": 1}));
+}
