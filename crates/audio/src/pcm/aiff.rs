@@ -60,8 +60,8 @@ pub(super) fn read(input: &mut Input) -> Result<Header, AudioError> {
     if input.position() != at {
         input.seek(at)?;
     }
-    let offset = match input.peek(16)?.get(8..12).and_then(<[u8]>::first_chunk) {
-        Some(offset) => u32::from_be_bytes(*offset),
+    let offset = match input.peek(16)?.first_chunk::<16>() {
+        Some(&[.., a, b, c, d, _, _, _, _]) => u32::from_be_bytes([a, b, c, d]),
         None => return Err(AudioError::corrupt(at, "an SSND chunk cut off", "16 bytes")),
     };
     input.consume(16);

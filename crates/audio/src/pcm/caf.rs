@@ -17,8 +17,7 @@ pub(super) fn is_caf(start: &[u8]) -> bool {
 
 /// Reads up to the first sample.
 pub(super) fn read(input: &mut Input) -> Result<Header, AudioError> {
-    input.peek(8)?;
-    input.consume(8);
+    input.skip(8)?;
     let mut description = None;
     for _ in 0..MAX_CHUNKS {
         let at = input.position();
