@@ -3,7 +3,8 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use symphonia::core::codecs::audio::well_known::{
-    CODEC_ID_FLAC, CODEC_ID_MP1, CODEC_ID_MP2, CODEC_ID_MP3, CODEC_ID_VORBIS,
+    CODEC_ID_AAC, CODEC_ID_ALAC, CODEC_ID_FLAC, CODEC_ID_MP1, CODEC_ID_MP2, CODEC_ID_MP3,
+    CODEC_ID_VORBIS,
 };
 use symphonia::core::codecs::audio::{
     AudioCodecId, AudioCodecParameters, AudioDecoder, AudioDecoderOptions,
@@ -78,6 +79,16 @@ impl Codec {
         sample_rate: u32,
     ) -> Result<Self, Refusal> {
         Self::new(CODEC_ID_FLAC, Some(stream_info), channels, sample_rate)
+    }
+
+    /// AAC; `config` is its AudioSpecificConfig.
+    pub(crate) fn aac(config: &[u8], channels: usize, sample_rate: u32) -> Result<Self, Refusal> {
+        Self::new(CODEC_ID_AAC, Some(config), channels, sample_rate)
+    }
+
+    /// ALAC; `cookie` is its description of 24 or 48 bytes.
+    pub(crate) fn alac(cookie: &[u8], channels: usize, sample_rate: u32) -> Result<Self, Refusal> {
+        Self::new(CODEC_ID_ALAC, Some(cookie), channels, sample_rate)
     }
 
     /// Vorbis; `headers` are the identification and the setup packet.

@@ -1,6 +1,6 @@
 //! Bytes of a file or a pipe: a buffer with an absolute position.
 
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, Cursor, Read, Seek, SeekFrom};
 
 use crate::error::AudioError;
 
@@ -66,6 +66,30 @@ impl<R: Read + Send> Medium for Stream<R> {
 
     fn jump(&mut self, _: u64) -> io::Result<()> {
         Err(io::ErrorKind::Unsupported.into())
+    }
+}
+
+/// What a pipe still held, from the absolute byte `start` on.
+struct Held {
+    bytes: Cursor<Vec<u8>>,
+    start: u64,
+}
+
+impl Read for Held {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        self.bytes.read(out)
+    }
+}
+
+impl Medium for Held {
+    fn byte_len(&self) -> Option<u64> {
+        Some(self.start + self.bytes.get_ref().len() as u64)
+    }
+
+    fn jump(&mut self, offset: u64) -> io::Result<()> {
+        let offset = offset.checked_sub(self.start).ok_or(io::ErrorKind::InvalidInput)?;
+        self.bytes.set_position(offset);
+        Ok(())
     }
 }
 
@@ -176,6 +200,29 @@ impl Input {
             }
             wanted = n.min(2 * wanted);
         }
+    }
+
+    /// Keeps all that a pipe still gives, up to `most` bytes: from then on, the input is a file that
+    /// begins here. False, with nothing dropped, where there is more.
+    pub(crate) fn hold(&mut self, most: usize) -> Result<bool, AudioError> {
+        let mut wanted = BUFFER;
+        loop {
+            let shown = self.peek(wanted)?.len();
+            if shown > most {
+                return Ok(false);
+            }
+            if shown < wanted {
+                break;
+            }
+            wanted = (2 * wanted).min(most + 1);
+        }
+        let mut bytes = std::mem::take(&mut self.buffer);
+        bytes.truncate(self.end);
+        bytes.drain(..self.start);
+        self.buffer = vec![0; bytes.len().clamp(MIN_BUFFER, BUFFER)];
+        self.medium = Box::new(Held { bytes: Cursor::new(bytes), start: self.position });
+        (self.start, self.end) = (0, 0);
+        Ok(true)
     }
 
     /// Continues at the absolute byte `offset`.

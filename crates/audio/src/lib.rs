@@ -1,5 +1,5 @@
 //! Recordings to samples, as streams of blocks: WAV, Wave64, AIFF, AU and CAF by demultiplexers of its
-//! own; FLAC, Ogg and MPEG audio with the decoders of symphonia, lewton and opus-decoder (feature
+//! own; FLAC, Ogg, MPEG audio, AAC and ALAC with the decoders of symphonia, lewton and opus-decoder (feature
 //! `symphonia`, on by default).
 //!
 //! Nothing in a file can make a reader panic or allocate more than a fixed amount; what is
@@ -29,12 +29,16 @@
 //! ```
 
 #[cfg(feature = "symphonia")]
+mod aac;
+#[cfg(feature = "symphonia")]
 mod codec;
 mod error;
 #[cfg(feature = "symphonia")]
 mod flac;
 mod health;
 mod input;
+#[cfg(feature = "symphonia")]
+mod mp4;
 #[cfg(feature = "symphonia")]
 mod mpeg;
 mod notes;

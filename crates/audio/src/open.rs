@@ -12,9 +12,9 @@ use crate::start::{self, Format};
 /// File name extensions (lower case) that a walk through folders should pick up. Files are still
 /// opened by content, whatever they are called.
 #[cfg(feature = "symphonia")]
-pub const EXTENSIONS: [&str; 21] = [
+pub const EXTENSIONS: [&str; 26] = [
     "wav", "wave", "rf64", "bw64", "bwf", "w64", "aif", "aiff", "aifc", "au", "snd", "caf", "flac",
-    "ogg", "oga", "opus", "mp1", "mp2", "mp3", "mpga", "amb",
+    "ogg", "oga", "opus", "mp1", "mp2", "mp3", "mpga", "amb", "m4a", "m4b", "aac", "adts", "3ga",
 ];
 /// File name extensions (lower case) that a walk through folders should pick up. Files are still
 /// opened by content, whatever they are called.
@@ -22,17 +22,17 @@ pub const EXTENSIONS: [&str; 21] = [
 pub const EXTENSIONS: [&str; 13] =
     ["wav", "wave", "rf64", "bw64", "bwf", "w64", "aif", "aiff", "aifc", "au", "snd", "caf", "amb"];
 
-/// File name extensions (lower case) of recordings in formats that are not read, so that a walk
-/// through folders can say what it passes over.
-pub const OTHER_EXTENSIONS: [&str; 39] = [
-    "3ga", "3gp", "8svx", "aa3", "aac", "ac3", "adts", "amr", "ape", "asf", "avi", "dff", "dsf",
-    "dts", "eac3", "gsm", "iff", "m4a", "m4b", "m4v", "mka", "mkv", "mov", "mp4", "mpc", "ofr",
-    "ra", "rm", "sd2", "shn", "sph", "spx", "tak", "thd", "tta", "voc", "webm", "wma", "wv",
+/// File name extensions (lower case) of recordings in formats that are not read, and of videos,
+/// which are read where they are named: a walk through folders says what it passes over.
+pub const OTHER_EXTENSIONS: [&str; 34] = [
+    "3gp", "8svx", "aa3", "ac3", "amr", "ape", "asf", "avi", "dff", "dsf", "dts", "eac3", "gsm",
+    "iff", "m4v", "mka", "mkv", "mov", "mp4", "mpc", "ofr", "ra", "rm", "sd2", "shn", "sph", "spx",
+    "tak", "thd", "tta", "voc", "webm", "wma", "wv",
 ];
 
 #[cfg(feature = "symphonia")]
-const FORMATS: &str =
-    "WAV, Wave64, AIFF, AU, CAF, FLAC, Ogg (Vorbis, Opus, FLAC) or MPEG audio (MP1, MP2, MP3)";
+const FORMATS: &str = "WAV, Wave64, AIFF, AU, CAF, FLAC, Ogg (Vorbis, Opus, FLAC), MPEG audio (MP1, MP2, MP3), MP4 \
+     (AAC, ALAC) or AAC in ADTS";
 #[cfg(not(feature = "symphonia"))]
 const FORMATS: &str = "WAV (RIFF, RIFX, RF64, BW64), Wave64, AIFF, AU or CAF";
 
@@ -83,6 +83,10 @@ fn from_medium(medium: Box<dyn Medium>) -> Result<Box<dyn BlockSource>, AudioErr
         Some(Format::Flac) => crate::flac::open(input),
         #[cfg(feature = "symphonia")]
         Some(Format::Mpeg) => crate::mpeg::open(input),
+        #[cfg(feature = "symphonia")]
+        Some(Format::Mp4) => crate::mp4::open(input),
+        #[cfg(feature = "symphonia")]
+        Some(Format::Aac) => crate::aac::open(input),
         #[cfg(feature = "symphonia")]
         Some(Format::Ogg) => crate::ogg::open(input),
         None => Err(AudioError::NotAudio { found, expected: FORMATS }),

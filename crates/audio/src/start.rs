@@ -20,19 +20,22 @@ pub(crate) enum Format {
     Mpeg,
     #[cfg(feature = "symphonia")]
     Ogg,
+    #[cfg(feature = "symphonia")]
+    Mp4,
+    /// In ADTS.
+    #[cfg(feature = "symphonia")]
+    Aac,
 }
 
 /// Bytes that tell a format.
 const SHOWN: usize = 16;
 
 /// Formats that are not read: place and bytes of their mark, and their name.
-const OTHERS: [(usize, &[u8], &str); 25] = [
+const OTHERS: [(usize, &[u8], &str); 23] = [
     (0, b"\0\x05\x16\x07", "macOS metadata (AppleDouble)"),
-    (4, b"ftyp", "MP4 (AAC, ALAC, ...)"),
+    (4, b"ftyp", "MP4"),
     (0, b"\x1a\x45\xdf\xa3", "Matroska or WebM"),
     (0, b"\x30\x26\xb2\x75\x8e\x66\xcf\x11", "ASF (WMA)"),
-    (0, b"\xff\xf1", "AAC in ADTS"),
-    (0, b"\xff\xf9", "AAC in ADTS"),
     (0, b"\x0b\x77", "AC-3"),
     (0, b"\x7f\xfe\x80\x01", "DTS"),
     (0, b"wvpk", "WavPack"),
@@ -90,6 +93,9 @@ fn at_start(start: &[u8]) -> Option<Format> {
         if start.starts_with(b"OggS") {
             return Some(Format::Ogg);
         }
+        if crate::mp4::is_mp4(start) {
+            return Some(Format::Mp4);
+        }
     }
     OTHERS
         .iter()
@@ -111,11 +117,13 @@ fn surely(bytes: &[u8]) -> Option<Format> {
     }
 }
 
-/// MPEG audio has no mark but the headers of its frames.
+/// MPEG audio and AAC have no mark but the headers of their frames.
 #[cfg(feature = "symphonia")]
 fn frames(shown: &[u8], is_end: bool) -> Option<(usize, Format)> {
     let free = crate::mpeg::is_free_format(shown).then_some(0);
-    crate::mpeg::find(shown, is_end, 2).or(free).map(|at| (at, Format::Mpeg))
+    let mpeg = crate::mpeg::find(shown, is_end, 2).or(free).map(|at| (at, Format::Mpeg));
+    let aac = crate::aac::find(shown, is_end, 2).map(|at| (at, Format::Aac));
+    [mpeg, aac].into_iter().flatten().min_by_key(|(at, _)| *at)
 }
 
 #[cfg(not(feature = "symphonia"))]

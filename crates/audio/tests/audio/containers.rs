@@ -64,12 +64,13 @@ fn aiff_and_aiff_c() {
     assert!(read_pipe(swapped).unwrap_err().to_string().contains("COMM first"));
 }
 
+fn au(size: u32) -> Vec<u8> {
+    let fields = [28u32, size, 3, 44_100, 2].map(u32::to_be_bytes).concat();
+    [b".snd".as_slice(), &fields, b"text", &big()].concat()
+}
+
 #[test]
 fn au_in_both_byte_orders() {
-    let au = |size: u32| {
-        let fields = [28u32, size, 3, 44_100, 2].map(u32::to_be_bytes).concat();
-        [b".snd".as_slice(), &fields, b"text", &big()].concat()
-    };
     check(&au(16), "au pcm_s16be", &[]);
     check(&au(u32::MAX), "au pcm_s16be", &[]);
     check(&au(0), "au pcm_s16be", &["data_size_zero"]);
@@ -78,47 +79,64 @@ fn au_in_both_byte_orders() {
     check(&[b"dns.".as_slice(), &fields, &little()].concat(), "au pcm_s16le", &[]);
 }
 
+fn caf(flags: u32, data: &[u8], size: i64) -> Vec<u8> {
+    let mut bytes = b"caff\0\x01\0\0desc\0\0\0\0\0\0\0\x20".to_vec();
+    bytes.extend(44_100f64.to_be_bytes());
+    bytes.extend(b"lpcm");
+    bytes.extend([flags, 4, 1, 2, 16].map(u32::to_be_bytes).concat());
+    bytes.extend(b"free\0\0\0\0\0\0\0\x03abcdata");
+    bytes.extend(size.to_be_bytes());
+    bytes.extend([0; 4]);
+    bytes.extend(data);
+    bytes
+}
+
 #[test]
 fn core_audio_format() {
-    let caf = |flags: u32, data: &[u8], size: i64| {
-        let mut bytes = b"caff\0\x01\0\0desc\0\0\0\0\0\0\0\x20".to_vec();
-        bytes.extend(44_100f64.to_be_bytes());
-        bytes.extend(b"lpcm");
-        bytes.extend([flags, 4, 1, 2, 16].map(u32::to_be_bytes).concat());
-        bytes.extend(b"free\0\0\0\0\0\0\0\x03abcdata");
-        bytes.extend(size.to_be_bytes());
-        bytes.extend([0; 4]);
-        bytes.extend(data);
-        bytes
-    };
     check(&caf(0, &big(), 20), "caf pcm_s16be", &[]);
     check(&caf(2, &little(), 20), "caf pcm_s16le", &[]);
     check(&caf(2, &little(), -1), "caf pcm_s16le", &[]);
     check(&caf(2, &little(), 200), "caf pcm_s16le", &["truncated"]);
 }
 
-#[test]
-fn wave64() {
+/// Wave64; `size` is that of its data and of their header of 24 bytes.
+fn w64(size: u64) -> Vec<u8> {
     let rest = *b"\xf3\xac\xd3\x11\x8c\xd1\x00\xc0\x4f\x8e\xdb\x8a";
     let part = |name: &[u8; 4], size: u64, body: &[u8]| {
         let mut part = [name.as_slice(), &rest, &size.to_le_bytes(), body].concat();
         part.resize(part.len().next_multiple_of(8), 0);
         part
     };
-    let file = |size: u64| {
-        let mut bytes = b"riff\x2e\x91\xcf\x11\xa5\xd6\x28\xdb\x04\xc1\x00\x00".to_vec();
-        bytes.extend([0; 8]);
-        bytes.extend(b"wave");
-        bytes.extend(rest);
-        let format = [1, 0, 2, 0, 0x44, 0xac, 0, 0, 0x10, 0xb1, 2, 0, 4, 0, 16, 0];
-        bytes.extend(part(b"junk", 24 + 3, b"abc"));
-        bytes.extend(part(b"fmt ", 24 + 16, &format));
-        bytes.extend(part(b"data", size, &little()));
-        bytes
-    };
-    check(&file(24 + 16), "w64 pcm_s16le", &[]);
-    check(&file(24), "w64 pcm_s16le", &["data_size_zero"]);
-    check(&file(240), "w64 pcm_s16le", &["truncated"]);
+    let mut bytes = b"riff\x2e\x91\xcf\x11\xa5\xd6\x28\xdb\x04\xc1\x00\x00".to_vec();
+    bytes.extend([0; 8]);
+    bytes.extend(b"wave");
+    bytes.extend(rest);
+    let format = [1, 0, 2, 0, 0x44, 0xac, 0, 0, 0x10, 0xb1, 2, 0, 4, 0, 16, 0];
+    bytes.extend(part(b"junk", 24 + 3, b"abc"));
+    bytes.extend(part(b"fmt ", 24 + 16, &format));
+    bytes.extend(part(b"data", size, &little()));
+    bytes
+}
+
+#[test]
+fn wave64() {
+    check(&w64(24 + 16), "w64 pcm_s16le", &[]);
+    check(&w64(24), "w64 pcm_s16le", &["data_size_zero"]);
+    check(&w64(240), "w64 pcm_s16le", &["truncated"]);
+}
+
+/// A file of each container, and one whose size was never filled in: for the mutations.
+pub fn seeds() -> Vec<Vec<u8>> {
+    vec![
+        aiff(b"AIFF", b"", &big(), None),
+        aiff(b"AIFC", b"sowt\0\0", &little(), Some(0)),
+        au(16),
+        au(u32::MAX),
+        caf(0, &big(), 20),
+        caf(2, &little(), -1),
+        w64(24 + 16),
+        w64(24),
+    ]
 }
 
 /// libsndfile's samples of the same files are beside them.

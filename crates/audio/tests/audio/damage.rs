@@ -313,9 +313,7 @@ fn other_formats_are_named() {
     let mut speex = OGG.to_vec();
     speex[28..36].copy_from_slice(b"Speex   ");
     for (bytes, name) in [
-        (b"\0\0\0\x20ftypM4A \0\0\0\0".as_slice(), "MP4"),
-        (b"\x1a\x45\xdf\xa3 and so on, more bytes", "Matroska"),
-        (b"\xff\xf1\x50\x80\x01\x1f\xfc and so on", "AAC"),
+        (b"\x1a\x45\xdf\xa3 and so on, more bytes".as_slice(), "Matroska"),
         (b"\0\x05\x16\x07\0\x02\0\0Mac OS X   ", "macOS"),
     ] {
         let error = refusal(bytes);

@@ -14,6 +14,8 @@ mod corpus;
 #[cfg(feature = "symphonia")]
 mod damage;
 mod dialects;
+#[cfg(feature = "symphonia")]
+mod mp4;
 mod mutations;
 #[cfg(feature = "symphonia")]
 mod oracles;

@@ -7,9 +7,10 @@ use corsmal_audio::{BlockSource, SampleEncoding, from_reader, from_seekable};
 
 use crate::allocations::measured;
 use crate::common::{Wav, tag};
+use crate::containers;
 
-/// Largest memory that reading a hostile WAV may take: the buffer and small change.
-const WAV_BYTES: usize = 256 << 10;
+/// Largest memory that reading hostile PCM may take: the buffer and small change.
+const PCM_BYTES: usize = 256 << 10;
 /// Frames per block of the test reads.
 const BLOCK: [usize; 2] = [64, 7];
 
@@ -37,7 +38,7 @@ fn mutate(bytes: &mut Vec<u8>, seeds: &[Vec<u8>], random: &mut Random) {
         if bytes.is_empty() {
             return;
         }
-        let near = if random.below(4) > 0 { 80 } else { bytes.len() };
+        let near = [80, 80, 640, bytes.len()][random.below(4)];
         let at = random.below(near.min(bytes.len()));
         match random.below(9) {
             0 => bytes[at] ^= 1 << random.below(8),
@@ -94,7 +95,8 @@ fn count(default: usize) -> usize {
     count.unwrap_or(default)
 }
 
-fn wav_seeds() -> Vec<Vec<u8>> {
+/// WAV and the other containers of samples that stand side by side.
+fn pcm_seeds() -> Vec<Vec<u8>> {
     let plain = Wav::pcm16(2, &[1, -2, 3, -4, 5, -6, 7, -8]);
     let long =
         Wav { form: b"RF64", data_size: Some(u32::MAX), long_size: Some(16), ..plain.clone() };
@@ -110,12 +112,12 @@ fn wav_seeds() -> Vec<Vec<u8>> {
         Wav { data_size: Some(0), ..plain },
         long,
     ];
-    all.iter().map(Wav::bytes).collect()
+    all.iter().map(Wav::bytes).chain(containers::seeds()).collect()
 }
 
 #[test]
-fn mutated_wav_files_neither_panic_nor_allocate() {
-    let seeds = wav_seeds();
+fn mutated_files_of_pcm_neither_panic_nor_allocate() {
+    let seeds = pcm_seeds();
     let mut random = Random(1);
     let (mut accepted, mut total) = (0, 0);
     for _ in 0..count(100_000) {
@@ -138,7 +140,7 @@ fn mutated_wav_files_neither_panic_nor_allocate() {
         assert!(whole != Some(None) && piped != Some(None));
         assert_eq!(whole, split);
         assert!(whole.flatten().is_none_or(|(frames, _)| frames <= len));
-        assert!(peak < WAV_BYTES, "{peak} bytes");
+        assert!(peak < PCM_BYTES, "{peak} bytes");
         accepted += usize::from(whole.is_some());
         total += 1;
     }
@@ -151,13 +153,17 @@ fn mutated_wav_files_neither_panic_nor_allocate() {
 #[test]
 fn mutated_compressed_files_do_not_panic() {
     use crate::compressed::{BLOCKS, LEVELS, SAMPLES};
+    use crate::mp4;
 
     /// Decoders allocate by what headers say, up to their own limits.
     const BYTES: usize = 64 << 20;
 
-    let adpcm: &[u8] = include_bytes!("samples/sines-2ch-ima.wav");
-    let all = [&SAMPLES[..], &LEVELS, &[BLOCKS, adpcm]].concat();
-    let seeds: Vec<Vec<u8>> = all.iter().map(|s| s.to_vec()).collect();
+    let adpcm: [&[u8]; 2] =
+        [include_bytes!("samples/sines-2ch-ima.wav"), include_bytes!("samples/sines-2ch-ms.wav")];
+    let mp4 = [mp4::AAC, mp4::M4A, mp4::FRAGMENTS, mp4::ALAC];
+    let all = [&SAMPLES[..], &LEVELS, &adpcm, &mp4, &[BLOCKS]].concat();
+    let mut seeds: Vec<Vec<u8>> = all.iter().map(|s| s.to_vec()).collect();
+    seeds.extend(mp4::seeds());
     let mut random = Random(2);
     let (mut accepted, mut worst, mut total) = (0, 0, 0);
     for _ in 0..count(100_000) / 100 {

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::common::read_file;
+use crate::common::{Wav, read_file, read_pipe};
 
 /// What a command writes to its output; `None` where it is not installed or refuses.
 fn output(command: &mut Command) -> Option<Vec<u8>> {
@@ -49,6 +49,10 @@ fn ffmpeg_and_libsndfile_give_the_same_samples() {
         ("levels-6ch.ogg", "ffmpeg", 1e-6),
         ("levels-8ch.ogg", "ffmpeg", 1e-6),
         ("levels-8ch.opus", "libsndfile", 4e-5),
+        ("sines-2ch.aac", "ffmpeg", 2e-6),
+        ("sines-2ch.m4a", "ffmpeg", 2e-6),
+        ("sines-2ch-fragments.mp4", "ffmpeg", 2e-6),
+        ("steps-6ch.m4a", "ffmpeg", 0.0),
         ("sines-2ch-ima.wav", "libsndfile", 0.0),
         ("sines-2ch-ms.wav", "libsndfile", 0.0),
     ];
@@ -68,5 +72,59 @@ fn ffmpeg_and_libsndfile_give_the_same_samples() {
     }
     if asked < cases.len() {
         eprintln!("skipped: ffmpeg or sndfile-convert absent, {asked} comparisons made");
+    }
+}
+
+/// AAC has the frames that were encoded, and ffmpeg's samples; ffmpeg keeps the padding of the last
+/// packet. ALAC has the samples that were encoded.
+#[test]
+fn mp4_of_ffmpeg_is_read_as_ffmpeg_reads_it() {
+    const FRAMES: usize = 10_000;
+    let folder = tempfile::tempdir().unwrap();
+    let (wav, muxed) = (folder.path().join("in.wav"), folder.path().join("out"));
+    let cases: [(&str, u16, u32, &[&str]); 12] = [
+        ("aac", 1, 8000, &["-f", "ipod"]),
+        ("aac", 2, 16_000, &["-f", "mov"]),
+        ("aac", 1, 22_050, &["-f", "ipod"]),
+        ("aac", 2, 44_100, &["-f", "mp4", "-movflags", "faststart"]),
+        ("aac", 2, 48_000, &["-f", "ipod", "-b:a", "40k"]),
+        ("aac", 1, 96_000, &["-f", "3gp"]),
+        ("alac", 1, 44_100, &["-f", "ipod"]),
+        ("alac", 2, 96_000, &["-f", "mov"]),
+        ("alac", 3, 48_000, &["-f", "ipod", "-af", "channelmap=0|1|2:3.0"]),
+        ("alac", 6, 48_000, &["-f", "ipod"]),
+        ("alac", 7, 48_000, &["-f", "ipod", "-af", "channelmap=0|1|2|3|4|5|6:6.1(back)"]),
+        ("alac", 8, 48_000, &["-f", "ipod", "-af", "channelmap=0|1|2|3|4|5|6|7:7.1(wide)"]),
+    ];
+    for (codec, channels, sample_rate, options) in cases {
+        let count = FRAMES * usize::from(channels);
+        // A triangle and a little noise.
+        let sample =
+            |n: usize| ((n * 97) % 20_000).abs_diff(10_000) as i16 + (n * 7919 % 301) as i16;
+        let samples: Vec<i16> = (0..count).map(sample).collect();
+        std::fs::write(&wav, Wav { sample_rate, ..Wav::pcm16(channels, &samples) }.bytes())
+            .unwrap();
+        let mut encode = Command::new("ffmpeg");
+        encode.args(["-v", "error", "-y"]);
+        encode.arg("-i").arg(&wav).args(["-c:a", codec]).args(options).arg(&muxed);
+        if output(&mut encode).is_none() {
+            eprintln!("skipped: ffmpeg absent");
+            return;
+        }
+        let bytes = std::fs::read(&muxed).unwrap();
+        let ours = read_file(bytes.clone()).unwrap();
+        assert_eq!(ours, read_pipe(bytes).unwrap());
+        let theirs = by_ffmpeg(&muxed).unwrap();
+        let name = format!("{codec}, {channels} channels, {sample_rate} Hz");
+        assert_eq!((ours.samples.len(), ours.repairs()), (count, vec![]), "{name}");
+        let kept = theirs.len() - count;
+        if codec == "alac" {
+            let expected: Vec<f32> = samples.iter().map(|s| f32::from(*s) / 32768.0).collect();
+            assert!(kept == 0 && ours.samples == expected && theirs == expected, "{name}");
+        } else {
+            assert!(kept < 1024 * usize::from(channels), "{name}: {kept}");
+            let worst = difference(&ours.samples, &theirs);
+            assert!(worst <= 1e-5, "{name}: {worst}");
+        }
     }
 }

@@ -55,7 +55,7 @@ impl Collected {
             1 => "1 file was skipped because its format is".to_string(),
             n => format!("{n} files were skipped because their formats are"),
         };
-        Some(format!("{files} not read: {}{more}", names.join(", ")))
+        Some(format!("{files} not read from folders: {}{more}", names.join(", ")))
     }
 }
 

@@ -193,13 +193,17 @@ fn index_columns_of_pandas_are_no_labels() {
 
 #[test]
 fn recordings_of_other_formats_are_counted() {
-    let dir = folder(&["a.wav", "b.M4A", "c.txt", "d/e.wma", "._f.wav", ".g.m4a", "d/._h.wma"]);
+    let dir = folder(&["a.wav", "b.MOV", "c.txt", "d/e.wma", "._f.wav", ".g.m4a", "d/._h.wma"]);
     let found = inputs::collect(&[text(dir.path())]).unwrap();
     assert_eq!(found.inputs.len(), 1);
     let names: Vec<_> = found.skipped.iter().map(|p| p.file_name().unwrap()).collect();
-    assert_eq!(names, ["b.M4A", "e.wma"]);
+    assert_eq!(names, ["b.MOV", "e.wma"]);
     let warning = found.warning().unwrap();
-    assert!(warning.starts_with("2 files were skipped, whose formats are not read: "), "{warning}");
+    assert!(
+        warning
+            .starts_with("2 files were skipped because their formats are not read from folders: "),
+        "{warning}"
+    );
     assert_eq!(inputs::collect(&[text(&dir.path().join("a.wav"))]).unwrap().warning(), None);
 }
 

@@ -50,3 +50,17 @@ with tempfile.TemporaryDirectory() as folder:
         if channels == 8:
             opus = ["-c:a", "libopus", "-mapping_family", "255", "-b:a", "128k"]
             run(*source, *opus, HERE / "levels-8ch.opus")
+
+    # AAC in ADTS, in MP4 (index behind) and in fragments: 10 packets and 65 samples behind the
+    # encoder's delay of 1024; no noise that a decoder makes up. ALAC: a packet of 4096 and the rest.
+    soundfile.write(folder / "sines.wav", sines[:9281], 44100)
+    aac = ["ffmpeg", "-y", "-i", folder / "sines.wav", "-bitexact"]
+    aac += ["-c:a", "aac", "-b:a", "64k", "-aac_pns", "0"]
+    run(*aac, HERE / "sines-2ch.aac")
+    run(*aac, HERE / "sines-2ch.m4a")
+    fragments = ["-movflags", "frag_keyframe+empty_moov+default_base_moof", "-frag_duration", "50000"]
+    run(*aac, *fragments, HERE / "sines-2ch-fragments.mp4")
+    i, c = np.ogrid[:5000, :6]
+    steps = ((i * 37 + c * 1001) % 20011 - 10005).astype(np.int16)
+    soundfile.write(folder / "steps.wav", steps, 48000)
+    run("ffmpeg", "-y", "-i", folder / "steps.wav", "-c:a", "alac", "-bitexact", HERE / "steps-6ch.m4a")
