@@ -135,18 +135,19 @@ def fit_projection(
     features: str | os.PathLike[str],
     out: str | os.PathLike[str],
     *,
-    n_components: int = 128,
+    n_components: int | None = None,
     overwrite: bool = False,
 ) -> None:
     """Fits principal components to the summary in a file of `extract` (training recordings only)
     and writes them to `out`, an .npz with `components`, `mean` and `explained_variance`.
 
-    The configuration key `projection.file` applies the file to other recordings, of whose features
-    it accepts no other configuration.
+    `n_components` is 128 by default, or as many as the rows and features allow. The configuration
+    key `projection.file` applies the file to other recordings, of whose features it accepts no
+    other configuration.
     """
     if not overwrite and os.path.exists(out):
         raise ParameterError(f"out = {os.fspath(out)!r} exists: overwrite=True replaces it")
-    _core.fit_projection(features, int(n_components), out)
+    _core.fit_projection(features, None if n_components is None else int(n_components), out)
 
 
 def _fit(X: Any, n_components: int) -> tuple[Doubles, Doubles, Doubles]:

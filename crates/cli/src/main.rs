@@ -15,6 +15,7 @@ mod output;
 mod paragraphs;
 mod progress;
 mod publish;
+mod study;
 mod text_table;
 
 use std::process::ExitCode;

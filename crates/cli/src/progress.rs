@@ -9,7 +9,7 @@ use clap::ValueEnum;
 use corsmal_extract::run::{Progress, RunReport};
 use corsmal_files::outcome::Outcome;
 use corsmal_files::quote::printable;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde_json::json;
 
 /// Form of messages.
@@ -19,6 +19,28 @@ pub enum LogFormat {
     Text,
     /// One JSON object a line.
     Json,
+}
+
+/// A bar for work without outcomes, on a terminal only.
+pub fn bar(total: usize, noun: &str, quiet: bool) -> ProgressBar {
+    let target = match quiet {
+        false => ProgressDrawTarget::stderr_with_hz(8),
+        true => ProgressDrawTarget::hidden(),
+    };
+    let bar = ProgressBar::with_draw_target(Some(total as u64), target);
+    bar.set_style(style(&format!("{{bar:30}} {{pos}} of {{len}} {noun}{{left}}")));
+    bar
+}
+
+/// A style with the time that remains, once it can be told.
+fn style(template: &str) -> ProgressStyle {
+    let left = |state: &ProgressState, out: &mut dyn std::fmt::Write| {
+        if state.pos() > 0 && state.len().is_some_and(|len| state.pos() < len) {
+            let _ = write!(out, ", {} left", human(state.eta()));
+        }
+    };
+    let style = ProgressStyle::with_template(template);
+    style.unwrap_or_else(|_| ProgressStyle::default_bar()).with_key("left", left)
 }
 
 /// Progress of a run on standard error.
@@ -40,10 +62,7 @@ impl Meter {
             _ => ProgressDrawTarget::hidden(),
         };
         let bar = ProgressBar::with_draw_target(None, target);
-        let template = "{bar:30} {pos}/{len} files, {per_sec}, {msg}, ETA {eta}";
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style);
-        }
+        bar.set_style(style("{bar:30} {pos} of {len} recordings{msg}{left}"));
         Self { format, quiet, bar, started: Instant::now(), seconds: Mutex::new(0.0) }
     }
 
@@ -147,7 +166,7 @@ impl Progress for Meter {
         };
         self.bar.inc(1);
         let speed = total / self.started.elapsed().as_secs_f64().max(1e-9);
-        self.bar.set_message(format!("{speed:.0} x real time"));
+        self.bar.set_message(format!(", {speed:.0} x real time"));
         if self.quiet && outcome.status.has_features() {
             return;
         }
@@ -209,16 +228,13 @@ fn repairs(outcomes: &[Outcome]) -> BTreeMap<&str, usize> {
     counts
 }
 
-fn human(elapsed: Duration) -> String {
-    let seconds = elapsed.as_secs_f64();
-    if seconds < 60.0 {
-        format!("{seconds:.2} s")
-    } else {
-        format!(
-            "{}:{:02}:{:02}",
-            seconds as u64 / 3600,
-            seconds as u64 / 60 % 60,
-            seconds as u64 % 60
-        )
+/// A duration for people.
+fn human(duration: Duration) -> String {
+    let seconds = duration.as_secs();
+    match seconds {
+        0..10 => format!("{:.1} s", duration.as_secs_f64()),
+        10..60 => format!("{seconds} s"),
+        60..3600 => format!("{} min {:02} s", seconds / 60, seconds % 60),
+        _ => format!("{} h {:02} min", seconds / 3600, seconds / 60 % 60),
     }
 }

@@ -147,19 +147,34 @@ impl ComparedFile {
         }
     }
 
+    /// Recordings of an output of ours for a message; `None` for files of other programs.
+    pub(super) fn recordings(&self) -> Option<String> {
+        self.provenance.as_ref()?;
+        let of_arrays = self.arrays.iter().filter_map(|e| e.ours.as_ref()).map(|(id, _)| id);
+        let of_table = self.table.iter().filter_map(|table| table.ids.as_ref()).flatten();
+        let mut ids: Vec<&String> = of_arrays.chain(of_table).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        Some(shown(&ids))
+    }
+
     /// Names for a message.
     pub(super) fn listing(&self) -> String {
-        const SHOWN: usize = 8;
         let arrays = self.arrays.iter().filter(|e| !e.name.starts_with(RESERVED)).map(|e| &e.name);
         let columns = self.table.iter().flat_map(|table| &table.names);
-        let names: Vec<&String> = arrays.chain(columns).collect();
-        let more = names.len().saturating_sub(SHOWN);
-        let shown: Vec<String> = names.iter().take(SHOWN).map(|n| format!("{n:?}")).collect();
-        match (names.len(), more) {
-            (0, _) => "none".into(),
-            (_, 0) => shown.join(", "),
-            _ => format!("{} and {more} more", shown.join(", ")),
-        }
+        shown(&arrays.chain(columns).collect::<Vec<_>>())
+    }
+}
+
+/// Some of the names, and how many more there are.
+fn shown(names: &[&String]) -> String {
+    const SHOWN: usize = 8;
+    let more = names.len().saturating_sub(SHOWN);
+    let first: Vec<String> = names.iter().take(SHOWN).map(|n| format!("{n:?}")).collect();
+    match (names.len(), more) {
+        (0, _) => "none".into(),
+        (_, 0) => first.join(", "),
+        _ => format!("{} and {more} more", first.join(", ")),
     }
 }
 

@@ -23,6 +23,8 @@ pub struct Comparison {
     /// Whether everything that could be compared is equal under the tolerance and nothing in common
     /// was left out.
     pub within: bool,
+    /// Whether recordings were paired by file name, for want of a common id.
+    pub by_file_name: bool,
     /// Configurations, where both files are outputs of ours.
     pub settings: Option<Settings>,
     /// One entry per feature, or per array of files that are not ours.
@@ -181,7 +183,7 @@ impl ComparisonBuilder {
 
     /// The report, with what the files hold beside.
     pub(super) fn finish(
-        self,
+        mut self,
         a: &ComparedFile,
         b: &ComparedFile,
         matching: Matching,
@@ -208,6 +210,16 @@ impl ComparisonBuilder {
             (Some(a), Some(b)) => Some(Settings::new(a, b)),
             _ => None,
         };
+        for feature in &mut self.features {
+            let made = settings.as_ref().and_then(|s| causes::of_settings(s, &feature.feature));
+            if feature.differing > 0
+                && feature.causes.is_empty()
+                && let Some(cause) = made
+            {
+                let (arrays, array) = (feature.differing, "the configurations".into());
+                feature.causes.push(Finding { arrays, array, cause });
+            }
+        }
         let equal = |f: &FeatureReport| f.differing == 0;
         Comparison {
             a: FileReport::new(a),
@@ -216,6 +228,7 @@ impl ComparisonBuilder {
                 && matching.only_a.is_empty()
                 && matching.only_b.is_empty()
                 && refused.is_empty(),
+            by_file_name: matching.by_file_name,
             settings,
             features: self.features,
             only_a: matching.only_a,

@@ -22,10 +22,23 @@ pub enum CompareError {
         /// The arrays of the file.
         known: String,
     },
-    /// Nothing to compare.
+    /// Two outputs of ours over other recordings.
     #[error(
-        "no numeric arrays in common: {a} has {in_a}; {b} has {in_b} (pairs can be named: a=b)"
+        "no recording in common, by id or file name: {a} has {in_a}; {b} has {in_b}. Name pairs of \
+         arrays with --map, or extract the same recordings"
     )]
+    NoRecordingInCommon {
+        /// First file.
+        a: PathBuf,
+        /// Second file.
+        b: PathBuf,
+        /// Recordings of the first.
+        in_a: String,
+        /// Recordings of the second.
+        in_b: String,
+    },
+    /// Nothing to compare.
+    #[error("no numeric arrays in common: {a} has {in_a}; {b} has {in_b} (--map A=B names a pair)")]
     NothingInCommon {
         /// First file.
         a: PathBuf,

@@ -1,6 +1,7 @@
 //! Which arrays, and which columns, of two files belong together.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::hash::Hash;
 
 use super::compared_file::{ArrayEntry, ComparedFile};
 use super::error::CompareError;
@@ -39,11 +40,13 @@ pub(super) struct Matching {
     pub only_a: Vec<String>,
     /// Arrays, columns and rows of the second file only.
     pub only_b: Vec<String>,
+    /// Whether recordings are paired by file name, for want of a common id.
+    pub by_file_name: bool,
 }
 
 impl Matching {
     /// Finds pairs: those of `map`, then equal names, then the same recording and feature of two
-    /// outputs of ours, at last the only array of each.
+    /// outputs of ours, by id or else by file name, at last the only array of each.
     pub(super) fn new(
         a: &ComparedFile,
         b: &ComparedFile,
@@ -78,6 +81,17 @@ impl Matching {
             |i| ours(&b.arrays()[i]),
         );
         let mut matching = Self::default();
+        if pairs.is_empty() {
+            let by_name = |e: &ArrayEntry| {
+                let (id, feature) = e.ours.as_ref()?;
+                Some((file_name(id).to_owned(), feature.clone()))
+            };
+            let (of_a, of_b) = (|i| by_name(&a.arrays()[i]), |j| by_name(&b.arrays()[j]));
+            if unique(rest_a.iter().map(|i| of_a(*i))) && unique(rest_b.iter().map(|j| of_b(*j))) {
+                join(&mut pairs, (&mut rest_a, &mut rest_b), of_a, of_b);
+                matching.by_file_name = !pairs.is_empty();
+            }
+        }
         matching.tables(a, b);
         if let (true, [only_a], [only_b]) =
             (pairs.is_empty() && matching.tables.is_empty(), &rest_a[..], &rest_b[..])
@@ -86,6 +100,10 @@ impl Matching {
             (rest_a, rest_b) = (Vec::new(), Vec::new());
         }
         if pairs.is_empty() && matching.tables.is_empty() {
+            if let (Some(in_a), Some(in_b)) = (a.recordings(), b.recordings()) {
+                let (a, b) = (a.path().into(), b.path().into());
+                return Err(CompareError::NoRecordingInCommon { a, b, in_a, in_b });
+            }
             let (in_a, in_b) = (a.listing(), b.listing());
             let (a, b) = (a.path().into(), b.path().into());
             return Err(CompareError::NothingInCommon { a, b, in_a, in_b });
@@ -113,7 +131,7 @@ impl Matching {
         };
         let columns = common(&x.names, &y.names, &mut self.only_a, &mut self.only_b);
         let rows = match (&x.ids, &y.ids) {
-            (Some(x), Some(y)) => common(x, y, &mut self.only_a, &mut self.only_b),
+            (Some(x), Some(y)) => self.rows(x, y),
             // Without ids, rows are those of the same number.
             _ => {
                 let (in_a, in_b) = (x.values.nrows(), y.values.nrows());
@@ -142,6 +160,36 @@ impl Matching {
             self.tables.push(TableMatch { feature, columns, rows: rows.clone() });
         }
     }
+}
+
+impl Matching {
+    /// Rows of the same id; without any, those of the same file name.
+    fn rows(&mut self, a: &[String], b: &[String]) -> Vec<(usize, usize)> {
+        let known: HashSet<&String> = b.iter().collect();
+        if a.iter().any(|id| known.contains(id)) {
+            return common(a, b, &mut self.only_a, &mut self.only_b);
+        }
+        let names =
+            |ids: &[String]| ids.iter().map(|id| file_name(id).to_owned()).collect::<Vec<String>>();
+        let (x, y) = (names(a), names(b));
+        if !(unique(x.iter().map(Some)) && unique(y.iter().map(Some))) {
+            return Vec::new();
+        }
+        let rows = common(&x, &y, &mut self.only_a, &mut self.only_b);
+        self.by_file_name |= !rows.is_empty();
+        rows
+    }
+}
+
+/// The last part of an id.
+fn file_name(id: &str) -> &str {
+    id.rsplit('/').next().unwrap_or(id)
+}
+
+/// Whether no key comes twice.
+fn unique<K: Eq + Hash>(keys: impl Iterator<Item = Option<K>>) -> bool {
+    let mut seen = HashSet::new();
+    keys.flatten().all(|key| seen.insert(key))
 }
 
 fn position(file: &ComparedFile, name: &str) -> Result<usize, CompareError> {

@@ -69,6 +69,9 @@ struct Meta {
     rows: usize,
 }
 
+/// Most components that are kept unless the user says otherwise.
+const COMPONENTS: usize = 128;
+
 /// A fitted projection.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Projection {
@@ -78,12 +81,13 @@ pub struct Projection {
 }
 
 impl Projection {
-    /// Fits `n_components` principal components to the statistics in a feature file of `extract`.
+    /// Fits principal components to the statistics in a feature file of `extract`: `n_components`, or
+    /// as many as there can be, at most 128.
     ///
     /// # Errors
     /// A file that is none of `extract`'s or has no statistics, more components than rows or
     /// columns, values that are not finite.
-    pub fn fit(features: &Path, n_components: usize) -> Result<Self, ProjectionError> {
+    pub fn fit(features: &Path, n_components: Option<usize>) -> Result<Self, ProjectionError> {
         let FeatureTable { table, provenance, .. } = FeatureTable::open(features)?;
         if table.feature_names().is_empty() {
             let reason = "has no statistics: extract with a configuration that has a [summary]";
@@ -93,6 +97,8 @@ impl Projection {
         if config.get("projection").is_some_and(|p| !p.is_null()) {
             return Err(content(features, "holds values that are already projected"));
         }
+        let (rows, columns) = table.values().dim();
+        let n_components = n_components.unwrap_or(COMPONENTS.min(rows).min(columns));
         let pca = Pca::fit(table.values().mapv(f64::from).view(), n_components)
             .map_err(|source| ProjectionError::Fit { path: features.into(), source })?;
         let identity = identity::of_file(features).map_err(|e| NpzError::io(features, e))?;

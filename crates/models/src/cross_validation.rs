@@ -126,11 +126,13 @@ pub struct CrossValidation {
 }
 
 impl CrossValidation {
-    /// The predictions of the held-out rows in the order of the table: columns `id`, `fold` and
-    /// `true`. `ids`, the class `names` and `classes` are those of the data set.
+    /// The predictions of the held-out rows in the order of the table: columns `id`, `fold`, `group`
+    /// where there are `groups`, and `true`. `ids`, the class `names` and `classes` are those of the
+    /// data set.
     pub fn predictions(
         &self,
         ids: &[String],
+        groups: Option<&[String]>,
         names: &Labels,
         classes: &Classes,
         path: &Path,
@@ -141,7 +143,9 @@ impl CrossValidation {
             for (at, (&row, &class)) in fold.rows.iter().zip(&fold.predicted).enumerate() {
                 let proba = fold.proba.as_ref().map(|proba| proba.row(at).to_vec());
                 let name = names.names()[truth[row]].clone();
-                let cells = vec![ids[row].clone(), fold.name.clone(), name];
+                let mut cells = vec![ids[row].clone(), fold.name.clone()];
+                cells.extend(groups.map(|groups| groups[row].clone()));
+                cells.push(name);
                 let key = Id(ids[row].clone());
                 rows.push((row, PredictionRow { key, cells, class: Some(class), proba }));
             }
@@ -149,7 +153,12 @@ impl CrossValidation {
         rows.sort_by_key(|(row, _)| *row);
         PredictionTable {
             path: path.into(),
-            columns: ["id", "fold", "true"].map(String::from).to_vec(),
+            columns: ["id", "fold"]
+                .into_iter()
+                .chain(groups.map(|_| "group"))
+                .chain(["true"])
+                .map(String::from)
+                .collect(),
             naming: 1,
             labels: names.names().to_vec(),
             rows: rows.into_iter().map(|(_, row)| row).collect(),

@@ -82,6 +82,8 @@ pub struct Folds {
     pub outer: Vec<Fold>,
     /// what is never split, one name per row
     groups: Option<Vec<String>>,
+    /// whether these groups are no more than the folds of a column
+    are_folds: bool,
     /// of the classes
     names: Vec<String>,
     seed: u32,
@@ -137,12 +139,20 @@ impl Folds {
             }
             _ => parts,
         };
-        Ok(Self { description, outer, groups: kept, names: labels.names().to_vec(), seed })
+        let are_folds = matches!(plan, CvPlan::Fold(_)) && groups.is_none();
+        let names = labels.names().to_vec();
+        Ok(Self { description, outer, groups: kept, are_folds, names, seed })
     }
 
     /// What is never split, one name per row; `None` where any row may be held out.
     pub fn groups(&self) -> Option<&[String]> {
         self.groups.as_deref()
+    }
+
+    /// What rows belong to that are not independent of each other: the groups, unless they are no
+    /// more than the folds of `fold=COLUMN`. A bootstrap draws them together.
+    pub fn dependent(&self) -> Option<&[String]> {
+        self.groups().filter(|_| !self.are_folds)
     }
 
     /// Folds inside these rows, of whole groups where there are groups. Row numbers are positions

@@ -5,11 +5,12 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::cross_validation::{CrossValidation, Data, cross_validate, nested_cross_validate};
-use crate::dataset::{LabelledTable, Result};
+use crate::dataset::{DatasetError, LabelledTable, Result};
 use crate::folds::{CvPlan, Folds};
 use crate::labels::Labels;
 use crate::pipeline::PipelineSpec;
 use crate::predictions::PredictionTable;
+use crate::scores::{ClassReport, ScoreReport, Scoring};
 use crate::targets::Classes;
 
 /// What was validated, how, and with which result.
@@ -33,6 +34,8 @@ pub struct Validation {
     pub candidates: Vec<PipelineSpec>,
     /// predictions and scores
     pub result: CrossValidation,
+    /// scores of all held-out rows together, with bootstrap intervals and calibration
+    pub held_out: ClassReport,
     /// what is odd, in words
     pub warnings: Vec<String>,
     /// the folds
@@ -69,6 +72,13 @@ pub fn validate(
             folds.inner(rows, &classes)
         })?,
     };
+    let held_out = held_out(&result.predictions(
+        &table.ids,
+        folds.dependent(),
+        &labels,
+        &classes,
+        &table.path,
+    ))?;
     Ok(Validation {
         features: table.path.display().to_string(),
         target: target.into(),
@@ -79,6 +89,7 @@ pub fn validate(
         seed,
         candidates,
         result,
+        held_out,
         warnings,
         folds,
         classes,
@@ -89,6 +100,19 @@ impl Validation {
     /// The predictions of the held-out rows; `ids` are those of the table, `path` is named in
     /// messages about them.
     pub fn predictions(&self, ids: &[String], path: &Path) -> PredictionTable {
-        self.result.predictions(ids, &self.labels, &self.classes, path)
+        let groups = self.folds.dependent();
+        self.result.predictions(ids, groups, &self.labels, &self.classes, path)
+    }
+}
+
+/// Scores of the predictions of held-out rows, as `score` gives them.
+///
+/// # Errors
+/// Rows that have no true class.
+pub fn held_out(predictions: &PredictionTable) -> Result<ClassReport> {
+    let refuse = |reason: String| DatasetError::content(&predictions.path, reason);
+    match predictions.score(&Scoring::default()).map_err(|e| refuse(e.to_string()))? {
+        ScoreReport::Classes(report) => Ok(*report),
+        ScoreReport::Numbers(_) => Err(refuse("predictions are numbers, not classes".into())),
     }
 }

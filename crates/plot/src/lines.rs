@@ -37,6 +37,8 @@ pub struct LinePlot {
     pub diagonal: bool,
     /// Mark the points.
     pub dots: bool,
+    /// Join the points.
+    pub joined: bool,
 }
 
 const LEFT: f64 = 70.0;
@@ -93,7 +95,9 @@ impl Figure for LinePlot {
             }
             let points: Vec<_> = line.points.iter().copied().filter(|p| finite(p)).collect();
             let placed: Vec<_> = points.iter().copied().map(place).collect();
-            on.line(&placed, paint, 2.0, false);
+            if self.joined {
+                on.line(&placed, paint, 2.0, false);
+            }
             if self.dots {
                 for (point, (x, y)) in points.iter().zip(&placed) {
                     let hint = format!("{}: {:.3} at {:.3}", line.name, point.1, point.0);

@@ -87,6 +87,7 @@ fn lines() -> LinePlot {
         lines: vec![Line { name: "held out".into(), points, band }, nothing],
         diagonal: true,
         dots: true,
+        joined: true,
     }
 }
 

@@ -138,7 +138,7 @@ pub(crate) fn extract(
 pub(crate) fn fit_projection(
     py: Python<'_>,
     features: PathBuf,
-    n_components: usize,
+    n_components: Option<usize>,
     out: PathBuf,
 ) -> PyResult<()> {
     compute(py, || Projection::fit(&features, n_components)?.save(&out))?.map_err(value_error)

@@ -8,6 +8,9 @@ use serde::Serialize;
 
 use crate::{ReportError, Result};
 
+/// Widest picture that reads well on half of the page.
+const HALF: f64 = 700.0;
+
 /// A picture with what it shows.
 #[derive(Clone, Debug, Serialize)]
 pub struct Figure {
@@ -49,7 +52,8 @@ impl Figure {
         let fault = |source| ReportError::Figure { name: name.clone(), source };
         let (svg, pdf) = (to_svg(plot).map_err(fault)?, to_pdf(plot).map_err(fault)?);
         let (title, caption) = (plot.title().to_owned(), caption.into());
-        Ok(Self { name, title, caption, wide: false, svg, pdf })
+        let wide = plot.size().0 > HALF;
+        Ok(Self { name, title, caption, wide, svg, pdf })
     }
 
     /// The same, over the whole width of the page.

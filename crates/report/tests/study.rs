@@ -5,8 +5,8 @@
 use corsmal_plot::{ChannelPicture, RecordingPicture, WaveScale};
 use corsmal_report::Fact;
 use corsmal_report::study::{
-    CalibrationBin, ClassCurve, ClassScore, Importance, LearningPoint, Prediction, Recording,
-    Score, Study,
+    CalibrationBin, ClassCurve, ClassScore, Estimate, Estimates, Importance, LearningPoint,
+    Prediction, Recording, Score, Study,
 };
 use ndarray::{Array2, arr2};
 
@@ -67,7 +67,10 @@ fn study() -> Study {
         examples: vec![(0, picture()), (1, picture())],
         scores: vec![Score { name: "accuracy".into(), value: 90.0, interval: Some((86.5, 92.75)) }],
         intervals: "95 % of 1,000 bootstrap resamples of the groups.".into(),
+        protocol: "No row was trained on.".into(),
         folds: vec![("1".into(), vec![88.0])],
+        seeds: vec![(7, vec![89.5])],
+        measures: vec![("Brier score".into(), 0.25, "mean squared distance".into())],
         class_scores: vec![class, class],
         confusion: arr2(&[[16, 4, 0], [1, 18, 1]]),
         calibration: vec![CalibrationBin { confidence: 0.7, accuracy: 0.6, count: 12 }],
@@ -96,9 +99,17 @@ fn every_part_is_there() {
     let all =
         ["scores", "confusion", "curves", "errors", "data", "examples", "importances", "learning"];
     assert_eq!(ids, all);
-    assert!(report.summary.contains("accuracy 90.00 % (86.5 to 92.8) on 4 held-out rows"));
+    assert!(report.summary.contains("accuracy 90.00 % (86.5 to 92.8) on 4 rows"));
     let html = report.html();
-    for told in ["dead (constant)", "not audio", "none given", "dog: bark.ogg", "mfcc (40)"] {
+    for told in [
+        "dead (constant)",
+        "not audio",
+        "none given",
+        "dog: bark.ogg",
+        "mfcc (40)",
+        "seed 7",
+        "0.2500",
+    ] {
         assert!(html.contains(told), "{told}");
     }
 }
@@ -107,7 +118,7 @@ fn every_part_is_there() {
 fn errors_are_listed_from_the_most_confident_on() {
     let report = study().report().unwrap();
     let errors = report.sections.iter().find(|s| s.id == "errors").unwrap();
-    assert!(errors.text[0].starts_with("2 of 4 held-out rows are wrong"));
+    assert!(errors.text[0].starts_with("2 of 4 rows are wrong"));
     assert!(errors.text[0].ends_with("1 without an answer."));
     let table = &errors.tables[0];
     let cell = |row: usize| format!("{:?}", table.rows[row].cells[0]);
@@ -133,4 +144,27 @@ fn what_is_not_known_is_left_out() {
     let report = blind.report().unwrap();
     let ids: Vec<_> = report.sections.iter().map(|s| s.id.as_str()).collect();
     assert_eq!(ids, ["scores", "confusion", "errors", "importances"]);
+}
+
+#[test]
+fn estimates_are_drawn_and_the_largest_errors_listed() {
+    let row = |id: &str, truth, estimate| Estimate { id: id.into(), truth, estimate };
+    let estimates = Estimates {
+        title: "Capacities".into(),
+        target: "capacity".into(),
+        measures: vec![("mean absolute error".into(), "12.5".into())],
+        rows: vec![
+            row("near", 100.0, Some(101.0)),
+            row("far", 100.0, Some(140.0)),
+            row("none", 50.0, None),
+        ],
+        ..Estimates::default()
+    };
+    let report = estimates.report().unwrap();
+    assert_eq!(report.summary, "capacity: 3 rows, 1 of them without an estimate.");
+    let ids: Vec<String> =
+        report.sections[1].tables[0].rows.iter().map(|r| format!("{:?}", r.cells[0])).collect();
+    assert!(ids[0].contains("none") && ids[1].contains("far") && ids[2].contains("near"));
+    assert!(report.html().contains("mean absolute error"));
+    assert!(Estimates::default().report().is_ok());
 }

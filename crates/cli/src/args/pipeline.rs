@@ -40,13 +40,18 @@ impl PipelineArgs {
 
     /// The pipelines to choose from: one, unless something is tuned.
     pub fn candidates(&self) -> Result<Vec<PipelineSpec>, Failure> {
+        self.candidates_with(self.seed)
+    }
+
+    /// The same with another seed.
+    pub fn candidates_with(&self, seed: u32) -> Result<Vec<PipelineSpec>, Failure> {
         let recipe = Recipe {
             classifier: self.classifier.clone(),
             parameters: self.parameters.clone(),
             standardize: self.standardize,
             pca: self.pca.clone(),
             tune: self.tune.clone(),
-            seed: self.seed,
+            seed,
         };
         Ok(recipe.candidates()?)
     }

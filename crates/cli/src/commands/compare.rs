@@ -21,7 +21,7 @@ Examples:
   corsmal-feat compare old.npz new.npz --atol 1e-4 --rtol 1e-5 --json
 
 Files may be outputs of `extract`, any .npz or .npy with numeric arrays, or a Parquet table. Arrays are paired
-by name, outputs of `extract` by recording and feature, tables by id and column; the only array of each file
+by name, outputs of `extract` by recording (id, else file name) and feature, tables by id and column; the only array of each file
 needs no name. The last axis is taken as frames, the one before as coefficients, the one before that as
 channels (librosa's order). Two arrays are in memory at a time.
 
@@ -94,6 +94,9 @@ fn text(report: &Comparison) -> String {
             file.format,
             version.unwrap_or_default()
         ));
+    }
+    if report.by_file_name {
+        lines.push("\nno id in common: recordings are paired by file name".into());
     }
     settings(report, &mut lines);
     lines.push(String::new());
@@ -204,11 +207,12 @@ fn details(feature: &FeatureReport, lines: &mut Vec<String>) {
         lines.push(format!("  {} values are finite, or a number, on one side only", d.one_sided));
     }
     if feature.causes.is_empty() {
-        lines.push("  no known cause fits".into());
+        lines.push("  cause unknown".into());
     }
     for found in &feature.causes {
         lines.push(format!("  likely cause: {}", found.cause.cause));
-        let arrays = if feature.arrays > 1 && found.array != "the table" {
+        let whole = ["the table", "the configurations"].contains(&found.array.as_str());
+        let arrays = if feature.arrays > 1 && !whole {
             format!(" ({}; {} of {} arrays)", found.array, found.arrays, feature.arrays)
         } else {
             String::new()

@@ -5,16 +5,21 @@ use std::process::ExitCode;
 
 use corsmal_files::draft;
 use corsmal_models::cross_validation::CrossValidation;
+use corsmal_models::dataset::LabelledTable;
 use corsmal_models::folds::{CvPlan, Folds};
 use corsmal_models::pipeline::PipelineSpec;
-use corsmal_models::scores::{ScoreReport, Scoring};
+use corsmal_models::predictions::PredictionTable;
+use corsmal_models::scores::{ClassReport, Scores};
 use corsmal_models::spread::Spread;
-use corsmal_models::validation::validate;
+use corsmal_models::validation::{Validation, validate};
+use corsmal_report::Fact;
+use serde::Serialize;
 
-use super::score::print_classes;
+use super::score::{print_classes, print_overall};
 use crate::args::{DatasetArgs, Jobs, NetworkArgs, PipelineArgs};
 use crate::failure::Failure;
 use crate::publish;
+use crate::study::{self, Explained, HeldOut};
 use crate::text_table::{TextTable, percent};
 
 /// Arguments of `cross-validate`.
@@ -26,6 +31,8 @@ Examples:
   corsmal-feat cross-validate feats.npz --labels folders --cv 5
   corsmal-feat cross-validate a34f_train.npz --target level --groups container \\
     --cv lists=1,4,7/2,5,8/3,6,9 --classifier svm --standardize --tune C=1,10 --tune gamma=scale,0.01
+
+  corsmal-feat cross-validate feats.npz --labels labels.csv --report report
 
 With --tune the parameters are chosen anew in every fold, on inner folds of its training rows.
 `score` says more of the --predictions, `compare-predictions` tests whether those of two runs differ.
@@ -49,6 +56,16 @@ pub struct Args {
     /// Write the predictions of the held-out rows, CSV.
     #[arg(long, short = 'o', value_name = "CSV")]
     predictions: Option<PathBuf>,
+    /// Write a report into this folder: report.html with scores, confusion matrix, curves, the errors
+    /// to listen to, what the recordings are like, which features matter and whether more rows would
+    /// help; tables as CSV and LaTeX, figures as SVG and PDF. Trains about six times as often. For
+    /// --net without what trains again.
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
+    /// Repeat with N seeds, from --seed on: how much of a difference between two classifiers is
+    /// chance?
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    seeds: u32,
     /// Replace an existing file of predictions.
     #[arg(long)]
     overwrite: bool,
@@ -68,14 +85,17 @@ fn cross_validate(args: &Args) -> Result<ExitCode, Failure> {
     if let Some(path) = &args.predictions {
         publish::check(path, args.overwrite)?;
     }
+    if let Some(folder) = &args.report {
+        study::prepare(folder)?;
+    }
     if let Some(name) = &args.network.net {
         return validate_network(args, name);
     }
     let candidates = args.pipeline.candidates()?;
     let (table, target) = args.dataset.load()?;
     let groups = args.dataset.groups.as_deref();
-    let validation =
-        validate(&table, &target, candidates, (args.cv.as_ref(), groups), args.pipeline.seed)?;
+    let plan = (args.cv.as_ref(), groups);
+    let validation = validate(&table, &target, candidates, plan, args.pipeline.seed)?;
     for warning in &validation.warnings {
         eprintln!("warning: {warning}");
     }
@@ -85,34 +105,146 @@ fn cross_validate(args: &Args) -> Result<ExitCode, Failure> {
     if let Some(path) = &args.predictions {
         draft::write(path, &predictions.to_csv()?)?;
     }
+    let others = (1..args.seeds).map(|more| args.pipeline.seed.wrapping_add(more));
+    let others = others.map(|seed| {
+        let candidates = args.pipeline.candidates_with(seed)?;
+        let found = validate(&table, &target, candidates, plan, seed)?;
+        Ok((seed, found.result.pooled))
+    });
+    let others = others.collect::<Result<Vec<_>, Failure>>()?;
+    let all_seeds = Seeds::of(args.pipeline.seed, &validation.result.pooled, &others);
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&validation)?);
-        return Ok(ExitCode::SUCCESS);
+        let output = Output { validation: &validation, seeds: all_seeds };
+        println!("{}", serde_json::to_string_pretty(&output)?);
+    } else if !args.quiet {
+        print(args, &table, &validation, all_seeds.as_ref());
     }
-    if args.quiet {
-        return Ok(ExitCode::SUCCESS);
+    if let Some(folder) = &args.report {
+        report(folder, &table, &validation, (&predictions, &others), args.quiet)?;
     }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What --json prints.
+#[derive(Serialize)]
+struct Output<'a> {
+    #[serde(flatten)]
+    validation: &'a Validation,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seeds: Option<Seeds>,
+}
+
+/// The scores of all held-out rows with several seeds.
+#[derive(Serialize)]
+struct Seeds {
+    first: u32,
+    accuracy: Vec<f64>,
+    weighted_f1: Vec<f64>,
+    macro_f1: Vec<f64>,
+}
+
+impl Seeds {
+    /// `None` for a single seed.
+    fn of(first: u32, scores: &Scores, others: &[(u32, Scores)]) -> Option<Self> {
+        let all = || std::iter::once(scores).chain(others.iter().map(|(_, scores)| scores));
+        (!others.is_empty()).then(|| Self {
+            first,
+            accuracy: all().map(|s| s.accuracy).collect(),
+            weighted_f1: all().map(|s| s.weighted_f1).collect(),
+            macro_f1: all().map(|s| s.macro_f1).collect(),
+        })
+    }
+
+    fn print(&self) {
+        let heads = [&format!("{} seeds, percent", self.accuracy.len()), "mean", "± std", "least"];
+        let mut table = TextTable::new(heads.into_iter().chain(["most"]));
+        for (name, values) in [
+            ("accuracy", &self.accuracy),
+            ("weighted F1", &self.weighted_f1),
+            ("macro F1", &self.macro_f1),
+        ] {
+            let spread = Spread::of(values);
+            let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+            let most = values.iter().copied().fold(0.0, f64::max);
+            let cells = [spread.mean, spread.std, least, most].map(percent);
+            table.row(std::iter::once(name.to_owned()).chain(cells));
+        }
+        println!("\n{}", table.text());
+    }
+}
+
+fn report(
+    folder: &Path,
+    table: &LabelledTable,
+    validation: &Validation,
+    (predictions, seeds): (&PredictionTable, &[(u32, Scores)]),
+    quiet: bool,
+) -> Result<(), Failure> {
+    // The pipeline of most folds, where it was chosen anew in each.
+    let candidates = &validation.candidates;
+    let folds_of = |at: &usize| {
+        let folds = validation.result.folds.iter();
+        folds.filter(|fold| fold.chosen == *at).count()
+    };
+    let most = (0..candidates.len()).rev().max_by_key(folds_of).unwrap_or(0);
+    let spec = &candidates[most];
+    let classifier = match candidates.len() {
+        1 => spec.describe(),
+        n => format!("chosen in every fold among {n}; most often {}", spec.describe()),
+    };
+    let held_out = HeldOut {
+        table,
+        target: &validation.target,
+        classes: &validation.classes,
+        folds: &validation.folds,
+        result: &validation.result,
+        predictions,
+        scores: &validation.held_out,
+        seeds,
+        facts: vec![
+            Fact::new(
+                "Rows and features",
+                format!("{} × {}", validation.rows, validation.n_features),
+            ),
+            Fact::new("Classifier", classifier),
+            Fact::new("Seed", validation.seed.to_string()),
+        ],
+        quiet,
+    };
+    held_out.write(folder, Some(&Explained { spec, seed: validation.seed }))
+}
+
+fn print(args: &Args, table: &LabelledTable, validation: &Validation, seeds: Option<&Seeds>) {
     println!(
         "features  {}: {} rows x {} features",
         table.path.display(),
         validation.rows,
         validation.n_features
     );
-    println!("target    {target}, {} classes", validation.labels.len());
+    println!("target    {}, {} classes", validation.target, validation.labels.len());
     match validation.candidates.as_slice() {
         [only] => println!("pipeline  {}", only.describe()),
         many => println!("pipeline  chosen in every fold among {}", many.len()),
     }
     println!("held out  {}\n", validation.folds_by);
     print_folds(&validation.result, &validation.candidates, &validation.folds);
-    if let ScoreReport::Classes(report) = predictions.score(&Scoring::default())? {
-        println!();
-        print_classes(&report);
+    if let Some(seeds) = seeds {
+        seeds.print();
     }
-    if let Some(path) = &args.predictions {
-        println!("\nnext: corsmal-feat score {}", path.display());
+    print_held_out(&validation.held_out);
+    match (&args.report, &args.predictions) {
+        (Some(_), _) => println!(),
+        (None, Some(path)) => {
+            println!("\nnext: corsmal-feat score {} --report DIR", path.display());
+        }
+        (None, None) => println!("\nnext: the same with --report DIR writes a report to look at"),
     }
-    Ok(ExitCode::SUCCESS)
+}
+
+fn print_held_out(report: &ClassReport) {
+    print_overall(report);
+    println!();
+    print_classes(report);
 }
 
 #[cfg(feature = "nets")]
@@ -122,7 +254,10 @@ fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
     let found = request.cross_validate(name, args.cv.as_ref())?;
     let held_out = args.predictions.as_deref().unwrap_or(Path::new("the held-out predictions"));
     let ids = &found.table.ids;
-    let predictions = found.result.predictions(ids, &found.labels, &found.classes, held_out);
+    let groups = found.folds.dependent();
+    let predictions =
+        found.result.predictions(ids, groups, &found.labels, &found.classes, held_out);
+    let scores = corsmal_models::validation::held_out(&predictions)?;
     if let Some(path) = &args.predictions {
         draft::write(path, &predictions.to_csv()?)?;
     }
@@ -133,6 +268,7 @@ fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
             "folds_by": found.folds.description,
             "training": found.report,
             "result": found.result,
+            "held_out": scores,
         });
         println!("{}", serde_json::to_string_pretty(&report)?);
     } else if !quiet {
@@ -141,10 +277,22 @@ fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
         println!("network   {name}");
         println!("held out  {}\n", found.folds.description);
         print_folds(&found.result, &[], &found.folds);
-        if let ScoreReport::Classes(report) = predictions.score(&Scoring::default())? {
-            println!();
-            print_classes(&report);
-        }
+        print_held_out(&scores);
+    }
+    if let Some(folder) = &args.report {
+        let held_out = HeldOut {
+            table: &found.table,
+            target: &found.target,
+            classes: &found.classes,
+            folds: &found.folds,
+            result: &found.result,
+            predictions: &predictions,
+            scores: &scores,
+            seeds: &[],
+            facts: vec![Fact::new("Network", name)],
+            quiet: *quiet,
+        };
+        held_out.write(folder, None)?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -10,6 +10,7 @@ use corsmal_ccm::submission::{Submission, stand_in};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use crate::failure::Failure;
+use crate::text_table::{TextTable, WIDTH};
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Rules {
@@ -140,27 +141,45 @@ fn print(results: &[(String, Scores)], format: Format) -> Result<(), Failure> {
             print!("{}", String::from_utf8_lossy(&bytes));
         }
         Format::Table => {
-            let width = results.iter().map(|(n, _)| n.chars().count()).max().unwrap_or(0).max(10);
-            if let Some((_, scores)) = results.first() {
-                println!("rules {}, {} recordings, percent", scores.rules.name(), scores.rows);
-            }
-            print!("{:width$}", "submission");
-            columns.iter().for_each(|n| print!(" {n:>7}"));
-            println!();
-            for (name, scores) in results {
-                print!("{name:width$}");
-                for column in &columns {
-                    let value = scores.get(column).map_or_else(String::new, two_decimals);
-                    print!(" {value:>w$}", w = column.len().max(7));
+            let Some((name, scores)) = results.first() else { return Ok(()) };
+            println!("rules {}, {} recordings, percent", scores.rules.name(), scores.rows);
+            match results {
+                [_] => println!("{}", single(name, scores, &columns)),
+                many => {
+                    println!("{}\n\n{}", table(many, &columns), legend(scores.rules, &columns));
                 }
-                println!();
-            }
-            if let Some((_, scores)) = results.first() {
-                println!("\n{}", legend(scores.rules, &columns));
             }
         }
     }
     Ok(())
+}
+
+/// The scores of one submission, a line each with its meaning.
+fn single(name: &str, scores: &Scores, columns: &[&str]) -> String {
+    let mut table = TextTable::new([name, "score", "meaning"]).left(&[2]);
+    for column in columns {
+        let value = scores.get(column).map_or_else(String::new, two_decimals);
+        let known = scores.rules.legend().iter().find(|(known, _)| known == column);
+        table.row([column, value.as_str(), known.map_or("", |(_, meaning)| meaning)]);
+    }
+    table.text()
+}
+
+/// A line for each submission; scores that a terminal has no room for follow below.
+fn table(results: &[(String, Scores)], columns: &[&str]) -> String {
+    const COLUMN: usize = 8;
+    let longest = results.iter().map(|(n, _)| n.chars().count()).max().unwrap_or(0).max(10);
+    let at_once = (WIDTH.saturating_sub(longest + 1) / COLUMN).max(1);
+    let parts = columns.chunks(at_once).map(|columns| {
+        let mut table =
+            TextTable::new(std::iter::once("submission").chain(columns.iter().copied()));
+        for (name, scores) in results {
+            let value = |column: &&str| scores.get(column).map_or_else(String::new, two_decimals);
+            table.row(std::iter::once(name.clone()).chain(columns.iter().map(value)));
+        }
+        table.text()
+    });
+    parts.collect::<Vec<_>>().join("\n\n")
 }
 
 /// Each note once, with the submissions that it is about.

@@ -23,9 +23,10 @@ pub struct Args {
     /// Training features: an .npz or .parquet of `extract` with summaries.
     #[arg(long, value_name = "FILE")]
     features: PathBuf,
-    /// Components to keep, at most the rows and the features of the file.
-    #[arg(long, value_name = "N", default_value_t = 128)]
-    n_components: usize,
+    /// Components to keep, at most the rows and the features of the file; 128 by default, or as many
+    /// as there can be.
+    #[arg(long, value_name = "N")]
+    n_components: Option<usize>,
     /// Projection file to write (.npz).
     #[arg(long, value_name = "FILE")]
     out: PathBuf,

@@ -8,6 +8,7 @@ use corsmal_models::scores::{ClassReport, Interval, NumericScores, ScoreReport, 
 
 use crate::args::LabelArgs;
 use crate::failure::Failure;
+use crate::study;
 use crate::text_table::{TextTable, confusion, percent};
 
 /// Arguments of `score`.
@@ -17,6 +18,7 @@ Examples:
   corsmal-feat score held-out.csv
   corsmal-feat score predictions.csv --labels labels.csv --target type --groups container
   corsmal-feat score predictions.csv --labels meta.csv --id-column file --target class --reject 0.6
+  corsmal-feat score held-out.csv --report report
   corsmal-feat score capacities.csv --labels labels.csv --target capacity
 
 Prediction files are those of `classify`, `cross-validate --predictions` and `fuse`. Accuracy, weighted
@@ -35,8 +37,8 @@ pub struct Args {
     /// Column of the true classes; `true` by default, or `class` with --labels folders.
     #[arg(long, visible_alias = "y", value_name = "COLUMN")]
     target: Option<String>,
-    /// Column of groups that the bootstrap draws together; by default group, container or fold where
-    /// there is one, else single lines are drawn.
+    /// Column of groups that the bootstrap draws together; by default group, container or recording
+    /// where there is one, else single lines are drawn.
     #[arg(long, value_name = "COLUMN")]
     groups: Option<String>,
     /// Predictions with a highest probability below P are unknown, and count as wrong.
@@ -51,6 +53,11 @@ pub struct Args {
     /// Seed of the bootstrap.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+    /// Write a report into this folder: report.html with scores, confusion matrix, curves, the errors
+    /// to listen to and, where the recordings are at their paths, what they are like; tables as CSV
+    /// and LaTeX, figures as SVG and PDF.
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
     /// Print everything as JSON, curves included.
     #[arg(long)]
     json: bool,
@@ -58,6 +65,9 @@ pub struct Args {
 
 /// Scores and prints.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    if let Some(folder) = &args.report {
+        study::prepare(folder)?;
+    }
     let mut table = PredictionTable::read(&args.predictions)?;
     let mut target = args.target.clone();
     if let Some(source) = args.labels.source(target.as_deref())? {
@@ -75,12 +85,29 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         seed: args.seed,
     };
     let report = table.score(&scoring)?;
+    if let Some(folder) = &args.report {
+        let target = scoring.target.as_deref();
+        match &report {
+            ScoreReport::Classes(report) => {
+                if scoring.reject > 0.0 {
+                    table.reject_below(scoring.reject)?;
+                }
+                study::write_scored(folder, &table, target, report)?;
+            }
+            ScoreReport::Numbers(scores) => {
+                let measures = number_measures(scores);
+                let measures = measures.map(|(name, value)| (name.trim().to_owned(), value));
+                study::write_estimates(folder, &table, target, measures.to_vec())?;
+            }
+        }
+    }
     if args.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
         return Ok(ExitCode::SUCCESS);
     }
     match report {
         ScoreReport::Classes(report) => {
+            println!("{} rows, {} classes", report.rows, report.labels.len());
             print_overall(&report);
             println!();
             print_classes(&report);
@@ -94,18 +121,19 @@ fn interval(interval: &Interval) -> [String; 2] {
     [percent(interval.low), percent(interval.high)]
 }
 
-fn print_overall(report: &ClassReport) {
+/// Scores of all rows together, with their intervals and those of the probabilities.
+pub fn print_overall(report: &ClassReport) {
     let (s, i) = (&report.scores, &report.intervals);
-    println!("{} rows, {} classes", report.rows, report.labels.len());
     if report.unknown > 0 {
         println!(
-            "{} without a prediction count as wrong; accuracy of the others {} %",
+            "{} without a prediction count{} as wrong; accuracy of the others {} %",
             report.unknown,
+            if report.unknown == 1 { "s" } else { "" },
             percent(report.accuracy_of_known)
         );
     }
     println!();
-    let mut table = TextTable::new(["percent", "score", "95 % CI from", "to"]);
+    let mut table = TextTable::new(["all rows, percent", "score", "95 % CI from", "to"]);
     for (name, score, bounds) in [
         ("accuracy", s.accuracy, &i.accuracy),
         ("weighted F1", s.weighted_f1, &i.weighted_f1),
@@ -117,7 +145,11 @@ fn print_overall(report: &ClassReport) {
     let drawn =
         if report.drawn == "rows" { "rows".into() } else { format!("values of {}", report.drawn) };
     println!("bootstrap over {} {drawn}", report.units);
-    if report.drawn != "rows" && report.units < 10 {
+    if report.drawn == "rows" {
+        println!(
+            "if several rows are of one person, place or device, --groups draws those together"
+        );
+    } else if report.units < 10 {
         println!("with so few of them the interval says little");
     }
     if let Some(calibration) = &report.calibration {
@@ -154,10 +186,9 @@ pub fn print_classes(report: &ClassReport) {
     println!("{}", confusion(&report.labels, &report.scores.confusion, &report.scores.unknown));
 }
 
-fn print_numbers(scores: &NumericScores) {
-    println!("{} rows, {} without an estimate\n", scores.rows, scores.unknown);
-    let mut table = TextTable::new(["error", "value"]);
-    for (name, value) in [
+/// Measures of the errors of estimated numbers, as text.
+fn number_measures(scores: &NumericScores) -> [(&'static str, String); 7] {
+    [
         ("mean absolute error", format!("{:.4}", scores.mean_absolute_error)),
         ("root mean squared error", format!("{:.4}", scores.root_mean_squared_error)),
         ("mean relative error, percent", percent(scores.mean_relative_error)),
@@ -165,7 +196,13 @@ fn print_numbers(scores: &NumericScores) {
         ("CORSMAL score, percent", percent(scores.score)),
         ("  95 % CI from", percent(scores.score_interval.low)),
         ("  95 % CI to", percent(scores.score_interval.high)),
-    ] {
+    ]
+}
+
+fn print_numbers(scores: &NumericScores) {
+    println!("{} rows, {} without an estimate\n", scores.rows, scores.unknown);
+    let mut table = TextTable::new(["error", "value"]);
+    for (name, value) in number_measures(scores) {
         table.row([name.to_string(), value]);
     }
     println!("{}", table.text());

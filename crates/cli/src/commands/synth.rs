@@ -35,7 +35,7 @@ pub struct Args {
     #[arg(long)]
     vision: bool,
     /// Print nothing.
-    #[arg(long)]
+    #[arg(long, short)]
     quiet: bool,
 }
 

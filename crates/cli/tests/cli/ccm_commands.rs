@@ -172,6 +172,14 @@ fn submissions_with_faults_are_refused_and_quirks_are_noted() {
     let width = |line: &str| line.split_whitespace().count();
     let shown: Vec<_> = table.lines().collect();
     assert_eq!(width(shown[1]), width(shown[2]) + 1, "{table}");
+    // The thirteen scores of the toolkit fit a terminal, for one submission and for several.
+    let one = ["evaluate", "--submission", text(&file), "--annotations", text(&annotations)];
+    let several = [&["evaluate"], &both[3..]].concat();
+    for arguments in [&one[..], &several] {
+        let table = lines(&run(arguments).stdout);
+        assert!(table.contains("filling level, weighted F1"), "{table}");
+        assert!(table.lines().all(|line| line.chars().count() <= 80), "{table}");
+    }
     let reversed = run(&[&both[..], &["--containers", "5-2"]].concat());
     assert_eq!(reversed.status.code(), Some(2));
     // A float label is a quirk of the official evaluators: scored as they do, and said.

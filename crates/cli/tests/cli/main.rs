@@ -12,6 +12,7 @@ mod formats;
 mod fusion;
 mod hostile;
 mod inspect;
+mod journey;
 mod live;
 mod models;
 #[cfg(feature = "nets")]

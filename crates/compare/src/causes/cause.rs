@@ -41,6 +41,8 @@ pub enum CauseKind {
     Steps,
     /// HTK's mel scale against Slaney's.
     MelScale,
+    /// Other values in the configurations.
+    Configuration,
 }
 
 /// A likely cause.

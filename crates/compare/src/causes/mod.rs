@@ -2,7 +2,8 @@
 //!
 //! A cause is a change of the first file's values that makes the second's of them (`scale`,
 //! `transform`, `arrangement`, `mel_scale`), or a confinement of the differences to places that one
-//! choice affects (`places`, `floor`). Nothing is guessed from names.
+//! choice affects (`places`, `floor`). Nothing is guessed from names. Where the values show none, keys
+//! of the configuration that differ are named (`of_settings`).
 
 mod arrangement;
 mod cause;
@@ -20,6 +21,7 @@ use ndarray::ArrayD;
 pub use cause::{Cause, CauseKind};
 
 use super::pair::{self, Pair};
+use super::settings::Settings;
 
 /// Likely causes for two arrays of one shape.
 pub(super) fn of_values(pair: &Pair, dtypes: [&str; 2]) -> Vec<Cause> {
@@ -47,6 +49,20 @@ pub(super) fn of_values(pair: &Pair, dtypes: [&str; 2]) -> Vec<Cause> {
     let rest = confinements(&rest, 2.0 * noise);
     let after = |c: Cause| Cause { evidence: format!("of what that leaves: {}", c.evidence), ..c };
     std::iter::once(cause).chain(rest.into_iter().map(after)).collect()
+}
+
+/// The keys of the configurations that differ and bear on a feature.
+pub(super) fn of_settings(settings: &Settings, feature: &str) -> Option<Cause> {
+    let bears = |key: &str| match key.strip_prefix("features.") {
+        None => Some(key.to_owned()),
+        Some(rest) => rest.strip_prefix(feature)?.starts_with('.').then(|| rest.to_owned()),
+    };
+    let keys: Vec<String> = settings.differences.iter().filter_map(|s| bears(&s.key)).collect();
+    (!keys.is_empty()).then(|| {
+        let cause = format!("the configuration: {}", keys.join(", "));
+        let evidence = "these keys differ, and the values show no simpler cause";
+        Cause::new(CauseKind::Configuration, cause, evidence)
+    })
 }
 
 fn confinements(pair: &Pair, noise: f64) -> Vec<Cause> {

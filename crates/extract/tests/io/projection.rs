@@ -65,7 +65,7 @@ fn fitted(folder: &Path) -> (Table, PathBuf) {
     let features = folder.join("train.npz");
     let table = extract(&folder.join("train"), config(PLAIN, &[]).unwrap(), &features);
     let file = folder.join("pca.npz");
-    Projection::fit(&features, 3).unwrap().save(&file).unwrap();
+    Projection::fit(&features, Some(3)).unwrap().save(&file).unwrap();
     (table, file)
 }
 
@@ -117,7 +117,7 @@ fn what_a_projection_was_not_fitted_for_is_refused() {
     assert!(refused(PLAIN, &unknown).contains("n_components"));
     // A stored configuration means the content that the file had.
     let stored = config(PLAIN, &with).unwrap().to_value();
-    Projection::fit(&folder.path().join("train.npz"), 2).unwrap().save(&file).unwrap();
+    Projection::fit(&folder.path().join("train.npz"), Some(2)).unwrap().save(&file).unwrap();
     let changed = Config::from_value(stored).unwrap_err().to_string();
     assert!(changed.contains("expected"), "{changed}");
     // Neither a feature file nor any bytes are a projection.
@@ -132,10 +132,10 @@ fn fits_that_are_impossible_are_refused() {
     let folder = TempDir::new().unwrap();
     let (_, _) = fitted(folder.path());
     let features = folder.path().join("train.npz");
-    let message = Projection::fit(&features, 7).unwrap_err().to_string();
+    let message = Projection::fit(&features, Some(7)).unwrap_err().to_string();
     assert!(message.contains("n_components = 7") && message.contains("train.npz"), "{message}");
     let frames = folder.path().join("frames.npz");
     let config = config("[features.melspectrogram]", &[]).unwrap();
     extract(&folder.path().join("train"), config, &frames);
-    assert!(Projection::fit(&frames, 1).unwrap_err().to_string().contains("[summary]"));
+    assert!(Projection::fit(&frames, Some(1)).unwrap_err().to_string().contains("[summary]"));
 }

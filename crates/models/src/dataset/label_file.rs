@@ -6,6 +6,10 @@ use std::path::{Path, PathBuf};
 use super::error::{DatasetError, Result};
 use crate::words::count;
 
+/// What other programs call the column that names recordings.
+const FILE_COLUMNS: [&str; 9] =
+    ["file", "filename", "file_name", "fname", "name", "clip", "wav", "audio", "recording"];
+
 /// Where labels come from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LabelSource {
@@ -68,10 +72,13 @@ impl LabelFile {
             (None, None, Some(at)) => (Key::Path, at),
             (None, None, None) => {
                 let found = header.iter().collect::<Vec<_>>().join(", ");
-                let reason = format!(
-                    "needs a column id or path, has {found}; --id-column NAME says which column \
-                     names the recordings"
-                );
+                let likely =
+                    header.iter().find(|name| FILE_COLUMNS.contains(&&*name.to_lowercase()));
+                let remedy = match likely {
+                    Some(name) => format!("does {name} name the recordings? --id-column {name}"),
+                    None => "--id-column NAME says which column names the recordings".into(),
+                };
+                let reason = format!("needs a column id or path, has {found}; {remedy}");
                 return Err(DatasetError::content(path, reason));
             }
         };
@@ -207,6 +214,8 @@ mod tests {
             assert_eq!(classes(text, key).unwrap(), ["cat", "dog"], "{text}");
         }
         let refused = classes("file,class\nx,cat\n", None).unwrap_err().to_string();
+        assert!(refused.contains("--id-column file"), "{refused}");
+        let refused = classes("x,class\nx,cat\n", None).unwrap_err().to_string();
         assert!(refused.contains("--id-column NAME"), "{refused}");
         let unknown = classes("file,class\nx,cat\n", Some("fil")).unwrap_err().to_string();
         assert!(unknown.contains("did you mean \"file\""), "{unknown}");

@@ -19,7 +19,8 @@ use crate::predictions::{PredictionError, PredictionTable};
 pub struct Scoring {
     /// column of true classes; `true` where not given
     pub target: Option<String>,
-    /// column of groups that are drawn together; a column `fold` or `group` where not given
+    /// column of groups that are drawn together; a column `group`, `container` or `recording` where
+    /// not given, else single rows
     pub groups: Option<String>,
     /// predictions with a highest probability below it are unknown
     pub reject: f64,
@@ -88,7 +89,7 @@ pub struct ScoreIntervals {
 }
 
 /// Columns that are groups unless the user says otherwise.
-const GROUPS: [&str; 4] = ["group", "container", "recording", "fold"];
+const GROUPS: [&str; 3] = ["group", "container", "recording"];
 
 impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     /// Scores every line against its true class or number.

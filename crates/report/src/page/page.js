@@ -32,6 +32,11 @@ const fit = new ResizeObserver(entries => {
   }
 });
 document.querySelectorAll(".scroll").forEach(box => fit.observe(box));
+// What sticks below the navigation must know how high it is.
+const nav = document.querySelector("nav");
+new ResizeObserver(() => {
+  document.documentElement.style.setProperty("--nav", `${nav.offsetHeight}px`);
+}).observe(nav);
 // On paper nothing can be unfolded.
 let closed = [];
 addEventListener("beforeprint", () => {

@@ -17,7 +17,7 @@ pub(super) fn section(study: &Study) -> Option<Section> {
     let sure = |p: &Prediction| p.confidence.unwrap_or(0.0);
     wrong.sort_by(|a, b| sure(b).total_cmp(&sure(a)).then_with(|| a.id.cmp(&b.id)));
     let mut text = format!(
-        "{} of {} held-out rows are wrong. The most confident errors come first: they are either \
+        "{} of {} rows are wrong. The most confident errors come first: they are either \
          labelled wrongly or the most instructive to listen to.",
         wrong.len(),
         study.predictions.len()

@@ -3,7 +3,10 @@
 
 mod data;
 mod errors;
+mod estimates;
 mod scores;
+
+pub use estimates::{Estimate, Estimates};
 
 use corsmal_plot::{Figure as Plot, RecordingPicture};
 use ndarray::Array2;
@@ -25,12 +28,18 @@ pub struct Study {
     pub recordings: Vec<Recording>,
     /// A recording of each class, with the class's number.
     pub examples: Vec<(usize, RecordingPicture)>,
-    /// Scores of all held-out rows, in percent.
+    /// Scores of all rows, in percent.
     pub scores: Vec<Score>,
+    /// What the rows that are scored are, as a sentence: held out from training, or not known.
+    pub protocol: String,
     /// How the intervals of the scores were made, as a sentence.
     pub intervals: String,
     /// The same for each fold: its name and the scores in the order of `scores`.
     pub folds: Vec<(String, Vec<f64>)>,
+    /// The same for the whole with other seeds: the seed and its scores.
+    pub seeds: Vec<(u32, Vec<f64>)>,
+    /// Measures of the probabilities: name, value, meaning.
+    pub measures: Vec<(String, f64, String)>,
     /// Scores of each class.
     pub class_scores: Vec<ClassScore>,
     /// `[true class, estimated class]`; a last column counts rows without an estimate.
@@ -43,7 +52,7 @@ pub struct Study {
     pub importances: Vec<Importance>,
     /// Scores by the number of training rows.
     pub learning: Vec<LearningPoint>,
-    /// Predictions of held-out rows.
+    /// The predictions.
     pub predictions: Vec<Prediction>,
 }
 
@@ -142,7 +151,7 @@ pub struct LearningPoint {
     pub range: (f64, f64),
 }
 
-/// The prediction of a held-out row.
+/// The prediction of a row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Prediction {
     /// Its id.
@@ -190,7 +199,7 @@ impl Study {
                 let range = interval
                     .map_or(String::new(), |(low, high)| format!(" ({low:.1} to {high:.1})"));
                 format!(
-                    "{}: {name} {value:.2} %{range} on {rows} held-out rows of {classes} classes.",
+                    "{}: {name} {value:.2} %{range} on {rows} rows of {classes} classes.",
                     self.target
                 )
             }

@@ -10,27 +10,22 @@ pub(super) fn section(study: &Study) -> Result<Option<Section>> {
     if study.scores.is_empty() {
         return Ok(None);
     }
-    let mut text = vec![
-        "Every row is predicted by a model that was not trained on it or on any row of its group."
-            .to_owned(),
-    ];
-    if !study.intervals.is_empty() {
-        text.push(study.intervals.clone());
-    }
+    let text = [&study.protocol, &study.intervals];
+    let text = text.into_iter().filter(|t| !t.is_empty()).cloned().collect();
     let mut rows = vec![Row {
         source: Source::Ours,
-        cells: std::iter::once(Cell::text("all held-out rows"))
+        cells: std::iter::once(Cell::text("all rows"))
             .chain(study.scores.iter().map(|s| Cell::Score(s.value, s.interval)))
             .collect(),
     }];
-    rows.extend(study.folds.iter().map(|(name, scores)| {
-        Row {
-            source: Source::Ours,
-            cells: std::iter::once(Cell::text(format!("fold {name}")))
-                .chain(scores.iter().map(|v| Cell::score(Some(*v))))
-                .collect(),
-        }
-    }));
+    let part = |name: String, scores: &[f64]| Row {
+        source: Source::Ours,
+        cells: std::iter::once(Cell::text(name))
+            .chain(scores.iter().map(|v| Cell::score(Some(*v))))
+            .collect(),
+    };
+    rows.extend(study.folds.iter().map(|(name, scores)| part(format!("fold {name}"), scores)));
+    rows.extend(study.seeds.iter().map(|(seed, s)| part(format!("all rows, seed {seed}"), s)));
     let table = Table {
         name: "scores".into(),
         caption: "Scores in percent, with 95 % intervals".into(),
@@ -46,7 +41,7 @@ pub(super) fn section(study: &Study) -> Result<Option<Section>> {
     let plot = ScorePlot {
         title: "Scores".into(),
         value_label: "percent".into(),
-        series: vec!["held-out rows".into()],
+        series: vec!["rows".into()],
         rows: study.scores.iter().map(mark).collect(),
         range: Some((0.0, 100.0)),
     };
@@ -59,15 +54,36 @@ pub(super) fn section(study: &Study) -> Result<Option<Section>> {
             y_label: "share that is right".into(),
             x_range: Some((0.0, 1.0)),
             y_range: Some((0.0, 1.0)),
-            lines: vec![Line { name: "held-out rows".into(), points, band: Vec::new() }],
+            lines: vec![Line { name: "rows".into(), points, band: Vec::new() }],
             diagonal: true,
             dots: true,
+            joined: true,
         };
         let caption = "On the dashed line, 80 of 100 predictions with a confidence of 0.8 are right. \
                        Below it, the classifier is too sure.";
         figures.push(Figure::new("calibration", caption, &plot)?);
     }
-    Ok(Some(Section { text, figures, tables: vec![table], ..Section::new("scores", "Scores") }))
+    let mut tables = vec![table];
+    tables.extend(measures(study));
+    Ok(Some(Section { text, figures, tables, ..Section::new("scores", "Scores") }))
+}
+
+/// Measures of the probabilities.
+fn measures(study: &Study) -> Option<Table> {
+    let row = |(name, value, meaning): &(String, f64, String)| Row {
+        source: Source::Ours,
+        cells: vec![
+            Cell::text(name),
+            Cell::Number(*value, format!("{value:.4}")),
+            Cell::text(meaning),
+        ],
+    };
+    (!study.measures.is_empty()).then(|| Table {
+        name: "measures".into(),
+        caption: "Measures of the probabilities, 0 to 1 unless said otherwise".into(),
+        columns: ["Measure", "Value", "Meaning"].map(String::from).to_vec(),
+        rows: study.measures.iter().map(row).collect(),
+    })
 }
 
 fn capitalised(text: &str) -> String {
@@ -135,6 +151,7 @@ pub(super) fn curves(study: &Study) -> Result<Option<Section>> {
             lines: hardest.iter().take(CURVES).map(line).collect(),
             diagonal: title == "ROC",
             dots: false,
+            joined: true,
         }
     };
     let roc = plot("ROC", "false positive rate", "true positive rate", |c| &c.roc);
@@ -181,7 +198,7 @@ pub(super) fn importances(study: &Study) -> Result<Option<Section>> {
     let plot = ScorePlot {
         title: "Importance by feature family".into(),
         value_label: "loss of accuracy when permuted, percentage points".into(),
-        series: vec!["held-out rows".into()],
+        series: vec!["rows".into()],
         rows: sorted.iter().map(row).collect(),
         range: None,
     };
@@ -231,12 +248,13 @@ pub(super) fn learning(study: &Study) -> Result<Option<Section>> {
         x_range: None,
         y_range: None,
         lines: vec![Line {
-            name: "held-out rows".into(),
+            name: "rows".into(),
             points: study.learning.iter().map(|p| (p.rows, p.accuracy)).collect(),
             band: study.learning.iter().map(|p| p.range).collect(),
         }],
         diagonal: false,
         dots: true,
+        joined: true,
     };
     let table = Table {
         name: "learning".into(),

@@ -3,6 +3,7 @@
 use corsmal_plot::{Mark, ScorePlot, ScoreRow};
 use corsmal_report::{Cell, Figure, Row, Section, Source, Table};
 
+use super::tasks::short_inputs;
 use crate::benchmark::method::{Method, Part, of_task};
 use crate::benchmark::results::{PartScores, Rows};
 use crate::error::Result;
@@ -85,9 +86,16 @@ pub(super) fn section(
 fn plot(task: Task, rows: &Rows, methods: &[Method], seed: u64) -> ScorePlot {
     const PROTOCOLS: [&str; 2] = ["corrected", "published"];
     let mut lines: Vec<ScoreRow> = Vec::new();
-    for paper in paper::scores(task).into_iter().rev() {
-        let mark = Mark { series: 0, value: paper.combined, interval: None };
-        lines.push(ScoreRow { name: paper.method.into(), marks: vec![mark] });
+    let published = paper::scores(task);
+    for row in published.iter().rev() {
+        let mark = Mark { series: 0, value: row.combined, interval: None };
+        // The paper has one method with several inputs.
+        let same = published.iter().filter(|other| other.method == row.method);
+        let name = match same.count() {
+            1 => row.method.to_owned(),
+            _ => format!("{}, {}", row.method, short_inputs(row.inputs)),
+        };
+        lines.push(ScoreRow { name, marks: vec![mark] });
     }
     for method in methods {
         let Cell::Score(value, interval) = method.cell(rows, Part::Training, task, seed) else {

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::paper::{self, Task};
 
 /// `audio+rgb1+rgb2` as "audio, RGB 1 2".
-fn short_inputs(inputs: &str) -> String {
+pub(super) fn short_inputs(inputs: &str) -> String {
     let mut text = String::new();
     let mut last = "";
     for part in inputs.split('+').filter(|p| !p.is_empty()) {

@@ -248,3 +248,49 @@ fn python_objects_are_never_read() {
     archive(&files.path("numbers.npz"), &[("y", numbers)]);
     assert_eq!(files.run("both.npz", "numbers.npz", &[]).status.code(), Some(0));
 }
+
+#[test]
+fn recordings_of_other_folders_are_paired_by_file_name() {
+    let files = Files::new();
+    extract(&files, "a.npz", &["--preset", "esc26"]);
+    let (audio, listed) = (files.path("audio"), files.path("listed.csv"));
+    let line =
+        |name: &str| format!("take/{name},{}\n", audio.join(format!("{name}.wav")).display());
+    std::fs::write(&listed, format!("id,path\n{}{}", line("one"), line("two"))).unwrap();
+    let again = |out: &str, more: &[&str]| {
+        let (list, out) = (files.path("listed.csv"), files.path(out));
+        let args = ["extract", text_of(&list), "-o", text_of(&out), "--preset", "esc26", "-q"];
+        assert!(run(&[&args[..], more].concat()).status.success());
+    };
+    again("b.npz", &[]);
+    let out = files.run("a.npz", "b.npz", &[]);
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    assert!(text(&out.stdout).contains("paired by file name"), "{}", text(&out.stdout));
+
+    // Nothing in the values names a cause, so the keys that differ are named.
+    again("c.npz", &["--set", "signal.res_type=kaiser_fast", "--set", "mfcc.pad_mode=reflect"]);
+    let report = files.json("b.npz", "c.npz", &[]);
+    assert_eq!(kinds(&report, "mfcc"), ["configuration"]);
+    let shown = text(&files.run("b.npz", "c.npz", &[]).stdout);
+    assert!(shown.contains("likely cause: the configuration: signal.res_type, mfcc.pad_mode"));
+
+    // Neither ids nor file names in common: the recordings are named, not the columns.
+    std::fs::write(&listed, format!("id,path\nx,{}\n", audio.join("one.wav").display())).unwrap();
+    again("d.npz", &[]);
+    let words = ["no recording in common", "a.npz has \"one\", \"two\"", "d.npz has \"x\""];
+    refused(&files.run("a.npz", "d.npz", &[]), &words);
+}
+
+fn text_of(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+#[test]
+fn a_projection_keeps_what_there_is_by_default() {
+    let files = Files::new();
+    extract(&files, "a.npz", &["--preset", "esc26"]);
+    let (features, out) = (files.path("a.npz"), files.path("pca.npz"));
+    let told = run(&["pca", "--features", text_of(&features), "--out", text_of(&out)]);
+    let told = text(&told.stdout);
+    assert!(told.contains("26 features to 2 components"), "{told}");
+}

@@ -1,0 +1,196 @@
+//! The whole way of a user with recordings of their own: features, model, predictions, scores,
+//! reports.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::command::{done, names, run, text};
+
+const RATE: u32 = 16_000;
+const CLASSES: [&str; 3] = ["hum", "rain", "ticks"];
+
+/// A second and a half of a class.
+fn sound(class: &str, seed: u64) -> Vec<i16> {
+    let mut state = seed.wrapping_mul(0x9e37_79b9).wrapping_add(1);
+    let mut noise = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_041);
+        (state >> 40) as f64 / f64::from(1 << 24) - 0.5
+    };
+    let pitch = 180.0 + 15.0 * seed as f64;
+    let sample = |t: u32| {
+        let s = f64::from(t) / f64::from(RATE);
+        let noise = noise();
+        let value = match class {
+            "hum" => 0.6 * (std::f64::consts::TAU * pitch * s).sin() + 0.02 * noise,
+            "rain" => 0.5 * noise,
+            _ if (s * 8.0).fract() < 0.05 => 0.8 * noise,
+            _ => 0.01 * noise,
+        };
+        (value * 20_000.0) as i16
+    };
+    (0..RATE + RATE / 2).map(sample).collect()
+}
+
+struct Journey {
+    folder: tempfile::TempDir,
+}
+
+impl Journey {
+    /// Class folders with eight recordings each, and one file that is no recording.
+    fn begin() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let spec = hound::WavSpec {
+            channels: 1,
+            sample_rate: RATE,
+            bits_per_sample: 16,
+            sample_format: hound::SampleFormat::Int,
+        };
+        for class in CLASSES {
+            let dir = folder.path().join("audio").join(class);
+            std::fs::create_dir_all(&dir).unwrap();
+            for number in 0..8 {
+                let path = dir.join(format!("{class}{number}.wav"));
+                let mut writer = hound::WavWriter::create(path, spec).unwrap();
+                sound(class, number).into_iter().for_each(|s| writer.write_sample(s).unwrap());
+                writer.finalize().unwrap();
+            }
+        }
+        std::fs::write(folder.path().join("audio/hum/broken.wav"), "RIFF").unwrap();
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// A report as JSON.
+    fn report(&self, name: &str) -> Value {
+        let text = std::fs::read_to_string(self.path(name).join("report.json")).unwrap();
+        serde_json::from_str(&text).unwrap()
+    }
+}
+
+fn sections(report: &Value) -> Vec<&str> {
+    let sections = report["sections"].as_array().unwrap();
+    sections.iter().map(|s| s["id"].as_str().unwrap()).collect()
+}
+
+#[track_caller]
+fn holds(page: &Path, parts: &[&str]) {
+    let html = std::fs::read_to_string(page).unwrap();
+    for part in parts {
+        assert!(html.contains(part), "{part:?} is not in {}", page.display());
+    }
+}
+
+#[test]
+fn from_a_folder_to_a_report() {
+    let j = Journey::begin();
+    let (audio, table) = (j.path("audio"), j.path("table.npz"));
+    let (model, csv, held) = (j.path("sounds.model"), j.path("out.csv"), j.path("held.csv"));
+
+    let extracted = run(&["extract", text(&audio), "-o", text(&table), "--preset", "esc26", "-q"]);
+    assert_eq!(extracted.status.code(), Some(1), "one file is no recording");
+
+    let learn = [text(&table), "--labels", "folders", "--set", "trees=25"];
+    let trained = done(&[&["train"], &learn[..], &["-o", text(&model)]].concat());
+    assert!(trained.contains("class: hum (8), rain (8), ticks (8)"), "{trained}");
+    assert!(trained.contains("next: corsmal-feat classify"), "{trained}");
+
+    let classify = ["classify", "--model", text(&model), text(&audio), "-o", text(&csv), "-q"];
+    assert_eq!(run(&classify).status.code(), Some(1));
+    assert_eq!(std::fs::read_to_string(&csv).unwrap().lines().count(), 1 + 25);
+
+    // The broken file lies in a class folder: it counts as a recording without an answer.
+    let scored = done(&["score", text(&csv), "--labels", "folders"]);
+    for part in ["25 rows, 3 classes", "1 without a prediction counts as wrong", "Brier score"] {
+        assert!(scored.contains(part), "{part}: {scored}");
+    }
+
+    let report = j.path("report");
+    let validate = [&["cross-validate"], &learn[..], &["--cv", "4", "-o", text(&held)]].concat();
+    let validated = [&validate[..], &["--seeds", "2", "--report", text(&report)]].concat();
+    let told = done(&validated);
+    for part in ["bootstrap over 24 rows", "calibration error", "2 seeds, percent", "ROC area"] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
+    assert!(told.lines().all(|line| line.chars().count() <= 80), "{told}");
+    let found = j.report("report");
+    let all =
+        ["scores", "confusion", "curves", "errors", "data", "examples", "importances", "learning"];
+    assert_eq!(sections(&found), all);
+    let parts = ["broken", "hum: hum0.wav", "all rows, seed 1", "mfcc (25)", "Command", "<svg"];
+    holds(&report.join("report.html"), &parts);
+    for name in ["tables/scores.tex", "tables/classes.csv", "figures/confusion.pdf"] {
+        assert!(report.join(name).is_file(), "{name}");
+    }
+
+    // The same numbers, three ways.
+    let json = [&validate[..], &["--json", "--overwrite"]].concat();
+    let json: Value = serde_json::from_str(&done(&json)).unwrap();
+    let again: Value = serde_json::from_str(&done(&["score", text(&held), "--json"])).unwrap();
+    let accuracy = json["held_out"]["scores"]["accuracy"].as_f64().unwrap();
+    assert!(accuracy > 0.9, "{accuracy}");
+    for key in ["scores", "intervals", "calibration", "roc_auc"] {
+        assert_eq!(json["held_out"][key], again[key], "{key}");
+    }
+    assert_eq!(found["sections"][0]["tables"][0]["rows"][0]["cells"][1], 100.0 * accuracy);
+}
+
+#[test]
+fn windows_are_listened_to_where_they_are() {
+    let j = Journey::begin();
+    let (audio, table, report) = (j.path("audio"), j.path("w.npz"), j.path("report"));
+    std::fs::remove_file(audio.join("hum/broken.wav")).unwrap();
+    // Ticks as hum, so that errors are certain.
+    std::fs::rename(audio.join("ticks/ticks0.wav"), audio.join("hum/ticks0.wav")).unwrap();
+    let cut = ["--preset", "esc26", "--window", "0.5", "--hop", "0.5", "-q"];
+    done(&[&["extract", text(&audio), "-o", text(&table)], &cut[..]].concat());
+    let validate =
+        ["cross-validate", text(&table), "--labels", "folders", "--cv", "4", "--set", "trees=25"];
+    let held = j.path("held.csv");
+    let more = ["-o", text(&held), "--report", text(&report)];
+    let told = done(&[&validate[..], &more[..]].concat());
+    assert!(told.contains("bootstrap over 24 values of group"), "{told}");
+    let header = std::fs::read_to_string(&held).unwrap();
+    assert!(header.starts_with("id,fold,group,true,predicted,"), "{header}");
+    holds(&report.join("report.html"), &["hum/ticks0@0.5", "0.50 to 1.00 s"]);
+
+    // Recordings that were moved away are no reason to fail.
+    std::fs::rename(&audio, j.path("elsewhere")).unwrap();
+    let moved = run(&[&validate[..], &["--report", text(&report), "-q"]].concat());
+    let message = String::from_utf8_lossy(&moved.stderr).into_owned();
+    assert!(moved.status.success() && moved.stdout.is_empty(), "{message}");
+    assert!(message.contains("24 of 24 recordings are no longer where"), "{message}");
+    assert!(!sections(&j.report("report")).contains(&"data"));
+}
+
+#[test]
+fn predictions_and_estimates_have_reports_of_their_own() {
+    let j = Journey::begin();
+    let (csv, report) = (j.path("p.csv"), j.path("report"));
+    let wav = j.path("audio/hum/hum0.wav");
+    let line = |id: &str, truth: &str, found: &str, p: &str| {
+        format!("{id},{},{truth},{found},{p}\n", wav.display())
+    };
+    let rows = [
+        line("1", "hum", "hum", "0.9,0.1"),
+        line("2", "rain", "hum", "0.8,0.2"),
+        line("3", "rain", "rain", "0.45,0.55"),
+    ];
+    let text_of = format!("id,path,true,predicted,p_hum,p_rain\n{}", rows.concat());
+    std::fs::write(&csv, text_of).unwrap();
+    done(&["score", text(&csv), "--reject", "0.6", "--report", text(&report)]);
+    let found = j.report("report");
+    assert_eq!(sections(&found), ["scores", "confusion", "curves", "errors", "data", "examples"]);
+    let errors = &found["sections"][3];
+    assert!(errors["text"][0].as_str().unwrap().ends_with("1 without an answer."));
+    assert_eq!(errors["tables"][0]["rows"].as_array().unwrap().len(), 1);
+    holds(&report.join("report.html"), &["Whether these recordings were held out"]);
+
+    std::fs::write(&csv, "id,capacity,predicted\n1,100.5,90\n2,200.5,300\n3,50,-1\n").unwrap();
+    done(&["score", text(&csv), "--target", "capacity", "--report", text(&report)]);
+    assert_eq!(j.report("report")["summary"], "capacity: 3 rows, 1 of them without an estimate.");
+    assert!(names(&report.join("figures")).contains(&"estimates.pdf".into()));
+}
