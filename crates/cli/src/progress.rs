@@ -52,7 +52,12 @@ pub struct Meter {
     started: Instant,
     /// Seconds of audio read.
     seconds: Mutex<f64>,
+    /// Recordings without features by what is wrong.
+    failures: Mutex<BTreeMap<String, usize>>,
 }
+
+/// Recordings that are named of those with the same fault.
+const NAMED: usize = 10;
 
 impl Meter {
     /// Draws a bar only on a terminal, and only where not `quiet`.
@@ -63,7 +68,14 @@ impl Meter {
         };
         let bar = ProgressBar::with_draw_target(None, target);
         bar.set_style(style("{bar:30} {pos} of {len} recordings{msg}{left}"));
-        Self { format, quiet, bar, started: Instant::now(), seconds: Mutex::new(0.0) }
+        Self {
+            format,
+            quiet,
+            bar,
+            started: Instant::now(),
+            seconds: Mutex::default(),
+            failures: Mutex::default(),
+        }
     }
 
     fn line(&self, text: &str) {
@@ -101,6 +113,10 @@ impl Meter {
     /// The last lines of a run.
     pub fn finish(&self, report: &RunReport, out: &Path) {
         self.bar.finish_and_clear();
+        let failures = self.failures.lock().unwrap_or_else(|e| e.into_inner());
+        for (fault, count) in failures.iter().filter(|(_, count)| **count > NAMED) {
+            eprintln!("and {} more: {}", count - NAMED, printable(fault));
+        }
         if self.quiet {
             return;
         }
@@ -176,7 +192,14 @@ impl Progress for Meter {
                 self.line(&json!({"event": "file", "outcome": value}).to_string());
             }
             LogFormat::Text if !outcome.status.has_features() => {
-                self.line(&failure_line(outcome));
+                let fault = fault(outcome);
+                let line = format!("{}: {fault}", outcome.path);
+                let mut failures = self.failures.lock().unwrap_or_else(|e| e.into_inner());
+                let count = failures.entry(fault).or_default();
+                *count += 1;
+                if *count <= NAMED {
+                    self.line(&line);
+                }
             }
             LogFormat::Text => {}
         }
@@ -197,6 +220,11 @@ impl Progress for Meter {
 
 /// Path, status and reason of a recording without features.
 pub fn failure_line(outcome: &Outcome) -> String {
+    format!("{}: {}", outcome.path, fault(outcome))
+}
+
+/// Status and reason of a recording without features.
+fn fault(outcome: &Outcome) -> String {
     let place = outcome
         .byte_offset
         .filter(|_| !outcome.reason.contains("byte"))
@@ -207,7 +235,7 @@ pub fn failure_line(outcome: &Outcome) -> String {
         said if reason.starts_with(said) => String::new(),
         unsaid => format!("{unsaid}: "),
     };
-    format!("{}: {status}{reason}{place}", outcome.path)
+    format!("{status}{reason}{place}")
 }
 
 /// Number of inputs by status.

@@ -146,9 +146,7 @@ pub fn print_overall(report: &ClassReport) {
         if report.drawn == "rows" { "rows".into() } else { format!("values of {}", report.drawn) };
     println!("bootstrap over {} {drawn}", report.units);
     if report.drawn == "rows" {
-        println!(
-            "if several rows are of one person, place or device, --groups draws those together"
-        );
+        println!("rows of one person, place or device are not independent: name them by --groups");
     } else if report.units < 10 {
         println!("with so few of them the interval says little");
     }

@@ -120,7 +120,7 @@ fn from_a_folder_to_a_report() {
     let all =
         ["scores", "confusion", "curves", "errors", "data", "examples", "importances", "learning"];
     assert_eq!(sections(&found), all);
-    let parts = ["broken", "hum: hum0.wav", "all rows, seed 1", "mfcc (25)", "Command", "<svg"];
+    let parts = ["broken", "hum: hum0.wav", "all rows, seed 1", "mfcc (24)", "Command", "<svg"];
     holds(&report.join("report.html"), &parts);
     for name in ["tables/scores.tex", "tables/classes.csv", "figures/confusion.pdf"] {
         assert!(report.join(name).is_file(), "{name}");
