@@ -160,7 +160,7 @@ fn single(name: &str, scores: &Scores, columns: &[&str]) -> String {
     for column in columns {
         let value = scores.get(column).map_or_else(String::new, two_decimals);
         let known = scores.rules.legend().iter().find(|(known, _)| known == column);
-        table.row([column, value.as_str(), known.map_or("", |(_, meaning)| meaning)]);
+        table.row([*column, value.as_str(), known.map_or("", |(_, meaning)| *meaning)]);
     }
     table.text()
 }

@@ -14,9 +14,9 @@ use corsmal_models::targets::Classes;
 use corsmal_report::Fact;
 use corsmal_report::study::{Importance, LearningPoint, Study};
 
+use super::page::{add_made, file_name, write};
 use super::recordings::{self, Source};
 use super::scored::of_predictions;
-use super::{add_made, file_name, write};
 use crate::failure::Failure;
 
 /// Repetitions of each permutation.

@@ -1,41 +1,10 @@
 //! The HTML reports of `cross-validate` and `score`, from what both computed.
 
 mod held_out;
+mod page;
 mod recordings;
 mod scored;
 
-use std::path::Path;
-
-use corsmal_report::{Fact, Report};
-
-use crate::failure::Failure;
-use crate::made;
-
 pub use held_out::{Explained, HeldOut};
+pub use page::prepare;
 pub use scored::{write_estimates, write_scored};
-
-/// Makes the folder of a report before anything is computed for it.
-pub fn prepare(folder: &Path) -> Result<(), Failure> {
-    std::fs::create_dir_all(folder)
-        .map_err(|e| Failure::new(format!("--report {}: {e}", folder.display())))
-}
-
-/// What stands in every report, after what the report is about.
-fn add_made(facts: &mut Vec<Fact>) {
-    facts.push(Fact::new("Made by", format!("corsmal-feat {}", env!("CARGO_PKG_VERSION"))));
-    facts.push(Fact::new("Date", made::today()));
-    facts.push(Fact::new("Command", made::command()));
-}
-
-/// Writes a report and says where it is.
-fn write(folder: &Path, report: &Report, quiet: bool) -> Result<(), Failure> {
-    report.write(folder)?;
-    if !quiet {
-        eprintln!("report: {}", folder.join("report.html").display());
-    }
-    Ok(())
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
-}

@@ -10,8 +10,8 @@ use corsmal_report::study::{
 };
 use ndarray::Array2;
 
+use super::page::{add_made, file_name, write};
 use super::recordings::{self, Source};
-use super::{add_made, file_name, write};
 use crate::failure::Failure;
 
 /// Writes the report of scored predictions of classes into a folder.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use corsmal_plot::Histogram;
 
-use super::{Recording, Study};
+use super::content::{Recording, Study};
 use crate::{Cell, Figure, FigureGroup, Result, Row, Section, Source, Table};
 
 /// Recordings with notes that are listed.

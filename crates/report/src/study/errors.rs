@@ -1,6 +1,6 @@
 //! Predictions to listen to.
 
-use super::{Prediction, Study};
+use super::content::{Prediction, Study};
 use crate::{Cell, Row, Section, Source, Table};
 
 /// Errors listed.

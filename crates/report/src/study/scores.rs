@@ -2,7 +2,7 @@
 
 use corsmal_plot::{ConfusionMatrix, Line, LinePlot, Mark, ScorePlot, ScoreRow};
 
-use super::{Study, pictured};
+use super::content::{self, Study};
 use crate::{Cell, Figure, Result, Row, Section, Source, Table};
 
 /// Scores of all held-out rows and of each fold, and calibration.
@@ -34,7 +34,7 @@ pub(super) fn section(study: &Study) -> Result<Option<Section>> {
             .collect(),
         rows,
     };
-    let mark = |score: &super::Score| ScoreRow {
+    let mark = |score: &content::Score| ScoreRow {
         name: capitalised(&score.name),
         marks: vec![Mark { series: 0, value: score.value, interval: score.interval }],
     };
@@ -102,7 +102,7 @@ pub(super) fn confusion(study: &Study) -> Result<Option<Section>> {
         counts: study.confusion.clone(),
         f1: study.class_scores.iter().map(|c| c.f1).collect(),
     };
-    let row = |(name, scores): (&String, &super::ClassScore)| Row {
+    let row = |(name, scores): (&String, &content::ClassScore)| Row {
         source: Source::Ours,
         cells: vec![
             Cell::text(name),
@@ -134,29 +134,30 @@ pub(super) fn curves(study: &Study) -> Result<Option<Section>> {
     if study.curves.is_empty() {
         return Ok(None);
     }
-    let mut hardest: Vec<&super::ClassCurve> = study.curves.iter().collect();
+    let mut hardest: Vec<&content::ClassCurve> = study.curves.iter().collect();
     hardest.sort_by(|a, b| a.roc_auc.total_cmp(&b.roc_auc));
-    let plot = |title: &str, x: &str, y: &str, points: fn(&super::ClassCurve) -> &[(f64, f64)]| {
-        let line = |curve: &&super::ClassCurve| Line {
-            name: study.class_name(curve.class).to_owned(),
-            points: points(curve).to_vec(),
-            band: Vec::new(),
+    let plot =
+        |title: &str, x: &str, y: &str, points: fn(&content::ClassCurve) -> &[(f64, f64)]| {
+            let line = |curve: &&content::ClassCurve| Line {
+                name: study.class_name(curve.class).to_owned(),
+                points: points(curve).to_vec(),
+                band: Vec::new(),
+            };
+            LinePlot {
+                title: title.into(),
+                x_label: x.into(),
+                y_label: y.into(),
+                x_range: Some((0.0, 1.0)),
+                y_range: Some((0.0, 1.0)),
+                lines: hardest.iter().take(CURVES).map(line).collect(),
+                diagonal: title == "ROC",
+                dots: false,
+                joined: true,
+            }
         };
-        LinePlot {
-            title: title.into(),
-            x_label: x.into(),
-            y_label: y.into(),
-            x_range: Some((0.0, 1.0)),
-            y_range: Some((0.0, 1.0)),
-            lines: hardest.iter().take(CURVES).map(line).collect(),
-            diagonal: title == "ROC",
-            dots: false,
-            joined: true,
-        }
-    };
     let roc = plot("ROC", "false positive rate", "true positive rate", |c| &c.roc);
     let pr = plot("Precision and recall", "recall", "precision", |c| &c.precision_recall);
-    let row = |curve: &super::ClassCurve| Row {
+    let row = |curve: &content::ClassCurve| Row {
         source: Source::Ours,
         cells: vec![
             Cell::text(study.class_name(curve.class)),
@@ -191,7 +192,7 @@ pub(super) fn importances(study: &Study) -> Result<Option<Section>> {
     }
     let mut sorted: Vec<_> = study.importances.iter().collect();
     sorted.sort_by(|a, b| b.loss.total_cmp(&a.loss));
-    let row = |i: &&super::Importance| ScoreRow {
+    let row = |i: &&content::Importance| ScoreRow {
         name: format!("{} ({})", i.family, i.features),
         marks: vec![Mark { series: 0, value: i.loss, interval: Some(i.range) }],
     };
@@ -282,4 +283,9 @@ pub(super) fn learning(study: &Study) -> Result<Option<Section>> {
         ..Section::new("learning", "Would more recordings help?")
     };
     Ok(Some(pictured(section, "learning", &plot)?))
+}
+
+/// A section with one figure.
+fn pictured(section: Section, name: &str, plot: &dyn corsmal_plot::Figure) -> Result<Section> {
+    Ok(Section { figures: vec![Figure::new(name, "", plot)?], ..section })
 }

@@ -1,0 +1,34 @@
+//! Writing a report.
+
+use std::path::Path;
+
+use corsmal_report::{Fact, Report};
+
+use crate::failure::Failure;
+use crate::made;
+
+/// Makes the folder of a report before anything is computed for it.
+pub fn prepare(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder)
+        .map_err(|e| Failure::new(format!("--report {}: {e}", folder.display())))
+}
+
+/// What stands in every report, after what the report is about.
+pub(super) fn add_made(facts: &mut Vec<Fact>) {
+    facts.push(Fact::new("Made by", format!("corsmal-feat {}", env!("CARGO_PKG_VERSION"))));
+    facts.push(Fact::new("Date", made::today()));
+    facts.push(Fact::new("Command", made::command()));
+}
+
+/// Writes a report and says where it is.
+pub(super) fn write(folder: &Path, report: &Report, quiet: bool) -> Result<(), Failure> {
+    report.write(folder)?;
+    if !quiet {
+        eprintln!("report: {}", folder.join("report.html").display());
+    }
+    Ok(())
+}
+
+pub(super) fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
