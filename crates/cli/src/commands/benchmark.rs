@@ -36,6 +36,9 @@ pub struct Args {
     seed: u64,
     #[command(flatten)]
     jobs: Jobs,
+    /// Print the whole report as JSON instead of its main scores.
+    #[arg(long)]
+    json: bool,
     /// Suppress progress messages.
     #[arg(short, long)]
     quiet: bool,
@@ -83,7 +86,9 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         }
         report => report?,
     };
-    if !quiet {
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&report)?);
+    } else if !quiet {
         print!("{}", scores(&report));
         if let Some(warning) = &report.warning {
             println!("{warning}\n");

@@ -62,6 +62,9 @@ pub struct Args {
     /// How to print the scores.
     #[arg(long, value_enum, default_value = "table")]
     format: Format,
+    /// The same as --format json.
+    #[arg(long, conflicts_with = "format")]
+    json: bool,
 }
 
 /// Container numbers; a type of its own so that clap does not take it for a repeated option.
@@ -104,7 +107,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         let scores = scores::evaluate(&submission, &annotations, &baseline, rules, list)?;
         results.push((submission.name(), scores));
     }
-    print(&results, args.format)?;
+    print(&results, if args.json { Format::Json } else { args.format })?;
     Ok(ExitCode::SUCCESS)
 }
 

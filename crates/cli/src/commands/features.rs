@@ -2,8 +2,8 @@
 
 use std::process::ExitCode;
 
-use corsmal_extract::features::{find, kinds, registry};
-use serde_json::Value;
+use corsmal_extract::features::{Entry, find, kinds, registry};
+use serde_json::{Value, json};
 
 use crate::failure::Failure;
 use crate::paragraphs::wrapped;
@@ -21,11 +21,19 @@ Examples:
 pub struct Args {
     /// A feature to show with its parameters and their defaults; without it all are listed.
     name: Option<String>,
+    /// Print everything as JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Lists features, or explains one as a table of a configuration file.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let Some(name) = args.name else {
+        if args.json {
+            let all = registry().into_iter().map(described).collect::<Vec<_>>();
+            println!("{}", serde_json::to_string_pretty(&all)?);
+            return Ok(ExitCode::SUCCESS);
+        }
         for feature in registry() {
             let about = wrapped(feature.about(), &" ".repeat(NAMES + 1));
             println!("{:<NAMES$} {}", feature.kind(), about.trim_start());
@@ -36,6 +44,10 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         let choices = corsmal_names::choices(&name, kinds());
         return Err(Failure::new(format!("feature \"{name}\" is unknown: {choices}")));
     };
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&described(feature))?);
+        return Ok(ExitCode::SUCCESS);
+    }
     println!("{}", wrapped(feature.about(), "# "));
     if !feature.python().is_empty() {
         println!("# In Python: corsmal_feat.{}", feature.python());
@@ -48,4 +60,18 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// A feature with its keys, their defaults and meanings.
+fn described(feature: &Entry) -> Value {
+    let defaults = feature.defaults();
+    let keys = feature
+        .keys()
+        .map(|key| json!({"key": key, "default": defaults[key], "meaning": feature.explain(key)}));
+    json!({
+        "name": feature.kind(),
+        "about": feature.about(),
+        "python": feature.python(),
+        "keys": keys.collect::<Vec<_>>(),
+    })
 }

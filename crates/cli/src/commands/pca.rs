@@ -33,6 +33,9 @@ pub struct Args {
     /// Replace an existing file.
     #[arg(long)]
     overwrite: bool,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
     /// Print nothing.
     #[arg(long, short)]
     quiet: bool,
@@ -49,7 +52,14 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     }
     let projection = Projection::fit(&args.features, args.n_components)?;
     projection.save(&args.out)?;
-    if !args.quiet {
+    if args.json {
+        let result = serde_json::json!({
+            "out": args.out.display().to_string(),
+            "n_features": projection.n_inputs(),
+            "n_components": projection.n_components(),
+        });
+        println!("{}", serde_json::to_string_pretty(&result)?);
+    } else if !args.quiet {
         let (from, to) = (projection.n_inputs(), projection.n_components());
         println!("{}: {from} features to {to} components", args.out.display());
     }

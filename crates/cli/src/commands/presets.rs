@@ -23,6 +23,9 @@ pub struct Args {
     /// Print the configuration file itself.
     #[arg(long, requires = "name")]
     toml: bool,
+    /// Print everything as JSON: the whole configuration, every key with its value.
+    #[arg(long, conflicts_with = "toml")]
+    json: bool,
 }
 
 /// Recordings as those of the CCM data set, by which columns are counted.
@@ -32,12 +35,21 @@ const RATE: f64 = 44_100.0;
 /// Lists or explains presets.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let Some(name) = args.name else {
+        if args.json {
+            let all = PRESETS.iter().map(described).collect::<Result<Vec<_>, _>>()?;
+            println!("{}", serde_json::to_string_pretty(&all)?);
+            return Ok(ExitCode::SUCCESS);
+        }
         list()?;
         return Ok(ExitCode::SUCCESS);
     };
     let preset = Preset::find(&name)?;
     if args.toml {
         print!("{}", preset.toml);
+        return Ok(ExitCode::SUCCESS);
+    }
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&described(preset)?)?);
         return Ok(ExitCode::SUCCESS);
     }
     let config = Arc::new(Config::preset(&name)?);
@@ -65,6 +77,17 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let body = preset.toml.lines().skip_while(|line| line.starts_with("description"));
     body.skip_while(|line| line.is_empty()).for_each(|line| println!("  {line}"));
     Ok(ExitCode::SUCCESS)
+}
+
+/// A preset with its hash and all that it says.
+fn described(preset: &Preset) -> Result<serde_json::Value, Failure> {
+    let config = Config::preset(preset.name)?;
+    Ok(serde_json::json!({
+        "name": preset.name,
+        "description": config.description,
+        "config_hash": config.hash(),
+        "config": config.to_value(),
+    }))
 }
 
 /// A table: what each preset computes of what, and how much.

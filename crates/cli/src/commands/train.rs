@@ -12,6 +12,7 @@ use serde_json::{Map, Value, json};
 
 use crate::args::{DatasetArgs, Jobs, NetworkArgs, PipelineArgs};
 use crate::failure::Failure;
+use crate::paragraphs::wrapped;
 use crate::publish;
 
 /// Arguments of `train`.
@@ -137,12 +138,13 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
         let classes_text: Vec<_> =
             rows_of.iter().map(|(name, rows)| format!("{name} ({rows})")).collect();
         println!("{out}: {}", spec.describe());
-        println!(
+        let learned = format!(
             "{} rows, {} features, {target}: {}",
             classes.len(),
             table.x.ncols(),
             classes_text.join(", ")
         );
+        println!("{}", wrapped(&learned, ""));
         let apply = if table.config.is_null() { "--features OTHER.npz" } else { "YOUR_RECORDINGS" };
         println!(
             "next: corsmal-feat classify --model {out} {apply} -o predictions.csv\n      \

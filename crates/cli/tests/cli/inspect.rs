@@ -148,7 +148,7 @@ fn folders_and_several_files_are_listed() {
         shown.contains("1.00 s    8000   4") && shown.contains("ch 1 dead (constant)"),
         "{shown}"
     );
-    assert!(shown.contains("1 recording: 1.00 s\n1 of 8000 Hz, 4 channels"), "{shown}");
+    assert!(shown.contains("1 recording: 1.00 s\n1 at 8000 Hz, 4 channels"), "{shown}");
     let bad = folder.path().join("bad.wav");
     std::fs::write(&bad, b"RIFF").unwrap();
     let both = inspect(&[&wav, &bad]);

@@ -94,3 +94,19 @@ fn the_help_is_in_groups_and_says_where_to_start() {
     }
     assert!(!help.contains("Other:"), "every command has a group: {help}");
 }
+
+#[test]
+fn what_is_explained_is_explained_to_programs_too() {
+    let json = |arguments: &[&str]| -> Value {
+        serde_json::from_str(&done(&[arguments, &["--json"]].concat())).unwrap()
+    };
+    let mfcc = json(&["features", "mfcc"]);
+    assert_eq!(mfcc["python"], "feature.mfcc");
+    let keys = mfcc["keys"].as_array().unwrap();
+    let n_mfcc = keys.iter().find(|key| key["key"] == "n_mfcc").unwrap();
+    assert_eq!(n_mfcc["default"], 20);
+    assert!(json(&["features"]).as_array().unwrap().iter().any(|f| *f == mfcc));
+    let esc26 = json(&["presets", "esc26"]);
+    assert_eq!(esc26["config"]["signal"]["sample_rate"], 22_050.0);
+    assert!(json(&["presets"]).as_array().unwrap().iter().any(|p| *p == esc26));
+}

@@ -73,7 +73,7 @@ struct Estimate {
     #[arg(long)]
     overwrite: bool,
     /// Print nothing.
-    #[arg(long)]
+    #[arg(long, short)]
     quiet: bool,
 }
 

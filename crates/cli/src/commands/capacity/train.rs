@@ -26,7 +26,7 @@ pub struct Args {
     #[arg(long)]
     overwrite: bool,
     /// Print nothing.
-    #[arg(long)]
+    #[arg(long, short)]
     quiet: bool,
 }
 

@@ -209,13 +209,16 @@ pub fn decibels(level: Option<f64>) -> String {
     level.map_or("-inf".into(), |db| format!("{db:.2}"))
 }
 
-/// A length of time: seconds below a minute, then hours, minutes and seconds.
+/// A length of time with its units.
 pub fn length(seconds: f64) -> String {
     if seconds < 60.0 {
         return format!("{seconds:.2} s");
     }
     let whole = seconds.round() as u64;
-    format!("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60)
+    match whole / 3600 {
+        0 => format!("{} min {:02} s", whole / 60, whole % 60),
+        hours => format!("{hours} h {:02} min {:02} s", whole / 60 % 60, whole % 60),
+    }
 }
 
 /// Writing to a string cannot fail.

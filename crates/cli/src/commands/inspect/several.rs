@@ -95,8 +95,10 @@ impl Sound {
 
 fn text(lines: &[Line]) -> String {
     let width = lines.iter().map(|l| l.path.chars().count()).max().unwrap_or(4).clamp(4, 60);
+    let lengths = lines.iter().filter_map(|l| l.sound.as_ref()).map(|s| length(s.seconds).len());
+    let long = lengths.max().unwrap_or(0).max(9);
     let mut out = format!(
-        "{:width$}  {:>9}  {:>6}  {:>2}  {:>9}  {:>7}  notes\n",
+        "{:width$}  {:>long$}  {:>6}  {:>2}  {:>9}  {:>7}  notes\n",
         "file", "length", "Hz", "ch", "peak dBFS", "silence"
     );
     for line in lines {
@@ -107,7 +109,7 @@ fn text(lines: &[Line]) -> String {
                     notes.push(format!("{} repaired", sound.repairs));
                 }
                 format!(
-                    "{:width$}  {:>9}  {:>6}  {:>2}  {:>9}  {:>7}  {}",
+                    "{:width$}  {:>long$}  {:>6}  {:>2}  {:>9}  {:>7}  {}",
                     line.path,
                     length(sound.seconds),
                     sound.sample_rate,
@@ -138,7 +140,7 @@ fn summary(lines: &[Line]) -> String {
     let kinds: Vec<String> = counts
         .iter()
         .map(|((rate, channels), n)| {
-            format!("{n} of {rate} Hz, {}", plural(u64::from(*channels), "channel"))
+            format!("{n} at {rate} Hz, {}", plural(u64::from(*channels), "channel"))
         })
         .collect();
     let total: f64 = sounds.iter().map(|s| s.seconds).sum();
@@ -147,7 +149,11 @@ fn summary(lines: &[Line]) -> String {
     let noted = sounds.iter().filter(|s| !s.notes.is_empty()).count();
     let mut out = format!("{}: {}", plural(sounds.len() as u64, "recording"), length(total));
     if sounds.len() > 1 {
-        out.push_str(&format!(" in all, {} to {}", length(shortest), length(longest)));
+        let (shortest, longest) = (length(shortest), length(longest));
+        match shortest == longest {
+            true => out.push_str(&format!(" in all, {longest} each")),
+            false => out.push_str(&format!(" in all, {shortest} to {longest}")),
+        }
     }
     out.push('\n');
     if !kinds.is_empty() {
