@@ -74,7 +74,8 @@ class CrossValidation:
     accuracy, weighted_f1, macro_f1 : over folds, `mean`, `std`, and the ends `low` and `high` of
         the 95 % interval (Student's t)
     predictions : of the held-out rows
-    report : everything, as `corsmal-feat cross-validate --json` prints it
+    report : everything, as `corsmal-feat cross-validate --json` prints it; `report["held_out"]` has
+        the bootstrap intervals and the calibration of all held-out rows
     """
 
     accuracy: dict[str, float]

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use crate::failure::Failure;
+use crate::made::quoted;
 
 /// Arguments of `demo`.
 #[derive(clap::Args)]
@@ -113,8 +114,9 @@ pub fn run(
         "\nDone in {:.1} s. Open {report}/report.html (SYNTHETIC data, it says so) and {picture};\n\
          predictions are in {predictions}. In Python:\n\
          \n  import numpy as np\n  feats = np.load(\"{logmel}\")\n  print(list(feats)[0], feats[list(feats)[0]].shape)  # [channels, mel bands, frames]\n\
-         \nThe same on your own recordings:\n\
-         \n  corsmal-feat extract --in YOUR_FOLDER --out feats.npz",
+         \nThe same on your own recordings, where each class has a folder:\n\
+         \n  corsmal-feat extract YOUR_FOLDER -o table.npz --preset mfcc-zcr\n  \
+         corsmal-feat cross-validate table.npz --labels folders --report report",
         started.elapsed().as_secs_f64(),
     );
     Ok(ExitCode::SUCCESS)
@@ -122,23 +124,5 @@ pub fn run(
 
 /// A command that a shell takes back.
 fn shown(words: &[&str]) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "-_./,=:+@%".contains(c);
-    let quoted = words.iter().map(|word| {
-        if !word.is_empty() && word.chars().all(plain) {
-            (*word).to_owned()
-        } else {
-            format!("'{}'", word.replace('\'', r"'\''"))
-        }
-    });
-    quoted.collect::<Vec<_>>().join(" ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_with_spaces_are_quoted() {
-        assert_eq!(shown(&["inspect", "de mo/it's.npz"]), r"inspect 'de mo/it'\''s.npz'");
-    }
+    words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
 }

@@ -15,7 +15,9 @@ pub fn prepare(folder: &Path) -> Result<(), Failure> {
 
 /// What stands in every report, after what the report is about.
 pub(super) fn add_made(facts: &mut Vec<Fact>) {
-    facts.push(Fact::new("Made by", format!("corsmal-feat {}", env!("CARGO_PKG_VERSION"))));
+    let (version, os, arch) =
+        (env!("CARGO_PKG_VERSION"), std::env::consts::OS, std::env::consts::ARCH);
+    facts.push(Fact::new("Made by", format!("corsmal-feat {version}, {os} {arch}")));
     facts.push(Fact::new("Date", made::today()));
     facts.push(Fact::new("Command", made::command()));
 }

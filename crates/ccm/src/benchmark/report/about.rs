@@ -32,7 +32,9 @@ pub(super) fn facts(
     sets.dedup();
     facts.push(Fact::new("Feature configurations", sets.join(", ")));
     facts.push(Fact::new("Seed", seed.to_string()));
-    facts.push(Fact::new("Made by", format!("corsmal-feat {}", env!("CARGO_PKG_VERSION"))));
+    let (version, os, arch) =
+        (env!("CARGO_PKG_VERSION"), std::env::consts::OS, std::env::consts::ARCH);
+    facts.push(Fact::new("Made by", format!("corsmal-feat {version}, {os} {arch}")));
     facts.extend(made.on.iter().map(|on| Fact::new("Date", on)));
     facts.extend(made.command.iter().map(|command| Fact::new("Command", command)));
     facts
