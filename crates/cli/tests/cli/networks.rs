@@ -67,7 +67,7 @@ fn a_network_is_validated_trained_and_applied() {
     assert_eq!(report["training"]["recipe"]["epochs"], 3);
     let lines = std::fs::read_to_string(&predictions).unwrap();
     assert_eq!(lines.lines().count(), 13, "{lines}");
-    assert!(lines.starts_with("id,fold,true,predicted,p_0,p_1"), "{lines}");
+    assert!(lines.starts_with("id,fold,group,true,predicted,p_0,p_1"), "{lines}");
 
     let kept = path("checkpoints");
     let train = [&["train"], &learn[..], &recipe[..], &["-q", "-o", text(&model)]].concat();
