@@ -103,7 +103,7 @@ fn from_recordings_to_predictions() {
     assert!(accuracy > 0.5, "{accuracy}");
     let held_out = std::fs::read_to_string(&held_out).unwrap();
     let rows: Vec<Vec<&str>> = held_out.lines().skip(1).map(|l| l.split(',').collect()).collect();
-    let right = rows.iter().filter(|row| row[2] == row[3]).count();
+    let right = rows.iter().filter(|row| row[3] == row[4]).count();
     assert_eq!(rows.len(), 57);
     assert!((right as f64 / 57.0 - accuracy).abs() < 1e-12);
 }
