@@ -82,6 +82,7 @@ from ._yin import yin
 from .errors import (
     ConfigError,
     CorsmalFeatError,
+    DataTypeError,
     DecodeError,
     ModelError,
     NotFittedError,
@@ -115,6 +116,7 @@ __all__ = [
     "CorsmalFeatError",
     "CrossValidation",
     "D_weighting",
+    "DataTypeError",
     "DecisionTree",
     "DecodeError",
     "ExtraTrees",

@@ -29,7 +29,19 @@ def size(name: str, value: Any, least: int = 1) -> int:
         raise ParameterError(f"{name} must be a whole number, not {value!r}")
     if not least <= value <= MOST:
         raise ParameterError(f"{name} must be {least} to {MOST}, not {value}")
+    if value != int(value):
+        raise ParameterError(f"{name} must be a whole number, not {value}")
     return int(value)
+
+
+def number(name: str, value: Any) -> float:
+    """A number from outside."""
+    if not isinstance(value, str | bytes):
+        try:
+            return float(value)
+        except (TypeError, ValueError):
+            pass
+    raise ParameterError(f"{name} must be a number, not {value!r}")
 
 
 def room(what: str, *shape: int) -> None:
@@ -68,10 +80,10 @@ def floats(name: str, value: Any, min_ndim: int = 1) -> Floats:
     return array
 
 
-def spectrum(S: Any) -> Floats:
+def spectrum(S: Any, min_ndim: int = 2) -> Floats:
     """A spectrogram `S` [shape=(..., d, t)]; whole numbers become double precision."""
     array = np.asarray(S)
-    return floats("S", array.astype(np.float64) if array.dtype.kind in "iu" else array, 2)
+    return floats("S", array.astype(np.float64) if array.dtype.kind in "iu" else array, min_ndim)
 
 
 def audio(y: Any) -> Floats:

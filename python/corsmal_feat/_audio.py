@@ -88,9 +88,9 @@ def load(
 
     Examples
     --------
-    >>> y, sr = corsmal_feat.load("recording.wav")  # doctest: +SKIP
-    >>> y.shape, sr  # doctest: +SKIP
-    ((117601,), 22050)
+    >>> y, sr = corsmal_feat.load("recording.wav")
+    >>> y.shape, sr
+    ((22050,), 22050)
     """
     kind = _dtype(dtype)
     recording = _open(path)
@@ -147,8 +147,13 @@ def stream(
     Examples
     --------
     >>> blocks = corsmal_feat.stream(
-    ...     "recording.wav", block_length=256, frame_length=2048, hop_length=512
-    ... )  # doctest: +SKIP
+    ...     "recording.wav", block_length=32, frame_length=2048, hop_length=512
+    ... )
+    >>> for y in blocks:
+    ...     print(y.shape, corsmal_feat.feature.rms(y=y, center=False).shape)
+    (17920,) (1, 32)
+    (17920,) (1, 32)
+    (11332,) (1, 19)
     """
     sizes = {"block_length": block_length, "frame_length": frame_length, "hop_length": hop_length}
     for name, value in sizes.items():
@@ -209,7 +214,7 @@ def get_samplerate(path: Source) -> float:
 
     Examples
     --------
-    >>> corsmal_feat.get_samplerate("recording.wav")  # doctest: +SKIP
+    >>> corsmal_feat.get_samplerate("recording.wav")
     44100
     """
     return _open(path).sample_rate

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, rows, unrows
+from ._arrays import Floats, number, rows, unrows
 from ._filters import Window, chroma_params
 from ._pitch import estimate_tuning
 from ._spectrum import spectrogram
@@ -70,5 +70,5 @@ def chroma_stft(
     double = np.dtype(dtype) == np.float64
     if double:
         s = s.astype(np.float64)
-    length = None if norm is None else float(norm)
+    length = None if norm is None else number("norm", norm)
     return unrows(_core.chroma(rows(s, 2), params, length, double), s, 2)

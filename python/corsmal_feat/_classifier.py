@@ -5,15 +5,27 @@ from __future__ import annotations
 import json
 import math
 import os
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _core
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
-from ._validation import Matrix, features, labels_of, names_of
+from ._validation import Matrix, features, labels_of, names_of, weights_of
 from .errors import ModelError, ParameterError
+
+if TYPE_CHECKING:
+    from ._estimator import FeatureExtractor
+    from ._features import Features
+
+
+class Learned(NamedTuple):
+    """What a classifier has learned from."""
+
+    #: position of each row's label in `classes_`
+    positions: npt.NDArray[np.int64]
+    weights: Matrix | None
 
 
 class Classifier(ClassifierMixin, BaseEstimator):
@@ -51,10 +63,15 @@ class Classifier(ClassifierMixin, BaseEstimator):
 
     def fit(self, X: Any, y: Any) -> Self:
         """Learns from `X` [shape=(rows, features)] and `y`, a label for each row."""
+        self._fit(X, y, None)
+        return self
+
+    def _fit(self, X: Any, y: Any, sample_weight: Any) -> Learned:
         owner = type(self).__name__
         names = names_of(X)
         x = features(X, owner)
         classes, positions = labels_of(y, len(x), owner)
+        weights = weights_of(sample_weight, len(x), owner)
         try:
             spec = _core.classifier_parameters(self._name, json.dumps(self._parameters(classes)))
         except TypeError as error:
@@ -77,6 +94,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
                 "y",
                 [] if names is None else names.tolist(),
                 json.dumps(provenance),
+                None if weights is None else weights.tolist(),
             )
         except ParameterError as error:
             size = f"n_samples = {x.shape[0]}, n_features = {x.shape[1]}"
@@ -87,7 +105,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
             self.feature_names_in_ = names
         elif hasattr(self, "feature_names_in_"):
             del self.feature_names_in_
-        return self
+        return Learned(positions, weights)
 
     def _query(self, X: Any) -> Matrix:
         if not hasattr(self, "_model"):
@@ -117,11 +135,26 @@ class Classifier(ClassifierMixin, BaseEstimator):
         x = self._query(X)
         return self._model.predict_proba(x)
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the model file, whole or not at all."""
+    def _decision_function(self, X: Any) -> Matrix:
+        values = self._model.decision_function(self._query(X))
+        return values[:, 0] if values.shape[1] == 1 else values
+
+    def save(
+        self, path: str | os.PathLike[str], *, features: Features | FeatureExtractor | None = None
+    ) -> None:
+        """Writes the model file, whole or not at all.
+
+        Parameters
+        ----------
+        path : path
+            The file.
+        features : Features or FeatureExtractor, optional
+            What made the rows that it was fitted on. The model then takes recordings:
+            `load_model(path).predict(["a.wav"])`, `corsmal-feat classify`.
+        """
         if not hasattr(self, "_model"):
             raise not_fitted(self)
-        self._model.save(os.fspath(path))
+        self._model.save(os.fspath(path), None if features is None else made_of(features))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -153,6 +186,30 @@ class Classifier(ClassifierMixin, BaseEstimator):
         self.__dict__.update(state)
         if isinstance(state.get("_model"), bytes):
             self._model = _core.TrainedModel.from_bytes(state["_model"])
+
+
+class WeightedClassifier(Classifier):
+    """One to which some rows may count more than others."""
+
+    def fit(self, X: Any, y: Any, sample_weight: Any = None) -> Self:
+        """Learns from `X` [shape=(rows, features)] and `y`, a label for each row.
+
+        `sample_weight` [shape=(rows,)], numbers of at least 0, says how much each row counts; one
+        of weight 0 is left out. By default all count alike.
+        """
+        self._fit(X, y, sample_weight)
+        return self
+
+
+def made_of(features: Features | FeatureExtractor) -> str:
+    """What a model file says about its features, as JSON."""
+    try:
+        made = features._made_of()
+    except AttributeError as error:
+        raise ParameterError(
+            f"features must be Features or a fitted FeatureExtractor, not {features!r}"
+        ) from error
+    return json.dumps(made)
 
 
 def _seed(value: Any) -> int:

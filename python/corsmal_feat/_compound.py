@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Doubles, Floats, floats, room, rows, size, unrows
+from ._arrays import Doubles, Floats, floats, number, room, rows, size, unrows
 from ._params import PaaFrames
 from .errors import ParameterError
 
@@ -37,28 +37,87 @@ def _doubles(name: str, value: Any, ndim: int) -> Doubles:
 
 
 def paa_fbank(sr: float, num_fft: int) -> Doubles:
-    """pyAudioAnalysis' mel filters [shape=(40, num_fft)] (`mfcc_filter_banks`)."""
+    """pyAudioAnalysis' mel filters (`mfcc_filter_banks`).
+
+    Parameters
+    ----------
+    sr : float
+        Sample rate in Hz.
+    num_fft : int
+        Bins of a spectrum.
+
+    Returns
+    -------
+    float64 [shape=(40, num_fft)]
+
+    Examples
+    --------
+    >>> corsmal_feat.corsmal.paa_fbank(16000, 400).shape
+    (40, 400)
+    """
     room("filters", 40, size("num_fft", num_fft))
-    return _core.paa_fbank(float(sr), int(num_fft))
+    return _core.paa_fbank(number("sr", sr), int(num_fft))
 
 
 def a34_short(y: npt.ArrayLike, sr: float, window: int, step: int, deltas: bool = True) -> Doubles:
-    """pyAudioAnalysis' short-term features [shape=(..., 68 or 34, frames)] of recordings `y`
-    [shape=(..., n)], 16-bit counts or samples in -1..1 (`feature_extraction`).
+    """pyAudioAnalysis' short-term features (`feature_extraction`).
 
-    Each recording is centred and peak-normalised as a whole. `window` and `step` are in samples.
+    Parameters
+    ----------
+    y : [shape=(..., n)]
+        Recordings, 16-bit counts or samples in -1..1. Each is centred and peak-normalised as a
+        whole.
+    sr : float
+        Sample rate in Hz.
+    window, step : int
+        Samples of a frame, and between frames.
+    deltas : bool
+        Whether differences from the frame before follow the 34 values.
+
+    Returns
+    -------
+    float64 [shape=(..., 68 or 34, frames)]
+
+    Examples
+    --------
+    >>> y = np.random.default_rng(0).uniform(-0.5, 0.5, 16000)
+    >>> corsmal_feat.corsmal.a34_short(y, 16000, 800, 400).shape
+    (68, 39)
     """
     y = _doubles("y", y, 1)
     window, step = size("window", window), size("step", step)
     room("filters", 40, window)
-    return unrows(_core.a34_short(rows(y, 1), float(sr), window, step, bool(deltas)), y, 1)
+    return unrows(_core.a34_short(rows(y, 1), number("sr", sr), window, step, bool(deltas)), y, 1)
 
 
 def a34f136(
     y: npt.ArrayLike, sr: float, mid_window: int, mid_step: int, window: int, step: int
 ) -> Doubles:
     """Means, then standard deviations of the 68 short-term features over mid-term windows
-    [shape=(..., 136, windows)] (pyAudioAnalysis `mid_feature_extraction`). All in samples."""
+    (pyAudioAnalysis `mid_feature_extraction`).
+
+    Parameters
+    ----------
+    y : [shape=(..., n)]
+        Recordings, 16-bit counts or samples in -1..1. Each is centred and peak-normalised as a
+        whole.
+    sr : float
+        Sample rate in Hz.
+    mid_window, mid_step : int
+        Samples of a mid-term window, and between them.
+    window, step : int
+        Samples of a frame, and between frames.
+
+    Returns
+    -------
+    float64 [shape=(..., 136, windows)]
+
+    Examples
+    --------
+    >>> y = np.random.default_rng(0).uniform(-0.5, 0.5, 32000)
+    >>> corsmal_feat.corsmal.a34f136(y, 16000, 16000, 16000, 800, 400).shape
+    (136, 2)
+    """
     y = _doubles("y", y, 1)
     room("filters", 40, size("window", window))
     frames = PaaFrames(
@@ -67,13 +126,36 @@ def a34f136(
         mid_window=size("mid_window", mid_window),
         mid_step=size("mid_step", mid_step),
     )
-    return unrows(_core.a34f136(rows(y, 1), float(sr), frames), y, 1)
+    return unrows(_core.a34f136(rows(y, 1), number("sr", sr), frames), y, 1)
 
 
 def a34f136_mean(
     y: npt.ArrayLike, sr: float, mid_window: int, mid_step: int, window: int, step: int
 ) -> Doubles:
-    """The vector of a recording [shape=(..., 136)]: the mean of `a34f136` over its windows."""
+    """The vector of a recording: the mean of `a34f136` over its windows.
+
+    Parameters
+    ----------
+    y : [shape=(..., n)]
+        Recordings, 16-bit counts or samples in -1..1. Each is centred and peak-normalised as a
+        whole.
+    sr : float
+        Sample rate in Hz.
+    mid_window, mid_step : int
+        Samples of a mid-term window, and between them.
+    window, step : int
+        Samples of a frame, and between frames.
+
+    Returns
+    -------
+    float64 [shape=(..., 136)]
+
+    Examples
+    --------
+    >>> y = np.random.default_rng(0).uniform(-0.5, 0.5, 32000)
+    >>> corsmal_feat.corsmal.a34f136_mean(y, 16000, 16000, 16000, 800, 400).shape
+    (136,)
+    """
     return np.asarray(a34f136(y, sr, mid_window, mid_step, window, step).mean(axis=-1))
 
 
@@ -84,8 +166,28 @@ def sk_resize(
     mode: str = "reflect",
     anti_aliasing: bool | None = None,
 ) -> Floats:
-    """`S` [shape=(rows, columns)] at another size, as scikit-image's `transform.resize` with linear
-    interpolation; Gaussian smoothing first if an axis shrinks."""
+    """A matrix at another size, as scikit-image's `transform.resize` with linear interpolation.
+
+    Parameters
+    ----------
+    S : [shape=(rows, columns)]
+        The matrix.
+    shape : (int, int)
+        Rows and columns wanted.
+    mode : str
+        How it goes on beyond its edges: "reflect", "constant", "edge", "symmetric" or "wrap".
+    anti_aliasing : bool, optional
+        Gaussian smoothing first; by default if an axis shrinks.
+
+    Returns
+    -------
+    array [shape=shape]
+
+    Examples
+    --------
+    >>> corsmal_feat.corsmal.sk_resize(np.eye(4), (2, 2), anti_aliasing=False).tolist()
+    [[0.5, 0.0], [0.0, 0.5]]
+    """
     s = floats("S", S, 2)
     if s.ndim != 2 or len(shape) != 2:
         raise ParameterError(f"S has {s.ndim} dimensions and shape {len(shape)}, expected 2 and 2")
@@ -95,9 +197,26 @@ def sk_resize(
 
 
 def pca_fit(X: npt.ArrayLike, n_components: int) -> Doubles:
-    """Principal components of `X` [shape=(rows, columns)] in one matrix
-    [shape=(n_components + 2, columns)]: the components, the column means, the explained variances
-    (padded with zeros). The largest entry of each component is positive."""
+    """Principal components in one matrix: the components, the column means, the explained variances
+    (padded with zeros). The largest entry of each component is positive.
+
+    Parameters
+    ----------
+    X : [shape=(rows, columns)]
+        The data.
+    n_components : int
+        How many.
+
+    Returns
+    -------
+    float64 [shape=(n_components + 2, columns)]
+
+    Examples
+    --------
+    >>> x = np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]])
+    >>> corsmal_feat.corsmal.pca_fit(x, 1).round(6).tolist()
+    [[1.0, 0.0], [2.0, 0.0], [4.0, 0.0]]
+    """
     components, mean, variance = _fit(X, n_components)
     padded = np.zeros_like(mean)
     padded[: len(variance)] = variance
@@ -105,10 +224,27 @@ def pca_fit(X: npt.ArrayLike, n_components: int) -> Doubles:
 
 
 def pca_fit_transform(X: npt.ArrayLike, n_components: int) -> Doubles:
-    """Coordinates [shape=(rows, n_components)] of the very data that the components are fitted to.
+    """Coordinates of the very data that the components are fitted to.
 
     For other data project on the fitted components: fitting them again on test data gives
     coordinates that have nothing to do with those of the training data.
+
+    Parameters
+    ----------
+    X : [shape=(rows, columns)]
+        The data.
+    n_components : int
+        How many.
+
+    Returns
+    -------
+    float64 [shape=(rows, n_components)]
+
+    Examples
+    --------
+    >>> x = np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]])
+    >>> corsmal_feat.corsmal.pca_fit_transform(x, 1).ravel().tolist()
+    [-2.0, 0.0, 2.0]
     """
     components, mean, _ = _fit(X, n_components)
     return pca_project(X, components, mean)
@@ -121,8 +257,30 @@ def pca_project(
     variance: npt.ArrayLike | None = None,
     whiten: bool = False,
 ) -> Doubles:
-    """`X` [shape=(rows, columns)] on fitted components [shape=(k, columns)], each coordinate
-    divided by its standard deviation if `whiten`."""
+    """Data on fitted components.
+
+    Parameters
+    ----------
+    X : [shape=(rows, columns)]
+        The data.
+    components : [shape=(k, columns)]
+        Directions of unit length.
+    mean : [shape=(columns,)]
+        Subtracted first.
+    variance : [shape=(k,)], optional
+        Along each component; needed to whiten.
+    whiten : bool
+        Whether each coordinate is divided by its standard deviation.
+
+    Returns
+    -------
+    float64 [shape=(rows, k)]
+
+    Examples
+    --------
+    >>> corsmal_feat.corsmal.pca_project([[3.0, 5.0]], [[1.0, 0.0]], [1.0, 1.0]).tolist()
+    [[2.0]]
+    """
     if whiten and variance is None:
         raise ParameterError("variance is needed with whiten=True")
     x = np.ascontiguousarray(_doubles("X", X, 2))
@@ -139,11 +297,27 @@ def fit_projection(
     overwrite: bool = False,
 ) -> None:
     """Fits principal components to the summary in a file of `extract` (training recordings only)
-    and writes them to `out`, an .npz with `components`, `mean` and `explained_variance`.
+    and writes them as an .npz with `components`, `mean` and `explained_variance`.
 
-    `n_components` is 128 by default, or as many as the rows and features allow. The configuration
-    key `projection.file` applies the file to other recordings, of whose features it accepts no
-    other configuration.
+    The configuration key `projection.file` applies the file to other recordings, of whose features
+    it accepts no other configuration.
+
+    Parameters
+    ----------
+    features : path
+        Output of `extract` with a summary.
+    out : path
+        The file to write.
+    n_components : int, optional
+        How many; 128 by default, or as many as the rows and features allow.
+    overwrite : bool
+        Whether `out` may be replaced.
+
+    Examples
+    --------
+    >>> corsmal_feat.corsmal.fit_projection("features.npz", "projection.npz", n_components=4)
+    >>> np.load("projection.npz")["components"].shape
+    (4, 26)
     """
     if not overwrite and os.path.exists(out):
         raise ParameterError(f"out = {os.fspath(out)!r} exists: overwrite=True replaces it")

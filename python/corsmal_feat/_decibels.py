@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Complexes, Floats, floats
+from ._arrays import Complexes, Floats, floats, number
 from .errors import ParameterError
 
 
@@ -50,8 +50,10 @@ def power_to_db(
     scalar = array.ndim == 0
     array = floats("S", array.astype(np.float64) if array.dtype.kind in "iu" else array, 0)
     reference = float(abs(ref(array) if callable(ref) else ref))
-    top = None if top_db is None else float(top_db)
-    result: Any = _core.power_to_db(np.ascontiguousarray(array), reference, float(amin), top)
+    top = None if top_db is None else number("top_db", top_db)
+    result: Any = _core.power_to_db(
+        np.ascontiguousarray(array), reference, number("amin", amin), top
+    )
     decibels: Floats = result[0] if scalar else result.reshape(array.shape)
     return decibels
 

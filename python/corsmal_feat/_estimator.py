@@ -16,7 +16,7 @@ from . import _core
 from ._extract import MOST_JOBS, Config, configuration, extract, interleaved, whole_rate
 from ._features import GOOD
 from ._sklearn import BaseEstimator, TransformerMixin, not_fitted
-from .errors import DecodeError, ParameterError
+from .errors import DataTypeError, DecodeError, ParameterError
 
 __all__ = ["FeatureExtractor"]
 
@@ -43,9 +43,10 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
 
     Examples
     --------
-    >>> extractor = corsmal_feat.FeatureExtractor("esc26")
-    >>> model = make_pipeline(extractor, StandardScaler(), corsmal_feat.SVC())  # doctest: +SKIP
-    >>> model.fit(["a.wav", "b.wav"], ["water", "rice"])  # doctest: +SKIP
+    >>> from sklearn.pipeline import make_pipeline
+    >>> model = make_pipeline(corsmal_feat.FeatureExtractor("esc26"), corsmal_feat.KNN(1))
+    >>> model.fit(["rice.wav", "water.wav"], ["rice", "water"]).predict(["water.wav"]).tolist()
+    ['water']
     """
 
     def __init__(
@@ -68,6 +69,8 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         self.progress = progress
 
     _names: list[str] | None = None
+    #: sample rates and channels of the recordings that it was fitted on
+    _formats: list[tuple[int, int]]
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
@@ -86,11 +89,14 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
             if not _is_path(recording):
                 _signal(recording, position)
         self._names, _ = self._compute(recordings[:1])
+        self._formats = self._formats_of(recordings)
         return self
 
     def fit_transform(self, X: Any, y: Any = None) -> Matrix:
         """`fit(X).transform(X)`."""
-        self._names, matrix = self._compute(_recordings(X))
+        recordings = _recordings(X)
+        self._names, matrix = self._compute(recordings)
+        self._formats = self._formats_of(recordings)
         return matrix
 
     def transform(self, X: Any) -> Matrix:
@@ -107,6 +113,30 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
                 f"{len(self._names)}: another number of channels or configuration"
             )
         return matrix
+
+    def _made_of(self) -> dict[str, Any]:
+        """What a model file says about features."""
+        config, digest = _core.effective_config(*self._configuration())
+        return {
+            "feature_names": self.get_feature_names_out().tolist(),
+            "feature_config": json.loads(config),
+            "feature_config_hash": digest,
+            "formats": self._formats,
+        }
+
+    def _formats_of(self, recordings: list[Any]) -> list[tuple[int, int]]:
+        """Different formats of those that can be read."""
+        return sorted({found for found in map(self._format, recordings) if found is not None})
+
+    def _format(self, recording: Any) -> tuple[int, int] | None:
+        """Sample rate and channels of a recording, if it can be read."""
+        if not _is_path(recording):
+            return whole_rate(self.sr), np.atleast_2d(recording).shape[0]
+        try:
+            opened = _core.Recording.open(recording)
+        except DecodeError:
+            return None
+        return opened.sample_rate, opened.channels
 
     def get_feature_names_out(self, input_features: Any = None) -> npt.NDArray[np.object_]:
         """Names of the columns, known after `fit`. `input_features` has no effect."""
@@ -195,7 +225,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
 
 def _recordings(X: Any) -> list[Any]:
     if hasattr(X, "toarray") and hasattr(X, "tocsr"):
-        raise TypeError("sparse data was passed, but dense data is required; use .toarray()")
+        raise DataTypeError("sparse data was passed, but dense data is required; use .toarray()")
     recordings = [X] if _is_path(X) else list(X if hasattr(X, "__iter__") else np.asarray(X))
     if not recordings:
         raise ParameterError("Found array with 0 sample(s): at least one recording is needed")

@@ -74,8 +74,9 @@ def evaluate(
 
     Examples
     --------
-    >>> corsmal_feat.evaluate("team.csv", "ccm_train_annotation.csv")["JFLT"]  # doctest: +SKIP
-    63.2
+    >>> scores = corsmal_feat.evaluate("team.csv", "annotations.csv", rules="paper")
+    >>> scores.recordings, scores["T1"]
+    (2, 100.0)
     """
     chosen = None if containers is None else [int(container) for container in containers]
     if seed is not None and not 0 <= int(seed) < 2**64:

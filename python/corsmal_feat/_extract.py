@@ -64,7 +64,9 @@ def extract(
 
     Examples
     --------
-    >>> features = corsmal_feat.extract(["audio/"], preset="mfcc-zcr")  # doctest: +SKIP
+    >>> features = corsmal_feat.extract(["audio/"], preset="mfcc-zcr")
+    >>> features.summary.shape, features.ids[:2]
+    ((12, 42), ['rice/0', 'rice/1'])
 
     Raises
     ------

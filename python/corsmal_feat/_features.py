@@ -161,6 +161,21 @@ class Features:
         )
         return pandas.DataFrame(columns, index=index)
 
+    def _made_of(self) -> dict[str, Any]:
+        """What a model file says about features."""
+        if self.summary is None:
+            raise ParameterError("features has frames: a model is fitted on rows of a summary")
+        return {
+            "feature_names": self.names,
+            "feature_config": self.config,
+            "feature_config_hash": self.config_hash,
+            "formats": [
+                (row.get("sample_rate"), row.get("channels"))
+                for row in self.outcomes
+                if row["status"] in GOOD
+            ],
+        }
+
     def _durations(self) -> npt.NDArray[np.float64]:
         rows = {row["id"]: row for row in self.outcomes}
 
@@ -216,7 +231,11 @@ def load_features(path: StrPath) -> Features:
 
     Examples
     --------
-    >>> features = corsmal_feat.load_features("features.npz")  # doctest: +SKIP
+    >>> features = corsmal_feat.load_features("features.npz")
+    >>> features
+    <Features: 12 recordings, 0 failed, summary of 26 values>
+    >>> features["water/3"].shape
+    (26,)
     """
     return Features.load(path)
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import room, size
+from ._arrays import number, room, size
 from ._params import ChromaParams, MelParams, WindowSpec
 from .errors import ParameterError
 
@@ -110,9 +110,11 @@ def mel_params(
     """Filter bank parameters as the Rust side takes them."""
     n_fft, n_mels = size("n_fft", n_fft), size("n_mels", n_mels)
     room("a filter bank", 2, n_mels, n_fft // 2 + 1)
-    name = "none" if norm is None else norm if isinstance(norm, str) else repr(float(norm))
-    high = None if fmax is None else float(fmax)
-    return MelParams(float(sr), int(n_fft), int(n_mels), float(fmin), high, bool(htk), name)
+    name = "none" if norm is None else norm if isinstance(norm, str) else repr(number("norm", norm))
+    high = None if fmax is None else number("fmax", fmax)
+    return MelParams(
+        number("sr", sr), int(n_fft), int(n_mels), number("fmin", fmin), high, bool(htk), name
+    )
 
 
 def mel(
@@ -179,14 +181,14 @@ def chroma_params(
     """Filter bank parameters as the Rust side takes them."""
     n_fft, n_chroma = size("n_fft", n_fft), size("n_chroma", n_chroma)
     room("a filter bank", 4, n_chroma, n_fft // 2 + 1)
-    width = None if octwidth is None else float(octwidth)
-    power = None if norm is None else float(norm)
+    width = None if octwidth is None else number("octwidth", octwidth)
+    power = None if norm is None else number("norm", norm)
     return ChromaParams(
-        sr=float(sr),
+        sr=number("sr", sr),
         n_fft=int(n_fft),
         n_chroma=int(n_chroma),
-        tuning=float(tuning),
-        ctroct=float(ctroct),
+        tuning=number("tuning", tuning),
+        ctroct=number("ctroct", ctroct),
         octwidth=width,
         norm=power,
         base_c=bool(base_c),

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Doubles, Floats, Singles, audio, floats, room, rows, size
+from ._arrays import Doubles, Floats, Singles, audio, floats, number, room, rows, size
 from ._mel import mfcc
 from ._mono import to_mono
 from ._time_domain import zero_crossing_rate
@@ -41,9 +41,30 @@ def _recording(y: Any) -> Singles:
 def spec9216(
     y: npt.ArrayLike, sr: float, fixed_len: int | None = None, *, librosa: str = "0.11"
 ) -> Floats:
-    """9216 values of one channel `y`: divided by its RMS, |STFT| (512, hop 128) in dB, resized to
-    96 x 96. `fixed_len` cuts or zero-pads first; padding makes the result float64, as it does in
-    the baselines. `sr` is not used; `librosa="0.8"` pads frames as the published baselines did."""
+    """An image of one channel: divided by its RMS, |STFT| (512, hop 128) in dB, resized to 96 x 96.
+
+    Parameters
+    ----------
+    y : [shape=(n,)]
+        One channel, float in -1..1.
+    sr : float
+        Its sample rate in Hz; not used.
+    fixed_len : int, optional
+        Samples to cut to, or to pad to with zeros; padding makes the result float64, as it does in
+        the baselines.
+    librosa : {"0.11", "0.8"}
+        "0.8" pads frames as the published baselines did.
+
+    Returns
+    -------
+    array [shape=(9216,)]
+
+    Examples
+    --------
+    >>> y = np.random.default_rng(0).uniform(-0.5, 0.5, 9000).astype(np.float32)
+    >>> corsmal_feat.corsmal.spec9216(y, 22050).shape
+    (9216,)
+    """
     y = audio(y)
     if y.ndim != 1:
         raise ParameterError(f"y has {y.ndim} dimensions, expected one channel")
@@ -55,8 +76,26 @@ def spec9216(
 
 
 def esc26(y: npt.ArrayLike, sr: float) -> Doubles:
-    """26 values of the mean channel of `y`: means, then standard deviations over frames of MFCC 1
-    to 12, then mean and standard deviation of the zero-crossing rate."""
+    """The baseline's vector: means, then standard deviations over frames of MFCC 1 to 12, then mean
+    and standard deviation of the zero-crossing rate, of the mean channel.
+
+    Parameters
+    ----------
+    y : [shape=(n,) or (channels, n)]
+        One recording, float in -1..1.
+    sr : float
+        Its sample rate in Hz.
+
+    Returns
+    -------
+    float64 [shape=(26,)]
+
+    Examples
+    --------
+    >>> y = np.random.default_rng(0).uniform(-0.5, 0.5, 9000).astype(np.float32)
+    >>> corsmal_feat.corsmal.esc26(y, 22050).shape
+    (26,)
+    """
     y = to_mono(y)
     cepstra = mfcc(y=y, sr=sr)[1:13]
     crossings = zero_crossing_rate(y)
@@ -65,36 +104,129 @@ def esc26(y: npt.ArrayLike, sr: float) -> Doubles:
 
 
 def m1_stft(y: npt.ArrayLike, *, n_fft: int = 2048, hop_length: int = 512) -> Singles:
-    """M1: magnitudes [shape=(1 + n_fft/2, frames)] of the mean channel. The paper gives no
-    parameters; these are our choice."""
+    """M1's input: magnitudes of the mean channel. The paper gives no parameters; these are our
+    choice.
+
+    Parameters
+    ----------
+    y : [shape=(n,) or (channels, n)]
+        One recording, float in -1..1.
+    n_fft, hop_length : int
+        Samples of a frame, and between frames.
+
+    Returns
+    -------
+    float32 [shape=(1 + n_fft/2, frames)]
+
+    Examples
+    --------
+    >>> y = np.random.default_rng(0).uniform(-0.5, 0.5, 9000).astype(np.float32)
+    >>> corsmal_feat.corsmal.m1_stft(y).shape
+    (1025, 18)
+    """
     return _core.m1_stft(_recording(y), size("n_fft", n_fft), size("hop_length", hop_length))
 
 
 def m2_mfcc(y: npt.ArrayLike, sr: float, *, padded: bool = True, librosa: str = "0.8") -> Singles:
-    """M2: 40 standardised MFCCs of the first 30 s [shape=(1501, 40)], or of the frames that are
-    there if not `padded`."""
-    return _core.m2_mfcc(_recording(y), float(sr), bool(padded), librosa)
+    """M2's input: 40 standardised MFCCs of the first 30 s.
+
+    Parameters
+    ----------
+    y : [shape=(n,) or (channels, n)]
+        One recording, float in -1..1.
+    sr : float
+        Its sample rate in Hz.
+    padded : bool
+        Whether a shorter recording is padded to 1501 frames.
+    librosa : {"0.8", "0.11"}
+        Whose padding of frames.
+
+    Returns
+    -------
+    float32 [shape=(1501 or frames, 40)]
+
+    Examples
+    --------
+    >>> y = np.random.default_rng(0).uniform(-0.5, 0.5, (8, 22050)).astype(np.float32)
+    >>> corsmal_feat.corsmal.m2_mfcc(y, 22050).shape
+    (1501, 40)
+    """
+    return _core.m2_mfcc(_recording(y), number("sr", sr), bool(padded), librosa)
 
 
 def m3_spectrogram(
     y: npt.ArrayLike, sr: float, *, n_fft: int = 1124, hop_length: int = 3087
 ) -> Singles:
-    """M3: magnitudes [shape=(1 + n_fft/2, frames)] of the last 32,000 samples at 16,600 Hz. Window
-    and hop are our choice, the paper gives none."""
+    """M3's input: magnitudes of the last 32,000 samples at 16,600 Hz. Window and hop are our
+    choice, the paper gives none.
+
+    Parameters
+    ----------
+    y : [shape=(n,) or (channels, n)]
+        One recording, float in -1..1.
+    sr : float
+        Its sample rate in Hz.
+    n_fft, hop_length : int
+        Samples of a frame, and between frames.
+
+    Returns
+    -------
+    float32 [shape=(1 + n_fft/2, frames)]
+
+    Examples
+    --------
+    >>> y = np.random.default_rng(0).uniform(-0.5, 0.5, 44100).astype(np.float32)
+    >>> corsmal_feat.corsmal.m3_spectrogram(y, 22050).shape
+    (563, 11)
+    """
     return _core.m3_spectrogram(
-        _recording(y), float(sr), size("n_fft", n_fft), size("hop_length", hop_length)
+        _recording(y), number("sr", sr), size("n_fft", n_fft), size("hop_length", hop_length)
     )
 
 
 def m4_logmel(y: npt.ArrayLike, sr: float, *, variant: str = "code") -> Singles:
-    """M4: 64 log-mel bands of every channel [shape=(frames, 64, channels)]. `variant="code"` cuts
-    each frame to 512 samples and doubles the decibels as the code does, "paper" does neither."""
-    return _core.m4_logmel(_recording(y), float(sr), variant)
+    """M4's input: 64 log-mel bands of every channel.
+
+    Parameters
+    ----------
+    y : [shape=(n,) or (channels, n)]
+        One recording, float in -1..1.
+    sr : float
+        Its sample rate in Hz.
+    variant : {"code", "paper"}
+        "code" cuts each frame to 512 samples and doubles the decibels as the code does, "paper"
+        does neither.
+
+    Returns
+    -------
+    float32 [shape=(frames, 64, channels)]
+
+    Examples
+    --------
+    >>> y = np.random.default_rng(0).uniform(-0.5, 0.5, (8, 44100)).astype(np.float32)
+    >>> corsmal_feat.corsmal.m4_logmel(y, 44100).shape
+    (98, 64, 8)
+    """
+    return _core.m4_logmel(_recording(y), number("sr", sr), variant)
 
 
 def m4_windows(features: npt.ArrayLike) -> Singles:
-    """M4: windows of 64 frames with 75 % overlap [shape=(windows, channels, 64, 64)] of
-    `m4_logmel`'s result."""
+    """M4's windows of 64 frames with 75 % overlap.
+
+    Parameters
+    ----------
+    features : [shape=(frames, 64, channels)]
+        The result of `m4_logmel`.
+
+    Returns
+    -------
+    float32 [shape=(windows, channels, 64, 64)]
+
+    Examples
+    --------
+    >>> corsmal_feat.corsmal.m4_windows(np.zeros((99, 64, 8))).shape
+    (3, 8, 64, 64)
+    """
     features = floats("features", features, 3)
     if features.ndim != 3:
         raise ParameterError(f"features has {features.ndim} dimensions, expected 3")
@@ -102,18 +234,77 @@ def m4_windows(features: npt.ArrayLike) -> Singles:
 
 
 def m5_a34f136(y: npt.ArrayLike, sr: float) -> Doubles:
-    """M5: 136 pyAudioAnalysis values of a recording of 8 channels (mixed as 7.1), 2 or 1."""
-    return _core.m5_a34f136(_recording(y), float(sr))
+    """M5's vector: 136 pyAudioAnalysis values of a recording of 8 channels (mixed as 7.1), 2 or 1.
+
+    Parameters
+    ----------
+    y : [shape=(n,) or (channels, n)]
+        One recording, float in -1..1.
+    sr : float
+        Its sample rate in Hz.
+
+    Returns
+    -------
+    float64 [shape=(136,)]
+
+    Examples
+    --------
+    >>> y = np.random.default_rng(0).uniform(-0.5, 0.5, (8, 44100)).astype(np.float32)
+    >>> corsmal_feat.corsmal.m5_a34f136(y, 44100).shape
+    (136,)
+    """
+    return _core.m5_a34f136(_recording(y), number("sr", sr))
 
 
 def m5_vggish_patches(y: npt.ArrayLike, sr: float, *, res_type: str = "kaiser_best") -> Singles:
-    """M5: log-mel patches for VGGish [shape=(patches, 96, 64)]."""
-    return _core.m5_vggish_patches(_recording(y), float(sr), res_type)
+    """M5's log-mel patches for VGGish.
+
+    Parameters
+    ----------
+    y : [shape=(n,) or (channels, n)]
+        One recording, float in -1..1.
+    sr : float
+        Its sample rate in Hz.
+    res_type : str
+        Resampler to 16 kHz.
+
+    Returns
+    -------
+    float32 [shape=(patches, 96, 64)]
+
+    Examples
+    --------
+    >>> y = np.random.default_rng(0).uniform(-0.5, 0.5, 88200).astype(np.float32)
+    >>> corsmal_feat.corsmal.m5_vggish_patches(y, 44100).shape
+    (2, 96, 64)
+    """
+    return _core.m5_vggish_patches(_recording(y), number("sr", sr), res_type)
 
 
 def m6_spectrogram(
     y: npt.ArrayLike, sr: float, *, start: float | None = None, librosa: str = "0.8"
 ) -> Singles:
-    """M6: decibel spectrogram of 10 s from the second onset, or from `start` seconds, as an image
-    [shape=(96, 96)]."""
-    return _core.m6_spectrogram(_recording(y), float(sr), start, librosa)
+    """M6's input: decibel spectrogram of 10 s as an image.
+
+    Parameters
+    ----------
+    y : [shape=(n,) or (channels, n)]
+        One recording, float in -1..1.
+    sr : float
+        Its sample rate in Hz.
+    start : float, optional
+        Seconds at which the 10 s begin; at the second onset by default.
+    librosa : {"0.8", "0.11"}
+        Whose onsets and padding.
+
+    Returns
+    -------
+    float32 [shape=(96, 96)]
+
+    Examples
+    --------
+    >>> y = np.random.default_rng(0).uniform(-0.5, 0.5, 44100).astype(np.float32)
+    >>> corsmal_feat.corsmal.m6_spectrogram(y, 22050, start=0).shape
+    (96, 96)
+    """
+    return _core.m6_spectrogram(_recording(y), number("sr", sr), start, librosa)

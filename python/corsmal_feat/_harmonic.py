@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Complexes, Floats, audio, floats, room, rows, size, unrows
+from ._arrays import Complexes, Floats, audio, floats, number, room, rows, size, unrows
 from ._chroma import chroma_stft
 from ._filters import Window, wavelet_window
 from ._mel import melspectrogram, mfcc
@@ -38,7 +38,7 @@ def _hpss_params(kernel_size: Any, power: float, margin: Any) -> HpssParams:
     return HpssParams(
         kernel_harmonic=size("kernel_size", kernels[0]),
         kernel_percussive=size("kernel_size", kernels[1]),
-        power=float(power),
+        power=number("power", power),
         margin_harmonic=float(margins[0]),
         margin_percussive=float(margins[1]),
     )
@@ -67,6 +67,10 @@ def istft(
         As they were in `stft`.
     length : int, optional
         Samples of the result.
+    dtype : float32 or float64, optional
+        Of the result; the precision of `stft_matrix` by default.
+    out : array, optional
+        Where to put the result.
 
     Returns
     -------
@@ -313,15 +317,15 @@ def _cqt_params(
     pad_mode: str = "constant",
 ) -> CqtParams:
     return CqtParams(
-        sr=float(sr),
+        sr=number("sr", sr),
         hop_length=size("hop_length", hop_length),
-        fmin=C1 if fmin is None else float(fmin),
+        fmin=C1 if fmin is None else number("fmin", fmin),
         n_bins=size("n_bins", n_bins),
         bins_per_octave=size("bins_per_octave", bins_per_octave),
-        tuning=float(tuning),
-        filter_scale=float(filter_scale),
-        norm=None if norm is None else float(norm),
-        sparsity=float(sparsity),
+        tuning=number("tuning", tuning),
+        filter_scale=number("filter_scale", filter_scale),
+        norm=None if norm is None else number("norm", norm),
+        sparsity=number("sparsity", sparsity),
         window=wavelet_window(window),
         scale=bool(scale),
         pad_mode=str(pad_mode),
@@ -463,10 +467,10 @@ def chroma_cqt(
     chroma = CqtChromaParams(
         bins_per_octave=bins_per_octave,
         n_chroma=n_chroma,
-        fmin=C1 if fmin is None else float(fmin),
+        fmin=C1 if fmin is None else number("fmin", fmin),
         window=None if weights is None else [float(w) for w in weights],
-        threshold=None if threshold is None else float(threshold),
-        norm=None if norm is None else float(norm),
+        threshold=None if threshold is None else number("threshold", threshold),
+        norm=None if norm is None else number("norm", norm),
     )
     if C is not None:
         c = floats("C", C, 2)
@@ -526,37 +530,123 @@ def tonnetz(
 
 
 def hpss_masks(S: npt.ArrayLike, **kwargs: Any) -> Floats:
-    """Harmonic and percussive mask, stacked (see `decompose.hpss`)."""
+    """Harmonic and percussive mask, stacked.
+
+    Parameters
+    ----------
+    S : [shape=(..., bins, frames)]
+        A spectrogram.
+    **kwargs
+        See `decompose.hpss`.
+
+    Returns
+    -------
+    array [shape=(2, ..., bins, frames)]
+
+    Examples
+    --------
+    >>> corsmal_feat.corsmal.hpss_masks(np.ones((9, 5))).shape
+    (2, 9, 5)
+    """
     return np.stack(hpss(S, mask=True, **kwargs))
 
 
 def hpss_mags(S: npt.ArrayLike, **kwargs: Any) -> Floats:
-    """Harmonic and percussive part of a spectrogram, stacked (see `decompose.hpss`)."""
+    """Harmonic and percussive part of a spectrogram, stacked.
+
+    Parameters
+    ----------
+    S : [shape=(..., bins, frames)]
+        A spectrogram.
+    **kwargs
+        See `decompose.hpss`.
+
+    Returns
+    -------
+    array [shape=(2, ..., bins, frames)]
+
+    Examples
+    --------
+    >>> corsmal_feat.corsmal.hpss_mags(np.ones((9, 5))).sum(axis=0).max()
+    np.float64(1.0)
+    """
     return np.stack(hpss(S, **kwargs))
 
 
 def hpss_audio(y: npt.ArrayLike, **kwargs: Any) -> Floats:
-    """Harmonic and percussive part of a signal, stacked (see `effects.hpss`)."""
+    """Harmonic and percussive part of a signal, stacked.
+
+    Parameters
+    ----------
+    y : [shape=(..., n)]
+        A signal.
+    **kwargs
+        See `effects.hpss`.
+
+    Returns
+    -------
+    array [shape=(2, ..., n)]
+
+    Examples
+    --------
+    >>> corsmal_feat.corsmal.hpss_audio(np.sin(np.arange(4096.0))).shape
+    (2, 4096)
+    """
     return np.stack(effects_hpss(y, **kwargs))
 
 
 def abs_cqt(y: npt.ArrayLike, **kwargs: Any) -> Floats:
-    """Constant-Q magnitudes (see `cqt`)."""
+    """Constant-Q magnitudes.
+
+    Parameters
+    ----------
+    y : [shape=(..., n)]
+        A signal.
+    **kwargs
+        See `cqt`.
+
+    Returns
+    -------
+    array [shape=(..., bins, frames)]
+
+    Examples
+    --------
+    >>> corsmal_feat.corsmal.abs_cqt(np.sin(np.arange(22050.0)), n_bins=24).shape
+    (24, 44)
+    """
     return np.abs(cqt(y, **kwargs))
 
 
 def af193(y: npt.ArrayLike, sr: float, *, librosa: str = "0.11") -> Floats:
-    """The baseline's vector [shape=(..., 193)] of `y` [shape=(..., n)]: means over time of 40 MFCC,
-    12 chroma, 128 mel, 7 spectral contrast and 6 tonnetz rows; leading axes are independent.
+    """The baseline's vector: means over time of 40 MFCC, 12 chroma, 128 mel, 7 spectral contrast
+    and 6 tonnetz rows; leading axes are independent.
 
     Chroma and contrast take magnitudes (not powers), tonnetz the harmonic part of the signal.
-    `librosa="0.8"` gives the published numbers: reflect padding, the constant-Q transform and the
-    end of the harmonic part as they were then, in single precision whatever the input.
+
+    Parameters
+    ----------
+    y : [shape=(..., n)]
+        A signal.
+    sr : float
+        Its sample rate in Hz.
+    librosa : {"0.11", "0.8"}
+        "0.8" gives the published numbers: reflect padding, the constant-Q transform and the end of
+        the harmonic part as they were then, in single precision whatever the input.
+
+    Returns
+    -------
+    array [shape=(..., 193)]
+
+    Examples
+    --------
+    >>> y = np.sin(np.arange(22050, dtype=np.float32) / 9)
+    >>> corsmal_feat.corsmal.af193(y, 22050).shape
+    (193,)
     """
     y = audio(y)
     channels = rows(y, 1)
     if y.dtype == np.float32 or librosa != "0.11":
-        return unrows(_core.af193(channels.astype(np.float32), float(sr), librosa), y, 1)
+        return unrows(_core.af193(channels.astype(np.float32), number("sr", sr), librosa), y, 1)
     return unrows(np.stack([_af193_composed(channel, sr) for channel in channels]), y, 1)
 
 

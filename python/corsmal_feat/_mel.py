@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, channels, floats, room, rows, size, spectrum, unrows
+from ._arrays import Floats, channels, floats, number, room, rows, size, spectrum, unrows
 from ._decibels import power_to_db
 from ._filters import Window, mel_params, warn_empty
 from ._spectrum import length_of, signal
@@ -66,7 +66,7 @@ def melspectrogram(
     else:
         y, stft = signal(y, n_fft, hop_length, win_length, window, center, pad_mode)
         bank = mel_params(sr, n_fft, n_mels, fmin, fmax, htk, norm)
-        result, empty = _core.melspectrogram(channels(y), stft, float(power), bank)
+        result, empty = _core.melspectrogram(channels(y), stft, number("power", power), bank)
         leading = y.shape[:-1]
     if empty:
         warn_empty()
@@ -124,7 +124,9 @@ def mfcc(
     kind = size("dct_type", dct_type)
     if kind > 3:
         raise ParameterError(f"dct_type must be 1, 2 or 3, not {dct_type}")
-    return unrows(_core.mfcc(rows(s, 2), n_mfcc, kind, norm == "ortho", float(lifter)), s, 2)
+    return unrows(
+        _core.mfcc(rows(s, 2), n_mfcc, kind, norm == "ortho", number("lifter", lifter)), s, 2
+    )
 
 
 def delta(
@@ -152,9 +154,9 @@ def delta(
     >>> corsmal_feat.feature.delta(np.arange(10.0)).round(6)
     array([1., 1., 1., 1., 1., 1., 1., 1., 1., 1.])
     """
+    width, order = size("width", width), size("order", order)
     if width < 3 or width % 2 == 0:
         raise ParameterError(f"width must be an odd number of at least 3, not {width}")
-    width, order = size("width", width), size("order", order)
     room("a filter", width)
     array = floats("data", data)
     moved = np.moveaxis(array, axis, -1)

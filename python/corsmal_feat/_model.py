@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from typing import Any
 
 import numpy as np
@@ -52,21 +53,49 @@ class TrainedModel:
         """The full configuration of the features, or None."""
         return self.header["feature_config"]
 
-    def predict(self, X: Any) -> npt.NDArray[Any]:
-        """The label of each row of `X` [shape=(rows, features)], or of each recording of a list of
-        paths."""
-        return self.classes_[self._model.predict(self._rows(X))]
+    def predict(self, X: Any, *, any_rate: bool = False) -> npt.NDArray[Any]:
+        """The label of each row, or of each recording.
 
-    def predict_proba(self, X: Any) -> Matrix:
-        """Probabilities [shape=(rows, classes)], columns in the order of `classes_`; `X` as in
-        `predict`."""
-        return self._model.predict_proba(self._rows(X))
+        Parameters
+        ----------
+        X : array [shape=(rows, features)], path, or list of paths
+            Rows of features or, for a model that knows its features, recordings.
+        any_rate : bool
+            Take recordings of a sample rate or with channels that the model was not trained on.
 
-    def _rows(self, X: Any) -> Matrix:
+        Returns
+        -------
+        labels [shape=(rows,)]
+
+        Raises
+        ------
+        DecodeError : a recording that has no features
+        ParameterError : rows or recordings that are not like those of the training
+        """
+        return self.classes_[self._model.predict(self._rows(X, any_rate))]
+
+    def predict_proba(self, X: Any, *, any_rate: bool = False) -> Matrix:
+        """Probabilities of rows or recordings.
+
+        Parameters
+        ----------
+        X, any_rate
+            See `predict`.
+
+        Returns
+        -------
+        float64 [shape=(rows, classes)], columns in the order of `classes_`
+        """
+        return self._model.predict_proba(self._rows(X, any_rate))
+
+    def _rows(self, X: Any, any_rate: bool) -> Matrix:
         if isinstance(X, (str, os.PathLike)):
             X = [X]
         if isinstance(X, (list, tuple)) and X and isinstance(X[0], (str, os.PathLike)):
-            return self._of_recordings([os.fspath(path) for path in X])
+            strange = [path for path in X if not isinstance(path, (str, os.PathLike))]
+            if strange:
+                raise ParameterError(f"X mixes paths and others: {strange[0]!r} is no path")
+            return self._of_recordings([os.fspath(path) for path in X], any_rate)
         rows = features(X, "TrainedModel")
         if rows.shape[1] != self.n_features_in_:
             raise ParameterError(
@@ -75,27 +104,58 @@ class TrainedModel:
             )
         return rows
 
-    def _of_recordings(self, paths: list[str]) -> Matrix:
+    def _of_recordings(self, paths: list[str], any_rate: bool) -> Matrix:
         if not self.feature_config:
             raise ModelError(
                 f"{self._path} was trained on rows of numbers: it does not say which features of a"
-                " recording they are"
+                " recording they are; save(path, features=...) keeps it"
             )
         # The same file may be in X twice.
         different = list(dict.fromkeys(paths))
-        found = extract(different, config=self.feature_config)
+        with warnings.catch_warnings():
+            # Of mixed sample rates: what the model takes of them is checked below.
+            warnings.simplefilter("ignore")
+            found = extract(different, config=self.feature_config)
         if len(found.outcomes) != len(different):
             raise ParameterError("X holds folders, globs or manifests: name each recording")
         for path, outcome in zip(different, found.outcomes, strict=True):
             if outcome["status"] not in GOOD:
                 raise DecodeError(f"{path}: {outcome['status']}: {outcome['reason']}")
+        if not any_rate:
+            self._check_formats(found.outcomes)
         if found.summary is None or len(found.names) != self.n_features_in_:
             raise ParameterError(
                 f"X gives {len(found.names)} values for each recording where {self._path} was"
                 f" trained on {self.n_features_in_}: another number of channels?"
             )
+        if found.config_hash != self.header["feature_config_hash"]:
+            raise ModelError(
+                f"{self._path}: its feature configuration was written by version"
+                f" {self.header['tool_version']} and reads differently in this one: train it again"
+            )
         row_of = dict(zip(different, found.summary.astype(np.float64), strict=True))
         return np.stack([row_of[path] for path in paths])
+
+    def _check_formats(self, outcomes: list[dict[str, Any]]) -> None:
+        """Refuses recordings of a format that changes their features."""
+        try:
+            rates, channels = self._model.format_rule()
+        except ModelError as error:
+            raise ModelError(
+                f"{self._path} does not say which sample rates and channels it was trained on:"
+                " train it again, or any_rate=True takes every recording as it is"
+            ) from error
+        for row in outcomes:
+            for found, known, what in (
+                (row.get("sample_rate"), rates, "Hz"),
+                (row.get("channels"), channels, "channels"),
+            ):
+                if found is not None and known is not None and found not in known:
+                    trained = ", ".join(map(str, known))
+                    raise ParameterError(
+                        f"{row['path']}: {found} {what} where {self._path} was trained on"
+                        f" {trained}: any_rate=True takes it as it is"
+                    )
 
 
 def load_model(path: str | os.PathLike[str]) -> TrainedModel:
@@ -112,8 +172,10 @@ def load_model(path: str | os.PathLike[str]) -> TrainedModel:
 
     Examples
     --------
-    >>> model = corsmal_feat.load_model("bottles.model")  # doctest: +SKIP
-    >>> model.predict(["a.wav", "b.wav"])  # doctest: +SKIP
-    array(['water', 'rice'], dtype='<U5')
+    >>> model = corsmal_feat.load_model("bottles.model")
+    >>> model
+    <TrainedModel bottles.model: rf of 26 features of recordings, 2 classes (rice, water)>
+    >>> model.predict(["rice.wav", "water.wav"]).tolist()
+    ['rice', 'water']
     """
     return TrainedModel(path)

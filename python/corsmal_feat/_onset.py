@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, audio, floats, rows, size, unrows
+from ._arrays import Floats, audio, floats, number, rows, size, unrows
 from ._decibels import power_to_db
 from ._mel import melspectrogram
 from ._params import PeakParams
@@ -48,7 +48,7 @@ def onset_strength(
     **kwargs: Any,
 ) -> Floats:
     """Spectral flux envelope [shape=(..., t)] of the mel spectrogram in dB, or of S in dB
-    (librosa.onset.onset_strength). Further keyword arguments go to `feature`.
+    (librosa.onset.onset_strength).
 
     Parameters
     ----------
@@ -66,6 +66,8 @@ def onset_strength(
         Instead of `melspectrogram` and the mean over bands.
     n_fft, hop_length : int
         See `stft`.
+    **kwargs
+        Of `feature`.
 
     Returns
     -------
@@ -115,11 +117,12 @@ def onset_strength_multi(
     **kwargs: Any,
 ) -> Floats:
     """Spectral flux of groups of bands, or with `aggregate=False` of every band
-    [shape=(..., groups, t)] (librosa.onset.onset_strength_multi). Parameters are those of
-    `onset_strength`, and
+    [shape=(..., groups, t)] (librosa.onset.onset_strength_multi).
 
     Parameters
     ----------
+    y, sr, S, n_fft, hop_length, lag, max_size, ref, detrend, center, feature, **kwargs
+        See `onset_strength`.
     channels : list of int or of slice, optional
         Bands where groups begin and end, or the groups themselves; one group by default.
     aggregate : callable or False
@@ -164,7 +167,7 @@ def _compared(
     if S is None:
         if feature is None:
             feature = _double_melspectrogram
-            keywords.setdefault("fmax", 0.5 * sr)
+            keywords.setdefault("fmax", 0.5 * number("sr", sr))
         mel = feature(y=y, sr=sr, n_fft=n_fft, hop_length=hop_length, **keywords)
         S = power_to_db(np.abs(mel))
     s: Any = np.atleast_2d(floats("S", S))
@@ -268,12 +271,14 @@ def onset_detect(
         post_max=_frames("post_max", post_max),
         pre_avg=_frames("pre_avg", pre_avg),
         post_avg=_frames("post_avg", post_avg),
-        delta=None if delta is None else float(delta),
+        delta=None if delta is None else number("delta", delta),
         wait=_frames("wait", wait),
     )
     found: list[list[int]] = [[] for _ in range(envelope[..., 0].size)]
     if np.isfinite(envelope).all():
-        found = _core.onset_detect(rows(envelope, 1), float(sr), hop_length, bool(normalize), peaks)
+        found = _core.onset_detect(
+            rows(envelope, 1), number("sr", sr), hop_length, bool(normalize), peaks
+        )
     if not sparse:
         mask = np.zeros((len(found), envelope.shape[-1]), dtype=bool)
         for row, frames in zip(mask, found, strict=True):

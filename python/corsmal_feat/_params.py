@@ -2,15 +2,47 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar, get_args, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
+
+from .errors import ParameterError
 
 #: a window by name (parameters after a colon), or as values
 WindowSpec = str | npt.NDArray[np.float64]
 
 
+_Params = TypeVar("_Params", bound=type)
+_WHOLE = (int, np.integer)
+_NUMBER = (int, float, np.integer, np.floating)
+
+
+def _checked(kind: _Params) -> _Params:
+    """Numbers of another type are refused here, by name: the Rust side has only a `TypeError`."""
+    make = kind.__new__
+    wanted = {}
+    for name, hint in get_type_hints(kind).items():
+        kinds = set(get_args(hint) or (hint,)) - {type(None)}
+        if kinds in ({int}, {float}):
+            wanted[name] = (_WHOLE if int in kinds else _NUMBER, type(None) in get_args(hint))
+
+    def new(cls: Any, *args: Any, **kwargs: Any) -> Any:
+        made = make(cls, *args, **kwargs)
+        for name, (types, optional) in wanted.items():
+            value = getattr(made, name)
+            if value is None and optional:
+                continue
+            if isinstance(value, bool | np.bool_) or not isinstance(value, types):
+                what = "a whole number" if types is _WHOLE else "a number"
+                raise ParameterError(f"{name} must be {what}, not {value!r}")
+        return made
+
+    kind.__new__ = new  # type: ignore[assignment]
+    return kind
+
+
+@_checked
 class StftParams(NamedTuple):
     """A short-time Fourier transform, all resolved."""
 
@@ -22,6 +54,7 @@ class StftParams(NamedTuple):
     pad_mode: str
 
 
+@_checked
 class FrameParams(NamedTuple):
     """How a waveform is cut into frames."""
 
@@ -30,6 +63,7 @@ class FrameParams(NamedTuple):
     center: bool
 
 
+@_checked
 class MelParams(NamedTuple):
     """A mel filter bank; `norm` is "slaney", "none" or a number in words."""
 
@@ -42,6 +76,7 @@ class MelParams(NamedTuple):
     norm: str
 
 
+@_checked
 class ChromaParams(NamedTuple):
     """A chroma filter bank; `norm` is librosa's number."""
 
@@ -55,6 +90,7 @@ class ChromaParams(NamedTuple):
     base_c: bool
 
 
+@_checked
 class PitchParams(NamedTuple):
     """A pitch tracker."""
 
@@ -65,6 +101,7 @@ class PitchParams(NamedTuple):
     threshold: float
 
 
+@_checked
 class PeakParams(NamedTuple):
     """Conditions of an onset; None is librosa's default for the sample rate and hop."""
 
@@ -76,6 +113,7 @@ class PeakParams(NamedTuple):
     wait: int | None
 
 
+@_checked
 class HpssParams(NamedTuple):
     """Harmonic-percussive separation."""
 
@@ -86,6 +124,7 @@ class HpssParams(NamedTuple):
     margin_percussive: float
 
 
+@_checked
 class CqtParams(NamedTuple):
     """A constant-Q transform."""
 
@@ -103,6 +142,7 @@ class CqtParams(NamedTuple):
     pad_mode: str
 
 
+@_checked
 class CqtChromaParams(NamedTuple):
     """How constant-Q bins are folded into pitch classes."""
 
@@ -114,6 +154,7 @@ class CqtChromaParams(NamedTuple):
     norm: float | None
 
 
+@_checked
 class PaaFrames(NamedTuple):
     """Windows and steps of pyAudioAnalysis, in samples."""
 
@@ -123,6 +164,7 @@ class PaaFrames(NamedTuple):
     mid_step: int
 
 
+@_checked
 class PcenParams(NamedTuple):
     """Per-channel energy normalisation; `b` is instead of the time constant."""
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import floats, rows, unrows
+from ._arrays import rows, size, spectrum, unrows
 from ._params import PcenParams
 from .errors import ParameterError
 
@@ -66,12 +66,13 @@ def pcen(
     if np.iscomplexobj(S):
         warnings.warn("pcen uses the magnitudes of a complex S", stacklevel=2)
         S = np.abs(np.asarray(S))
-    s: Any = floats("S", S)
+    s: Any = spectrum(S, 1)
     time = axis % s.ndim if -s.ndim <= axis < s.ndim else None
     if time is None:
         raise ParameterError(
             f"axis must be an axis of S, which has {s.ndim} dimensions, not {axis}"
         )
+    max_size = size("max_size", max_size)
     places = [time]
     if max_size > 1 and ref is None:
         if s.ndim == 1:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, rows, size, unrows
+from ._arrays import Floats, number, rows, size, unrows
 from ._filters import Window
 from ._params import PitchParams
 from ._spectrum import spectrogram
@@ -38,7 +38,13 @@ def _tracked(
     if np.iscomplexobj(S):
         S = np.abs(S)
     s, n_fft = spectrogram(y, S, n_fft or 0, hop_length, win_length, window, center, pad_mode, 1.0)
-    params = PitchParams(float(sr), n_fft, float(fmin), float(fmax), float(threshold))
+    params = PitchParams(
+        number("sr", sr),
+        n_fft,
+        number("fmin", fmin),
+        number("fmax", fmax),
+        number("threshold", threshold),
+    )
     if ref is None or ref is np.max:
         return s, None, params
     shape = (*s.shape[:-2], s.shape[-1])
@@ -137,8 +143,8 @@ def estimate_tuning(
         Step of the result in fractions of a bin.
     bins_per_octave : int
         Bins of an octave.
-    **kwargs
-        Further arguments of `piptrack`.
+    hop_length, fmin, fmax, threshold, win_length, window, center, pad_mode, ref
+        See `piptrack`.
 
     Returns
     -------
@@ -155,7 +161,9 @@ def estimate_tuning(
         ref,
     )  # fmt: skip
     bins = size("bins_per_octave", bins_per_octave)
-    tuning = _core.estimate_tuning(rows(s, 2), levels, params, float(resolution), bins)
+    tuning = _core.estimate_tuning(
+        rows(s, 2), levels, params, number("resolution", resolution), bins
+    )
     return _or_untuned(tuning)
 
 
@@ -187,16 +195,33 @@ def pitch_tuning(
         array = array.astype(np.float64)
     bins = size("bins_per_octave", bins_per_octave)
     flat = np.ascontiguousarray(array.reshape(-1))
-    return _or_untuned(_core.pitch_tuning(flat, float(resolution), bins))
+    return _or_untuned(_core.pitch_tuning(flat, number("resolution", resolution), bins))
 
 
 def _or_untuned(tuning: float | None) -> float:
     if tuning is None:
-        warnings.warn("no frequencies to estimate a tuning from: 0 is assumed", stacklevel=3)
+        warnings.warn(
+            "Trying to estimate tuning from empty frequency set: 0 is assumed", stacklevel=3
+        )
         return 0.0
     return tuning
 
 
 def piptrack_both(**kwargs: Any) -> npt.NDArray[Any]:
-    """Pitches and magnitudes of `piptrack`, stacked [shape=(2, ..., d, t)]."""
+    """Pitches and magnitudes of `piptrack`, stacked.
+
+    Parameters
+    ----------
+    **kwargs
+        See `piptrack`.
+
+    Returns
+    -------
+    array [shape=(2, ..., d, t)]
+
+    Examples
+    --------
+    >>> corsmal_feat.corsmal.piptrack_both(y=np.sin(np.arange(4096.0))).shape
+    (2, 1025, 9)
+    """
     return np.stack(piptrack(**kwargs))

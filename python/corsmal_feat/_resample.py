@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import MOST, Floats, audio, rows, unrows
+from ._arrays import MOST, Floats, audio, number, rows, unrows
 from .errors import ParameterError
 from .util import fix_length
 
@@ -78,6 +78,7 @@ def resample(
     if name not in CONVERTERS:
         names = ", ".join(CONVERTERS)
         raise ParameterError(f"res_type must be one of {names}, not {res_type!r}")
+    orig_sr, target_sr = number("orig_sr", orig_sr), number("target_sr", target_sr)
     if not (np.isfinite([orig_sr, target_sr]).all() and orig_sr > 0 and target_sr > 0):
         raise ParameterError(
             f"orig_sr and target_sr must be positive rates in Hz, not {orig_sr} and {target_sr}"
@@ -89,12 +90,10 @@ def resample(
     moved = np.moveaxis(y, axis, -1)
     result: Any
     if name in _OWN:
-        flat = _core.resample(
-            rows(moved, 1), float(orig_sr), float(target_sr), name, bool(fix), bool(scale)
-        )
+        flat = _core.resample(rows(moved, 1), orig_sr, target_sr, name, bool(fix), bool(scale))
         result = unrows(flat, moved, 1)
     else:
-        result = _by_whole_signal(moved, float(orig_sr), float(target_sr), name)
+        result = _by_whole_signal(moved, orig_sr, target_sr, name)
         if fix:
             samples = int(np.ceil(moved.shape[-1] * (target_sr / orig_sr)))
             result = fix_length(result, size=samples)

@@ -183,9 +183,9 @@ def cross_validate(
 
     Examples
     --------
-    >>> result = corsmal_feat.cross_validate("feats.npz", "type", cv=5)  # doctest: +SKIP
-    >>> result.accuracy["mean"]  # doctest: +SKIP
-    0.93
+    >>> result = corsmal_feat.cross_validate("features.npz", labels="folders", cv=3)
+    >>> result.accuracy["mean"], result.predictions.labels
+    (1.0, ['rice', 'water'])
     """
     plan = str(cv) if cv is not None else None
     recipe = {
@@ -245,7 +245,9 @@ def fuse(
 
     Examples
     --------
-    >>> corsmal_feat.fuse(["rf.csv", "svm.csv"], weights=[2, 1]).save("mean.csv")  # doctest: +SKIP
+    >>> both = corsmal_feat.fuse(["rf.csv", "knn.csv"], weights=[2, 1])
+    >>> len(both), both.proba.shape
+    (12, (12, 2))
     """
     if isinstance(predictions, (str, os.PathLike)):
         predictions = [predictions]
@@ -287,7 +289,9 @@ def compare_predictions(
 
     Examples
     --------
-    >>> corsmal_feat.compare_predictions("forest.csv", "svm.csv")  # doctest: +SKIP
+    >>> comparison = corsmal_feat.compare_predictions("rf.csv", "knn.csv")
+    >>> comparison.only_first, comparison.only_second, comparison.p_value
+    (0, 0, 1.0)
     """
     count = _whole("resamples", resamples, 1_000_001)
     text = _core.compare_predictions(
@@ -351,8 +355,8 @@ def score(
 
     Examples
     --------
-    >>> corsmal_feat.score("held-out.csv")["weighted_f1"]  # doctest: +SKIP
-    0.93
+    >>> corsmal_feat.score("rf.csv")["weighted_f1"]
+    1.0
     """
     if not 0.0 <= reject <= 1.0:
         raise ParameterError(f"reject must be a probability from 0 to 1, not {reject}")

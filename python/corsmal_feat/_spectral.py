@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Doubles, Floats, room, rows, size
+from ._arrays import Doubles, Floats, number, room, rows, size
 from ._filters import Window
 from ._spectrum import Framing, Spectra, spectra, spectrogram
 from .errors import ParameterError
@@ -25,7 +25,7 @@ def _spectra(y: Any, S: Any, n_fft: int, framing: Framing, whole: bool = False) 
 def _frequencies(freq: Any, sr: float, s: Spectra) -> Any:
     """Frequencies [bins] of the rows of `s`, or [channels, bins, frames] where they vary."""
     if freq is None:
-        return _core.fft_frequencies(float(sr), s.n_fft)
+        return _core.fft_frequencies(number("sr", sr), s.n_fft)
     freq = np.asarray(freq, dtype=np.float64)
     if freq.ndim == 1 or s.shape is None:
         return np.ascontiguousarray(freq)
@@ -141,7 +141,7 @@ def spectral_bandwidth(
         shape = (*s.shape[:-2], 1, s.shape[-1])
         given = np.asarray(centroid, dtype=np.float64)
         centres = rows(_fitting("centroid", given, shape), 2)[:, 0]
-    result = _core.spectral_bandwidth(s.source, at, centres, bool(norm), float(p))
+    result = _core.spectral_bandwidth(s.source, at, centres, bool(norm), number("p", p))
     return s.restored(result)
 
 
@@ -188,7 +188,7 @@ def spectral_rolloff(
     framing = (hop_length, win_length, window, center, pad_mode)
     s = _spectra(y, S, n_fft, framing, whole=_varies(freq))
     at = _frequencies(freq, sr, s)
-    return s.restored(_core.spectral_rolloff(s.source, at, float(roll_percent)))
+    return s.restored(_core.spectral_rolloff(s.source, at, number("roll_percent", roll_percent)))
 
 
 def spectral_flatness(
@@ -232,7 +232,9 @@ def spectral_flatness(
     """
     framing = (hop_length, win_length, window, center, pad_mode)
     s = _spectra(y, S, n_fft, framing)
-    return s.restored(_core.spectral_flatness(s.source, float(amin), float(power)))
+    return s.restored(
+        _core.spectral_flatness(s.source, number("amin", amin), number("power", power))
+    )
 
 
 def spectral_contrast(
@@ -293,7 +295,13 @@ def spectral_contrast(
     if at.ndim != 1:
         raise ParameterError(f"freq has shape {at.shape}, expected one frequency for each bin")
     result, empty = _core.spectral_contrast(
-        s.source, at, float(sr), float(fmin), int(n_bands), float(quantile), bool(linear)
+        s.source,
+        at,
+        number("sr", sr),
+        number("fmin", fmin),
+        int(n_bands),
+        number("quantile", quantile),
+        bool(linear),
     )
     if empty:
         warnings.warn(

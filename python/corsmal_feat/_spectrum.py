@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Complexes, Floats, Same, audio, channels, rows, size, spectrum, unrows
+from ._arrays import Complexes, Floats, Same, audio, channels, number, rows, size, spectrum, unrows
 from ._filters import Window, window_spec
 from ._params import StftParams
 from .errors import ParameterError
@@ -185,4 +185,4 @@ def spectrogram(
         S = spectrum(S)
         return S, length_of(S, n_fft)
     y, params = signal(y, n_fft, hop_length, win_length, window, center, pad_mode)
-    return unrows(_core.spectrogram(channels(y), params, float(power)), y, 1), n_fft
+    return unrows(_core.spectrogram(channels(y), params, number("power", power)), y, 1), n_fft

@@ -7,7 +7,7 @@ from typing import Any
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Doubles, Singles, audio, channels, floats, room, rows, size, unrows
+from ._arrays import Doubles, Singles, audio, channels, floats, number, room, rows, size, unrows
 from ._params import FrameParams
 from .errors import ParameterError
 
@@ -58,8 +58,10 @@ def zero_crossing_rate(
     if callable(ref_magnitude):
         threshold = threshold * float(ref_magnitude(abs(y)))
     elif ref_magnitude is not None:
-        threshold = threshold * float(ref_magnitude)
-    rate = _core.zero_crossing_rate(channels(y), frame, float(threshold), bool(zero_pos), bool(pad))
+        threshold = threshold * number("ref_magnitude", ref_magnitude)
+    rate = _core.zero_crossing_rate(
+        channels(y), frame, number("threshold", threshold), bool(zero_pos), bool(pad)
+    )
     return unrows(rate, y, 1)
 
 

@@ -7,6 +7,7 @@ from typing import Any, overload
 import numpy as np
 import numpy.typing as npt
 
+from ._arrays import number, size
 from .errors import ParameterError
 
 Number = int | float | np.integer[Any] | np.floating[Any]
@@ -19,13 +20,11 @@ def _offset(n_fft: int | None) -> int:
 
 
 def _hop(hop_length: int) -> int:
-    if hop_length < 1:
-        raise ParameterError(f"hop_length must be at least 1, not {hop_length}")
-    return int(hop_length)
+    return size("hop_length", hop_length)
 
 
 def _rate(sr: float) -> float:
-    if not sr > 0:
+    if not number("sr", sr) > 0:
         raise ParameterError(f"sr must be a positive sample rate in Hz, not {sr}")
     return float(sr)
 

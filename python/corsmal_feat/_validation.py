@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._sklearn import DataConversionWarning
-from .errors import ParameterError
+from .errors import DataTypeError, ParameterError
 
 Matrix = npt.NDArray[np.float64]
 
@@ -27,10 +27,10 @@ def names_of(X: Any) -> npt.NDArray[np.object_] | None:
 def features(X: Any, owner: str) -> Matrix:
     """`X` [shape=(rows, features)] as finite, contiguous float64."""
     if hasattr(X, "toarray") and hasattr(X, "tocsr"):
-        raise TypeError(
+        raise DataTypeError(
             f"{owner}: sparse data was passed, but dense data is required; use .toarray()"
         )
-    array = np.asarray(X)
+    array = _array("X", X, owner)
     if array.dtype.kind == "c":
         raise ParameterError(f"Complex data not supported by {owner}")
     if array.ndim != 2:
@@ -43,7 +43,7 @@ def features(X: Any, owner: str) -> Matrix:
             array = array.astype(np.float64)
         except (TypeError, ValueError) as error:
             if "argument must be" in str(error):
-                raise TypeError(f"{owner}: features must be numbers: {error}") from error
+                raise DataTypeError(f"{owner}: features must be numbers: {error}") from error
             raise ParameterError(f"{owner}: features must be numbers: {error}") from error
     array = np.ascontiguousarray(array, dtype=np.float64)
     for count, what in zip(array.shape, ("sample", "feature"), strict=True):
@@ -62,7 +62,7 @@ def labels_of(y: Any, rows: int, owner: str) -> tuple[npt.NDArray[Any], npt.NDAr
     """Sorted different labels, and the position of each row's label among them."""
     if y is None:
         raise ParameterError(f"{owner} requires y to be passed, but the target y is None")
-    labels = np.asarray(y)
+    labels = _array("y", y, owner)
     if labels.ndim == 2 and labels.shape[1] == 1:
         _warn_column(labels)
         labels = labels.ravel()
@@ -84,7 +84,7 @@ def labels_of(y: Any, rows: int, owner: str) -> tuple[npt.NDArray[Any], npt.NDAr
     ):
         raise ParameterError(f"{owner}: y holds bytes, labels are text: decode them first")
     if labels.dtype == object:
-        missing = [row for row, label in enumerate(labels) if label is None or label != label]
+        missing = [row for row, label in enumerate(labels) if _is_missing(label)]
         if missing:
             raise ParameterError(f"{owner}: y contains missing values (row {missing[0]})")
     try:
@@ -92,6 +92,48 @@ def labels_of(y: Any, rows: int, owner: str) -> tuple[npt.NDArray[Any], npt.NDAr
     except TypeError as error:
         raise ParameterError(f"{owner}: y mixes labels of different types: {error}") from error
     return classes, positions
+
+
+def weights_of(sample_weight: Any, rows: int, owner: str) -> Matrix | None:
+    """How much each row counts [shape=(rows,)], or None where all count alike."""
+    if sample_weight is None:
+        return None
+    try:
+        weights = np.asarray(sample_weight, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ParameterError(f"{owner}: sample_weight must be numbers: {error}") from error
+    if weights.ndim == 0:
+        weights = np.full(rows, weights)
+    if weights.ndim != 1:
+        raise ParameterError(
+            f"Sample weights must be 1D array or scalar, got an array of shape {weights.shape}"
+        )
+    if weights.shape != (rows,):
+        raise ParameterError(f"sample_weight.shape == {weights.shape}, expected {(rows,)}")
+    refused = np.flatnonzero(~(np.isfinite(weights) & (weights >= 0)))
+    if len(refused):
+        row = refused[0]
+        raise ParameterError(
+            f"{owner}: sample_weight must be finite numbers of at least 0; row {row} has {weights[row]}"
+        )
+    if not weights.any():
+        raise ParameterError(f"{owner}: sample_weight is 0 for every row")
+    return weights
+
+
+def _array(name: str, value: Any, owner: str) -> npt.NDArray[Any]:
+    try:
+        return np.asarray(value)
+    except ValueError as error:
+        raise ParameterError(f"{owner}: the rows of {name} differ in length") from error
+
+
+def _is_missing(label: Any) -> bool:
+    # Not equal to itself: NaN, NaT; nor different: pandas' NA has no truth.
+    try:
+        return label is None or bool(label != label)
+    except TypeError:
+        return True
 
 
 def _warn_column(labels: npt.NDArray[Any]) -> None:

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ._arrays import Floats, audio
+from ._arrays import Floats, audio, number
 from .errors import ParameterError
 from .util import frame, tiny
 
 #: Values of one block of frames: bounds the memory of the transforms.
 _BLOCK = 1 << 22
+_NOT_GIVEN: Any = object()
 _PADDINGS = ("constant", "edge", "reflect", "symmetric", "wrap", "linear_ramp")
 
 
@@ -24,6 +25,7 @@ def yin(
     fmax: float,
     sr: float = 22050,
     frame_length: int = 2048,
+    win_length: Any = _NOT_GIVEN,
     hop_length: int | None = None,
     trough_threshold: float = 0.1,
     center: bool = True,
@@ -40,6 +42,8 @@ def yin(
         Range in Hz, up to half the sample rate.
     frame_length : int
         Samples of a frame; two periods of `fmin` should fit.
+    win_length : deprecated
+        Has no effect, as in librosa 0.11.
     hop_length : int, optional
         Samples between frames, a quarter of `frame_length` by default.
     trough_threshold : float
@@ -61,6 +65,13 @@ def yin(
     """
     if fmin is None or fmax is None:
         raise ParameterError('both "fmin" and "fmax" must be provided')
+    if win_length is not _NOT_GIVEN:
+        warnings.warn(
+            "win_length is deprecated in librosa 0.11 and has no effect",
+            category=FutureWarning,
+            stacklevel=2,
+        )
+    sr, fmin, fmax = number("sr", sr), number("fmin", fmin), number("fmax", fmax)
     _check(sr, fmin, fmax, frame_length)
     signal = audio(y)
     hop = frame_length // 4 if hop_length is None else int(hop_length)

@@ -7,13 +7,18 @@ how it differs from scikit-learn's: docs/classifiers.md.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from numbers import Integral
+from typing import Any, ClassVar, Literal, overload
 
+import numpy as np
 import numpy.typing as npt
 
-from ._classifier import Classifier
+from ._classifier import Classifier, WeightedClassifier
+from ._forest import Forest, GrownClassifier
 from ._model import TrainedModel, load_model
-from .errors import NotFittedError
+from ._sklearn import not_fitted
+from ._validation import Matrix
+from .errors import NotFittedError, ParameterError
 
 __all__ = [
     "KNN",
@@ -27,17 +32,34 @@ __all__ = [
     "load_model",
 ]
 
+Positions = npt.NDArray[np.int64]
+
 
 class KNN(Classifier):
     """k nearest neighbours, as `sklearn.neighbors.KNeighborsClassifier(algorithm="brute")`.
 
     Parameters
     ----------
-    n_neighbors : neighbours that vote
-    weights : "uniform", or "distance" for votes of 1 / distance
-    metric : "euclidean", "manhattan", "cosine", "chebyshev" or "minkowski"
-    p : exponent of the minkowski metric
-    algorithm : "brute", or "linfa" for neighbours found by linfa-nn
+    n_neighbors : int
+        Neighbours that vote.
+    weights : str
+        "uniform", or "distance" for votes of 1 / distance.
+    metric : str
+        "euclidean", "manhattan", "cosine", "chebyshev" or "minkowski".
+    p : float
+        Exponent of the minkowski metric.
+    algorithm : str
+        "brute", or "linfa" for neighbours found by linfa-nn.
+
+    Examples
+    --------
+    >>> x, y = [[0.0], [1.0], [5.0]], ["low", "low", "high"]
+    >>> knn = corsmal_feat.KNN(1).fit(x, y)
+    >>> knn.predict([[4.0]]).tolist()
+    ['high']
+    >>> distances, rows = knn.kneighbors([[4.0]], 2)
+    >>> distances.tolist(), rows.tolist()
+    ([[1.0, 3.0]], [[2, 1]])
     """
 
     _name = "knn"
@@ -58,21 +80,73 @@ class KNN(Classifier):
         self.p = p
         self.algorithm = algorithm
 
+    @overload
+    def kneighbors(
+        self, X: Any = ..., n_neighbors: int | None = ..., return_distance: Literal[True] = ...
+    ) -> tuple[Matrix, Positions]: ...
+    @overload
+    def kneighbors(
+        self, X: Any = ..., n_neighbors: int | None = ..., *, return_distance: Literal[False]
+    ) -> Positions: ...
+    def kneighbors(
+        self, X: Any = None, n_neighbors: int | None = None, return_distance: bool = True
+    ) -> tuple[Matrix, Positions] | Positions:
+        """The training rows nearest to each row of `X`.
 
-class SVC(Classifier):
+        Parameters
+        ----------
+        X : array [shape=(rows, features)], optional
+            Without it, the neighbours of each training row among the others.
+        n_neighbors : int, optional
+            How many of them; as many as vote, by default.
+        return_distance : bool
+            Whether distances are wanted, too.
+
+        Returns
+        -------
+        distances : float64 [shape=(rows, n_neighbors)]
+            Nearest first; left out without `return_distance`.
+        positions : int64 [shape=(rows, n_neighbors)]
+            Numbers of training rows.
+        """
+        if not hasattr(self, "_model"):
+            raise not_fitted(self)
+        k = self.n_neighbors if n_neighbors is None else n_neighbors
+        if not isinstance(k, Integral) or isinstance(k, bool) or not 1 <= k < 1 << 63:
+            raise ParameterError(f"n_neighbors must be a whole number of at least 1, not {k!r}")
+        distances, positions = self._model.neighbours(None if X is None else self._query(X), int(k))
+        return (distances, positions) if return_distance else positions
+
+
+class SVC(WeightedClassifier):
     """Support vector machine, one against one, as `sklearn.svm.SVC`.
 
     Parameters
     ----------
-    C : cost of a training row on the wrong side
-    kernel : "rbf" or "linear"
-    gamma : "scale", "auto" or a positive number
-    class_weight : None, "balanced" or a weight per label
-    probability : whether `predict_proba` will be asked for
-    tol : tolerance of the optimality conditions
-    cache_size : memory for kernel values, MiB
-    random_state : seed of the folds for the probabilities
-    solver : "own", or "linfa" for linfa-svm (no probabilities, smaller tables)
+    C : float
+        Cost of a training row on the wrong side.
+    kernel : str
+        "rbf" or "linear".
+    gamma : str or float
+        "scale", "auto" or a positive number.
+    class_weight : dict or str, optional
+        "balanced", or a weight by label.
+    probability : bool
+        Whether `predict_proba` will be asked for.
+    tol : float
+        Tolerance of the optimality conditions.
+    cache_size : int
+        Memory for kernel values, MiB.
+    random_state : int, RandomState, optional
+        Seed of the folds for the probabilities.
+    solver : str
+        "own", or "linfa" for linfa-svm (no probabilities, no sample weights, smaller tables).
+
+    Examples
+    --------
+    >>> svc = corsmal_feat.SVC(kernel="linear").fit([[0.0], [1.0], [3.0]], ["low", "low", "high"])
+    >>> svc.decision_function([[1.0], [2.0], [3.0]]).round(3).tolist()
+    [1.0, -0.0, -1.0]
     """
 
     _name = "svm"
@@ -101,6 +175,12 @@ class SVC(Classifier):
         self.random_state = random_state
         self.solver = solver
 
+    def decision_function(self, X: Any) -> Matrix:
+        """Of two classes [shape=(rows,)], positive for the second; of more [shape=(rows, classes)],
+        the votes of the pairs with their decision values between them (scikit-learn's
+        `decision_function_shape="ovr"`)."""
+        return self._decision_function(X)
+
     @property
     def predict_proba(self) -> Any:
         """As of the other classifiers; absent without `probability`, so that scikit-learn's tools
@@ -110,18 +190,36 @@ class SVC(Classifier):
         return super().predict_proba
 
 
-class DecisionTree(Classifier):
+class DecisionTree(GrownClassifier):
     """Decision tree, as `sklearn.tree.DecisionTreeClassifier`.
 
     Parameters
     ----------
-    criterion : "gini" or "entropy"
-    max_depth : deepest level, or None
-    min_samples_split, min_samples_leaf : fewest rows to split, and in a leaf
-    max_features : None, "sqrt", "log2", a whole number, or a fraction up to 1.0
-    class_weight : None, "balanced" or a weight per label
-    random_state : seed of the order in which features are tried
-    solver : "own", or "linfa" for linfa-trees (no probabilities)
+    criterion : str
+        "gini" or "entropy".
+    max_depth : int, optional
+        Deepest level.
+    min_samples_split, min_samples_leaf : int
+        Fewest rows to split, and in a leaf.
+    max_features : str, int or float, optional
+        "sqrt", "log2", a whole number, or a fraction up to 1.0; by default all.
+    class_weight : dict or str, optional
+        "balanced", or a weight by label.
+    random_state : int, RandomState, optional
+        Seed of the order in which features are tried.
+    solver : str
+        "own", or "linfa" for linfa-trees (no probabilities, sample weights or importances).
+
+    Attributes
+    ----------
+    feature_importances_ : float64 [shape=(features,)]
+        See `RandomForest`.
+
+    Examples
+    --------
+    >>> tree = corsmal_feat.DecisionTree().fit([[0, 1], [1, 1], [2, 1]], ["low", "low", "high"])
+    >>> tree.feature_importances_.tolist()
+    [1.0, 0.0]
     """
 
     _name = "tree"
@@ -149,27 +247,43 @@ class DecisionTree(Classifier):
         self.solver = solver
 
 
-class _Forest(Classifier):
-    _renamed: ClassVar = {"n_estimators": "trees", "random_state": "seed"}
-
-    def _parameters(self, classes: npt.NDArray[Any] | None) -> dict[str, Any]:
-        parameters = super()._parameters(classes)
-        # None means all features here, as in scikit-learn.
-        parameters.setdefault("max_features", "all")
-        return parameters
-
-
-class RandomForest(_Forest):
+class RandomForest(Forest):
     """Random forest, as `sklearn.ensemble.RandomForestClassifier`; all cores, same result.
 
     Parameters
     ----------
-    n_estimators : number of trees
-    criterion, max_depth, min_samples_split, min_samples_leaf : see `DecisionTree`
-    max_features : features looked at in each split: "sqrt", "log2", None, a number or a fraction
-    bootstrap : draw rows with replacement for each tree
-    class_weight : None, "balanced" or a weight per label
-    random_state : seed of all draws
+    n_estimators : int
+        Number of trees.
+    criterion, max_depth, min_samples_split, min_samples_leaf
+        See `DecisionTree`.
+    max_features : str, int or float, optional
+        Features looked at in each split: "sqrt", "log2", a number or a fraction; None for all.
+    bootstrap : bool
+        Draw rows with replacement for each tree.
+    oob_score : bool
+        Ask each tree about the rows that it has not seen; needs `bootstrap`.
+    class_weight : dict or str, optional
+        "balanced", or a weight by label.
+    random_state : int, RandomState, optional
+        Seed of all draws.
+
+    Attributes
+    ----------
+    feature_importances_ : float64 [shape=(features,)]
+        How much impurity the splits on each feature took away, the mean of the trees, summing to
+        one. Known after `fit`; model files do not hold it.
+    oob_score_ : float
+        With `oob_score`: part of the rows whose label the trees that have not seen them give.
+    oob_decision_function_ : float64 [shape=(rows, classes)]
+        With `oob_score`: class fractions by those trees; NaN for a row that every tree has seen.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> x = rng.standard_normal((60, 3))
+    >>> forest = corsmal_feat.RandomForest(50, oob_score=True, random_state=1).fit(x, x[:, 1] > 0)
+    >>> int(forest.feature_importances_.argmax()), forest.oob_score_ > 0.9
+    (1, True)
     """
 
     _name = "rf"
@@ -184,6 +298,7 @@ class RandomForest(_Forest):
         min_samples_leaf: int = 1,
         max_features: str | float | None = "sqrt",
         bootstrap: bool = True,
+        oob_score: bool = False,
         class_weight: Any = None,
         random_state: Any = None,
     ) -> None:
@@ -194,14 +309,26 @@ class RandomForest(_Forest):
         self.min_samples_leaf = min_samples_leaf
         self.max_features = max_features
         self.bootstrap = bootstrap
+        self.oob_score = oob_score
         self.class_weight = class_weight
         self.random_state = random_state
 
 
-class ExtraTrees(_Forest):
+class ExtraTrees(Forest):
     """Extremely randomised trees, as `sklearn.ensemble.ExtraTreesClassifier`.
 
-    Parameters as `RandomForest`, but no bootstrap by default.
+    Parameters
+    ----------
+    n_estimators, criterion, max_depth, min_samples_split, min_samples_leaf, max_features
+        See `RandomForest`, which also has the attributes.
+    bootstrap, oob_score, class_weight, random_state
+        See there; no `bootstrap` by default.
+
+    Examples
+    --------
+    >>> trees = corsmal_feat.ExtraTrees(20).fit([[0.0], [1.0], [5.0]], ["low", "low", "high"])
+    >>> trees.predict([[5.0]]).tolist()
+    ['high']
     """
 
     _name = "et"
@@ -216,6 +343,7 @@ class ExtraTrees(_Forest):
         min_samples_leaf: int = 1,
         max_features: str | float | None = "sqrt",
         bootstrap: bool = False,
+        oob_score: bool = False,
         class_weight: Any = None,
         random_state: Any = None,
     ) -> None:
@@ -226,19 +354,30 @@ class ExtraTrees(_Forest):
         self.min_samples_leaf = min_samples_leaf
         self.max_features = max_features
         self.bootstrap = bootstrap
+        self.oob_score = oob_score
         self.class_weight = class_weight
         self.random_state = random_state
 
 
-class LogisticRegression(Classifier):
+class LogisticRegression(WeightedClassifier):
     """Logistic regression (multinomial, L2), as `sklearn.linear_model.LogisticRegression`.
 
     Parameters
     ----------
-    C : inverse of the penalty's strength
-    class_weight : None, "balanced" or a weight per label
-    tol : largest slope of the mean loss at the end
-    max_iter : most steps
+    C : float
+        Inverse of the penalty's strength.
+    class_weight : dict or str, optional
+        "balanced", or a weight by label.
+    tol : float
+        Largest slope of the mean loss at the end.
+    max_iter : int
+        Most steps.
+
+    Examples
+    --------
+    >>> model = corsmal_feat.LogisticRegression().fit([[0.0], [1.0], [5.0]], ["low", "low", "high"])
+    >>> model.classes_.tolist(), (model.decision_function([[0.0], [5.0]]) > 0).tolist()
+    (['high', 'low'], [True, False])
     """
 
     _name = "logistic"
@@ -255,3 +394,8 @@ class LogisticRegression(Classifier):
         self.class_weight = class_weight
         self.tol = tol
         self.max_iter = max_iter
+
+    def decision_function(self, X: Any) -> Matrix:
+        """Scores: of two classes [shape=(rows,)], positive for the second; of more [shape=(rows,
+        classes)]."""
+        return self._decision_function(X)

@@ -82,7 +82,9 @@ def specshow(
 
     Examples
     --------
-    >>> corsmal_feat.display.specshow(np.zeros((128, 9)), y_axis="mel")  # doctest: +SKIP
+    >>> mesh = corsmal_feat.display.specshow(np.zeros((128, 9)), x_axis="time", y_axis="mel")
+    >>> mesh.axes.get_ylabel()
+    'Hz'
     """
     values = np.asarray(data)
     if values.ndim != 2:
@@ -198,7 +200,9 @@ def waveshow(
 
     Examples
     --------
-    >>> corsmal_feat.display.waveshow(np.zeros(22050))  # doctest: +SKIP
+    >>> area = corsmal_feat.display.waveshow(np.zeros(22050))
+    >>> area.axes.get_xlabel()
+    'Time'
     """
     signal = np.atleast_2d(np.asarray(y))
     if signal.ndim > 2 or not signal.size:

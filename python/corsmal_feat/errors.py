@@ -5,6 +5,7 @@ from __future__ import annotations
 __all__ = [
     "ConfigError",
     "CorsmalFeatError",
+    "DataTypeError",
     "DecodeError",
     "ModelError",
     "NotFittedError",
@@ -20,6 +21,10 @@ class CorsmalFeatError(Exception):
 
 class ParameterError(CorsmalFeatError, ValueError):
     """A parameter or array was refused."""
+
+
+class DataTypeError(ParameterError, TypeError):
+    """Data are of a type that is not taken."""
 
 
 class ConfigError(ParameterError):

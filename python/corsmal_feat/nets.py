@@ -43,7 +43,18 @@ class TrainingSteps(TypedDict):
 
 
 def names() -> dict[str, str]:
-    """Names of the published networks, each with a sentence about it."""
+    """The published networks.
+
+    Returns
+    -------
+    dict
+        By name a sentence about it.
+
+    Examples
+    --------
+    >>> "m2_type" in corsmal_feat.nets.names()
+    True
+    """
     return dict(_core.networks_published())
 
 
@@ -52,9 +63,21 @@ def build(name: str, *, outputs: int | None = None, seed: int = 0) -> Network:
 
     Parameters
     ----------
-    name : one of `names()`
-    outputs : number of classes, where it is not the published one
-    seed : of the initial numbers
+    name : str
+        One of `names()`.
+    outputs : int, optional
+        Number of classes, where it is not the published one.
+    seed : int
+        Of the initial numbers.
+
+    Returns
+    -------
+    Network
+
+    Examples
+    --------
+    >>> corsmal_feat.nets.build("m3-mlp", outputs=4).forward(np.zeros((2, 6193))).shape
+    (2, 4)
     """
     if outputs is not None and outputs < 1:
         raise ParameterError(f"outputs must be at least 1, not {outputs}")
@@ -62,17 +85,56 @@ def build(name: str, *, outputs: int | None = None, seed: int = 0) -> Network:
 
 
 def read_weights(path: str | os.PathLike[str]) -> dict[str, _Singles]:
-    """Weights from `.npz`, `.safetensors` or `.pth`; nothing in the file is run."""
+    """Reads weights; nothing in the file is run.
+
+    Parameters
+    ----------
+    path : path
+        `.npz`, `.safetensors` or `.pth`.
+
+    Returns
+    -------
+    dict
+        By name the numbers.
+
+    Examples
+    --------
+    >>> corsmal_feat.nets.write_weights("one.safetensors", {"bias": np.ones(3)})
+    >>> corsmal_feat.nets.read_weights("one.safetensors")["bias"].tolist()
+    [1.0, 1.0, 1.0]
+    """
     return _core.read_weights(os.fspath(path))
 
 
 def write_weights(path: str | os.PathLike[str], state: Mapping[str, Any]) -> None:
-    """Writes weights as `.npz` or `.safetensors`, whole or not at all."""
+    """Writes weights, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        `.npz` or `.safetensors`.
+    state : mapping
+        By name the numbers, such as a network's `state_dict()`.
+
+    Examples
+    --------
+    >>> corsmal_feat.nets.write_weights("ones.npz", {"bias": np.ones(3)})
+    """
     _core.write_weights(os.fspath(path), [(str(k), _single(v)) for k, v in state.items()])
 
 
 class Network:
-    """A network with its numbers. `build` makes one."""
+    """A network with its numbers. `build` makes one.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    num_parameters : int
+        Numbers that training changes.
+    layers : list
+        Layers in their order, each with the shape of an item after it.
+    """
 
     def __init__(self, network: _core.Network) -> None:
         self._network = network

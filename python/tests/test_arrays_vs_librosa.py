@@ -210,3 +210,30 @@ def test_other_framings_are_refused_by_name() -> None:
     ):
         with pytest.raises(corsmal_feat.ParameterError, match=name):
             corsmal_feat.stft(y, **options)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda y: corsmal_feat.stft(y, n_fft="x"),
+        lambda y: corsmal_feat.stft(y, hop_length=100.5),
+        lambda y: corsmal_feat.feature.mfcc(y=y, sr="44100"),
+        lambda y: corsmal_feat.feature.melspectrogram(y=y, n_mels=3.5),
+        lambda y: corsmal_feat.feature.spectral_rolloff(y=y, roll_percent="x"),
+        lambda y: corsmal_feat.feature.chroma_stft(y=y, tuning="x"),
+        lambda y: corsmal_feat.feature.delta(y, width="a"),
+        lambda y: corsmal_feat.pcen(np.ones((4, 5)), gain="x"),
+        lambda y: corsmal_feat.pcen(np.ones((4, 5)), max_size=1.5),
+        lambda y: corsmal_feat.cqt(y, fmin="C1"),
+        lambda y: corsmal_feat.resample(y, orig_sr="a", target_sr=3),
+        lambda y: corsmal_feat.onset.onset_detect(y=y, sr=None),
+        lambda y: corsmal_feat.effects.hpss(y, kernel_size="a"),
+        lambda y: corsmal_feat.power_to_db(np.ones(3), top_db="x"),
+        lambda y: corsmal_feat.frames_to_time([1, 2], sr=None),
+        lambda y: corsmal_feat.yin(y, fmin="a", fmax=900),
+        lambda y: corsmal_feat.filters.mel(sr=None, n_fft=512),
+    ],
+)
+def test_what_is_no_number_is_refused_by_name(call: Any) -> None:
+    with pytest.raises(corsmal_feat.ParameterError, match="must be (a|an|one)"):
+        call(np.zeros(5000, np.float32))

@@ -124,6 +124,44 @@ def test_parquet_edited_by_pandas(tmp_path: Path, folder: Path) -> None:
     assert list(again.labels["rating"]) == ["good", "bad"]
 
 
+def test_parquet_edited_by_polars(tmp_path: Path, folder: Path) -> None:
+    polars = pytest.importorskip("polars")
+    pytest.importorskip("pyarrow")
+    path = tmp_path / "table.parquet"
+    kept = cf.extract([folder], preset="mfcc-zcr", out=path)
+    table = polars.read_parquet(path)
+    table = table.with_columns(polars.Series("rating", ["good", "bad"])).reverse()
+    table.write_parquet(path)
+    again = cf.load_features(path)
+    assert again.ids == kept.ids[::-1] and again.names == kept.names
+    assert np.array_equal(again.summary, kept.summary[::-1])
+    assert list(again.labels["rating"]) == ["bad", "good"]
+    assert again.to_frame().shape == (2, len(kept.names) + 1)
+
+
+def test_a_cache_extracts_once(
+    tmp_path: Path, folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pipeline = pytest.importorskip("sklearn.pipeline")
+    paths, labels = [str(folder / "a.wav"), str(folder / "b.wav")], ["a", "b"]
+    steps = cf.FeatureExtractor("esc26", progress=True), cf.KNN(1)
+    told = []
+    for _ in range(2):
+        model = pipeline.make_pipeline(*steps, memory=str(tmp_path / "cache"))
+        model.fit(paths, labels)
+        told.append("2 of 2 recordings" in capfd.readouterr().err)
+        assert model.predict(paths).tolist() == labels
+        capfd.readouterr()
+    assert told == [True, False]
+
+
+def test_objects_of_the_shared_cases() -> None:
+    if not (CASES / "f_obj.npz").exists():
+        pytest.skip("no shared cases here")
+    with pytest.raises(cf.ParameterError, match=r"f_obj\.npz: .* holds Python objects"):
+        cf.load_features(CASES / "f_obj.npz")
+
+
 def test_parquet_of_the_shared_cases() -> None:
     if not (CASES / "own_ed.parquet").exists():
         pytest.skip("no shared cases here")

@@ -3,7 +3,15 @@
 import corsmal_feat as librosa
 import numpy as np
 import numpy.typing as npt
-from corsmal_feat import FeatureExtractor, Features, RandomForest, load_features, load_model
+from corsmal_feat import (
+    KNN,
+    SVC,
+    FeatureExtractor,
+    Features,
+    RandomForest,
+    load_features,
+    load_model,
+)
 
 Array = npt.NDArray[np.float32 | np.float64]
 
@@ -26,9 +34,16 @@ def describe(path: str) -> Array:
 
 
 def learn(paths: list[str], labels: list[str]) -> list[str]:
-    rows = FeatureExtractor("esc26", errors="nan", progress=True).fit_transform(paths)
-    forest = RandomForest(200, random_state=1).fit(rows, labels)
-    forest.save("bottles.model")
+    extractor = FeatureExtractor("esc26", errors="nan", progress=True)
+    rows = extractor.fit_transform(paths)
+    weights = np.linspace(0.5, 1.0, len(labels))
+    forest = RandomForest(200, oob_score=True, random_state=1).fit(rows, labels, weights)
+    print(forest.oob_score_, forest.feature_importances_.argmax())
+    values: npt.NDArray[np.float64] = SVC().fit(rows, labels).decision_function(rows)
+    distances, nearest = KNN(3).fit(rows, labels).kneighbors(rows[:2])
+    positions: npt.NDArray[np.int64] = KNN(3).fit(rows, labels).kneighbors(return_distance=False)
+    print(values.max(), distances.min(), nearest.shape, positions.shape)
+    forest.save("bottles.model", features=extractor)
     return [str(label) for label in load_model("bottles.model").predict(paths)]
 
 

@@ -150,6 +150,22 @@ pub enum ModelError {
         /// how to train one that has
         remedy: &'static str,
     },
+    /// Something asked of a classifier that only others have.
+    #[error("this classifier has no {what}: {which}")]
+    Lacks {
+        /// what was asked
+        what: &'static str,
+        /// which classifiers have it
+        which: &'static str,
+    },
+    /// A weight of a training row that is no weight.
+    #[error("the weight of row {row} is {value}: a finite number of at least 0")]
+    SampleWeight {
+        /// the row
+        row: usize,
+        /// its weight
+        value: f64,
+    },
     /// A classifier registered under a name that another one has.
     #[error("the name {name:?} already belongs to a classifier: register yours under another one")]
     NameTaken {

@@ -41,6 +41,16 @@ pub struct FormatRule {
 }
 
 impl FormatRule {
+    /// The sample rates in Hz that are taken; `None` for any.
+    pub fn sample_rates(&self) -> Option<&[u32]> {
+        self.sample_rates.as_deref()
+    }
+
+    /// The channel counts that are taken; `None` for any.
+    pub fn channels(&self) -> Option<&[u32]> {
+        self.channels.as_deref()
+    }
+
     /// Refuses a recording of another format in words that say what to do; what is unknown passes.
     ///
     /// # Errors

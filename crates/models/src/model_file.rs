@@ -223,6 +223,11 @@ impl Model {
         self.pipeline.predict_proba(x)
     }
 
+    /// The fitted steps and classifier.
+    pub fn pipeline(&self) -> &Pipeline {
+        &self.pipeline
+    }
+
     /// Which recordings the model may be applied to when their features are made with `config`, its
     /// own feature configuration or one that differs in `signal`.
     ///

@@ -253,6 +253,27 @@ impl ClassWeight {
         }
     }
 
+    /// The weight of every class; a rule takes the weights of the rows for their number.
+    ///
+    /// # Errors
+    /// As [`ClassWeight::per_class`].
+    pub(crate) fn per_class_of(
+        &self,
+        y: &[usize],
+        n_classes: usize,
+        row_weights: Option<&[f64]>,
+    ) -> Result<Vec<f64>> {
+        let (Self::Rule(WeightRule::Balanced), Some(row_weights)) = (self, row_weights) else {
+            return self.per_class(y, n_classes);
+        };
+        let mut sums = vec![0.0; n_classes];
+        y.iter().zip(row_weights).for_each(|(&class, weight)| sums[class] += weight);
+        let present = sums.iter().filter(|&&sum| sum > 0.0).count() as f64;
+        let total: f64 = sums.iter().sum();
+        let weight = |&sum: &f64| if sum > 0.0 { total / (present * sum) } else { 1.0 };
+        Ok(sums.iter().map(weight).collect())
+    }
+
     /// The weight of every class.
     ///
     /// # Errors

@@ -5,7 +5,7 @@ use linfa::traits::{Fit, PredictInplace};
 use ndarray::{Array2, ArrayBase, ArrayView2, CowArray, Data, Ix2};
 use serde::{Deserialize, Serialize};
 
-use crate::classifiers::{Classifier, ClassifierSpec, Predicted};
+use crate::classifiers::{Classifier, ClassifierSpec, Neighbours, Predicted};
 use crate::error::{ModelError, Result};
 use crate::steps::{Step, StepSpec};
 use crate::table::{check_features, check_labels, check_query};
@@ -41,6 +41,21 @@ impl PipelineSpec {
     /// # Errors
     /// Whatever a step or the classifier refuses.
     pub fn train(&self, x: ArrayView2<'_, f64>, y: &[usize], n_classes: usize) -> Result<Pipeline> {
+        self.train_weighted(x, y, n_classes, None)
+    }
+
+    /// The same where rows count more or less to the classifier (see
+    /// [`ClassifierSpec::train_weighted`]); to steps they count alike.
+    ///
+    /// # Errors
+    /// Whatever a step or the classifier refuses.
+    pub fn train_weighted(
+        &self,
+        x: ArrayView2<'_, f64>,
+        y: &[usize],
+        n_classes: usize,
+        weights: Option<&[f64]>,
+    ) -> Result<Pipeline> {
         if !self.steps.is_empty() {
             check_features(x)?;
             check_labels(x.nrows(), y, n_classes)?;
@@ -52,7 +67,7 @@ impl PipelineSpec {
             current = step.transform(current.view())?.into();
             steps.push(step);
         }
-        let classifier = self.classifier.train(current.view(), y, n_classes)?;
+        let classifier = self.classifier.train_weighted(current.view(), y, n_classes, weights)?;
         Ok(Pipeline { steps, classifier })
     }
 }
@@ -115,6 +130,30 @@ impl Pipeline {
     /// As [`Pipeline::predict`]; [`ModelError::NoProbability`] for an SVM trained without.
     pub fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
         self.classifier.predict_proba(self.through_steps(x)?.view())
+    }
+
+    /// Decision values of `[rows, features]`: see [`Classifier::decision_function`].
+    ///
+    /// # Errors
+    /// As [`Pipeline::predict`]; [`ModelError::Lacks`](crate::error::ModelError::Lacks) for a
+    /// classifier without them.
+    pub fn decision_function(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
+        self.classifier.decision_function(self.through_steps(x)?.view())
+    }
+
+    /// The `k` nearest training rows, behind the steps: see [`Classifier::neighbours`].
+    ///
+    /// # Errors
+    /// As [`Pipeline::predict`]; [`ModelError::Lacks`](crate::error::ModelError::Lacks) for any but
+    /// `knn`.
+    pub fn neighbours(&self, x: Option<ArrayView2<'_, f64>>, k: usize) -> Result<Neighbours> {
+        let x = x.map(|x| self.through_steps(x)).transpose()?;
+        self.classifier.neighbours(x.as_ref().map(|x| x.view()), k)
+    }
+
+    /// The classifier behind the steps.
+    pub fn classifier(&self) -> &Classifier {
+        &self.classifier
     }
 
     /// Whether the parts fit together, for models read from files.

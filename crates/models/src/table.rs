@@ -52,6 +52,18 @@ pub(crate) fn check_labels(rows: usize, y: &[usize], n_classes: usize) -> Result
     }
 }
 
+/// Refuses weights that do not go with the rows, are negative or not finite.
+pub(crate) fn check_weights(rows: usize, weights: &[f64]) -> Result<()> {
+    if weights.len() != rows {
+        let (expected, actual) = (rows, weights.len());
+        return Err(ModelError::Length { what: "sample weights", expected, actual });
+    }
+    match weights.iter().enumerate().find(|(_, w)| !(w.is_finite() && **w >= 0.0)) {
+        Some((row, &value)) => Err(ModelError::SampleWeight { row, value }),
+        None => Ok(()),
+    }
+}
+
 /// Rows per class.
 pub(crate) fn class_counts(y: &[usize], n_classes: usize) -> Vec<usize> {
     let mut counts = vec![0; n_classes];

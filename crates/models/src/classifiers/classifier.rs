@@ -4,6 +4,7 @@ use linfa::traits::PredictInplace;
 use ndarray::{Array2, ArrayBase, ArrayView2, Axis, Data, Ix2};
 use serde::{Deserialize, Serialize};
 
+use super::Neighbours;
 use super::fitted::Fitted;
 use crate::error::{ModelError, Result};
 use crate::table::check_query;
@@ -70,14 +71,64 @@ impl Classifier {
         if known.dim() != (x.nrows(), self.present.len()) {
             return Err(ModelError::Inconsistent("probabilities of another shape".into()));
         }
+        Ok(self.all_columns(known))
+    }
+
+    /// `[rows, classes that had rows]` with columns of zeros for the other classes.
+    fn all_columns(&self, known: Array2<f64>) -> Array2<f64> {
+        if self.present.len() == self.n_classes {
+            return known;
+        }
+        let mut all = Array2::zeros((known.nrows(), self.n_classes));
+        for (column, &class) in known.axis_iter(Axis(1)).zip(&self.present) {
+            all.column_mut(class).assign(&column);
+        }
+        all
+    }
+
+    /// Decision values of `[rows, features]`, as [`Classify::decision_function`]; a class without
+    /// rows in training is one below the lowest of the row.
+    ///
+    /// # Errors
+    /// As [`Classifier::predict`]; [`ModelError::Lacks`] for a classifier without them.
+    pub fn decision_function(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
+        check_query(x, self.n_features())?;
+        let known = self.fitted.as_classify().decision_function(x)?;
+        let of_two = self.present.len() == 2;
+        if known.dim() != (x.nrows(), if of_two { 1 } else { self.present.len() }) {
+            return Err(ModelError::Inconsistent("decision values of another shape".into()));
+        }
         if self.present.len() == self.n_classes {
             return Ok(known);
         }
         let mut all = Array2::zeros((x.nrows(), self.n_classes));
-        for (column, &class) in known.axis_iter(Axis(1)).zip(&self.present) {
-            all.column_mut(class).assign(&column);
+        for (mut all, known) in all.outer_iter_mut().zip(known.outer_iter()) {
+            let row = if of_two { vec![-known[0], known[0]] } else { known.to_vec() };
+            all.fill(row.iter().copied().fold(f64::INFINITY, f64::min) - 1.0);
+            row.iter().zip(&self.present).for_each(|(&value, &class)| all[class] = value);
         }
         Ok(all)
+    }
+
+    /// The `k` nearest training rows of each row of `x`, or of each training row among the others.
+    ///
+    /// # Errors
+    /// As [`Classifier::predict`]; [`ModelError::Lacks`] for any but `knn`.
+    pub fn neighbours(&self, x: Option<ArrayView2<'_, f64>>, k: usize) -> Result<Neighbours> {
+        if let Some(x) = x {
+            check_query(x, self.n_features())?;
+        }
+        self.fitted.as_classify().neighbours(x, k)
+    }
+
+    /// See [`Classify::feature_importances`].
+    pub fn feature_importances(&self) -> Option<&[f64]> {
+        self.fitted.as_classify().feature_importances()
+    }
+
+    /// See [`Classify::out_of_bag`]; classes without rows have zeros.
+    pub fn out_of_bag(&self) -> Option<Array2<f64>> {
+        self.fitted.as_classify().out_of_bag().map(|known| self.all_columns(known.to_owned()))
     }
 
     /// Whether the parts fit together, for models read from files.

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use ndarray::{Array2, ArrayView2};
 
-use crate::error::Result;
+use crate::error::{ModelError, Result};
 use crate::params::Parameters;
 use crate::table::argmax;
 
@@ -20,6 +20,32 @@ pub trait Train: Parameters + Clone {
     /// # Errors
     /// Parameters that do not fit the rows, or numbers that cannot be computed with.
     fn train(&self, x: ArrayView2<'_, f64>, y: &[usize], n_classes: usize) -> Result<Self::Fitted>;
+
+    /// The same where rows count more or less: `weights` has a positive number for each.
+    ///
+    /// # Errors
+    /// As [`Train::train`]; [`ModelError::Lacks`] for a method to which rows count alike.
+    fn train_weighted(
+        &self,
+        _x: ArrayView2<'_, f64>,
+        _y: &[usize],
+        _n_classes: usize,
+        _weights: &[f64],
+    ) -> Result<Self::Fitted> {
+        Err(ModelError::Lacks {
+            what: "sample weights",
+            which: "svm and tree (both with solver=own), rf, et and logistic take them",
+        })
+    }
+}
+
+/// Training rows that are near to others.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Neighbours {
+    /// `[rows, k]`, nearest first
+    pub distances: Array2<f64>,
+    /// numbers of training rows, `[rows, k]`
+    pub rows: Array2<usize>,
 }
 
 /// A fitted classifier. The rows given are finite and have the right number of features.
@@ -33,8 +59,37 @@ pub trait Classify: Debug + Send + Sync {
     /// Probabilities `[rows, classes]`, every row summing to one.
     ///
     /// # Errors
-    /// [`ModelError::NoProbability`](crate::ModelError::NoProbability) where the method has none.
+    /// [`ModelError::NoProbability`] where the method has none.
     fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>>;
+
+    /// Decision values `[rows, classes]`, the largest of a row being its class; of two classes
+    /// `[rows, 1]`, positive for the second one.
+    ///
+    /// # Errors
+    /// [`ModelError::Lacks`] where the method has none.
+    fn decision_function(&self, _: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
+        Err(ModelError::Lacks { what: "decision function", which: "svm and logistic have one" })
+    }
+
+    /// The `k` nearest training rows of each row of `x`, or of each training row among the others.
+    ///
+    /// # Errors
+    /// [`ModelError::Lacks`] where the method has none, or a `k` beyond the training rows.
+    fn neighbours(&self, _x: Option<ArrayView2<'_, f64>>, _k: usize) -> Result<Neighbours> {
+        Err(ModelError::Lacks { what: "neighbours", which: "knn has them" })
+    }
+
+    /// How much each feature told the classes apart in training, summing to one (Breiman 2001: mean
+    /// decrease of impurity). Forests know it after training; files do not hold it.
+    fn feature_importances(&self) -> Option<&[f64]> {
+        None
+    }
+
+    /// Class fractions `[training rows, classes]` by the trees of a forest that did not see the row,
+    /// NaN where all did. Known after training that was asked for it; files do not hold it.
+    fn out_of_bag(&self) -> Option<ArrayView2<'_, f64>> {
+        None
+    }
 
     /// Class indices; the most probable, the lowest among equals, unless the method says otherwise.
     ///
@@ -48,6 +103,6 @@ pub trait Classify: Debug + Send + Sync {
     /// Whether the parts fit together: asked of models read from files, whose bytes may be anyone's.
     ///
     /// # Errors
-    /// [`ModelError::Inconsistent`](crate::ModelError::Inconsistent).
+    /// [`ModelError::Inconsistent`].
     fn validate(&self) -> Result<()>;
 }

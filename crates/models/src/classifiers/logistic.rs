@@ -41,9 +41,34 @@ impl Train for LogisticParams {
     const FEWEST_CLASSES: usize = 2;
 
     fn train(&self, x: ArrayView2<'_, f64>, y: &[usize], n_classes: usize) -> Result<Logistic> {
+        self.solve(x, y, n_classes, None)
+    }
+
+    fn train_weighted(
+        &self,
+        x: ArrayView2<'_, f64>,
+        y: &[usize],
+        n_classes: usize,
+        weights: &[f64],
+    ) -> Result<Logistic> {
+        self.solve(x, y, n_classes, Some(weights))
+    }
+}
+
+impl LogisticParams {
+    fn solve(
+        &self,
+        x: ArrayView2<'_, f64>,
+        y: &[usize],
+        n_classes: usize,
+        weights: Option<&[f64]>,
+    ) -> Result<Logistic> {
         let outputs = if n_classes == 2 { 1 } else { n_classes };
-        let per_class = self.class_weight.per_class(y, n_classes)?;
-        let row_weights: Vec<f64> = y.iter().map(|&c| per_class[c]).collect();
+        let per_class = self.class_weight.per_class_of(y, n_classes, weights)?;
+        let mut row_weights: Vec<f64> = y.iter().map(|&c| per_class[c]).collect();
+        if let Some(weights) = weights {
+            row_weights.iter_mut().zip(weights).for_each(|(row, weight)| *row *= weight);
+        }
         let objective = Objective {
             x,
             y,
@@ -134,6 +159,20 @@ fn soften(mut scores: ArrayViewMut1<'_, f64>) -> (f64, f64) {
     (top, sum)
 }
 
+fn overflow() -> ModelError {
+    ModelError::Numerical {
+        owner: LogisticParams::OWNER,
+        reason: "the scores overflowed: features too large".into(),
+    }
+}
+
+impl Logistic {
+    /// Linear scores `[rows, classes]`; `[rows, 1]` of two classes.
+    fn scores(&self, x: ArrayView2<'_, f64>) -> Array2<f64> {
+        x.dot(&self.weights.t()) + &self.intercepts
+    }
+}
+
 impl Classify for Logistic {
     fn n_features(&self) -> usize {
         self.weights.ncols()
@@ -143,8 +182,13 @@ impl Classify for Logistic {
         self.n_classes
     }
 
+    fn decision_function(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
+        let scores = self.scores(x);
+        if scores.iter().all(|v| v.is_finite()) { Ok(scores) } else { Err(overflow()) }
+    }
+
     fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
-        let mut scores = x.dot(&self.weights.t()) + &self.intercepts;
+        let mut scores = self.scores(x);
         if self.n_classes == 2 {
             let second = scores.column(0).mapv(logistic);
             let mut proba = Array2::zeros((x.nrows(), 2));
@@ -157,10 +201,7 @@ impl Classify for Logistic {
         }
         match scores.iter().all(|v| v.is_finite()) {
             true => Ok(scores),
-            false => Err(ModelError::Numerical {
-                owner: LogisticParams::OWNER,
-                reason: "the scores overflowed: features too large".into(),
-            }),
+            false => Err(overflow()),
         }
     }
 

@@ -22,7 +22,7 @@ mod trees;
 
 pub use cart::{Criterion, MaxFeatures};
 pub use classifier::{Classifier, MAX_CLASSES, Predicted};
-pub use classify::{Classify, Train};
+pub use classify::{Classify, Neighbours, Train};
 pub use decision_tree::{DecisionTreeParams, TreeSolver};
 pub use extra_trees::ExtraTreesParams;
 pub use knn::{KNearestParams, Metric, Search, Weights};

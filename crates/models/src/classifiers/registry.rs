@@ -12,6 +12,10 @@ use super::{Classify, Train, decision_tree, knn};
 use crate::error::{ModelError, Result};
 use crate::params::{Parameter, Values};
 
+/// Trains with parameters on rows, labels, a number of classes and weights of the rows.
+type TrainWith =
+    fn(&Values, ArrayView2<'_, f64>, &[usize], usize, Option<&[f64]>) -> Result<Registered>;
+
 /// What is known of a registered classifier.
 pub(super) struct Kind {
     name: &'static str,
@@ -19,7 +23,7 @@ pub(super) struct Kind {
     table: &'static [Parameter],
     fewest_classes: usize,
     check: fn(&Values) -> Result<Values>,
-    train: fn(&Values, ArrayView2<'_, f64>, &[usize], usize) -> Result<Registered>,
+    train: TrainWith,
     read: fn(&[u8]) -> Result<Registered>,
 }
 
@@ -47,8 +51,12 @@ where
         table: P::TABLE,
         fewest_classes: P::FEWEST_CLASSES,
         check: |given| Ok(P::from_json(given)?.values()),
-        train: |parameters, x, y, n_classes| {
-            let fitted = P::from_json(parameters)?.train(x, y, n_classes)?;
+        train: |parameters, x, y, n_classes, weights| {
+            let parameters = P::from_json(parameters)?;
+            let fitted = match weights {
+                None => parameters.train(x, y, n_classes)?,
+                Some(weights) => parameters.train_weighted(x, y, n_classes, weights)?,
+            };
             Ok(Registered::new(P::OWNER, fitted))
         },
         read: |bytes| Registered::read_as::<P::Fitted>(P::OWNER, bytes),
@@ -102,8 +110,9 @@ impl RegisteredSpec {
         x: ArrayView2<'_, f64>,
         y: &[usize],
         n_classes: usize,
+        weights: Option<&[f64]>,
     ) -> Result<Registered> {
-        (self.kind.train)(&self.parameters, x, y, n_classes)
+        (self.kind.train)(&self.parameters, x, y, n_classes, weights)
     }
 }
 

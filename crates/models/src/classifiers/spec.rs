@@ -2,7 +2,7 @@
 
 use linfa::DatasetBase;
 use linfa::traits::Fit;
-use ndarray::{Array1, ArrayBase, ArrayView2, Data, Ix2};
+use ndarray::{Array1, ArrayBase, ArrayView2, Axis, Data, Ix2};
 use serde::de::{DeserializeOwned, Error as _};
 use serde::ser::SerializeStruct;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -19,7 +19,7 @@ use super::svm::SvmParams;
 use super::{Classifier, Classify, MAX_CLASSES, Train};
 use crate::error::{ModelError, Result};
 use crate::params::{Parameter, Parameters, key_of};
-use crate::table::{check_features, check_labels, check_varied, class_counts};
+use crate::table::{check_features, check_labels, check_varied, check_weights, class_counts};
 
 macro_rules! built_in {
     ($($variant:ident, $name:literal, $params:ident => $fitted:path, $about:literal;)*) => {
@@ -88,7 +88,13 @@ macro_rules! built_in {
                 stored.unwrap_or_default()
             }
 
-            fn fit_present(&self, x: ArrayView2<'_, f64>, y: &[usize], n: usize) -> Result<Fitted> {
+            fn fit_present(
+                &self,
+                x: ArrayView2<'_, f64>,
+                y: &[usize],
+                n: usize,
+                weights: Option<&[f64]>,
+            ) -> Result<Fitted> {
                 let fewest = match self {
                     $(Self::$variant(p) => {
                         p.check()?;
@@ -102,8 +108,11 @@ macro_rules! built_in {
                     });
                 }
                 match self {
-                    $(Self::$variant(p) => p.train(x, y, n).map($fitted),)*
-                    Self::Registered(spec) => spec.train(x, y, n).map(Fitted::Registered),
+                    $(Self::$variant(p) => match weights {
+                        None => p.train(x, y, n),
+                        Some(weights) => p.train_weighted(x, y, n, weights),
+                    }.map($fitted),)*
+                    Self::Registered(spec) => spec.train(x, y, n, weights).map(Fitted::Registered),
                 }
             }
         }
@@ -186,6 +195,33 @@ impl ClassifierSpec {
         y: &[usize],
         n_classes: usize,
     ) -> Result<Classifier> {
+        self.train_weighted(x, y, n_classes, None)
+    }
+
+    /// The same where rows count more or less: `weights` has a number for each, and a row of weight
+    /// zero is left out.
+    ///
+    /// # Errors
+    /// As [`ClassifierSpec::train`]; weights that are negative, not finite or not one for each row,
+    /// or a classifier that takes none.
+    pub fn train_weighted(
+        &self,
+        x: ArrayView2<'_, f64>,
+        y: &[usize],
+        n_classes: usize,
+        weights: Option<&[f64]>,
+    ) -> Result<Classifier> {
+        if let Some(weights) = weights {
+            check_weights(x.nrows(), weights)?;
+            let rows: Vec<usize> = (0..weights.len()).filter(|&row| weights[row] > 0.0).collect();
+            if rows.len() < weights.len() {
+                check_labels(x.nrows(), y, n_classes)?;
+                let y: Vec<usize> = rows.iter().map(|&row| y[row]).collect();
+                let weights: Vec<f64> = rows.iter().map(|&row| weights[row]).collect();
+                let x = x.select(Axis(0), &rows);
+                return self.train_weighted(x.view(), &y, n_classes, Some(&weights));
+            }
+        }
         check_features(x)?;
         check_labels(x.nrows(), y, n_classes)?;
         check_varied(x)?;
@@ -195,7 +231,7 @@ impl ClassifierSpec {
         present.iter().enumerate().for_each(|(i, &c)| position[c] = i);
         let compact: Vec<usize> = y.iter().map(|&c| position[c]).collect();
         let spec = self.for_classes(&present, n_classes)?;
-        let fitted = spec.fit_present(x, &compact, present.len())?;
+        let fitted = spec.fit_present(x, &compact, present.len(), weights)?;
         Ok(Classifier { present, n_classes, fitted })
     }
 

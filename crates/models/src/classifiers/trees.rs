@@ -17,6 +17,11 @@ pub struct Trees {
     n_features: usize,
     n_classes: usize,
     trees: Vec<Tree>,
+    /// known after training
+    #[serde(skip)]
+    importances: Option<Vec<f64>>,
+    #[serde(skip)]
+    out_of_bag: Option<Array2<f64>>,
 }
 
 /// Most trees of an ensemble.
@@ -96,8 +101,32 @@ pub(super) struct Plan<'a> {
     pub growth: Growth,
     pub n_trees: usize,
     pub bootstrap: bool,
+    /// whether trees are asked about the rows that they have not seen
+    pub out_of_bag: bool,
     pub class_weight: &'a ClassWeight,
     pub seed: u64,
+}
+
+impl Plan<'_> {
+    /// How often each row is in the sample of the tree of this seed, and the tree's further draws.
+    /// `upto`: rows are drawn in proportion to their weights, which are added up there.
+    fn draw(&self, seed: u64, rows: usize, upto: Option<&[f64]>) -> (Vec<u32>, Xoshiro256PlusPlus) {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut times = vec![u32::from(!self.bootstrap); rows];
+        if self.bootstrap {
+            for _ in 0..rows {
+                let row = match upto {
+                    None => rng.gen_range(0..rows),
+                    Some(upto) => {
+                        let at = rng.r#gen::<f64>() * upto[rows - 1];
+                        upto.partition_point(|&sum| sum <= at).min(rows - 1)
+                    }
+                };
+                times[row] += 1;
+            }
+        }
+        (times, rng)
+    }
 }
 
 /// Most rows predicted together: each tree comes into the cache once per block.
@@ -111,10 +140,13 @@ const BLOCKS: usize = 8;
 
 impl Trees {
     /// Grows the trees in parallel, each from its own seed: the number of threads does not matter.
+    /// Rows count by their weights, which are the chances to be drawn where a tree has a sample of its
+    /// own, as in scikit-learn 1.9.
     pub(super) fn grow(
         x: ArrayView2<'_, f64>,
         y: &[usize],
         n_classes: usize,
+        weights: Option<&[f64]>,
         plan: &Plan<'_>,
     ) -> Result<Self> {
         if u32::try_from(x.nrows()).is_err() || u32::try_from(x.ncols()).is_err() {
@@ -128,20 +160,86 @@ impl Trees {
         let labels: Vec<u32> = y.iter().map(|&c| c as u32).collect();
         let mut seeds = Xoshiro256PlusPlus::seed_from_u64(plan.seed);
         let seeds: Vec<u64> = (0..plan.n_trees).map(|_| seeds.next_u64()).collect();
-        let trees = seeds
-            .into_par_iter()
-            .map(|seed| {
-                let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-                let mut times = vec![u32::from(!plan.bootstrap); y.len()];
-                if plan.bootstrap {
-                    (0..y.len()).for_each(|_| times[rng.gen_range(0..y.len())] += 1);
-                }
-                let sample = Sample { y: &labels, times: &times, class_weights: &per_class };
+        // Equal weights are none, to the bit.
+        let weights = weights.filter(|all| all.iter().any(|weight| *weight != all[0]));
+        let upto = weights.filter(|_| plan.bootstrap).map(added_up);
+        let upto = upto.as_deref();
+        let row_weights = weights.filter(|_| !plan.bootstrap);
+        let (trees, shares): (Vec<Tree>, Vec<Vec<(u32, f64)>>) = seeds
+            .par_iter()
+            .map(|&seed| {
+                let (times, mut rng) = plan.draw(seed, y.len(), upto);
+                let sample =
+                    Sample { y: &labels, times: &times, class_weights: &per_class, row_weights };
                 Tree::grow(&columns, &sample, &plan.growth, rng.next_u64())
             })
-            .collect();
-        Ok(Self { n_features: x.ncols(), n_classes, trees })
+            .unzip();
+        let importances = Some(mean_importances(&shares, x.ncols()));
+        let mut grown =
+            Self { n_features: x.ncols(), n_classes, trees, importances, out_of_bag: None };
+        if plan.out_of_bag {
+            grown.out_of_bag = Some(grown.left_out(x, &seeds, plan, upto));
+        }
+        Ok(grown)
     }
+
+    /// Class fractions `[rows, classes]` by the trees that have not seen each row, NaN where all have.
+    fn left_out(
+        &self,
+        x: ArrayView2<'_, f64>,
+        seeds: &[u64],
+        plan: &Plan<'_>,
+        upto: Option<&[f64]>,
+    ) -> Array2<f64> {
+        // So many trees at once that a row's word says which of them have not seen it.
+        const TREES: usize = u64::BITS as usize;
+        let mut fractions = Array2::<f64>::zeros((x.nrows(), self.n_classes));
+        for (trees, seeds) in self.trees.chunks(TREES).zip(seeds.chunks(TREES)) {
+            let mut unseen = vec![0u64; x.nrows()];
+            for (bit, &seed) in seeds.iter().enumerate() {
+                let (times, _) = plan.draw(seed, x.nrows(), upto);
+                let marks = times.iter().map(|&times| u64::from(times == 0) << bit);
+                unseen.iter_mut().zip(marks).for_each(|(unseen, mark)| *unseen |= mark);
+            }
+            let rows = fractions.axis_iter_mut(Axis(0)).into_par_iter().zip(x.axis_iter(Axis(0)));
+            rows.zip(unseen).for_each(|((mut sums, row), unseen)| {
+                let row: Vec<f32> = row.iter().map(|&value| value as f32).collect();
+                let by = trees.iter().enumerate().filter(|(bit, _)| unseen >> bit & 1 == 1);
+                for (_, tree) in by {
+                    let [leaf] = tree.leaves([&row], self.n_classes);
+                    sums.iter_mut().zip(leaf).for_each(|(sum, &p)| *sum += f64::from(p));
+                }
+            });
+        }
+        for mut row in fractions.outer_iter_mut() {
+            let sum = row.sum();
+            row /= sum;
+        }
+        fractions
+    }
+}
+
+/// Sums of the weights up to each row, the largest weight being one.
+fn added_up(weights: &[f64]) -> Vec<f64> {
+    let largest = weights.iter().copied().fold(0.0, f64::max);
+    let add = |sum: &mut f64, weight: &f64| {
+        *sum += weight / largest;
+        Some(*sum)
+    };
+    weights.iter().scan(0.0, add).collect()
+}
+
+/// Mean of the trees' shares, summing to one; zeros if no tree has a split.
+fn mean_importances(shares: &[Vec<(u32, f64)>], n_features: usize) -> Vec<f64> {
+    let mut importances = vec![0.0; n_features];
+    for &(feature, share) in shares.iter().flatten() {
+        importances[feature as usize] += share;
+    }
+    let sum: f64 = importances.iter().sum();
+    if sum > 0.0 {
+        importances.iter_mut().for_each(|importance| *importance /= sum);
+    }
+    importances
 }
 
 impl Trees {
@@ -200,6 +298,14 @@ impl Classify for Trees {
                 }
             });
         Ok(proba)
+    }
+
+    fn feature_importances(&self) -> Option<&[f64]> {
+        self.importances.as_deref()
+    }
+
+    fn out_of_bag(&self) -> Option<ArrayView2<'_, f64>> {
+        self.out_of_bag.as_ref().map(|fractions| fractions.view())
     }
 
     fn validate(&self) -> Result<()> {

@@ -175,6 +175,15 @@ impl Search<'_> {
         let (mut start, mut count) = (0, 0);
         for &(class, end) in &self.ends {
             let pairs = values[start..end].iter().zip(&self.times[start..end]);
+            if self.sample.row_weights.is_some() {
+                let members = self.rows[start..end].iter().zip(&values[start..end]);
+                for (&row, _) in members.filter(|(_, value)| **value <= threshold) {
+                    count += 1;
+                    tally.left[class] += self.sample.weight(row as usize);
+                }
+                start = end;
+                continue;
+            }
             let (mut rows, mut times) = (0u32, 0u32);
             for (&value, &n) in pairs {
                 let left = u32::from(value <= threshold);

@@ -67,11 +67,22 @@ impl<'a> Tally<'a> {
                 self.left_squares / self.left_sum + self.right_squares / self.right_sum
             }
             Criterion::Entropy => {
-                let side = |counts: &[f64], sum: f64| -> f64 {
-                    counts.iter().filter(|&&c| c > 0.0).map(|c| c * (c / sum).ln()).sum()
-                };
-                side(self.left, self.left_sum) + side(self.right, self.right_sum)
+                minus_entropy(self.left, self.left_sum) + minus_entropy(self.right, self.right_sum)
             }
         }
     }
+}
+
+/// The gain of a side that holds these class weights, by itself.
+pub(super) fn purity(criterion: Criterion, totals: &[f64]) -> f64 {
+    let sum: f64 = totals.iter().sum();
+    match criterion {
+        Criterion::Gini => totals.iter().map(|t| t * t).sum::<f64>() / sum,
+        Criterion::Entropy => minus_entropy(totals, sum),
+    }
+}
+
+/// Σ c log(c / sum)
+fn minus_entropy(counts: &[f64], sum: f64) -> f64 {
+    counts.iter().filter(|&&c| c > 0.0).map(|c| c * (c / sum).ln()).sum()
 }

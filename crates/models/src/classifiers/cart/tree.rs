@@ -8,6 +8,7 @@ use super::Growth;
 use super::columns::FeatureColumns;
 use super::sample::Sample;
 use super::split::Search;
+use super::tally::purity;
 use crate::error::{ModelError, Result};
 
 const LEAF: u32 = u32::MAX;
@@ -39,13 +40,14 @@ struct Open {
 }
 
 impl Tree {
-    /// Grows a tree; the same seed gives the same tree.
+    /// Grows a tree; the same seed gives the same tree. Also gives the features of its splits with
+    /// their shares of the impurity that all splits took away.
     pub(in crate::classifiers) fn grow(
         columns: &FeatureColumns,
         sample: &Sample<'_>,
         growth: &Growth,
         seed: u64,
-    ) -> Self {
+    ) -> (Self, Vec<(u32, f64)>) {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let counts = |&row: &u32| sample.times[row as usize] > 0;
         let mut rows: Vec<u32> = (0..sample.y.len() as u32).filter(counts).collect();
@@ -55,6 +57,7 @@ impl Tree {
         let mut features: Vec<u32> = (0..n_features as u32).collect();
         let mut spare = Vec::with_capacity(rows.len());
         let mut tree = Self { nodes: vec![PLACEHOLDER], leaves: Vec::new() };
+        let mut decreases = vec![0.0; n_features];
         let mut open = vec![Open { node: 0, start: 0, end: rows.len(), depth: 0 }];
         while let Some(at) = open.pop() {
             let members = &mut rows[at.start..at.end];
@@ -85,6 +88,7 @@ impl Tree {
                 tree.close(at.node, &totals);
                 continue;
             };
+            decreases[split.feature] += (split.gain - purity(growth.criterion, &totals)).max(0.0);
             let middle = at.start
                 + partition(members, columns.column(split.feature), split.threshold, &mut spare);
             let left = tree.nodes.len();
@@ -98,7 +102,7 @@ impl Tree {
             open.push(Open { node: left + 1, start: middle, end: at.end, depth });
             open.push(Open { node: left, start: at.start, end: middle, depth });
         }
-        tree
+        (tree, shares(&decreases))
     }
 
     fn close(&mut self, node: usize, totals: &[f64]) {
@@ -154,6 +158,13 @@ impl Tree {
             });
         if sound { Ok(()) } else { Err(ModelError::Inconsistent("tree".into())) }
     }
+}
+
+/// The features that took impurity away, with their shares of the sum.
+fn shares(decreases: &[f64]) -> Vec<(u32, f64)> {
+    let sum: f64 = decreases.iter().sum();
+    let share = |(feature, &decrease): (usize, &f64)| (feature as u32, decrease / sum);
+    decreases.iter().enumerate().filter(|(_, decrease)| **decrease > 0.0).map(share).collect()
 }
 
 const PLACEHOLDER: Node = Node { feature: LEAF, threshold: 0.0, next: 0 };

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::Train;
 use super::cart::FeatureRule;
 use super::trees::{Plan, Trees, tree_parameters};
-use crate::error::Result;
+use crate::error::{ModelError, Result};
 
 pub(super) use linfa::{LinfaTree, STORED_NAME};
 
@@ -61,16 +61,46 @@ impl Train for DecisionTreeParams {
     const FEWEST_CLASSES: usize = 1;
 
     fn train(&self, x: ArrayView2<'_, f64>, y: &[usize], n_classes: usize) -> Result<FittedTree> {
-        if self.solver == TreeSolver::Linfa {
-            return LinfaTree::train(&self.growth(), x, y, n_classes).map(FittedTree::Linfa);
+        match self.solver {
+            TreeSolver::Own => self.grow(x, y, n_classes, None),
+            TreeSolver::Linfa => {
+                LinfaTree::train(&self.growth(), x, y, n_classes).map(FittedTree::Linfa)
+            }
         }
+    }
+
+    fn train_weighted(
+        &self,
+        x: ArrayView2<'_, f64>,
+        y: &[usize],
+        n_classes: usize,
+        weights: &[f64],
+    ) -> Result<FittedTree> {
+        match self.solver {
+            TreeSolver::Own => self.grow(x, y, n_classes, Some(weights)),
+            TreeSolver::Linfa => {
+                Err(ModelError::Lacks { what: "sample weights", which: "train with solver=own" })
+            }
+        }
+    }
+}
+
+impl DecisionTreeParams {
+    fn grow(
+        &self,
+        x: ArrayView2<'_, f64>,
+        y: &[usize],
+        n_classes: usize,
+        weights: Option<&[f64]>,
+    ) -> Result<FittedTree> {
         let plan = Plan {
             growth: self.growth(),
             n_trees: 1,
             bootstrap: false,
+            out_of_bag: false,
             class_weight: &self.class_weight,
             seed: self.seed,
         };
-        Trees::grow(x, y, n_classes, &plan).map(FittedTree::Own)
+        Trees::grow(x, y, n_classes, weights, &plan).map(FittedTree::Own)
     }
 }

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::nearest::Nearest;
 use super::{KNearest, Metric, OWNER, check_lengths, squared_lengths};
-use crate::classifiers::Classify;
+use crate::classifiers::{Classify, Neighbours};
 use crate::error::{ModelError, Result};
 
 /// The name by which model files know these neighbours.
@@ -99,6 +99,10 @@ impl Classify for LinfaNeighbours {
             .zip(votes)
             .for_each(|(mut row, votes)| row.assign(&ndarray::aview1(&votes)));
         Ok(proba)
+    }
+
+    fn neighbours(&self, x: Option<ArrayView2<'_, f64>>, k: usize) -> Result<Neighbours> {
+        self.0.neighbours(x, k)
     }
 
     fn validate(&self) -> Result<()> {

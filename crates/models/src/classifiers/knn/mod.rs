@@ -21,7 +21,7 @@ pub(super) use linfa::{LinfaNeighbours, STORED_NAME};
 pub(super) use params::FittedNeighbours;
 pub use params::{KNearestParams, Search};
 
-use super::Classify;
+use super::{Classify, Neighbours};
 use crate::error::{ModelError, Result};
 
 const OWNER: &str = "knn";
@@ -84,23 +84,61 @@ impl Classify for KNearest {
     }
 
     fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
-        check_lengths(x)?;
-        let by_products = matches!(self.metric, Metric::Euclidean | Metric::Cosine);
-        let screen = (by_products && x.nrows() >= SCREEN_FROM)
-            .then(|| Screen::new(self.x.view(), self.metric == Metric::Euclidean));
+        let (screen, rows) = self.prepare(x)?;
         let mut proba = Array2::zeros((x.nrows(), self.n_classes));
-        let rows = x.nrows().div_ceil(BLOCKS).clamp(SCREEN_FROM, QUERY_BLOCK);
         proba
             .axis_chunks_iter_mut(Axis(0), rows)
             .into_par_iter()
             .zip(x.axis_chunks_iter(Axis(0), rows))
             .for_each(|(mut votes, block)| {
-                let heaps = self.search(block, screen.as_ref());
+                let heaps = self.search(block, screen.as_ref(), self.k);
                 for (mut row, heap) in votes.outer_iter_mut().zip(heaps) {
                     self.vote(heap, row.as_slice_mut().expect("rows of a new array"));
                 }
             });
         Ok(proba)
+    }
+
+    fn neighbours(&self, x: Option<ArrayView2<'_, f64>>, k: usize) -> Result<Neighbours> {
+        let among_others = x.is_none();
+        let most = self.x.nrows() - usize::from(among_others);
+        if !(1..=most).contains(&k) {
+            return Err(ModelError::ParameterValue {
+                owner: OWNER,
+                key: "k".into(),
+                value: k.to_string(),
+                allowed: format!("1 to {most}: there are {} training rows", self.x.nrows()),
+            });
+        }
+        let x = x.as_ref().map_or(self.x.view(), |x| x.view());
+        let (screen, block) = self.prepare(x)?;
+        let mut found = Neighbours {
+            distances: Array2::zeros((x.nrows(), k)),
+            rows: Array2::zeros((x.nrows(), k)),
+        };
+        let wanted = k + usize::from(among_others);
+        let places = found.distances.axis_chunks_iter_mut(Axis(0), block).into_par_iter();
+        places
+            .zip(found.rows.axis_chunks_iter_mut(Axis(0), block))
+            .zip(x.axis_chunks_iter(Axis(0), block))
+            .enumerate()
+            .for_each(|(at, ((mut distances, mut rows), queries))| {
+                let heaps = self.search(queries, screen.as_ref(), wanted);
+                for (place, heap) in heaps.into_iter().enumerate() {
+                    let mut nearest = heap.sorted();
+                    if among_others {
+                        // Where so many rows equal it that it is not among them, one of those goes.
+                        let own = at * block + place;
+                        let own = nearest.iter().position(|(_, row)| *row == own).unwrap_or(0);
+                        nearest.remove(own);
+                    }
+                    for (rank, (distance, row)) in nearest.into_iter().enumerate() {
+                        distances[[place, rank]] = self.true_distance(distance);
+                        rows[[place, rank]] = row;
+                    }
+                }
+            });
+        Ok(found)
     }
 
     fn validate(&self) -> Result<()> {
@@ -118,8 +156,27 @@ impl Classify for KNearest {
 }
 
 impl KNearest {
+    /// The screen, if it is worth its making, and the number of query rows in a block.
+    fn prepare(&self, x: ArrayView2<'_, f64>) -> Result<(Option<Screen>, usize)> {
+        check_lengths(x)?;
+        let by_products = matches!(self.metric, Metric::Euclidean | Metric::Cosine);
+        let screen = (by_products && x.nrows() >= SCREEN_FROM)
+            .then(|| Screen::new(self.x.view(), self.metric == Metric::Euclidean));
+        Ok((screen, x.nrows().div_ceil(BLOCKS).clamp(SCREEN_FROM, QUERY_BLOCK)))
+    }
+
+    /// The distance that [`search`](Self::search) found, as people know it.
+    fn true_distance(&self, found: f64) -> f64 {
+        if self.metric == Metric::Euclidean { found.sqrt() } else { found }
+    }
+
     /// The k nearest training rows of each query row; squared distances for the euclidean metric.
-    fn search(&self, block: ArrayView2<'_, f64>, screen: Option<&Screen>) -> Vec<Nearest> {
+    fn search(
+        &self,
+        block: ArrayView2<'_, f64>,
+        screen: Option<&Screen>,
+        k: usize,
+    ) -> Vec<Nearest> {
         let block = match self.metric {
             Metric::Cosine => unit_rows(block),
             _ => block.as_standard_layout().into_owned(),
@@ -127,23 +184,24 @@ impl KNearest {
         let norms = squared_lengths(block.view());
         let Some(screen) = screen else {
             let nearest = |(query, &norm): (ArrayView1<'_, f64>, &f64)| {
-                let mut heap = Nearest::new(self.k);
+                let mut heap = Nearest::new(k);
                 (0..self.x.nrows()).for_each(|row| heap.push(self.distance(query, norm, row), row));
                 heap
             };
             return block.outer_iter().zip(&norms).map(nearest).collect();
         };
         let found: Vec<Option<Nearest>> = self
-            .candidates(block.view(), screen)
+            .candidates(block.view(), screen, k)
             .into_iter()
             .enumerate()
             .map(|(q, rows)| {
                 let exact = |row| (self.distance(block.row(q), norms[q], row), row);
-                Nearest::of(self.k, rows.into_iter().map(exact).collect())
+                Nearest::of(k, rows.into_iter().map(exact).collect())
             })
             .collect();
         let tied: Vec<usize> = (0..found.len()).filter(|&q| found[q].is_none()).collect();
-        let mut in_order = self.in_order(block.select(Axis(0), &tied).view(), screen).into_iter();
+        let mut in_order =
+            self.in_order(block.select(Axis(0), &tied).view(), screen, k).into_iter();
         found
             .into_iter()
             .map(|f| f.or_else(|| in_order.next()))
@@ -152,28 +210,28 @@ impl KNearest {
     }
 
     /// Training rows, for each query row, among which the k nearest are.
-    fn candidates(&self, block: ArrayView2<'_, f64>, screen: &Screen) -> Vec<Vec<usize>> {
+    fn candidates(&self, block: ArrayView2<'_, f64>, screen: &Screen, k: usize) -> Vec<Vec<usize>> {
         // Per query row the k lowest upper bounds, ascending, and what was below the last of them.
-        let mut highs = vec![Vec::with_capacity(self.k + 1); block.nrows()];
+        let mut highs = vec![Vec::with_capacity(k + 1); block.nrows()];
         let mut seen = vec![Vec::new(); block.nrows()];
         screen.scan(block, |pair| {
             let highs: &mut Vec<f64> = &mut highs[pair.query];
             highs.insert(highs.partition_point(|&h| h <= pair.high), pair.high);
-            highs.truncate(self.k);
+            highs.truncate(k);
             seen[pair.query].push((pair.low, pair.row));
-            if highs.len() < self.k { f64::INFINITY } else { highs[self.k - 1] }
+            if highs.len() < k { f64::INFINITY } else { highs[k - 1] }
         });
         let below = |(seen, highs): (Vec<(f64, usize)>, Vec<f64>)| {
-            let limit = highs[self.k - 1];
+            let limit = highs[k - 1];
             seen.into_iter().filter(|&(low, _)| low <= limit).map(|(_, row)| row).collect()
         };
         seen.into_iter().zip(highs).map(below).collect()
     }
 
     /// The same with every training row offered in its order, for rows whose ties matter.
-    fn in_order(&self, block: ArrayView2<'_, f64>, screen: &Screen) -> Vec<Nearest> {
+    fn in_order(&self, block: ArrayView2<'_, f64>, screen: &Screen, k: usize) -> Vec<Nearest> {
         let norms = squared_lengths(block);
-        let mut heaps = vec![Nearest::new(self.k); block.nrows()];
+        let mut heaps = vec![Nearest::new(k); block.nrows()];
         screen.scan(block, |pair| {
             let (heap, query) = (&mut heaps[pair.query], block.row(pair.query));
             heap.push(self.distance(query, norms[pair.query], pair.row), pair.row);
@@ -201,14 +259,13 @@ impl KNearest {
     /// Class fractions of the neighbours' votes.
     fn vote(&self, nearest: Nearest, votes: &mut [f64]) {
         let neighbours = nearest.sorted();
-        let distance = |d: f64| if self.metric == Metric::Euclidean { d.sqrt() } else { d };
         let on_top = neighbours[0].0 == 0.0;
         for (d, row) in neighbours {
             let weight = match self.weights {
                 Weights::Uniform => 1.0,
                 Weights::Distance if on_top => f64::from(u8::from(d == 0.0)),
                 // Bounded, so that the sum over all neighbours stays finite.
-                Weights::Distance => (1.0 / distance(d)).min(1e300),
+                Weights::Distance => (1.0 / self.true_distance(d)).min(1e300),
             };
             votes[self.y[row]] += weight;
         }

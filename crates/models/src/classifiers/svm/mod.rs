@@ -214,9 +214,8 @@ impl Train for SvmParams {
 
     fn train(&self, x: ArrayView2<'_, f64>, y: &[usize], n_classes: usize) -> Result<Svm> {
         let weights = self.class_weight.per_class(y, n_classes)?;
-        let function = self.function(x);
-        let x = x.as_standard_layout();
         if self.solver == SvmSolver::Linfa {
+            let (function, x) = (self.function(x), x.as_standard_layout());
             let costs: Vec<f64> = weights.iter().map(|weight| self.C * weight).collect();
             let solved = linfa::train(x.view(), y, &costs, function, self.tol)?;
             let pair = |Solved { first, second, rows, coefficients, rho }| Pair {
@@ -231,6 +230,42 @@ impl Train for SvmParams {
             let support = compact(&mut pairs, x.view());
             return Ok(Svm { n_classes, function, support, pairs });
         }
+        let costs: Vec<f64> = y.iter().map(|&class| self.C * weights[class]).collect();
+        self.solve(x, y, n_classes, &costs)
+    }
+
+    /// A weight is a factor of the row's cost.
+    fn train_weighted(
+        &self,
+        x: ArrayView2<'_, f64>,
+        y: &[usize],
+        n_classes: usize,
+        weights: &[f64],
+    ) -> Result<Svm> {
+        if self.solver == SvmSolver::Linfa {
+            return Err(ModelError::Lacks {
+                what: "sample weights",
+                which: "train with solver=own",
+            });
+        }
+        let per_class = self.class_weight.per_class(y, n_classes)?;
+        let cost = |(&class, weight): (&usize, &f64)| self.C * per_class[class] * weight;
+        let costs: Vec<f64> = y.iter().zip(weights).map(cost).collect();
+        self.solve(x, y, n_classes, &costs)
+    }
+}
+
+impl SvmParams {
+    /// `costs`: the largest α of each row.
+    fn solve(
+        &self,
+        x: ArrayView2<'_, f64>,
+        y: &[usize],
+        n_classes: usize,
+        costs: &[f64],
+    ) -> Result<Svm> {
+        let function = self.function(x);
+        let x = x.as_standard_layout();
         let budget = self.cache_mb.saturating_mul(1 << 20);
         let gram = Gram::new(x.view(), function, budget)?;
         let mut members = vec![Vec::new(); n_classes];
@@ -244,16 +279,13 @@ impl Train for SvmParams {
         let mut pairs: Vec<Pair> = jobs
             .into_par_iter()
             .map(|(first, second, seed)| {
-                let sizes =
-                    [(first, members[first].len(), 1.0), (second, members[second].len(), -1.0)];
-                let repeat = |value: fn(&(usize, usize, f64)) -> (usize, f64)| {
-                    sizes.iter().flat_map(move |s| std::iter::repeat_n(value(s), s.1))
-                };
+                let rows = [members[first].as_slice(), &members[second]].concat();
+                let sign = |&row: &u32| if y[row as usize] == first { 1.0 } else { -1.0 };
                 let problem = TwoClass {
                     gram: &gram,
-                    rows: [members[first].as_slice(), &members[second]].concat(),
-                    signs: repeat(|s| (s.0, s.2)).map(|s| s.1).collect(),
-                    bounds: repeat(|s| (s.0, s.2)).map(|s| self.C * weights[s.0]).collect(),
+                    signs: rows.iter().map(sign).collect(),
+                    bounds: rows.iter().map(|&row| costs[row as usize]).collect(),
+                    rows,
                     tol: self.tol,
                     cache_bytes,
                 };
@@ -341,6 +373,28 @@ impl Classify for Svm {
             }
             argmax(&votes)
         }))
+    }
+
+    /// The votes of the pairs, and less than half a vote more for their decision values, as
+    /// scikit-learn breaks ties.
+    fn decision_function(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
+        let two = self.n_classes == 2;
+        let rows = self.decide(x, |decisions| {
+            if two {
+                return vec![-decisions[0]];
+            }
+            let mut votes = vec![0.0; self.n_classes];
+            let mut sums = vec![0.0; self.n_classes];
+            for (pair, &d) in self.pairs.iter().zip(decisions) {
+                votes[if d < 0.0 { pair.second } else { pair.first }] += 1.0;
+                sums[pair.first] += d;
+                sums[pair.second] -= d;
+            }
+            let share = |(vote, sum): (&f64, &f64)| vote + sum / (3.0 * (sum.abs() + 1.0));
+            votes.iter().zip(&sums).map(share).collect()
+        });
+        let columns = if two { 1 } else { self.n_classes };
+        Ok(Array2::from_shape_fn((x.nrows(), columns), |(row, class)| rows[row][class]))
     }
 
     fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {

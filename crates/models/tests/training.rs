@@ -1,0 +1,216 @@
+//! What training takes and gives beside labels and probabilities: sample weights, decision values,
+//! neighbours, importances, answers about rows that a tree has not seen.
+
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod common;
+
+use common::clouds;
+use corsmal_models::classifiers::{Classifier, ClassifierSpec};
+use corsmal_models::params::key_values;
+use ndarray::{Array2, ArrayView1, Axis, s};
+
+fn spec(name: &str, parameters: &[&str]) -> ClassifierSpec {
+    ClassifierSpec::new(name, &key_values(parameters).unwrap()).unwrap()
+}
+
+/// Where the largest value is, the first among equals.
+fn largest(values: &[f64]) -> usize {
+    (0..values.len()).rev().max_by(|&a, &b| values[a].total_cmp(&values[b])).unwrap()
+}
+
+/// Those to which rows may count more or less.
+const WEIGHTED: [&str; 5] = ["svm", "tree", "rf", "et", "logistic"];
+
+#[test]
+fn a_row_of_weight_zero_is_left_out() {
+    let (x, y) = clouds(90, 5, 3, 1);
+    let weights: Vec<f64> = (0..90).map(|row| if row % 4 == 0 { 0.0 } else { 1.0 }).collect();
+    let kept: Vec<usize> = (0..90).filter(|row| row % 4 != 0).collect();
+    let kept_y: Vec<usize> = kept.iter().map(|&row| y[row]).collect();
+    for name in WEIGHTED {
+        let spec = spec(name, &[]);
+        let weighted = spec.train_weighted(x.view(), &y, 3, Some(&weights)).unwrap();
+        let without = spec.train(x.select(Axis(0), &kept).view(), &kept_y, 3).unwrap();
+        let [a, b] = [weighted, without].map(|model| model.predict_proba(x.view()).unwrap());
+        assert_eq!(a, b, "{name}");
+    }
+}
+
+#[test]
+fn a_weight_of_two_is_the_row_twice() {
+    let (x, y) = clouds(80, 4, 2, 2);
+    let twice = |row: &usize| row.is_multiple_of(3);
+    let weights: Vec<f64> = (0..80).map(|row| if twice(&row) { 2.0 } else { 1.0 }).collect();
+    let rows: Vec<usize> = (0..80).chain((0..80).filter(twice)).collect();
+    let repeated_y: Vec<usize> = rows.iter().map(|&row| y[row]).collect();
+    let repeated = x.select(Axis(0), &rows);
+    let cases = [
+        spec("tree", &["max_depth=4"]),
+        spec("tree", &["criterion=entropy", "max_depth=3"]),
+        spec("et", &["trees=7", "max_depth=4"]),
+        spec("svm", &["kernel=linear", "tol=1e-9", "probability=false"]),
+        spec("logistic", &[]),
+    ];
+    for spec in cases {
+        let weighted = spec.train_weighted(x.view(), &y, 2, Some(&weights)).unwrap();
+        let twice = spec.train(repeated.view(), &repeated_y, 2).unwrap();
+        let values = |model: &Classifier| match spec.name() {
+            "svm" => model.decision_function(x.view()).unwrap(),
+            _ => model.predict_proba(x.view()).unwrap(),
+        };
+        let differences = (values(&weighted) - values(&twice)).mapv(f64::abs);
+        let most = differences.iter().copied().fold(0.0, f64::max);
+        assert!(most < 1e-5, "{}: {most}", spec.name());
+    }
+}
+
+#[test]
+fn weights_that_are_none_are_refused() {
+    let (x, y) = clouds(6, 2, 2, 3);
+    let refusal = |name: &str, weights: &[f64]| {
+        let refused = spec(name, &[]).train_weighted(x.view(), &y, 2, Some(weights));
+        refused.unwrap_err().to_string()
+    };
+    assert!(refusal("rf", &[1.0; 5]).contains("sample weights"));
+    let bad = [1.0, 1.0, -0.5, 1.0, 1.0, 1.0];
+    assert!(refusal("svm", &bad).contains("the weight of row 2 is -0.5"));
+    assert!(refusal("svm", &[f64::NAN; 6]).contains("row 0 is NaN"));
+    // Only rows of one class count.
+    let one: Vec<f64> = y.iter().map(|&class| class as f64).collect();
+    assert!(refusal("logistic", &one).contains("at least 2 classes"));
+    assert!(refusal("knn", &[1.0; 6]).contains("no sample weights"));
+    let linfa = spec("tree", &["solver=linfa"]).train_weighted(x.view(), &y, 2, Some(&[1.0; 6]));
+    assert!(linfa.unwrap_err().to_string().contains("solver=own"));
+}
+
+#[test]
+fn the_largest_decision_value_is_the_label() {
+    let (x, y) = clouds(120, 4, 4, 4);
+    for name in ["svm", "logistic"] {
+        let model = spec(name, &[]).train(x.view(), &y, 4).unwrap();
+        let values = model.decision_function(x.view()).unwrap();
+        assert_eq!(values.dim(), (120, 4));
+        let best = |row: ArrayView1<'_, f64>| largest(row.as_slice().unwrap());
+        let labels: Vec<usize> = values.outer_iter().map(best).collect();
+        assert_eq!(labels, model.predict(x.view()).unwrap(), "{name}");
+
+        // Class 1 has no rows: never the label, and no largest value.
+        let y: Vec<usize> = y.iter().map(|&class| if class < 2 { 0 } else { 2 }).collect();
+        let model = spec(name, &[]).train(x.view(), &y, 3).unwrap();
+        let values = model.decision_function(x.view()).unwrap();
+        assert_eq!(values.dim(), (120, 3));
+        let labels: Vec<usize> = values.outer_iter().map(best).collect();
+        assert_eq!(labels, model.predict(x.view()).unwrap(), "{name}");
+        assert!(labels.iter().all(|&label| label != 1));
+    }
+    let forest = spec("rf", &["trees=3"]).train(x.view(), &y, 4).unwrap();
+    let refusal = forest.decision_function(x.view()).unwrap_err().to_string();
+    assert!(refusal.contains("svm and logistic have one"), "{refusal}");
+}
+
+#[test]
+fn neighbours_are_those_of_a_plain_search() {
+    // Two rows that are the same, and enough rows for the search by matrix products.
+    let (mut x, y) = clouds(120, 5, 3, 5);
+    let row = x.row(7).to_owned();
+    x.row_mut(90).assign(&row);
+    for metric in ["euclidean", "manhattan", "cosine", "chebyshev"] {
+        let model = spec("knn", &["k=1", &format!("metric={metric}")]);
+        let model = model.train(x.view(), &y, 3).unwrap();
+        let distance = |a: usize, b: usize| {
+            let (a, b) = (x.row(a), x.row(b));
+            let d = (&a - &b).mapv(f64::abs);
+            match metric {
+                "euclidean" => d.dot(&d).sqrt(),
+                "manhattan" => d.sum(),
+                "cosine" => 1.0 - a.dot(&b) / (a.dot(&a) * b.dot(&b)).sqrt(),
+                _ => d.iter().copied().fold(0.0, f64::max),
+            }
+        };
+        for (query, others) in [(Some(x.slice(s![..40, ..])), false), (None, true)] {
+            let found = model.neighbours(query, 6).unwrap();
+            assert_eq!(found.rows.ncols(), 6);
+            for (row, near) in found.rows.outer_iter().enumerate() {
+                let mut all: Vec<(f64, usize)> = (0..120)
+                    .filter(|&other| !(others && other == row))
+                    .map(|other| (distance(row, other), other))
+                    .collect();
+                all.sort_by(|a, b| a.0.total_cmp(&b.0));
+                for (rank, &other) in near.iter().enumerate() {
+                    let (wanted, is) = (all[rank].0, found.distances[[row, rank]]);
+                    assert!((wanted - is).abs() < 1e-6, "{metric} {row} {rank}: {wanted} {is}");
+                    assert!((distance(row, other) - is).abs() < 1e-6, "{metric} {row} {rank}");
+                    assert!(!others || other != row);
+                }
+            }
+        }
+        assert!(model.neighbours(None, 119).is_ok());
+        let refusal = model.neighbours(None, 120).unwrap_err().to_string();
+        assert!(refusal.contains("1 to 119"), "{refusal}");
+        assert!(model.neighbours(Some(x.view()), 0).is_err());
+    }
+    let tree = spec("tree", &[]).train(x.view(), &y, 3).unwrap();
+    assert!(tree.neighbours(None, 1).unwrap_err().to_string().contains("knn has them"));
+}
+
+#[test]
+fn forests_know_what_they_split_on() {
+    let (noise, _) = clouds(200, 6, 1, 6);
+    let y: Vec<usize> = noise.column(2).iter().map(|&v| usize::from(v > 0.0)).collect();
+    for name in ["tree", "rf", "et"] {
+        let train =
+            |parameters: &[&str]| spec(name, parameters).train(noise.view(), &y, 2).unwrap();
+        for criterion in ["criterion=gini", "criterion=entropy"] {
+            let model = train(&[criterion]);
+            let importances = model.feature_importances().unwrap();
+            assert!((importances.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{name}");
+            let best = largest(importances);
+            assert!(best == 2 && importances[2] > 0.5, "{name}: {importances:?}");
+        }
+        let stump = train(&["min_samples_split=1000"]);
+        assert_eq!(
+            stump.feature_importances().unwrap(),
+            [0.0; 6],
+            "{name}: no split, no importance"
+        );
+    }
+    let linfa = spec("tree", &["solver=linfa"]).train(noise.view(), &y, 2).unwrap();
+    assert!(linfa.feature_importances().is_none());
+}
+
+#[test]
+fn trees_answer_for_rows_they_have_not_seen() {
+    let (x, y) = clouds(150, 4, 3, 7);
+    for name in ["rf", "et"] {
+        // More trees than fit one word of marks.
+        let asked = spec(name, &["trees=70", "bootstrap=true", "oob_score=true"]);
+        let fractions = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let model = pool.install(|| asked.train(x.view(), &y, 3)).unwrap();
+            model.out_of_bag().unwrap()
+        };
+        let known = fractions(1);
+        assert_eq!(known, fractions(3), "{name}");
+        assert!(known.sum_axis(Axis(1)).iter().all(|sum| (sum - 1.0).abs() < 1e-6));
+        let seen = spec(name, &["trees=70", "bootstrap=true"]).train(x.view(), &y, 3).unwrap();
+        assert!(seen.out_of_bag().is_none());
+        let accuracy = |fractions: &Array2<f64>| {
+            let right = fractions
+                .outer_iter()
+                .zip(&y)
+                .filter(|(row, class)| largest(&row.to_vec()) == **class);
+            right.count() as f64 / y.len() as f64
+        };
+        // Trained rows are known by heart; rows that were left out are not.
+        let by_heart = accuracy(&seen.predict_proba(x.view()).unwrap());
+        assert!(by_heart > 0.99 && accuracy(&known) < by_heart, "{name}");
+        assert!(accuracy(&known) > 0.5, "{name}");
+    }
+    let one = spec("rf", &["trees=1", "oob_score=true"]).train(x.view(), &y, 3).unwrap();
+    let (answered, seen): (Vec<f64>, Vec<f64>) =
+        one.out_of_bag().unwrap().column(0).iter().partition(|value| !value.is_nan());
+    assert!(!answered.is_empty() && !seen.is_empty());
+    let refused = ClassifierSpec::new("et", &key_values(&["oob_score=true"]).unwrap());
+    assert!(refused.unwrap_err().to_string().contains("bootstrap=true"));
+}

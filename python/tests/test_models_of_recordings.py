@@ -1,0 +1,111 @@
+"""Models that know their features: trained on recordings, asked about recordings."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import corsmal_feat as cf
+import numpy as np
+import pytest
+import soundfile
+
+RATE = 16000
+
+
+def record(path: Path, hz: float, seed: int, rate: int = RATE, channels: int = 1) -> Path:
+    noise = 0.02 * np.random.default_rng(seed).standard_normal((rate // 2, channels))
+    tone = 0.2 * np.sin(2 * np.pi * hz * np.arange(rate // 2) / rate)
+    soundfile.write(path, tone[:, None] + noise, rate)
+    return path
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Path], list[str]]:
+    folder = tmp_path_factory.mktemp("recordings")
+    kinds = ["low", "high"] * 5
+    hz = {"low": 300, "high": 3000}
+    return [record(folder / f"{i}.wav", hz[k], i) for i, k in enumerate(kinds)], kinds
+
+
+def test_a_model_with_its_features_takes_recordings(
+    recordings: tuple[list[Path], list[str]], tmp_path: Path
+) -> None:
+    paths, kinds = recordings
+    features = cf.extract(paths, preset="mfcc-zcr")
+    extractor = cf.FeatureExtractor("mfcc-zcr")
+    of_run = cf.RandomForest(20, random_state=1).fit(features.summary, kinds)
+    of_rows = cf.RandomForest(20, random_state=1).fit(extractor.fit_transform(paths), kinds)
+    of_run.save(tmp_path / "run", features=features)
+    of_rows.save(tmp_path / "rows", features=extractor)
+    for name in ("run", "rows"):
+        model = cf.load_model(tmp_path / name)
+        assert f"rf of {len(features.names)} features of recordings, 2 classes (high, low)" in repr(
+            model
+        )
+        assert model.predict(paths).tolist() == kinds
+        assert model.predict([*paths[:2], paths[0]]).tolist() == ["low", "high", "low"]
+        assert model.predict(str(paths[1])).tolist() == ["high"]
+        assert np.array_equal(model.predict_proba(paths), of_run.predict_proba(features.summary))
+        assert model.header["trained_on"] == {"sample_rates": [RATE], "channels": [1]}
+        assert model.header["feature_names"] == features.names
+    other = record(tmp_path / "other.wav", 300, 5, rate=44100)
+    with pytest.raises(cf.ParameterError, match=r"44100 Hz where .* was trained on 16000"):
+        model.predict([paths[0], other])
+    assert len(model.predict([paths[0], other], any_rate=True)) == 2
+    stereo = record(tmp_path / "stereo.wav", 300, 5, channels=2)
+    with pytest.raises(cf.ParameterError, match="channels"):
+        model.predict([stereo])
+    (tmp_path / "bad.wav").write_bytes(b"no audio at all")
+    with pytest.raises(cf.DecodeError, match=r"bad\.wav"):
+        model.predict([tmp_path / "bad.wav"])
+    with pytest.raises(cf.ParameterError, match="mixes paths"):
+        model.predict([paths[0], 3])
+    with pytest.raises(cf.ParameterError, match="5 features"):
+        model.predict(np.zeros((2, 5)))
+
+
+def test_a_model_of_rows_says_so(recordings: tuple[list[Path], list[str]], tmp_path: Path) -> None:
+    paths, kinds = recordings
+    forest = cf.KNN(1).fit(np.arange(10.0).reshape(-1, 1), kinds)
+    forest.save(tmp_path / "model")
+    model = cf.load_model(tmp_path / "model")
+    assert "features of rows" in repr(model)
+    with pytest.raises(cf.ModelError, match="features="):
+        model.predict(paths)
+    assert model.predict([[0.0], [1.0]]).tolist() == kinds[:2]
+    features = cf.extract(paths, preset="mfcc-zcr")
+    with pytest.raises(cf.ParameterError, match="feature names"):
+        forest.save(tmp_path / "wrong", features=features)
+    with pytest.raises(cf.ParameterError, match="rows of a summary"):
+        forest.save(tmp_path / "wrong", features=cf.extract(paths[:1], preset="logmel"))
+    with pytest.raises(cf.ParameterError, match="FeatureExtractor"):
+        forest.save(tmp_path / "wrong", features="mfcc-zcr")
+    assert not (tmp_path / "wrong").exists()
+
+
+def test_the_command_and_python_share_models(
+    recordings: tuple[list[Path], list[str]], tmp_path: Path
+) -> None:
+    command = os.environ.get("CORSMAL_FEAT")
+    if command is None:
+        pytest.skip("CORSMAL_FEAT is not set: the path of the command")
+    paths, kinds = recordings
+    (tmp_path / "list.csv").write_text(
+        "path,kind\n" + "".join(f"{p},{k}\n" for p, k in zip(paths, kinds, strict=True))
+    )
+
+    def run(*arguments: str | Path) -> None:
+        subprocess.run([command, *arguments], check=True, capture_output=True, cwd=tmp_path)
+
+    run("extract", "list.csv", "-o", "f.npz", "--preset", "mfcc-zcr")
+    run("train", "f.npz", "--target", "kind", "-o", "theirs.model")
+    model = cf.load_model(tmp_path / "theirs.model")
+    assert model.predict(paths).tolist() == kinds
+    features = cf.load_features(tmp_path / "f.npz")
+    ours = cf.KNN(1).fit(features.summary, features.labels["kind"])
+    ours.save(tmp_path / "ours.model", features=features)
+    run("classify", "-m", "ours.model", *paths, "-o", "p.csv")
+    rows = (tmp_path / "p.csv").read_text().splitlines()[1:]
+    assert [("low" if "low" in row.split(",") else "high") for row in rows] == kinds
