@@ -123,14 +123,22 @@ def test_forests_with_weights_are_near(ours, theirs, settings) -> None:
     x, y = clouds(150, 6, 3)
     x[:, 4] = 0.0
     weights = np.where(y == "class 0", 0.05, 1.0)
-    settings = settings | {"n_estimators": 300, "random_state": 0, "oob_score": True}
+    settings = settings | {"n_estimators": 300, "oob_score": True}
     for weight in (None, weights):
-        mine = ours(**settings).fit(x, y, sample_weight=weight)
-        reference = theirs(**settings).fit(x, y, sample_weight=weight)
+        fits = [
+            [
+                kind(**settings, random_state=seed).fit(x, y, sample_weight=weight)
+                for seed in range(3)
+            ]
+            for kind in (ours, theirs)
+        ]
+        # Beyond what seeds do: their importances spread by 0.02.
+        (mine, *_), (reference, *_) = fits
         assert mine.feature_importances_[4] == 0
-        wanted = reference.feature_importances_
-        np.testing.assert_allclose(mine.feature_importances_, wanted, atol=0.03)
-        assert abs(mine.oob_score_ - reference.oob_score_) < 0.04
+        means = [np.mean([f.feature_importances_ for f in side], axis=0) for side in fits]
+        np.testing.assert_allclose(*means, atol=0.03)
+        scores = [np.mean([f.oob_score_ for f in side]) for side in fits]
+        assert abs(scores[0] - scores[1]) < 0.03
         difference = np.abs(mine.oob_decision_function_ - reference.oob_decision_function_)
         assert difference.mean() < 0.04
     back = pickle.loads(pickle.dumps(mine))
