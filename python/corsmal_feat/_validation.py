@@ -114,7 +114,8 @@ def weights_of(sample_weight: Any, rows: int, owner: str) -> Matrix | None:
     if len(refused):
         row = refused[0]
         raise ParameterError(
-            f"{owner}: sample_weight must be finite numbers of at least 0; row {row} has {weights[row]}"
+            f"{owner}: sample_weight must be finite numbers of at least 0, not {weights[row]}"
+            f" (row {row})"
         )
     if not weights.any():
         raise ParameterError(f"{owner}: sample_weight is 0 for every row")

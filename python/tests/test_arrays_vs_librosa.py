@@ -235,5 +235,5 @@ def test_other_framings_are_refused_by_name() -> None:
     ],
 )
 def test_what_is_no_number_is_refused_by_name(call: Any) -> None:
-    with pytest.raises(corsmal_feat.ParameterError, match="must be (a|an|one)"):
+    with pytest.raises(corsmal_feat.ParameterError, match=r"must be (a|an|one)"):
         call(np.zeros(5000, np.float32))

@@ -107,7 +107,7 @@ impl Classify for KNearest {
                 owner: OWNER,
                 key: "k".into(),
                 value: k.to_string(),
-                allowed: format!("1 to {most}: there are {} training rows", self.x.nrows()),
+                allowed: format!("1 to {most} ({} training rows)", self.x.nrows()),
             });
         }
         let x = x.as_ref().map_or(self.x.view(), |x| x.view());
