@@ -394,7 +394,11 @@ def cqt(
     """
     y = audio(y)
     if res_type is None:
-        warnings.warn("res_type=None stands for 'soxr_hq'", FutureWarning, stacklevel=2)
+        warnings.warn(
+            "Support for VQT with res_type=None is deprecated: it stands for 'soxr_hq'",
+            FutureWarning,
+            stacklevel=2,
+        )
     elif res_type not in CONVERTERS:
         names = ", ".join(CONVERTERS)
         raise ParameterError(f"res_type must be one of {names}, not {res_type!r}")

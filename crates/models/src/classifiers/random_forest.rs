@@ -19,7 +19,7 @@ tree_parameters! {
             bootstrap: bool = true, "true or false", "draw rows with replacement for each tree";
             #[serde(skip_serializing_if = "std::ops::Not::not")]
             oob_score: bool = false, "true or false (needs bootstrap=true)",
-                "ask each tree about the rows that it has not seen";
+                "ask each tree about the rows that it has not seen (Python: oob_score_)";
         }
         last {}
     }
