@@ -136,7 +136,8 @@ class Classifier(ClassifierMixin, BaseEstimator):
         return self._model.predict_proba(x)
 
     def _decision_function(self, X: Any) -> Matrix:
-        values = self._model.decision_function(self._query(X))
+        x = self._query(X)
+        values = self._model.decision_function(x)
         return values[:, 0] if values.shape[1] == 1 else values
 
     def save(

@@ -118,7 +118,7 @@ def weights_of(sample_weight: Any, rows: int, owner: str) -> Matrix | None:
             f" (row {row})"
         )
     if not weights.any():
-        raise ParameterError(f"{owner}: sample_weight is 0 for every row")
+        raise ParameterError(f"{owner}: sample_weight is zero for every row")
     return weights
 
 

@@ -194,7 +194,7 @@ def test_weights_that_are_none_are_refused() -> None:
         (np.ones((20, 2)), "1D array"),
         (-np.ones(20), "at least 0"),
         (np.full(20, np.nan), "finite"),
-        (np.zeros(20), "0 for every row"),
+        (np.zeros(20), "zero for every row"),
         (["a"] * 20, "must be numbers"),
     ):
         for estimator in (SVC(), RandomForest(5)):

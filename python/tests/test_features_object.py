@@ -155,11 +155,13 @@ def test_a_cache_extracts_once(
     assert told == [True, False]
 
 
-def test_objects_of_the_shared_cases() -> None:
-    if not (CASES / "f_obj.npz").exists():
-        pytest.skip("no shared cases here")
-    with pytest.raises(cf.ParameterError, match=r"f_obj\.npz: .* holds Python objects"):
-        cf.load_features(CASES / "f_obj.npz")
+def test_labels_that_are_objects_are_said(tmp_path: Path) -> None:
+    y = np.array(["a", "b"] * 10, dtype=object)
+    np.savez(tmp_path / "table.npz", X=np.arange(40.0).reshape(20, 2), y=y)
+    with pytest.raises(cf.ParameterError, match=r'member "y": holds Python objects'):
+        cf.cross_validate(tmp_path / "table.npz", "y", cv=2)
+    np.savez(tmp_path / "table.npz", X=np.arange(40.0).reshape(20, 2), y=y.astype(str))
+    assert cf.cross_validate(tmp_path / "table.npz", "y", cv=2).predictions.labels == ["a", "b"]
 
 
 def test_parquet_of_the_shared_cases() -> None:

@@ -43,12 +43,15 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
         fault(format!("member {:?} has shape {shape:?}, expected rows x features", members.x))
     })?;
     let mut columns: Vec<(String, Vec<String>)> = Vec::new();
+    let mut unread = Vec::new();
     for name in npz.names().to_vec() {
         let header = match npz.header(&name) {
-            // Objects and dates are of no use here, and nobody asked for them.
-            Err(NpzError::Npy { source: NpyError::DType { .. } | NpyError::Pickled, .. })
-                if members.ids.as_ref() != Some(&name) =>
-            {
+            // Objects and dates are of no use here; they are said where one is asked for.
+            Err(NpzError::Npy {
+                source: source @ (NpyError::DType { .. } | NpyError::Pickled),
+                ..
+            }) if members.ids.as_ref() != Some(&name) => {
+                unread.push((name, source.to_string()));
                 continue;
             }
             header => header?,
@@ -83,6 +86,7 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
         config: Value::Null,
         config_hash: String::new(),
         columns,
+        unread,
     })
 }
 

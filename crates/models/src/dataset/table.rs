@@ -32,6 +32,8 @@ pub struct LabelledTable {
     /// its hash; empty for files of other programs
     pub config_hash: String,
     pub(super) columns: Vec<(String, Vec<String>)>,
+    /// members of files of other programs that cannot be read, and why
+    pub(super) unread: Vec<(String, String)>,
 }
 
 impl LabelledTable {
@@ -46,6 +48,7 @@ impl LabelledTable {
             config: Value::Null,
             config_hash: String::new(),
             columns,
+            unread: Vec::new(),
         }
     }
 
@@ -75,6 +78,7 @@ impl LabelledTable {
             config,
             config_hash,
             columns: table.labels().map(|(name, c)| (name.to_string(), c.to_vec())).collect(),
+            unread: Vec::new(),
         })
     }
 
@@ -159,6 +163,9 @@ impl LabelledTable {
             && let (Some((_, kind)), Some((_, level))) = (find("type"), find("level"))
         {
             return Ok(kind.iter().zip(level).map(|(t, l)| format!("{t}-{l}")).collect());
+        }
+        if let Some((_, why)) = self.unread.iter().find(|(member, _)| member == name) {
+            return Err(DatasetError::content(&self.path, format!("member {name:?}: {why}")));
         }
         let known = self.columns.iter().map(|(name, _)| name.as_str());
         let choices = match self.columns.is_empty() {
