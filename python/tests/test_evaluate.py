@@ -41,7 +41,7 @@ def test_scores_by_name() -> None:
 
 @needs_ccm
 def test_what_cannot_be_scored_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(corsmal_feat.ParameterError, match="rules = best"):
+    with pytest.raises(corsmal_feat.ParameterError, match=r"rules must be .*, not best"):
         corsmal_feat.evaluate(SUBMISSION, ANNOTATIONS, rules="best")
     with pytest.raises(corsmal_feat.ParameterError, match=r"none\.csv"):
         corsmal_feat.evaluate(tmp_path / "none.csv", ANNOTATIONS)

@@ -122,7 +122,7 @@ def test_what_cannot_be_is_refused(folder: Path, tmp_path: Path):
         cf.extract(folder, preset="logmell")
     with pytest.raises(cf.ParameterError, match="one of them"):
         cf.extract(folder, preset="esc26", config={})
-    with pytest.raises(cf.ParameterError, match="jobs = 0"):
+    with pytest.raises(cf.ParameterError, match=r"jobs must be .*, not 0"):
         cf.extract(folder, jobs=0)
     with pytest.raises(cf.ParameterError, match="need out"):
         cf.extract(folder, resume=True)
