@@ -139,6 +139,7 @@ pub(super) fn read_parquet(
         config: Value::Null,
         config_hash: String::new(),
         columns: texts,
+        unread: Vec::new(),
     })
 }
 
