@@ -8,11 +8,13 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use corsmal_ccm::benchmark::{Baseline, BenchmarkOptions, FeatureSet, Made};
+use corsmal_ccm::benchmark::{
+    Baseline, BenchmarkOptions, Estimate, FeatureSet, Made, Prepared, System, Work,
+};
 use corsmal_ccm::synth::{self, Size};
 use corsmal_extract::engine::{Features, Signals};
 use corsmal_files::npz::NpzFile;
-use corsmal_report::Report;
+use corsmal_report::{Cell, Report};
 use ndarray::Axis;
 use shared_data::ccm;
 
@@ -61,6 +63,7 @@ fn options(data: &Path, out: &Path, baselines: Vec<Baseline>) -> BenchmarkOption
         data: data.into(),
         out: out.into(),
         baselines,
+        systems: Vec::new(),
         added: Vec::new(),
         jobs: 2,
         seed: 1,
@@ -227,6 +230,7 @@ fn one_name_is_not_added_twice() {
         data: "nowhere".into(),
         out: "nowhere".into(),
         baselines: Vec::new(),
+        systems: Vec::new(),
         added: vec![("x".into(), "a.csv".into()), ("x".into(), "b.csv".into())],
         jobs: 1,
         seed: 1,
@@ -244,6 +248,7 @@ fn an_unusable_file_to_add_stops_before_the_work() {
         data: dir.path().join("nowhere"),
         out: dir.path().join("report"),
         baselines: Vec::new(),
+        systems: Vec::new(),
         added: vec![("x".into(), file)],
         jobs: 1,
         seed: 1,
@@ -288,6 +293,7 @@ impl Adding {
             data: self.dir.path().join("data"),
             out: self.dir.path().join("report"),
             baselines: Vec::new(),
+            systems: Vec::new(),
             added: vec![("theirs".into(), path)],
             jobs: 1,
             seed: 1,
@@ -358,6 +364,7 @@ fn a_file_of_ids_is_about_the_part_that_it_fits() {
             data: adding.dir.path().join("data"),
             out: adding.dir.path().join("report"),
             baselines: Vec::new(),
+            systems: Vec::new(),
             added: vec![("theirs".into(), path.clone())],
             jobs: 1,
             seed: 1,
@@ -371,4 +378,69 @@ fn a_file_of_ids_is_about_the_part_that_it_fits() {
     assert!(!submission(228).map_err(|e| e.to_string()).unwrap(), "public test, without labels");
     let error = submission(60).unwrap_err().to_string();
     assert!(error.contains("its ids fit several parts"), "{error}");
+}
+
+/// Says what it knows, and always the same.
+struct Constant;
+
+struct Ready<'a>(&'a Work<'a>);
+
+impl System for Constant {
+    fn name(&self) -> &'static str {
+        "M4"
+    }
+
+    fn prepare<'a>(&'a self, work: &'a Work<'a>) -> corsmal_ccm::Result<Box<dyn Prepared + 'a>> {
+        for (place, subject) in work.subjects.iter().enumerate() {
+            // Nothing tells what a test recording holds.
+            let training = place < work.training;
+            assert_eq!(subject.filling.is_some(), training);
+            assert_eq!(subject.name.is_some(), training);
+            assert_eq!(subject.action.is_some(), training);
+            assert!(subject.input.labels.is_empty());
+        }
+        Ok(Box::new(Ready(work)))
+    }
+}
+
+impl Prepared for Ready<'_> {
+    fn notes(&self) -> Vec<String> {
+        vec!["it always says rice.".into()]
+    }
+
+    fn predict(&self, train: &[usize], wanted: &[usize]) -> corsmal_ccm::Result<Vec<Estimate>> {
+        let container = |row: &usize| self.0.subjects[*row].container;
+        let known: Vec<_> = train.iter().map(container).collect();
+        assert!(train.iter().all(|&row| row < self.0.training));
+        assert!(wanted.iter().all(|row| !known.contains(&container(row))));
+        Ok(wanted.iter().map(|_| Estimate { kind: Some(2), ..Estimate::default() }).collect())
+    }
+}
+
+#[test]
+fn a_system_is_run_on_containers_that_it_never_heard() {
+    let dir = tempfile::tempdir().unwrap();
+    let (data, out) = (dir.path().join("data"), dir.path().join("report"));
+    synth::generate(&data, Size::Reduced, 3).unwrap();
+    let systems: Vec<Box<dyn System>> = vec![Box::new(Constant)];
+    let report = run(&BenchmarkOptions { systems, ..options(&data, &out, Vec::new()) }).unwrap();
+    let tables: Vec<_> = report.sections.iter().flat_map(|s| &s.tables).collect();
+    let rows = |table: &str| {
+        let table = tables.iter().find(|t| t.name == table).unwrap();
+        table.rows.iter().filter(|r| r.cells[0] == Cell::Text("M4".into())).count()
+    };
+    // The paper's row and that of this run; only the paper's where nothing is estimated.
+    assert_eq!((rows("type"), rows("level")), (2, 1));
+    let texts: Vec<_> = report.sections.iter().flat_map(|s| &s.text).collect();
+    assert!(texts.iter().any(|t| *t == "M4 of this run: it always says rice."));
+    assert!(report.sections.iter().all(|s| s.id != "corrections"));
+    for name in ["submissions/m4-held-out.csv", "submissions/m4-public-test.csv"] {
+        assert!(out.join(name).exists(), "{name}");
+    }
+    assert!(out.join("figures/m4-type-confusion.svg").exists());
+    assert!(!out.join("figures/m4-level-confusion.svg").exists());
+
+    let systems: Vec<Box<dyn System>> = vec![Box::new(Constant), Box::new(Constant)];
+    let twice = BenchmarkOptions { systems, ..options(&data, &out, Vec::new()) };
+    assert_eq!(run(&twice).unwrap_err().to_string(), "M4 is given twice");
 }

@@ -176,6 +176,7 @@ fn annotation_files_must_not_contradict_each_other() {
             data: dir.path().into(),
             out: dir.path().join("report"),
             baselines: Vec::new(),
+            systems: Vec::new(),
             added: Vec::new(),
             jobs: 1,
             seed: 1,

@@ -64,6 +64,16 @@ pub enum NetError {
         /// its value
         value: f32,
     },
+    /// A recording that does not fill a window.
+    #[error("too short: {frames} frames, {network} takes windows of {needed}")]
+    TooShort {
+        /// the network
+        network: String,
+        /// frames there are
+        frames: usize,
+        /// frames of a window
+        needed: usize,
+    },
     /// A number that is not finite among the inputs.
     #[error("input {input}, item {item}: {value} is not a finite number")]
     NonFinite {

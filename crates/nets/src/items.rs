@@ -14,6 +14,18 @@ pub struct Column {
     pub offsets: Vec<usize>,
 }
 
+impl Column {
+    /// Items one after another.
+    pub fn of<'a>(items: impl IntoIterator<Item = &'a [f32]>) -> Self {
+        let (mut values, mut offsets) = (Vec::new(), vec![0]);
+        for item in items {
+            values.extend_from_slice(item);
+            offsets.push(values.len());
+        }
+        Self { values, offsets }
+    }
+}
+
 /// Items of a network.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Items {

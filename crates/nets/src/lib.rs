@@ -23,6 +23,7 @@ pub mod cross_validation;
 pub mod dataset;
 pub mod error;
 pub mod fit;
+pub mod front_end;
 mod history;
 pub mod items;
 mod kernels;

@@ -1,7 +1,6 @@
 //! A trained network on disk: a safetensors file whose text entry says everything else.
 
 use std::collections::HashMap;
-use std::io::Read;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -19,13 +18,6 @@ use crate::weights::{self, State, WeightsError};
 const ENTRY: &str = "corsmal-feat";
 /// Version of that entry.
 const FORMAT: u32 = 1;
-
-/// Whether a file begins as a trained network does: the length of a header, and the header's brace.
-pub fn is_model(path: &Path) -> bool {
-    let mut start = [0; 9];
-    let read = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut start));
-    read.is_ok() && start[8] == b'{'
-}
 
 /// What the file says about its network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -270,7 +270,7 @@ fn split(joint: &[usize]) -> std::result::Result<Fold, ModelError> {
 }
 
 /// The three folds of containers; of a set with fewer containers, those that are there.
-fn container_folds(targets: &[Target]) -> std::result::Result<Vec<Fold>, ModelError> {
+pub(super) fn container_folds(targets: &[Target]) -> std::result::Result<Vec<Fold>, ModelError> {
     let number = |t: &Target| t.recording.container.map_or(0, |c| c.number());
     let groups: Vec<String> = targets.iter().map(|t| number(t).to_string()).collect();
     let lists: Vec<Vec<String>> = CONTAINER_FOLDS

@@ -7,6 +7,7 @@ use corsmal_models::model_file::{Model, ModelHeader};
 
 use super::baselines::Outcome;
 use super::results::{Estimate, Rows, Target};
+use super::system::Run;
 use crate::dataset::{Filling, Subset};
 use crate::error::{CcmError, Result};
 use crate::submission::{Format, RowKey, Submission, pseudo_random};
@@ -23,12 +24,7 @@ pub(super) fn prepare(out: &Path) -> Result<()> {
 /// Writes the submissions of a baseline and its model.
 pub(super) fn write_outcome(out: &Path, outcome: &Outcome, rows: &Rows) -> Result<()> {
     let name = format!("{}-{}", outcome.baseline.slug(), outcome.variant.name());
-    let held_out = outcome.held_out.iter().map(|(row, e)| (&rows.training[*row], e));
-    write_submissions(out, &format!("{name}-held-out"), &held_out.collect::<Vec<_>>())?;
-    for (part, estimates) in rows.tests.iter().zip(&outcome.tests) {
-        let pairs: Vec<_> = part.rows.iter().zip(estimates).collect();
-        write_submissions(out, &format!("{name}-{}", slug(part.subset)), &pairs)?;
-    }
+    write_estimates(out, &name, rows, &outcome.held_out, &outcome.tests)?;
     // Published PCA is fitted on what it reduces, so that there is no projection for recordings to
     // come.
     if outcome.model.n_features() != outcome.feature_names.len() {
@@ -54,6 +50,28 @@ pub(super) fn write_outcome(out: &Path, outcome: &Outcome, rows: &Rows) -> Resul
     let model = Model::new(header, outcome.model.clone()).map_err(|e| fault(&e))?;
     let path = out.join("models").join(format!("{name}.model"));
     model.save(&path).map_err(|e| fault(&e))
+}
+
+/// Writes the submissions of a system.
+pub(super) fn write_run(out: &Path, run: &Run, rows: &Rows) -> Result<()> {
+    write_estimates(out, &run.name.to_lowercase(), rows, &run.held_out, &run.tests)
+}
+
+/// Writes estimates of held-out training recordings and of each test part.
+fn write_estimates(
+    out: &Path,
+    name: &str,
+    rows: &Rows,
+    held_out: &[(usize, Estimate)],
+    tests: &[Vec<Estimate>],
+) -> Result<()> {
+    let held_out = held_out.iter().map(|(row, e)| (&rows.training[*row], e));
+    write_submissions(out, &format!("{name}-held-out"), &held_out.collect::<Vec<_>>())?;
+    for (part, estimates) in rows.tests.iter().zip(tests) {
+        let pairs: Vec<_> = part.rows.iter().zip(estimates).collect();
+        write_submissions(out, &format!("{name}-{}", slug(part.subset)), &pairs)?;
+    }
+    Ok(())
 }
 
 /// Writes the pseudo-random estimates of every part as submissions.

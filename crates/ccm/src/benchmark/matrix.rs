@@ -122,7 +122,7 @@ impl Store<'_> {
 }
 
 /// Recordings with their labels, cropped to their action where one is annotated.
-fn inputs(root: &Path, targets: &[Target], actions: &Actions) -> Vec<Input> {
+pub(super) fn inputs(root: &Path, targets: &[Target], actions: &Actions) -> Vec<Input> {
     let input = |target: &Target| {
         let recording = &target.recording;
         let action = recording.container.zip(recording.name).and_then(|k| actions.get(&k).copied());

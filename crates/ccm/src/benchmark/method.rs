@@ -1,8 +1,8 @@
 //! The lines of the tables: methods with their estimates.
 
-use super::added::Placed;
-use super::baselines::{Outcome, Variant};
+use super::baselines::Variant;
 use super::interval::bootstrap;
+use super::predicted::Predicted;
 use super::results::{Estimate, PartScores, Rows, Target, score};
 use crate::dataset::{Filling, FillingLevel, FillingType, Subset};
 use crate::paper::Task;
@@ -13,6 +13,8 @@ use corsmal_report::{Cell, Source};
 /// A method with its estimates.
 pub(super) struct Method {
     pub(super) name: String,
+    /// Name of its files; none where nothing of it is kept.
+    pub(super) slug: Option<String>,
     pub(super) inputs: String,
     pub(super) protocol: String,
     pub(super) source: Source,
@@ -72,6 +74,19 @@ impl Method {
         score(&targets, &estimates, seed)
     }
 
+    /// The tasks of which it estimates something in training recordings.
+    pub(super) fn addressed(&self) -> String {
+        let has = |known: fn(&Estimate) -> bool| self.training.iter().any(|(_, e)| known(e));
+        let tasks = [
+            ("level", has(|e| e.level.is_some())),
+            ("type", has(|e| e.kind.is_some())),
+            ("capacity", has(|e| e.capacity_ml.is_some())),
+        ];
+        let named: Vec<&str> =
+            tasks.iter().filter(|(_, any)| *any).map(|(name, _)| *name).collect();
+        named.join(", ")
+    }
+
     /// The score of a task on a part, with its interval where it is a classification: by resampling
     /// whole containers in the training part, recordings in the test parts, whose three containers
     /// are too few.
@@ -127,17 +142,13 @@ pub(super) fn of_task(task: Task, scores: &PartScores) -> Option<f64> {
     }
 }
 
-/// All methods: baselines, pseudo-random estimates, files that were added.
-pub(super) fn methods(
-    rows: &Rows,
-    outcomes: &[Outcome],
-    added: &[Placed],
-    seed: u64,
-) -> Vec<Method> {
+/// All methods: baselines, systems, pseudo-random estimates, files that were added.
+pub(super) fn methods(rows: &Rows, predicted: &Predicted<'_>, seed: u64) -> Vec<Method> {
+    let outcomes = predicted.outcomes.iter();
     let mut list: Vec<Method> = outcomes
-        .iter()
         .map(|o| Method {
             name: o.baseline.name(),
+            slug: Some(format!("{}-{}", o.baseline.slug(), o.variant.name())),
             inputs: "audio".into(),
             protocol: match o.variant {
                 Variant::Published => "published".into(),
@@ -148,20 +159,31 @@ pub(super) fn methods(
             tests: o.tests.iter().cloned().map(Some).collect(),
         })
         .collect();
+    list.extend(predicted.runs.iter().map(|run| Method {
+        name: run.name.into(),
+        slug: Some(run.name.to_lowercase()),
+        inputs: run.inputs.clone(),
+        protocol: "corrected".into(),
+        source: Source::Ours,
+        training: run.held_out.clone(),
+        tests: run.tests.iter().cloned().map(Some).collect(),
+    }));
     let random = |targets: &[Target]| -> Vec<Estimate> {
         let keys: Vec<_> = targets.iter().map(|t| t.key).collect();
         pseudo_random(&keys, seed).into_iter().map(Estimate::from).collect()
     };
     list.push(Method {
         name: "Random".into(),
+        slug: None,
         inputs: String::new(),
         protocol: format!("seed {seed}"),
         source: Source::Ours,
         training: random(&rows.training).into_iter().enumerate().collect(),
         tests: rows.tests.iter().map(|t| Some(random(&t.rows))).collect(),
     });
-    list.extend(added.iter().filter(|a| a.is_any()).map(|a| Method {
+    list.extend(predicted.added.iter().filter(|a| a.is_any()).map(|a| Method {
         name: a.name.clone(),
+        slug: None,
         inputs: String::new(),
         protocol: "given".into(),
         source: Source::Added,

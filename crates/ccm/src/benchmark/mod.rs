@@ -1,5 +1,6 @@
 //! The benchmark: the twelve audio baselines of the paper on a CCM data set, as their published
-//! code runs them and corrected, scored and put beside the paper's figures.
+//! code runs them and corrected, and the paper's systems that other crates bring; scored and put
+//! beside the paper's figures.
 
 mod added;
 mod baselines;
@@ -9,8 +10,10 @@ mod interval;
 mod made;
 mod matrix;
 mod method;
+mod predicted;
 mod report;
 mod results;
+mod system;
 
 use std::collections::HashSet;
 use std::path::PathBuf;
@@ -21,14 +24,16 @@ pub use added::Added;
 pub use baselines::{Baseline, Learner, Variant};
 pub use features::FeatureSet;
 pub use made::Made;
+pub use results::Estimate;
+pub use system::{Prepared, Subject, System, Work};
 
 use crate::dataset::DataSet;
 use crate::error::{CcmError, Result};
 use corsmal_report::Report;
 use matrix::Store;
+use predicted::Predicted;
 
 /// What to run.
-#[derive(Clone, Debug)]
 pub struct BenchmarkOptions {
     /// Folder of the data set.
     pub data: PathBuf,
@@ -36,6 +41,8 @@ pub struct BenchmarkOptions {
     pub out: PathBuf,
     /// The baselines to run.
     pub baselines: Vec<Baseline>,
+    /// The systems to run.
+    pub systems: Vec<Box<dyn System>>,
     /// Prediction files of other methods that join the tables, by name.
     pub added: Vec<(String, PathBuf)>,
     /// Recordings that are extracted at a time, at least 1.
@@ -69,6 +76,10 @@ pub fn run(
     let mut slugs = HashSet::new();
     if let Some(twice) = options.baselines.iter().find(|b| !slugs.insert(b.slug())) {
         return Err(CcmError::Request(format!("baseline {} is given twice", twice.slug())));
+    }
+    let mut systems = HashSet::new();
+    if let Some(twice) = options.systems.iter().find(|s| !systems.insert(s.name())) {
+        return Err(CcmError::Request(format!("{} is given twice", twice.name())));
     }
     let added = options
         .added
@@ -104,11 +115,22 @@ pub fn run(
             }
         }
     }
+    let mut runs = Vec::new();
+    if !options.systems.is_empty() {
+        let (folder, how) = (options.out.join("features"), (options.jobs, options.seed));
+        let work = Work::new(&set, &rows, &folder, how, progress, stop)?;
+        for system in &options.systems {
+            let run = system::run(system.as_ref(), &work, &rows)?;
+            files::write_run(&options.out, &run, &rows)?;
+            runs.push(run);
+        }
+    }
     files::write_random(&options.out, &rows, options.seed)?;
     let made = &options.made;
-    let report = report::report(&set, &rows, &outcomes, &added, options.seed, made)?;
+    let predicted = Predicted { outcomes: &outcomes, runs: &runs, added: &added };
+    let report = report::report(&set, &rows, &predicted, options.seed, made)?;
     let figures = options.out.join("figures");
-    report::write_figures(&figures, &rows, &outcomes, options.seed)?;
+    report::write_figures(&figures, &rows, &predicted, options.seed)?;
     report.write(&options.out)?;
     Ok(report)
 }

@@ -81,18 +81,23 @@ impl Rows {
 }
 
 /// Estimates for a recording, as class numbers.
-#[derive(Clone, Default)]
-pub(super) struct Estimate {
-    pub(super) kind: Option<usize>,
-    pub(super) level: Option<usize>,
-    pub(super) kind_probabilities: Option<[f64; 4]>,
-    pub(super) level_probabilities: Option<[f64; 3]>,
-    pub(super) capacity_ml: Option<f64>,
+#[derive(Clone, Debug, Default)]
+pub struct Estimate {
+    /// Number of the type.
+    pub kind: Option<usize>,
+    /// Number of the level.
+    pub level: Option<usize>,
+    /// Probability of each type.
+    pub kind_probabilities: Option<[f64; 4]>,
+    /// Probability of each level.
+    pub level_probabilities: Option<[f64; 3]>,
+    /// Capacity in mL.
+    pub capacity_ml: Option<f64>,
 }
 
 impl Estimate {
     /// From a joint class and, where the classifier has them, its probabilities.
-    pub(super) fn joint(class: usize, probabilities: Option<&[f64]>) -> Self {
+    pub fn joint(class: usize, probabilities: Option<&[f64]>) -> Self {
         let filling = Filling::from_joint(class);
         let mut kinds = [0.0; 4];
         let mut levels = [0.0; 3];

@@ -1,10 +1,10 @@
-//! `corsmal-feat benchmark`: the paper's audio baselines on a CCM data set.
+//! `corsmal-feat benchmark`: the paper's audio baselines and systems on a CCM data set.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use corsmal_ccm::CcmError;
-use corsmal_ccm::benchmark::{self, Baseline, BenchmarkOptions, Made};
+use corsmal_ccm::benchmark::{self, Baseline, BenchmarkOptions, Made, System};
 use corsmal_report::{Cell, Report, Row, Source};
 
 use crate::args::Jobs;
@@ -15,7 +15,10 @@ use crate::made;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  corsmal-feat benchmark --data ~/CCM --out report\n  \
                         corsmal-feat benchmark --data ~/CCM --out report --baselines zcr-mfcc-rf \
-                        --add M6=m6_acc.csv\n\nThe report is report/report.html; the same tables \
+                        --add M6=m6_acc.csv\n  corsmal-feat benchmark --data ~/CCM --out report \
+                        --methods m1,m2,m4,m6 --epochs 5\n\nSystems are trained on whole containers \
+                        held out in three folds, by their published recipes; `corsmal-feat nets` \
+                        lists them.\n\nThe report is report/report.html; the same tables \
                         are in report/tables and report/report.json.")]
 pub struct Args {
     /// Folder of the data set.
@@ -24,9 +27,21 @@ pub struct Args {
     /// Folder for the report, tables, pictures, submissions, models and cached features.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Baselines to run, such as zcr-mfcc-knn or spectrogram-pca-rf; default all twelve.
+    /// Baselines to run, such as zcr-mfcc-knn or spectrogram-pca-rf; default all twelve, none with
+    /// --methods.
     #[arg(long, num_args = 1.., value_delimiter = ',', value_parser = baseline, value_name = "NAME")]
     baselines: Vec<Baseline>,
+    /// Systems of the paper to train and run: m1, m2, m4, m5, m6. They need a build with the feature
+    /// `nets`.
+    #[arg(long, num_args = 1.., value_delimiter = ',', value_name = "NAME")]
+    methods: Vec<String>,
+    /// Epochs of every network of the systems; default those of its recipe.
+    #[arg(long, value_name = "N", requires = "methods", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    epochs: Option<u32>,
+    /// Embeddings of the recordings that M5 takes, vggish or r21d, as an .npz with X, offsets and
+    /// ids; several files of a name are joined.
+    #[arg(long, value_parser = named_file, value_name = "NAME=NPZ", requires = "methods")]
+    embeddings: Vec<(String, PathBuf)>,
     /// Predictions of another method that join the tables: a submission in an official format or
     /// capacity estimates by file name.
     #[arg(long, value_parser = named_file, value_name = "NAME=CSV")]
@@ -61,25 +76,48 @@ fn named_file(text: &str) -> Result<(String, PathBuf), String> {
     }
 }
 
-/// Runs the baselines and writes the report.
+#[cfg(feature = "nets")]
+fn systems(args: &Args) -> Result<Vec<Box<dyn System>>, Failure> {
+    let settings = corsmal_systems::Settings {
+        epochs: args.epochs.map(|n| n as usize),
+        embeddings: args.embeddings.clone(),
+    };
+    let made = |name: &String| Ok(corsmal_systems::named(name)?.make(&settings)?);
+    args.methods.iter().map(made).collect()
+}
+
+#[cfg(not(feature = "nets"))]
+fn systems(args: &Args) -> Result<Vec<Box<dyn System>>, Failure> {
+    // What --epochs and --embeddings say is for the systems.
+    let Args { epochs: _, embeddings: _, .. } = args;
+    if args.methods.is_empty() { Ok(Vec::new()) } else { Err(super::nets::absent()) }
+}
+
+/// Runs baselines and systems and writes the report.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
-    let baselines = if args.baselines.is_empty() { Baseline::all() } else { args.baselines };
+    let systems = systems(&args)?;
+    let baselines = match (args.baselines.is_empty(), systems.is_empty()) {
+        (true, true) => Baseline::all(),
+        _ => args.baselines,
+    };
     let options = BenchmarkOptions {
         data: args.data,
         out: args.out,
         baselines,
+        systems,
         added: args.add,
         jobs: args.jobs.count(),
         seed: args.seed,
         made: Made { on: Some(made::today()), command: Some(made::command()) },
     };
     let quiet = args.quiet;
+    let stop = crate::interrupt::flag();
     let progress = |step: &str| {
         if !quiet {
             eprintln!("{step}");
         }
     };
-    let report = match benchmark::run(&options, &progress, crate::interrupt::flag()) {
+    let report = match benchmark::run(&options, &progress, stop) {
         Err(error @ CcmError::Interrupted) => {
             eprintln!("{error}");
             return Ok(ExitCode::from(INTERRUPTED));
@@ -121,19 +159,23 @@ fn scores(report: &Report) -> String {
         Some(Cell::Score(value, None)) => format!("{value:6.2}"),
         _ => "     \u{2013}".into(),
     };
-    let width = levels.iter().map(|r| word(r.cells.first()).chars().count()).max().unwrap_or(6);
+    let same =
+        |a: &Row, b: &Row| [0, 2].iter().all(|&c| word(a.cells.get(c)) == word(b.cells.get(c)));
+    // A method may address one of the tasks only.
+    let alone = types.iter().filter(|row| !levels.iter().any(|other| same(row, other)));
+    let shown: Vec<&Row> = levels.iter().chain(alone).copied().collect();
+    let width = shown.iter().map(|r| word(r.cells.first()).chars().count()).max().unwrap_or(6);
     let mut out = format!(
         "\nweighted F1 on training recordings that were not trained on, percent (95 % interval)\n\n\
          {:width$}  {:10}  {:24}{}\n",
         "method", "protocol", TASKS[0].1, TASKS[1].1
     );
-    for row in levels {
+    for row in shown {
         let (method, protocol) = (word(row.cells.first()), word(row.cells.get(2)));
-        let same = |other: &&&Row| {
-            word(other.cells.first()) == method && word(other.cells.get(2)) == protocol
+        let of = |rows: &[&Row]| {
+            score(rows.iter().find(|other| same(row, other)).and_then(|r| r.cells.get(3)))
         };
-        let other = types.iter().find(same).and_then(|r| r.cells.get(3));
-        let (level, kind) = (score(row.cells.get(3)), score(other));
+        let (level, kind) = (of(&levels), of(&types));
         out.push_str(&format!("{method:width$}  {protocol:10}  {level:24}{kind}\n"));
     }
     out + "\n"

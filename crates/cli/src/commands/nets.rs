@@ -1,5 +1,7 @@
 //! `corsmal-feat nets`: the networks of the paper, listed and explained.
 
+use std::io::Read;
+use std::path::Path;
 use std::process::ExitCode;
 
 use crate::failure::Failure;
@@ -10,11 +12,13 @@ use crate::failure::Failure;
 Examples:
   corsmal-feat nets
   corsmal-feat nets m4-type
+  corsmal-feat nets m4
 
-Recipes are those of the published code with its defects corrected; docs/networks.md says where
+Systems, m1 to m6, are what `corsmal-feat benchmark --methods` runs; networks are what they are made of
+and what `train --net` learns. Recipes are those of the published code with its defects corrected; docs/networks.md says where
 paper, code and this tool differ.")]
 pub struct Args {
-    /// Show the layers and the recipe of one network.
+    /// Show the layers and the recipe of one network, or what one system is made of.
     #[arg(value_name = "NAME")]
     name: Option<String>,
     /// Print everything as JSON.
@@ -26,20 +30,33 @@ pub struct Args {
 #[cfg(feature = "nets")]
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     use corsmal_nets::networks::{self, NETWORKS};
+    use corsmal_systems::{self as systems, SYSTEMS};
     use serde_json::json;
 
     let Some(name) = &args.name else {
         if args.json {
-            let all: Vec<_> =
-                NETWORKS.iter().map(|d| json!({"name": d.name, "about": d.about})).collect();
+            let named = |name, about| json!({ "name": name, "about": about });
+            let networks: Vec<_> = NETWORKS.iter().map(|d| named(d.name, d.about)).collect();
+            let systems: Vec<_> = SYSTEMS.iter().map(|s| named(s.name, s.about)).collect();
+            let all = json!({ "systems": systems, "networks": networks });
             println!("{}", serde_json::to_string_pretty(&all)?);
             return Ok(ExitCode::SUCCESS);
         }
+        println!("systems (benchmark --methods)");
+        for system in SYSTEMS {
+            println!("  {:16} {}", system.name, system.about);
+        }
+        println!("\nnetworks (train --net)");
         for definition in NETWORKS {
-            println!("{:16} {}", definition.name, definition.about);
+            println!("  {:16} {}", definition.name, definition.about);
         }
         return Ok(ExitCode::SUCCESS);
     };
+    // m1 is a system and the network that it is made of: what trains it says more.
+    let is_network = networks::named(name).is_ok();
+    if let Some(system) = systems::named(name).ok().filter(|_| !is_network) {
+        return explain(system, args.json);
+    }
     let definition = networks::named(name)?;
     let network = definition.build(None, 0)?;
     let (layers, parameters) = (network.describe(), network.parameters().count());
@@ -68,6 +85,34 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// What a system is made of, and what of it is not there.
+#[cfg(feature = "nets")]
+fn explain(system: &corsmal_systems::Definition, as_json: bool) -> Result<ExitCode, Failure> {
+    let corsmal_systems::Definition { name, about, networks, limits, .. } = system;
+    if as_json {
+        let all = serde_json::json!({
+            "name": name,
+            "about": about,
+            "networks": networks,
+            "limits": limits,
+        });
+        println!("{}", serde_json::to_string_pretty(&all)?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!("{name}: {about}\n\nnetworks  {}", networks.join(", "));
+    for limit in *limits {
+        println!("\n{limit}");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Whether a file begins as a trained network does: the length of a header, and the header's brace.
+pub fn is_model(path: &Path) -> bool {
+    let mut start = [0; 9];
+    let read = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut start));
+    read.is_ok() && start[8] == b'{'
 }
 
 /// Says how to get them.

@@ -18,3 +18,5 @@ mod models;
 #[cfg(feature = "nets")]
 mod networks;
 mod scoring;
+#[cfg(not(feature = "nets"))]
+mod without_networks;

@@ -37,9 +37,12 @@ fn sequences(path: &Path) {
 #[test]
 fn networks_are_listed_and_explained() {
     let list = done(&["nets"]);
-    for name in ["m1", "m2_type", "m4_level", "m5_r21d_type", "m6_shaking", "vggish"] {
-        assert!(list.lines().any(|line| line.starts_with(&format!("{name} "))), "{name}\n{list}");
+    for name in ["m1", "m2_type", "m4_level", "m5_r21d_type", "m6_shaking", "vggish", "m4", "m5"] {
+        let named = |line: &str| line.trim_start().starts_with(&format!("{name} "));
+        assert!(list.lines().any(named), "{name}\n{list}");
     }
+    let system = done(&["nets", "m4"]);
+    assert!(system.contains("m4_type, m4_level") && system.contains("capacity"), "{system}");
     let one = done(&["nets", "m2-type"]);
     for expected in ["86876 parameters", "convolution 120 x 40, 1 to 16, stride 4", "lr = 0.00025"]
     {
@@ -104,4 +107,49 @@ fn what_a_network_cannot_learn_from_is_refused() {
     refuse(&[&level[..], &["--set", "epoch=3"]].concat(), "epochs");
     refuse(&[&level[..], &["--set", "lr=-1"]].concat(), "above 0");
     refuse(&[&level[..], &["--set", "select=validation"]].concat(), "groups");
+}
+
+#[test]
+fn systems_of_the_paper_join_the_benchmark() {
+    let folder = tempfile::tempdir().unwrap();
+    let (data, out) = (folder.path().join("ccm"), folder.path().join("report"));
+    done(&["synth", "--out", text(&data), "--small", "--quiet"]);
+    let folders = ["benchmark", "--data", text(&data), "--out", text(&out)];
+    let scores = done(&[&folders[..], &["--methods", "m1,m2,m5", "--epochs", "1"]].concat());
+    // Baselines run only where they are asked for.
+    assert!(!scores.contains("kNN"), "{scores}");
+    for (name, tasks) in [("M1", 2), ("M2", 1), ("M5", 2)] {
+        let line = scores.lines().find(|line| line.starts_with(name)).unwrap();
+        assert_eq!(line.matches(" to ").count(), tasks, "{line}");
+    }
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
+    let submission = read("submissions/m1-held-out.csv");
+    assert_eq!(submission.lines().count(), 58, "{submission}");
+    for name in ["figures/m1-joint-confusion.svg", "figures/m2-type-confusion.svg"] {
+        assert!(out.join(name).exists(), "{name}");
+    }
+    assert!(!out.join("figures/m2-level-confusion.svg").exists());
+    let report: Value = serde_json::from_str(&read("report.json")).unwrap();
+    let report = report.to_string();
+    for note in [
+        "m2_type was trained for 1 epoch, its recipe has 500.",
+        "type only; its capacity needs the depth views.",
+        "vggish embeddings were not given",
+    ] {
+        assert!(report.contains(note), "{note}");
+    }
+    // The paper's figures stand beside.
+    let table = read("tables/type.csv");
+    let rows = table.lines().filter(|line| line.starts_with("M2,")).count();
+    assert_eq!(rows, 2, "{table}");
+
+    let refuse = |more: &[&str], expected: &str| {
+        let message = refused(&[&folders[..], more].concat());
+        assert!(message.contains(expected), "{message}");
+    };
+    refuse(&["--methods", "m3"], "four views");
+    refuse(&["--methods", "m9"], "m1, m2, m3, m4, m5, m6");
+    refuse(&["--methods", "m1,M1"], "given twice");
+    let nowhere = "yamnet=nowhere.npz";
+    refuse(&["--methods", "m5", "--embeddings", nowhere], "vggish and r21d");
 }

@@ -2,6 +2,7 @@ use super::Definition;
 use crate::batch::Shape;
 use crate::layer::Chain;
 use crate::layers::{Dropout, Linear, Relu};
+use crate::front_end::FrontEnd;
 use crate::network::{Architecture, Body, Input};
 use crate::recipe::Recipe;
 
@@ -12,6 +13,10 @@ pub(super) const M1: Definition = Definition {
     outputs: 3,
     classifies: true,
     architecture,
+    front_end: Some(FrontEnd {
+        set: &["summary.stats=[\"mean\",\"std\"]"],
+        ..FrontEnd::of("m1")
+    }),
     // The paper names Adam alone; the rest is our choice.
     recipe: Recipe::adam(1e-3, 32, 100),
 };

@@ -12,6 +12,7 @@ pub(super) const M2_CAPACITY: Definition = Definition {
     outputs: 1,
     classifies: false,
     architecture,
+    front_end: None,
     recipe: Recipe::adam(2.5e-4, 8, 500),
 };
 

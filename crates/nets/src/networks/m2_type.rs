@@ -1,6 +1,7 @@
 use super::Definition;
 use crate::batch::Shape;
 use crate::layers::{Conv2d, Dropout, Flatten, Linear, Relu};
+use crate::front_end::FrontEnd;
 use crate::network::{Architecture, Body, Input};
 use crate::recipe::{OptimizerKind, Recipe};
 
@@ -11,6 +12,7 @@ pub(super) const M2_TYPE: Definition = Definition {
     outputs: 4,
     classifies: true,
     architecture,
+    front_end: Some(FrontEnd::of("m2")),
     // 500 epochs in the code, 200 in the report.
     recipe: Recipe {
         optimizer: OptimizerKind::Sgd,

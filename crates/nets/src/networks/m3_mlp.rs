@@ -1,6 +1,7 @@
 use super::Definition;
 use crate::batch::Shape;
 use crate::layers::{Linear, Relu};
+use crate::front_end::FrontEnd;
 use crate::network::{Architecture, Body, Input};
 use crate::recipe::Recipe;
 
@@ -11,6 +12,7 @@ pub(super) const M3_MLP: Definition = Definition {
     outputs: 3,
     classifies: true,
     architecture,
+    front_end: Some(FrontEnd { item: |tensor| tensor.by_coefficient(), ..FrontEnd::of("m3") }),
     // The paper names none: our choice.
     recipe: Recipe::adam(1e-4, 32, 100),
 };

@@ -2,6 +2,7 @@ use super::Definition;
 use crate::batch::Shape;
 use crate::layer::Chain;
 use crate::layers::{BatchNorm, Conv2d, Dropout, Flatten, Linear, MaxPool, Relu, Softmax};
+use crate::front_end::{FrontEnd, Windows};
 use crate::network::{Architecture, Body, Input};
 use crate::recipe::Recipe;
 
@@ -12,8 +13,23 @@ pub(super) const M4_TYPE: Definition = Definition {
     outputs: 4,
     classifies: true,
     architecture,
+    front_end: Some(FRONT_END),
     recipe: Recipe { weight_decay: 1e-5, ..Recipe::adam(1e-5, 32, 200) },
 };
+
+/// Windows of 64 frames, 75 % overlap, scaled by the published extremes: the decibels of silence and
+/// of the loudest recording.
+const FRONT_END: FrontEnd = FrontEnd {
+    preset: "m4-code",
+    set: &[],
+    windows: Some(Windows { frames: 64, step: 16 }),
+    item: |tensor| {
+        let scale = |v: f32| ((f64::from(v) - MIN) / (MAX - MIN)) as f32;
+        tensor.values.into_iter().map(scale).collect()
+    },
+};
+const MIN: f64 = -313.071_195_49;
+const MAX: f64 = 194.191_876_53;
 
 const BLOCKS: [&[usize]; 5] =
     [&[32, 32], &[64, 64], &[128, 128, 128], &[256, 256, 256], &[256, 256, 256]];

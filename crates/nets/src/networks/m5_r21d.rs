@@ -15,6 +15,7 @@ pub(super) const M5_R21D_LEVEL: Definition = Definition {
     outputs: 3,
     classifies: true,
     architecture: |outputs| architecture(outputs, 512, 3),
+    front_end: None,
     recipe: XAVIER,
 };
 
@@ -25,6 +26,7 @@ pub(super) const M5_R21D_TYPE: Definition = Definition {
     outputs: 4,
     classifies: true,
     architecture: |outputs| architecture(outputs, 256, 2),
+    front_end: None,
     recipe: XAVIER,
 };
 

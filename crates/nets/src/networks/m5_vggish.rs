@@ -15,6 +15,7 @@ pub(super) const M5_VGGISH_LEVEL: Definition = Definition {
     outputs: 3,
     classifies: true,
     architecture,
+    front_end: None,
     recipe: XAVIER,
 };
 

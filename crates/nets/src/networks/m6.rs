@@ -2,6 +2,7 @@ use super::Definition;
 use crate::batch::Shape;
 use crate::layer::Chain;
 use crate::layers::{Conv2d, Dropout, Flatten, Linear, MaxPool, Relu};
+use crate::front_end::FrontEnd;
 use crate::network::{Architecture, Body, Input};
 use crate::recipe::{InitialKind, Recipe};
 
@@ -16,6 +17,7 @@ pub(super) const M6_ACTION: Definition = Definition {
     outputs: 3,
     classifies: true,
     architecture: |outputs| architecture(&[64, 128], &[512, 512], false, outputs),
+    front_end: Some(FrontEnd::of("m6-code")),
     recipe: KERAS,
 };
 
@@ -26,6 +28,7 @@ pub(super) const M6_POURING: Definition = Definition {
     outputs: 6,
     classifies: true,
     architecture: |outputs| architecture(&[64, 128, 256], &[512, 512], true, outputs),
+    front_end: Some(FrontEnd::of("m6-code")),
     recipe: KERAS,
 };
 
@@ -36,6 +39,7 @@ pub(super) const M6_SHAKING: Definition = Definition {
     outputs: 4,
     classifies: true,
     architecture: |outputs| architecture(&[64, 128], &[512], false, outputs),
+    front_end: Some(FrontEnd::of("m6-code")),
     recipe: KERAS,
 };
 

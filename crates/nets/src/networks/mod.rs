@@ -3,6 +3,7 @@
 //! Adding one: a file here with a [`Definition`], and one line in the list below.
 
 use crate::error::{NetError, Result};
+use crate::front_end::FrontEnd;
 use crate::network::{Architecture, Network};
 use crate::recipe::Recipe;
 
@@ -19,6 +20,9 @@ pub struct Definition {
     pub classifies: bool,
     /// layers, for a number of outputs
     pub architecture: fn(usize) -> Architecture,
+    /// how its input comes from a recording; `None` where it takes what other networks give, or
+    /// more than sound
+    pub front_end: Option<FrontEnd>,
     /// training as the published code has it, its defects corrected
     pub recipe: Recipe,
 }

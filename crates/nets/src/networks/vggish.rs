@@ -2,6 +2,7 @@ use super::Definition;
 use crate::batch::Shape;
 use crate::layer::Chain;
 use crate::layers::{Conv2d, FlattenPixels, Linear, MaxPool, Relu};
+use crate::front_end::{FrontEnd, Windows};
 use crate::network::{Architecture, Body, Input};
 use crate::recipe::Recipe;
 
@@ -12,6 +13,10 @@ pub(super) const VGGISH: Definition = Definition {
     outputs: 128,
     classifies: false,
     architecture,
+    front_end: Some(FrontEnd {
+        windows: Some(Windows { frames: 96, step: 96 }),
+        ..FrontEnd::of("m5-vggish")
+    }),
     // Never trained in the benchmark; for those who go on with its weights.
     recipe: Recipe::adam(1e-5, 32, 10),
 };

@@ -5,6 +5,7 @@ use corsmal_report::{Fact, Section};
 use crate::benchmark::Made;
 use crate::benchmark::baselines::Outcome;
 use crate::benchmark::results::Rows;
+use crate::benchmark::system::Run;
 use crate::citation;
 use crate::dataset::DataSet;
 
@@ -30,7 +31,9 @@ pub(super) fn facts(
         .map(|o| format!("{} {:.8}", o.baseline.features.preset(), o.config.hash()))
         .collect();
     sets.dedup();
-    facts.push(Fact::new("Feature configurations", sets.join(", ")));
+    if !sets.is_empty() {
+        facts.push(Fact::new("Feature configurations", sets.join(", ")));
+    }
     facts.push(Fact::new("Seed", seed.to_string()));
     let (version, os, arch) =
         (env!("CARGO_PKG_VERSION"), std::env::consts::OS, std::env::consts::ARCH);
@@ -60,7 +63,10 @@ pub(super) fn methods() -> Section {
 }
 
 /// `nowhere`: methods whose files have no recording of the data set.
-pub(super) fn notes<'a>(nowhere: impl Iterator<Item = &'a str>) -> Section {
+pub(super) fn notes<'a>(nowhere: impl Iterator<Item = &'a str>, runs: &[Run]) -> Section {
+    let of_systems = runs
+        .iter()
+        .flat_map(|run| run.notes.iter().map(|note| format!("{} of this run: {note}", run.name)));
     let absent = nowhere
         .map(|name| format!("The predictions of {name} are for no recording of this data set."));
     Section {
@@ -80,6 +86,7 @@ pub(super) fn notes<'a>(nowhere: impl Iterator<Item = &'a str>) -> Section {
         ]
         .into_iter()
         .chain(absent)
+        .chain(of_systems)
         .collect(),
         ..Section::new("notes", "Reading these figures")
     }

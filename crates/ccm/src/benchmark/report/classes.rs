@@ -1,7 +1,7 @@
 //! Which classes are taken for which.
 
 use corsmal_plot::ConfusionMatrix as Plot;
-use corsmal_report::{Figure, FigureGroup, Section};
+use corsmal_report::{Figure, FigureGroup, Section, Source};
 use ndarray::Array2;
 
 use crate::benchmark::method::{Method, Part, joint_names, kind_names, level_names};
@@ -9,25 +9,28 @@ use crate::benchmark::results::{PartScores, Rows};
 use crate::error::Result;
 use crate::scores::ConfusionMatrix;
 
-/// Class by class: the corrected baseline that is best at the joint class first, then the others.
+/// Class by class: the method that is best at the joint class first, then the others.
 pub(super) fn section(rows: &Rows, methods: &[Method], seed: u64) -> Result<Option<Section>> {
-    let corrected = methods.iter().filter(|m| m.protocol == "corrected");
-    let mut scored: Vec<(&Method, PartScores)> = corrected
-        .filter_map(|m| Some((m, m.scores(rows, Part::Training, seed, &|_| true)?)))
-        .collect();
-    let joint = |s: &PartScores| s.joint.unwrap_or(0.0);
+    let shown = methods.iter().filter(|m| m.protocol == "corrected" || m.source == Source::Added);
+    let mut scored: Vec<(&Method, PartScores)> =
+        shown.filter_map(|m| Some((m, m.scores(rows, Part::Training, seed, &|_| true)?))).collect();
+    // One that does not address both tasks comes last.
+    let joint = |s: &PartScores| s.joint.unwrap_or(-1.0);
     scored.sort_by(|a, b| joint(&b.1).total_cmp(&joint(&a.1)));
     let Some((best, _)) = scored.first() else { return Ok(None) };
     let text = format!(
-        "Corrected baselines on held-out training containers; {} is the best at the joint class. \
-         Shades are shares of the true class. The folder figures has these pictures for every \
-         baseline and both protocols.",
+        "Held-out training containers; {} is the best at the joint class. Shades are shares of the \
+         true class. The folder figures has these pictures for every baseline, of both protocols, \
+         and for every system.",
         best.name
     );
     let groups = scored.iter().map(|(method, scores)| {
         let slug = format!("classes-{}", slug(&method.name));
         Ok(FigureGroup {
-            title: format!("{}, joint class {:.2} %", method.name, joint(scores)),
+            title: match scores.joint {
+                Some(joint) => format!("{}, joint class {joint:.2} %", method.name),
+                None => method.name.clone(),
+            },
             figures: figures(&slug, &method.name, scores)?,
         })
     });
@@ -43,14 +46,15 @@ fn slug(name: &str) -> String {
     words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("-")
 }
 
-/// The three confusion matrices of a method.
+/// The confusion matrices of the tasks that a method addresses.
 pub(super) fn figures(name: &str, title: &str, scores: &PartScores) -> Result<Vec<Figure>> {
     let parts = [
-        ("level", level_names(), &scores.level_matrix),
-        ("type", kind_names(), &scores.kind_matrix),
-        ("joint", joint_names(), &scores.joint_matrix),
+        ("level", level_names(), &scores.level_matrix, scores.level),
+        ("type", kind_names(), &scores.kind_matrix, scores.kind),
+        ("joint", joint_names(), &scores.joint_matrix, scores.joint),
     ];
-    let figures = parts.into_iter().map(|(task, labels, matrix)| {
+    let addressed = parts.into_iter().filter(|(.., score)| score.is_some());
+    let figures = addressed.map(|(task, labels, matrix, _)| {
         let plot = plot(&format!("{title}: {task}"), labels, matrix);
         Figure::new(format!("{name}-{task}-confusion"), "", &plot)
     });

@@ -9,7 +9,7 @@ use crate::benchmark::results::{PartScores, Rows};
 use crate::error::Result;
 use crate::paper::{self, Task};
 
-/// The best corrected baseline of each task, with the paper's figures for it and its best method.
+/// The best method of each task in this run, with the paper's figures for it and its best method.
 pub(super) fn section(
     synthetic: bool,
     rows: &Rows,
@@ -53,9 +53,8 @@ pub(super) fn section(
     Ok(Section {
         text: vec![
             format!(
-                "The best corrected baseline of this run on held-out training containers, the \
-                 paper's result for the same baseline on its test containers, and the paper's best \
-                 method. Weighted F1 in percent. {comparable}"
+                "The best method of this run on held-out training containers, the paper's result \
+                 for the same method on its test containers, and the paper's best method. Weighted F1 in percent. {comparable}"
             ),
             "Intervals hold 95 % of 1,000 bootstrap resamples. Scores on the training part resample \
              whole containers; scores on the test parts resample recordings, because their three \
@@ -65,12 +64,12 @@ pub(super) fn section(
         figures: figures.into_iter().collect::<corsmal_report::Result<_>>()?,
         tables: vec![Table {
             name: "glance".into(),
-            caption: "Best corrected baseline of this run and the paper's results".into(),
+            caption: "Best method of this run and the paper's results".into(),
             columns: [
                 "Task",
                 "Best in this run",
                 "This run, held-out containers",
-                "Paper, same baseline",
+                "Paper, same method",
                 "Paper's best",
                 "Paper, combined",
             ]

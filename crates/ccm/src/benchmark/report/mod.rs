@@ -12,9 +12,8 @@ use std::path::Path;
 use corsmal_report::Report;
 
 use super::Made;
-use super::added::Placed;
-use super::baselines::Outcome;
 use super::method::{Part, methods};
+use super::predicted::Predicted;
 use super::results::Rows;
 use crate::dataset::DataSet;
 use crate::error::Result;
@@ -26,25 +25,30 @@ const SYNTHETIC: &str = "These recordings are SYNTHETIC. Nothing here says anyth
 pub(super) fn report(
     set: &DataSet,
     rows: &Rows,
-    outcomes: &[Outcome],
-    added: &[Placed],
+    predicted: &Predicted<'_>,
     seed: u64,
     made: &Made,
 ) -> Result<Report> {
-    let methods = methods(rows, outcomes, added, seed);
+    let &Predicted { outcomes, runs, added } = predicted;
+    let methods = methods(rows, predicted, seed);
     let mut sections = vec![glance::section(set.synthetic, rows, &methods, seed)?];
     for task in Task::ALL {
         sections.push(tasks::section(task, rows, &methods, seed)?);
     }
-    sections.push(corrections::section(rows, outcomes, seed)?);
+    if !outcomes.is_empty() {
+        sections.push(corrections::section(rows, outcomes, seed)?);
+    }
     sections.push(containers::section(rows, &methods, seed)?);
     sections.extend(classes::section(rows, &methods, seed)?);
     sections.push(about::methods());
     let nowhere = added.iter().filter(|a| !a.is_any()).map(|a| a.name.as_str());
-    sections.push(about::notes(nowhere));
+    sections.push(about::notes(nowhere, runs));
     sections.push(about::cite());
     Ok(Report {
-        title: "CORSMAL benchmark: audio baselines".into(),
+        title: match runs {
+            [] => "CORSMAL benchmark: audio baselines".into(),
+            _ => "CORSMAL benchmark".into(),
+        },
         summary: "Filling level, filling type, capacity and filling mass of containers, estimated \
                   from the sound of pouring and shaking, next to the results published in the \
                   paper."
@@ -55,18 +59,19 @@ pub(super) fn report(
     })
 }
 
-/// Writes the confusion matrices of every baseline, of both protocols, into a folder.
+/// Writes the confusion matrices of every baseline, of both protocols, and of every system into a
+/// folder.
 pub(super) fn write_figures(
     folder: &Path,
     rows: &Rows,
-    outcomes: &[Outcome],
+    predicted: &Predicted<'_>,
     seed: u64,
 ) -> Result<()> {
-    for (method, outcome) in methods(rows, outcomes, &[], seed).iter().zip(outcomes) {
+    for method in methods(rows, predicted, seed) {
+        let Some(slug) = &method.slug else { continue };
         let Some(scores) = method.scores(rows, Part::Training, seed, &|_| true) else { continue };
-        let name = format!("{}-{}", outcome.baseline.slug(), method.protocol);
         let title = format!("{}, {}", method.name, method.protocol);
-        for figure in classes::figures(&name, &title, &scores)? {
+        for figure in classes::figures(slug, &title, &scores)? {
             figure.write(folder)?;
         }
     }

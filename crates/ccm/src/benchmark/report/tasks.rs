@@ -58,9 +58,11 @@ pub(super) fn section(task: Task, rows: &Rows, methods: &[Method], seed: u64) ->
             continue;
         }
         // The paper's mass table has the tasks that a method addresses in this place.
-        let audio = task == Task::Mass && !method.inputs.is_empty();
-        let inputs = if audio { "level, type" } else { &method.inputs };
-        let names = [&method.name, inputs, &method.protocol];
+        let inputs = match task {
+            Task::Mass if !method.inputs.is_empty() => method.addressed(),
+            _ => short_inputs(&method.inputs),
+        };
+        let names = [&method.name, &inputs, &method.protocol];
         let cells = names.map(|t| Cell::Text(t.to_string())).into_iter().chain(figures).collect();
         let row = Row { source: method.source, cells };
         let same = |line: &Row| line.cells[0] == row.cells[0];

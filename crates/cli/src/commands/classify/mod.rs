@@ -15,6 +15,7 @@ use corsmal_models::model_file::{Model, ModelFileError};
 
 pub use args::Args;
 
+use super::nets::is_model;
 use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
 use crate::publish;
 use records::End;
@@ -25,9 +26,8 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         publish::check(&args.out, args.overwrite)?;
     }
     let place = args.model.display();
-    #[cfg(feature = "nets")]
-    if corsmal_nets::model::is_model(&args.model) {
-        return network::run(&args, &corsmal_nets::model::NetModel::load(&args.model)?);
+    if is_model(&args.model) {
+        return with_network(&args);
     }
     let model = Model::load(&args.model).map_err(|e| match e {
         e @ ModelFileError::Io { .. } => Failure::from(e),
@@ -76,4 +76,15 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         (_, 0) => ExitCode::SUCCESS,
         _ => ExitCode::from(FAILED_FILES),
     })
+}
+
+#[cfg(feature = "nets")]
+fn with_network(args: &Args) -> Result<ExitCode, Failure> {
+    network::run(args, &corsmal_nets::model::NetModel::load(&args.model)?)
+}
+
+#[cfg(not(feature = "nets"))]
+fn with_network(args: &Args) -> Result<ExitCode, Failure> {
+    let absent = super::nets::absent();
+    Err(Failure::new(format!("{}: a trained network; {absent}", args.model.display())))
 }

@@ -1,0 +1,156 @@
+//! Systems of the paper that other crates bring, such as networks: what they are given and how they
+//! are run. Whole containers are held out, and labels of test recordings are never shown.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::baselines::container_folds;
+use super::matrix::inputs;
+use super::results::{Estimate, Rows};
+use crate::dataset::{DataSet, Filling, SequenceName};
+use crate::error::{CcmError, Result};
+use corsmal_extract::inputs::Input;
+
+/// A recording as a system sees it.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// The file, uncropped, with its id.
+    pub input: Input,
+    /// Number of the container, where known.
+    pub container: Option<u8>,
+    /// Settings and filling in the name, where known.
+    pub name: Option<SequenceName>,
+    /// Type and level; of training recordings only.
+    pub filling: Option<Filling>,
+    /// Seconds in which something is poured or shaken; `Some(None)` where nothing is.
+    pub action: Option<Option<(f64, f64)>>,
+}
+
+/// What a system works on.
+pub struct Work<'a> {
+    /// Training recordings, then those of the test parts.
+    pub subjects: Vec<Subject>,
+    /// How many of them are for training.
+    pub training: usize,
+    /// Folder in which features may be kept.
+    pub features: PathBuf,
+    /// Recordings that are extracted at a time.
+    pub jobs: usize,
+    /// Seed of what the published recipes leave to chance.
+    pub seed: u64,
+    /// Told each step.
+    pub progress: &'a dyn Fn(&str),
+    /// Set when the work is to end.
+    pub stop: &'a Arc<AtomicBool>,
+}
+
+/// A system of the paper.
+pub trait System {
+    /// Its name in the paper's tables.
+    fn name(&self) -> &'static str;
+
+    /// Gets ready: features of all recordings.
+    ///
+    /// # Errors
+    /// Recordings that it cannot take, inputs that are not there.
+    fn prepare<'a>(&'a self, work: &'a Work<'a>) -> Result<Box<dyn Prepared + 'a>>;
+}
+
+/// A system that has its features.
+pub trait Prepared {
+    /// What it hears and sees, joined by `+`.
+    fn inputs(&self) -> String {
+        "audio".into()
+    }
+
+    /// What differs from the published system, in sentences.
+    fn notes(&self) -> Vec<String>;
+
+    /// Estimates of the `wanted` subjects in their order, after training on the subjects `train`.
+    ///
+    /// # Errors
+    /// A training that fails or is interrupted.
+    fn predict(&self, train: &[usize], wanted: &[usize]) -> Result<Vec<Estimate>>;
+}
+
+/// What a system predicted.
+pub(super) struct Run {
+    pub(super) name: &'static str,
+    pub(super) inputs: String,
+    pub(super) notes: Vec<String>,
+    /// Training recordings, each by networks that never heard its container.
+    pub(super) held_out: Vec<(usize, Estimate)>,
+    /// Test parts, by networks trained on all training recordings.
+    pub(super) tests: Vec<Vec<Estimate>>,
+}
+
+impl<'a> Work<'a> {
+    pub(super) fn new(
+        set: &DataSet,
+        rows: &Rows,
+        features: &Path,
+        (jobs, seed): (usize, u64),
+        progress: &'a dyn Fn(&str),
+        stop: &'a Arc<AtomicBool>,
+    ) -> Result<Self> {
+        let actions = set.actions()?;
+        let none = crate::dataset::Actions::new();
+        let parts = std::iter::once((&rows.training, true))
+            .chain(rows.tests.iter().map(|test| (&test.rows, false)));
+        let mut subjects = Vec::new();
+        for (targets, training) in parts {
+            for (mut input, target) in inputs(&set.root, targets, &none).into_iter().zip(targets) {
+                input.labels.clear();
+                let recording = &target.recording;
+                let key = recording.container.zip(recording.name);
+                subjects.push(Subject {
+                    input,
+                    container: recording.container.map(|c| c.number()),
+                    name: recording.name.filter(|_| training),
+                    filling: target.filling.filter(|_| training),
+                    action: key.filter(|_| training).and_then(|k| actions.get(&k).copied()),
+                });
+            }
+        }
+        let features = features.to_path_buf();
+        let training = rows.training.len();
+        Ok(Self { subjects, training, features, jobs, seed, progress, stop })
+    }
+
+    /// Fails once the work is to end.
+    ///
+    /// # Errors
+    /// [`CcmError::Interrupted`].
+    pub fn go_on(&self) -> Result<()> {
+        if self.stop.load(Ordering::Relaxed) { Err(CcmError::Interrupted) } else { Ok(()) }
+    }
+}
+
+/// Holds out containers in three folds; test parts are predicted after training on everything.
+pub(super) fn run(system: &dyn System, work: &Work<'_>, rows: &Rows) -> Result<Run> {
+    let name = system.name();
+    let fault = |e: corsmal_models::ModelError| CcmError::Request(format!("{name}: {e}"));
+    (work.progress)(&format!("{name}: features"));
+    let prepared = system.prepare(work)?;
+    let mut held_out = Vec::with_capacity(work.training);
+    let folds = container_folds(&rows.training).map_err(fault)?;
+    for (number, fold) in folds.iter().enumerate() {
+        work.go_on()?;
+        (work.progress)(&format!("{name}: fold {} of {}", number + 1, folds.len()));
+        let found = prepared.predict(&fold.train, &fold.test)?;
+        held_out.extend(fold.test.iter().copied().zip(found));
+    }
+    held_out.sort_by_key(|(row, _)| *row);
+    let mut tests = Vec::with_capacity(rows.tests.len());
+    if !rows.tests.is_empty() {
+        work.go_on()?;
+        (work.progress)(&format!("{name}: all training recordings"));
+        let all: Vec<usize> = (0..work.training).collect();
+        let wanted: Vec<usize> = (work.training..work.subjects.len()).collect();
+        let mut found = prepared.predict(&all, &wanted)?.into_iter();
+        tests.extend(rows.tests.iter().map(|t| found.by_ref().take(t.rows.len()).collect()));
+    }
+    let (inputs, notes) = (prepared.inputs(), prepared.notes());
+    Ok(Run { name, inputs, notes, held_out, tests })
+}

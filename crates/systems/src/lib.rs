@@ -1,0 +1,98 @@
+//! The systems of the paper, M1 to M6: front ends and networks of `corsmal-nets` joined by votes,
+//! cascades and fusion, run by [`corsmal_ccm::benchmark`].
+//!
+//! Adding one: a file here with a [`Definition`], and one line in the list below.
+
+mod learning;
+pub mod recordings;
+
+use std::path::PathBuf;
+
+use corsmal_ccm::benchmark::System;
+use corsmal_ccm::{CcmError, Result};
+
+/// What is chosen for all networks of all systems.
+#[derive(Clone, Debug, Default)]
+pub struct Settings {
+    /// Epochs instead of the published ones.
+    pub epochs: Option<usize>,
+    /// Embeddings of recordings by other programs, by name (`vggish`, `r21d`), in the format of
+    /// [`corsmal_nets::dataset`]; several files of a name are joined.
+    pub embeddings: Vec<(String, PathBuf)>,
+}
+
+/// A system of the paper.
+pub struct Definition {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// One sentence.
+    pub about: &'static str,
+    /// Networks that it is made of.
+    pub networks: &'static [&'static str],
+    /// What of it is not there, or is a choice of ours, in sentences.
+    pub limits: &'static [&'static str],
+    /// Makes it, unless what it needs is not there.
+    make: Option<fn(Settings) -> Box<dyn System>>,
+}
+
+macro_rules! systems {
+    ($($module:ident: $definition:ident;)*) => {
+        $(mod $module;)*
+
+        /// All systems of the paper.
+        pub const SYSTEMS: &[Definition] = &[$($module::$definition),*];
+    };
+}
+
+systems! {
+    m1: M1;
+    m2: M2;
+    m3: M3;
+    m4: M4;
+    m5: M5;
+    m6: M6;
+}
+
+/// The system of this name.
+///
+/// # Errors
+/// [`CcmError::Request`] with the names there are.
+pub fn named(name: &str) -> Result<&'static Definition> {
+    SYSTEMS.iter().find(|s| s.name.eq_ignore_ascii_case(name)).ok_or_else(|| {
+        let names: Vec<&str> = SYSTEMS.iter().map(|s| s.name).collect();
+        CcmError::Request(format!("there is no system {name}: {}", names.join(", ")))
+    })
+}
+
+impl Definition {
+    /// The system, ready to be run.
+    ///
+    /// # Errors
+    /// [`CcmError::Request`] for one whose inputs this program does not make.
+    pub fn make(&self, settings: &Settings) -> Result<Box<dyn System>> {
+        let make = self.make.ok_or_else(|| {
+            CcmError::Request(format!("{}: {}", self.name, self.limits.join(" ")))
+        })?;
+        Ok(make(settings.clone()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn systems_are_made_of_known_networks() {
+        for system in SYSTEMS {
+            for network in system.networks {
+                corsmal_nets::networks::named(network).unwrap();
+            }
+            let made = system.make(&Settings::default());
+            match made {
+                Ok(made) => assert!(made.name().eq_ignore_ascii_case(system.name)),
+                Err(error) => assert!(error.to_string().contains(system.limits[0])),
+            }
+        }
+        assert!(named("m7").is_err_and(|e| e.to_string().contains("m1, m2")));
+    }
+}

@@ -1,0 +1,55 @@
+use corsmal_ccm::Result;
+use corsmal_ccm::benchmark::{Estimate, Prepared, System, Work};
+use corsmal_nets::items::Items;
+
+use crate::learning::{self, Learning, array, best};
+use crate::{Definition, Settings};
+
+/// NTNU-ERC's system.
+pub(crate) const M2: Definition = Definition {
+    name: "m2",
+    about: "M2 (NTNU-ERC): type by a convolutional network over MFCC",
+    networks: &["m2_type", "m2_capacity"],
+    limits: &["Its capacity network needs the depth views, which `benchmark` does not read; \
+               `corsmal-feat capacity` estimates capacities from views, and --add joins them."],
+    make: Some(|settings| Box::new(Ntnu(settings))),
+};
+
+struct Ntnu(Settings);
+
+struct Ready<'a> {
+    learning: Learning<'a>,
+    items: Items,
+    types: Vec<usize>,
+}
+
+impl System for Ntnu {
+    fn name(&self) -> &'static str {
+        "M2"
+    }
+
+    fn prepare<'a>(&'a self, work: &'a Work<'a>) -> Result<Box<dyn Prepared + 'a>> {
+        let learning = Learning::new("M2", work, &self.0);
+        learning.note("type only; its capacity needs the depth views.".into());
+        let items = learning::single(learning.items("m2_type")?);
+        let types = learning.types();
+        Ok(Box::new(Ready { learning, items, types }))
+    }
+}
+
+impl Prepared for Ready<'_> {
+    fn notes(&self) -> Vec<String> {
+        self.learning.notes()
+    }
+
+    fn predict(&self, train: &[usize], wanted: &[usize]) -> Result<Vec<Estimate>> {
+        let trained = self.learning.train("m2_type", 4, &self.items, &self.types, train)?;
+        let found = self.learning.probabilities(&trained, &self.items, wanted)?;
+        let estimate = |kind: &Vec<f64>| Estimate {
+            kind: Some(best(kind)),
+            kind_probabilities: array(kind),
+            ..Estimate::default()
+        };
+        Ok(found.iter().map(estimate).collect())
+    }
+}
