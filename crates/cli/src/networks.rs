@@ -1,23 +1,31 @@
 //! `train --net` and `cross-validate --net`.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use corsmal_ccm::dataset::SequenceName;
+use corsmal_extract::config::Config;
+use corsmal_extract::inputs;
 use corsmal_models::cross_validation::CrossValidation;
 use corsmal_models::dataset::LabelledTable;
 use corsmal_models::folds::{CvPlan, Folds};
 use corsmal_models::labels::Labels;
+use corsmal_models::model_file::TrainedOn;
 use corsmal_models::scores::Scores;
+use corsmal_models::splits as models;
 use corsmal_models::targets::Classes;
 use corsmal_nets::NetError;
 use corsmal_nets::cross_validation::{self, Data, Fold};
 use corsmal_nets::dataset::Dataset;
 use corsmal_nets::fit::{self, Progress, Task};
-use corsmal_nets::items::Items;
+use corsmal_nets::front_end::{FrontEnd, Item};
+use corsmal_nets::items::{Column, Items};
 use corsmal_nets::model::{self, NetModel};
+use corsmal_nets::network::Network;
 use corsmal_nets::networks::{self, Definition};
 use corsmal_nets::recipe::Recipe;
+use corsmal_systems::recordings;
 use ndarray::Array2;
 use serde_json::{Value, json};
 
@@ -33,6 +41,8 @@ pub struct Request<'a> {
     pub pipeline: &'a PipelineArgs,
     /// checkpoints
     pub network: &'a NetworkArgs,
+    /// recordings that are extracted at a time
+    pub jobs: usize,
     /// nothing but warnings
     pub quiet: bool,
 }
@@ -42,10 +52,22 @@ struct Loaded {
     definition: &'static Definition,
     recipe: Recipe,
     items: Items,
+    /// the row of each item: a recording may be several windows
+    row_of: Vec<usize>,
+    /// features and formats of recordings that the items were made of
+    made: Made,
+    /// a row for each recording, or each item of a file
     table: LabelledTable,
     target: String,
     labels: Labels,
     classes: Classes,
+}
+
+/// How items were made of recordings; nothing where they came from a file.
+#[derive(Default)]
+struct Made {
+    config: Option<Config>,
+    trained_on: Option<TrainedOn>,
 }
 
 /// A validation, in the terms of the classifiers'.
@@ -75,22 +97,85 @@ impl Request<'_> {
                 definition.name
             )));
         }
-        let recipe = definition.recipe.with(&self.pipeline.changes()?)?;
+        let recipe = definition.recipe_with(&self.pipeline.changes()?)?;
         let path = self.dataset.path();
-        let Dataset { ids, mut columns, items } = Dataset::read(path, &definition.build(None, 0)?)?;
-        columns.extend(named_labels(&columns));
-        let mut table = LabelledTable::of_columns(path, ids, columns);
+        let network = definition.build(None, 0)?;
+        let (mut table, items, row_of, made) = match is_npz(path) {
+            true => {
+                let Dataset { ids, mut columns, items } = Dataset::read(path, &network)?;
+                columns.extend(named_labels(&columns));
+                let row_of = (0..ids.len()).collect();
+                (LabelledTable::of_columns(path, ids, columns), items, row_of, Made::default())
+            }
+            false => self.of_recordings(definition, &network)?,
+        };
         let target = self.dataset.label(&mut table)?;
         let (labels, classes) = table.classes(&target)?;
-        Ok(Loaded { definition, recipe, items, table, target, labels, classes })
+        Ok(Loaded { definition, recipe, items, row_of, made, table, target, labels, classes })
+    }
+
+    /// Recordings through the network's front end.
+    fn of_recordings(
+        &self,
+        definition: &Definition,
+        network: &Network,
+    ) -> Result<(LabelledTable, Items, Vec<usize>, Made), Failure> {
+        let path = self.dataset.path();
+        let front_end = front_end(definition)?;
+        let collected = inputs::collect(&[path])?;
+        if let Some(skipped) = collected.warning() {
+            eprintln!("warning: {skipped}");
+        }
+        let config = recordings::configuration(&front_end)?;
+        let stop = interrupt::flag();
+        let shared = Arc::new(config.clone());
+        let mut kept = recordings::temporary(&collected.inputs, &shared, self.jobs, stop)?;
+        let outcomes = std::mem::take(&mut kept.outcomes);
+        let (mut heard, mut ids, mut row_of) = (Vec::new(), Vec::new(), Vec::new());
+        let mut items: Vec<Item> = Vec::new();
+        let mut columns: Vec<(String, Vec<String>)> = Vec::new();
+        for (input, outcome) in collected.inputs.iter().zip(outcomes) {
+            let found = match outcome.status.has_features() {
+                true => {
+                    front_end.items(network, kept.tensor(&input.id)?).map_err(|e| e.to_string())
+                }
+                false => Err(format!("{}: {}", outcome.status, outcome.reason)),
+            };
+            let found = match found {
+                Ok(found) => found,
+                Err(reason) => {
+                    eprintln!("warning: {}: {reason}: not trained on", input.id);
+                    continue;
+                }
+            };
+            if columns.is_empty() {
+                columns = input.labels.iter().map(|(n, _)| (n.clone(), Vec::new())).collect();
+            }
+            columns.iter_mut().zip(&input.labels).for_each(|((_, c), (_, v))| c.push(v.clone()));
+            row_of.extend(std::iter::repeat_n(ids.len(), found.len()));
+            items.extend(found);
+            ids.push(input.id.clone());
+            heard.push(outcome);
+        }
+        if ids.is_empty() {
+            let place = path.display();
+            return Err(Failure::new(format!("{place}: no recording that can be trained on")));
+        }
+        let trained_on = TrainedOn::of(heard.iter().map(|o| (o.sample_rate, o.channels)));
+        let mut table = LabelledTable::of_columns(path, ids, columns);
+        table.outcomes = heard;
+        let column = Column::of(items.iter().map(|item| item.values.as_slice()));
+        let made = Made { config: Some(config), trained_on };
+        Ok((table, Items { columns: vec![column] }, row_of, made))
     }
 
     /// Trains on all items.
     pub fn train(&self, name: &str) -> Result<(NetModel, Value), Failure> {
-        let Loaded { definition, recipe, items, table, target, labels, classes } =
+        let Loaded { definition, recipe, items, row_of, made, table, target, labels, classes } =
             self.load(name)?;
-        let y = classes.indices().to_vec();
+        let y: Vec<usize> = row_of.iter().map(|&row| classes.indices()[row]).collect();
         let groups = self.dataset.groups.as_deref().map(|g| table.column(g)).transpose()?;
+        let groups = groups.map(|g| of_items(&g, &row_of));
         let groups = groups.as_deref();
         let data = Data { items: &items, classes: &y, n_classes: labels.len(), groups };
         let all = Fold { name: "all".into(), train: (0..y.len()).collect(), test: Vec::new() };
@@ -123,8 +208,13 @@ impl Request<'_> {
             target,
             recipe,
             history,
-            feature_config: Value::Null,
-            provenance: json!({ "files": self.dataset.provenance()?, "items": y.len() }),
+            feature_config: made.config.map_or(Value::Null, |config| config.to_value()),
+            provenance: json!({
+                "files": if is_npz(self.dataset.path()) { self.dataset.provenance()? } else { Value::Null },
+                "recordings": if is_npz(self.dataset.path()) { Value::Null } else { table.ids.len().into() },
+                "items": y.len(),
+                "trained_on": made.trained_on,
+            }),
             tool_version: env!("CARGO_PKG_VERSION").into(),
         };
         Ok((NetModel::new(header, network)?, summary))
@@ -132,7 +222,7 @@ impl Request<'_> {
 
     /// Holds out parts of the items in turn.
     pub fn cross_validate(&self, name: &str, plan: Option<&CvPlan>) -> Result<Validated, Failure> {
-        let Loaded { definition, recipe, items, table, target, labels, classes } =
+        let Loaded { definition, recipe, items, row_of, table, target, labels, classes, .. } =
             self.load(name)?;
         let groups = self.dataset.groups.as_deref();
         let folds = Folds::new(plan, &table, groups, (&labels, &classes), self.pipeline.seed)?;
@@ -140,13 +230,23 @@ impl Request<'_> {
             let name = &labels.names()[class];
             eprintln!("warning: fold {fold}: class {name} has no training rows");
         }
-        let y = classes.indices().to_vec();
-        let data =
-            Data { items: &items, classes: &y, n_classes: labels.len(), groups: folds.groups() };
+        let y: Vec<usize> = row_of.iter().map(|&row| classes.indices()[row]).collect();
+        let groups = folds.groups().map(|groups| of_items(groups, &row_of));
+        let groups = groups.as_deref();
+        let data = Data { items: &items, classes: &y, n_classes: labels.len(), groups };
+        let mut items_of: Vec<Vec<usize>> = vec![Vec::new(); table.ids.len()];
+        row_of.iter().enumerate().for_each(|(item, &row)| items_of[row].push(item));
+        let of_rows = |rows: &[usize]| -> Vec<usize> {
+            rows.iter().flat_map(|&row| items_of[row].iter().copied()).collect()
+        };
         let outer: Vec<Fold> = folds
             .outer
             .iter()
-            .map(|f| Fold { name: f.name.clone(), train: f.train.clone(), test: f.test.clone() })
+            .map(|f| Fold {
+                name: f.name.clone(),
+                train: of_rows(&f.train),
+                test: of_rows(&f.test),
+            })
             .collect();
         let found = cross_validation::cross_validate(
             definition,
@@ -165,13 +265,19 @@ impl Request<'_> {
             )
             .collect();
         let report = json!({ "network": definition.name, "recipe": recipe, "folds": histories });
-        let of_fold = |f: cross_validation::FoldResult| {
-            let (rows, columns) = (f.probabilities.len(), labels.len());
-            let flat = f.probabilities.into_iter().flatten().collect();
-            let proba = Array2::from_shape_vec((rows, columns), flat);
-            proba.map(|proba| (f.name, f.test, proba))
+        // A recording of several windows has their mean.
+        let of_fold = |(f, fold): (cross_validation::FoldResult, &models::Fold)| {
+            let mut proba = Array2::zeros((fold.test.len(), labels.len()));
+            let mut windows = f.probabilities.iter();
+            for (mut mean, &row) in proba.rows_mut().into_iter().zip(&fold.test) {
+                for window in windows.by_ref().take(items_of[row].len()) {
+                    mean.iter_mut().zip(window).for_each(|(sum, p)| *sum += p);
+                }
+                mean /= items_of[row].len() as f64;
+            }
+            (f.name, fold.test.clone(), proba)
         };
-        let folds_found = found.into_iter().map(of_fold).collect::<Result<Vec<_>, _>>()?;
+        let folds_found = found.into_iter().zip(&folds.outer).map(of_fold).collect();
         let result = CrossValidation::of_probabilities(folds_found, &classes)?;
         Ok(Validated { table, target, labels, classes, folds, result, report })
     }
@@ -214,6 +320,29 @@ impl Request<'_> {
             _ => error.into(),
         }
     }
+}
+
+/// Whether a path names a file of a network's inputs, and not recordings.
+fn is_npz(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz"))
+}
+
+/// How a network's input comes from recordings.
+///
+/// # Errors
+/// What it takes instead.
+pub fn front_end(definition: &Definition) -> Result<FrontEnd, Failure> {
+    definition.front_end.ok_or_else(|| {
+        Failure::new(format!(
+            "{}: takes {} and no recordings: give an .npz of that",
+            definition.name, definition.takes
+        ))
+    })
+}
+
+/// The value of each item's row.
+fn of_items(values: &[String], row_of: &[usize]) -> Vec<String> {
+    row_of.iter().map(|&row| values[row].clone()).collect()
 }
 
 /// Type and level as numbers, where a column has names of CCM sequences.

@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     let definition = networks::named(&name)?;
-    let recipe = definition.recipe.with(&changes)?;
+    let recipe = definition.recipe_with(&changes)?;
     let network = definition.build(None, 0)?;
     let data = Dataset::read(Path::new(&features), &network)?;
     let containers = data.column("container").ok_or("no column container")?;

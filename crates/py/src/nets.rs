@@ -196,7 +196,7 @@ type ItemColumns<'py> = Vec<(PyReadonlyArrayDyn<'py, f32>, Vec<usize>)>;
 pub(crate) fn network_recipe(name: &str, changes: &str) -> PyResult<String> {
     let changes = serde_json::from_str(changes).map_err(value_error)?;
     let recipe =
-        networks::named(name).and_then(|d| d.recipe.with(&changes)).map_err(value_error)?;
+        networks::named(name).and_then(|d| d.recipe_with(&changes)).map_err(value_error)?;
     serde_json::to_string(&recipe).map_err(value_error)
 }
 

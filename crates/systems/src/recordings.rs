@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use corsmal_ccm::{CcmError, Result};
 use corsmal_extract::config::{Config, ConfigError, Preset};
+use corsmal_extract::engine::{FeatureArray, Features};
 use corsmal_extract::inputs::Input;
 use corsmal_extract::run::{self, Quiet, RunError, RunOptions};
 use corsmal_files::layout;
@@ -14,6 +15,7 @@ use corsmal_files::outcome::Outcome;
 use corsmal_files::shard::Shard;
 use corsmal_nets::front_end::{FrontEnd, Tensor};
 use ndarray::Ix3;
+use tempfile::TempDir;
 
 /// The configuration of a front end.
 ///
@@ -25,10 +27,29 @@ pub fn configuration(front_end: &FrontEnd) -> std::result::Result<Config, Config
     Config::with_overrides(preset.toml, preset.name, &changes)
 }
 
+/// Features computed from a signal as a front end takes them.
+///
+/// # Errors
+/// A text, where a temporary file cannot be read.
+pub fn tensor(features: Features) -> std::result::Result<Tensor, String> {
+    match features {
+        Features::Summary(values) => Ok(Tensor::vector(values)),
+        Features::Frames(arrays) => {
+            let Some(array) = arrays.into_iter().next() else { return Ok(Tensor::default()) };
+            let FeatureArray { coefficients, frames, values, .. } = array;
+            let values = values.into_vec().map_err(|e| e.to_string())?;
+            let channels = values.len() / (coefficients * frames).max(1);
+            Ok(Tensor { channels, coefficients, frames, values })
+        }
+    }
+}
+
 /// Features of recordings in a file that is made where it is not there yet.
 pub struct Kept {
     npz: NpzFile,
     rows: Option<corsmal_files::table::Table>,
+    /// Where the file lies, if it goes with this.
+    _folder: Option<TempDir>,
     /// What became of each recording.
     pub outcomes: Vec<Outcome>,
 }
@@ -71,7 +92,22 @@ pub fn extract(
         Some(_) => Some(layout::read_table(&mut npz).map_err(|e| fault(&e))?.0),
         None => None,
     };
-    Ok(Kept { npz, rows, outcomes: report.outcomes })
+    Ok(Kept { npz, rows, _folder: None, outcomes: report.outcomes })
+}
+
+/// Extracts the features of `inputs` into a file that goes with what is returned.
+///
+/// # Errors
+/// As [`extract`].
+pub fn temporary(
+    inputs: &[Input],
+    config: &Arc<Config>,
+    jobs: usize,
+    stop: &Arc<AtomicBool>,
+) -> Result<Kept> {
+    let folder = tempfile::tempdir().map_err(CcmError::Write)?;
+    let kept = extract(inputs, config, &folder.path().join("features.npz"), jobs, stop)?;
+    Ok(Kept { _folder: Some(folder), ..kept })
 }
 
 impl Kept {

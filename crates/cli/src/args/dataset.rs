@@ -83,7 +83,8 @@ impl LabelArgs {
 /// Labelled features, as `train` and `cross-validate` take them.
 #[derive(clap::Args)]
 pub struct DatasetArgs {
-    /// Features: an .npz or .parquet of `extract` with summaries, or any .npz.
+    /// Features: an .npz or .parquet of `extract` with summaries, or any .npz. With --net also
+    /// recordings: a file, a folder or a manifest.
     #[arg(value_name = "FEATURES", required_unless_present = "features")]
     table: Option<PathBuf>,
     /// The same by name.

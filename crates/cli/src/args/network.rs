@@ -5,12 +5,26 @@ use std::path::PathBuf;
 /// Which network is trained.
 #[derive(clap::Args)]
 pub struct NetworkArgs {
-    /// Train a network of `corsmal-feat nets` instead of a classifier, from an .npz of its inputs;
-    /// --set changes its recipe, such as epochs=5.
+    /// Train a network of `corsmal-feat nets` instead of a classifier, from recordings or from an
+    /// .npz of its inputs; --set changes its recipe, such as epochs=5.
     #[arg(long, value_name = "NAME")]
     #[arg(conflicts_with_all = ["classifier", "standardize", "pca", "tune"])]
     pub net: Option<String>,
+    /// Where the network is computed: cpu, the only device that there is in this build.
+    #[arg(long, value_name = "DEVICE", default_value = "cpu", requires = "net", value_parser = device)]
+    pub device: String,
     /// Folder in which the training is kept after each epoch, and from which it goes on.
     #[arg(long, value_name = "FOLDER", requires = "net")]
     pub checkpoints: Option<PathBuf>,
+}
+
+fn device(name: &str) -> Result<String, String> {
+    match name {
+        "cpu" => Ok(name.into()),
+        _ => Err(
+            "no such device in this build: networks are computed on the cpu only, of which they \
+                  take every core (--jobs); docs/networks.md says why"
+                .into(),
+        ),
+    }
 }

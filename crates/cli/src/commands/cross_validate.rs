@@ -249,8 +249,9 @@ fn print_held_out(report: &ClassReport) {
 
 #[cfg(feature = "nets")]
 fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
-    let Args { dataset, pipeline, network, quiet, .. } = args;
-    let request = crate::networks::Request { dataset, pipeline, network, quiet: *quiet };
+    let Args { dataset, pipeline, network, quiet, jobs, .. } = args;
+    let (jobs, quiet) = (jobs.count(), *quiet);
+    let request = crate::networks::Request { dataset, pipeline, network, jobs, quiet };
     let found = request.cross_validate(name, args.cv.as_ref())?;
     let held_out = args.predictions.as_deref().unwrap_or(Path::new("the held-out predictions"));
     let ids = &found.table.ids;
@@ -271,7 +272,7 @@ fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
             "held_out": scores,
         });
         println!("{}", serde_json::to_string_pretty(&report)?);
-    } else if !quiet {
+    } else if !args.quiet {
         println!("features  {}: {} items", found.table.path.display(), ids.len());
         println!("target    {}, {} classes", found.target, found.labels.len());
         println!("network   {name}");

@@ -68,12 +68,24 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
             "about": definition.about,
             "parameters": parameters,
             "layers": layers,
+            "takes": definition.takes,
+            "preset": definition.front_end.map(|f| f.preset),
             "recipe": definition.recipe,
+            "paper": definition.paper.iter().copied().collect::<std::collections::BTreeMap<_, _>>(),
         });
         println!("{}", serde_json::to_string_pretty(&all)?);
         return Ok(ExitCode::SUCCESS);
     }
-    println!("{}: {}\n{parameters} parameters\n", definition.name, definition.about);
+    println!("{}: {}\n{parameters} parameters", definition.name, definition.about);
+    match definition.front_end {
+        Some(front_end) => {
+            println!(
+                "takes {}, from recordings by preset {}\n",
+                definition.takes, front_end.preset
+            );
+        }
+        None => println!("takes {}\n", definition.takes),
+    }
     let width = layers.iter().map(|(layer, _)| layer.chars().count()).max().unwrap_or(0);
     for (layer, shape) in &layers {
         println!("{layer:width$}  {shape}");
@@ -83,6 +95,9 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         for (key, value) in recipe {
             println!("  {key} = {value}");
         }
+    }
+    for (number, (key, value)) in definition.paper.iter().enumerate() {
+        println!("{}  {key} = {value}", if number == 0 { "\nrecipe=paper\n" } else { "" });
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -156,15 +156,16 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
 
 #[cfg(feature = "nets")]
 fn train_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
-    let Args { dataset, pipeline, network, quiet, .. } = args;
-    let request = crate::networks::Request { dataset, pipeline, network, quiet: *quiet };
+    let Args { dataset, pipeline, network, quiet, jobs, .. } = args;
+    let (jobs, quiet) = (jobs.count(), *quiet);
+    let request = crate::networks::Request { dataset, pipeline, network, jobs, quiet };
     let (model, summary) = request.train(name)?;
     let bytes = model.to_bytes().map_err(Failure::new)?;
     corsmal_files::draft::write(&args.out, &bytes)?;
     let (out, header) = (args.out.display(), &model.header);
     if args.json {
         println!("{}", serde_json::to_string_pretty(&summary)?);
-    } else if !quiet {
+    } else if !args.quiet {
         let (name, target) = (&header.network, &header.target);
         println!("{out}: {name}, {} numbers", model.network.parameters().count());
         println!("{target}: {}; epoch {} kept", header.labels.join(", "), header.history.kept + 1);

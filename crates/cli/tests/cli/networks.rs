@@ -51,6 +51,10 @@ fn networks_are_listed_and_explained() {
     let json: Value = serde_json::from_str(&done(&["nets", "m4-type", "--json"])).unwrap();
     assert_eq!(json["parameters"], 4_472_580);
     assert_eq!(json["recipe"]["weight_decay"], 1e-5);
+    assert_eq!((&json["preset"], &json["paper"]), (&"m4-code".into(), &serde_json::json!({})));
+    let level = done(&["nets", "m4-level"]);
+    assert!(level.contains("takes m4_type's features of each window"), "{level}");
+    assert!(level.contains("recipe=paper") && level.contains("lr = 0.00001"), "{level}");
     assert!(refused(&["nets", "m8"]).contains("m6_pouring"));
 }
 
@@ -107,6 +111,8 @@ fn what_a_network_cannot_learn_from_is_refused() {
     refuse(&[&level[..], &["--set", "epoch=3"]].concat(), "epochs");
     refuse(&[&level[..], &["--set", "lr=-1"]].concat(), "above 0");
     refuse(&[&level[..], &["--set", "select=validation"]].concat(), "groups");
+    refuse(&[&level[..], &["--set", "recipe=book"]].concat(), "code or paper");
+    refuse(&[&level[..], &["--device", "cuda"]].concat(), "cpu only");
 }
 
 #[test]
@@ -152,4 +158,99 @@ fn systems_of_the_paper_join_the_benchmark() {
     refuse(&["--methods", "m1,M1"], "given twice");
     let nowhere = "yamnet=nowhere.npz";
     refuse(&["--methods", "m5", "--embeddings", nowhere], "vggish and r21d");
+}
+
+/// A second of eight channels: a tone, or noise.
+fn tone(path: &Path, class: usize, seconds: f64, rate: u32) {
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    let spec = hound::WavSpec {
+        channels: 8,
+        sample_rate: rate,
+        bits_per_sample: 16,
+        sample_format: hound::SampleFormat::Int,
+    };
+    let mut writer = hound::WavWriter::create(path, spec).unwrap();
+    let frames = (seconds * f64::from(rate)) as u32;
+    for i in 0..8 * frames {
+        let noise = f64::from(i.wrapping_mul(2_654_435_761) >> 16) - 32_768.0;
+        let sine = 20_000.0 * (f64::from(i / 8) * 0.05).sin();
+        writer.write_sample(if class == 0 { sine } else { noise * 0.5 } as i16).unwrap();
+    }
+    writer.finalize().unwrap();
+}
+
+#[test]
+fn a_network_learns_from_recordings_and_hears_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let audio = path("audio");
+    for (class, name) in ["tone", "noise"].iter().enumerate() {
+        for take in 0..3 {
+            tone(&audio.join(name).join(format!("{take}.wav")), class, 1.0, 44_100);
+        }
+    }
+    // Too short for a window of 64 frames.
+    tone(&audio.join("tone/short.wav"), 0, 0.3, 44_100);
+    let model = path("type.safetensors");
+    let learn = ["train", text(&audio), "--net", "m4-type", "--labels", "folders"];
+    let recipe = ["--set", "epochs=4", "--set", "batch=6", "--set", "lr=0.001", "-o", text(&model)];
+    let output = crate::command::run(&[&learn[..], &recipe[..]].concat());
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    assert!(
+        message.contains("short: too short: ") && message.contains("not trained on"),
+        "{message}"
+    );
+
+    // A line for each window of a recording, and the reason for the one that has none.
+    let classify = ["classify", "-m", text(&model), text(&audio)];
+    let output = crate::command::run(&classify);
+    assert_eq!(output.status.code(), Some(1));
+    let table = String::from_utf8(output.stdout).unwrap();
+    let of = |id: &str| table.lines().filter(|l| l.starts_with(&format!("{id},"))).count();
+    assert_eq!((of("tone/0"), of("noise/2"), of("tone/short")), (3, 3, 1), "{table}");
+    let first = table.lines().find(|l| l.starts_with("tone/0,")).unwrap();
+    assert!(first.contains(",0,0.64,") || first.contains(",0.0,0.64,"), "{first}");
+    assert!(table.contains("too_short"), "{table}");
+
+    // One decision for each, by their votes; right, since the network was trained on them.
+    let votes = crate::command::run(&[&classify[..], &["--vote", "majority"]].concat());
+    let votes = String::from_utf8(votes.stdout).unwrap();
+    assert_eq!(votes.lines().count(), 8, "{votes}");
+
+    // A stream, window by window as it comes.
+    let wav = audio.join("noise/1.wav");
+    let live = ["classify", "-m", text(&model), "-", "--window", "0.7", "--hop", "0.1"];
+    let stdin = std::fs::File::open(&wav).unwrap();
+    let output = crate::command::tool().args(live).stdin(stdin).output().unwrap();
+    let live = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(live.lines().count(), 5, "{live}");
+
+    // Other formats are refused file by file.
+    let other = path("other.wav");
+    tone(&other, 0, 1.0, 22_050);
+    let output = crate::command::run(&["classify", "-m", text(&model), text(&other)]);
+    assert_eq!(output.status.code(), Some(1));
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(message.contains("mismatch"), "{message}");
+
+    let report = done(
+        &[
+            &["cross-validate"],
+            &learn[1..],
+            &["--cv", "3", "--set", "epochs=1", "--set", "batch=6", "-q", "--json"],
+        ]
+        .concat(),
+    );
+    let report: Value = serde_json::from_str(&report).unwrap();
+    let rows: usize = report["result"]["folds"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|fold| fold["rows"].as_array().unwrap().len())
+        .sum();
+    assert_eq!(rows, 6);
+    let level = ["train", text(&audio), "--net", "m4-level", "--labels", "folders"];
+    let message = refused(&[&level[..], &["-o", text(&path("no.safetensors"))]].concat());
+    assert!(message.contains("takes m4_type's features of each window"), "{message}");
 }

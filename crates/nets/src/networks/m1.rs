@@ -13,6 +13,8 @@ pub(super) const M1: Definition = Definition {
     outputs: 3,
     classifies: true,
     architecture,
+    paper: &[],
+    takes: "the mean and deviation of 1025 STFT magnitudes",
     front_end: Some(FrontEnd {
         set: &["summary.stats=[\"mean\",\"std\"]"],
         ..FrontEnd::of("m1")

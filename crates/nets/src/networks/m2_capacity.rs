@@ -12,6 +12,8 @@ pub(super) const M2_CAPACITY: Definition = Definition {
     outputs: 1,
     classifies: false,
     architecture,
+    paper: &[],
+    takes: "a depth image and the box of the container",
     front_end: None,
     recipe: Recipe::adam(2.5e-4, 8, 500),
 };

@@ -12,6 +12,8 @@ pub(super) const M2_TYPE: Definition = Definition {
     outputs: 4,
     classifies: true,
     architecture,
+    paper: &[("epochs", 200.0)],
+    takes: "1501 frames of 40 MFCC",
     front_end: Some(FrontEnd::of("m2")),
     // 500 epochs in the code, 200 in the report.
     recipe: Recipe {

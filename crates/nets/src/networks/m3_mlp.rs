@@ -12,6 +12,8 @@ pub(super) const M3_MLP: Definition = Definition {
     outputs: 3,
     classifies: true,
     architecture,
+    paper: &[],
+    takes: "a spectrogram of 6193 values",
     front_end: Some(FrontEnd { item: |tensor| tensor.by_coefficient(), ..FrontEnd::of("m3") }),
     // The paper names none: our choice.
     recipe: Recipe::adam(1e-4, 32, 100),

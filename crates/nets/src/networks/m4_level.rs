@@ -11,6 +11,8 @@ pub(super) const M4_LEVEL: Definition = Definition {
     outputs: 3,
     classifies: true,
     architecture,
+    paper: &[("lr", 1e-5), ("batch", 32.0), ("epochs", 200.0)],
+    takes: "m4_type's features of each window",
     front_end: None,
     // As in the code; the paper has 1e-5, 32 and 200.
     recipe: Recipe { clip_grad_norm: 0.5, drop_last: true, ..Recipe::adam(1e-4, 16, 400) },

@@ -13,6 +13,8 @@ pub(super) const M4_TYPE: Definition = Definition {
     outputs: 4,
     classifies: true,
     architecture,
+    paper: &[],
+    takes: "windows of 64 frames of 64 mel bands of 8 channels",
     front_end: Some(FRONT_END),
     recipe: Recipe { weight_decay: 1e-5, ..Recipe::adam(1e-5, 32, 200) },
 };

@@ -15,6 +15,8 @@ pub(super) const M5_R21D_LEVEL: Definition = Definition {
     outputs: 3,
     classifies: true,
     architecture: |outputs| architecture(outputs, 512, 3),
+    paper: &[],
+    takes: "R(2+1)D features of four views",
     front_end: None,
     recipe: XAVIER,
 };
@@ -26,6 +28,8 @@ pub(super) const M5_R21D_TYPE: Definition = Definition {
     outputs: 4,
     classifies: true,
     architecture: |outputs| architecture(outputs, 256, 2),
+    paper: &[],
+    takes: "R(2+1)D features of four views",
     front_end: None,
     recipe: XAVIER,
 };

@@ -15,6 +15,8 @@ pub(super) const M5_VGGISH_LEVEL: Definition = Definition {
     outputs: 3,
     classifies: true,
     architecture,
+    paper: &[],
+    takes: "VGGish embeddings",
     front_end: None,
     recipe: XAVIER,
 };

@@ -17,6 +17,8 @@ pub(super) const M6_ACTION: Definition = Definition {
     outputs: 3,
     classifies: true,
     architecture: |outputs| architecture(&[64, 128], &[512, 512], false, outputs),
+    paper: &[],
+    takes: "a spectrogram of 96 x 96",
     front_end: Some(FrontEnd::of("m6-code")),
     recipe: KERAS,
 };
@@ -28,6 +30,8 @@ pub(super) const M6_POURING: Definition = Definition {
     outputs: 6,
     classifies: true,
     architecture: |outputs| architecture(&[64, 128, 256], &[512, 512], true, outputs),
+    paper: &[],
+    takes: "a spectrogram of 96 x 96",
     front_end: Some(FrontEnd::of("m6-code")),
     recipe: KERAS,
 };
@@ -39,6 +43,8 @@ pub(super) const M6_SHAKING: Definition = Definition {
     outputs: 4,
     classifies: true,
     architecture: |outputs| architecture(&[64, 128], &[512], false, outputs),
+    paper: &[],
+    takes: "a spectrogram of 96 x 96",
     front_end: Some(FrontEnd::of("m6-code")),
     recipe: KERAS,
 };

@@ -2,6 +2,8 @@
 //!
 //! Adding one: a file here with a [`Definition`], and one line in the list below.
 
+use serde_json::{Map, Value, json};
+
 use crate::error::{NetError, Result};
 use crate::front_end::FrontEnd;
 use crate::network::{Architecture, Network};
@@ -20,11 +22,15 @@ pub struct Definition {
     pub classifies: bool,
     /// layers, for a number of outputs
     pub architecture: fn(usize) -> Architecture,
+    /// what an item is, in words
+    pub takes: &'static str,
     /// how its input comes from a recording; `None` where it takes what other networks give, or
     /// more than sound
     pub front_end: Option<FrontEnd>,
     /// training as the published code has it, its defects corrected
     pub recipe: Recipe,
+    /// what the paper says where it differs from the code
+    pub paper: &'static [(&'static str, f64)],
 }
 
 macro_rules! networks {
@@ -65,6 +71,35 @@ pub fn named(name: &str) -> Result<&'static Definition> {
 pub const MAX_OUTPUTS: usize = 1 << 16;
 
 impl Definition {
+    /// The recipe with some keys replaced. Besides those of [`Recipe::with`] there is `recipe`: code,
+    /// the default, or paper, which the other keys go on from.
+    ///
+    /// # Errors
+    /// As [`Recipe::with`].
+    pub fn recipe_with(&self, changes: &Map<String, Value>) -> Result<Recipe> {
+        let mut changes = changes.clone();
+        let from = match changes.remove("recipe") {
+            None => self.recipe,
+            Some(Value::String(name)) if name == "code" => self.recipe,
+            Some(Value::String(name)) if name == "paper" => {
+                let number = |&(key, value): &(&str, f64)| {
+                    let whole = value >= 1.0;
+                    let value = if whole { json!(value as u64) } else { json!(value) };
+                    (key.to_owned(), value)
+                };
+                self.recipe.with(&self.paper.iter().map(number).collect())?
+            }
+            Some(other) => {
+                return Err(NetError::Recipe {
+                    key: "recipe".into(),
+                    value: other.to_string(),
+                    allowed: "code or paper".into(),
+                });
+            }
+        };
+        from.with(&changes)
+    }
+
     /// With initial numbers of this seed and as many outputs as asked for, or as published.
     ///
     /// # Errors
@@ -79,5 +114,23 @@ impl Definition {
             });
         }
         Network::new(self.name, (self.architecture)(outputs), seed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_paper_changes_what_it_says() {
+        let with = |name: &str, text: &str| {
+            let changes = serde_json::from_str(text).unwrap();
+            named(name).unwrap().recipe_with(&changes)
+        };
+        let recipe = with("m4_level", r#"{"recipe": "paper", "epochs": 3}"#).unwrap();
+        assert_eq!((recipe.lr, recipe.batch, recipe.epochs), (1e-5, 32, 3));
+        let code = named("m1").unwrap().recipe;
+        assert_eq!(with("m1", r#"{"recipe": "paper"}"#).unwrap(), code);
+        assert!(with("m1", r#"{"recipe": "other"}"#).is_err());
     }
 }

@@ -13,6 +13,8 @@ pub(super) const VGGISH: Definition = Definition {
     outputs: 128,
     classifies: false,
     architecture,
+    paper: &[],
+    takes: "log-mel patches of 96 x 64",
     front_end: Some(FrontEnd {
         windows: Some(Windows { frames: 96, step: 96 }),
         ..FrontEnd::of("m5-vggish")

@@ -5,8 +5,10 @@ use std::sync::Arc;
 
 use corsmal_extract::config::Config;
 use corsmal_extract::inputs::{self, Input};
+use corsmal_models::labels::Labels;
 use corsmal_models::model_file::{FormatRule, Model};
 use corsmal_models::predictions::{Form, Unit};
+use corsmal_models::voting::VotingRule;
 
 use super::records::Records;
 use crate::args::{Jobs, MemberArgs, VoteArgs};
@@ -29,6 +31,9 @@ in sample rate or channels from those that the model was trained on, have a stat
 prediction. With --window one line per
 window, with its start and end in seconds, written as soon as the window is complete; memory does
 not grow with the stream.
+
+A network of `train --net` that takes windows, such as m4-type, has a line for each of them, or one
+decision with --vote; one of whole recordings is as good as its --window is like them.
 
 Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 interrupted.")]
 pub struct Args {
@@ -104,17 +109,25 @@ impl Args {
         if self.paths.is_empty() { &self.inputs } else { &self.paths }
     }
 
-    /// A writer for records with these label columns.
-    pub(super) fn records(&self, model: &Model, columns: &[String]) -> Result<Records, Failure> {
-        let labels = &model.header().labels;
-        let unit = match (self.window, self.vote.rule(labels)?) {
+    /// A writer for records about `unit`s with these label columns.
+    pub(super) fn records(
+        &self,
+        labels: &Labels,
+        target: &str,
+        unit: Unit,
+        columns: &[String],
+    ) -> Result<Records, Failure> {
+        let output = Output::open(&self.out)?;
+        Ok(Records::new(output, (self.form(), unit), labels, (columns, target), self.reject))
+    }
+
+    /// What a line of a classifier's predictions is about.
+    pub(super) fn unit(&self, vote: Option<VotingRule>) -> Unit {
+        match (self.window, vote) {
             (None, _) => Unit::Recording,
             (Some(_), None) => Unit::Window,
             (Some(_), Some(_)) => Unit::Vote,
-        };
-        let target = (columns, model.header().target.as_str());
-        let output = Output::open(&self.out)?;
-        Ok(Records::new(output, (self.form(), unit), labels, target, self.reject))
+        }
     }
 
     /// Which recordings the model may be applied to.
@@ -150,9 +163,11 @@ pub(super) fn configuration(args: &Args, model: &Model) -> Result<Arc<Config>, F
             header.tool_version
         )));
     }
-    if args.overrides.is_empty() {
-        return Ok(Arc::new(config));
-    }
+    changed(args, &header.feature_config)
+}
+
+/// A model's configuration with what --set changes of the recordings' format.
+pub(super) fn changed(args: &Args, tree: &serde_json::Value) -> Result<Arc<Config>, Failure> {
     const FORMAT: [&str; 2] = ["signal.sample_rate", "signal.channels"];
     let key = |text: &String| text.split('=').next().unwrap_or_default().trim().to_string();
     if let Some(other) = args.overrides.iter().find(|text| !FORMAT.contains(&key(text).as_str())) {
@@ -161,8 +176,7 @@ pub(super) fn configuration(args: &Args, model: &Model) -> Result<Arc<Config>, F
              signal.channels may bring recordings to the format that it was trained on"
         )));
     }
-    let changed = Config::from_tree(header.feature_config.clone(), &args.overrides)?;
-    Ok(Arc::new(changed))
+    Ok(Arc::new(Config::from_tree(tree.clone(), &args.overrides)?))
 }
 
 /// The recordings named.

@@ -18,7 +18,7 @@ pub use args::Args;
 use super::nets::is_model;
 use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
 use crate::publish;
-use records::End;
+use records::{End, Records};
 
 /// Predicts and writes the table.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
@@ -45,6 +45,16 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         (None, None) => whole::run(&args, &model)?,
         (None, Some(window)) => windows::run(&args, &model, window, vote)?,
     };
+    finish(&args, &model.header().target, end, records)
+}
+
+/// Publishes what was written and says how it went.
+fn finish(
+    args: &Args,
+    target: &str,
+    end: End,
+    records: Option<Records>,
+) -> Result<ExitCode, Failure> {
     let Some(records) = records else {
         eprintln!("interrupted; nothing was written");
         return Ok(ExitCode::from(INTERRUPTED));
@@ -60,7 +70,6 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         End::Done | End::Interrupted => records.finish()?.publish()?,
     }
     if !args.quiet {
-        let target = &model.header().target;
         let predictions = match written - failed {
             1 => "1 prediction".into(),
             n => format!("{n} predictions"),
@@ -80,7 +89,9 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 
 #[cfg(feature = "nets")]
 fn with_network(args: &Args) -> Result<ExitCode, Failure> {
-    network::run(args, &corsmal_nets::model::NetModel::load(&args.model)?)
+    let model = corsmal_nets::model::NetModel::load(&args.model)?;
+    let (end, records) = network::run(args, &model)?;
+    finish(args, &model.header.target, end, records)
 }
 
 #[cfg(not(feature = "nets"))]

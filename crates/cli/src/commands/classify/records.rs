@@ -2,6 +2,7 @@
 
 use std::io::ErrorKind;
 
+use corsmal_extract::inputs::{Input, InputSource};
 use corsmal_models::predictions::RecordWriter;
 
 use crate::failure::Failure;
@@ -16,6 +17,14 @@ pub(super) enum End {
     Interrupted,
     /// Whoever reads standard output has seen enough.
     Unread,
+}
+
+/// The path of a recording as given.
+pub(super) fn path_of(input: &Input) -> &str {
+    match &input.source {
+        InputSource::File(path) => path.to_str().unwrap_or(&input.id),
+        InputSource::Stdin => "-",
+    }
 }
 
 /// Whether a write went through; `false` where nobody reads any more.

@@ -10,7 +10,7 @@ use corsmal_files::outcome::{Outcome, Status};
 use corsmal_models::classifiers::Predicted;
 use corsmal_models::dataset::LabelledTable;
 use corsmal_models::model_file::{FormatRule, Model};
-use corsmal_models::predictions::Record;
+use corsmal_models::predictions::{Record, Unit};
 use linfa::traits::Predict;
 use ndarray::Axis;
 
@@ -47,7 +47,8 @@ pub fn run(args: &Args, model: &Model) -> Result<(End, Option<Records>), Failure
         let table = LabelledTable::of_extraction(place, &table, config.to_value(), config.hash())?;
         predictions = self::predictions(model, &table, &formats, args)?;
     }
-    let mut records = args.records(model, &columns)?;
+    let header = model.header();
+    let mut records = args.records(&header.labels, &header.target, Unit::Recording, &columns)?;
     for input in &found {
         let labels = input.labels.iter().map(|(_, value)| value.as_str()).collect();
         let path = path(input);
@@ -82,7 +83,8 @@ pub fn of_features(
     };
     let predictions = predictions(model, table, &formats, args)?;
     let columns: Vec<String> = table.columns().iter().map(|(name, _)| name.clone()).collect();
-    let mut records = args.records(model, &columns)?;
+    let header = model.header();
+    let mut records = args.records(&header.labels, &header.target, Unit::Recording, &columns)?;
     let rows: HashMap<&str, usize> =
         table.ids.iter().enumerate().map(|(row, id)| (id.as_str(), row)).collect();
     let inputs: Vec<(&str, &str)> = match table.outcomes.is_empty() {

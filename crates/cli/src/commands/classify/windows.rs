@@ -16,7 +16,7 @@ use ndarray::ArrayView2;
 use rayon::prelude::*;
 
 use super::args::{Args, configuration, recordings};
-use super::records::{End, Records, delivered};
+use super::records::{End, Records, delivered, path_of};
 use crate::failure::Failure;
 
 /// Recordings of each worker whose lines wait to be written in order.
@@ -41,7 +41,8 @@ pub fn run(
     let found = recordings(args)?;
     let columns: Vec<String> =
         found.iter().take(1).flat_map(|f| &f.labels).map(|(column, _)| column.clone()).collect();
-    let mut records = args.records(model, &columns)?;
+    let header = model.header();
+    let mut records = args.records(&header.labels, &header.target, args.unit(vote), &columns)?;
     let stop = crate::interrupt::flag();
     let predictor = Predictor { model, formats, signals, windowing, vote, stop };
     let end = predict(args, &found, &predictor, &mut records)?;
@@ -125,7 +126,7 @@ impl Predictor<'_> {
         input: &'i Input,
         each: &mut dyn FnMut(Line<'i>) -> Result<bool, Failure>,
     ) -> Result<(), Failure> {
-        let path = Self::path(input);
+        let path = path_of(input);
         let record = |span, windows, status: Status, found: Option<Decision>| {
             let (class, proba) = found.map_or((None, None), |(c, p)| (Some(c), p));
             let labels = input.labels.iter().map(|(_, value)| value.as_str()).collect();
@@ -196,13 +197,6 @@ impl Predictor<'_> {
             }
         };
         each(found).map(|_| ())
-    }
-
-    fn path(input: &Input) -> &str {
-        match &input.source {
-            corsmal_extract::inputs::InputSource::File(path) => path.to_str().unwrap_or(&input.id),
-            corsmal_extract::inputs::InputSource::Stdin => "-",
-        }
     }
 
     /// The row that the model takes.
