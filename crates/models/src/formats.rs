@@ -29,15 +29,6 @@ impl TrainedOn {
             (rates.into_iter().collect(), channels.into_iter().collect());
         known.then_some(Self { sample_rates, channels })
     }
-
-    /// The recordings that features may be made of: of these rates where features are of a
-    /// recording's own rate, of these numbers of channels where there are features of each.
-    pub fn rule(&self, own_rate: bool, every_channel: bool) -> FormatRule {
-        FormatRule {
-            sample_rates: own_rate.then(|| self.sample_rates.clone()),
-            channels: every_channel.then(|| self.channels.clone()),
-        }
-    }
 }
 
 /// Which recordings a model may be applied to, as far as their format matters to its features.

@@ -255,7 +255,10 @@ impl Model {
             let trained = rates.iter().map(|rate| hertz(*rate)).collect::<Vec<_>>().join(", ");
             return Err(ModelFileError::Rate { rate: rate(config), trained });
         }
-        Ok(trained.rule(own_rate, every_channel))
+        Ok(FormatRule {
+            sample_rates: own_rate.then(|| rates.clone()),
+            channels: every_channel.then(|| trained.channels.clone()),
+        })
     }
 
     /// Writes the file, whole or not at all.

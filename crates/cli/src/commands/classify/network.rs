@@ -10,7 +10,7 @@ use corsmal_extract::inputs::Input;
 use corsmal_files::outcome::Status;
 use corsmal_models::fusion::WindowVotes;
 use corsmal_models::labels::Labels;
-use corsmal_models::model_file::{FormatRule, TrainedOn};
+use corsmal_models::model_file::TrainedOn;
 use corsmal_models::predictions::{Record, Unit};
 use corsmal_models::voting::{Decision, VotingRule};
 use corsmal_nets::NetError;
@@ -107,7 +107,9 @@ struct Listener<'a> {
     model: &'a NetModel,
     front_end: FrontEnd,
     config: Arc<Config>,
-    formats: FormatRule,
+    /// the formats that recordings may have, where they matter to the features
+    rates: Option<Vec<u32>>,
+    channels: Option<Vec<u32>>,
     vote: Option<VotingRule>,
     pool: rayon::ThreadPool,
 }
@@ -130,12 +132,34 @@ impl<'a> Listener<'a> {
             serde_json::from_value(header.provenance["trained_on"].clone()).unwrap_or_default();
         let own_rate = tree["signal"]["sample_rate"].as_f64() == Some(0.0);
         let every_channel = tree["signal"]["channels"] == "all";
-        let formats = match trained.filter(|_| !args.any_rate) {
-            Some(trained) => trained.rule(own_rate, every_channel),
-            None => FormatRule::default(),
-        };
+        let trained = trained.filter(|_| !args.any_rate);
+        let rates = trained.as_ref().filter(|_| own_rate).map(|t| t.sample_rates.clone());
+        let channels = trained.filter(|_| every_channel).map(|t| t.channels);
         let pool = args.jobs.pool()?;
-        Ok(Self { args, model, front_end, config, formats, vote, pool })
+        Ok(Self { args, model, front_end, config, rates, channels, vote, pool })
+    }
+
+    /// Refuses a recording of a format that the network was not trained on.
+    fn check(&self, rate: Option<u32>, channels: Option<u32>) -> Result<(), Trouble> {
+        let all = |known: &[u32]| known.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
+        let known = [
+            (
+                rate,
+                &self.rates,
+                "Hz",
+                "--set signal.sample_rate resamples them, --any-rate takes them",
+            ),
+            (channels, &self.channels, "channels", "--set signal.channels=mean mixes them"),
+        ];
+        for (found, known, unit, way) in known {
+            if let (Some(found), Some(known)) = (found, known)
+                && !known.contains(&found)
+            {
+                let reason = format!("{found} {unit}, trained on {} {unit}; {way}", all(known));
+                return Err(Trouble { status: Status::Mismatch, reason });
+            }
+        }
+        Ok(())
     }
 
     /// Probabilities of each window of a stretch of sound, or of all of it.
@@ -191,10 +215,10 @@ impl<'a> Listener<'a> {
             if stop.load(std::sync::atomic::Ordering::Relaxed) {
                 return Ok(End::Interrupted);
             }
-            let fits = self.formats.check(outcome.sample_rate, outcome.channels);
+            let fits = self.check(outcome.sample_rate, outcome.channels);
             let heard = match (outcome.status.has_features(), fits) {
                 (false, _) => Err(Trouble { status: outcome.status, reason: outcome.reason }),
-                (true, Err(reason)) => Err(Trouble { status: Status::Mismatch, reason }),
+                (true, Err(trouble)) => Err(trouble),
                 (true, Ok(())) => self.hear(kept.tensor(&input.id)?)?,
             };
             let goes_on = match (heard, self.vote) {
@@ -261,8 +285,8 @@ impl<'a> Listener<'a> {
                 }
             };
             let (rate, channels) = windows.format();
-            if let Err(reason) = self.formats.check(Some(rate), Some(channels)) {
-                if !self.write(records, input, None, refuse(Status::Mismatch, reason))? {
+            if let Err(trouble) = self.check(Some(rate), Some(channels)) {
+                if !self.write(records, input, None, Err(trouble))? {
                     return Ok(End::Unread);
                 }
                 continue;
