@@ -18,6 +18,7 @@ const GROUPS: [(&str, &[&str]); 4] = [
             "fuse",
             "classifiers",
             "nets",
+            "embed",
         ],
     ),
     ("Files", &["compare", "merge", "completions"]),

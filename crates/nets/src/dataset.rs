@@ -5,15 +5,16 @@
 //! | `X` `[rows, numbers]` with `offsets` `[items + 1]` | sequences one after another |
 //! | `X` `[items, …]` without `offsets` | items of one shape, in PyTorch's layout |
 //! | `view` `[items]` | which input of the network an item is; those of one recording are joined |
-//! | any other of one dimension, one value for each item | a column |
+//! | any other of one dimension, one value for each item, unless its name begins with `__` | a column |
 //!
 //! Ids are the member `ids`, else `container/sequence` where both are there, else numbers.
 
 use std::collections::HashMap;
 use std::path::Path;
 
-use corsmal_files::npy::Kind;
-use corsmal_files::npz::{NpzError, NpzFile};
+use corsmal_files::draft::Draft;
+use corsmal_files::npy::{DType, Header, Kind};
+use corsmal_files::npz::{Compression, NpzError, NpzFile, NpzWriter};
 use thiserror::Error;
 
 use crate::batch::{Batch, Shape};
@@ -110,6 +111,38 @@ impl Dataset {
         Ok(Self { ids, columns, items })
     }
 
+    /// Writes the sequences of the only input, whole or not at all, as [`Dataset::read`] takes them;
+    /// `about` says how they were made.
+    ///
+    /// # Errors
+    /// [`DatasetError::Npz`].
+    pub fn write_sequences(
+        &self,
+        path: &Path,
+        numbers: usize,
+        about: &str,
+    ) -> Result<(), DatasetError> {
+        let column = &self.items.columns[0];
+        let io = |e| NpzError::io(path, e);
+        let draft = Draft::create(path).map_err(io)?;
+        let handle = draft.handle().map_err(io)?;
+        let mut npz = NpzWriter::over(handle, path, Compression::Stored, Vec::new());
+        npz.floats("X", &[column.values.len() / numbers, numbers], &column.values)?;
+        let offsets = column.offsets.iter().map(|o| (o / numbers) as i64);
+        let bytes: Vec<u8> = offsets.flat_map(i64::to_le_bytes).collect();
+        let whole = DType { kind: Kind::Int, itemsize: 8, big_endian: false };
+        let header = Header::new(whole, &[column.offsets.len()]);
+        npz.array("offsets", &header, &bytes)?;
+        npz.strings("ids", &self.ids)?;
+        for (name, values) in &self.columns {
+            npz.strings(name, values)?;
+        }
+        npz.text("__meta__", about)?;
+        npz.finish()?;
+        draft.publish().map_err(io)?;
+        Ok(())
+    }
+
     /// A column by name.
     pub fn column(&self, name: &str) -> Option<&[String]> {
         self.columns.iter().find(|(n, _)| n == name).map(|(_, values)| values.as_slice())
@@ -133,7 +166,7 @@ fn offsets(npz: &mut NpzFile, rows: usize) -> Result<Vec<usize>, String> {
 fn columns(npz: &mut NpzFile, count: usize) -> Result<Vec<(String, Vec<String>)>, DatasetError> {
     let mut columns = Vec::new();
     for name in npz.names().to_vec() {
-        if name == "X" || name == "offsets" {
+        if name == "X" || name == "offsets" || name.starts_with("__") {
             continue;
         }
         let Ok(header) = npz.header(&name) else { continue };
@@ -218,5 +251,31 @@ fn ids(columns: &[(String, Vec<String>)], count: usize) -> Vec<String> {
             containers.iter().zip(sequences).map(|(c, s)| format!("{c}/{s}")).collect()
         }
         _ => (0..count).map(|i| i.to_string()).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::networks;
+
+    #[test]
+    fn sequences_are_read_as_they_were_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.npz");
+        let values: Vec<f32> = (0..5 * 128).map(|i| i as f32 / 7.0).collect();
+        let column = Column { values, offsets: vec![0, 2 * 128, 5 * 128] };
+        let written = Dataset {
+            ids: vec!["a/1".into(), "b/2".into()],
+            columns: vec![("level".into(), vec!["0".into(), "2".into()])],
+            items: Items { columns: vec![column] },
+        };
+        // As long as there are items: still no column.
+        written.write_sequences(&path, 128, "{}").unwrap();
+        let network = networks::named("m5-vggish-level").unwrap().build(None, 0).unwrap();
+        let read = Dataset::read(&path, &network).unwrap();
+        assert_eq!((&read.ids, &read.items), (&written.ids, &written.items));
+        assert_eq!(read.column("level"), Some(&written.columns[0].1[..]));
+        assert!(read.column("__meta__").is_none());
     }
 }

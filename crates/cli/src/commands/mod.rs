@@ -10,6 +10,7 @@ mod completions;
 mod cross_validate;
 mod dataset;
 mod demo;
+mod embed;
 mod evaluate;
 mod extract;
 mod features;
@@ -85,7 +86,9 @@ enum Command {
     ComparePredictions(compare_predictions::Args),
     /// Make one prediction from several files, from windows, or from type and level.
     Fuse(fuse::Args),
-    /// Run the paper's audio baselines on a CCM data set and write the report.
+    /// Make embeddings of recordings, such as VGGish's 128 numbers a second.
+    Embed(embed::Args),
+    /// Run the paper's audio baselines and systems on a CCM data set and write the report.
     Benchmark(benchmark::Args),
     /// Estimate capacities of containers from the views of a CORSMAL data set.
     Capacity(capacity::Args),
@@ -110,6 +113,7 @@ impl Command {
             Self::Compare(args) => compare::run(args),
             Self::Demo(args) => demo::run(args, &run_words),
             Self::Nets(args) => nets::run(args),
+            Self::Embed(args) => embed::run(args),
             Self::Pca(args) => pca::run(args),
             Self::Classifiers(args) => classifiers::run(args),
             Self::Score(args) => score::run(args),

@@ -254,3 +254,24 @@ fn a_network_learns_from_recordings_and_hears_them() {
     let message = refused(&[&level[..], &["-o", text(&path("no.safetensors"))]].concat());
     assert!(message.contains("takes m4_type's features of each window"), "{message}");
 }
+
+#[test]
+fn embedding_needs_the_weights_of_its_network() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let (audio, weights, out) = (path("a.wav"), path("w.npz"), path("out.npz"));
+    tone(&audio, 0, 1.0, 16_000);
+    let mut npz = NpzWriter::create(&weights, Compression::Stored).unwrap();
+    npz.floats("features.0.weight", &[2, 2], &[0.0; 4]).unwrap();
+    npz.finish().unwrap();
+    let refuse = |network: &str, weights: &Path, expected: &str| {
+        let words = ["embed", network, text(&audio), "--weights", text(weights), "-o", text(&out)];
+        let message = refused(&words);
+        assert!(message.contains(expected), "{message}");
+        assert!(!out.exists());
+    };
+    refuse("vggish", &weights, "features.3.weight");
+    refuse("vggish", &path("none.pth"), "none.pth");
+    refuse("m2-type", &weights, "gives classes");
+    refuse("yamnet", &weights, "vggish");
+}

@@ -149,7 +149,7 @@ impl<'a> Listener<'a> {
                 "Hz",
                 "--set signal.sample_rate resamples them, --any-rate takes them",
             ),
-            (channels, &self.channels, "channels", "--set signal.channels=mean mixes them"),
+            (channels, &self.channels, "channels", "the network takes each of them"),
         ];
         for (found, known, unit, way) in known {
             if let (Some(found), Some(known)) = (found, known)
