@@ -295,7 +295,10 @@ impl Request<'_> {
             let (done, total) = (progress.epochs.len(), progress.total);
             let left = span(progress.left.as_secs());
             match progress.epochs.last() {
-                None => eprintln!("{name}: {total} epochs, about {left}"),
+                None => {
+                    let mib = progress.memory.div_ceil(1 << 20);
+                    eprintln!("{name}: {total} epochs, about {left}, {mib} MiB of memory");
+                }
                 Some(epoch) => {
                     let score = epoch.score.map(|s| format!(", weighted F1 {:.2}", 100.0 * s));
                     let score = score.unwrap_or_default();

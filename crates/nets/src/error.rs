@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+const GIB: f64 = (1u64 << 30) as f64;
+
 /// A refusal. Texts name the place, what was found and what would be accepted.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -73,6 +75,17 @@ pub enum NetError {
         frames: usize,
         /// frames of a window
         needed: usize,
+    },
+    /// A training that needs more memory than is free.
+    #[error(
+        "the training needs about {:.1} GiB of memory, {:.1} GiB are free: a smaller batch or fewer items need less",
+        *needed as f64 / GIB, *available as f64 / GIB
+    )]
+    Memory {
+        /// bytes needed
+        needed: u64,
+        /// bytes free
+        available: u64,
     },
     /// A number that is not finite among the inputs.
     #[error("input {input}, item {item}: {value} is not a finite number")]

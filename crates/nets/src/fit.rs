@@ -8,6 +8,7 @@ use crate::error::{NetError, Result};
 use crate::items::Items;
 use crate::layers::softmax;
 use crate::loss::{Loss, Targets};
+use crate::memory;
 use crate::network::Network;
 use crate::random::Stream;
 use crate::recipe::{Activation, InitialKind, Recipe, Select};
@@ -38,6 +39,8 @@ pub fn fit(
     recipe.check()?;
     task.items.check(network)?;
     check(network, task, recipe)?;
+    let memory = memory::of_training(network, task, recipe);
+    memory::require(memory, memory::available())?;
     match recipe.initial {
         InitialKind::Pytorch => network.start(recipe.seed),
         InitialKind::Xavier => network.start_xavier(recipe.seed, false),
@@ -68,7 +71,7 @@ pub fn fit(
             0 => expected.mul_f64(to_come as f64 / total as f64),
             n => elapsed.mul_f64(to_come as f64 / n as f64),
         };
-        let goes_on = progress(Progress { epochs, total, elapsed, left });
+        let goes_on = progress(Progress { epochs, total, elapsed, left, memory });
         if goes_on { Ok(()) } else { Err(NetError::Stopped { epochs: epochs.len() }) }
     };
     tell(&epochs)?;
@@ -76,7 +79,8 @@ pub fn fit(
         let mut sum = 0.0;
         let steps = steps_of(task.train, recipe, epoch);
         for rows in &steps {
-            let inputs = task.items.batch(trainer.network, rows, recipe.padding);
+            let chance = Stream::new(recipe.seed, "offset").part(epoch as u64);
+            let inputs = task.items.laid(trainer.network, rows, recipe, chance);
             let classes = rows.iter().map(|&r| task.classes[r]).collect();
             sum += trainer.step(&inputs, &Targets::Classes(classes))?.loss;
         }
@@ -116,7 +120,8 @@ pub fn probabilities(
 ) -> Result<Vec<Vec<f64>>> {
     let mut all = Vec::with_capacity(rows.len());
     for rows in rows.chunks(TOGETHER) {
-        let out = network.logits(&items.batch(network, rows, recipe.padding))?;
+        let chance = Stream::new(recipe.seed, "offset of predictions");
+        let out = network.logits(&items.laid(network, rows, recipe, chance))?;
         let n = out.shape.len();
         let mut values = out.values.into_values();
         softmax(&mut values, n);
@@ -176,7 +181,7 @@ fn trial(
     settings: &StepSettings,
 ) -> Result<Duration> {
     let rows = &steps_of(task.train, recipe, 0)[0];
-    let inputs = task.items.batch(network, rows, recipe.padding);
+    let inputs = task.items.laid(network, rows, recipe, Stream::new(recipe.seed, "offset"));
     let classes = Targets::Classes(rows.iter().map(|&r| task.classes[r]).collect());
     let began = Instant::now();
     network.gradients(&inputs, &classes, &settings.loss, &settings.class_weights, None)?;

@@ -35,4 +35,6 @@ pub struct Progress<'a> {
     pub elapsed: Duration,
     /// time that is left, as the part done lets expect; before the first epoch from a trial step
     pub left: Duration,
+    /// bytes of memory that the training takes, roughly
+    pub memory: u64,
 }

@@ -3,7 +3,8 @@
 use crate::batch::{Batch, Shape};
 use crate::error::{NetError, Result};
 use crate::network::Network;
-use crate::recipe::Padding;
+use crate::random::Stream;
+use crate::recipe::{Offset, Padding, Recipe};
 
 /// All items of one input, one after another, channels last.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -23,6 +24,10 @@ impl Column {
             offsets.push(values.len());
         }
         Self { values, offsets }
+    }
+
+    fn item(&self, item: usize) -> &[f32] {
+        &self.values[self.offsets[item]..self.offsets[item + 1]]
     }
 }
 
@@ -94,16 +99,17 @@ impl Items {
     /// These items as a batch. They were checked.
     pub fn batch(&self, network: &Network, items: &[usize], padding: Padding) -> Vec<Batch> {
         let one = |(column, shape): (&Column, Shape)| {
-            let item = |i: usize| &column.values[column.offsets[i]..column.offsets[i + 1]];
             let Shape::Sequence { numbers, .. } = shape else {
-                return Batch::new(items.iter().flat_map(|&i| item(i)).copied().collect(), shape);
+                let all = items.iter().flat_map(|&i| column.item(i)).copied().collect();
+                return Batch::new(all, shape);
             };
-            let lengths: Vec<usize> = items.iter().map(|&i| item(i).len() / numbers).collect();
+            let lengths: Vec<usize> =
+                items.iter().map(|&i| column.item(i).len() / numbers).collect();
             let steps = lengths.iter().copied().max().unwrap_or(0);
             let mut values = Vec::with_capacity(items.len() * steps * numbers);
             for &i in items {
                 let end = values.len() + steps * numbers;
-                values.extend_from_slice(item(i));
+                values.extend_from_slice(column.item(i));
                 values.resize(end, padding.value());
             }
             let mut batch = Batch::new(values, Shape::Sequence { steps, numbers });
@@ -114,8 +120,68 @@ impl Items {
         self.columns.iter().zip(shapes).map(one).collect()
     }
 
+    /// These items as the recipe lays them into a batch; `chance` is where random offsets come from.
+    pub(crate) fn laid(
+        &self,
+        network: &Network,
+        items: &[usize],
+        recipe: &Recipe,
+        chance: Stream,
+    ) -> Vec<Batch> {
+        if recipe.offset == Offset::Start {
+            return self.batch(network, items, recipe.padding);
+        }
+        let steps = Offset::STEPS;
+        let one = |(column, shape): (&Column, Shape)| {
+            let Shape::Sequence { numbers, .. } = shape else {
+                let all = items.iter().flat_map(|&i| column.item(i)).copied().collect();
+                return Batch::new(all, shape);
+            };
+            let mut values = vec![0.0; items.len() * steps * numbers];
+            for (&i, place) in items.iter().zip(values.chunks_exact_mut(steps * numbers)) {
+                let item = column.item(i);
+                let item = &item[..item.len().min(steps * numbers)];
+                let free = steps - item.len() / numbers;
+                let begin = chance.below(i as u64, free + 1) * numbers;
+                place[begin..begin + item.len()].copy_from_slice(item);
+            }
+            Batch::new(values, Shape::Sequence { steps, numbers })
+        };
+        let shapes = network.inputs().iter().map(|i| i.shape);
+        self.columns.iter().zip(shapes).map(one).collect()
+    }
+
     /// Sum of the steps of an item over its inputs, a measure of its work.
     pub(crate) fn work(&self, item: usize) -> usize {
         self.columns.iter().map(|c| c.offsets[item + 1] - c.offsets[item]).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::networks;
+
+    #[test]
+    fn a_sequence_lies_anywhere_among_the_published_steps() {
+        let definition = networks::named("m4_level").unwrap();
+        let network = definition.build(None, 0).unwrap();
+        let long = vec![2.0; 130 * 1024];
+        let items = Items { columns: vec![Column::of([&[1.0; 3 * 1024][..], &long])] };
+        let recipe = Recipe { offset: Offset::Random, ..definition.recipe };
+        let begin = |epoch: u64| {
+            let chance = Stream::new(0, "offset").part(epoch);
+            let batch = &items.laid(&network, &[0, 1], &recipe, chance)[0];
+            assert_eq!((batch.shape.places(), batch.items()), (100, 2));
+            assert!(batch.lengths.is_none());
+            let values = batch.values.values();
+            let (short, long) = values.split_at(100 * 1024);
+            assert!(long.iter().all(|&v| v == 2.0));
+            assert_eq!(short.iter().sum::<f32>(), 3.0 * 1024.0);
+            short.iter().position(|&v| v == 1.0).unwrap() / 1024
+        };
+        let begins: Vec<usize> = (0..20).map(begin).collect();
+        assert!(begins.iter().all(|&b| b <= 97) && begins.iter().any(|&b| b != begins[0]));
+        assert_eq!(begins, (0..20).map(begin).collect::<Vec<_>>());
     }
 }

@@ -25,6 +25,12 @@ pub trait Layer: Debug + Send + Sync {
     /// [`crate::NetError::LayerInput`] for a shape that it cannot take.
     fn output(&self, input: Shape) -> Result<Shape>;
 
+    /// Numbers that a training step holds for each item on account of this layer, roughly: what comes
+    /// after it, and the gradient by that.
+    fn kept(&self, input: Shape) -> usize {
+        self.output(input).map_or(0, |output| 2 * output.len())
+    }
+
     /// Numbers after it. In training it leaves on the tape what [`Layer::backward`] needs.
     fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch;
 

@@ -31,6 +31,7 @@ pub mod layer;
 pub mod layers;
 pub mod loss;
 pub mod matrix;
+mod memory;
 pub mod model;
 pub mod network;
 pub mod networks;

@@ -157,6 +157,21 @@ impl Network {
         lines
     }
 
+    /// Numbers that a training step holds for an item of these input shapes, roughly.
+    pub(crate) fn kept(&self, shapes: &[Shape]) -> usize {
+        let chains = self.architecture.body.chains().iter().zip(shapes);
+        let of = |(chain, &input): (&Chain, &Shape)| {
+            let mut shape = input;
+            let mut sum = input.len();
+            for layer in chain {
+                sum += layer.kept(shape);
+                shape = layer.output(shape).unwrap_or(shape);
+            }
+            sum
+        };
+        chains.map(of).sum()
+    }
+
     /// Refuses inputs of other shapes.
     ///
     /// # Errors

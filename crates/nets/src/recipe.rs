@@ -34,6 +34,9 @@ pub struct Recipe {
     pub initial: InitialKind,
     /// what becomes of the steps after a short sequence
     pub padding: Padding,
+    /// where a short sequence begins
+    #[serde(default)]
+    pub offset: Offset,
     /// whether the loss sees the output activation
     pub activation: Activation,
     /// which epoch's numbers are kept
@@ -84,6 +87,23 @@ impl Padding {
     }
 }
 
+/// Where a short sequence begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Offset {
+    /// at the first step
+    #[default]
+    Start,
+    /// as M4 published it: anywhere among [`Offset::STEPS`] steps, of which the others are zero, anew
+    /// in each epoch; its predictions are made so, too
+    Random,
+}
+
+impl Offset {
+    /// Steps of a sequence at a random offset; of a longer one the first of them count.
+    pub const STEPS: usize = 100;
+}
+
 /// The output activation in training.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -122,6 +142,7 @@ impl Recipe {
             dropout: true,
             initial: InitialKind::Pytorch,
             padding: Padding::Masked,
+            offset: Offset::Start,
             activation: Activation::Corrected,
             select: Select::Last,
             seed: 0,

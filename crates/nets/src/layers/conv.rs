@@ -135,6 +135,11 @@ impl Layer for Conv2d {
         Ok(Shape::Image { height: g.out_height, width: g.out_width, channels: self.outputs })
     }
 
+    fn kept(&self, input: Shape) -> usize {
+        let sees = self.inputs * self.kernel.0 * self.kernel.1;
+        self.output(input).map_or(0, |output| 2 * output.len() + output.places() * sees)
+    }
+
     fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch {
         let Some(g) = self.geometry(input.shape) else { unreachable!("shapes were checked") };
         let weight = self.matrix(pass.parameters.get(&self.key("weight")));

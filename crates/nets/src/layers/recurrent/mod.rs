@@ -151,6 +151,15 @@ impl Layer for Recurrent {
         (0..self.layers).flat_map(one).collect()
     }
 
+    fn kept(&self, input: Shape) -> usize {
+        // Gates and states of each layer, and the gradients by the gates.
+        let gates = match self.cell {
+            Cell::Gru => 3,
+            Cell::Lstm => 4,
+        };
+        input.places() * self.hidden * self.layers * (2 * gates + 2)
+    }
+
     fn output(&self, input: Shape) -> Result<Shape> {
         match input {
             Shape::Sequence { numbers, .. } if numbers == self.inputs => {
