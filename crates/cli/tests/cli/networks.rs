@@ -90,7 +90,8 @@ fn a_network_is_validated_trained_and_applied() {
     let table = done(&classify);
     assert_eq!(table.lines().count(), 13, "{table}");
     assert!(table.lines().nth(1).is_some_and(|line| line.starts_with("r00,")), "{table}");
-    assert!(refused(&["classify", "-m", text(&model), "x.wav"]).contains("give --features"));
+    let message = refused(&["classify", "-m", text(&model), "x.wav"]);
+    assert!(message.contains("takes VGGish embeddings and no recordings"), "{message}");
 }
 
 #[test]
