@@ -277,7 +277,7 @@ impl Request<'_> {
             }
             (f.name, fold.test.clone(), proba)
         };
-        let folds_found = found.into_iter().zip(&folds.outer).map(of_fold).collect();
+        let folds_found: Vec<_> = found.into_iter().zip(&folds.outer).map(of_fold).collect();
         let result = CrossValidation::of_probabilities(folds_found, &classes)?;
         Ok(Validated { table, target, labels, classes, folds, result, report })
     }

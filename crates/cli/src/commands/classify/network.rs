@@ -272,7 +272,6 @@ impl<'a> Listener<'a> {
         }
         let (signals, stop) = (Signals::new(self.config.clone()), crate::interrupt::flag());
         let stopped = || stop.load(std::sync::atomic::Ordering::Relaxed);
-        let refuse = |status, reason| Err(Trouble { status, reason });
         for input in found {
             let mut windows = match Windows::open(input, &signals, windowing, stop) {
                 Ok(windows) => windows,
@@ -343,6 +342,10 @@ impl<'a> Listener<'a> {
         }
         Ok(if stopped() { End::Interrupted } else { End::Done })
     }
+}
+
+fn refuse<T>(status: Status, reason: String) -> Result<T, Trouble> {
+    Err(Trouble { status, reason })
 }
 
 /// The verdict on a recording that a network cannot take; `None` where the recording is not at fault.
