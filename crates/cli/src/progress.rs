@@ -28,7 +28,7 @@ pub fn bar(total: usize, noun: &str, quiet: bool) -> ProgressBar {
         true => ProgressDrawTarget::hidden(),
     };
     let bar = ProgressBar::with_draw_target(Some(total as u64), target);
-    bar.set_style(style(&format!("{{bar:30}} {{pos}} of {{len}} {noun}{{left}}")));
+    bar.set_style(style(&format!("{{bar:20}} {{pos}} of {{len}} {noun}{{left}}")));
     bar
 }
 
@@ -67,7 +67,7 @@ impl Meter {
             _ => ProgressDrawTarget::hidden(),
         };
         let bar = ProgressBar::with_draw_target(None, target);
-        bar.set_style(style("{bar:30} {pos} of {len} recordings{msg}{left}"));
+        bar.set_style(style("{bar:20} {pos} of {len} recordings{msg}{left}"));
         Self {
             format,
             quiet,
