@@ -291,7 +291,7 @@ fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
             scores: &scores,
             seeds: &[],
             facts: vec![Fact::new("Network", name)],
-            quiet: *quiet,
+            quiet,
         };
         held_out.write(folder, None)?;
     }
