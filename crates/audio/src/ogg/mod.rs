@@ -63,6 +63,8 @@ struct Place {
     unplaced: u64,
     /// Samples per channel still to be dropped at its start.
     skip: u64,
+    /// Samples per channel by which its first position is late: it was cut out of a longer recording.
+    late: u64,
     /// Its last page was read.
     is_over: bool,
 }
@@ -84,7 +86,7 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn BlockSource>, AudioError>
     let declared = page::last_granule(&mut input, link.serial)?
         .and_then(|end| u64::try_from(end).ok()?.checked_sub(link.skip))
         .filter(|frames| *frames < 1 << 40);
-    let spec = AudioSpec {
+    let mut spec = AudioSpec {
         sample_rate: link.sample_rate,
         channels: link.channels,
         format: link.name.into(),
@@ -107,6 +109,11 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn BlockSource>, AudioError>
     };
     let mut report = ReadReport::default();
     stream.place_packets(false, &mut report);
+    if declared.is_some() && stream.place.position.is_none() {
+        // The first page with samples says where they begin.
+        stream.read_page(&mut report)?;
+    }
+    spec.declared_frames = declared.and_then(|end| end.checked_sub(stream.place.late));
     Ok(Box::new(StreamSource::new(stream, spec, report)))
 }
 
@@ -189,6 +196,8 @@ impl OggStream {
                     let first = self.given + queued(&self.steps);
                     report.note(Repair::LostFrames { first, count: late });
                     self.steps.push_back(Step::Silence(late));
+                } else {
+                    place.late = late;
                 }
                 // Otherwise, what begins later than 0 was cut out of a longer recording.
                 let extra =

@@ -38,6 +38,12 @@ fn every_reported_file_is_read_rightly() {
         let file = read_file(bytes.clone()).unwrap();
         assert_eq!(file.samples.len() / file.channels, frames, "{name}");
         assert_eq!(file.repairs(), repairs, "{name}");
+        let longest = 2 * frames as u64;
+        assert!(
+            file.declared_frames.is_none_or(|n| n <= longest),
+            "{name}: {:?}",
+            file.declared_frames
+        );
         let mut source = from_reader(Cursor::new(bytes)).unwrap();
         let pipe = read_with(source.as_mut(), [1, 700, 37].into_iter().cycle()).unwrap();
         assert_eq!(file.samples, pipe.samples, "{name}");
