@@ -105,8 +105,8 @@ fn what_is_explained_is_explained_to_programs_too() {
     let keys = mfcc["keys"].as_array().unwrap();
     let n_mfcc = keys.iter().find(|key| key["key"] == "n_mfcc").unwrap();
     assert_eq!(n_mfcc["default"], 20);
-    assert!(json(&["features"]).as_array().unwrap().iter().any(|f| *f == mfcc));
+    assert!(json(&["features"]).as_array().unwrap().contains(&mfcc));
     let esc26 = json(&["presets", "esc26"]);
     assert_eq!(esc26["config"]["signal"]["sample_rate"], 22_050.0);
-    assert!(json(&["presets"]).as_array().unwrap().iter().any(|p| *p == esc26));
+    assert!(json(&["presets"]).as_array().unwrap().contains(&esc26));
 }
