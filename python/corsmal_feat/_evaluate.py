@@ -83,7 +83,7 @@ def evaluate(
         raise ParameterError(f"seed must be a whole number from 0 to 2**64 - 1, not {seed}")
     for container in chosen or ():
         if not 0 <= container <= 255:
-            raise ParameterError(f"containers: {container} is no container: 0 to 255")
+            raise ParameterError(f"containers must be numbers from 0 to 255, not {container}")
     reference = None if baseline is None else os.fspath(baseline)
     values, recordings, notes = _core.evaluate(
         os.fspath(submission), os.fspath(annotations), rules, reference, seed, chosen

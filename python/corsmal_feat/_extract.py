@@ -55,7 +55,7 @@ def extract(
     progress : True tells on the standard error stream how many recordings are done; a function is
         called with that number and the number of all
 
-    A bad recording is no error: its row of `outcomes` says what is wrong. Ctrl-C stops the run, and
+    A bad recording raises no error: its row of `outcomes` says what is wrong. Ctrl-C stops the run, and
     `resume=True` continues it.
 
     Returns

@@ -312,7 +312,7 @@ def _of_parquet(name: str) -> dict[str, Any]:
     try:
         table = parquet.read_table(name)
     except failed as error:
-        raise ParameterError(f"{name} is no Parquet file: {error}") from error
+        raise ParameterError(f"{name} is not a readable Parquet file: {error}") from error
     metadata = table.schema.metadata or {}
     if "id" not in table.column_names:
         raise ParameterError(f"{name} is not an output of corsmal-feat: it has no column id")

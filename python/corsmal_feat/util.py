@@ -217,7 +217,7 @@ def tiny(x: npt.ArrayLike) -> np.floating[Any]:
 
 
 def valid_audio(y: Any) -> bool:
-    """True, or an error that says why `y` is no signal (librosa.util.valid_audio).
+    """True, or an error that says why `y` is not a signal (librosa.util.valid_audio).
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ def test_what_cannot_be_scored_is_refused(tmp_path: Path) -> None:
         corsmal_feat.evaluate(SUBMISSION, ANNOTATIONS, rules="best")
     with pytest.raises(corsmal_feat.ParameterError, match=r"none\.csv"):
         corsmal_feat.evaluate(tmp_path / "none.csv", ANNOTATIONS)
-    with pytest.raises(corsmal_feat.ParameterError, match="300 is no container"):
+    with pytest.raises(corsmal_feat.ParameterError, match="0 to 255, not 300"):
         corsmal_feat.evaluate(SUBMISSION, ANNOTATIONS, containers=[300])
     with pytest.raises(corsmal_feat.ParameterError, match="seed must be a whole number from 0"):
         corsmal_feat.evaluate(SUBMISSION, ANNOTATIONS, seed=-1)

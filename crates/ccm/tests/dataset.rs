@@ -137,10 +137,10 @@ fn what_is_wrong_is_said() {
     let all: String = findings.odd.iter().map(|o| format!("{}\n", o.what)).collect();
     for expected in [
         "never filled with water half",
-        "none of the data set's",
+        "not one of the data set's",
         "no container 22",
         "no folder above it",
-        "there twice",
+        "present twice",
     ] {
         assert!(all.contains(expected), "{expected}: {all}");
     }
@@ -170,7 +170,7 @@ fn annotation_files_must_not_contradict_each_other() {
     let findings = check(&set);
     let odd = &findings.odd[0];
     assert!(!findings.sound() && odd.path == copy, "{odd:?}");
-    assert!(odd.what.contains("of id 0 than") && odd.what.contains(path.to_str().unwrap()));
+    assert!(odd.what.contains("about id 0") && odd.what.contains(path.to_str().unwrap()));
     let error = corsmal_ccm::benchmark::run(
         &corsmal_ccm::benchmark::BenchmarkOptions {
             data: dir.path().into(),
@@ -186,7 +186,10 @@ fn annotation_files_must_not_contradict_each_other() {
         &Default::default(),
     );
     let error = error.unwrap_err().to_string();
-    assert!(error.contains("annotation_copy.csv says something else of id 0 than"), "{error}");
+    assert!(
+        error.contains("annotation_copy.csv contradicts") && error.contains("about id 0"),
+        "{error}"
+    );
 
     // A capacity that the file of 2020 gives otherwise.
     let tree = "Container ID,Sequence,Scenario,Background,Illumination,Container Capacity [mL],\
@@ -196,7 +199,7 @@ fn annotation_files_must_not_contradict_each_other() {
     let sequence = Annotations::read(&path).unwrap().rows[2].sequence.unwrap();
     std::fs::write(&copy, tree.replace("1,2,", &format!("1,{sequence},"))).unwrap();
     let what = &DataSet::open(dir.path()).unwrap().contradictions[0].what;
-    assert!(what.contains(&format!("of container 1 sequence {sequence} than")), "{what}");
+    assert!(what.contains(&format!("about container 1 sequence {sequence}")), "{what}");
 }
 
 /// Ids start at 0 in every part.

@@ -315,10 +315,10 @@ impl Request<'_> {
     fn stopped(&self, error: NetError) -> Failure {
         match (&error, &self.network.checkpoints) {
             (NetError::Stopped { .. }, Some(_)) => {
-                Failure::new(format!("{error}; the same command goes on from there"))
+                Failure::new(format!("{error}; run the same command again to continue"))
             }
             (NetError::Stopped { .. }, None) => {
-                Failure::new(format!("{error}; --checkpoints would have kept them"))
+                Failure::new(format!("{error}; with --checkpoints they would have been kept"))
             }
             _ => error.into(),
         }

@@ -87,7 +87,7 @@ pub enum ModelError {
         features: usize,
     },
     /// Two things that must have the same number of entries do not.
-    #[error("{what}: expected {expected} entries, found {actual}")]
+    #[error("{what}: expected {expected}, found {actual}")]
     Length {
         /// what is counted
         what: &'static str,

@@ -126,7 +126,10 @@ fn what_linfa_lacks_is_refused_by_name() {
     };
     assert!(refuse("knn", &["algorithm=linfa", "metric=cosine"]).contains("euclidean, manhattan"));
     assert!(refuse("tree", &["solver=linfa", "class_weight=balanced"]).contains("class_weight"));
-    assert!(refuse("tree", &["solver=linfa", "max_features=sqrt"]).contains("has all only"));
+    assert!(
+        refuse("tree", &["solver=linfa", "max_features=sqrt"])
+            .contains("must be all with solver=linfa")
+    );
     assert!(refuse("svm", &["solver=fast"]).contains("own or linfa"));
     let (x, y) = clouds(30, 2, 2, 36);
     let huge = spec("knn", &["algorithm=linfa"]).train((&x * 1e145).view(), &y, 2).unwrap_err();

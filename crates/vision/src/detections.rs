@@ -216,13 +216,13 @@ mod tests {
     fn faults_give_the_line() {
         for (row, part) in [
             ("x,1,cup,1,0,0,1,1,", "line 2: 'x' is not a frame number"),
-            ("1,5,cup,1,0,0,1,1,", "no view"),
+            ("1,5,cup,1,0,0,1,1,", "not a view"),
             ("1,1,12,1,0,0,1,1,", "12 is not a COCO category"),
-            ("1,1,cup,1.5,0,0,1,1,", "no score"),
-            ("1,1,cup,nan,0,0,1,1,", "no score"),
-            ("1,1,cup,1,0,0,inf,1,", "no edge"),
+            ("1,1,cup,1.5,0,0,1,1,", "not a score"),
+            ("1,1,cup,nan,0,0,1,1,", "not a score"),
+            ("1,1,cup,1,0,0,inf,1,", "not an edge"),
             ("1,1,cup,1,3,0,1,1,", "comes first"),
-            ("1,1,cup,1,0,0,1,1,{x", "no readable JSON"),
+            ("1,1,cup,1,0,0,1,1,{x", "not readable as JSON"),
             ("1,1,cup", "not a readable table"),
         ] {
             let error = table("d.csv", &format!("{HEADER}{row}\n")).unwrap_err().to_string();

@@ -20,15 +20,17 @@ Examples:
   corsmal-feat compare feats.npz librosa.npz --map clip=logmel
   corsmal-feat compare old.npz new.npz --atol 1e-4 --rtol 1e-5 --json
 
-Files may be outputs of `extract`, any .npz or .npy with numeric arrays, or a Parquet table. Arrays are paired
-by name, outputs of `extract` by recording (id, else file name) and feature, tables by id and column; the only array of each file
-needs no name. The last axis is taken as frames, the one before as coefficients, the one before that as
-channels (librosa's order). Two arrays are in memory at a time.
+Files may be outputs of `extract`, any .npz or .npy with numeric arrays, or a Parquet table.
+Arrays are paired by name, outputs of `extract` by recording (id, else file name) and feature,
+tables by id and column; the only array of each file needs no name. The last axis counts frames,
+the one before coefficients, the one before that channels (librosa's order). Two arrays are in
+memory at a time.
 
-Likely causes are derived from the values, each with its evidence: offsets, factors, clamps, padding, order of
-axes and channels, and so on. docs/parity.md says what lies behind them.
+Likely causes are derived from the values, each with its evidence: offsets, factors, clamps,
+padding, order of axes and channels, and so on. docs/parity.md explains them.
 
-Exit codes: 0 all within the tolerance, 1 differences (also arrays in one file only), 2 could not run.")]
+Exit codes: 0 all within the tolerance, 1 differences (also arrays in one file only), 2 could
+not run.")]
 pub struct Args {
     /// The first file.
     a: PathBuf,

@@ -18,10 +18,10 @@ Example:
   corsmal-feat cross-validate … --classifier rf --predictions rf.csv
   corsmal-feat compare-predictions svm.csv rf.csv
 
-McNemar's exact test looks at the recordings that only one of the two got right. The bootstrap draws
-recordings, and whole folds where all lines have one, with replacement and gives a 95 % interval of
-the difference of weighted F1. Recordings of one group resemble each other: where folds are groups,
-the interval over folds is the honest one, and with few folds it says little.
+McNemar's exact test looks at the recordings that only one of the two got right. The bootstrap
+draws recordings, and whole folds where all lines have one, with replacement and gives a 95 %
+interval of the difference of weighted F1. Recordings of one group resemble each other: where
+folds are groups, the interval over folds is the honest one, and with few folds it says little.
 
 Exit codes: 0 fine, 2 could not run.")]
 pub struct Args {

@@ -13,8 +13,8 @@ use crate::made::quoted;
 Example:
   corsmal-feat demo --out demo
 
-Everything that it shows is computed from synthetic recordings: scores on them say nothing about real
-data.")]
+Everything that it shows is computed from synthetic recordings: scores on them say nothing about
+real data.")]
 pub struct Args {
     /// Folder for everything that is made; it may be from an earlier demo.
     #[arg(long, value_name = "DIR", default_value = "corsmal-feat-demo")]

@@ -15,8 +15,8 @@ Example:
   corsmal-feat extract --in audio/ --out part1.npz --shard 1/2
   corsmal-feat merge part0.npz part1.npz --out feats.npz
 
-The result has the same bytes as one run over all inputs. Summaries of shards whose recordings have other
-numbers of channels do not fit into one table and are refused.")]
+The result has the same bytes as one run over all inputs. Shards whose summaries differ in width
+(recordings with other channel counts) do not fit into one table and are refused.")]
 pub struct Args {
     /// The outputs of all shards, in any order.
     #[arg(required = true)]

@@ -17,8 +17,8 @@ Examples:
   corsmal-feat pca --features train.npz --n-components 128 --out pca.npz
   corsmal-feat extract --in test/ --out test.npz --preset spec9216-code --project pca.npz
 
-The file knows the configuration of its features and is refused with any other. Fit on training
-recordings only: extract never fits.")]
+The file records the configuration of its features; features of any other are refused. Fit on
+training recordings only: extract never fits.")]
 pub struct Args {
     /// Training features: an .npz or .parquet of `extract` with summaries.
     #[arg(long, value_name = "FILE")]

@@ -70,7 +70,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
                  and the times of its frames in seconds."
                 .to_string()
         }
-        Some(_) => format!("Output: one row a recording. {}", columns(&config)?),
+        Some(_) => format!("Output: one row per recording. {}", columns(&config)?),
     };
     println!("{}\n", wrapped(&output, ""));
     println!("As a file (every other key has its default: corsmal-feat features NAME):\n");

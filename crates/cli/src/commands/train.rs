@@ -25,8 +25,8 @@ Examples:
   corsmal-feat train other.npz --x X --y type --groups container \\
     --classifier svm --standardize --tune C=0.1,1,10 -o type.model
 
-The model file holds classifier, scaling, label names, the feature configuration and the sample rates
-and channels of the recordings, so `corsmal-feat classify` needs nothing else.
+The model file holds classifier, scaling, label names, the feature configuration and the sample
+rates and channels of the recordings, so `corsmal-feat classify` needs nothing else.
 `corsmal-feat classifiers` explains the classifiers and their parameters.
 
 Exit codes: 0 fine, 2 could not run.")]

@@ -103,7 +103,7 @@ fn submissions_are_checked_before_they_are_written() {
         (&["--format", "2022", "--part", "public"], "missing rows: id 2"),
         (&["--format", "2022", "--capacity", text(&kind)], "no column 'fileName'"),
         (&["--format", "2022", "--annotations", text(&kind)], "type.csv"),
-        (&["--type-weights", "1,2"], "weights: 2 where 1 are needed"),
+        (&["--type-weights", "1,2"], "weights: expected 1, found 2"),
         (&["--type-weights=-1"], "positive"),
         (&["--joint", text(&kind)], "--joint"),
         (&["--vote", "majority", "--background", "tea"], "tea"),
@@ -131,7 +131,7 @@ fn submissions_are_checked_before_they_are_written() {
     }
     for (lines, message) in [
         ("id,p_none,p_rice\nx,5,3\n", "line 2, column 'p_none': '5' is not a probability"),
-        ("id,p_none,p_rice\nx,0.5,0.6\n", "line 2: the probabilities have the sum 1.1, not 1"),
+        ("id,p_none,p_rice\nx,0.5,0.6\n", "line 2: the probabilities add up to 1.1, not 1"),
         ("id,p_none,p_rice\nx,0,1\nx,1,0\n", "more than one row: id x"),
     ] {
         put("one.csv", lines);

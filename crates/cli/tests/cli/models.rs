@@ -215,7 +215,7 @@ fn what_cannot_be_learned_from_is_refused() {
     small_table(&odd, |_, _| {});
     let found = plain(&["--groups", "group", "--cv", "k=9"]);
     assert!(found.starts_with("warning: ") && found.contains("1 of 3 features have one value"));
-    assert!(found.contains("4 groups cannot make 9 folds"), "{found}");
+    assert!(found.contains("4 groups are too few for 9 folds"), "{found}");
     let open = ["cross-validate", "--features", text(&odd), "--target", "type"];
     let by_group = done(&[&open[..], &["--classifier", "knn"]].concat());
     assert!(by_group.contains("one group of group held out"), "groups are not split: {by_group}");
@@ -272,7 +272,7 @@ fn inner_folds_are_as_many_as_the_smallest_class_allows() {
     done(&validate);
     rare(2);
     let found = refused(&validate);
-    assert!(found.contains("class rare has 1 row to choose parameters by"), "{found}");
+    assert!(found.contains("class rare has 1 row for choosing parameters"), "{found}");
 }
 
 /// Labels that are one 64-bit float, text in bytes, dates that nobody asked for.
@@ -342,7 +342,7 @@ fn models_that_are_damaged_or_of_other_features_are_refused() {
     done(&by_features);
     let whole = std::fs::read(&model).unwrap();
     for (damage, message) in [
-        (whole[..whole.len() - 1].to_vec(), "bytes where its lengths say"),
+        (whole[..whole.len() - 1].to_vec(), "bytes; its lengths add up to"),
         ([&whole[..8], &[9], &whole[9..]].concat(), "version 9"),
         ([&whole[..100], &[whole[100] ^ 1], &whole[101..]].concat(), "damaged"),
         (b"hello".to_vec(), "not a model file"),

@@ -239,7 +239,7 @@ fn what_silence_cannot_have_is_refused_by_name() {
         Extractor::new(Arc::new(Plan::new(&config, SR, 1).unwrap()), 0..u64::MAX, 0);
     extractor.push(&[0.0; 100]);
     let message = extractor.finish(true).unwrap_err().to_string();
-    assert!(message.starts_with("spec9216: y = silence"), "{message}");
+    assert!(message.starts_with("spec9216: y must be a signal with an RMS above 0"), "{message}");
 }
 
 #[test]

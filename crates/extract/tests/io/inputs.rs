@@ -240,7 +240,7 @@ fn manifest_errors_name_the_line() {
         ("m.csv", "path,start\na.wav,soon\n", "line 2: start = \"soon\" is not a time in seconds"),
         ("m.csv", "path,start\na.wav,nan\n", "line 2: start = \"nan\""),
         ("m.csv", "path,end\na.wav,-1\n", "line 2: end = \"-1\""),
-        ("m.csv", "path,start,end\na.wav,2,2\n", "line 2: end = 2 is not behind start = 2"),
+        ("m.csv", "path,start,end\na.wav,2,2\n", "line 2: end = 2 is not after start = 2"),
         ("m.csv", "path,id\n,x\n", "line 2: no path"),
         ("m.csv", "path,id\na.wav,__x\n", "line 2: id \"__x\" must not begin with __"),
         ("m.csv", "path,id\na.wav,x.npy\n", "line 2: id \"x.npy\" must not end in .npy"),
@@ -328,7 +328,7 @@ fn shards_are_read_as_written() {
     assert_eq!("2/3".parse::<Shard>().unwrap().to_string(), "2/3");
     for text in ["3/3", "0/0", "1", "-1/2", "a/b", "", "1/2/3"] {
         let error = text.parse::<Shard>().unwrap_err().to_string();
-        assert!(error.contains("expected i/n with 0 <= i < n"), "{error}");
+        assert!(error.contains("must be i/n with 0 <= i < n"), "{error}");
     }
 }
 

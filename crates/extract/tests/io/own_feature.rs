@@ -13,7 +13,9 @@ fn the_example_runs_and_its_feature_is_like_any_other() {
     let kinds: Vec<&str> = registry().iter().map(|entry| entry.kind()).collect();
     assert_eq!(kinds[built_in..], ["crest_factor"]);
     // A name is given once.
-    assert!(example::main().unwrap_err().to_string().contains("\"crest_factor\" already"));
+    assert!(
+        example::main().unwrap_err().to_string().contains("already a feature \"crest_factor\"")
+    );
     // Keys and values are checked, slips are recognised.
     let refused = |text: &str| Config::with_overrides(text, "test", &[]).unwrap_err().to_string();
     let refusal = refused("[features.crest_factor]\nquietest = 0");

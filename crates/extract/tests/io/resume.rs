@@ -191,7 +191,7 @@ fn a_changed_line_is_work_not_done_and_said() {
         let (ledger, resumed) = Ledger::resume(&out, &header(), |_, _: &Record| true).unwrap();
         assert_eq!(resumed.records.len(), 3);
         let said = resumed.dropped.unwrap();
-        assert!(said.contains("feats.npz.ledger, line 5: its check sum"), "{said}");
+        assert!(said.contains("feats.npz.ledger, line 5: its checksum"), "{said}");
         drop(ledger);
         work(&out, Compression::Stored, usize::MAX);
         assert!(fs::read(&out).unwrap() == expected);

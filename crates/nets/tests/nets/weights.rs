@@ -101,7 +101,7 @@ fn hostile_pickles_are_refused() {
     refuse(&pickle([2, 3], [9, 1], 6), &six(), "beyond its numbers");
     refuse(&pickle([2, 3], [3, 1], 6), &six()[..20], "5 numbers of 6");
     refuse(&pickle([2, 3], [3, 1], 6)[..40], &six(), "ends");
-    refuse(b"\x80\x02]q\x00(h\x00e.", &six(), "no dictionary");
+    refuse(b"\x80\x02]q\x00(h\x00e.", &six(), "not hold a dictionary");
     // Each recall doubles the list: 2^40 values from a few hundred bytes.
     let mut bomb = b"\x80\x02]q\x00K\x01a".to_vec();
     for _ in 0..40 {

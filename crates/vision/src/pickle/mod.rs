@@ -341,7 +341,7 @@ mod tests {
             (b"(lp0\n", "ends early"),
             (b"g7\n.", "reference to nothing"),
             (b"(I1\nd.", "no value"),
-            (b"I1\nI2\na.", "no list"),
+            (b"I1\nI2\na.", "not a list"),
             (b"S'abc\n.", "quoted string"),
         ] {
             let error = refused(text);

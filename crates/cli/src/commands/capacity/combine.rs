@@ -16,8 +16,8 @@ Example, M5's combination of its two frames:
   corsmal-feat capacity combine --in capacity_estimation_1_public_test.csv \\
       capacity_estimation_20_public_test.csv --out combined.csv
 
-The estimate of a recording is the mean of its estimates in the files, or the prior where no file has one.
-An estimate equal to the prior counts as none, as in the published program.")]
+The estimate of a recording is the mean of its estimates in the files, or the prior where no
+file has one. An estimate equal to the prior counts as none, as in the published program.")]
 pub struct Args {
     /// Tables with the columns fileName and `capacity[mL]`.
     #[arg(long = "in", value_name = "CSV", num_args = 1.., required = true)]

@@ -28,9 +28,9 @@ Examples:
   corsmal-feat capacity --method fused --model fused.capacity --data ~/CCM --out capacity.csv
   corsmal-feat fuse --joint joint.csv --capacity capacity.csv --out submission.csv
 
-The output has one row per recording: estimate in mL (-1: none), uncertainty, sizes, frames used, status
-(ok, prior, none, failed) and the reason where there is no estimate. `fuse --capacity` and
-`benchmark --add` read it. Which files are looked for is in docs/vision.md.
+The output has one row per recording: estimate in mL (-1: none), uncertainty, sizes, frames
+used, status (ok, prior, none, failed) and the reason where there is no estimate. `fuse
+--capacity` and `benchmark --add` read it. docs/vision.md lists the files that it looks for.
 
 Exit codes: 0 all fine, 1 some recordings have damaged files, 2 could not run, 130 interrupted."
 )]

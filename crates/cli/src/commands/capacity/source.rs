@@ -7,6 +7,8 @@ use corsmal_ccm::capacity::{CapacityOptions, Method};
 use corsmal_vision::cuboid::Outliers;
 use corsmal_vision::lode::Variant;
 
+use crate::args::Jobs;
+
 /// Where recordings and detections are.
 #[derive(clap::Args)]
 pub(super) struct Source {
@@ -20,9 +22,8 @@ pub(super) struct Source {
     /// Seed of votes and isolation forests.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Recordings at a time; by default one for each core.
-    #[arg(long, value_name = "N", env = "CORSMAL_FEAT_JOBS", value_parser = clap::value_parser!(u16).range(1..))]
-    jobs: Option<u16>,
+    #[command(flatten)]
+    jobs: Jobs,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -35,7 +36,6 @@ pub(super) enum VariantName {
 
 impl Source {
     pub(super) fn options(self, method: Method, variant: VariantName) -> CapacityOptions {
-        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
         let published = variant == VariantName::Published;
         CapacityOptions {
             data: self.data,
@@ -44,7 +44,7 @@ impl Source {
             variant: if published { Variant::Published } else { Variant::Corrected },
             outliers: if published { Outliers::Published } else { Outliers::Corrected },
             model: None,
-            jobs: self.jobs.map_or_else(cores, usize::from),
+            jobs: self.jobs.count(),
             seed: self.seed,
         }
     }

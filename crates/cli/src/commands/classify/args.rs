@@ -25,12 +25,11 @@ Examples:
   arecord -f cd -t wav | corsmal-feat classify --model type.model --in - --window 2 --hop 0.5
   corsmal-feat classify --model type.model --in audio/ --window 1 --vote majority --out votes.csv
 
-One line per recording: id, path, status, label columns of a manifest (the one that the model predicts
-is called true), predicted, and p_<label> for each class. Recordings that could not be read, or differ
-in sample rate or channels from those that the model was trained on, have a status other than ok and no
-prediction. With --window one line per
-window, with its start and end in seconds, written as soon as the window is complete; memory does
-not grow with the stream.
+One line per recording: id, path, status, label columns of a manifest (the one that the model
+predicts is called true), predicted, and p_<label> for each class. Recordings that could not be
+read, or differ in sample rate or channels from those that the model was trained on, have a
+status other than ok and no prediction. With --window one line per window, with its start and
+end in seconds, written as soon as the window is complete; memory does not grow with the stream.
 
 A network of `train --net` that takes windows, such as m4-type, has a line for each of them, or one
 decision with --vote; one of whole recordings is as good as its --window is like them.

@@ -21,9 +21,10 @@ Examples:
     --out submission.csv
 
 Prediction files are those of `classify` and `cross-validate --predictions`, or have columns
-Object,Sequence,p0,p1,… True classes, folds and labels are carried along. Files are averaged (--weights: one for each, in their order). --type, --level
-and --joint are for recordings of the CORSMAL data set and write an official submission, -1 where
-something is not estimated.
+Object,Sequence,p0,p1,… True classes, folds and labels are carried along. Files are averaged;
+--weights has one weight for each, in their order. --type, --level and --joint are for
+recordings of the CORSMAL data set and write an official submission, -1 where something is not
+estimated.
 
 Exit codes: 0 all fine, 1 some recordings have no prediction, 2 could not run.")]
 pub struct Args {
@@ -113,7 +114,7 @@ pub(super) struct SubmissionArgs {
     /// Official format of the submission; 2022 has class probabilities.
     #[arg(long, value_enum, default_value = "2020")]
     pub(super) format: Format,
-    /// Decide type and level together: level empty goes with type none only.
+    /// Decide type and level together: the level is empty exactly where the type is none.
     #[arg(long)]
     pub(super) feasible: bool,
     /// With --feasible: food boxes are never filled with water.
@@ -129,7 +130,7 @@ pub(super) struct SubmissionArgs {
     /// Official annotations, to name recordings by id (2022) or container and sequence (2020).
     #[arg(long, value_name = "CSV")]
     pub(super) annotations: Option<PathBuf>,
-    /// Refuse a submission that has not exactly the recordings of this part, and write them in the
+    /// Refuse a submission unless it has exactly the recordings of this part; write them in the
     /// official order.
     #[arg(long, value_enum)]
     pub(super) part: Option<Part>,

@@ -74,7 +74,7 @@ fn each_has_its_outcome() {
         ("adpcm", Status::Unsupported, "format tag 0x0002"),
         ("nan", Status::NonFinite, "frame 4500 on (channel 1"),
         ("inf", Status::NonFinite, "frame 4500 on (channel 1"),
-        ("short", Status::TooShort, "2047 samples, at least 2048"),
+        ("short", Status::TooShort, "2047 samples; one frame needs at least 2048"),
         ("three", Status::Mismatch, "channels"),
     ] {
         let outcome = row(outcomes, id);

@@ -53,11 +53,11 @@ fn what_cannot_be_fitted_or_applied_is_refused_and_leaves_nothing() {
     for (features, components, out, reason) in [
         ("train.npz", "2", "new.csv", "must end in .npz"),
         ("train.npz", "2", "pca.npz", "exists"),
-        ("train.npz", "5", "new.npz", "n_components = 5"),
-        ("train.npz", "0", "new.npz", "n_components = 0"),
+        ("train.npz", "5", "new.npz", "1 to 4, the smaller side of X, not 5"),
+        ("train.npz", "0", "new.npz", "the smaller side of X, not 0"),
         ("frames.npz", "2", "new.npz", "no statistics"),
         ("pca.npz", "2", "new.npz", "file of another program"),
-        ("projected.npz", "1", "new.npz", "projected already"),
+        ("projected.npz", "1", "new.npz", "already projected"),
         ("absent.npz", "2", "new.npz", "absent.npz"),
     ] {
         let refused = pca(&at(features), components, &at(out)).with(2);
