@@ -7,9 +7,9 @@ mod kernel;
 mod linfa;
 mod probability;
 mod smo;
+mod two_class;
 
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
-use rand::seq::SliceRandom;
 use rand::{RngCore, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 use self::kernel::{Function, Gram};
 use self::linfa::Solved;
 use self::probability::Sigmoid;
+use self::two_class::TwoClass;
 use super::{Classify, Train};
 use crate::error::{ModelError, Result};
 use crate::params::{ClassWeight, Parameters, parameters};
@@ -139,73 +140,6 @@ pub struct Svm {
     /// `[support vectors, features]`, each once however many pairs use it
     support: Array2<f64>,
     pairs: Vec<Pair>,
-}
-
-/// A two-class problem on rows of the training table.
-struct TwoClass<'a, 'x> {
-    gram: &'a Gram<'x>,
-    /// training rows
-    rows: Vec<u32>,
-    /// +1 or −1
-    signs: Vec<f64>,
-    /// largest α of each row
-    bounds: Vec<f64>,
-    tol: f64,
-    cache_bytes: usize,
-}
-
-impl TwoClass<'_, '_> {
-    fn solve(&self) -> Result<smo::Solution> {
-        let mut rows = self.gram.rows(&self.rows, self.cache_bytes);
-        smo::solve(&mut rows, &self.signs, &self.bounds, self.tol)
-    }
-
-    /// The problem restricted to some of its rows.
-    fn subset(&self, keep: &[usize]) -> Self {
-        Self {
-            gram: self.gram,
-            rows: keep.iter().map(|&i| self.rows[i]).collect(),
-            signs: keep.iter().map(|&i| self.signs[i]).collect(),
-            bounds: keep.iter().map(|&i| self.bounds[i]).collect(),
-            tol: self.tol,
-            cache_bytes: self.cache_bytes,
-        }
-    }
-
-    /// Decision values of all rows, each from a machine that has not seen it (five folds).
-    fn held_out_decisions(&self, seed: u64) -> Result<Vec<f64>> {
-        const FOLDS: usize = 5;
-        let n = self.rows.len();
-        let mut order: Vec<usize> = (0..n).collect();
-        order.shuffle(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
-        let mut decisions = vec![0.0; n];
-        for fold in 0..FOLDS {
-            let (start, end) = (fold * n / FOLDS, (fold + 1) * n / FOLDS);
-            let held = &order[start..end];
-            let kept: Vec<usize> = order[..start].iter().chain(&order[end..]).copied().collect();
-            let inner = self.subset(&kept);
-            let positive = inner.signs.iter().filter(|&&s| s > 0.0).count();
-            if positive == 0 || positive == kept.len() {
-                // As LIBSVM: one class alone wins everywhere.
-                let value = f64::from(i8::from(positive > 0) - i8::from(positive < kept.len()));
-                held.iter().for_each(|&i| decisions[i] = value);
-                continue;
-            }
-            let solution = inner.solve()?;
-            let mut values = vec![0.0f32; kept.len()];
-            for &i in held {
-                self.gram.fill(self.rows[i], &inner.rows, &mut values);
-                let sum: f64 = values
-                    .iter()
-                    .zip(&solution.alpha)
-                    .zip(&inner.signs)
-                    .map(|((&k, a), s)| f64::from(k) * a * s)
-                    .sum();
-                decisions[i] = sum - solution.rho;
-            }
-        }
-        Ok(decisions)
-    }
 }
 
 impl Train for SvmParams {

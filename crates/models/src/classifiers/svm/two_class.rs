@@ -1,0 +1,77 @@
+//! A two-class problem on rows of the training table.
+
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::kernel::Gram;
+use super::smo;
+use crate::error::Result;
+
+/// A two-class problem on rows of the training table.
+pub(super) struct TwoClass<'a, 'x> {
+    pub(super) gram: &'a Gram<'x>,
+    /// training rows
+    pub(super) rows: Vec<u32>,
+    /// +1 or −1
+    pub(super) signs: Vec<f64>,
+    /// largest α of each row
+    pub(super) bounds: Vec<f64>,
+    pub(super) tol: f64,
+    pub(super) cache_bytes: usize,
+}
+
+impl TwoClass<'_, '_> {
+    /// The machine.
+    pub(super) fn solve(&self) -> Result<smo::Solution> {
+        let mut rows = self.gram.rows(&self.rows, self.cache_bytes);
+        smo::solve(&mut rows, &self.signs, &self.bounds, self.tol)
+    }
+
+    /// The problem restricted to some of its rows.
+    fn subset(&self, keep: &[usize]) -> Self {
+        Self {
+            gram: self.gram,
+            rows: keep.iter().map(|&i| self.rows[i]).collect(),
+            signs: keep.iter().map(|&i| self.signs[i]).collect(),
+            bounds: keep.iter().map(|&i| self.bounds[i]).collect(),
+            tol: self.tol,
+            cache_bytes: self.cache_bytes,
+        }
+    }
+
+    /// Decision values of all rows, each from a machine that has not seen it (five folds).
+    pub(super) fn held_out_decisions(&self, seed: u64) -> Result<Vec<f64>> {
+        const FOLDS: usize = 5;
+        let n = self.rows.len();
+        let mut order: Vec<usize> = (0..n).collect();
+        order.shuffle(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
+        let mut decisions = vec![0.0; n];
+        for fold in 0..FOLDS {
+            let (start, end) = (fold * n / FOLDS, (fold + 1) * n / FOLDS);
+            let held = &order[start..end];
+            let kept: Vec<usize> = order[..start].iter().chain(&order[end..]).copied().collect();
+            let inner = self.subset(&kept);
+            let positive = inner.signs.iter().filter(|&&s| s > 0.0).count();
+            if positive == 0 || positive == kept.len() {
+                // As LIBSVM: one class alone wins everywhere.
+                let value = f64::from(i8::from(positive > 0) - i8::from(positive < kept.len()));
+                held.iter().for_each(|&i| decisions[i] = value);
+                continue;
+            }
+            let solution = inner.solve()?;
+            let mut values = vec![0.0f32; kept.len()];
+            for &i in held {
+                self.gram.fill(self.rows[i], &inner.rows, &mut values);
+                let sum: f64 = values
+                    .iter()
+                    .zip(&solution.alpha)
+                    .zip(&inner.signs)
+                    .map(|((&k, a), s)| f64::from(k) * a * s)
+                    .sum();
+                decisions[i] = sum - solution.rho;
+            }
+        }
+        Ok(decisions)
+    }
+}
