@@ -120,7 +120,7 @@ def test_what_cannot_be_is_refused(folder: Path, tmp_path: Path):
         cf.extract(folder, set={"melspectrogram.hop_length": 0})
     with pytest.raises(cf.ParameterError, match="unknown"):
         cf.extract(folder, preset="logmell")
-    with pytest.raises(cf.ParameterError, match="one of them"):
+    with pytest.raises(cf.ParameterError, match="either preset or config"):
         cf.extract(folder, preset="esc26", config={})
     with pytest.raises(cf.ParameterError, match=r"jobs must be .*, not 0"):
         cf.extract(folder, jobs=0)
