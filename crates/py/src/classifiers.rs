@@ -18,6 +18,9 @@ use crate::pool::compute;
 #[pyclass(frozen, name = "TrainedModel", module = "corsmal_feat._core")]
 pub(crate) struct PyModel(Model);
 
+/// Numbers that are taken; None for any.
+type Taken = Option<Vec<u32>>;
+
 /// How the rows of a table were made.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -179,7 +182,7 @@ impl PyModel {
     }
 
     /// Sample rates and channel counts that recordings may have; None for any.
-    fn format_rule(&self) -> PyResult<(Option<Vec<u32>>, Option<Vec<u32>>)> {
+    fn format_rule(&self) -> PyResult<(Taken, Taken)> {
         let rule = self.0.format_rule(&self.0.header().feature_config).map_err(model_error)?;
         Ok((rule.sample_rates().map(<[u32]>::to_vec), rule.channels().map(<[u32]>::to_vec)))
     }
