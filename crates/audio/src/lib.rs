@@ -1,5 +1,5 @@
 //! Recordings to samples, as streams of blocks: WAV, Wave64, AIFF, AU and CAF by demultiplexers of its
-//! own; FLAC, Ogg, MPEG audio, AAC and ALAC with the decoders of symphonia, lewton and opus-decoder (feature
+//! own; FLAC, Ogg, MPEG audio, AAC and ALAC with the decoders of symphonia, lewton and opus-pure (feature
 //! `symphonia`, on by default).
 //!
 //! Nothing in a file can make a reader panic or allocate more than a fixed amount; what is

@@ -1,6 +1,6 @@
-//! Opus (RFC 6716, RFC 7845), by opus-decoder.
+//! Opus (RFC 6716, RFC 7845), by opus-pure.
 
-use opus_decoder::OpusDecoder;
+use opus_pure::OpusDecoder;
 
 use super::order;
 use crate::codec::{Decoded, PacketDecoder, Refusal, guarded};
@@ -50,7 +50,7 @@ impl Opus {
             return None;
         }
         let order = if family == 1 { order::of(channels) } else { (0..channels).collect() };
-        let decoder = |i| OpusDecoder::new(SAMPLE_RATE, if i < coupled { 2 } else { 1 }).ok();
+        let decoder = |i| OpusDecoder::new(SAMPLE_RATE as i32, width(i, coupled)).ok();
         let streams = match guarded(|| (0..streams).map(decoder).collect::<Option<Vec<_>>>()) {
             Ok(streams) => streams?,
             Err(refusal) => return Some(Err(refusal)),
@@ -63,10 +63,8 @@ impl Opus {
 
     /// Puts the decoded samples of a stream where the mapping wants them.
     fn place(&self, stream: usize, frames: usize, samples: &mut [f32]) {
-        let (first, width) = match stream.checked_sub(self.coupled) {
-            None => (2 * stream, 2),
-            Some(single) => (2 * self.coupled + single, 1),
-        };
+        let width = width(stream, self.coupled);
+        let first = stream + stream.min(self.coupled);
         for (slot, &channel) in self.mapping.iter().zip(&self.order) {
             let Some(from) = usize::from(*slot).checked_sub(first).filter(|c| *c < width) else {
                 continue;
@@ -86,8 +84,9 @@ impl PacketDecoder for Opus {
         let Some(packets) = split(packet, self.streams.len()) else { return Ok(Decoded::Damaged) };
         samples.resize(frames * self.order.len(), 0.0);
         for (stream, packet) in packets.iter().enumerate() {
-            let (decoder, decoded) = (&mut self.streams[stream], &mut self.decoded);
-            match guarded(|| decoder.decode_float(packet, decoded, false))? {
+            let decoded = &mut self.decoded[..frames * width(stream, self.coupled)];
+            let decoder = &mut self.streams[stream];
+            match guarded(|| decoder.decode(packet, frames, decoded))? {
                 Ok(n) if n == frames => self.place(stream, frames, samples),
                 _ => return Ok(Decoded::Damaged),
             }
@@ -96,8 +95,16 @@ impl PacketDecoder for Opus {
     }
 
     fn reset(&mut self) {
-        self.streams.iter_mut().for_each(OpusDecoder::reset);
+        for stream in &mut self.streams {
+            // Fails for no decoder that could be made.
+            let _ = stream.reset_state();
+        }
     }
+}
+
+/// Channels of a stream, of which the first `coupled` have two.
+fn width(stream: usize, coupled: usize) -> usize {
+    if stream < coupled { 2 } else { 1 }
 }
 
 /// The packets of the streams in one packet: all but the last tell their own length (RFC 6716,

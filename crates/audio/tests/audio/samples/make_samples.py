@@ -64,3 +64,14 @@ with tempfile.TemporaryDirectory() as folder:
     steps = ((i * 37 + c * 1001) % 20011 - 10005).astype(np.int16)
     soundfile.write(folder / "steps.wav", steps, 48000)
     run("ffmpeg", "-y", "-i", folder / "steps.wav", "-c:a", "alac", "-bitexact", HERE / "steps-6ch.m4a")
+
+    # Opus. Noise beyond full scale, whose packets of 60 ms hold frames of more than 1500 bytes in all;
+    # and clicks in two channels, which short blocks code.
+    noise = np.random.default_rng(1).uniform(-1, 1, (11520, 2))
+    soundfile.write(folder / "noise.wav", noise, 48000)
+    opus = ["opusenc", "--quiet", "--serial", "1"]
+    run(*opus, "--bitrate", "256", "--framesize", "60", folder / "noise.wav", HERE / "noise-2ch.opus")
+    clicks = 0.05 * noise
+    clicks[::1500] = (0.9, -0.7)
+    soundfile.write(folder / "clicks.wav", clicks, 48000)
+    run(*opus, "--bitrate", "96", folder / "clicks.wav", HERE / "clicks-2ch.opus")
