@@ -79,8 +79,8 @@ pub enum Repair {
         /// How many there are in all.
         bytes: u64,
     },
-    /// Behind the samples of a WAV file there are more: a second data chunk, or another WAV file.
-    /// They were not read.
+    /// Behind the samples there are more: a second data chunk, or another file of uncompressed
+    /// samples. They were not read.
     MoreData {
         /// Where that chunk or file begins.
         offset: u64,
@@ -158,13 +158,24 @@ impl fmt::Display for Repair {
 pub struct ReadReport {
     /// Frames handed out by `read` so far.
     pub decoded_frames: u64,
-    /// The recording ended before what its header declares.
+    /// The recording ended before what its header declares, or bytes that may have been frames were
+    /// left out.
     pub truncated: bool,
     /// Deviations worked around, in the order met, each kind of cause once.
     pub repairs: Vec<Repair>,
 }
 
 impl ReadReport {
+    /// The deviation by which samples are missing, or may be.
+    pub fn loss(&self) -> Option<&Repair> {
+        let is_lost = |repair: &&Repair| match repair {
+            Repair::Truncated { .. } | Repair::LostFrames { .. } => true,
+            Repair::ForeignBytes { .. } => self.truncated,
+            _ => false,
+        };
+        self.repairs.iter().find(is_lost)
+    }
+
     /// Notes a deviation; of its kind the first place and the sum of frames or bytes are kept.
     pub(crate) fn note(&mut self, repair: Repair) {
         let kind = std::mem::discriminant(&repair);

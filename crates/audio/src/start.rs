@@ -7,6 +7,17 @@ use crate::tags;
 
 /// Bytes before the audio that are searched for its beginning, tags not counted.
 const SEARCHED: usize = 64 << 10;
+/// Bytes behind them that show a chain of frames which begins in them.
+#[cfg(feature = "symphonia")]
+const CHAIN: usize = if crate::aac::WINDOW > crate::mpeg::WINDOW {
+    crate::aac::WINDOW / 2
+} else {
+    crate::mpeg::WINDOW / 2
+};
+#[cfg(not(feature = "symphonia"))]
+const CHAIN: usize = MARK;
+/// The longest mark that is sure.
+const MARK: usize = 24;
 
 /// A format by its first bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,11 +75,14 @@ pub(crate) fn find(input: &mut Input) -> Result<Option<Format>, AudioError> {
     if let Some(format) = at_start(input.peek(SHOWN)?) {
         return Ok(Some(format));
     }
-    let shown = input.peek(SEARCHED)?;
-    let is_end = shown.len() < SEARCHED;
+    let shown = input.peek(SEARCHED + CHAIN)?;
+    // No more than a pipe is sure to show.
+    let shown = &shown[..shown.len().min(SEARCHED + CHAIN)];
+    let is_end = shown.len() < SEARCHED + CHAIN;
     let sure = (0..shown.len()).find_map(|at| Some((at, surely(&shown[at..])?)));
-    let found = sure.or_else(|| frames(shown, is_end));
-    if let Some((at, format)) = found {
+    // What begins first counts; the other stands behind the audio, or in it.
+    let found = [sure, frames(shown, is_end)].into_iter().flatten().min_by_key(|(at, _)| *at);
+    if let Some((at, format)) = found.filter(|(at, _)| *at < SEARCHED) {
         input.consume(at);
         return Ok(Some(format));
     }
@@ -109,12 +123,32 @@ fn surely(bytes: &[u8]) -> Option<Format> {
         [b'R', b'I' | b'F', b'F' | b'6', ..] if bytes.get(8..12) == Some(b"WAVE") => {
             Container::of(&bytes[..12]).map(Format::Pcm)
         }
+        [b'F', b'O', b'R', b'M', ..] | [b'r', b'i', b'f', b'f', ..] => {
+            Container::of(&bytes[..bytes.len().min(SHOWN)]).map(Format::Pcm)
+        }
+        [b'c', b'a', b'f', b'f', 0, 1, _, _, b'd', b'e', b's', b'c', ..]
+        | [b'.', b's', b'n', b'd', 0, ..]
+        | [b'd', b'n', b's', b'.', _, _, _, 0, ..]
+            if has_likely_fields(bytes) =>
+        {
+            Container::of(&bytes[..SHOWN]).map(Format::Pcm)
+        }
         #[cfg(feature = "symphonia")]
         [b'f', b'L', b'a', b'C', 0 | 0x80, 0, 0, 34, ..] => Some(Format::Flac),
         #[cfg(feature = "symphonia")]
         [b'O', b'g', b'g', b'S', 0, 2, 0, 0, ..] => Some(Format::Ogg),
         _ => None,
     }
+}
+
+/// Whether CAF, or AU with a known encoding and few channels, starts here.
+fn has_likely_fields(bytes: &[u8]) -> bool {
+    let Some(head) = bytes.first_chunk::<MARK>() else { return false };
+    let field = |at: usize| {
+        let field = [head[at], head[at + 1], head[at + 2], head[at + 3]];
+        if head[0] == b'.' { u32::from_be_bytes(field) } else { u32::from_le_bytes(field) }
+    };
+    head[0] == b'c' || (matches!(field(12), 1..=7 | 27) && (1..=64).contains(&field(20)))
 }
 
 /// MPEG audio and AAC have no mark but the headers of their frames.

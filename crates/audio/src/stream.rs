@@ -4,6 +4,10 @@ use crate::error::AudioError;
 use crate::report::ReadReport;
 use crate::source::{AudioSpec, BlockSource};
 
+/// Longest gap, in seconds, that is filled with silence.
+#[cfg(feature = "symphonia")]
+pub(crate) const LONGEST_GAP: u64 = 3600;
+
 /// What a [`Stream`] gives next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Next {

@@ -7,7 +7,7 @@ use crate::error::AudioError;
 use crate::input::Input;
 use crate::report::{ReadReport, Repair};
 use crate::source::{AudioSpec, BlockSource, SampleEncoding};
-use crate::stream::{Next, Stream, StreamSource};
+use crate::stream::{LONGEST_GAP, Next, Stream, StreamSource};
 use crate::tags;
 
 const EXPECTED: &str = "ADTS with AAC-LC of 1 or 2 channels";
@@ -18,9 +18,7 @@ const CHAIN: usize = 3;
 /// Largest frame: its length has 13 bits.
 const MAX_FRAME: usize = 1 << 13;
 /// Bytes that show such a chain wherever it begins in the first half of them.
-const WINDOW: usize = 2 * (CHAIN + 1) * MAX_FRAME;
-/// Longest run of frames, in seconds, none of which can be decoded.
-const LONGEST_GAP: u64 = 3600;
+pub(crate) const WINDOW: usize = 2 * (CHAIN + 1) * MAX_FRAME;
 
 /// What a frame header says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -123,6 +121,7 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn BlockSource>, AudioError>
     let at = input.position();
     let refused = |refusal: Refusal| refusal.at(at, EXPECTED);
     let shown = input.peek(WINDOW)?;
+    let shown = &shown[..shown.len().min(WINDOW)];
     let Some(first) = Header::parse(shown) else {
         return Err(AudioError::corrupt(at, "no whole frame of AAC", EXPECTED));
     };

@@ -5,6 +5,6 @@ mod bits;
 mod config;
 mod sbr;
 
-pub(crate) use adts::{find, open};
+pub(crate) use adts::{WINDOW, find, open};
 pub(crate) use config::{Config, FRAME};
 pub(crate) use sbr::{LOOKED_AT, refuse as refuse_replication};

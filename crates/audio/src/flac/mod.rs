@@ -14,13 +14,11 @@ use crate::error::AudioError;
 use crate::input::Input;
 use crate::report::{ReadReport, Repair};
 use crate::source::{AudioSpec, BlockSource, SampleEncoding};
-use crate::stream::{Next, Stream, StreamSource};
+use crate::stream::{LONGEST_GAP, Next, Stream, StreamSource};
 use frame::{Header, Number};
 use info::Info;
 
 const EXPECTED: &str = "FLAC frames with right checksums";
-/// Longest gap, in seconds, that is filled with silence.
-const LONGEST_GAP: u64 = 3600;
 /// Ends of a frame that are tried where no frame follows.
 const MAX_ENDS: usize = 16;
 /// Bytes that may be searched in vain for each byte of the file.
@@ -49,10 +47,14 @@ struct FlacStream {
 /// One of the recordings in a file; there is more than one where files were concatenated.
 #[derive(Default)]
 struct Part {
+    /// Samples per channel before it, of the parts before.
+    begin: u64,
     /// Samples per channel of all frames but the last, where frames are counted.
     block: Option<u32>,
     /// The sample that comes next by the recording's own count; `None` before the first frame.
     next: Option<u64>,
+    /// Bytes before the first frame that belong to none.
+    foreign: u64,
     /// What looked like a frame and could not be read was met last.
     is_broken: bool,
     /// It may be a frame that the end of the file cuts off.
@@ -133,6 +135,9 @@ impl FlacStream {
             let is_start = |at: usize| frame::may_start(&shown[at..]) || info::starts(&shown[at..]);
             let step = places.find(|&at| is_start(at)).unwrap_or(shown.len() - info::SHOWN);
             self.input.consume(step);
+            if self.part.next.is_none() {
+                self.part.foreign += step as u64;
+            }
         }
     }
 
@@ -218,27 +223,50 @@ impl FlacStream {
         Ok(None)
     }
 
-    /// Samples per channel that are missing before a frame.
-    fn gap(&mut self, header: &Header, report: &mut ReadReport) -> u64 {
-        let regular = if self.info.block >= 16 { self.info.block } else { header.block };
-        let block = u64::from(*self.part.block.get_or_insert(regular));
-        let start = match header.number {
-            Number::Frame(n) => n * block,
-            Number::Sample(n) => n,
+    /// The first sample of a frame, behind which the input stands, by its own count.
+    fn start(&mut self, header: &Header) -> Result<u64, AudioError> {
+        let number = match header.number {
+            Number::Sample(n) => return Ok(n),
+            Number::Frame(n) => n,
         };
-        let expected = self.part.next.replace(start + u64::from(header.block)).unwrap_or(0);
+        let block = match self.part.block {
+            Some(block) => block,
+            // All frames but the last are equal: where none follows, only the stream information
+            // says how long the others were.
+            None if number > 0 && self.info.block > header.block => {
+                let next = Header::parse(self.input.peek(info::SHOWN)?);
+                if next.is_some_and(|next| self.info.admits(&next)) {
+                    header.block
+                } else {
+                    self.info.block
+                }
+            }
+            None => header.block,
+        };
+        self.part.block = Some(block);
+        Ok(number * u64::from(block))
+    }
+
+    /// Samples per channel that are missing before a frame, behind which the input stands.
+    fn gap(&mut self, header: &Header, report: &mut ReadReport) -> Result<u64, AudioError> {
+        let start = self.start(header)?;
+        let before = self.part.next.replace(start + u64::from(header.block));
+        let expected = before.unwrap_or(0);
         let gap = start.saturating_sub(expected);
-        let is_first = expected == 0;
+        // Where the first frames are missing, bytes and all, the recording was cut.
+        let block = u64::from(self.part.block.unwrap_or(header.block));
+        let is_cut =
+            before.is_none() && self.part.foreign < (gap / block).max(1) * MIN_FRAME as u64;
         let longest = LONGEST_GAP * u64::from(self.info.sample_rate);
-        if gap > 0 && (is_first || gap > longest) || start < expected {
+        if gap > 0 && (is_cut || gap > longest) || start < expected {
             let frames = start.abs_diff(expected);
             report.note(Repair::TimeJump { at: self.given, frames });
-            return 0;
+            return Ok(0);
         }
         if gap > 0 {
             report.note(Repair::LostFrames { first: self.given, count: gap });
         }
-        gap
+        Ok(gap)
     }
 
     /// Goes on with another recording, whose magic number the input shows.
@@ -254,24 +282,28 @@ impl FlacStream {
         self.codec = Codec::flac(&info.repaired(), info.channels.into(), info.sample_rate)
             .map_err(|refusal| refusal.at(at, EXPECTED))?;
         self.info = info;
-        self.part = Part::default();
+        self.part = Part { begin: self.given, ..Part::default() };
         report.note(Repair::Concatenated { at: self.given });
         Ok(())
     }
 
     /// Notes where a part has not the length declared.
     fn finish(&self, report: &mut ReadReport) -> Result<(), AudioError> {
-        let actual = self.part.next.unwrap_or(0);
+        let begin = self.part.begin;
+        let actual = self.part.next.unwrap_or(0).max(self.given - begin);
         match self.info.declared {
             _ if self.part.next.is_none() && self.part.is_broken && !self.part.is_cut => {
                 let at = self.input.position();
                 return Err(AudioError::corrupt(at, "no intact frame", EXPECTED));
             }
             Some(declared) if actual < declared => {
-                report.note_truncated(Some(declared), self.given);
+                report.note_truncated(Some(begin + declared), self.given);
             }
             Some(declared) if actual > declared => {
-                report.note(Repair::LongerThanDeclared { declared, actual });
+                report.note(Repair::LongerThanDeclared {
+                    declared: begin + declared,
+                    actual: begin + actual,
+                });
             }
             None if self.part.is_broken => report.note_truncated(None, self.given),
             _ => {}
@@ -294,7 +326,7 @@ impl Stream for FlacStream {
         match self.find(samples)? {
             Candidate::Frame(header, length) => {
                 self.input.consume(length);
-                let gap = self.gap(&header, report);
+                let gap = self.gap(&header, report)?;
                 self.given += gap + u64::from(header.block);
                 if gap > 0 {
                     std::mem::swap(samples, &mut self.waiting);

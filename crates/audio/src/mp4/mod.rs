@@ -17,7 +17,7 @@ use crate::error::AudioError;
 use crate::input::Input;
 use crate::report::{ReadReport, Repair};
 use crate::source::{AudioSpec, BlockSource, SampleEncoding};
-use crate::stream::{Next, Stream, StreamSource};
+use crate::stream::{LONGEST_GAP, Next, Stream, StreamSource};
 use boxes::Head;
 use edits::Timeline;
 use fragments::Fragments;
@@ -35,8 +35,6 @@ const LOOKED_THROUGH: usize = 64 << 10;
 const MAX_BOXES: usize = 4096;
 /// Largest packet: 8 channels of 32 bits in the largest frame of ALAC, and more.
 const MAX_PACKET: u32 = 4 << 20;
-/// Longest gap, in seconds, that is filled with silence.
-const LONGEST_GAP: u64 = 3600;
 
 /// Boxes that can start a file.
 const FIRST: [&[u8; 4]; 8] =

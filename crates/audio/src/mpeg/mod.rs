@@ -12,14 +12,17 @@ use crate::error::AudioError;
 use crate::input::Input;
 use crate::report::{ReadReport, Repair};
 use crate::source::{AudioSpec, BlockSource, SampleEncoding};
-use crate::stream::{Next, Stream, StreamSource};
+use crate::stream::{LONGEST_GAP, Next, Stream, StreamSource};
 use crate::tags;
-use header::{HEADER, Header};
+use header::{HEADER, Header, MAX_FRAME};
 use tag::Tag;
 
 pub(crate) use sync::{WINDOW, find, is_free_format};
 
 const EXPECTED: &str = "MPEG audio of layers 1 to 3 with frames of stated size";
+
+/// Frames whose mean size tells how many are missing: rates of MP3 vary slowly.
+const RECENT: usize = 8;
 
 /// Whether the bytes are those of a frame header.
 pub(crate) fn is_header(bytes: &[u8]) -> bool {
@@ -35,72 +38,132 @@ struct Frames {
     before: Option<Header>,
     /// Frames that went missing before the one found last.
     missing: u64,
+    /// What stands before the one found last may have been frames.
+    is_gap: bool,
+    /// Bytes of the frames decoded last, in no order.
+    recent: Vec<usize>,
+    /// Frames decoded.
+    count: usize,
 }
 
 impl Frames {
     /// Goes to the next whole frame, which the input then shows; `None` at the end.
     fn next(&mut self, report: &mut ReadReport) -> Result<Option<Header>, AudioError> {
+        tags::skip(&mut self.input)?;
         let offset = self.input.position();
-        let mut foreign = 0;
-        loop {
-            tags::skip(&mut self.input)?;
-            let header = Header::parse(self.input.peek(HEADER)?).filter(|h| h.size > HEADER);
-            let first = self.first;
-            if let Some(header) = header.filter(|h| first.is_none_or(|first| h.continues(&first))) {
-                let shown = self.input.peek(header.size)?.len();
-                if shown < header.size {
-                    report.note(Repair::PartialFrame { bytes: shown as u64 });
-                    return Ok(None);
-                }
-                self.missing = self.missing_in(foreign, &header);
-                if foreign > 0 && first.is_some() && self.missing == 0 {
-                    report.note(Repair::ForeignBytes { offset, bytes: foreign });
-                }
-                self.before = Some(header);
-                return Ok(Some(header));
-            }
+        let first = self.first;
+        let continues = |h: &Header| h.size > HEADER && first.is_none_or(|f| h.continues(&f));
+        let mut header = Header::parse(self.input.peek(HEADER)?).filter(continues);
+        let mut foreign = Foreign::default();
+        while header.is_none() {
+            let position = self.input.position();
             let shown = self.input.peek(WINDOW)?;
+            let shown = &shown[..shown.len().min(WINDOW)];
             let is_end = shown.len() < WINDOW;
-            let step = match (find(shown, is_end, 1), first) {
-                (Some(at), Some(first)) if !continues_at(shown, at, &first) => {
-                    let position = self.input.position() + at as u64;
-                    return Err(changed(position, &self.input.peek(WINDOW)?[at..]));
-                }
-                (Some(at), _) => at,
-                (None, _) if is_end => return Ok(None),
-                (None, _) => shown.len() - WINDOW / 2,
-            };
+            // Behind other bytes a single header may be chance.
+            let next = sync::find_where(shown, is_end, 1, continues);
+            let other = sync::find_where(shown, is_end, sync::CHAIN, |h| !continues(h));
+            if let Some(at) = other.filter(|at| next.is_none_or(|next| *at < next)) {
+                return Err(changed(position + at as u64, &shown[at..]));
+            }
+            if next.is_none() && is_end {
+                return Ok(None);
+            }
+            let step = next.unwrap_or(WINDOW / 2);
+            header = next.and_then(|at| Header::parse(&shown[at..]));
+            foreign.add(&shown[..step]);
             self.input.consume(step);
-            foreign += step as u64;
         }
+        let Some(header) = header else { return Ok(None) };
+        let shown = self.input.peek(header.size)?;
+        if shown.len() < header.size {
+            let bytes = shown.len() as u64;
+            report.note(Repair::PartialFrame { bytes });
+            return Ok(None);
+        }
+        // Another recording may begin behind other bytes, which then took no time.
+        let is_tag = foreign.bytes > 0 && Tag::parse(&shown[..header.size], &header).is_some();
+        self.missing = if is_tag { 0 } else { self.missing_in(&foreign, &header) };
+        if foreign.bytes > 0 && first.is_some() {
+            // So many bytes may have been frames.
+            let is_large = foreign.bytes >= header.size as u64;
+            self.is_gap = !is_tag && (self.missing > 0 || is_large);
+            if self.missing == 0 {
+                report.note(Repair::ForeignBytes { offset, bytes: foreign.bytes });
+                report.truncated |= self.is_gap;
+            }
+        }
+        self.before = Some(header);
+        Ok(Some(header))
+    }
+
+    /// Remembers the size of a frame that was decoded.
+    fn decoded(&mut self, size: usize) {
+        match self.recent.get_mut(self.count % RECENT) {
+            Some(oldest) => *oldest = size,
+            None => self.recent.push(size),
+        }
+        self.count += 1;
     }
 
     /// How many frames the `foreign` bytes before a frame were: damaged headers hide frames, one of
-    /// any bit rate, or several of a constant one. Other bytes were put between the frames.
-    fn missing_in(&self, foreign: u64, header: &Header) -> u64 {
-        let Some(before) = self.before.filter(|_| foreign > 0) else { return 0 };
-        if header.sizes().any(|size| size as u64 == foreign) {
-            return 1;
-        }
-        if before.bit_rate != header.bit_rate {
+    /// any bit rate, or several of a constant one; and where a medium lost its bytes, most of these
+    /// are alike. Other bytes were put between the frames.
+    fn missing_in(&self, foreign: &Foreign, header: &Header) -> u64 {
+        let Some(before) = self.before.filter(|_| foreign.bytes > 0) else { return 0 };
+        let bytes = foreign.bytes;
+        // Nothing near an overflow is filled in.
+        let longest = LONGEST_GAP * u64::from(header.sample_rate) / header.samples as u64;
+        if bytes > longest * MAX_FRAME as u64 {
             return 0;
         }
         // Some encoders never pad.
         let plain = before.plain_size().max(1) as u64;
-        if foreign.is_multiple_of(plain) {
-            return foreign / plain;
-        }
         // With padding, a frame is so many bytes on average, times 8 times the sample rate.
         let scale = 8 * u64::from(before.sample_rate);
         let average = before.samples as u64 * u64::from(before.bit_rate);
-        let frames = (foreign * scale + average / 2) / average;
-        let rest = (foreign * scale).abs_diff(frames * average);
-        if rest <= scale { frames } else { 0 }
+        let constant = (bytes * scale + average / 2) / average;
+        let rest = (bytes * scale).abs_diff(constant * average);
+        let frames = if header.sizes().any(|size| size as u64 == bytes) {
+            1
+        } else if before.bit_rate == header.bit_rate && bytes.is_multiple_of(plain) {
+            bytes / plain
+        } else if before.bit_rate == header.bit_rate && rest <= scale {
+            constant
+        } else if foreign.is_blank() {
+            let sum = self.recent.iter().sum::<usize>() as u64;
+            (bytes * self.recent.len() as u64 + sum / 2).checked_div(sum).unwrap_or(0)
+        } else {
+            0
+        };
+        if frames <= longest { frames } else { 0 }
     }
 }
 
-fn continues_at(shown: &[u8], at: usize, first: &Header) -> bool {
-    shown.get(at..).and_then(Header::parse).is_some_and(|h| h.continues(first))
+/// Bytes before a frame that belong to none.
+#[derive(Default)]
+struct Foreign {
+    bytes: u64,
+    /// The first of them, and how many from there on are the same.
+    value: u8,
+    alike: u64,
+}
+
+impl Foreign {
+    fn add(&mut self, bytes: &[u8]) {
+        if let (0, Some(&value)) = (self.bytes, bytes.first()) {
+            self.value = value;
+        }
+        if self.alike == self.bytes {
+            self.alike += bytes.iter().take_while(|b| **b == self.value).count() as u64;
+        }
+        self.bytes += bytes.len() as u64;
+    }
+
+    /// Whether a medium lost them: most are alike, up to the rest of the last frame.
+    fn is_blank(&self) -> bool {
+        2 * self.alike >= self.bytes
+    }
 }
 
 fn changed(offset: u64, frame: &[u8]) -> AudioError {
@@ -171,7 +234,15 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn BlockSource>, AudioError>
     }
     let mut report = ReadReport::default();
     let no_frame = || AudioError::corrupt(at, "no whole frame of MPEG audio", EXPECTED);
-    let mut frames = Frames { input, first: None, before: None, missing: 0 };
+    let mut frames = Frames {
+        input,
+        first: None,
+        before: None,
+        missing: 0,
+        is_gap: false,
+        recent: Vec::new(),
+        count: 0,
+    };
     let mut first = frames.next(&mut report)?.ok_or_else(no_frame)?;
     let tag = Tag::parse(&frames.input.peek(first.size)?[..first.size], &first);
     if tag.is_some() {
@@ -253,6 +324,10 @@ impl MpegStream {
         report: &mut ReadReport,
     ) -> Result<(), AudioError> {
         let at = self.frames.input.position();
+        if std::mem::take(&mut self.frames.is_gap) {
+            // What the decoder holds of the frames before does not fit.
+            self.codec.reset();
+        }
         let frame = &self.frames.input.peek(header.size)?[..header.size];
         if let Some(tag) = Tag::parse(frame, header) {
             self.frames.input.consume(header.size);
@@ -264,6 +339,7 @@ impl MpegStream {
         }
         let decoded = self.codec.decode(frame, &mut self.scratch);
         self.frames.input.consume(header.size);
+        self.frames.decoded(header.size);
         self.part.frames += 1;
         if decoded.map_err(|refusal| refusal.at(at, EXPECTED))? == Decoded::Damaged {
             self.scratch.resize(header.samples * self.channels(), 0.0);

@@ -4,7 +4,7 @@ use super::header::{HEADER, Header, MAX_FRAME};
 use crate::tags;
 
 /// Frames that must follow each other for the first one to be believed.
-const CHAIN: usize = 3;
+pub(super) const CHAIN: usize = 3;
 /// Bytes that show such a chain wherever it begins in the first half of them.
 pub(crate) const WINDOW: usize = 2 * (CHAIN + 1) * MAX_FRAME;
 
@@ -35,8 +35,22 @@ fn is_chain(buffer: &[u8], at: usize, is_end: bool, least: usize) -> bool {
 /// The first byte of `buffer` at which a chain of frames begins, of at least `least` frames where it
 /// ends with the file.
 pub(crate) fn find(buffer: &[u8], is_end: bool, least: usize) -> Option<usize> {
+    find_where(buffer, is_end, least, |_| true)
+}
+
+/// As [`find`], of frames with such a header.
+pub(super) fn find_where(
+    buffer: &[u8],
+    is_end: bool,
+    least: usize,
+    admits: impl Fn(&Header) -> bool,
+) -> Option<usize> {
     let last = if is_end { buffer.len() } else { buffer.len().saturating_sub(WINDOW / 2) };
-    (0..last).find(|&at| buffer[at] == 0xff && is_chain(buffer, at, is_end, least))
+    (0..last).find(|&at| {
+        buffer[at] == 0xff
+            && Header::parse(&buffer[at..]).is_some_and(|header| admits(&header))
+            && is_chain(buffer, at, is_end, least)
+    })
 }
 
 /// Whether frames of free format follow each other from the start of `buffer` on: their headers are

@@ -86,7 +86,10 @@ impl Link {
                 first = Some((page.serial, name_of(page.body())));
                 page.packets(partial, packets);
             } else {
-                others.push(name_of(page.body()));
+                let name = name_of(page.body());
+                if !others.contains(&name) {
+                    others.push(name);
+                }
             }
             if !page.read(input)? {
                 break;

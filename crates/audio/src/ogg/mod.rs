@@ -1,5 +1,5 @@
 //! Ogg: pages and packets are read here, their audio is decoded by symphonia (FLAC, most of
-//! Vorbis), lewton (the rest of Vorbis) and opus-decoder.
+//! Vorbis), lewton (the rest of Vorbis) and opus-pure.
 //!
 //! Positions in the pages say what to drop at both ends and how much is missing in between.
 
@@ -17,12 +17,9 @@ use crate::error::AudioError;
 use crate::input::Input;
 use crate::report::{ReadReport, Repair};
 use crate::source::{AudioSpec, BlockSource};
-use crate::stream::{Next, Stream, StreamSource};
+use crate::stream::{LONGEST_GAP, Next, Stream, StreamSource};
 use link::{EXPECTED, Link};
 use page::Page;
-
-/// Longest gap, in seconds, that is filled with silence.
-const LONGEST_GAP: u64 = 3600;
 
 /// What comes next of the pages read so far.
 enum Step {
@@ -159,6 +156,7 @@ impl OggStream {
         }
         self.link = link;
         self.ahead.clear();
+        report.note(Repair::Concatenated { at: self.given + queued(&self.steps) });
         self.sequence = self.page.sequence;
         self.place = Place { skip: self.link.skip, ..Place::default() };
         self.place_packets(false, report);

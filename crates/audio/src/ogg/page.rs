@@ -12,6 +12,8 @@ const HEAD: usize = 27;
 const LARGEST: usize = HEAD + 255 + 255 * 255;
 /// Packets are not larger in practice; what is longer is cut here.
 const MAX_PACKET: usize = 4 << 20;
+/// Bytes of what only looks like pages that may be looked through for each byte passed.
+const PATIENCE: u64 = 64;
 
 /// A page.
 #[derive(Debug, Clone, Default)]
@@ -30,6 +32,9 @@ pub(super) struct Page {
     /// Lengths of segments; one below 255 ends a packet.
     lacing: Vec<u8>,
     body: Vec<u8>,
+    /// Bytes passed so far, and those looked through in vain.
+    passed: u64,
+    searched: u64,
 }
 
 impl Page {
@@ -43,9 +48,14 @@ impl Page {
             if shown.starts_with(b"OggS") && self.take(input)? {
                 return Ok(true);
             }
+            if self.searched > PATIENCE * (self.passed + (1 << 20)) {
+                let actual = "hardly any intact page of Ogg";
+                return Err(AudioError::corrupt(self.offset, actual, "pages with right checksums"));
+            }
             let shown = input.peek(HEAD)?;
             let next = shown[1..].iter().position(|&b| b == b'O').map_or(shown.len(), |at| at + 1);
             input.consume(next);
+            self.passed += next as u64;
         }
     }
 
@@ -62,6 +72,7 @@ impl Page {
         let Some(lacing) = input.peek(table)?.get(HEAD..table) else { return Ok(false) };
         let length = table + lacing.iter().map(|n| usize::from(*n)).sum::<usize>();
         debug_assert!(length <= LARGEST);
+        self.searched += length as u64;
         let Some(page) = input.peek(length)?.get(..length) else { return Ok(false) };
         let u32_at = |at: usize| page[at..].first_chunk().map_or(0, |b| u32::from_le_bytes(*b));
         let mut crc = Crc32::new(0);
@@ -82,6 +93,8 @@ impl Page {
         self.body.clear();
         self.body.extend_from_slice(&page[table..]);
         input.consume(length);
+        self.passed += length as u64;
+        self.searched -= length as u64;
         Ok(true)
     }
 

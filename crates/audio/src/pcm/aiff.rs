@@ -1,6 +1,6 @@
 //! AIFF and AIFF-C (Apple, 1989 and 1991).
 
-use super::extent::{Extent, to_end};
+use super::extent::{Extent, beyond_end, is_placeholder, is_really_empty, to_end};
 use super::format::{Encoding, Endian, Format};
 use super::header::Header;
 use crate::error::AudioError;
@@ -9,13 +9,14 @@ use crate::report::Repair;
 
 /// A file with more chunks before its samples is hostile.
 const MAX_CHUNKS: usize = 4096;
+/// The size of samples that SoX states where it writes into a pipe.
+const STREAMED: u64 = 0x7f00_0000;
 const EXPECTED: &str = "AIFF: PCM of 1 to 32 bits, float of 32 or 64 bits, A-law, mu-law";
 
 /// What the `COMM` chunk says.
 struct Common {
     format: Format,
     endian: Endian,
-    frames: u64,
 }
 
 pub(super) fn is_aiff(start: &[u8]) -> bool {
@@ -50,10 +51,10 @@ pub(super) fn read(input: &mut Input) -> Result<Header, AudioError> {
             return Err(AudioError::corrupt(at, "SSND before COMM in a stream", "COMM first"));
         }
         if !input.skip(padded)? {
-            break;
+            return Err(beyond_end(at, &id, size.into()));
         }
     }
-    let (Some(Common { format, endian, frames }), Some((at, size))) = (common, sound) else {
+    let (Some(Common { format, endian }), Some((at, size))) = (common, sound) else {
         let actual = "no COMM and SSND chunk";
         return Err(AudioError::corrupt(start, actual, "both chunks of AIFF"));
     };
@@ -70,12 +71,14 @@ pub(super) fn read(input: &mut Input) -> Result<Header, AudioError> {
         return Err(AudioError::corrupt(at, actual, "samples inside the file"));
     }
     let mut repairs = Vec::new();
-    let is_empty = input.peek(1)?.is_empty() || frames == 0;
-    let declared = match u64::from(size).checked_sub(8 + u64::from(offset)) {
+    let declared = match u64::from(size).saturating_sub(8 + u64::from(offset)) {
         _ if size == u32::MAX => to_end(Repair::DataSizeUnknown, &mut repairs),
-        None if !is_empty => to_end(Repair::DataSizeZero, &mut repairs),
-        Some(0) if !is_empty => to_end(Repair::DataSizeZero, &mut repairs),
-        declared => declared.or(Some(0)),
+        size if is_placeholder(input, &format, size, STREAMED) => {
+            to_end(Repair::DataSizeUnknown, &mut repairs)
+        }
+        // The count of frames in COMM is filled in as late as this size.
+        0 if !is_really_empty(input, Endian::Big)? => to_end(Repair::DataSizeZero, &mut repairs),
+        declared => Some(declared),
     };
     let extent = Extent::new(input, &format, declared, &mut repairs);
     let container = if is_compressed { "aifc" } else { "aiff" };
@@ -91,9 +94,8 @@ impl Common {
         let body = chunk.get(8..26).ok_or_else(cut)?;
         let u16_at = |i: usize| u16::from_be_bytes([body[i], body[i + 1]]);
         let channels = u16_at(0);
-        let frames = u32::from_be_bytes([body[2], body[3], body[4], body[5]]);
         let bits = u16_at(6);
-        let bytes = bits.div_ceil(8) as u8;
+        let bytes = u8::try_from(bits.div_ceil(8)).unwrap_or(u8::MAX);
         let kind = if is_compressed { chunk.get(26..30).ok_or_else(cut)? } else { b"NONE" };
         let (encoding, endian) = match kind {
             b"NONE" | b"twos" if (1..=4).contains(&bytes) => (Encoding::Int(bytes), Endian::Big),
@@ -113,7 +115,7 @@ impl Common {
             }
         };
         let format = Format::new(channels.into(), extended(&body[8..18]), encoding, at)?;
-        Ok(Self { format, endian, frames: frames.into() })
+        Ok(Self { format, endian })
     }
 }
 

@@ -1,6 +1,6 @@
 //! Apple's Core Audio Format, version 1.
 
-use super::extent::{Extent, to_end};
+use super::extent::{Extent, beyond_end, to_end};
 use super::format::{Encoding, Endian, Format};
 use super::header::Header;
 use crate::error::AudioError;
@@ -24,7 +24,8 @@ pub(super) fn read(input: &mut Input) -> Result<Header, AudioError> {
         let shown = input.peek(12 + 32)?;
         let Some(size) = shown.get(4..12).and_then(<[u8]>::first_chunk) else { break };
         let size = i64::from_be_bytes(*size);
-        match &shown[..4] {
+        let name = [shown[0], shown[1], shown[2], shown[3]];
+        match &name {
             b"desc" => description = Some(describe(shown.get(12..44), at)?),
             b"data" => {
                 let Some((format, endian)) = description else {
@@ -50,7 +51,7 @@ pub(super) fn read(input: &mut Input) -> Result<Header, AudioError> {
         }
         let size = u64::try_from(size).unwrap_or(u64::MAX);
         if !input.skip(size.saturating_add(12))? {
-            break;
+            return Err(beyond_end(at, &name, size));
         }
     }
     let at = input.position();

@@ -1,8 +1,12 @@
 //! Which bytes of a file are samples.
 
-use super::format::Format;
+use super::format::{Endian, Format};
+use crate::error::AudioError;
 use crate::input::Input;
 use crate::report::Repair;
+
+/// Behind samples of no length more chunks are not looked at.
+const MAX_CHUNKS: usize = 4096;
 
 /// The bytes of the samples.
 #[derive(Debug)]
@@ -44,4 +48,47 @@ impl Extent {
 pub(super) fn to_end(repair: Repair, repairs: &mut Vec<Repair>) -> Option<u64> {
     repairs.push(repair);
     None
+}
+
+/// A data size of 0 is meant if nothing follows, or (where the input can be looked through) if
+/// chunks follow that end exactly with the file. Otherwise it was never filled in.
+pub(super) fn is_really_empty(input: &mut Input, endian: Endian) -> Result<bool, AudioError> {
+    if input.peek(1)?.is_empty() {
+        return Ok(true);
+    }
+    let (Some(len), start) = (input.len(), input.position()) else {
+        return Ok(false);
+    };
+    let mut chunks = 0;
+    let end = loop {
+        let at = input.position();
+        let Some(&[i0, i1, i2, i3, s0, s1, s2, s3]) = input.peek(8)?.first_chunk::<8>() else {
+            break at;
+        };
+        let size = u64::from(endian.u32([s0, s1, s2, s3]));
+        let named = [i0, i1, i2, i3].iter().all(|b| (0x20..0x7f).contains(b));
+        let next = at + 8 + size + size % 2;
+        chunks += 1;
+        if !named || next > len + 1 || chunks > MAX_CHUNKS {
+            break 0;
+        }
+        input.seek(next.min(len))?;
+    };
+    input.seek(start)?;
+    Ok(end == len)
+}
+
+/// Whether a data size is the one that a writer puts where it cannot know: `all`, perhaps rounded
+/// down to whole frames, and more than is there.
+pub(super) fn is_placeholder(input: &Input, format: &Format, size: u64, all: u64) -> bool {
+    let whole = all - all % format.unit_bytes().max(1);
+    let available = input.len().map(|len| len.saturating_sub(input.position()));
+    (size == all || size == whole) && available.is_none_or(|there| there < size)
+}
+
+/// A chunk before the samples at byte `at` that claims more bytes than the file has.
+pub(super) fn beyond_end(at: u64, name: &[u8], size: u64) -> AudioError {
+    let name = name.escape_ascii();
+    let actual = format!("chunk \"{name}\" of {size} bytes reaches beyond the end of the file");
+    AudioError::corrupt(at, actual, "whole chunks before the data")
 }

@@ -139,17 +139,28 @@ impl PcmSource {
             self.report.note(Repair::PartialFrame { bytes: rest });
         }
         // A pipe may stay open behind its samples.
-        let Some(size) = self.declared_len.filter(|_| self.is_wav && self.seekable()) else {
+        let Some(size) = self.declared_len.filter(|_| self.seekable()) else {
             return;
         };
-        let more = self.input.skip(rest).and_then(|_| {
-            let is_behind = self.done + rest == size;
-            if is_behind { wav::more_data(&mut self.input, size, self.endian) } else { Ok(None) }
+        let more = self.input.skip(rest).and_then(|_| match self.done + rest == size {
+            true if self.is_wav => wav::more_data(&mut self.input, size, self.endian),
+            true => another(&mut self.input),
+            false => Ok(None),
         });
         if let Ok(Some(offset)) = more {
             self.report.note(Repair::MoreData { offset });
         }
     }
+}
+
+/// The byte at which another recording begins, behind no more than padding.
+fn another(input: &mut Input) -> Result<Option<u64>, AudioError> {
+    const PADDING: usize = 8;
+    let at = input.position();
+    let shown = input.peek(PADDING + 16)?;
+    let zeros = shown.iter().take(PADDING).take_while(|b| **b == 0).count();
+    let begins = (0..=zeros).find(|&n| Container::of(&shown[n..]).is_some());
+    Ok(begins.map(|n| at + n as u64))
 }
 
 impl BlockSource for PcmSource {

@@ -1,6 +1,6 @@
 //! WAV (RIFF, RIFX, RF64, BW64): finds `fmt ` and `data`, repairs what the policy allows.
 
-use super::extent::{Extent, to_end};
+use super::extent::{Extent, beyond_end, is_placeholder, is_really_empty, to_end};
 use super::format::{Endian, Format};
 use super::header::Header;
 use crate::error::AudioError;
@@ -9,6 +9,9 @@ use crate::report::Repair;
 
 /// A file with more chunks before its data is hostile.
 const MAX_CHUNKS: usize = 4096;
+
+/// Data sizes of writers that could not know: SoX and arecord, into a pipe.
+const STREAMED: [u64; 2] = [0x7fff_f000, 0x7fff_ff00];
 
 /// Chunk names that decide whether an odd chunk was padded, where both readings are possible.
 const KNOWN: [&[u8; 4]; 24] = [
@@ -91,6 +94,7 @@ fn finish(
         unknown = declared == u64::MAX;
     }
     let plain = matches!(&form, b"RIFF" | b"RIFX") && long_size.is_none();
+    unknown |= plain && STREAMED.iter().any(|all| is_placeholder(input, &format, declared, *all));
     if let (true, false, Some(there)) = (plain, unknown, available)
         && there.saturating_sub(declared) >= 1 << 32
     {
@@ -124,11 +128,7 @@ fn skip_chunk(
     repairs: &mut Vec<Repair>,
 ) -> Result<(), AudioError> {
     if !input.skip(size.into())? {
-        let actual = format!(
-            "chunk \"{}\" of {size} bytes reaches beyond the end of the file",
-            id.escape_ascii()
-        );
-        return Err(AudioError::corrupt(at, actual, "whole chunks before the data"));
+        return Err(beyond_end(at, &id, size.into()));
     }
     if size % 2 == 1 {
         let next = input.peek(5)?;
@@ -174,32 +174,4 @@ pub(super) fn more_data(
         }
     }
     Ok(None)
-}
-
-/// A data size of 0 is meant if nothing follows, or (where the input can be looked through) if
-/// chunks follow that end exactly with the file. Otherwise it was never filled in.
-fn is_really_empty(input: &mut Input, endian: Endian) -> Result<bool, AudioError> {
-    if input.peek(1)?.is_empty() {
-        return Ok(true);
-    }
-    let (Some(len), start) = (input.len(), input.position()) else {
-        return Ok(false);
-    };
-    let mut chunks = 0;
-    let end = loop {
-        let at = input.position();
-        let Some(&[i0, i1, i2, i3, s0, s1, s2, s3]) = input.peek(8)?.first_chunk::<8>() else {
-            break at;
-        };
-        let size = u64::from(endian.u32([s0, s1, s2, s3]));
-        let named = [i0, i1, i2, i3].iter().all(|b| (0x20..0x7f).contains(b));
-        let next = at + 8 + size + size % 2;
-        chunks += 1;
-        if !named || next > len + 1 || chunks > MAX_CHUNKS {
-            break 0;
-        }
-        input.seek(next.min(len))?;
-    };
-    input.seek(start)?;
-    Ok(end == len)
 }

@@ -1,6 +1,6 @@
 //! Sony's Wave64: WAV with chunk names of 16 and sizes of 8 bytes.
 
-use super::extent::{Extent, to_end};
+use super::extent::{Extent, beyond_end, to_end};
 use super::format::{Endian, Format};
 use super::header::Header;
 use crate::error::AudioError;
@@ -50,8 +50,9 @@ pub(super) fn read(input: &mut Input) -> Result<Header, AudioError> {
         }
         // Chunks begin at multiples of 8.
         let padded = size.max(HEAD).checked_next_multiple_of(8).unwrap_or(u64::MAX);
+        let name = name.copied().unwrap_or(*b"????");
         if !input.skip(padded)? {
-            break;
+            return Err(beyond_end(at, &name, size));
         }
     }
     Err(cut(input.position()))

@@ -1,5 +1,7 @@
 //! Containers beside WAV, built byte by byte: the same samples as in a WAV.
 
+use corsmal_audio::Repair;
+
 use crate::common::{Recording, read_file, read_pipe};
 
 const SAMPLES: [i16; 8] = [0, 1, -1, 12_345, -12_345, i16::MAX, i16::MIN, 77];
@@ -26,6 +28,14 @@ fn check(bytes: &[u8], format: &str, repairs: &[&str]) {
     let got = read_both(bytes);
     assert_eq!((got.format.as_str(), got.channels, got.sample_rate), (format, 2, 44_100));
     assert_eq!((got.samples.as_slice(), got.repairs()), (&expected()[..], repairs.to_vec()));
+    // One byte before it does not matter.
+    let behind = read_both(&[b"\n", bytes].concat());
+    assert_eq!((behind.samples, behind.report), (got.samples, got.report));
+    for length in 0..bytes.len() {
+        let file = read_file(bytes[..length].to_vec()).map(|got| got.samples);
+        let pipe = read_pipe(bytes[..length].to_vec()).map(|got| got.samples);
+        assert_eq!(file.ok(), pipe.ok(), "{format}: {length} bytes");
+    }
 }
 
 fn chunk(name: &[u8; 4], body: &[u8]) -> Vec<u8> {
@@ -53,6 +63,23 @@ fn aiff_and_aiff_c() {
     check(&aiff(b"AIFF", b"", &big(), Some(0)), "aiff pcm_s16be", &["data_size_zero"]);
     check(&aiff(b"AIFF", b"", &big(), Some(u32::MAX)), "aiff pcm_s16be", &["data_size_unknown"]);
     check(&aiff(b"AIFF", b"", &big(), Some(900)), "aiff pcm_s16be", &["truncated"]);
+    // What SoX writes into a pipe.
+    let streamed = Some(0x7f00_0008);
+    check(&aiff(b"AIFF", b"", &big(), streamed), "aiff pcm_s16be", &["data_size_unknown"]);
+    // Killed before the writer came back to its header: no size and no count, in either chunk.
+    for size in [0, 8] {
+        let mut killed = aiff(b"AIFF", b"", &big(), Some(size));
+        let common = killed.windows(4).position(|w| w == b"COMM").unwrap();
+        killed[common + 10..common + 14].fill(0);
+        killed[4..8].fill(0);
+        check(&killed, "aiff pcm_s16be", &["data_size_zero"]);
+        let empty = killed.len() - 16;
+        assert_eq!(read_both(&killed[..empty]).samples, []);
+    }
+    let mut wide = aiff(b"AIFF", b"", &big(), None);
+    let common = wide.windows(4).position(|w| w == b"COMM").unwrap();
+    wide[common + 14..common + 16].copy_from_slice(&2056u16.to_be_bytes());
+    assert_eq!(read_file(wide).unwrap_err().verdict().name(), "unsupported");
     let error = read_file(aiff(b"AIFC", b"ima4\0\0", &big(), None)).unwrap_err();
     assert!(error.to_string().contains("ima4"), "{error}");
     // The samples first, which only a file can have.
@@ -165,5 +192,41 @@ fn adpcm_is_that_of_libsndfile() {
         let cut = read_file(wav[..wav.len() - 101].to_vec()).unwrap();
         assert!(cut.report.truncated && !cut.samples.is_empty());
         assert_eq!(cut.samples, expected[..cut.samples.len()]);
+    }
+}
+
+#[test]
+fn other_recordings_behind_the_samples_are_said() {
+    let first = aiff(b"AIFF", b"", &big(), None);
+    for padding in [0, 1, 7] {
+        let bytes = [first.clone(), vec![0; padding], first.clone()].concat();
+        let got = read_file(bytes.clone()).unwrap();
+        let offset = (first.len() + padding) as u64;
+        assert_eq!(got.report.repairs, [Repair::MoreData { offset }]);
+        assert_eq!((got.samples, read_pipe(bytes).unwrap().samples), (expected(), expected()));
+    }
+    let got = read_file([first, b"\0\0FORx, AIFF or what".to_vec()].concat()).unwrap();
+    assert!(got.repairs().is_empty());
+}
+
+#[test]
+fn chunks_that_claim_too_much_are_named() {
+    let mut wide = aiff(b"AIFF", b"", &big(), None);
+    wide[16..20].copy_from_slice(&60_000u32.to_be_bytes());
+    let mut caf = b"caff\0\x01\0\0".to_vec();
+    caf.extend(b"NAME\0\0\0\0\0\0\xea\x60and so on");
+    let mut w64 = b"riff\x2e\x91\xcf\x11\xa5\xd6\x28\xdb\x04\xc1\x00\x00".to_vec();
+    w64.extend([0; 8]);
+    for name in [b"wave", b"NAME"] {
+        w64.extend(name);
+        w64.extend(b"\xf3\xac\xd3\x11\x8c\xd1\x00\xc0\x4f\x8e\xdb\x8a");
+    }
+    w64.extend(60_000u64.to_le_bytes());
+    for (bytes, at) in [(wide, 12), (caf, 8), (w64, 40)] {
+        for error in [read_file(bytes.clone()).unwrap_err(), read_pipe(bytes).unwrap_err()] {
+            let text = error.to_string();
+            assert!(text.contains("\"NAME\" of 60000 bytes"), "{text}");
+            assert!(text.contains(&format!("byte {at}")), "{text}");
+        }
     }
 }

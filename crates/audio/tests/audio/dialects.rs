@@ -50,6 +50,20 @@ fn big_endian_and_64_bit_forms() {
     }
 }
 
+/// SoX, which rounds down to whole frames, and arecord.
+#[test]
+fn sizes_of_writers_into_pipes_are_no_claims() {
+    for (channels, size) in [(2, 0x7fff_f000), (2, 0x7fff_ff00), (3, 0x7fff_f000 - 0x7fff_f000 % 6)]
+    {
+        let wav = Wav { data_size: Some(size), ..Wav::pcm16(channels, &SAMPLES[..6]) };
+        let got = read_both(&wav);
+        assert_eq!((got.repairs(), got.declared_frames), (vec!["data_size_unknown"], None));
+        assert_eq!(got.samples, expected()[..6]);
+    }
+    let got = read_both(&Wav { data_size: Some(0x7fff_f004), ..wav() });
+    assert_eq!(got.repairs(), ["truncated"]);
+}
+
 #[test]
 fn extensible_sub_formats() {
     for (sub, bits, name) in

@@ -5,6 +5,8 @@
 
 mod allocations;
 #[cfg(feature = "symphonia")]
+mod begin;
+#[cfg(feature = "symphonia")]
 mod cases;
 mod common;
 #[cfg(feature = "symphonia")]
@@ -15,8 +17,14 @@ mod corpus;
 mod damage;
 mod dialects;
 #[cfg(feature = "symphonia")]
+mod flac;
+#[cfg(feature = "symphonia")]
 mod mp4;
+#[cfg(feature = "symphonia")]
+mod mpeg;
 mod mutations;
+#[cfg(feature = "symphonia")]
+mod ogg;
 #[cfg(feature = "symphonia")]
 mod oracles;
 mod properties;

@@ -1,0 +1,78 @@
+//! MPEG audio with other bytes between and behind its frames.
+
+use crate::compressed::MP3;
+use crate::damage::{mp3_frames, read_both, refusal};
+
+/// Largest sample.
+fn peak(samples: &[f32]) -> f32 {
+    samples.iter().fold(0.0, |peak, y| peak.max(y.abs()))
+}
+
+/// Frames of layer 3 in MPEG 2.5 with 8 kbit/s at 8 kHz: 576 samples of silence in 72 bytes.
+fn slow_frames(count: usize) -> Vec<u8> {
+    let mut frame = vec![0xff, 0xe3, 0x18, 0xc4];
+    frame.resize(72, 0);
+    frame.repeat(count)
+}
+
+#[test]
+fn frames_that_a_medium_lost_are_silence() {
+    let frames = mp3_frames();
+    let plain = read_both(MP3);
+    let start = |frame: usize| frames[..frame].iter().map(|f| f.len()).sum::<usize>();
+    for (value, count) in [(0, 4), (0xaa, 7)] {
+        // From the middle of a frame to the middle of a later one.
+        let mut bytes = MP3.to_vec();
+        bytes[start(9) + 100..start(9 + count) + 100].fill(value);
+        let got = read_both(&bytes);
+        assert_eq!(got.samples.len(), plain.samples.len());
+        assert!(got.report.loss().is_some() && got.repairs().contains(&"lost_frames"));
+        assert!(peak(&got.samples) < 1.5 * peak(&plain.samples), "{}", peak(&got.samples));
+        let last = got.samples.len() - 1152;
+        assert_eq!(got.samples[last..], plain.samples[last..]);
+    }
+}
+
+#[test]
+fn so_many_other_bytes_that_they_may_have_been_frames_are_a_loss() {
+    let frames = mp3_frames();
+    let (head, tail) = (frames[..11].concat(), frames[11..].concat());
+    let with = |junk: &[u8]| read_both(&[head.as_slice(), junk, &tail].concat());
+    let junk: Vec<u8> = (0..40_000u32).map(|n| (n * n >> 7) as u8 & 0x7f).collect();
+    assert!(with(&junk[..50]).report.loss().is_none());
+    for length in [3000, 40_000] {
+        let got = with(&junk[..length]);
+        assert!(got.report.loss().is_some(), "{length}");
+        assert_eq!(got.samples.len(), read_both(MP3).samples.len());
+        assert!(got.repairs().contains(&"foreign_bytes"));
+    }
+}
+
+#[test]
+fn a_chance_header_behind_the_end_is_no_change_of_format() {
+    let plain = read_both(MP3);
+    // A frame of another sample rate that ends with the file, and one near its end.
+    for behind in [0, 1, 3] {
+        let mut chance = vec![0; 100];
+        chance.extend(b"\xff\xfb\x14\xc4");
+        chance.resize(chance.len() + 92 + behind, 0xab);
+        let got = read_both(&[MP3, &chance].concat());
+        assert!(got.samples == plain.samples, "{behind}");
+    }
+    // Many of them are.
+    let other = [slow_frames(5), vec![0; 300]].concat();
+    let error = refusal(&[MP3, &other].concat());
+    assert_eq!(error.verdict().name(), "unsupported");
+    assert!(error.to_string().contains("8000 Hz"), "{error}");
+}
+
+#[test]
+fn silence_is_never_longer_than_an_hour() {
+    let frames = slow_frames(20);
+    for (count, value, filled) in [(30, 0, 30), (70_000, 0, 0), (70_000, 0x55, 0)] {
+        let gap = vec![value; 72 * count];
+        let got = read_both(&[frames.as_slice(), &gap, &frames].concat());
+        assert_eq!(got.samples.len(), 576 * (40 + filled), "{count} frames of {value}");
+        assert!(got.report.loss().is_some());
+    }
+}
