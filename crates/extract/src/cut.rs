@@ -1,7 +1,7 @@
 //! Recordings cut into windows, each an input of its own.
 
 use crate::inputs::{Input, InputError, InputSource};
-use crate::survey::{Header, count_frames, headers};
+use crate::survey::{headers, lengths};
 
 /// Column that holds the recording of a window: the group that folds keep together.
 pub const RECORDING: &str = "recording";
@@ -26,18 +26,21 @@ pub struct WindowSpan {
 /// What cannot be read stays as it is, for its row in the output.
 ///
 /// # Errors
-/// Standard input, which cannot be read twice; a recording whose length cannot be found; too many
-/// windows; a window with the id of another input.
+/// Standard input, which cannot be read twice; too many windows; a window with the id of another
+/// input.
 pub fn into_windows(inputs: Vec<Input>, span: WindowSpan) -> Result<Vec<Input>, InputError> {
     let headers = headers(&inputs);
+    let lengths = lengths(&inputs, &headers);
     let mut windows = Vec::new();
-    for (input, header) in inputs.into_iter().zip(headers) {
+    for ((input, header), length) in inputs.into_iter().zip(headers).zip(lengths) {
         if input.source == InputSource::Stdin {
             let reason = "standard input cannot be cut into windows; classify --window can";
             return Err(InputError::Window { id: input.id, reason: reason.into() });
         }
-        match header {
-            Some(header) => of_recording(&input, &header, span, &mut windows)?,
+        match header.zip(length) {
+            Some((header, length)) => {
+                of_recording(&input, (header.sample_rate, length), span, &mut windows)?;
+            }
             None => windows.push(labelled(&input, input.id.clone(), input.start, input.end)),
         }
     }
@@ -54,20 +57,12 @@ pub fn into_windows(inputs: Vec<Input>, span: WindowSpan) -> Result<Vec<Input>, 
 
 fn of_recording(
     input: &Input,
-    header: &Header,
+    (sample_rate, there): (u32, u64),
     span: WindowSpan,
     windows: &mut Vec<Input>,
 ) -> Result<(), InputError> {
-    let rate = f64::from(header.sample_rate);
+    let rate = f64::from(sample_rate);
     let frames = |seconds: f64| ((seconds * rate).round() as u64).max(1);
-    let refuse = |reason: String| InputError::Window { id: input.id.clone(), reason };
-    let there = match (header.frames, &input.source) {
-        (Some(frames), _) => frames,
-        (None, InputSource::File(path)) => {
-            count_frames(path).map_err(|e| refuse(format!("its length is unknown: {e}")))?
-        }
-        (None, InputSource::Stdin) => 0,
-    };
     // The frame that a time names: the last one that does not begin later.
     let at = |seconds: f64| (seconds * rate + 1e-3) as u64;
     let base = input.start.map_or(0, at);
@@ -83,7 +78,8 @@ fn of_recording(
         Some(rest) => rest / hop + 1,
     };
     if count + windows.len() as u64 > MOST {
-        return Err(refuse(format!("more than {MOST} windows in all; use a longer hop")));
+        let reason = format!("more than {MOST} windows in all; use a longer hop");
+        return Err(InputError::Window { id: input.id.clone(), reason });
     }
     for number in 0..count {
         let first = base + number * hop;

@@ -22,7 +22,7 @@ pub struct Header {
     pub sample_rate: u32,
     /// Channels.
     pub channels: u16,
-    /// Frames; `None` where only decoding tells.
+    /// Frames; `None` where only decoding tells: lengths in headers of compressed files are claims.
     pub frames: Option<u64>,
     /// Whether its reader can go to any frame.
     pub seekable: bool,
@@ -48,16 +48,35 @@ fn path(input: &Input) -> Option<&Path> {
 }
 
 fn of(source: &dyn BlockSource) -> Header {
-    let (spec, frames) = (source.spec(), source.most_frames());
+    let (spec, seekable) = (source.spec(), source.seekable());
+    let frames = source.most_frames().filter(|_| seekable);
     let (sample_rate, channels) = (spec.sample_rate, spec.channels);
-    Header { sample_rate, channels, frames, seekable: source.seekable() }
+    Header { sample_rate, channels, frames, seekable }
+}
+
+/// The frames of each input, those of every file counted once; `None` for what cannot be read to its
+/// end, which the run will say. `headers` are those of [`headers`].
+pub fn lengths(inputs: &[Input], headers: &[Option<Header>]) -> Vec<Option<u64>> {
+    let mut paths: Vec<(&Path, Header)> = inputs
+        .iter()
+        .zip(headers)
+        .filter_map(|(input, header)| Some((path(input)?, (*header)?)))
+        .collect();
+    paths.sort_unstable_by_key(|(path, _)| *path);
+    paths.dedup_by_key(|(path, _)| *path);
+    let count =
+        |(path, header): &(&Path, Header)| header.frames.or_else(|| count_frames(path).ok());
+    let found: Vec<Option<u64>> = paths.par_iter().map(count).collect();
+    let known: HashMap<&Path, Option<u64>> =
+        paths.into_iter().map(|(path, _)| path).zip(found).collect();
+    inputs.iter().map(|input| path(input).and_then(|path| known.get(path).copied()?)).collect()
 }
 
 /// Frames of a recording whose header does not say: decodes it.
 ///
 /// # Errors
 /// It cannot be read to its end.
-pub fn count_frames(path: &Path) -> Result<u64, AudioError> {
+fn count_frames(path: &Path) -> Result<u64, AudioError> {
     let mut source = corsmal_audio::open(path)?;
     let channels = usize::from(source.spec().channels);
     let mut block = vec![0.0; (BLOCK / channels).max(1) * channels];

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use corsmal_audio::{BlockSource, Repair};
+use corsmal_audio::BlockSource;
 use corsmal_files::outcome::{Outcome, Status};
 
 use super::extractor::{Extractor, Span};
@@ -245,11 +245,9 @@ pub fn describe(outcome: &mut Outcome, source: &dyn BlockSource) {
         if !outcome.repairs.iter().any(|r| r == repair.name()) {
             outcome.repairs.push(repair.name().to_string());
         }
-        if matches!(repair, Repair::Truncated { .. } | Repair::LostFrames { .. })
-            && outcome.status == Status::Ok
-        {
-            outcome.status = Status::Truncated;
-            outcome.reason = repair.to_string();
-        }
+    }
+    if let Some(loss) = report.loss().filter(|_| outcome.status == Status::Ok) {
+        outcome.status = Status::Truncated;
+        outcome.reason = loss.to_string();
     }
 }

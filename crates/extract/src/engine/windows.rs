@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use corsmal_audio::{BlockSource, Repair};
+use corsmal_audio::BlockSource;
 
 use super::failed::Failed;
 use super::reading;
@@ -97,10 +97,9 @@ impl<'a> Windows<'a> {
         })
     }
 
-    /// Whether the recording turned out shorter than its header says, once all windows are there.
+    /// Whether samples of the recording are missing, once all windows are there.
     pub fn is_truncated(&self) -> bool {
-        let lost = |r: &Repair| matches!(r, Repair::Truncated { .. } | Repair::LostFrames { .. });
-        self.source.health().repairs.iter().any(lost)
+        self.source.health().loss().is_some()
     }
 
     /// Sample rate in Hz and channels of the recording.

@@ -10,3 +10,4 @@ mod own_feature;
 mod projection;
 mod resume;
 mod support;
+mod windows;

@@ -1,0 +1,47 @@
+//! Recordings cut into windows.
+
+use std::path::Path;
+
+use corsmal_extract::cut::{WindowSpan, into_windows};
+use corsmal_extract::inputs::{Input, InputSource};
+
+/// 30,000 frames at 44.1 kHz.
+const MP3: &[u8] = include_bytes!("../../../audio/tests/audio/samples/sine-1ch.mp3");
+
+fn input(path: &Path) -> Input {
+    let source = InputSource::File(path.to_owned());
+    Input { id: "x".into(), source, start: None, end: None, labels: Vec::new() }
+}
+
+/// Windows of a tenth of a second.
+fn windows(bytes: &[u8]) -> Vec<Input> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x");
+    std::fs::write(&path, bytes).unwrap();
+    into_windows(vec![input(&path)], WindowSpan { window: 0.1, hop: 0.1 }).unwrap()
+}
+
+#[test]
+fn lengths_in_headers_do_not_say_how_many_windows_there_are() {
+    let plain = windows(MP3);
+    assert_eq!(plain.len(), 30_000 / 4410);
+    let count = MP3.windows(4).position(|w| w == b"Info" || w == b"Xing").unwrap() + 8;
+    for claim in [0u32, 5, 5000] {
+        let mut bytes = MP3.to_vec();
+        bytes[count..count + 4].copy_from_slice(&claim.to_be_bytes());
+        assert_eq!(windows(&bytes).len(), plain.len(), "{claim} frames claimed");
+    }
+    assert_eq!(windows(&[MP3, MP3].concat()).len(), 60_000 / 4410);
+}
+
+#[test]
+fn what_cannot_be_read_stays_one_input_for_its_row() {
+    // Another sample rate in the middle is refused while reading.
+    let mut slow = vec![0xff, 0xe3, 0x18, 0xc4];
+    slow.resize(72, 0);
+    for bytes in [b"no audio at all".to_vec(), [MP3, &slow.repeat(5)].concat()] {
+        let windows = windows(&bytes);
+        assert_eq!((windows.len(), windows[0].id.as_str()), (1, "x"));
+        assert_eq!((windows[0].start, windows[0].end), (None, None));
+    }
+}
