@@ -135,7 +135,7 @@ mod tests {
     fn replication_is_found_where_every_packet_has_it() {
         for length in [5, 14, 15, 16, 60, 269] {
             let he = packet(&[(13, length)]);
-            assert!(is_refused(&[he.clone()]), "{length}");
+            assert!(is_refused(std::slice::from_ref(&he)), "{length}");
             assert!(is_refused(&[he.clone(), packet(&[(14, length), (0, 40)]), he.clone()]));
             assert!(!is_refused(&[he.clone(), packet(&[]), he]));
         }

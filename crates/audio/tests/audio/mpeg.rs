@@ -38,7 +38,7 @@ fn so_many_other_bytes_that_they_may_have_been_frames_are_a_loss() {
     let frames = mp3_frames();
     let (head, tail) = (frames[..11].concat(), frames[11..].concat());
     let with = |junk: &[u8]| read_both(&[head.as_slice(), junk, &tail].concat());
-    let junk: Vec<u8> = (0..40_000u32).map(|n| (n * n >> 7) as u8 & 0x7f).collect();
+    let junk: Vec<u8> = (0..40_000u32).map(|n| ((n * n) >> 7) as u8 & 0x7f).collect();
     assert!(with(&junk[..50]).report.loss().is_none());
     for length in [3000, 40_000] {
         let got = with(&junk[..length]);
