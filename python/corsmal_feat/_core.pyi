@@ -349,6 +349,9 @@ def upright_box(
 def region(
     depth_mm: npt.NDArray[np.uint16],
 ) -> tuple[tuple[int, int, int, int], npt.NDArray[np.float32], tuple[float, float]] | None: ...
+def m2_capacity(
+    image: npt.NDArray[np.float32], size: tuple[float, float], weights: str
+) -> float: ...
 
 @final
 class Network:

@@ -1,4 +1,4 @@
-"""Capacity of a container from calibrated views: masks, depth images, no network needed.
+"""Capacity of a container from calibrated views: masks, depth images; a network in `m2_capacity` alone.
 
 Lengths are in mm and capacities in mL unless said otherwise. `docs/vision.md` says what is
 published, what is corrected and what is our reading.
@@ -29,6 +29,7 @@ __all__ = [
     "load_depth",
     "load_mask",
     "lode",
+    "m2_capacity",
     "region",
     "upright_box",
 ]
@@ -353,6 +354,35 @@ def region(depth: _Depth) -> Region | None:
         return None
     (left, top, right, bottom), image, (height, width) = found
     return {"bounds": (left, top, right, bottom), "image": image, "size": (height, width)}
+
+
+def m2_capacity(depth: _Depth | Region, weights: StrPath) -> float | None:
+    """M2's capacity in mL from a depth image of the robot's view, or from its region of interest.
+
+    Parameters
+    ----------
+    depth : path of a 16-bit PNG, array of uint16 in mm, or what `region` found
+    weights : path of the published weights of M2's capacity network (.pth, .npz, .safetensors)
+
+    Returns
+    -------
+    float or None
+        None where nothing near is large enough. The network may give values that no container
+        holds, also below 0.
+
+    Raises
+    ------
+    ParameterError
+        The weights are another network's, or an image cannot be read.
+    """
+    found = depth if isinstance(depth, dict) else region(depth)
+    if found is None:
+        return None
+    image = np.asarray(found["image"], dtype=np.float32)
+    if image.ndim != 2:
+        raise ParameterError(f"a region's image with shape {image.shape}; expected [112, 112]")
+    height, width = found["size"]
+    return _core.m2_capacity(image, (float(height), float(width)), os.fspath(weights))
 
 
 def _camera(numbers: Sequence[float]) -> Camera:

@@ -97,3 +97,45 @@ def test_refusals_say_what_is_possible(tmp_path: Path) -> None:
         vision.load_calibration(evil)
     with pytest.raises(ParameterError, match=r"none\.png"):
         vision.load_mask(tmp_path / "none.png")
+
+
+def test_masks_of_another_size_are_refused(tmp_path: Path) -> None:
+    files = [calibration(tmp_path / f"{i}.json", i * np.pi / 2) for i in range(2)]
+    half = cylinder()[::2, ::2]
+    with pytest.raises(ParameterError, match="view 1 has 320 by 350 px.* about 640 by 640 px"):
+        vision.lode([half, half], files)
+
+
+def test_cameras_that_see_nothing_are_refused(tmp_path: Path) -> None:
+    file = calibration(tmp_path / "c.json", 0.0)
+    camera = vision.load_calibration(file).rgb
+    tiny = vision.Camera(
+        camera.intrinsic, camera.rotation * 1e-39, camera.translation, camera.projection
+    )
+    depth = np.full((8, 8), 900, dtype=np.uint16)
+    for outliers in ("published", "corrected", "kept"):
+        with pytest.raises(ParameterError, match="no rotation"):
+            vision.cuboid(depth, depth > 0, vision.Calibration(tiny), outliers=outliers)
+
+
+def test_m2_gives_the_published_capacities() -> None:
+    data = SHARED / "data" / "ccm"
+    weights = data / "weights" / "m2_capacity_cnn.npz"
+    if not weights.exists():
+        pytest.skip(f"{weights} is absent (set CORSMAL_SHARED)")
+    reference = np.load(data / "m2_capacity_reference.npz")
+    for image, size, expected in zip(
+        reference["x"], reference["box"], reference["millilitres"], strict=True
+    ):
+        found: vision.Region = {
+            "bounds": (0, 0, 1, 1),
+            "image": image[0],
+            "size": (float(size[0]), float(size[1])),
+        }
+        assert vision.m2_capacity(found, weights) == pytest.approx(float(expected[0]), abs=0.05)
+    depth = np.zeros((720, 1280), dtype=np.uint16)
+    assert vision.m2_capacity(depth, weights) is None
+    depth[300:500, 600:720] = 500
+    assert isinstance(vision.m2_capacity(depth, weights), float)
+    with pytest.raises(ParameterError, match="not the weights of M2's capacity network"):
+        vision.m2_capacity(depth, data / "weights" / "m2_filling_type_cnn.npz")

@@ -3,11 +3,14 @@
 #![allow(clippy::unwrap_used)]
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use corsmal_ccm::capacity::{self, CapacityModel, CapacityOptions, Method, Row};
+use corsmal_ccm::capacity::{
+    self, CapacityModel, CapacityOptions, Method, Problem, RegionNetwork, Row, Views,
+};
 use corsmal_ccm::dataset::{
-    Annotations, Container, Filling, FillingLevel, FillingType, SequenceName,
+    Annotations, Container, DataSet, Filling, FillingLevel, FillingType, SequenceName,
 };
 use corsmal_ccm::predictions::read_capacities;
 use corsmal_ccm::scores::{RuleSet, evaluate};
@@ -15,18 +18,37 @@ use corsmal_ccm::submission::{RowKey, Submission, pseudo_random};
 use corsmal_ccm::synth::write_views;
 use corsmal_vision::cuboid::Outliers;
 use corsmal_vision::lode::{PRIOR_ML, Variant};
+use corsmal_vision::region::Region;
+use corsmal_vision::{Depth, Mask};
 
 /// Two recordings of each training container, on the table and in the hand, with views.
 fn data(dir: &Path) {
     for container in Container::all().take(9) {
         for scenario in [0, 1] {
-            let filling = Filling::new(FillingType::Pasta, FillingLevel::Half).unwrap();
-            let name = SequenceName { scenario, filling, background: 0, illumination: 0 };
-            let base = dir.join(format!("train/{}", container.number()));
-            std::fs::create_dir_all(base.join("audio")).unwrap();
-            std::fs::write(base.join(format!("audio/{name}_audio.wav")), b"").unwrap();
+            let (base, name) = recording(dir, container, scenario);
             write_views(&base, &name.to_string(), container, name, 5).unwrap();
         }
+    }
+}
+
+/// A recording without views: its folder and name.
+fn recording(dir: &Path, container: Container, scenario: u8) -> (PathBuf, SequenceName) {
+    let filling = Filling::new(FillingType::Pasta, FillingLevel::Half).unwrap();
+    let name = SequenceName { scenario, filling, background: 0, illumination: 0 };
+    let base = dir.join(format!("train/{}", container.number()));
+    std::fs::create_dir_all(base.join("audio")).unwrap();
+    std::fs::write(base.join(format!("audio/{name}_audio.wav")), b"").unwrap();
+    (base, name)
+}
+
+/// A network that takes the region's height for the capacity.
+#[derive(Debug)]
+struct Height(f64);
+
+impl RegionNetwork for Height {
+    fn capacity_ml(&self, region: &Region) -> Result<f64, String> {
+        assert_eq!(region.image.len(), 112 * 112);
+        Ok(f64::from(region.size[0]) * self.0)
     }
 }
 
@@ -38,6 +60,7 @@ fn options(dir: &Path, method: Method) -> CapacityOptions {
         variant: Variant::Corrected,
         outliers: Outliers::Published,
         model: None,
+        network: None,
         jobs: 2,
         seed: 1,
     }
@@ -86,9 +109,10 @@ fn methods_measure_synthetic_views_and_faults_are_rows() {
     }
     let stop = AtomicBool::new(false);
     for method in [Method::M3, Method::Fused] {
-        let (learned, held_out) =
-            capacity::train(&options(root, method), &|_, _| {}, &stop).unwrap();
-        println!("{held_out:.3?}");
+        let learned = capacity::train(&options(root, method), &|_, _| {}, &stop).unwrap();
+        println!("{:.3?}", learned.held_out);
+        assert_eq!((learned.recordings, learned.failed), (18, vec![]));
+        let learned = learned.model;
         let path = root.join("model.json");
         learned.write(&path).unwrap();
         let model = CapacityModel::read(&path).unwrap();
@@ -110,6 +134,17 @@ fn methods_measure_synthetic_views_and_faults_are_rows() {
     }
     let error = capacity::run(&options(root, Method::M3), &|_, _| {}, &stop).unwrap_err();
     assert!(error.to_string().contains("capacity train --method m3"), "{error}");
+    let error = capacity::run(&options(root, Method::M2), &|_, _| {}, &stop).unwrap_err();
+    assert!(error.to_string().contains("needs the weights"), "{error}");
+    impossible_models_are_refused(&root.join("model.json"));
+    let m2 = |scale, variant| {
+        let network: Arc<dyn RegionNetwork> = Arc::new(Height(scale));
+        run(&CapacityOptions { network: Some(network), variant, ..options(root, Method::M2) })
+    };
+    let regions = m2(1000.0, Variant::Corrected);
+    let found = regions.iter().filter(|row| row.status() == "ok" && row.capacity() > 100.0);
+    assert!(found.count() >= 16, "{regions:?}");
+    assert!(m2(-1.0, Variant::Corrected).iter().all(|row| row.status() == "none"));
 
     // One file of each kind is damaged or gone.
     let path = |c: u8, file: &str| root.join(format!("train/{c}/{file}"));
@@ -130,13 +165,51 @@ fn methods_measure_synthetic_views_and_faults_are_rows() {
         let row = row.unwrap();
         (row.status(), row.capacity())
     };
+    // The last image of the third view shows nothing: the one before is taken, unless as published, where the
+    // first of a short video is never looked at.
+    let black = Depth { width: 1280, height: 720, data: vec![0; 1280 * 720] }.to_png().unwrap();
+    std::fs::write(path(6, &format!("depth/{name}/c3/0008.png")), &black).unwrap();
+    assert_eq!(status(&m2(1000.0, Variant::Corrected), 6).0, "ok");
+    assert_eq!(status(&m2(1000.0, Variant::Published), 6), ("none", -1.0));
+    // A mask of half the size.
+    let half = |shown: bool| Mask { width: 640, height: 360, data: vec![shown; 640 * 360] };
+    std::fs::create_dir_all(path(7, &format!("masks/{name}/c1"))).unwrap();
+    let masks = path(7, &format!("masks/{name}/c1/0000.png"));
+    std::fs::write(masks, half(true).to_png().unwrap()).unwrap();
     let m5 = run(&options(root, Method::M5));
+    assert_eq!(status(&m5, 7), ("failed", -1.0));
+    let reason = |rows: &[Row], container: u8| {
+        let of = |r: &&Row| matches!(r.key, RowKey::Sequence(c, s) if c == container && s < 7);
+        match &rows.iter().find(of).unwrap().estimate {
+            Err(Problem::Damaged(reason)) => reason.clone(),
+            other => panic!("{other:?}"),
+        }
+    };
+    assert!(reason(&m5, 7).contains("0000.png: 640 by 360 px"), "{}", reason(&m5, 7));
     assert_eq!(status(&m5, 1), ("failed", -1.0));
     assert_eq!(status(&m5, 2), ("none", -1.0));
     assert_eq!(status(&m5, 3), ("failed", -1.0));
     assert_eq!(status(&m5, 4), ("prior", PRIOR_ML));
     let m4 = run(&options(root, Method::M4));
     assert_eq!(status(&m4, 5), ("failed", -1.0));
+    let small = Depth { width: 640, height: 360, data: vec![500; 640 * 360] }.to_png().unwrap();
+    for frame in ["0000", "0008"] {
+        std::fs::write(path(5, &format!("depth/{name}/c1/{frame}.png")), &small).unwrap();
+    }
+    let halved = run(&options(root, Method::M4));
+    assert!(reason(&halved, 5).contains(".png: 640 by 360 px"), "{}", reason(&halved, 5));
+    // What is damaged teaches nothing, and is named.
+    let learned = capacity::train(&options(root, Method::Fused), &|_, _| {}, &stop).unwrap();
+    let failed: Vec<u8> = learned
+        .failed
+        .iter()
+        .map(|(key, _)| match key {
+            RowKey::Sequence(container, _) => *container,
+            RowKey::Id(_) => 0,
+        })
+        .collect();
+    assert_eq!((learned.recordings, &failed[..]), (18, &[1, 3, 5, 7][..]));
+    assert!(learned.failed[0].1.contains("c1_calib.pickle"), "{:?}", learned.failed);
     let out = root.join("capacity.csv");
     capacity::write(&out, "m4", &m4).unwrap();
     let read = read_capacities(&out).unwrap();
@@ -145,6 +218,69 @@ fn methods_measure_synthetic_views_and_faults_are_rows() {
         read.values().filter(|v| v.is_none()).count(),
         m4.iter().filter(|r| r.capacity() < 0.0).count()
     );
+}
+
+/// Numbers in a model's file from which no estimate, or any memory, would follow.
+fn impossible_models_are_refused(path: &Path) {
+    let text = std::fs::read_to_string(path).unwrap();
+    let sound: serde_json::Value = serde_json::from_str(&text).unwrap();
+    for (place, value, part) in [
+        ("/fusion/methods/cup/lode/deviation", serde_json::json!(0), "lode of category cup"),
+        ("/fusion/priors/box/0", serde_json::json!(1e6), "prior of category box"),
+        ("/m3/processes/cup/length", serde_json::json!(0.0), "not above 0"),
+        (
+            "/m3/means/glass",
+            serde_json::json!([1.0]),
+            "category glass: a process of 8 sizes and 1 means",
+        ),
+        ("/m3/processes", serde_json::json!({}), "no process"),
+    ] {
+        let mut changed = sound.clone();
+        *changed.pointer_mut(place).unwrap() = value;
+        let file = path.with_extension("changed");
+        std::fs::write(&file, changed.to_string()).unwrap();
+        let error = CapacityModel::read(&file).unwrap_err().to_string();
+        assert!(error.contains(part) && error.contains("model.changed"), "{place}: {error}");
+    }
+}
+
+#[test]
+fn the_ends_of_a_video_are_those_of_its_images_or_else_of_its_table() {
+    let dir = tempfile::tempdir().unwrap();
+    let (base, name) = recording(dir.path(), Container::new(1).unwrap(), 0);
+    let set = DataSet::open(dir.path()).unwrap();
+    let ends = || {
+        let views = Views::of(&set.recordings[0], None);
+        views.ends(&views.detections().unwrap().unwrap_or_default(), 20).unwrap()
+    };
+    assert_eq!(ends(), None);
+    let table = |last: u32| {
+        let rows = [3, last].map(|frame| {
+            [1, 2].map(|view| format!("{frame},{view},person,0.9,0,0,9,9\n")).concat()
+        });
+        let text = format!("frame,view,label,score,x_min,y_min,x_max,y_max\n{}", rows.concat());
+        std::fs::create_dir_all(base.join("detections")).unwrap();
+        std::fs::write(base.join(format!("detections/{name}.csv")), text).unwrap();
+    };
+    // Frames in which nothing was found have no rows.
+    table(40);
+    assert_eq!(ends(), Some((0, 21)));
+    table(8);
+    assert_eq!(ends(), Some((0, 8)));
+    let images = |kind: &str, view: u8, frames: std::ops::Range<u32>| {
+        let folder = base.join(format!("{kind}/{name}/c{view}"));
+        std::fs::create_dir_all(&folder).unwrap();
+        for frame in frames {
+            std::fs::write(folder.join(format!("{frame:04}.png")), b"").unwrap();
+        }
+    };
+    images("depth", 1, 0..25);
+    assert_eq!(ends(), Some((0, 8)));
+    images("depth", 2, 1..25);
+    assert_eq!(ends(), Some((1, 5)));
+    images("rgb", 1, 0..30);
+    images("rgb", 2, 0..30);
+    assert_eq!(ends(), Some((0, 10)));
 }
 
 /// Capacities that the printed scores of two methods imply: inferred, not official.

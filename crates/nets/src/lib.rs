@@ -18,6 +18,7 @@
 //! [`weights`] reads and writes PyTorch's numbers.
 
 pub mod batch;
+pub mod capacity;
 mod checkpoint;
 pub mod cross_validation;
 pub mod dataset;

@@ -83,7 +83,7 @@ mod _core {
 
     #[pymodule_export]
     use crate::vision::{
-        cuboid, load_calibration, load_depth, load_mask, lode, region, upright_box,
+        cuboid, load_calibration, load_depth, load_mask, lode, m2_capacity, region, upright_box,
     };
 
     #[pymodule_init]

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use corsmal_nets::capacity::CapacityNetwork;
 use corsmal_vision::cloud::{DepthView, upright_box as around};
 use corsmal_vision::cuboid::{Outliers, cuboid as measure};
 use corsmal_vision::lode::{Variant, View, band, dimensions};
@@ -31,12 +32,10 @@ fn numbers(camera: &Camera) -> Numbers {
 }
 
 fn camera(n: &Numbers) -> PyResult<Camera> {
-    if !n.iter().all(|v| v.is_finite()) {
-        return Err(value_error("a calibration with numbers that are not finite"));
-    }
     let square = |at: usize| std::array::from_fn(|r| std::array::from_fn(|c| n[at + 3 * r + c]));
     let mut camera = Camera::new(square(0), square(9), [n[18], n[19], n[20]]);
     camera.projection = std::array::from_fn(|r| std::array::from_fn(|c| n[21 + 4 * r + c]));
+    camera.check().map_err(value_error)?;
     Ok(camera)
 }
 
@@ -161,4 +160,20 @@ pub(crate) fn region<'py>(
     let side = find_region::INPUT_SIDE;
     let image = Array2::from_shape_vec((side, side), found.image).map_err(value_error)?;
     Ok(Some((found.bounds, image.into_pyarray(py), found.size)))
+}
+
+/// Capacity in mL by M2's network, from what [`region`] gives.
+#[pyfunction]
+pub(crate) fn m2_capacity(
+    py: Python<'_>,
+    image: PyReadonlyArray2<'_, f32>,
+    size: [f32; 2],
+    weights: PathBuf,
+) -> PyResult<f64> {
+    let image: Vec<f32> = image.as_array().iter().copied().collect();
+    compute(py, || {
+        let network = CapacityNetwork::read(&weights).map_err(|e| e.to_string())?;
+        network.millilitres(&image, size).map_err(|e| e.to_string())
+    })?
+    .map_err(value_error)
 }

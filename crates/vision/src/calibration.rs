@@ -11,6 +11,12 @@ use crate::pickle::{Id, Pickle, Value};
 
 /// Largest file that is read; real ones have under 4 kB.
 const MAX_BYTES: u64 = 1 << 20;
+/// Largest focal length and principal point in px.
+const MAX_PX: f64 = 1e5;
+/// Largest distance of a camera from the world's origin in m.
+pub(crate) const MAX_DISTANCE: f64 = 100.0;
+/// How far a rotation times its transpose may be from the unit matrix; real files: 1e-7.
+const TURNED: f64 = 1e-3;
 
 /// A camera without lens distortion, as the data set gives it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -46,6 +52,42 @@ impl Camera {
             })
         });
         Self { intrinsic, rotation, translation, projection }
+    }
+
+    /// Whether anything can be seen with it: focal lengths above 0 and a principal point, in px, a
+    /// rotation, and a place within 100 m.
+    ///
+    /// # Errors
+    /// A text that names the part at fault.
+    pub fn check(&self) -> std::result::Result<(), String> {
+        let [[fx, skew, cx], [zero, fy, cy], last] = self.intrinsic;
+        let focal = [fx, fy].iter().all(|f| (1.0..=MAX_PX).contains(f));
+        let point = [cx, cy, skew].iter().all(|p| p.abs() <= MAX_PX);
+        if !focal || !point || zero != 0.0 || last != [0.0, 0.0, 1.0] {
+            return Err(format!(
+                "'intrinsic' is no camera matrix: expected focal lengths and a principal point of at \
+                 most {MAX_PX} px over a row 0, 0, 1"
+            ));
+        }
+        let r = &self.rotation;
+        let unit = (0..3).all(|i| {
+            (0..3).all(|j| {
+                let product: f64 = (0..3).map(|k| r[i][k] * r[j][k]).sum();
+                (product - if i == j { 1.0 } else { 0.0 }).abs() <= TURNED
+            })
+        });
+        if !unit || matrix::determinant(r) <= 0.0 {
+            return Err("'rvec' is no rotation: expected rows of length 1 at right angles".into());
+        }
+        if !self.translation.iter().all(|t| t.abs() <= MAX_DISTANCE) {
+            return Err(format!(
+                "'tvec' puts the camera more than {MAX_DISTANCE} m away; expected metres"
+            ));
+        }
+        if !self.projection.iter().flatten().all(|p| p.abs() <= MAX_PX * MAX_DISTANCE * 4.0) {
+            return Err("'projMatrix' has numbers that no camera has".into());
+        }
+        Ok(())
     }
 
     /// Pixel (column, row) of a point in m; computed as OpenCV's `projectPoints` does.
@@ -136,6 +178,7 @@ impl Calibration {
                 camera.projection =
                     std::array::from_fn(|r| std::array::from_fn(|c| flat[4 * r + c]));
             }
+            camera.check().map_err(|reason| format!("camera '{name}': {reason}"))?;
             Ok(Some(camera))
         };
         let rgb = camera("rgb")?.ok_or(
@@ -240,6 +283,16 @@ mod tests {
             (&CAMERA.replace("\"tvec\"", "\"t\""), "no 'tvec'"),
             (&CAMERA.replace("900,0,640", "900,0"), "'intrinsic' of camera 'rgb' is not 3 by 3"),
             ("no pickle", "byte 1: operation 'n'"),
+            // Finite numbers that would leave the range of single precision, or any room.
+            (&CAMERA.replace("900,0,640", "1e39,0,640"), "camera 'rgb': 'intrinsic' is no camera"),
+            (&CAMERA.replace("[0,0,1]", "[0,0,0]"), "'intrinsic' is no camera"),
+            (&CAMERA.replace("[2]", "[1e39]"), "'tvec' puts the camera more than 100 m away"),
+            (
+                &CAMERA.replace("[0,0,0]", "[[1e-39,0,0],[0,1,0],[0,0,1]]"),
+                "camera 'rgb': 'rvec' is no rotation",
+            ),
+            (&CAMERA.replace("[0,0,0]", "[[1,0,0],[0,1,0],[0,0,-1]]"), "'rvec' is no rotation"),
+            (&CAMERA.replace("[0,0,0]", "[1e200,0,0]"), "'rvec' is no rotation"),
         ] {
             let error = parse(text).unwrap_err().to_string();
             assert!(error.starts_with("c.json: ") && error.contains(part), "{error}");

@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 
-use crate::calibration::Camera;
+use crate::calibration::{Camera, MAX_DISTANCE};
 use crate::error::{Result, VisionError};
 use crate::image::Depth;
 use crate::mask::Mask;
@@ -45,26 +45,34 @@ pub struct UprightBox {
 pub(crate) fn points(view: &DepthView<'_>) -> Result<Vec<[f64; 3]>> {
     let DepthView { depth, mask, camera } = view;
     if (depth.width, depth.height) != (mask.width, mask.height) {
-        return Err(VisionError::Request(format!(
+        return Err(VisionError::Conflict(format!(
             "a depth image of {} by {} px and a mask of {} by {}; they must be equal",
             depth.width, depth.height, mask.width, mask.height
         )));
     }
     let back = camera
         .back_projection()
-        .ok_or_else(|| VisionError::Request("the camera matrix cannot be inverted".into()))?;
+        .ok_or_else(|| VisionError::Conflict("the camera matrix cannot be inverted".into()))?;
     let pixels = depth.data.iter().zip(&mask.data).enumerate();
     let points = pixels.filter(|(_, (mm, inside))| **inside && **mm > 0).map(|(i, (&mm, _))| {
         let (column, row) = ((i % depth.width) as f64, (i / depth.width) as f64);
         back.point(column, row, f64::from(mm) / 1000.0)
     });
-    Ok(points.collect())
+    let points: Vec<[f64; 3]> = points.collect();
+    if !points.iter().flatten().all(|v| v.abs() <= MAX_DISTANCE) {
+        return Err(VisionError::Conflict(format!(
+            "a point more than {MAX_DISTANCE} m from the world's origin: the calibration does not fit this \
+             depth image"
+        )));
+    }
+    Ok(points)
 }
 
 /// The upright box around the points of all views.
 ///
 /// # Errors
-/// [`VisionError::Request`] when sizes differ or hardly any depth lies on the masks.
+/// [`VisionError::Conflict`] when sizes differ or the camera does not fit, [`VisionError::Request`] when hardly
+/// any depth lies on the masks.
 pub fn upright_box(views: &[DepthView<'_>]) -> Result<UprightBox> {
     let mut cloud = Vec::new();
     for view in views {

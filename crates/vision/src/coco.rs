@@ -1,9 +1,14 @@
 //! Masks and categories as COCO writes them.
 
-use serde_json::Value as Json;
+use std::fmt;
+
+use serde::de::{Deserialize, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use crate::image::{MAX_PIXELS, MAX_SIDE};
 use crate::mask::Mask;
+
+/// Largest number of coordinates of a mask's polygons.
+const MAX_COORDINATES: usize = 1 << 17;
 
 /// Category numbers and names of the detectors trained on COCO (91 numbers, of which 80 are used).
 const CATEGORIES: [(u8, &str); 80] = [
@@ -94,57 +99,140 @@ pub fn category_name(number: u8) -> Option<&'static str> {
     CATEGORIES.iter().find(|(n, _)| *n == number).map(|(_, name)| *name)
 }
 
-/// A mask from a COCO segmentation: `{"size": [height, width], "counts": …}` with counts as numbers
-/// or as COCO's compressed text, or polygons `[[x, y, x, y, …], …]`, which need the size of the image.
-pub(crate) fn mask(json: &Json, size: Option<(usize, usize)>) -> Result<Mask, String> {
-    match json {
-        Json::Object(rle) => {
-            let side = |i: usize| {
-                let side = rle.get("size").and_then(|s| s.get(i)).and_then(Json::as_u64);
-                side.filter(|&s| (1..=MAX_SIDE as u64).contains(&s)).map(|s| s as usize)
-            };
-            let (Some(height), Some(width)) = (side(0), side(1)) else {
-                return Err("a mask without \"size\": [height, width]".into());
-            };
-            let counts = match rle.get("counts") {
-                Some(Json::String(text)) => decompress(text)?,
-                Some(Json::Array(counts)) => counts
-                    .iter()
-                    .map(|c| c.as_u64().ok_or("a run length that is not a whole number"))
-                    .collect::<Result<_, _>>()?,
-                _ => return Err("a mask without \"counts\"".into()),
-            };
-            runs(&counts, width, height)
-        }
-        Json::Array(polygons) => {
-            let (width, height) = size.ok_or("polygons need the size of the image")?;
-            let mut out = Mask::empty(width, height);
-            for polygon in polygons {
-                let numbers: Option<Vec<f64>> = polygon
-                    .as_array()
-                    .map(|p| p.iter().map_while(Json::as_f64).collect::<Vec<_>>())
-                    .filter(|p| p.len() >= 6 && p.len() % 2 == 0);
-                let numbers = numbers.filter(|n| polygon.as_array().map(Vec::len) == Some(n.len()));
-                let numbers = numbers
-                    .ok_or("a polygon must be a list x, y, x, y, … of three points or more")?;
-                fill(&numbers, &mut out);
+/// A COCO segmentation: `{"size": [height, width], "counts": …}` with counts as numbers or as COCO's
+/// compressed text, or polygons `[[x, y, x, y, …], …]`.
+///
+/// It is read straight into numbers: a tree of JSON values takes seventy times the text's size.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Segmentation {
+    /// Columns, rows, and run lengths down the columns, outside first.
+    Runs { width: usize, height: usize, counts: Vec<u32> },
+    /// x and y of each polygon's points in turn.
+    Polygons(Vec<Vec<f32>>),
+}
+
+impl Segmentation {
+    /// The pixels; polygons need the `(width, height)` of the image.
+    pub(crate) fn mask(&self, size: Option<(usize, usize)>) -> Result<Mask, String> {
+        match self {
+            Self::Runs { width, height, counts } => Ok(runs(counts, *width, *height)),
+            Self::Polygons(polygons) => {
+                let (width, height) = size.ok_or("polygons need the size of the image")?;
+                let mut out = Mask::empty(width, height);
+                for polygon in polygons {
+                    fill(polygon, &mut out);
+                }
+                Ok(out)
             }
-            Ok(out)
         }
-        _ => Err("a mask that is neither run lengths nor polygons".into()),
     }
 }
 
-/// Run lengths down the columns, outside first.
-fn runs(counts: &[u64], width: usize, height: usize) -> Result<Mask, String> {
-    let total = (width * height) as u64;
-    if width * height > MAX_PIXELS {
-        return Err(format!("a mask of {width} by {height} px; the limit is {MAX_PIXELS} px"));
+impl<'de> Deserialize<'de> for Segmentation {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(SegmentationVisitor)
     }
-    let sum = counts.iter().try_fold(0u64, |sum, &c| sum.checked_add(c));
-    if sum != Some(total) {
-        return Err(format!("run lengths that do not add up to the {total} px of the mask"));
+}
+
+pub(crate) struct SegmentationVisitor;
+
+impl<'de> Visitor<'de> for SegmentationVisitor {
+    type Value = Segmentation;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(
+            "run lengths {\"size\": [height, width], \"counts\": …} or polygons [[x, y, …], …]",
+        )
     }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Segmentation, A::Error> {
+        let (mut size, mut counts) = (None, None);
+        while let Some(key) = map.next_key::<String>()? {
+            match key.as_str() {
+                "size" => size = Some(map.next_value::<[u32; 2]>()?),
+                "counts" => counts = Some(map.next_value::<Counts>()?.0),
+                _ => {
+                    map.next_value::<IgnoredAny>()?;
+                }
+            }
+        }
+        let sound = |side: &u32| (1..=MAX_SIDE as u32).contains(side);
+        let [height, width] = size
+            .filter(|sides| sides.iter().all(sound))
+            .ok_or_else(|| A::Error::custom("a mask without \"size\": [height, width]"))?
+            .map(|side| side as usize);
+        let counts = counts.ok_or_else(|| A::Error::custom("a mask without \"counts\""))?;
+        if width * height > MAX_PIXELS {
+            return Err(A::Error::custom(format!(
+                "a mask of {width} by {height} px; the limit is {MAX_PIXELS} px"
+            )));
+        }
+        let sum: u64 = counts.iter().copied().map(u64::from).sum();
+        if sum != (width * height) as u64 {
+            return Err(A::Error::custom(format!(
+                "run lengths that do not add up to the {} px of the mask",
+                width * height
+            )));
+        }
+        Ok(Segmentation::Runs { width, height, counts })
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Segmentation, A::Error> {
+        let mut polygons = Vec::new();
+        let mut coordinates = 0;
+        while let Some(polygon) = list.next_element::<Vec<f32>>()? {
+            if polygon.len() < 6 || polygon.len() % 2 == 1 {
+                return Err(A::Error::custom(
+                    "a polygon must be a list x, y, x, y, … of three points or more",
+                ));
+            }
+            coordinates += polygon.len();
+            if coordinates > MAX_COORDINATES {
+                return Err(A::Error::custom(format!(
+                    "polygons of more than {MAX_COORDINATES} coordinates"
+                )));
+            }
+            polygons.push(polygon);
+        }
+        Ok(Segmentation::Polygons(polygons))
+    }
+}
+
+/// Run lengths, plain or compressed.
+struct Counts(Vec<u32>);
+
+impl<'de> Deserialize<'de> for Counts {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct CountsVisitor;
+        impl<'de> Visitor<'de> for CountsVisitor {
+            type Value = Counts;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("run lengths as a list of whole numbers or COCO's compressed text")
+            }
+
+            fn visit_str<E: Error>(self, text: &str) -> Result<Counts, E> {
+                decompress(text).map(Counts).map_err(E::custom)
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Counts, A::Error> {
+                let mut counts = Vec::new();
+                while let Some(count) = list.next_element::<u32>()? {
+                    // Only the first run may be empty: a mask has no more runs than pixels.
+                    if count == 0 && !counts.is_empty() {
+                        return Err(A::Error::custom("an empty run after the first"));
+                    }
+                    counts.push(count);
+                }
+                Ok(Counts(counts))
+            }
+        }
+        deserializer.deserialize_any(CountsVisitor)
+    }
+}
+
+/// Run lengths down the columns, outside first; their sum has been checked.
+fn runs(counts: &[u32], width: usize, height: usize) -> Mask {
     let mut mask = Mask::empty(width, height);
     let mut at = 0;
     for (i, &count) in counts.iter().enumerate() {
@@ -156,12 +244,12 @@ fn runs(counts: &[u64], width: usize, height: usize) -> Result<Mask, String> {
         }
         at = end;
     }
-    Ok(mask)
+    mask
 }
 
 /// COCO's text: numbers of five bits a character, from the third on as differences to the last but
 /// one.
-fn decompress(text: &str) -> Result<Vec<u64>, String> {
+fn decompress(text: &str) -> Result<Vec<u32>, String> {
     const FAULT: &str = "compressed run lengths that are damaged";
     let mut counts: Vec<i64> = Vec::new();
     let mut bytes = text.bytes();
@@ -187,7 +275,7 @@ fn decompress(text: &str) -> Result<Vec<u64>, String> {
         }
         counts.push(value);
     }
-    counts.into_iter().map(|c| u64::try_from(c).map_err(|_| FAULT.to_string())).collect()
+    counts.into_iter().map(|c| u32::try_from(c).map_err(|_| FAULT.to_string())).collect()
 }
 
 /// COCO's text of a mask.
@@ -222,8 +310,9 @@ pub fn compress(mask: &Mask) -> String {
 }
 
 /// Adds the pixels whose centres lie in a polygon (even-odd); a pixel covers 0 to 1.
-fn fill(polygon: &[f64], mask: &mut Mask) {
-    let points: Vec<(f64, f64)> = polygon.chunks_exact(2).map(|p| (p[0], p[1])).collect();
+fn fill(polygon: &[f32], mask: &mut Mask) {
+    let points: Vec<(f64, f64)> =
+        polygon.chunks_exact(2).map(|p| (f64::from(p[0]), f64::from(p[1]))).collect();
     let width = mask.width;
     let mut cuts = Vec::new();
     for (row, pixels) in mask.data.chunks_exact_mut(width).enumerate() {
@@ -248,7 +337,12 @@ fn fill(polygon: &[f64], mask: &mut Mask) {
 mod tests {
     use super::*;
     use crate::mask::tests::drawn;
-    use serde_json::json;
+    use serde_json::{Value as Json, json};
+
+    fn mask(json: &Json, size: Option<(usize, usize)>) -> Result<Mask, String> {
+        let read: Segmentation = serde_json::from_value(json.clone()).map_err(|e| e.to_string())?;
+        read.mask(size)
+    }
 
     #[test]
     fn runs_go_down_the_columns() {
@@ -274,14 +368,18 @@ mod tests {
         for (json, part) in [
             (json!({"size": [1_000_000, 1_000_000], "counts": [1]}), "size"),
             (json!({"size": [8192, 8192], "counts": [67_108_864]}), "limit"),
-            (json!({"size": [3, 4], "counts": [4, u64::MAX, 9]}), "add up"),
-            (json!({"size": [3, 4], "counts": [4, -4, 12]}), "whole number"),
+            (json!({"size": [3, 4], "counts": [4, u32::MAX, 9]}), "add up"),
+            (json!({"size": [3, 4], "counts": [4, u64::MAX, 9]}), "u32"),
+            (json!({"size": [3, 4], "counts": [4, -4, 12]}), "u32"),
+            (json!({"size": [3, 4], "counts": [0, 0, 12]}), "empty run after the first"),
             (json!({"size": [3, 4], "counts": "oooooooooooooo"}), "damaged"),
             (json!({"size": [3, 4], "counts": "\u{7f}"}), "damaged"),
             (json!({"size": [3, 4]}), "counts"),
             (json!([[1, 2, 3, 4]]), "three points"),
-            (json!([[1, 2, 3, 4, 5, "x"]]), "three points"),
-            (json!(7), "neither"),
+            (json!([[1, 2, 3, 4, 5, 6, 7]]), "three points"),
+            (json!([[1, 2, 3, 4, 5, "x"]]), "f32"),
+            (json!([vec![1.0; MAX_COORDINATES + 2]]), "coordinates"),
+            (json!(7), "expected run lengths"),
         ] {
             let error = mask(&json, Some((4, 3))).unwrap_err();
             assert!(error.contains(part), "{json}: {error}");

@@ -55,8 +55,8 @@ pub struct Cuboid {
 /// The same seed gives the same estimate.
 ///
 /// # Errors
-/// [`VisionError::Request`] when sizes differ, no depth lies on the mask, or the box is larger than
-/// anything that is measured.
+/// [`VisionError::Conflict`] when sizes differ or the camera does not fit, [`VisionError::Request`] when no
+/// depth lies on the mask or the box is larger than anything that is measured.
 pub fn cuboid(
     depth: &Depth,
     mask: &Mask,
@@ -135,10 +135,10 @@ fn share_on_mask(low: [f64; 3], high: [f64; 3], mask: &Mask, camera: &Camera) ->
     Ok(on_mask as f64 / total as f64)
 }
 
-/// The container that the published program measures: the first candidate of the frame with the
-/// fewest candidates, the largest first mask among those.
+/// The container that the published program measures: the most confident candidate of the frame with the
+/// fewest candidates, the largest such mask among those.
 ///
-/// `detections` are those of one view, in the order of their scores; `width` is that of the images.
+/// `detections` are those of one view; `width` is that of the images.
 ///
 /// # Errors
 /// A mask is damaged.
@@ -152,8 +152,10 @@ pub fn choose(
     frames.dedup();
     let mut best: Option<(usize, usize, Choice)> = None;
     for frame in frames.into_iter().filter(|f| f % FRAME_STEP == 0) {
-        let of_frame = || detections.iter().filter(move |d| d.frame == frame);
-        let person = of_frame().find(|d| d.label == "person");
+        let mut of_frame: Vec<_> = detections.iter().filter(|d| d.frame == frame).collect();
+        // Detectors list by score, tables need not; equals keep their order.
+        of_frame.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let person = of_frame.iter().find(|d| d.label == "person");
         let centred = person.is_some_and(|p| {
             let centre = (p.bounds[0] + p.bounds[2]) / 2.0;
             (width / 3.0..width / 3.0 * 2.0).contains(&centre)
@@ -161,7 +163,9 @@ pub fn choose(
         if !centred {
             continue;
         }
-        let candidates: Vec<&Detection> = of_frame()
+        let candidates: Vec<&Detection> = of_frame
+            .iter()
+            .copied()
             .filter(|d| d.bounds[2] > width / 4.0 && d.bounds[0] < width / 4.0 * 3.0)
             .filter(|d| CONTAINERS.contains(&d.label.as_str()))
             .collect();
@@ -250,5 +254,36 @@ mod tests {
         wide.data[0] = 1;
         let all = Mask { data: vec![true; 640 * 480], ..mask };
         assert!(reason(&wide, &all).contains("at most 20 m³"));
+        // A camera whose points leave every room, as single precision cannot hold them.
+        let mut far = camera();
+        far.translation = [0.0, 0.0, 1e39];
+        let (depth, mask) = sphere();
+        for outliers in [Outliers::Published, Outliers::Corrected, Outliers::Kept] {
+            let error = cuboid(&depth, &mask, &far, outliers, 1).unwrap_err();
+            assert!(matches!(error, VisionError::Conflict(_)), "{error}");
+            assert!(error.to_string().len() < 120, "{error}");
+        }
+    }
+
+    #[test]
+    fn the_order_of_a_table_does_not_matter() {
+        let rows = [
+            "0,1,person,0.9,200,0,440,480,",
+            // Another person, at the edge.
+            "0,1,person,0.6,0,0,20,480,",
+            r#"0,1,cup,0.8,200,0,300,9,"{""size"":[1,4],""counts"":[0,4]}""#,
+            r#"0,1,vase,0.7,200,0,300,9,"{""size"":[1,4],""counts"":[0,1,3]}""#,
+        ];
+        let chosen = |order: [usize; 4]| {
+            let text: Vec<&str> = order.iter().map(|i| rows[*i]).collect();
+            let header = "frame,view,label,score,x_min,y_min,x_max,y_max,mask";
+            let dir = tempfile::tempdir().unwrap();
+            let path = dir.path().join("d.csv");
+            std::fs::write(&path, format!("{header}\n{}\n", text.join("\n"))).unwrap();
+            let detections = crate::read_detections(&path).unwrap();
+            choose(&detections, 640.0, (4, 1)).unwrap().map(|c| c.mask.area())
+        };
+        assert_eq!(chosen([0, 1, 2, 3]), Some(4));
+        assert_eq!(chosen([3, 1, 2, 0]), Some(4));
     }
 }

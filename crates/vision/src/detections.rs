@@ -5,16 +5,19 @@
 //! in px. A label is a COCO category, by number (of 91) or name. A mask is a PNG beside the table, or a
 //! COCO segmentation (in CSV as JSON text); it may be left out.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
-use serde_json::Value as Json;
+use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
-use crate::coco;
+use crate::coco::{self, SegmentationVisitor};
 use crate::error::{Result, VisionError, read};
 use crate::mask::Mask;
 
-/// Largest table that is read.
-const MAX_BYTES: u64 = 256 << 20;
+/// Largest table that is read: a minute of four views with plain run lengths takes a tenth.
+const MAX_BYTES: u64 = 64 << 20;
+/// Largest number of detections in a table.
+const MAX_DETECTIONS: usize = 1 << 20;
 /// Largest frame number.
 const MAX_FRAME: u32 = 10_000_000;
 
@@ -38,7 +41,7 @@ pub struct Detection {
 enum Segmentation {
     None,
     File(PathBuf),
-    Coco(Json),
+    Coco(coco::Segmentation),
 }
 
 impl Detection {
@@ -51,7 +54,7 @@ impl Detection {
         match &self.mask {
             Segmentation::None => Ok(None),
             Segmentation::File(path) => Mask::read(path).map(Some),
-            Segmentation::Coco(json) => match coco::mask(json, size) {
+            Segmentation::Coco(segmentation) => match segmentation.mask(size) {
                 Ok(mask) => Ok(Some(mask)),
                 Err(reason) => {
                     let Self { frame, view, .. } = *self;
@@ -80,26 +83,136 @@ pub fn read_detections(path: &Path) -> Result<Vec<Detection>> {
     }
 }
 
+/// An entry of a JSON table.
+#[derive(serde::Deserialize)]
+struct Entry {
+    frame: Text,
+    view: Text,
+    label: Text,
+    score: f64,
+    #[serde(rename = "box")]
+    bounds: [f64; 4],
+    #[serde(default)]
+    mask: EntryMask,
+}
+
+/// A string, or a number as it is written.
+struct Text(String);
+
+impl<'de> Deserialize<'de> for Text {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        struct TextVisitor;
+        impl Visitor<'_> for TextVisitor {
+            type Value = Text;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number or a string")
+            }
+
+            fn visit_str<E: Error>(self, text: &str) -> std::result::Result<Text, E> {
+                Ok(Text(text.into()))
+            }
+
+            fn visit_u64<E: Error>(self, number: u64) -> std::result::Result<Text, E> {
+                Ok(Text(number.to_string()))
+            }
+
+            fn visit_i64<E: Error>(self, number: i64) -> std::result::Result<Text, E> {
+                Ok(Text(number.to_string()))
+            }
+
+            fn visit_f64<E: Error>(self, number: f64) -> std::result::Result<Text, E> {
+                Ok(Text(number.to_string()))
+            }
+        }
+        deserializer.deserialize_any(TextVisitor)
+    }
+}
+
+/// A file's name, a COCO segmentation, or nothing.
+#[derive(Default)]
+enum EntryMask {
+    #[default]
+    None,
+    File(String),
+    Coco(coco::Segmentation),
+}
+
+impl<'de> Deserialize<'de> for EntryMask {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        struct MaskVisitor;
+        impl<'de> Visitor<'de> for MaskVisitor {
+            type Value = EntryMask;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the name of a PNG, ")?;
+                SegmentationVisitor.expecting(f)
+            }
+
+            fn visit_unit<E: Error>(self) -> std::result::Result<EntryMask, E> {
+                Ok(EntryMask::None)
+            }
+
+            fn visit_str<E: Error>(self, file: &str) -> std::result::Result<EntryMask, E> {
+                Ok(EntryMask::File(file.into()))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(
+                self,
+                map: A,
+            ) -> std::result::Result<EntryMask, A::Error> {
+                SegmentationVisitor.visit_map(map).map(EntryMask::Coco)
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(
+                self,
+                list: A,
+            ) -> std::result::Result<EntryMask, A::Error> {
+                SegmentationVisitor.visit_seq(list).map(EntryMask::Coco)
+            }
+        }
+        deserializer.deserialize_any(MaskVisitor)
+    }
+}
+
+/// Makes the detections of a JSON list one by one, so that only they are held.
+struct Entries<'a>(&'a Path);
+
+impl<'de> Visitor<'de> for Entries<'_> {
+    type Value = Vec<Detection>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a list of detections")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(
+        self,
+        mut list: A,
+    ) -> std::result::Result<Vec<Detection>, A::Error> {
+        let mut detections = Vec::new();
+        while let Some(entry) = list.next_element::<Entry>()? {
+            let number = detections.len() + 1;
+            let fault = |reason: String| A::Error::custom(format!("entry {number}: {reason}"));
+            if number > MAX_DETECTIONS {
+                return Err(fault(format!("a table has at most {MAX_DETECTIONS}")));
+            }
+            let mask = match entry.mask {
+                EntryMask::None => Segmentation::None,
+                EntryMask::File(file) => Segmentation::File(beside(self.0, &file)),
+                EntryMask::Coco(coco) => Segmentation::Coco(coco),
+            };
+            let names = [&entry.frame, &entry.view, &entry.label].map(|t| t.0.as_str());
+            let found = detection(names, entry.score, entry.bounds, mask);
+            detections.push(found.map_err(fault)?);
+        }
+        Ok(detections)
+    }
+}
+
 fn from_json(bytes: &[u8], path: &Path) -> Result<Vec<Detection>> {
-    let table: Vec<Json> = serde_json::from_slice(bytes)
-        .map_err(|e| VisionError::file(path, format!("not a JSON list of detections: {e}")))?;
-    let rows = table.iter().enumerate().map(|(i, row)| {
-        let text = |key: &str| match row.get(key) {
-            Some(Json::String(text)) => Some(text.clone()),
-            Some(Json::Number(number)) => Some(number.to_string()),
-            _ => None,
-        };
-        let side = |k: usize| row.get("box").and_then(|b| b.get(k)).map(Json::to_string);
-        let segmentation = match row.get("mask") {
-            None | Some(Json::Null) => Segmentation::None,
-            Some(Json::String(file)) => Segmentation::File(beside(path, file)),
-            Some(coco) => Segmentation::Coco(coco.clone()),
-        };
-        let bounds = std::array::from_fn(side);
-        detection(text, bounds, segmentation)
-            .map_err(|reason| VisionError::file(path, format!("entry {}: {reason}", i + 1)))
-    });
-    rows.collect()
+    let mut json = serde_json::Deserializer::from_slice(bytes);
+    let detections = json.deserialize_seq(Entries(path)).and_then(|d| json.end().map(|()| d));
+    detections.map_err(|e| VisionError::file(path, format!("not a JSON list of detections: {e}")))
 }
 
 fn from_csv(bytes: &[u8], path: &Path) -> Result<Vec<Detection>> {
@@ -114,23 +227,36 @@ fn from_csv(bytes: &[u8], path: &Path) -> Result<Vec<Detection>> {
             return Err(VisionError::file(path, format!("no column '{name}'; it has {there}")));
         }
     }
-    let rows = reader.records().map(|row| {
+    let mut detections = Vec::new();
+    for row in reader.records() {
         let row = row.map_err(fault)?;
         let line = row.position().map_or(0, |p| p.line());
-        let text = |key: &str| column(key).and_then(|c| row.get(c)).map(str::to_string);
+        let text = |key: &str| column(key).and_then(|c| row.get(c)).unwrap_or_default();
         let place = |reason: String| VisionError::file(path, format!("line {line}: {reason}"));
-        let segmentation = match text("mask").as_deref() {
-            None | Some("") => Segmentation::None,
-            Some(json) if json.starts_with(['{', '[']) => Segmentation::Coco(
+        if detections.len() == MAX_DETECTIONS {
+            return Err(place(format!("a table has at most {MAX_DETECTIONS} detections")));
+        }
+        let mask = match text("mask") {
+            "" => Segmentation::None,
+            json if json.starts_with(['{', '[']) => Segmentation::Coco(
                 serde_json::from_str(json)
                     .map_err(|e| place(format!("a mask that is not readable as JSON: {e}")))?,
             ),
-            Some(file) => Segmentation::File(beside(path, file)),
+            file => Segmentation::File(beside(path, file)),
         };
-        let bounds = ["x_min", "y_min", "x_max", "y_max"].map(text);
-        detection(text, bounds, segmentation).map_err(place)
-    });
-    rows.collect()
+        let number = |key: &str, what: &str| {
+            let text = text(key);
+            text.parse::<f64>().map_err(|_| place(format!("'{text}' is not {what}")))
+        };
+        let mut bounds = [0.0; 4];
+        for (side, key) in bounds.iter_mut().zip(["x_min", "y_min", "x_max", "y_max"]) {
+            *side = number(key, "an edge of a box in px")?;
+        }
+        let score = number("score", "a score from 0 to 1")?;
+        let names = ["frame", "view", "label"].map(text);
+        detections.push(detection(names, score, bounds, mask).map_err(place)?);
+    }
+    Ok(detections)
 }
 
 fn beside(table: &Path, file: &str) -> PathBuf {
@@ -138,41 +264,37 @@ fn beside(table: &Path, file: &str) -> PathBuf {
 }
 
 fn detection(
-    text: impl Fn(&str) -> Option<String>,
-    bounds: [Option<String>; 4],
+    [frame, view, label]: [&str; 3],
+    score: f64,
+    bounds: [f64; 4],
     mask: Segmentation,
 ) -> std::result::Result<Detection, String> {
-    let shown = |value: &Option<String>| value.clone().unwrap_or_else(|| "nothing".into());
-    let frame = text("frame");
-    let number = frame.as_ref().and_then(|f| f.parse().ok()).filter(|&f| f <= MAX_FRAME);
-    let frame = number.ok_or_else(|| format!("'{}' is not a frame number", shown(&frame)))?;
-    let view = text("view");
-    let number = view.as_ref().and_then(|v| v.trim_start_matches('c').parse().ok());
+    let number = frame.parse().ok().filter(|&f| f <= MAX_FRAME);
+    let frame = number.ok_or_else(|| format!("'{frame}' is not a frame number"))?;
+    let number = view.strip_prefix('c').unwrap_or(view).parse().ok();
     let view = number
         .filter(|v| (1..=4).contains(v))
-        .ok_or_else(|| format!("'{}' is not a view (1 to 4, or c1 to c4)", shown(&view)))?;
-    let label = text("label").filter(|l| !l.is_empty()).ok_or("no label")?;
-    let label = match label.parse() {
-        Ok(number) => coco::category_name(number)
-            .ok_or_else(|| format!("{number} is not a COCO category (1 to 90)"))?
+        .ok_or_else(|| format!("'{view}' is not a view (1 to 4, or c1 to c4)"))?;
+    // What is a number is a category's, as detectors write it: also 47.0.
+    let label = match label.parse::<f64>() {
+        Ok(number) => Some(number)
+            .filter(|n| n.fract() == 0.0 && (0.0..=255.0).contains(n))
+            .and_then(|n| coco::category_name(n as u8))
+            .ok_or_else(|| format!("{label} is not a COCO category (1 to 90)"))?
             .to_string(),
+        Err(_) if label.is_empty() => return Err("no label".into()),
         Err(_) => label.to_lowercase(),
     };
-    let score = text("score");
-    let value = score.as_ref().and_then(|s| s.parse().ok()).filter(|s| (0.0..=1.0).contains(s));
-    let score = value.ok_or_else(|| format!("'{}' is not a score from 0 to 1", shown(&score)))?;
-    let mut sides = [0.0; 4];
-    for (side, text) in sides.iter_mut().zip(&bounds) {
-        *side = text
-            .as_ref()
-            .and_then(|t| t.parse().ok())
-            .filter(|v: &f64| v.abs() <= 1e6)
-            .ok_or_else(|| format!("'{}' is not an edge of a box in px", shown(text)))?;
+    if !(0.0..=1.0).contains(&score) {
+        return Err(format!("'{score}' is not a score from 0 to 1"));
     }
-    if sides[0] > sides[2] || sides[1] > sides[3] {
-        return Err(format!("a box {sides:?} whose right or lower edge comes first"));
+    if let Some(side) = bounds.iter().find(|side| !(side.abs() <= 1e6)) {
+        return Err(format!("'{side}' is not an edge of a box in px"));
     }
-    Ok(Detection { frame, view, label, score, bounds: sides, mask })
+    if bounds[0] > bounds[2] || bounds[1] > bounds[3] {
+        return Err(format!("a box {bounds:?} whose right or lower edge comes first"));
+    }
+    Ok(Detection { frame, view, label, score, bounds, mask })
 }
 
 #[cfg(test)]
@@ -216,11 +338,16 @@ mod tests {
     fn faults_give_the_line() {
         for (row, part) in [
             ("x,1,cup,1,0,0,1,1,", "line 2: 'x' is not a frame number"),
-            ("1,5,cup,1,0,0,1,1,", "not a view"),
+            ("1,5,cup,1,0,0,1,1,", "'5' is not a view"),
             ("1,1,12,1,0,0,1,1,", "12 is not a COCO category"),
-            ("1,1,cup,1.5,0,0,1,1,", "not a score"),
-            ("1,1,cup,nan,0,0,1,1,", "not a score"),
-            ("1,1,cup,1,0,0,inf,1,", "not an edge"),
+            ("1,1,300,1,0,0,1,1,", "300 is not a COCO category"),
+            ("1,1,47.5,1,0,0,1,1,", "47.5 is not a COCO category"),
+            ("1,1,nan,1,0,0,1,1,", "nan is not a COCO category"),
+            ("1,ccc1,cup,1,0,0,1,1,", "'ccc1' is not a view"),
+            ("1,1,,1,0,0,1,1,", "no label"),
+            ("1,1,cup,1.5,0,0,1,1,", "is not a score"),
+            ("1,1,cup,nan,0,0,1,1,", "is not a score"),
+            ("1,1,cup,1,0,0,inf,1,", "is not an edge"),
             ("1,1,cup,1,3,0,1,1,", "comes first"),
             ("1,1,cup,1,0,0,1,1,{x", "not readable as JSON"),
             ("1,1,cup", "not a readable table"),
@@ -230,6 +357,31 @@ mod tests {
         }
         let error = table("d.csv", "frame,view\n1,1\n").unwrap_err().to_string();
         assert!(error.contains("no column 'label'; it has frame, view"), "{error}");
-        assert!(table("d.json", "{}").unwrap_err().to_string().contains("JSON list"));
+        for (text, part) in [
+            ("{}", "not a JSON list of detections"),
+            ("[{}]", "missing field `frame`"),
+            (
+                r#"[{"frame":0,"view":5,"label":1,"score":1,"box":[0,0,1,1]}]"#,
+                "entry 1: '5' is not a view",
+            ),
+            (r#"[{"frame":0,"view":1,"label":1,"score":1,"box":[0,0,1]}]"#, "array of length 4"),
+            (
+                r#"[{"frame":0,"view":1,"label":1,"score":1,"box":[0,0,1,1],"mask":{"size":[1,2],"counts":[0,0,2]}}]"#,
+                "empty run",
+            ),
+            (
+                r#"[{"frame":0,"view":1,"label":1,"score":1,"box":[0,0,1,1],"mask":7}]"#,
+                "name of a PNG",
+            ),
+        ] {
+            let error = table("d.json", text).unwrap_err().to_string();
+            assert!(error.contains(part), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_whole_number_with_a_point_is_a_category_too() {
+        let rows = table("d.csv", &format!("{HEADER}0,1,47.0,1,0,0,1,1,m.png\n")).unwrap();
+        assert_eq!(rows[0].label, "cup");
     }
 }

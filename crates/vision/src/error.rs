@@ -49,7 +49,10 @@ pub enum VisionError {
         /// What was found and what is expected.
         reason: String,
     },
-    /// Arguments that do not fit together, or nothing that could be measured.
+    /// Inputs that contradict each other, or that nothing could be seen with.
+    #[error("{0}")]
+    Conflict(String),
+    /// Nothing that could be measured, or arguments that nothing can be made of.
     #[error("{0}")]
     Request(String),
 }

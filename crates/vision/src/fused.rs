@@ -13,6 +13,8 @@ use crate::category::Category;
 
 /// Smallest standard deviation of a method, in logarithms: no method is that exact on a new container.
 const FLOOR: f64 = 0.03;
+/// Largest logarithm of a capacity, and of an estimate over it, that a file may have.
+const MAX_LOG: f64 = 30.0;
 
 /// Bias and spread of a method in one category, in logarithms.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -94,6 +96,29 @@ impl Fusion {
         fusion
     }
 
+    /// Checks what comes from a file.
+    ///
+    /// # Errors
+    /// A text that names category and method.
+    pub fn check(&self) -> Result<(), String> {
+        let sound = |mean: f64, deviation: f64| {
+            mean.abs() <= MAX_LOG && (FLOOR..=MAX_LOG).contains(&deviation)
+        };
+        let methods = self.methods.iter().flat_map(|(category, of)| {
+            of.iter().map(move |(name, r)| (category, name.as_str(), r.bias, r.deviation))
+        });
+        let priors =
+            self.priors.iter().map(|(c, [mean, deviation])| (c, "prior", *mean, *deviation));
+        match methods.chain(priors).find(|(.., mean, deviation)| !sound(*mean, *deviation)) {
+            None => Ok(()),
+            Some((category, name, mean, deviation)) => Err(format!(
+                "{name} of category {}: mean {mean} and deviation {deviation}; expected logarithms of at \
+                 most {MAX_LOG}, and a deviation of at least {FLOOR}",
+                category.name()
+            )),
+        }
+    }
+
     /// The estimate for a container of a category; `None` where nothing is known of it.
     pub fn estimate(&self, category: Category, estimates: &BTreeMap<String, f64>) -> Option<Fused> {
         let known = self.methods.get(&category);
@@ -151,6 +176,26 @@ mod tests {
     fn example(container: u8, capacity: f64, good: f64, bad: f64) -> Example {
         let estimates = [("good".to_string(), good), ("bad".to_string(), bad)].into();
         Example { container, category: Category::Cup, capacity, estimates }
+    }
+
+    #[test]
+    fn impossible_numbers_in_a_file_are_refused() {
+        let mut fusion =
+            Fusion::fit(&[example(1, 500.0, 600.0, 300.0), example(2, 200.0, 240.0, 400.0)]);
+        assert_eq!(fusion.check(), Ok(()));
+        let good = fusion.methods[&Category::Cup]["good"];
+        for (bias, deviation) in
+            [(f64::NAN, 0.1), (1e3, 0.1), (0.0, 0.0), (0.0, -1.0), (0.0, f64::INFINITY)]
+        {
+            let changed = Reliability { bias, deviation, ..good };
+            let of = fusion.methods.get_mut(&Category::Cup).unwrap();
+            of.insert("good".into(), changed);
+            let error = fusion.check().unwrap_err();
+            assert!(error.starts_with("good of category cup: "), "{error}");
+        }
+        fusion.methods.clear();
+        fusion.priors.insert(Category::Box, [1e9, 0.1]);
+        assert!(fusion.check().unwrap_err().starts_with("prior of category box"));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Regression by Gaussian processes with a squared-exponential kernel and white noise.
 
-use linfa_linalg::cholesky::{Cholesky, SolveCInplace};
+use linfa_linalg::cholesky::{Cholesky, CholeskyInplace, SolveCInplace};
+use linfa_linalg::triangular::{SolveTriangularInplace, UPLO};
 use ndarray::{Array1, Array2, Axis};
 use serde::{Deserialize, Serialize};
 
@@ -15,8 +16,17 @@ const MAX_ROWS: usize = 4096;
 
 /// A fitted process.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "Numbers", into = "Numbers")]
 pub struct GaussianProcess {
+    numbers: Numbers,
+    /// Cholesky factor of the covariance over the variance of the signal, which every prediction needs.
+    factor: Array2<f64>,
+}
+
+/// What a process is written as.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
     /// Mean of each input.
     centre: Vec<f64>,
     /// Standard deviation of each input.
@@ -72,7 +82,7 @@ impl GaussianProcess {
         };
         let scale: Vec<f64> = (0..width).map(deviation).collect();
         let mean = targets.iter().sum::<f64>() / n;
-        let mut process = Self {
+        let mut numbers = Numbers {
             inputs: rows.iter().map(|row| standardised(row, &centre, &scale)).collect(),
             centre,
             scale,
@@ -87,7 +97,7 @@ impl GaussianProcess {
         for length in LENGTHS {
             for noise in NOISES {
                 // Covariance over the variance of the signal.
-                let covariance = process.covariance(length, noise);
+                let covariance = numbers.covariance(length, noise);
                 let Ok(factor) = covariance.cholesky() else { continue };
                 let mut solved = centred.clone().insert_axis(Axis(1));
                 let mut matrix = covariance;
@@ -100,19 +110,61 @@ impl GaussianProcess {
                 let likelihood = -0.5 * n * signal.ln() - determinant;
                 if likelihood > best {
                     best = likelihood;
-                    process.length = length;
-                    process.signal = signal;
-                    process.noise = noise * signal;
-                    process.weights = solved.to_vec();
+                    numbers.length = length;
+                    numbers.signal = signal;
+                    numbers.noise = noise * signal;
+                    numbers.weights = solved.to_vec();
                 }
             }
         }
-        if process.weights.is_empty() {
+        if numbers.weights.is_empty() {
             return Err(VisionError::Request("no covariance matrix could be factored".into()));
         }
-        Ok(process)
+        Self::try_from(numbers).map_err(VisionError::Request)
     }
 
+    /// How many inputs it takes.
+    pub fn inputs(&self) -> usize {
+        self.numbers.centre.len()
+    }
+
+    /// Predicts the target of inputs.
+    ///
+    /// # Errors
+    /// [`VisionError::Request`] when their number is not that of the training rows, or the prediction is not a
+    /// number.
+    pub fn predict(&self, inputs: &[f64]) -> Result<Normal> {
+        let Numbers { centre, scale, mean, length, signal, noise, .. } = &self.numbers;
+        if inputs.len() != centre.len() {
+            return Err(VisionError::Request(format!(
+                "{} inputs for a process of {}",
+                inputs.len(),
+                centre.len()
+            )));
+        }
+        let at = standardised(inputs, centre, scale);
+        let near = self.numbers.inputs.iter().map(|row| kernel(row, &at, *length));
+        let near = Array1::from_iter(near);
+        let sum: f64 = near.iter().zip(&self.numbers.weights).map(|(k, w)| k * w).sum();
+        // With the factor L of the covariance, k' C^-1 k is the square of L^-1 k.
+        let solved =
+            self.factor.solve_triangular_into(near.insert_axis(Axis(1)), UPLO::Lower).map_err(
+                |e| VisionError::Request(format!("a covariance matrix without solution: {e}")),
+            )?;
+        let explained: f64 = solved.iter().map(|v| v * v).sum();
+        let variance = signal * (1.0 - explained).max(0.0) + noise;
+        let found = Normal { mean: mean + sum, deviation: variance.sqrt() };
+        if !(found.mean.is_finite() && found.deviation.is_finite()) {
+            return Err(VisionError::Request(format!(
+                "a Gaussian process predicts {} ± {}",
+                found.mean, found.deviation
+            )));
+        }
+        Ok(found)
+    }
+}
+
+impl Numbers {
     fn covariance(&self, length: f64, noise: f64) -> Array2<f64> {
         let n = self.inputs.len();
         let mut matrix = Array2::zeros((n, n));
@@ -126,31 +178,51 @@ impl GaussianProcess {
         }
         matrix
     }
+}
 
-    /// Predicts the target of inputs.
-    ///
-    /// # Errors
-    /// [`VisionError::Request`] when their number is not that of the training rows.
-    pub fn predict(&self, inputs: &[f64]) -> Result<Normal> {
-        if inputs.len() != self.centre.len() || self.weights.len() != self.inputs.len() {
-            return Err(VisionError::Request(format!(
-                "{} inputs for a process of {}",
-                inputs.len(),
-                self.centre.len()
-            )));
+impl From<GaussianProcess> for Numbers {
+    fn from(process: GaussianProcess) -> Self {
+        process.numbers
+    }
+}
+
+impl TryFrom<Numbers> for GaussianProcess {
+    type Error = String;
+
+    /// Checks what comes from a file before a matrix of it is made.
+    fn try_from(numbers: Numbers) -> std::result::Result<Self, String> {
+        let Numbers { centre, scale, mean, length, signal, noise, inputs, weights } = &numbers;
+        let rows = inputs.len();
+        if !(2..=MAX_ROWS).contains(&rows) || weights.len() != rows {
+            return Err(format!(
+                "a Gaussian process of {rows} rows and {} weights; expected equally many, 2 to {MAX_ROWS}",
+                weights.len()
+            ));
         }
-        let at = standardised(inputs, &self.centre, &self.scale);
-        let near = self.inputs.iter().map(|row| kernel(row, &at, self.length));
-        let near = Array1::from_iter(near);
-        let mean = self.mean + near.iter().zip(&self.weights).map(|(k, w)| k * w).sum::<f64>();
-        let mut matrix = self.covariance(self.length, self.noise / self.signal);
-        let mut solved = near.clone().insert_axis(Axis(1));
-        let explained = match matrix.solvec_inplace(&mut solved) {
-            Ok(solved) => near.dot(&solved.column(0)),
-            Err(_) => 0.0,
-        };
-        let variance = self.signal * (1.0 - explained).max(0.0) + self.noise;
-        Ok(Normal { mean, deviation: variance.sqrt() })
+        let width = centre.len();
+        if width == 0 || scale.len() != width || inputs.iter().any(|row| row.len() != width) {
+            return Err(format!(
+                "a Gaussian process whose rows, means and scales are not all {width} numbers"
+            ));
+        }
+        let numbers_of =
+            || centre.iter().chain(inputs.iter().flatten()).chain(weights).chain([mean]);
+        let positive = || scale.iter().chain([length, signal]);
+        if !numbers_of().all(|v| v.is_finite())
+            || !positive().all(|v| v.is_finite() && *v > 0.0)
+            || !(noise.is_finite() && *noise >= 0.0)
+        {
+            return Err(
+                "a Gaussian process with numbers that are not finite, or scales, a length or a signal that are \
+                 not above 0"
+                    .into(),
+            );
+        }
+        let factor = numbers
+            .covariance(*length, noise / signal)
+            .cholesky_into()
+            .map_err(|e| format!("a Gaussian process whose covariance cannot be factored: {e}"))?;
+        Ok(Self { numbers, factor })
     }
 }
 
@@ -166,6 +238,7 @@ fn kernel(a: &[f64], b: &[f64], length: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
 
     #[test]
     fn a_smooth_function_is_followed_and_doubted_far_away() {
@@ -180,7 +253,40 @@ mod tests {
             (process.predict(&[2.0, 7.0]).unwrap(), process.predict(&[30.0, 7.0]).unwrap());
         assert!(far.deviation > 20.0 * near.deviation, "{near:?} {far:?}");
         let text = serde_json::to_string(&process).unwrap();
-        assert_eq!(serde_json::from_str::<GaussianProcess>(&text).unwrap(), process);
+        let read: GaussianProcess = serde_json::from_str(&text).unwrap();
+        assert_eq!(read.numbers, process.numbers);
+        assert_eq!(read.predict(&[2.0, 7.0]).unwrap(), near);
+    }
+
+    #[test]
+    fn impossible_numbers_in_a_file_are_refused() {
+        let rows: Vec<Vec<f64>> = (0..4).map(|i| vec![f64::from(i)]).collect();
+        let process = GaussianProcess::fit(&rows, &[1.0, 2.0, 3.0, 5.0]).unwrap();
+        let sound = serde_json::to_value(&process).unwrap();
+        let many = vec![vec![0.5]; MAX_ROWS + 1];
+        let weights = vec![0.5; MAX_ROWS + 1];
+        for (changes, part) in [
+            (vec![("length", json!(0.0))], "not above 0"),
+            (vec![("signal", json!(0.0))], "not above 0"),
+            (vec![("signal", json!(-1.0))], "not above 0"),
+            (vec![("noise", json!(-1e-3))], "not above 0"),
+            (vec![("scale", json!([0.0]))], "not above 0"),
+            (vec![("scale", json!([]))], "not all 1 numbers"),
+            (vec![("inputs", json!([[1.0], [2.0], [3.0], [4.0, 5.0]]))], "not all 1 numbers"),
+            (vec![("weights", json!([1.0]))], "4 rows and 1 weights"),
+            (vec![("inputs", json!(many)), ("weights", json!(weights))], "2 to 4096"),
+            (
+                vec![("inputs", json!([[1.0], [1.0], [1.0], [1.0]])), ("noise", json!(0.0))],
+                "factored",
+            ),
+        ] {
+            let mut changed = sound.clone();
+            for (key, value) in changes {
+                changed[key] = value;
+            }
+            let error = serde_json::from_value::<GaussianProcess>(changed).unwrap_err().to_string();
+            assert!(error.contains(part), "{part}: {error}");
+        }
     }
 
     #[test]

@@ -45,6 +45,10 @@ impl Grid {
     }
 }
 
+/// Least share of an image's size that twice the principal point is, or the other way around; real cameras:
+/// 0.98.
+const OFF_CENTRE: f64 = 0.8;
+
 /// How faithfully the published program is followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -130,10 +134,12 @@ pub struct View<'a> {
 ///
 /// # Errors
 /// [`VisionError::Request`] with the reason when there is no estimate: an empty mask, a circle
-/// outside an image (published variant), no circle on both masks.
+/// outside an image (published variant), no circle on both masks. [`VisionError::Conflict`] for masks of
+/// another size than the calibrated images.
 pub fn dimensions(views: [View<'_>; 2], variant: Variant) -> Result<Dimensions> {
     let mut centres = [[0.0; 2]; 2];
     for (i, view) in views.iter().enumerate() {
+        check_size(view, i + 1)?;
         let border = contour::largest(view.mask)
             .ok_or_else(|| VisionError::Request(format!("the mask of view {} is empty", i + 1)))?;
         centres[i] = border.centroid().ok_or_else(|| {
@@ -170,6 +176,24 @@ pub fn band(views: [View<'_>; 2], variant: Variant) -> Band {
         dimensions(changed, variant).ok().map(|d| d.capacity)
     };
     Band { low: capacity(Mask::eroded), high: capacity(Mask::dilated) }
+}
+
+/// A lens points near the middle of its image: a mask whose middle is far from the principal point is of
+/// another size, and everything measured on it would be as wrong as its scale.
+fn check_size(view: &View<'_>, number: usize) -> Result<()> {
+    let Mask { width, height, .. } = *view.mask;
+    let calibrated = [0, 1].map(|axis| view.camera.intrinsic[axis][2] * 2.0);
+    let fits = |size: usize, expected: f64| {
+        (size as f64 * OFF_CENTRE..=size as f64 / OFF_CENTRE).contains(&expected)
+    };
+    if fits(width, calibrated[0]) && fits(height, calibrated[1]) {
+        return Ok(());
+    }
+    Err(VisionError::Conflict(format!(
+        "the mask of view {number} has {width} by {height} px, but its calibration is of images of about \
+         {:.0} by {:.0} px; give the mask at the size of the calibrated image",
+        calibrated[0], calibrated[1]
+    )))
 }
 
 /// The point in m seen at two pixels: least squares on the homogeneous equations of both cameras.
@@ -301,7 +325,7 @@ mod tests {
         let (ts, tc) = 20f64.to_radians().sin_cos();
         let rotation = [[-s, c, 0.0], [c * ts, s * ts, -tc], [-c * tc, -s * tc, -ts]];
         let k = [[900.0, 0.0, 320.0], [0.0, 900.0, 240.0], [0.0, 0.0, 1.0]];
-        Camera::new(k, rotation, [0.0, 0.05, 1.0])
+        Camera::new(k, rotation, [0.0, 0.12, 1.0])
     }
 
     /// The mask of an upright cylinder of 60 mm width and 120 mm height at the origin.
@@ -335,11 +359,30 @@ mod tests {
         let published = dimensions(views, Variant::Published).unwrap();
         assert_eq!(published.width, d.width);
         // Without the rows below the object, circles reach beyond the image.
-        let cut = masks.map(|m| Mask { width: 640, height: 340, data: m.data[..340 * 640].into() });
+        let cut = masks.map(|m| Mask { width: 640, height: 400, data: m.data[..400 * 640].into() });
         let views = [0, 1].map(|i| View { mask: &cut[i], camera: &cameras[i] });
         let error = dimensions(views, Variant::Published).unwrap_err().to_string();
         assert!(error.contains("beyond an image"), "{error}");
         assert_eq!(dimensions(views, Variant::Corrected).unwrap().capacity, d.capacity);
+    }
+
+    #[test]
+    fn masks_of_another_size_are_refused() {
+        let cameras = [camera(0.3), camera(0.3 + PI / 2.0)];
+        let halved = [0, 1].map(|i| {
+            let full = cylinder(&cameras[i]);
+            let data =
+                (0..240 * 320).map(|at| full.data[at / 320 * 2 * 640 + at % 320 * 2]).collect();
+            Mask { width: 320, height: 240, data }
+        });
+        let views = [0, 1].map(|i| View { mask: &halved[i], camera: &cameras[i] });
+        for variant in [Variant::Published, Variant::Corrected] {
+            let error = dimensions(views, variant).unwrap_err();
+            assert!(matches!(error, VisionError::Conflict(_)), "{error}");
+            let message = error.to_string();
+            assert!(message.contains("view 1 has 320 by 240 px"), "{message}");
+            assert!(message.contains("about 640 by 480 px"), "{message}");
+        }
     }
 
     #[test]

@@ -9,15 +9,20 @@ pub(crate) fn times(m: &Matrix3, v: [f64; 3]) -> [f64; 3] {
     m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
+fn cofactor(m: &Matrix3, r: usize, c: usize) -> f64 {
+    let (r1, r2, c1, c2) = ((r + 1) % 3, (r + 2) % 3, (c + 1) % 3, (c + 2) % 3);
+    m[r1][c1] * m[r2][c2] - m[r1][c2] * m[r2][c1]
+}
+
+pub(crate) fn determinant(m: &Matrix3) -> f64 {
+    (0..3).map(|c| m[0][c] * cofactor(m, 0, c)).sum()
+}
+
 /// Inverse by cofactors; `None` for a singular matrix.
 pub(crate) fn inverse(m: &Matrix3) -> Option<Matrix3> {
-    let minor = |r: usize, c: usize| {
-        let (r1, r2, c1, c2) = ((r + 1) % 3, (r + 2) % 3, (c + 1) % 3, (c + 2) % 3);
-        m[r1][c1] * m[r2][c2] - m[r1][c2] * m[r2][c1]
-    };
-    let determinant: f64 = (0..3).map(|c| m[0][c] * minor(0, c)).sum();
+    let determinant = determinant(m);
     let inverse: Matrix3 =
-        std::array::from_fn(|r| std::array::from_fn(|c| minor(c, r) / determinant));
+        std::array::from_fn(|r| std::array::from_fn(|c| cofactor(m, c, r) / determinant));
     inverse.iter().flatten().all(|v| v.is_finite()).then_some(inverse)
 }
 

@@ -6,9 +6,10 @@ use corsmal_vision::category::{self, Category, Vote};
 use corsmal_vision::cloud::{self, DepthView};
 use corsmal_vision::cuboid::{self, Outliers};
 use corsmal_vision::lode::{self, Variant, View};
+use corsmal_vision::region::{self, Region};
 use corsmal_vision::{Camera, Depth, Detection, Mask};
 
-use super::views::{IMAGE_SIZE, Problem, Views};
+use super::views::{IMAGE_SIZE, Kind, Problem, Views};
 
 /// Labels that M5 takes for a container.
 const M5_LABELS: [&str; 5] = ["bottle", "wine glass", "cup", "book", "vase"];
@@ -76,12 +77,12 @@ pub(super) fn m5(
     variant: Variant,
 ) -> Result<Estimate, Problem> {
     let (found, mut problems) = lode_frames(views, detections, variant)?;
+    // Damage is a failure; a container that is not seen gets the prior, as published.
+    if let Some(damaged) = problems.iter().find(|p| matches!(p, Problem::Damaged(_))) {
+        return Err(damaged.clone());
+    }
     let capacity = |i: usize| found.get(i).map(|f: &Lode| f.dimensions.capacity);
     let Some(combined) = lode::combine(capacity(0), capacity(1)) else {
-        // Damage is a failure; a container that is not seen gets the prior, as published.
-        if let Some(damaged) = problems.iter().find(|p| matches!(p, Problem::Damaged(_))) {
-            return Err(damaged.clone());
-        }
         let reason = match problems.pop() {
             Some(Problem::Missing(reason)) => reason,
             _ => "no frame with both views".into(),
@@ -114,18 +115,15 @@ fn lode_frames(
     variant: Variant,
 ) -> Result<(Vec<Lode>, Vec<Problem>), Problem> {
     let cameras = [views.camera(1)?, views.camera(2)?];
-    let numbers = views.numbers(detections, &[1, 2])?;
-    let Some(&first) = numbers.first() else {
+    let Some((first, late)) = views.ends(detections, M5_FROM_END)? else {
         return Ok((vec![], vec![Problem::Missing("no frame with both side views".into())]));
     };
-    let late = numbers.len().checked_sub(M5_FROM_END).unwrap_or(numbers.len() - 1);
     let mut wanted = vec![first];
-    wanted.extend(Some(numbers[late]).filter(|n| *n != first));
+    wanted.extend(Some(late).filter(|n| *n != first));
     let (mut found, mut problems) = (Vec::new(), Vec::new());
     for frame in wanted {
         let estimate = || -> Result<Lode, Problem> {
-            let mask =
-                |view| views.mask(detections, (view, frame), &M5_LABELS, M5_SCORE, IMAGE_SIZE);
+            let mask = |view| views.mask(detections, (view, frame), &M5_LABELS, M5_SCORE);
             let masks = [mask(1)?, mask(2)?];
             let pair = [0, 1].map(|i| View { mask: &masks[i], camera: &cameras[i] });
             let dimensions = lode::dimensions(pair, variant)?;
@@ -160,13 +158,11 @@ pub(super) fn m4(
     seed: u64,
 ) -> Result<Estimate, Problem> {
     let camera = views.camera(1)?;
-    let depths = views.frames("depth", 1)?;
-    let first =
-        depths.first().ok_or_else(|| Problem::Missing("no depth image of view 1".into()))?;
-    let first = Depth::read(&first.path)?;
+    if views.frames(Kind::Depth, 1)?.is_empty() {
+        return Err(Problem::Missing("no depth image of view 1".into()));
+    }
     let of_view: Vec<Detection> = detections.iter().filter(|d| d.view == 1).cloned().collect();
-    let size = (first.width, first.height);
-    let choice = cuboid::choose(&of_view, first.width as f64, size)?.ok_or_else(|| {
+    let choice = cuboid::choose(&of_view, IMAGE_SIZE.0 as f64, IMAGE_SIZE)?.ok_or_else(|| {
         Problem::Missing(format!(
             "view 1 has no frame (every {}th) with a person in the middle third and a container",
             cuboid::FRAME_STEP
@@ -175,6 +171,40 @@ pub(super) fn m4(
     let depth = views.depth(1, choice.frame)?;
     let found = cuboid::cuboid(&depth, &choice.mask, &camera, outliers, seed)?;
     Ok(Estimate { capacity: found.capacity, frames: 1, ..Estimate::default() })
+}
+
+/// M2's network, published weights and all.
+pub trait RegionNetwork: std::fmt::Debug + Send + Sync {
+    /// Capacity in mL of the container in a region of interest.
+    ///
+    /// # Errors
+    /// A text when the network cannot be run.
+    fn capacity_ml(&self, region: &Region) -> Result<f64, String>;
+}
+
+/// M2: its network on the region of interest of the last depth image of view 3 that has one.
+pub(super) fn m2(
+    views: &Views,
+    network: &dyn RegionNetwork,
+    variant: Variant,
+) -> Result<Estimate, Problem> {
+    let frames = views.frames(Kind::Depth, 3)?;
+    // The published program never looks at the first image of a short video.
+    let first = match (variant, frames.len()) {
+        (Variant::Published, 1..region::FRAMES) => 1,
+        (_, count) => count.saturating_sub(region::FRAMES),
+    };
+    for frame in frames[first..].iter().rev() {
+        if let Some(region) = region::region(&views.depth(3, frame.number)?) {
+            let capacity = network.capacity_ml(&region).map_err(Problem::Damaged)?;
+            return Ok(Estimate { capacity, frames: 1, ..Estimate::default() });
+        }
+    }
+    let looked = frames.len() - first;
+    Err(Problem::Missing(match looked {
+        0 => "no depth image of view 3".into(),
+        n => format!("nothing near and large enough in the last {n} depth images of view 3"),
+    }))
 }
 
 /// Inputs of M3's Gaussian processes: the logarithms of width and height in the four views.
@@ -244,25 +274,19 @@ pub(super) fn geometry(
 fn upright(views: &Views, detections: &[Detection]) -> Result<(f64, usize), Problem> {
     const FRAMES: usize = 2;
     let mut logs = Vec::new();
-    for frame in views.numbers(detections, &[1])? {
-        let mut parts: Vec<(Depth, Mask, Camera)> = Vec::new();
-        for view in [1, 2] {
-            let part = || -> Result<_, Problem> {
-                let depth = views.depth(view, frame)?;
-                let size = (depth.width, depth.height);
-                let mask = views.mask(detections, (view, frame), &LABELS, 0.0, size)?;
-                Ok((depth, mask, views.camera(view)?))
-            };
-            match part() {
-                Ok(part) => parts.push(part),
-                Err(Problem::Missing(_)) => {}
-                Err(damaged) => return Err(damaged),
-            }
-        }
-        // One side alone says little about depth.
-        if parts.len() < 2 {
-            continue;
-        }
+    for frame in views.seen(detections, &[1, 2])? {
+        // One side alone says little about depth. A mask is found at once, a depth image takes 60 ms.
+        let parts = || -> Result<Vec<(Depth, Mask, Camera)>, Problem> {
+            let mask = |view| views.mask(detections, (view, frame), &LABELS, 0.0);
+            let masks = [(1, mask(1)?), (2, mask(2)?)];
+            let part = |(view, mask)| Ok((views.depth(view, frame)?, mask, views.camera(view)?));
+            masks.into_iter().map(part).collect()
+        };
+        let parts = match parts() {
+            Ok(parts) => parts,
+            Err(Problem::Missing(_)) => continue,
+            Err(damaged) => return Err(damaged),
+        };
         let of: Vec<DepthView<'_>> =
             parts.iter().map(|(depth, mask, camera)| DepthView { depth, mask, camera }).collect();
         logs.push(cloud::upright_box(&of)?.volume.max(1.0).ln());

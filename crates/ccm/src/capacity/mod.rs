@@ -1,4 +1,4 @@
-//! Capacity of the containers from the data set's views: M3, M4, M5 and a fused estimate.
+//! Capacity of the containers from the data set's views: M2, M3, M4, M5 and a fused estimate.
 //!
 //! `docs/vision.md` says what is published, what is corrected and what is our reading.
 
@@ -9,6 +9,7 @@ mod table;
 mod views;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
@@ -21,15 +22,17 @@ use crate::error::{CcmError, Result};
 use crate::submission::RowKey;
 
 pub use combine::combine_files;
-pub use methods::{Estimate, Sizes};
+pub use methods::{Estimate, RegionNetwork, Sizes};
 use model::Sample;
 pub use model::{CapacityModel, HeldOut};
 pub use table::{Measured, PRIOR_MASS_G, Row, read, write};
-pub use views::{Frame, Problem, Views};
+pub use views::{Frame, Kind, Problem, Views};
 
 /// A method of the paper, or the fused estimate beyond it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
+    /// A network on a region of interest in the depth of the robot's view.
+    M2,
     /// Gaussian processes on the sizes of detected regions.
     M3,
     /// Cuboid around the points of one depth image.
@@ -44,6 +47,7 @@ impl Method {
     /// Name in files and on the command line.
     pub fn name(self) -> &'static str {
         match self {
+            Self::M2 => "m2",
             Self::M3 => "m3",
             Self::M4 => "m4",
             Self::M5 => "m5",
@@ -61,12 +65,14 @@ pub struct CapacityOptions {
     pub detections: Option<PathBuf>,
     /// The method.
     pub method: Method,
-    /// How faithfully LoDE is followed.
+    /// How faithfully M2's search and LoDE are followed.
     pub variant: Variant,
     /// How M4's outliers are dropped.
     pub outliers: Outliers,
     /// What M3 and the fused estimate have learned.
     pub model: Option<CapacityModel>,
+    /// M2's network.
+    pub network: Option<Arc<dyn RegionNetwork>>,
     /// Recordings at a time.
     pub jobs: usize,
     /// Seed of votes and forests.
@@ -90,11 +96,14 @@ pub fn run(
             options.method.name()
         )));
     }
+    if options.method == Method::M2 && options.network.is_none() {
+        return Err(CcmError::Request("method m2 needs the weights of its network".into()));
+    }
     let set = DataSet::open(&options.data)?;
     each(&set.recordings, options.jobs, progress, interrupted, |recording| {
         let started = Instant::now();
         let views = Views::of(recording, options.detections.as_deref());
-        let estimate = estimate(&views, options);
+        let estimate = estimate(&views, options).and_then(sound);
         Row {
             key: key(recording),
             estimate,
@@ -129,10 +138,27 @@ fn each<T: Send>(
     })
 }
 
+/// An estimate that can be a capacity; -1 stands for none in tables.
+fn sound(estimate: Estimate) -> std::result::Result<Estimate, Problem> {
+    let Estimate { capacity, .. } = estimate;
+    if capacity.is_finite() && capacity > 0.0 {
+        return Ok(estimate);
+    }
+    Err(Problem::Missing(format!("an estimate of {capacity} mL, which no container holds")))
+}
+
 fn estimate(views: &Views, options: &CapacityOptions) -> std::result::Result<Estimate, Problem> {
-    let detections = methods::table(views)?;
     let without_model = || Problem::Missing("no model".into());
+    // M2 needs no detections: a damaged table is none of its business.
+    let detections = match options.method {
+        Method::M2 => Vec::new(),
+        _ => methods::table(views)?,
+    };
     match options.method {
+        Method::M2 => {
+            let network = options.network.as_deref().ok_or_else(without_model)?;
+            methods::m2(views, network, options.variant)
+        }
         Method::M5 => methods::m5(views, &detections, options.variant),
         Method::M4 => methods::m4(views, &detections, options.outliers, options.seed),
         Method::M3 => {
@@ -163,8 +189,20 @@ fn estimate(views: &Views, options: &CapacityOptions) -> std::result::Result<Est
     }
 }
 
-/// Learns from the training recordings of a data set. For the fused estimate, also the scores of all
-/// methods on containers that nothing was learned from.
+/// What was learned, and from what.
+#[derive(Debug)]
+pub struct Learned {
+    /// The model.
+    pub model: CapacityModel,
+    /// Scores of all methods on containers that nothing was learned from, for the fused estimate.
+    pub held_out: Option<HeldOut>,
+    /// Training recordings of the data set.
+    pub recordings: usize,
+    /// Those with damaged files, which were left out, and the fault.
+    pub failed: Vec<(RowKey, String)>,
+}
+
+/// Learns from the training recordings of a data set. One with damaged files is left out and named.
 ///
 /// # Errors
 /// [`CcmError`] when the data set cannot be opened, nothing can be learned, or the work is stopped.
@@ -172,42 +210,68 @@ pub fn train(
     options: &CapacityOptions,
     progress: &(dyn Fn(usize, usize) + Sync),
     interrupted: &AtomicBool,
-) -> Result<(CapacityModel, Option<HeldOut>)> {
+) -> Result<Learned> {
     let fused = options.method == Method::Fused;
     let set = DataSet::open(&options.data)?;
     let recordings: Vec<Recording> =
         set.recordings.iter().filter(|r| r.part == Subset::Training).cloned().collect();
-    let samples = each(&recordings, options.jobs, progress, interrupted, |recording| {
-        let container = recording.container?;
-        let annotated = set.annotation(recording).map(|a| a.capacity_ml).filter(|c| *c > 0.0);
-        let capacity = annotated.or(container.capacity_ml())?;
-        let views = Views::of(recording, options.detections.as_deref());
-        let detections = methods::table(&views).ok()?;
-        let geometry = || methods::geometry(&views, &detections, options.seed).unwrap_or_default();
-        let estimates = if fused { geometry().estimates } else { Default::default() };
-        Some(Sample {
-            container: container.number(),
-            category: methods::category_of(container.category()),
-            capacity,
-            vote: methods::vote(&detections, options.seed).ok(),
-            estimates,
-        })
+    let results = each(&recordings, options.jobs, progress, interrupted, |recording| {
+        sample(&set, recording, options).transpose().map(|result| (key(recording), result))
     })?;
-    let samples: Vec<Sample> = samples.into_iter().flatten().collect();
+    let (mut samples, mut failed) = (Vec::new(), Vec::new());
+    for (key, result) in results.into_iter().flatten() {
+        match result {
+            Ok(sample) => samples.push(sample),
+            Err(Problem::Missing(reason) | Problem::Damaged(reason)) => failed.push((key, reason)),
+        }
+    }
     let mut containers: Vec<u8> = samples.iter().map(|s| s.container).collect();
     containers.sort_unstable();
     containers.dedup();
+    if let (true, Some((key, reason))) = (samples.is_empty(), failed.first()) {
+        return Err(CcmError::Request(format!(
+            "{} of {} training recordings have damaged files, and none is left; the first, {key}: {reason}",
+            failed.len(),
+            recordings.len()
+        )));
+    }
     let provenance = serde_json::json!({
         "method": options.method.name(),
         "data": options.data.display().to_string(),
         "synthetic": set.synthetic,
-        "recordings": samples.len(),
+        "recordings": recordings.len(),
+        "failed": failed.len(),
         "with_container": samples.iter().filter(|s| s.vote.is_some()).count(),
         "containers": containers,
         "seed": options.seed,
     });
     let model = CapacityModel::fit(&samples, fused, provenance)?;
-    Ok((model, fused.then(|| model::held_out(&samples))))
+    let held_out = fused.then(|| model::held_out(&samples));
+    Ok(Learned { model, held_out, recordings: recordings.len(), failed })
+}
+
+/// What a training recording teaches; `None` where its container or capacity is not known.
+fn sample(
+    set: &DataSet,
+    recording: &Recording,
+    options: &CapacityOptions,
+) -> std::result::Result<Option<Sample>, Problem> {
+    let annotated = set.annotation(recording).map(|a| a.capacity_ml).filter(|c| *c > 0.0);
+    let Some(container) = recording.container else { return Ok(None) };
+    let Some(capacity) = annotated.or(container.capacity_ml()) else { return Ok(None) };
+    let views = Views::of(recording, options.detections.as_deref());
+    let detections = methods::table(&views)?;
+    let estimates = match options.method {
+        Method::Fused => methods::geometry(&views, &detections, options.seed)?.estimates,
+        _ => Default::default(),
+    };
+    Ok(Some(Sample {
+        container: container.number(),
+        category: methods::category_of(container.category()),
+        capacity,
+        vote: methods::vote(&detections, options.seed).ok(),
+        estimates,
+    }))
 }
 
 /// How a recording is named in tables: by container and sequence where they are known.

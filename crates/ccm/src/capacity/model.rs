@@ -15,8 +15,10 @@ use crate::error::{CcmError, Result};
 
 /// Version of the file format.
 const FORMAT: u32 = 1;
-/// Largest file that is read.
-const MAX_BYTES: u64 = 256 << 20;
+/// Largest file that is read; three processes of their largest size take a quarter.
+const MAX_BYTES: u64 = 8 << 20;
+/// Sizes that a process takes: width and height in four views.
+const SIZES: usize = 8;
 /// Name of the file format.
 const KIND: &str = "corsmal-feat capacity model";
 
@@ -87,6 +89,27 @@ impl M3 {
             ));
         }
         Ok(model)
+    }
+
+    /// Checks what comes from a file; the processes have been.
+    fn check(&self) -> std::result::Result<(), String> {
+        if self.processes.is_empty() {
+            return Err("no process of any category".into());
+        }
+        for (category, process) in &self.processes {
+            let means = self.means.get(category).map_or(0, Vec::len);
+            if (process.inputs(), means) != (SIZES, SIZES) {
+                return Err(format!(
+                    "category {}: a process of {} sizes and {means} means; expected {SIZES} of each",
+                    category.name(),
+                    process.inputs()
+                ));
+            }
+        }
+        match self.means.values().flatten().find(|mean| !mean.is_finite()) {
+            Some(mean) => Err(format!("a mean size of {mean}; expected a logarithm of px")),
+            None => Ok(()),
+        }
     }
 
     /// The logarithm of the capacity in mL.
@@ -165,8 +188,9 @@ pub(super) fn held_out(samples: &[Sample]) -> HeldOut {
             {
                 estimates.insert("m3".into(), normal.mean.exp());
             }
+            // The prior is that of the voted category, too: what stands in one row knows equally much.
             let fused = vote.and_then(|vote| fusion.estimate(vote.category, &estimates));
-            if let Some(&[mean, _]) = fusion.priors.get(&sample.category) {
+            if let Some(&[mean, _]) = vote.and_then(|vote| fusion.priors.get(&vote.category)) {
                 estimates.insert("prior".into(), mean.exp());
             }
             if let Some(fused) = fused {
@@ -231,6 +255,12 @@ impl CapacityModel {
                 model.format
             )));
         }
+        let fusion = model.fusion.as_ref().map_or(Ok(()), Fusion::check);
+        model
+            .m3
+            .check()
+            .and(fusion)
+            .map_err(|reason| CcmError::Request(format!("{}: {reason}", path.display())))?;
         Ok(model)
     }
 

@@ -7,6 +7,7 @@
 //! `view1/masks/<id>/0000.png`, and `detections/<id>.csv` or `.json`. Calibrations may be `.json`.
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use corsmal_vision::{Calibration, Camera, Depth, Detection, Mask, VisionError, read_detections};
 
@@ -27,6 +28,30 @@ pub struct Views {
     /// Folder of tables of detections, where it is another one.
     detections: Option<PathBuf>,
     container: Option<u8>,
+    /// Frames by kind and view, once they have been asked for.
+    frames: [[OnceLock<Result<Vec<Frame>, Problem>>; 4]; 3],
+}
+
+/// Kinds of images of a view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Depth in mm.
+    Depth,
+    /// Colour.
+    Rgb,
+    /// Which pixels show the container.
+    Masks,
+}
+
+impl Kind {
+    /// Name of its folder.
+    fn folder(self) -> &'static str {
+        match self {
+            Self::Depth => "depth",
+            Self::Rgb => "rgb",
+            Self::Masks => "masks",
+        }
+    }
 }
 
 /// A frame of a view.
@@ -51,6 +76,7 @@ impl From<VisionError> for Problem {
     fn from(error: VisionError) -> Self {
         match error {
             VisionError::Request(reason) => Self::Missing(reason),
+            // Inputs that contradict each other, and files that cannot be read.
             other => Self::Damaged(other.to_string()),
         }
     }
@@ -70,6 +96,7 @@ impl Views {
             stem,
             detections: detections.map(Into::into),
             container: recording.container.map(|c| c.number()),
+            frames: Default::default(),
         }
     }
 
@@ -93,11 +120,29 @@ impl Views {
         Ok(Calibration::load(&path)?.rgb)
     }
 
-    /// The frames of a view of one kind: `depth`, `rgb` or `masks`; none where there is no folder.
+    /// The frames of a view of one kind, in their order; none where there is no folder.
     ///
     /// # Errors
-    /// The folder cannot be read.
-    pub fn frames(&self, kind: &str, view: u8) -> Result<Vec<Frame>, Problem> {
+    /// The folder cannot be read, or `view` is not 1 to 4.
+    pub fn frames(&self, kind: Kind, view: u8) -> Result<&[Frame], Problem> {
+        let of_kind = &self.frames[kind as usize];
+        let list = of_kind
+            .get(usize::from(view.wrapping_sub(1)))
+            .ok_or_else(|| Problem::Missing(format!("no view {view}; views are 1 to 4")))?;
+        match list.get_or_init(|| self.list(kind.folder(), view)) {
+            Ok(frames) => Ok(frames),
+            Err(problem) => Err(problem.clone()),
+        }
+    }
+
+    /// The image of a kind that shows a frame of a view.
+    fn image(&self, kind: Kind, view: u8, frame: u32) -> Result<Option<&Path>, Problem> {
+        let frames = self.frames(kind, view)?;
+        let at = frames.partition_point(|f| f.number < frame);
+        Ok(frames.get(at).filter(|f| f.number == frame).map(|f| f.path.as_path()))
+    }
+
+    fn list(&self, kind: &str, view: u8) -> Result<Vec<Frame>, Problem> {
         let Self { base, stem, .. } = self;
         let folders = [
             base.join(format!("{kind}/{stem}/c{view}")),
@@ -148,30 +193,32 @@ impl Views {
     /// A depth image of a view.
     ///
     /// # Errors
-    /// It is not there, or damaged.
+    /// It is not there, damaged, or of another size than the calibrated images.
     pub fn depth(&self, view: u8, frame: u32) -> Result<Depth, Problem> {
-        let frames = self.frames("depth", view)?;
-        let found = frames.iter().find(|f| f.number == frame).ok_or_else(|| {
+        let path = self.image(Kind::Depth, view, frame)?.ok_or_else(|| {
             Problem::Missing(format!("no depth image of view {view}, frame {frame}"))
         })?;
-        Ok(Depth::read(&found.path)?)
+        let depth = Depth::read(path)?;
+        check_size((depth.width, depth.height), || path.display().to_string())?;
+        Ok(depth)
     }
 
     /// The object's pixels in a frame: a mask's file, or else the most confident detection among
-    /// `labels` with at least `score`. `size` is that of the image, for polygons.
+    /// `labels` with at least `score`.
     ///
     /// # Errors
-    /// There is neither, or it is damaged.
+    /// There is neither, it is damaged, or of another size than the calibrated images.
     pub fn mask(
         &self,
         detections: &[Detection],
         (view, frame): (u8, u32),
         labels: &[&str],
         score: f64,
-        size: (usize, usize),
     ) -> Result<Mask, Problem> {
-        if let Some(file) = self.frames("masks", view)?.into_iter().find(|f| f.number == frame) {
-            return Ok(Mask::read(&file.path)?);
+        if let Some(path) = self.image(Kind::Masks, view, frame)? {
+            let mask = Mask::read(path)?;
+            check_size((mask.width, mask.height), || path.display().to_string())?;
+            return Ok(mask);
         }
         let of_frame = detections
             .iter()
@@ -185,24 +232,54 @@ impl Views {
             }
         }
         let missing = || Problem::Missing(format!("no container in view {view}, frame {frame}"));
-        best.ok_or_else(missing)?.mask(Some(size))?.ok_or_else(|| {
+        let mask = best.ok_or_else(missing)?.mask(Some(IMAGE_SIZE))?.ok_or_else(|| {
             Problem::Missing(format!("view {view}, frame {frame}: the detection has no mask"))
-        })
+        })?;
+        check_size((mask.width, mask.height), || {
+            format!("the detection in view {view}, frame {frame}")
+        })?;
+        Ok(mask)
+    }
+
+    /// Numbers of the first frame of the side views' video and of the one `from_end` from its end, the last
+    /// where there are fewer; `None` where nothing says how long it is.
+    ///
+    /// The video's frames are the images that both views have: colour, depth, or else masks. A table of
+    /// detections has no row for a frame in which nothing was found: it counts from 0 to its last frame.
+    ///
+    /// # Errors
+    /// A folder cannot be read.
+    pub fn ends(
+        &self,
+        detections: &[Detection],
+        from_end: usize,
+    ) -> Result<Option<(u32, u32)>, Problem> {
+        for kind in [Kind::Rgb, Kind::Depth, Kind::Masks] {
+            let other = self.frames(kind, 2)?;
+            let shared = |f: &&Frame| other.binary_search_by_key(&f.number, |o| o.number).is_ok();
+            let numbers: Vec<u32> =
+                self.frames(kind, 1)?.iter().filter(shared).map(|f| f.number).collect();
+            if let (Some(first), Some(last)) = (numbers.first(), numbers.last()) {
+                let late = numbers.len().checked_sub(from_end).and_then(|at| numbers.get(at));
+                return Ok(Some((*first, *late.unwrap_or(last))));
+            }
+        }
+        let last = detections.iter().map(|d| d.frame).max();
+        Ok(last.map(|last| (0, (last + 1).checked_sub(from_end as u32).unwrap_or(last))))
     }
 
     /// Numbers of the frames in which every one of `views` has a mask or a detection.
     ///
     /// # Errors
     /// A folder cannot be read.
-    pub fn numbers(&self, detections: &[Detection], views: &[u8]) -> Result<Vec<u32>, Problem> {
+    pub fn seen(&self, detections: &[Detection], views: &[u8]) -> Result<Vec<u32>, Problem> {
         let mut common: Option<Vec<u32>> = None;
         for &view in views {
             let mut numbers: Vec<u32> = detections
                 .iter()
                 .filter(|d| d.view == view)
                 .map(|d| d.frame)
-                .chain(self.frames("masks", view)?.into_iter().map(|f| f.number))
-                .chain(self.frames("rgb", view)?.into_iter().map(|f| f.number))
+                .chain(self.frames(Kind::Masks, view)?.iter().map(|f| f.number))
                 .collect();
             numbers.sort_unstable();
             numbers.dedup();
@@ -216,4 +293,20 @@ impl Views {
         }
         Ok(common.unwrap_or_default())
     }
+}
+
+/// Masks and depth images must be as large as what the calibration belongs to: measures on others are as wrong
+/// as their scale.
+fn check_size(size: (usize, usize), what: impl Fn() -> String) -> Result<(), Problem> {
+    if size == IMAGE_SIZE {
+        return Ok(());
+    }
+    Err(Problem::Damaged(format!(
+        "{}: {} by {} px; the data set's images, which the calibrations belong to, have {} by {} px",
+        what(),
+        size.0,
+        size.1,
+        IMAGE_SIZE.0,
+        IMAGE_SIZE.1
+    )))
 }

@@ -3,6 +3,7 @@
 // Helper functions of tests may unwrap as tests do.
 #![allow(clippy::unwrap_used)]
 
+mod capacity;
 mod ccm_commands;
 mod command;
 mod compare;

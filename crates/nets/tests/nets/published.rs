@@ -2,6 +2,7 @@
 
 use corsmal_files::npz::NpzFile;
 use corsmal_nets::batch::{Batch, Shape};
+use corsmal_nets::capacity::CapacityNetwork;
 use corsmal_nets::layers::softmax;
 use corsmal_nets::{networks, weights};
 
@@ -31,18 +32,22 @@ fn m2_finds_nothing_in_the_empty_container() {
 fn m2_estimates_the_published_capacities() {
     let Some(published) = shared("data/ccm/weights/m2_capacity_cnn.npz") else { return };
     let Some(reference) = shared("data/ccm/m2_capacity_reference.npz") else { return };
-    let mut network = networks::named("m2_capacity").unwrap().build(None, 0).unwrap();
-    network.load_state(&weights::read(&published).unwrap()).unwrap();
+    let network = CapacityNetwork::read(&published).unwrap();
     let mut reference = NpzFile::open(&reference).unwrap();
     let mut array = |name| {
         let array = reference.f32(name).unwrap();
         (array.shape().to_vec(), array.iter().copied().collect::<Vec<f32>>())
     };
-    let inputs = network.batches(&[array("x"), array("box")]).unwrap();
-    let got = network.forward(&inputs).unwrap();
-    for (got, want) in got.values.values().iter().zip(array("y").1) {
-        assert!((got - want).abs() < 1e-5, "{got} {want}");
+    let (depths, sizes, expected) = (array("x").1, array("box").1, array("millilitres").1);
+    assert_eq!(expected.len(), 3);
+    for (i, want) in expected.into_iter().enumerate() {
+        let depth = &depths[i * 112 * 112..][..112 * 112];
+        let got = network.millilitres(depth, [sizes[2 * i], sizes[2 * i + 1]]).unwrap();
+        assert!((got - f64::from(want)).abs() < 0.05, "{got} {want}");
     }
+    let other = shared("data/ccm/weights/m2_filling_type_cnn.npz").unwrap();
+    let error = CapacityNetwork::read(&other).unwrap_err().to_string();
+    assert!(error.contains("not the weights of M2's capacity network"), "{error}");
 }
 
 /// The features are stored in half precision: that alone changes probabilities by 1.5e-4.

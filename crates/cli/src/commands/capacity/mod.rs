@@ -1,6 +1,7 @@
 //! `corsmal-feat capacity`: capacities of containers from the views of a data set.
 
 mod combine;
+mod network;
 mod source;
 mod train;
 
@@ -24,6 +25,7 @@ use source::{Source, VariantName};
     after_help = "\
 Examples:
   corsmal-feat capacity --method m5 --data ~/CCM --out capacity.csv
+  corsmal-feat capacity --method m2 --weights task3.pth --data ~/CCM --out capacity.csv
   corsmal-feat capacity train --method fused --data ~/CCM --out fused.capacity
   corsmal-feat capacity --method fused --model fused.capacity --data ~/CCM --out capacity.csv
   corsmal-feat fuse --joint joint.csv --capacity capacity.csv --out submission.csv
@@ -49,8 +51,10 @@ enum Sub {
     Combine(combine::Args),
 }
 
-/// Arguments of an estimate.
+/// Arguments of an estimate. clap leaves the group of a struct empty that flattens another, so that it would
+/// never be seen as given: its members are named.
 #[derive(clap::Args)]
+#[group(args = ["method", "data", "out"], requires_all = ["method", "data", "out"])]
 struct Estimate {
     /// The method.
     #[arg(long, value_enum)]
@@ -66,6 +70,9 @@ struct Estimate {
     /// What `capacity train` learned, for m3 and fused.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
+    /// Published weights of its network, for m2: .pth, .npz or .safetensors under PyTorch's names.
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
     /// Table to write.
     #[arg(long, value_name = "CSV")]
     out: PathBuf,
@@ -79,6 +86,8 @@ struct Estimate {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum MethodName {
+    /// A network on the nearest large thing in the third view's depth; needs --weights.
+    M2,
     /// Gaussian processes on the sizes of detected regions in four views.
     M3,
     /// Cuboid around the points of the first view's depth image.
@@ -102,6 +111,7 @@ enum OutliersName {
 impl MethodName {
     fn method(self) -> Method {
         match self {
+            Self::M2 => Method::M2,
             Self::M3 => Method::M3,
             Self::M4 => Method::M4,
             Self::M5 => Method::M5,
@@ -132,6 +142,9 @@ fn estimate(args: Estimate) -> Result<ExitCode, Failure> {
         };
     }
     options.model = args.model.as_deref().map(CapacityModel::read).transpose()?;
+    if method == Method::M2 {
+        options.network = Some(network::read(args.weights.as_deref())?);
+    }
     let rows = match capacity::run(&options, &|_, _| {}, crate::interrupt::flag()) {
         Err(error @ CcmError::Interrupted) => {
             eprintln!("{error}");

@@ -44,6 +44,7 @@ impl Source {
             variant: if published { Variant::Published } else { Variant::Corrected },
             outliers: if published { Outliers::Published } else { Outliers::Corrected },
             model: None,
+            network: None,
             jobs: self.jobs.count(),
             seed: self.seed,
         }

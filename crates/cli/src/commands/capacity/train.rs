@@ -8,11 +8,15 @@ use corsmal_ccm::CcmError;
 use corsmal_ccm::capacity::{self, HeldOut, Method};
 
 use super::source::{Source, VariantName};
-use crate::failure::{Failure, INTERRUPTED};
+use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
 use crate::publish;
 
 /// Arguments of `capacity train`.
 #[derive(clap::Args)]
+#[command(after_help = "\
+A recording with damaged files is left out and named.
+
+Exit codes: 0 all fine, 1 some recordings have damaged files, 2 could not run, 130 interrupted.")]
 pub struct Args {
     /// The method.
     #[arg(long, value_enum)]
@@ -47,23 +51,34 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         Learning::Fused => Method::Fused,
     };
     let options = args.source.options(method, VariantName::Corrected);
-    let (model, held_out) = match capacity::train(&options, &|_, _| {}, crate::interrupt::flag()) {
-        Err(error @ CcmError::Interrupted) => {
-            eprintln!("{error}");
-            return Ok(ExitCode::from(INTERRUPTED));
-        }
-        model => model?,
-    };
+    let capacity::Learned { model, held_out, recordings, failed } =
+        match capacity::train(&options, &|_, _| {}, crate::interrupt::flag()) {
+            Err(error @ CcmError::Interrupted) => {
+                eprintln!("{error}");
+                return Ok(ExitCode::from(INTERRUPTED));
+            }
+            model => model?,
+        };
     model.write(&args.out)?;
     if !args.quiet {
-        let (all, used) = (&model.provenance["recordings"], &model.provenance["with_container"]);
-        println!("{}: learned from {used} of {all} recordings", args.out.display());
+        let used = &model.provenance["with_container"];
+        println!("{}: learned from {used} of {recordings} recordings", args.out.display());
         if model.provenance["synthetic"] == true {
             println!("SYNTHETIC data: scores mean nothing about real recordings");
         }
         if let Some(held_out) = held_out {
             print_scores(&held_out);
         }
+    }
+    if !failed.is_empty() {
+        for (key, reason) in &failed {
+            eprintln!("{key}: {reason}");
+        }
+        eprintln!(
+            "{} of {recordings} recordings have damaged files and taught nothing",
+            failed.len()
+        );
+        return Ok(ExitCode::from(FAILED_FILES));
     }
     Ok(ExitCode::SUCCESS)
 }

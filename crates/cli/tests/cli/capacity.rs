@@ -1,0 +1,112 @@
+//! `capacity` as a user runs it, on synthetic views.
+
+use std::path::Path;
+
+use crate::command::{done, refused, run, text};
+
+/// Synthetic recordings with views, of which one a container stays.
+fn data(dir: &Path) -> String {
+    let data = dir.join("data");
+    done(&["synth", "--small", "--vision", "--quiet", "--out", text(&data)]);
+    for container in 1..=9 {
+        for entry in std::fs::read_dir(data.join(format!("train/{container}/audio"))).unwrap() {
+            let path = entry.unwrap().path();
+            if !path.file_name().unwrap().to_str().unwrap().starts_with("s0_fi1_fu1_") {
+                std::fs::remove_file(&path).unwrap();
+            }
+        }
+    }
+    text(&data).into()
+}
+
+/// Statuses and capacities of a table.
+fn rows(path: &Path) -> Vec<(String, f64)> {
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    let header = reader.headers().unwrap().clone();
+    let column = |name: &str| header.iter().position(|h| h == name).unwrap();
+    let (status, capacity) = (column("status"), column("capacity[mL]"));
+    let rows = reader.records().map(|row| {
+        let row = row.unwrap();
+        (row[status].to_string(), row[capacity].parse().unwrap())
+    });
+    rows.collect()
+}
+
+#[test]
+fn every_method_estimates_from_files() {
+    let dir = tempfile::tempdir().unwrap();
+    let data = data(dir.path());
+    let out = dir.path().join("capacity.csv");
+    let model = dir.path().join("fused.capacity");
+    let learned =
+        done(&["capacity", "train", "--method", "fused", "--data", &data, "--out", text(&model)]);
+    assert!(learned.contains("SYNTHETIC"), "{learned}");
+    for (method, model) in
+        [("m3", Some(text(&model))), ("m4", None), ("m5", None), ("fused", Some(text(&model)))]
+    {
+        let common =
+            ["capacity", "--method", method, "--data", &data, "--out", text(&out), "--overwrite"];
+        let mut arguments = common.to_vec();
+        if let Some(model) = model {
+            arguments.extend(["--model", model]);
+        }
+        let said = done(&arguments);
+        let found = rows(&out);
+        assert!(said.contains(&format!("{} recordings", found.len())), "{method}: {said}");
+        let measured = found.iter().filter(|(status, capacity)| status == "ok" && *capacity > 10.0);
+        assert!(measured.count() * 3 > found.len() * 2, "{method}: {found:?}");
+    }
+    #[cfg(feature = "nets")]
+    m2_runs_on_weights(dir.path(), &data);
+    // A table that is damaged: its recording is named, the others teach.
+    let broken = std::fs::read_dir(Path::new(&data).join("train/2/audio")).unwrap().next();
+    let broken = broken.unwrap().unwrap().file_name().into_string().unwrap();
+    let stem = broken.strip_suffix("_audio.wav").unwrap();
+    std::fs::write(Path::new(&data).join(format!("train/2/detections/{stem}.json")), "[{").unwrap();
+    let train = ["capacity", "train", "--method", "m3", "--data", &data, "--overwrite", "--out"];
+    let output = run(&[&train[..], &[text(&model)]].concat());
+    assert_eq!(output.status.code(), Some(1));
+    let named = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(named.contains(stem) && named.contains("1 of 9 recordings"), "{named}");
+    let needs = refused(&["capacity", "--method", "m3", "--data", &data, "--out", "new.csv"]);
+    assert!(needs.contains("capacity train --method m3"), "{needs}");
+}
+
+/// Weights that answer a quarter of 4000 mL whatever they see.
+#[cfg(feature = "nets")]
+fn m2_runs_on_weights(dir: &Path, data: &str) {
+    use corsmal_nets::{networks, weights};
+
+    let network = networks::named("m2_capacity").unwrap().build(None, 1).unwrap();
+    let state = network.parameters().iter().map(|(d, values)| {
+        let values = match d.name.as_str() {
+            "linear3.weight" => vec![0.0; values.len()],
+            "linear3.bias" => vec![0.25],
+            _ => values.to_vec(),
+        };
+        (d.name.clone(), d.shape.clone(), values)
+    });
+    let file = dir.join("m2.npz");
+    weights::write(&file, &state.collect()).unwrap();
+    let out = dir.join("m2.csv");
+    let arguments = ["capacity", "--method", "m2", "--data", data, "--out", text(&out)];
+    assert!(refused(&arguments).contains("needs --weights"));
+    done(&[&arguments[..], &["--weights", text(&file)]].concat());
+    let found = rows(&out);
+    assert_eq!(found, vec![("ok".to_string(), 1000.0); 9]);
+}
+
+#[test]
+fn what_an_estimate_needs_is_said() {
+    for (given, missing) in [
+        (vec![], "--method"),
+        (vec!["--method", "m5"], "--data"),
+        (vec!["--data", "d", "--out", "o.csv"], "--method"),
+        (vec!["--method", "m5", "--data", "d"], "--out"),
+    ] {
+        let output = run(&[&["capacity"], &given[..]].concat());
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains(missing), "{given:?}: {message}");
+    }
+}
