@@ -1,4 +1,4 @@
-"""Capacity of a container from calibrated views: masks, depth images; a network in `m2_capacity` alone.
+"""Capacity of a container from calibrated views: masks, depth images; M2 alone runs a network.
 
 Lengths are in mm and capacities in mL unless said otherwise. `docs/vision.md` says what is
 published, what is corrected and what is our reading.

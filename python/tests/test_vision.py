@@ -102,7 +102,7 @@ def test_refusals_say_what_is_possible(tmp_path: Path) -> None:
 def test_masks_of_another_size_are_refused(tmp_path: Path) -> None:
     files = [calibration(tmp_path / f"{i}.json", i * np.pi / 2) for i in range(2)]
     half = cylinder()[::2, ::2]
-    with pytest.raises(ParameterError, match="view 1 has 320 by 350 px.* about 640 by 640 px"):
+    with pytest.raises(ParameterError, match=r"view 1 has 320 by 350 px.* about 640 by 640 px"):
         vision.lode([half, half], files)
 
 
