@@ -212,7 +212,7 @@ mod tests {
         let p = PcenParams::default();
         assert!(refused(PcenParams { gain: -1.0, ..p }, 22_050.0, 512).contains("gain"));
         assert!(refused(PcenParams { eps: 0.0, ..p }, 22_050.0, 512).contains("eps"));
-        assert!(refused(PcenParams { b: Some(1.5), ..p }, 22_050.0, 512).contains("b = 1.5"));
+        assert!(refused(PcenParams { b: Some(1.5), ..p }, 22_050.0, 512).starts_with("b must be "));
         assert!(refused(PcenParams { max_size: 0, ..p }, 22_050.0, 512).contains("max_size"));
         assert!(refused(p, 0.0, 512).contains("sr"));
         assert!(refused(p, 22_050.0, 0).contains("hop_length"));
