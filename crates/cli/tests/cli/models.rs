@@ -219,7 +219,7 @@ fn what_cannot_be_learned_from_is_refused() {
     let open = ["cross-validate", "--features", text(&odd), "--target", "type"];
     let by_group = done(&[&open[..], &["--classifier", "knn"]].concat());
     assert!(by_group.contains("one group of group held out"), "groups are not split: {by_group}");
-    assert!(plain(&["--cv", "lists=0/1"]).contains("(--groups)"));
+    assert!(plain(&["--cv", "lists=0/1"]).contains("Name it with --groups"));
     assert!(plain(&["--x", "Z"]).contains("no member \"Z\""));
     assert!(plain(&["--ids", "type"]).contains("id \"rice\" occurs twice"));
     assert!(validate("mass", &[]).contains("is a decimal number"));

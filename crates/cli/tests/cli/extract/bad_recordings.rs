@@ -95,9 +95,11 @@ fn each_has_its_outcome() {
     assert_eq!(truncated.repairs, ["truncated", "partial_frame"]);
     let good = row(outcomes, "good");
     assert_eq!((good.sample_rate, good.channels), (Some(16_000), Some(2)));
-    // What sets the width of the table, a line for each, and a summary.
-    assert_eq!(run.stderr.lines().count(), 1 + 12 + 1, "{}", run.stderr);
-    assert!(run.stderr.lines().last().unwrap().contains("2 ok, 1 too_short, 1 truncated"));
+    // What sets the width of the table, a line for each, and two that sum up.
+    assert_eq!(run.stderr.lines().count(), 1 + 12 + 2, "{}", run.stderr);
+    let mut last = run.stderr.lines().rev();
+    assert!(last.next().unwrap().ends_with("2 repaired: 1 partial_frame, 2 truncated"));
+    assert!(last.next().unwrap().contains("2 ok, 1 too_short, 1 truncated"));
 }
 
 #[test]
