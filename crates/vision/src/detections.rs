@@ -288,7 +288,7 @@ fn detection(
     if !(0.0..=1.0).contains(&score) {
         return Err(format!("'{score}' is not a score from 0 to 1"));
     }
-    if let Some(side) = bounds.iter().find(|side| !(side.abs() <= 1e6)) {
+    if let Some(side) = bounds.iter().find(|side| side.is_nan() || side.abs() > 1e6) {
         return Err(format!("'{side}' is not an edge of a box in px"));
     }
     if bounds[0] > bounds[2] || bounds[1] > bounds[3] {

@@ -205,13 +205,15 @@ impl TryFrom<Numbers> for GaussianProcess {
                 "a Gaussian process whose rows, means and scales are not all {width} numbers"
             ));
         }
-        let numbers_of =
-            || centre.iter().chain(inputs.iter().flatten()).chain(weights).chain([mean]);
-        let positive = || scale.iter().chain([length, signal]);
-        if !numbers_of().all(|v| v.is_finite())
-            || !positive().all(|v| v.is_finite() && *v > 0.0)
-            || !(noise.is_finite() && *noise >= 0.0)
-        {
+        let are_possible = {
+            let mut any = centre.iter().chain(inputs.iter().flatten()).chain(weights).chain([mean]);
+            let mut positive = scale.iter().chain([length, signal]);
+            any.all(|v| v.is_finite())
+                && positive.all(|v| v.is_finite() && *v > 0.0)
+                && noise.is_finite()
+                && *noise >= 0.0
+        };
+        if !are_possible {
             return Err(
                 "a Gaussian process with numbers that are not finite, or scales, a length or a signal that are \
                  not above 0"
