@@ -29,8 +29,11 @@ pub struct Views {
     detections: Option<PathBuf>,
     container: Option<u8>,
     /// Frames by kind and view, once they have been asked for.
-    frames: [[OnceLock<Result<Vec<Frame>, Problem>>; 4]; 3],
+    frames: [[Listing; 4]; 3],
 }
+
+/// The frames of a kind and view, listed when they are first asked for.
+type Listing = OnceLock<Result<Vec<Frame>, Problem>>;
 
 /// Kinds of images of a view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
