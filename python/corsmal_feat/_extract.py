@@ -55,8 +55,8 @@ def extract(
     progress : True tells on the standard error stream how many recordings are done; a function is
         called with that number and the number of all
 
-    A bad recording raises no error: its row of `outcomes` says what is wrong. Ctrl-C stops the run, and
-    `resume=True` continues it.
+    A bad recording raises no error: its row of `outcomes` says what is wrong. Ctrl-C stops the run,
+    and `resume=True` continues it.
 
     Returns
     -------

@@ -135,7 +135,7 @@ impl Pipeline {
     /// Decision values of `[rows, features]`: see [`Classifier::decision_function`].
     ///
     /// # Errors
-    /// As [`Pipeline::predict`]; [`ModelError::Lacks`](crate::error::ModelError::Lacks) for a
+    /// As [`Pipeline::predict`]; [`ModelError::Lacks`] for a
     /// classifier without them.
     pub fn decision_function(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
         self.classifier.decision_function(self.through_steps(x)?.view())
@@ -144,7 +144,7 @@ impl Pipeline {
     /// The `k` nearest training rows, behind the steps: see [`Classifier::neighbours`].
     ///
     /// # Errors
-    /// As [`Pipeline::predict`]; [`ModelError::Lacks`](crate::error::ModelError::Lacks) for any but
+    /// As [`Pipeline::predict`]; [`ModelError::Lacks`] for any but
     /// `knn`.
     pub fn neighbours(&self, x: Option<ArrayView2<'_, f64>>, k: usize) -> Result<Neighbours> {
         let x = x.map(|x| self.through_steps(x)).transpose()?;

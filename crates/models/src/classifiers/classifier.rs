@@ -86,7 +86,7 @@ impl Classifier {
         all
     }
 
-    /// Decision values of `[rows, features]`, as [`Classify::decision_function`]; a class without
+    /// Decision values of `[rows, features]`, as [`Classify::decision_function`](super::Classify::decision_function); a class without
     /// rows in training is one below the lowest of the row.
     ///
     /// # Errors
@@ -121,12 +121,12 @@ impl Classifier {
         self.fitted.as_classify().neighbours(x, k)
     }
 
-    /// See [`Classify::feature_importances`].
+    /// See [`Classify::feature_importances`](super::Classify::feature_importances).
     pub fn feature_importances(&self) -> Option<&[f64]> {
         self.fitted.as_classify().feature_importances()
     }
 
-    /// See [`Classify::out_of_bag`]; classes without rows have zeros.
+    /// See [`Classify::out_of_bag`](super::Classify::out_of_bag); classes without rows have zeros.
     pub fn out_of_bag(&self) -> Option<Array2<f64>> {
         self.fitted.as_classify().out_of_bag().map(|known| self.all_columns(known.to_owned()))
     }
