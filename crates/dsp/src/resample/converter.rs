@@ -1,10 +1,16 @@
 //! Any of librosa's converters as a stream.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::sinc::{SincPlan, SincStream};
 use super::{ResType, ResamplePlan, ResampleStream};
 use crate::error::Result;
+
+/// Bits of both rates, and the kind.
+type Key = (u64, u64, ResType);
+
+/// Converters that [`Converter::shared`] keeps, of at most a few megabytes each.
+const KEPT: usize = 8;
 
 /// The filters from one rate to another of one [`ResType`].
 #[derive(Debug, Clone)]
@@ -27,6 +33,22 @@ impl Converter {
             ResType::KaiserBest => sinc(false),
             ResType::KaiserFast => sinc(true),
         }
+    }
+
+    /// [`new`](Self::new), or one of those that were asked for last: arrays come one by one, mostly
+    /// at the same rates.
+    pub(super) fn shared(orig_sr: f64, target_sr: f64, res_type: ResType) -> Result<Self> {
+        static RECENT: Mutex<Vec<(Key, Converter)>> = Mutex::new(Vec::new());
+        let key = (orig_sr.to_bits(), target_sr.to_bits(), res_type);
+        let recent = || RECENT.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, converter)) = recent().iter().find(|(known, _)| *known == key) {
+            return Ok(converter.clone());
+        }
+        let converter = Self::new(orig_sr, target_sr, res_type)?;
+        let mut recent = recent();
+        recent.truncate(KEPT - 1);
+        recent.insert(0, (key, converter.clone()));
+        Ok(converter)
     }
 
     /// A stream of `channels` interleaved channels.

@@ -105,7 +105,21 @@ pub(super) struct Fir {
 struct Residue {
     len: usize,
     /// Taps that meet frames `m + j * down` of the `len` frames under an output, for `m < down`.
-    phases: Vec<Vec<f32>>,
+    phases: Vec<Phase>,
+}
+
+#[derive(Debug, Clone)]
+struct Phase {
+    taps: Vec<f32>,
+    /// They read the same backwards.
+    symmetric: bool,
+}
+
+impl Phase {
+    fn new(taps: Vec<f32>) -> Self {
+        let symmetric = taps.iter().eq(taps.iter().rev());
+        Self { taps, symmetric }
+    }
 }
 
 impl Fir {
@@ -117,7 +131,7 @@ impl Fir {
                 let own: Vec<f32> =
                     taps.iter().skip(first).step_by(up).rev().map(|&t| t as f32).collect();
                 let phases = (0..down)
-                    .map(|m| own.iter().skip(m).step_by(down).copied().collect())
+                    .map(|m| Phase::new(own.iter().skip(m).step_by(down).copied().collect()))
                     .collect();
                 Residue { len: own.len(), phases }
             })
@@ -146,9 +160,10 @@ impl Fir {
                     .phases
                     .iter()
                     .enumerate()
-                    .map(|(m, taps)| {
+                    .map(|(m, Phase { taps, symmetric })| {
                         let at = skip + m;
-                        Plane { samples: &planes[at % self.down][at / self.down..], taps }
+                        let samples = &planes[at % self.down][at / self.down..];
+                        Plane { samples, taps, symmetric: *symmetric }
                     })
                     .collect();
                 if channels == 1 && self.up == 1 {

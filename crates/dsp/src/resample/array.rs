@@ -1,0 +1,95 @@
+//! Conversion of whole arrays.
+
+use std::borrow::Cow;
+
+use ndarray::{Array2, ArrayView2};
+use rayon::prelude::*;
+
+use super::check::check_rates;
+use super::converter::Converter;
+use super::kernel::SPAN;
+use super::sinc::{SincPlan, resample_sinc};
+use super::{ResType, ResamplePlan};
+use crate::error::Result;
+use crate::real::{Real, all_finite, require_finite};
+use crate::tiles::planar;
+
+/// `y [channels, samples]` at another rate (librosa 0.11 `resample`). Equal rates copy `y`.
+///
+/// `fix` makes the length `ceil(samples * target_sr / orig_sr)`, by a final zero where the filters
+/// give one sample less; `scale` divides by the square root of the ratio. The filters run in single
+/// precision for `f64` input too, as libsoxr's do.
+///
+/// # Errors
+/// Impossible rates, or non-finite samples.
+pub fn resample<T: Real>(
+    y: ArrayView2<T>,
+    orig_sr: f64,
+    target_sr: f64,
+    res_type: ResType,
+    fix: bool,
+    scale: bool,
+) -> Result<Array2<T>> {
+    check_rates(orig_sr, target_sr)?;
+    let y = planar(y);
+    if !all_finite(y.as_slice().expect("contiguous")) {
+        require_finite("y", &y)?;
+    }
+    if orig_sr == target_sr {
+        return Ok(y.into_owned());
+    }
+    let ratio = target_sr / orig_sr;
+    let samples = y.as_slice().expect("contiguous");
+    let mut out = match Converter::shared(orig_sr, target_sr, res_type)? {
+        Converter::Soxr(plan) => resample_hq(y.view(), &plan),
+        Converter::Sinc(plan) => {
+            let n = y.ncols();
+            let mut out = Array2::zeros((y.nrows(), plan.filtered_len(n as u64) as usize));
+            let slots = out.as_slice_mut().expect("made in C order");
+            match (T::as_f32(samples), T::as_f32_mut(slots)) {
+                (Some(samples), Some(slots)) => resample_sinc(samples, n, &plan, slots),
+                _ => {
+                    let fast = res_type == ResType::KaiserFast;
+                    let plan = SincPlan::<T>::new(orig_sr, target_sr, fast)?;
+                    resample_sinc(samples, n, &plan, slots);
+                }
+            }
+            out
+        }
+    };
+    let n_out = (y.ncols() as f64 * ratio).ceil() as usize;
+    if fix && out.ncols() != n_out {
+        let mut fixed = Array2::zeros((out.nrows(), n_out));
+        let common = n_out.min(out.ncols());
+        fixed.slice_mut(ndarray::s![.., ..common]).assign(&out.slice(ndarray::s![.., ..common]));
+        out = fixed;
+    }
+    if scale {
+        out.mapv_inplace(|v| T::of(v.wide() / ratio.sqrt()));
+    }
+    Ok(out)
+}
+
+/// `y` has contiguous channels.
+fn resample_hq<T: Real>(y: ArrayView2<T>, plan: &ResamplePlan) -> Array2<T> {
+    let (channels, n) = y.dim();
+    let mut out = Array2::zeros((channels, plan.filtered_len(n as u64) as usize));
+    let rows = out.outer_iter_mut().zip(y.outer_iter()).flat_map(|(row, signal)| {
+        let signal = signal.to_slice().expect("contiguous");
+        let spans = row.into_slice().expect("made in C order").chunks_mut(SPAN).enumerate();
+        spans.map(move |(i, out)| (i * SPAN, out, signal))
+    });
+    let spans: Vec<_> = rows.collect();
+    spans.into_par_iter().for_each(|(first, out, signal)| {
+        let range = first as u64..(first + out.len()) as u64;
+        let needed = plan.input_range(range.clone());
+        let start = needed.start.clamp(0, n as i64) as usize;
+        let signal = &signal[start..(needed.end.max(0) as usize).clamp(start, n)];
+        let single = || Cow::Owned(signal.iter().map(|v| v.wide() as f32).collect());
+        let samples = T::as_f32(signal).map_or_else(single, Cow::Borrowed);
+        let converted = plan.segment(1, range, &samples, start as u64);
+        let converted = converted.expect("one channel is whole frames");
+        out.iter_mut().zip(converted).for_each(|(slot, v)| *slot = T::of(f64::from(v)));
+    });
+    out
+}
