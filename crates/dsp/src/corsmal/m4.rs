@@ -1,14 +1,15 @@
 //! M4 (HVRL, Keio): a log-mel spectrogram of every channel.
 
 use ndarray::{Array3, Array4, ArrayView2, ArrayView3, s};
-use num_complex::Complex;
 use realfft::RealFftPlanner;
 
 use super::Variant;
 use crate::error::{DspError, Result};
 use crate::frequency::require_rate;
+use crate::lanes::decibel_double;
 use crate::mel::{hz_to_mel, mel_to_hz};
 use crate::real::require_finite;
+use crate::simd::vectorized;
 use crate::window::{Window, get_window};
 
 const BANDS: usize = 64;
@@ -56,24 +57,53 @@ impl M4LogMel {
         let (mut frame, mut spectrum) = (fft.make_input_vec(), fft.make_output_vec());
         let mut scratch = fft.make_scratch_vec();
         let mut out = Array3::zeros((frames, BANDS, channels));
+        let mut energies = [0.0; BANDS];
+        let mut power = vec![0.0; spectrum.len()];
         for (c, signal) in y.outer_iter().enumerate() {
-            let count = |i: usize| signal.get(i).map_or(0.0, |&v| f64::from(v) * 32768.0);
+            // The zeros after the last sample are not pre-emphasised.
+            let mut emphasised = Vec::with_capacity(n + step + length);
+            let mut before = 0.0;
+            emphasised.extend(signal.iter().map(|x| {
+                let count = f64::from(*x) * 32768.0;
+                count - PRE_EMPHASIS * std::mem::replace(&mut before, count)
+            }));
+            emphasised.resize(n.max(frames * step + used), 0.0);
             for t in 0..frames {
-                frame.fill(0.0);
-                for (k, slot) in frame.iter_mut().enumerate().take(used) {
-                    let i = t * step + k;
-                    // The padding after the last sample is not pre-emphasised.
-                    let before = if i == 0 || i >= n { 0.0 } else { count(i - 1) };
-                    *slot = (count(i) - PRE_EMPHASIS * before) * window[k];
-                }
+                let samples = &emphasised[t * step..];
+                vectorized(
+                    #[inline(always)]
+                    || {
+                        for (slot, (x, w)) in
+                            frame.iter_mut().zip(samples.iter().zip(&window[..used]))
+                        {
+                            *slot = x * w;
+                        }
+                    },
+                );
+                frame[used..].fill(0.0);
                 fft.process_with_scratch(&mut frame, &mut spectrum, &mut scratch)
                     .expect("buffers made by the plan itself");
-                let power = |z: &Complex<f64>| z.norm_sqr() / n_fft as f64;
-                for (b, (first, weights)) in bank.iter().enumerate() {
-                    let bins = weights.iter().zip(spectrum.iter().skip(*first));
-                    let energy: f64 = bins.map(|(w, z)| w * power(z)).sum();
-                    let floored = if energy == 0.0 { f64::EPSILON } else { energy };
-                    out[[t, b, c]] = (decibels * floored.log10()) as f32;
+                vectorized(
+                    #[inline(always)]
+                    || {
+                        for (slot, z) in power.iter_mut().zip(&spectrum) {
+                            *slot = (z.re * z.re + z.im * z.im) / n_fft as f64;
+                        }
+                    },
+                );
+                for ((first, weights), slot) in bank.iter().zip(&mut energies) {
+                    let bins = weights.iter().zip(power.iter().skip(*first));
+                    let energy: f64 = bins.map(|(w, p)| w * p).sum();
+                    *slot = if energy == 0.0 { f64::EPSILON } else { energy };
+                }
+                let part = out.slice_mut(s![t, .., c]);
+                for (slot, energy) in part.into_iter().zip(energies) {
+                    let tens = if energy.is_normal() {
+                        decibel_double(energy)
+                    } else {
+                        10.0 * energy.log10()
+                    };
+                    *slot = (decibels / 10.0 * tens) as f32;
                 }
             }
         }

@@ -140,7 +140,7 @@ fn vggish_log_mel(y: ArrayView1<f32>) -> Result<Array2<f32>> {
         }
         fft.process_with_scratch(&mut frame, &mut spectrum, &mut scratch)
             .expect("buffers made by the plan itself");
-        let magnitude = Array1::from_iter(spectrum.iter().map(|z| z.norm()));
+        let magnitude = Array1::from_iter(spectrum.iter().map(|z| z.norm_sqr().sqrt()));
         let mel = bank.dot(&magnitude);
         out.row_mut(t).assign(&mel.mapv(|m| (m + 0.01).ln() as f32));
     }

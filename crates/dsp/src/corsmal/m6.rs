@@ -1,8 +1,8 @@
 //! M6 (ACC): a 96 x 96 spectrogram from the second onset on.
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, s};
+use ndarray::{Array2, ArrayView1, ArrayView2, Axis, s};
 
-use super::{amplitude_db, cut_or_pad, mono_at};
+use super::{mono_at, padded_amplitude_db};
 use crate::decibel::Decibel;
 use crate::error::Result;
 use crate::librosa::LibrosaVersion;
@@ -57,9 +57,9 @@ impl M6Spectrogram {
             M6Crop::Onset => self.onsets(y.view())?.get(1).copied().unwrap_or(0),
             M6Crop::At(seconds) => (seconds.max(0.0) * SR) as usize,
         };
-        let rest: Array1<f32> = y.slice(s![start.min(y.len())..]).to_owned();
-        let y = cut_or_pad(rest, SAMPLES).insert_axis(Axis(0));
-        let image = amplitude_db(y.view(), &self.transform())?;
+        let start = start.min(y.len());
+        let y = y.slice(s![start..y.len().min(start + SAMPLES)]);
+        let image = padded_amplitude_db(y, SAMPLES, &self.transform())?;
         resize(image.view(), &ResizeParams::new(96, 96))
     }
 

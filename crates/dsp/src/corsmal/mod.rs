@@ -23,7 +23,7 @@ pub use m5::{M5A34f136, M5VggishPatches, downmix_71, downmix_71_weights};
 pub use m6::{M6Crop, M6Spectrogram};
 pub use spec9216::Spec9216;
 
-use ndarray::{Array1, Array2, ArrayView2, Axis};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, s};
 use serde::{Deserialize, Serialize};
 
 use crate::decibel::Decibel;
@@ -56,18 +56,31 @@ fn mono_at(y: ArrayView2<f32>, sr: f64, target_sr: f64, res_type: ResType) -> Re
     Ok(resample(mono.view(), sr, target_sr, res_type, true, false)?.remove_axis(Axis(0)))
 }
 
-/// The first `len` samples, or all and zeros up to `len`.
-fn cut_or_pad(y: Array1<f32>, len: usize) -> Array1<f32> {
-    let mut samples = y.to_vec();
-    samples.resize(len, 0.0);
-    Array1::from_vec(samples)
-}
-
 /// `amplitude_to_db(|stft|)` `[bins, frames]` of one channel, 80 dB deep.
 fn amplitude_db<T: Real>(y: ArrayView2<T>, params: &StftParams) -> Result<Array2<T>> {
     let mut power = spectrogram(y, params, 2.0)?;
     Decibel::default().power(power.as_slice_mut().expect("made in C order"))?;
     Ok(power.index_axis_move(Axis(0), 0))
+}
+
+/// [`amplitude_db`] of `y` and zeros up to `len` samples.
+///
+/// Frames of nothing but zeros are all alike: one is transformed, and stands for those that follow.
+fn padded_amplitude_db<T: Real>(
+    y: ArrayView1<T>,
+    len: usize,
+    params: &StftParams,
+) -> Result<Array2<T>> {
+    // So many zeros make the last frame such a one, whatever lies beyond them.
+    let mut samples = y.to_vec();
+    samples.resize(len.min(y.len() + 2 * params.n_fft), T::zero());
+    let known = amplitude_db(ArrayView1::from(&samples).insert_axis(Axis(0)), params)?;
+    let mut image = Array2::zeros((known.nrows(), params.n_frames(len)));
+    for (mut row, known) in image.outer_iter_mut().zip(known.outer_iter()) {
+        row.fill(known[known.len() - 1]);
+        row.slice_mut(s![..known.len()]).assign(&known);
+    }
+    Ok(image)
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! The spectrogram input of the classical baselines.
 
-use ndarray::{Array1, Array2, ArrayView1, Axis, s};
+use ndarray::{Array1, Array2, ArrayView1, s};
 
-use super::amplitude_db;
+use super::padded_amplitude_db;
 use crate::error::{DspError, Result};
 use crate::real::{Real, require_finite};
 use crate::resize::{ResizeParams, resize};
@@ -38,19 +38,16 @@ impl Spec9216 {
         }
         let scaled = y.mapv(|v| v / rms);
         match self.fixed_len {
-            Some(len) if len > y.len() => {
-                let mut padded = Array1::zeros(len);
-                padded.slice_mut(s![..y.len()]).assign(&scaled.mapv(Real::wide));
-                self.image(padded)
-            }
-            Some(len) => self.image(scaled.slice_move(s![..len])),
-            None => self.image(scaled),
+            Some(len) if len > y.len() => self.image(scaled.mapv(Real::wide), len),
+            Some(len) => self.image(scaled.slice_move(s![..len]), len),
+            None => self.image(scaled, y.len()),
         }
     }
 
-    fn image<T: Real>(&self, y: Array1<T>) -> Result<Array2<f64>> {
+    /// The image of `y` and zeros up to `len` samples.
+    fn image<T: Real>(&self, y: Array1<T>, len: usize) -> Result<Array2<f64>> {
         let params = StftParams { pad_mode: self.pad_mode, ..StftParams::new(512, 128) };
-        let decibels = amplitude_db(y.insert_axis(Axis(0)).view(), &params)?;
+        let decibels = padded_amplitude_db(y.view(), len, &params)?;
         Ok(resize(decibels.view(), &ResizeParams::new(96, 96))?.mapv(Real::wide))
     }
 }

@@ -14,6 +14,7 @@ mod spectrum;
 mod twiddles;
 mod weighted;
 
+pub(crate) use decibel::decibel_double;
 pub use decibel::power_to_decibel;
 pub use fft::LaneFft;
 pub use gather::{Aligned, Frames, Slots, gather};

@@ -122,10 +122,11 @@ pub fn spectrogram_into<T: Real>(
 pub(crate) fn magnitude<T: Real>(z: Complex<T>) -> T {
     if T::SINGLE {
         let (re, im) = (z.re.wide(), z.im.wide());
-        T::of((re * re + im * im).sqrt())
-    } else {
-        z.norm()
+        return T::of((re * re + im * im).sqrt());
     }
+    let square = z.re * z.re + z.im * z.im;
+    // What is left of it may have lost digits, or all.
+    if square.is_normal() { square.sqrt() } else { z.norm() }
 }
 
 /// Fills `out` with `value` of every bin, transformed in double precision and rounded to `T`.
