@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use linfa::DatasetBase;
-use linfa::traits::{Fit, Predict};
-use ndarray::{Array2, ArrayView2, Axis};
+use linfa::traits::Predict;
+use ndarray::{Array2, ArrayView2, Axis, CowArray, Ix2};
+use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::classifiers::Predicted;
+use crate::classifiers::{ClassifierSpec, Predicted};
 use crate::error::{ModelError, Result};
 use crate::fusion::merge_classes;
 use crate::labels::Labels;
@@ -16,6 +17,7 @@ use crate::predictions::{Id, PredictionRow, PredictionTable};
 use crate::scores::Scores;
 use crate::splits::Fold;
 use crate::spread::Spread;
+use crate::steps::{Prepared, StepSpec, through};
 use crate::table::argmax;
 use crate::targets::Classes;
 
@@ -218,14 +220,81 @@ pub fn cross_validate(
     folds: &[Fold],
     spec: &PipelineSpec,
 ) -> Result<CrossValidation> {
-    data.check(folds)?;
-    let outcomes = folds.iter().map(|fold| run_fold(data, fold, spec)).collect::<Result<_>>()?;
-    CrossValidation::of(outcomes, |rows| data.scored(rows), data.scored_classes())
+    let mut outcomes = cross_validate_each(data, folds, std::slice::from_ref(spec))?;
+    Ok(outcomes.remove(0))
 }
 
-fn run_fold(data: &Data<'_>, fold: &Fold, spec: &PipelineSpec) -> Result<FoldOutcome> {
-    let model = spec.fit(&data.select(&fold.train))?;
-    let predicted: Result<Predicted> = Predict::predict(&model, &data.select(&fold.test));
+/// The same for each of several pipelines. Steps that some share are fitted once for them; folds and
+/// classifiers are computed side by side.
+///
+/// # Errors
+/// As [`cross_validate`]: the first refusal, by fold, then by pipeline.
+pub fn cross_validate_each(
+    data: &Data<'_>,
+    folds: &[Fold],
+    specs: &[PipelineSpec],
+) -> Result<Vec<CrossValidation>> {
+    data.check(folds)?;
+    let by_fold: Vec<Result<Vec<FoldOutcome>>> =
+        folds.par_iter().map(|fold| run_fold(data, fold, specs)).collect();
+    let mut outcomes = vec![Vec::with_capacity(folds.len()); specs.len()];
+    for fold in by_fold {
+        for (outcomes, outcome) in outcomes.iter_mut().zip(fold?) {
+            outcomes.push(outcome);
+        }
+    }
+    let joined =
+        |outcomes| CrossValidation::of(outcomes, |rows| data.scored(rows), data.scored_classes());
+    outcomes.into_iter().map(joined).collect()
+}
+
+/// What each pipeline makes of a fold.
+fn run_fold(data: &Data<'_>, fold: &Fold, specs: &[PipelineSpec]) -> Result<Vec<FoldOutcome>> {
+    // Pipelines by their steps.
+    let mut groups: Vec<(&[StepSpec], Vec<usize>)> = Vec::new();
+    for (i, spec) in specs.iter().enumerate() {
+        match groups.iter_mut().find(|(steps, _)| *steps == spec.steps) {
+            Some((_, members)) => members.push(i),
+            None => groups.push((&spec.steps, vec![i])),
+        }
+    }
+    let (train, test) = (data.select(&fold.train), data.select(&fold.test));
+    let mut outcomes: Vec<(usize, Result<FoldOutcome>)> = Vec::with_capacity(specs.len());
+    for (steps, members) in groups {
+        let ready = Prepared::fit(steps, train.records.view()).and_then(|prepared| {
+            let test = through(prepared.steps(), test.records.view())?;
+            Ok((prepared, test))
+        });
+        match ready {
+            Ok((prepared, test)) => outcomes.par_extend(members.into_par_iter().map(|i| {
+                let classifier = &specs[i].classifier;
+                (
+                    i,
+                    run_classifier(
+                        data,
+                        fold,
+                        classifier,
+                        (prepared.rows(), &train.targets),
+                        &test,
+                    ),
+                )
+            })),
+            Err(error) => outcomes.push((members[0], Err(error))),
+        }
+    }
+    outcomes.sort_by_key(|(i, _)| *i);
+    outcomes.into_iter().map(|(_, outcome)| outcome).collect()
+}
+
+fn run_classifier(
+    data: &Data<'_>,
+    fold: &Fold,
+    classifier: &ClassifierSpec,
+    (x, classes): (ArrayView2<'_, f64>, &Classes),
+    test: &CowArray<'_, f64, Ix2>,
+) -> Result<FoldOutcome> {
+    let fitted = classifier.train(x, &classes.indices().to_vec(), classes.n_classes())?;
+    let predicted: Result<Predicted> = Predict::predict(&fitted, test);
     let Predicted { classes, proba } = predicted?;
     let (predicted, proba) = match (data.merge, proba) {
         (None, proba) => (classes, proba),
@@ -234,7 +303,7 @@ fn run_fold(data: &Data<'_>, fold: &Fold, spec: &PipelineSpec) -> Result<FoldOut
             (merged.outer_iter().map(|row| argmax(row.iter())).collect(), Some(merged))
         }
         (Some(_), None) => {
-            let owner = spec.classifier.name();
+            let owner = classifier.name();
             let remedy = "merged classes add them up, so train with probabilities";
             return Err(ModelError::NoProbability { owner, remedy });
         }
@@ -261,7 +330,7 @@ pub fn nested_cross_validate(
     let mut outcomes = Vec::with_capacity(folds.len());
     for fold in folds {
         let (chosen, scores) = choose(data, &fold.train, candidates, &inner)?;
-        let outcome = run_fold(data, fold, &candidates[chosen])?;
+        let outcome = run_fold(data, fold, std::slice::from_ref(&candidates[chosen]))?.remove(0);
         outcomes.push(FoldOutcome { chosen, inner: scores, ..outcome });
     }
     CrossValidation::of(outcomes, |rows| data.scored(rows), data.scored_classes())
@@ -284,7 +353,7 @@ pub fn choose(
     let inside = DatasetBase::new(inside.records.view(), inside.targets.clone());
     let inside = Data { dataset: &inside, ..*data };
     let inner_folds = inner(rows)?;
-    let score = |spec| cross_validate(&inside, &inner_folds, spec).map(|cv| cv.weighted_f1.mean);
-    let scores: Vec<f64> = candidates.iter().map(score).collect::<Result<_>>()?;
+    let validated = cross_validate_each(&inside, &inner_folds, candidates)?;
+    let scores: Vec<f64> = validated.iter().map(|cv| cv.weighted_f1.mean).collect();
     Ok((argmax(&scores), scores))
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::classifiers::{Classifier, ClassifierSpec, Neighbours, Predicted};
 use crate::error::{ModelError, Result};
-use crate::steps::{Step, StepSpec};
+use crate::steps::{Prepared, Step, StepSpec, through};
 use crate::table::{check_features, check_labels, check_query};
 use crate::targets::Classes;
 
@@ -60,15 +60,9 @@ impl PipelineSpec {
             check_features(x)?;
             check_labels(x.nrows(), y, n_classes)?;
         }
-        let mut steps = Vec::with_capacity(self.steps.len());
-        let mut current = CowArray::from(x);
-        for spec in &self.steps {
-            let step = spec.fit(current.view())?;
-            current = step.transform(current.view())?.into();
-            steps.push(step);
-        }
-        let classifier = self.classifier.train_weighted(current.view(), y, n_classes, weights)?;
-        Ok(Pipeline { steps, classifier })
+        let prepared = Prepared::fit(&self.steps, x)?;
+        let classifier = self.classifier.train_weighted(prepared.rows(), y, n_classes, weights)?;
+        Ok(Pipeline { steps: prepared.into_steps(), classifier })
     }
 }
 
@@ -89,6 +83,17 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
+    /// A classifier behind the steps whose results it was trained on.
+    ///
+    /// # Errors
+    /// [`ModelError::Inconsistent`] where one part gives another number of features than the next
+    /// takes.
+    pub fn new(steps: Vec<Step>, classifier: Classifier) -> Result<Self> {
+        let pipeline = Self { steps, classifier };
+        pipeline.check_joints()?;
+        Ok(pipeline)
+    }
+
     /// Features per row.
     pub fn n_features(&self) -> usize {
         self.steps.first().map_or_else(|| self.classifier.n_features(), Step::n_inputs)
@@ -109,11 +114,7 @@ impl Pipeline {
         if !self.steps.is_empty() {
             check_query(x, self.n_features())?;
         }
-        let mut current = CowArray::from(x);
-        for step in &self.steps {
-            current = step.transform(current.view())?.into();
-        }
-        Ok(current)
+        through(&self.steps, x)
     }
 
     /// Class indices of `[rows, features]`.
@@ -160,6 +161,10 @@ impl Pipeline {
     pub(crate) fn validate(&self) -> Result<()> {
         self.steps.iter().try_for_each(Step::validate)?;
         self.classifier.validate()?;
+        self.check_joints()
+    }
+
+    fn check_joints(&self) -> Result<()> {
         let joined = self.steps.windows(2).all(|w| w[0].n_outputs() == w[1].n_inputs());
         let last = self.steps.last().is_none_or(|s| s.n_outputs() == self.classifier.n_features());
         if joined && last { Ok(()) } else { Err(ModelError::Inconsistent("pipeline".into())) }

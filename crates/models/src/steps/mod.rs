@@ -2,6 +2,7 @@
 
 mod columns;
 mod pca;
+mod prepared;
 mod standardize;
 
 use ndarray::{Array2, ArrayView2};
@@ -10,6 +11,7 @@ use serde_json::{Map, Value};
 
 pub use self::columns::{Columns, ColumnsParams};
 pub use self::pca::{Components, Pca, PcaParams};
+pub use self::prepared::{Prepared, through};
 pub use self::standardize::{ConstantRule, Standardize, StandardizeParams};
 use crate::error::{ModelError, Result};
 use crate::params::Parameters;
