@@ -299,10 +299,10 @@ impl Adding {
             seed: 1,
             made: Made::default(),
         };
-        let said = std::cell::RefCell::new(Vec::new());
-        let progress = |step: &str| said.borrow_mut().push(step.to_string());
+        let said = std::sync::Mutex::new(Vec::new());
+        let progress = |step: &str| said.lock().unwrap().push(step.to_string());
         let result = corsmal_ccm::benchmark::run(&options, &progress, &Arc::default());
-        (result, said.into_inner())
+        (result, said.into_inner().unwrap())
     }
 
     fn refusal(&self, lines: &[String]) -> String {

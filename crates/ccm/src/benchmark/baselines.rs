@@ -6,27 +6,9 @@ use corsmal_extract::config::Config;
 use corsmal_models::classifiers::{
     ClassifierSpec, Gamma, KNearestParams, RandomForestParams, SvmParams,
 };
-use corsmal_models::model_file::TrainedOn;
-use corsmal_models::pipeline::{Pipeline, PipelineSpec};
-use corsmal_models::splits::{Fold, group_lists, train_test_split};
-use corsmal_models::steps::{Components, PcaParams, StepSpec};
-use corsmal_models::targets::Classes;
-use corsmal_models::{ModelError, cross_validation};
-use linfa::DatasetBase;
-use linfa::traits::Fit;
-use ndarray::{Array2, ArrayView2, Axis};
 
 use super::features::FeatureSet;
-use super::matrix::Matrices;
-use super::results::{Estimate, Rows, Target};
-use crate::dataset::{CONTAINER_FOLDS, Filling, PublishedSplit};
-use crate::error::{CcmError, Result};
-
-/// Principal components of the baselines.
-const COMPONENTS: usize = 128;
-
-/// Recordings of the training part of the real data set.
-const ALL_TRAINING: usize = 684;
+use super::results::Estimate;
 
 /// A classifier with the published settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,7 +33,7 @@ pub struct Baseline {
 }
 
 /// How a baseline is run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Variant {
     /// As the published code: no scaling, a random split of recordings, PCA fitted anew on every
     /// part.
@@ -85,7 +67,7 @@ impl Learner {
         }
     }
 
-    fn spec(self, seed: u64) -> ClassifierSpec {
+    pub(super) fn spec(self, seed: u64) -> ClassifierSpec {
         match self {
             Self::Knn => KNearestParams::default().into(),
             Self::Svm => SvmParams {
@@ -111,14 +93,8 @@ pub(super) struct Outcome {
     pub(super) seen: Vec<Estimate>,
     /// Estimates of each test part.
     pub(super) tests: Vec<Vec<Estimate>>,
-    /// The pipeline that predicted the tests, and what it is.
-    pub(super) model: Pipeline,
-    pub(super) spec: PipelineSpec,
-    /// The features that it takes.
+    /// By which the features were computed.
     pub(super) config: Arc<Config>,
-    pub(super) feature_names: Vec<String>,
-    /// Formats of the recordings that it was trained on.
-    pub(super) trained_on: Option<TrainedOn>,
 }
 
 impl Baseline {
@@ -147,151 +123,4 @@ impl Baseline {
         let pca = if self.pca { "-pca" } else { "" };
         format!("{}{pca}-{}", self.features.slug(), self.learner.name().to_lowercase())
     }
-
-    pub(super) fn run(
-        &self,
-        variant: Variant,
-        rows: &Rows,
-        matrices: &Matrices,
-        seed: u64,
-    ) -> Result<Outcome> {
-        let outcome = match variant {
-            Variant::Published => self.published(rows, matrices, seed),
-            Variant::Corrected => self.corrected(rows, matrices, seed),
-        };
-        outcome.map_err(|e| CcmError::Request(format!("{} ({}): {e}", self.name(), variant.name())))
-    }
-
-    fn published(
-        &self,
-        rows: &Rows,
-        matrices: &Matrices,
-        seed: u64,
-    ) -> std::result::Result<Outcome, ModelError> {
-        let joint = rows.joint();
-        let fold = split(&joint)?;
-        let spec = PipelineSpec::plain(self.learner.spec(seed));
-        // The published code fits PCA on all training recordings, the held-out ones included, and
-        // anew on every test part.
-        let least = matrices.tests.iter().map(Array2::nrows).filter(|&n| n > 1);
-        let components =
-            least.chain([matrices.training.nrows()]).min().unwrap_or(1).min(COMPONENTS);
-        let reduce = |x: ArrayView2<'_, f64>| -> std::result::Result<Array2<f64>, ModelError> {
-            if !self.pca {
-                return Ok(x.to_owned());
-            }
-            if x.nrows() <= 1 {
-                // One recording is its own mean: it lies at the origin.
-                return Ok(Array2::zeros((x.nrows(), components)));
-            }
-            pca(components).fit(x)?.transform(x)
-        };
-        let x = reduce(matrices.training.view())?;
-        let y: Vec<usize> = fold.train.iter().map(|&row| joint[row]).collect();
-        let model = spec.train(x.select(Axis(0), &fold.train).view(), &y, Filling::COUNT)?;
-        let seen = estimates(&model, x.view())?;
-        let tests = matrices
-            .tests
-            .iter()
-            .map(|x| estimates(&model, reduce(x.view())?.view()))
-            .collect::<std::result::Result<_, _>>()?;
-        Ok(Outcome {
-            baseline: *self,
-            variant: Variant::Published,
-            held_out: fold.test.iter().map(|&row| (row, seen[row].clone())).collect(),
-            seen,
-            tests,
-            model,
-            spec,
-            config: matrices.config.clone(),
-            feature_names: matrices.names.clone(),
-            trained_on: matrices.trained_on.clone(),
-        })
-    }
-
-    fn corrected(
-        &self,
-        rows: &Rows,
-        matrices: &Matrices,
-        seed: u64,
-    ) -> std::result::Result<Outcome, ModelError> {
-        let joint = rows.joint();
-        let folds = container_folds(&rows.training)?;
-        let least = folds.iter().map(|f| f.train.len()).min().unwrap_or(1);
-        let mut spec = PipelineSpec::standardized(self.learner.spec(seed));
-        if self.pca {
-            spec.steps.push(pca(COMPONENTS.min(least)));
-        }
-        let classes = Classes::new(joint, Filling::COUNT)?;
-        let dataset = DatasetBase::new(matrices.training.view(), classes);
-        let data = cross_validation::Data { dataset: &dataset, merge: None };
-        let validated = cross_validation::cross_validate(&data, &folds, &spec)?;
-        let mut held_out = Vec::with_capacity(dataset.targets.len());
-        for fold in &validated.folds {
-            for (i, (&row, &class)) in fold.rows.iter().zip(&fold.predicted).enumerate() {
-                let p = fold.proba.as_ref().map(|p| p.row(i).to_vec());
-                held_out.push((row, Estimate::joint(class, p.as_deref())));
-            }
-        }
-        held_out.sort_by_key(|(row, _)| *row);
-        let model = spec.fit(&dataset)?;
-        let tests = matrices
-            .tests
-            .iter()
-            .map(|x| estimates(&model, x.view()))
-            .collect::<std::result::Result<_, _>>()?;
-        Ok(Outcome {
-            baseline: *self,
-            variant: Variant::Corrected,
-            held_out,
-            seen: Vec::new(),
-            tests,
-            model,
-            spec,
-            config: matrices.config.clone(),
-            feature_names: matrices.names.clone(),
-            trained_on: matrices.trained_on.clone(),
-        })
-    }
-}
-
-fn pca(components: usize) -> StepSpec {
-    StepSpec::Pca(PcaParams { n_components: Some(Components::Count(components.max(1))) })
-}
-
-/// The published split; for other numbers of recordings one by the same rule.
-fn split(joint: &[usize]) -> std::result::Result<Fold, ModelError> {
-    if joint.len() == ALL_TRAINING
-        && let Ok(fold) = PublishedSplit::Baselines.rows()
-    {
-        return Ok(fold);
-    }
-    train_test_split(joint.len(), 0.2, 42, Some(joint))
-}
-
-/// The three folds of containers; of a set with fewer containers, those that are there.
-pub(super) fn container_folds(targets: &[Target]) -> std::result::Result<Vec<Fold>, ModelError> {
-    let number = |t: &Target| t.recording.container.map_or(0, |c| c.number());
-    let groups: Vec<String> = targets.iter().map(|t| number(t).to_string()).collect();
-    let lists: Vec<Vec<String>> = CONTAINER_FOLDS
-        .iter()
-        .map(|fold| fold.iter().map(u8::to_string).filter(|c| groups.contains(c)).collect())
-        .filter(|list: &Vec<String>| !list.is_empty())
-        .collect();
-    group_lists(&groups, &lists)
-}
-
-fn estimates(
-    model: &Pipeline,
-    x: ArrayView2<'_, f64>,
-) -> std::result::Result<Vec<Estimate>, ModelError> {
-    let classes = model.predict(x)?;
-    let probabilities = match model.predict_proba(x) {
-        Ok(p) => Some(p),
-        Err(ModelError::NoProbability { .. }) => None,
-        Err(e) => return Err(e),
-    };
-    let row_of = |row| probabilities.as_ref().map(|p| p.row(row).to_vec());
-    let estimate = |(row, class)| Estimate::joint(class, row_of(row).as_deref());
-    Ok(classes.into_iter().enumerate().map(estimate).collect())
 }

@@ -4,8 +4,10 @@ use std::path::Path;
 
 use corsmal_models::labels::Labels;
 use corsmal_models::model_file::{Model, ModelHeader};
+use corsmal_models::pipeline::{Pipeline, PipelineSpec};
 
 use super::baselines::Outcome;
+use super::matrix::Matrices;
 use super::results::{Estimate, Rows, Target};
 use super::system::Run;
 use crate::dataset::{Filling, Subset};
@@ -21,33 +23,47 @@ pub(super) fn prepare(out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Writes the submissions of a baseline and its model.
+/// Writes the submissions of a baseline.
 pub(super) fn write_outcome(out: &Path, outcome: &Outcome, rows: &Rows) -> Result<()> {
-    let name = format!("{}-{}", outcome.baseline.slug(), outcome.variant.name());
-    write_estimates(out, &name, rows, &outcome.held_out, &outcome.tests)?;
+    write_estimates(out, &name_of(outcome), rows, &outcome.held_out, &outcome.tests)
+}
+
+fn name_of(outcome: &Outcome) -> String {
+    format!("{}-{}", outcome.baseline.slug(), outcome.variant.name())
+}
+
+/// Writes the model of a baseline, a pipeline and what it is.
+pub(super) fn write_model(
+    out: &Path,
+    outcome: &Outcome,
+    (spec, pipeline): (PipelineSpec, Pipeline),
+    matrices: &Matrices,
+    rows: &Rows,
+) -> Result<()> {
     // Published PCA is fitted on what it reduces, so that there is no projection for recordings to
     // come.
-    if outcome.model.n_features() != outcome.feature_names.len() {
+    if pipeline.n_features() != matrices.names.len() {
         return Ok(());
     }
+    let name = name_of(outcome);
     let fault = |e: &dyn std::fmt::Display| CcmError::Request(format!("model {name}: {e}"));
     let labels = Labels::new(Filling::all().map(Filling::name).collect()).map_err(|e| fault(&e))?;
     let header = ModelHeader {
-        pipeline: outcome.spec.clone(),
+        pipeline: spec,
         labels,
         target: "joint".into(),
-        feature_names: outcome.feature_names.clone(),
-        feature_config: outcome.config.to_value(),
-        feature_config_hash: outcome.config.hash(),
+        feature_names: matrices.names.clone(),
+        feature_config: matrices.config.to_value(),
+        feature_config_hash: matrices.config.hash(),
         provenance: serde_json::json!({
             "baseline": outcome.baseline.name(),
             "variant": outcome.variant.name(),
             "training_recordings": rows.training.len(),
         }),
-        trained_on: outcome.trained_on.clone(),
+        trained_on: matrices.trained_on.clone(),
         tool_version: env!("CARGO_PKG_VERSION").into(),
     };
-    let model = Model::new(header, outcome.model.clone()).map_err(|e| fault(&e))?;
+    let model = Model::new(header, pipeline).map_err(|e| fault(&e))?;
     let path = out.join("models").join(format!("{name}.model"));
     model.save(&path).map_err(|e| fault(&e))
 }

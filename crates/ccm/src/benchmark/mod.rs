@@ -11,6 +11,7 @@ mod made;
 mod matrix;
 mod method;
 mod predicted;
+mod protocols;
 mod report;
 mod results;
 mod system;
@@ -18,7 +19,7 @@ mod system;
 use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 pub use added::Added;
 pub use baselines::{Baseline, Learner, Variant};
@@ -27,11 +28,16 @@ pub use made::Made;
 pub use results::Estimate;
 pub use system::{Prepared, Subject, System, Work};
 
+use corsmal_models::pipeline::{Pipeline, PipelineSpec};
+use corsmal_report::Report;
+use rayon::prelude::*;
+
 use crate::dataset::DataSet;
 use crate::error::{CcmError, Result};
-use corsmal_report::Report;
+use baselines::Outcome;
 use matrix::Store;
 use predicted::Predicted;
+use protocols::{Setting, Unit};
 
 /// What to run.
 pub struct BenchmarkOptions {
@@ -56,7 +62,8 @@ pub struct BenchmarkOptions {
 /// Runs the benchmark and writes `report.html`, `report.json`, `tables/`, `figures/`,
 /// `submissions/`, `models/` and `features/` below the output folder.
 ///
-/// `progress` is told each step. Features already in `features/` are reused when their
+/// Baselines run side by side, on the threads of the pool. `progress` is told each step, and each
+/// baseline that is done, of how many. Features already in `features/` are reused when their
 /// configuration and the recordings are the same. `stop` ends the work at the next recording or
 /// baseline.
 ///
@@ -66,7 +73,7 @@ pub struct BenchmarkOptions {
 /// when a recording cannot be read, when something cannot be written, and when stopped.
 pub fn run(
     options: &BenchmarkOptions,
-    progress: &dyn Fn(&str),
+    progress: &(dyn Fn(&str) + Sync),
     stop: &Arc<AtomicBool>,
 ) -> Result<Report> {
     let mut names = HashSet::new();
@@ -95,6 +102,7 @@ pub fn run(
     files::prepare(&options.out)?;
     let store = Store { folder: options.out.join("features"), jobs: options.jobs, stop };
     let mut outcomes = Vec::new();
+    let (done, total) = (AtomicUsize::new(0), options.baselines.len() * Variant::ALL.len());
     for feature_set in FeatureSet::ALL {
         let wanted: Vec<_> =
             options.baselines.iter().filter(|b| b.features == feature_set).copied().collect();
@@ -103,17 +111,24 @@ pub fn run(
         }
         progress(&format!("features: {}", feature_set.name()));
         let matrices = store.load(&set, &rows, feature_set)?;
-        for baseline in wanted {
-            for variant in Variant::ALL {
-                if stop.load(Ordering::Relaxed) {
-                    return Err(CcmError::Interrupted);
-                }
-                progress(&format!("{}, {}", baseline.name(), variant.name()));
-                let outcome = baseline.run(variant, &rows, &matrices, options.seed)?;
-                files::write_outcome(&options.out, &outcome, &rows)?;
-                outcomes.push(outcome);
-            }
-        }
+        let out = options.out.as_path();
+        let finish = |outcome: &Outcome, spec: PipelineSpec, model: Pipeline| {
+            files::write_outcome(out, outcome, &rows)?;
+            files::write_model(out, outcome, (spec, model), &matrices, &rows)?;
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            let name = outcome.baseline.name();
+            progress(&format!("{done} of {total}: {name}, {}", outcome.variant.name()));
+            Ok(())
+        };
+        let seed = options.seed;
+        let setting = Setting { rows: &rows, matrices: &matrices, seed, stop, finish: &finish };
+        let units = Unit::all(&wanted);
+        let made: Vec<Result<Vec<Outcome>>> = units.par_iter().map(|u| u.run(&setting)).collect();
+        let made = made.into_iter().collect::<Result<Vec<_>>>()?;
+        let mut made: Vec<Outcome> = made.into_iter().flatten().collect();
+        // As they were asked for, whatever was finished first.
+        made.sort_by_key(|o| (wanted.iter().position(|b| *b == o.baseline), o.variant));
+        outcomes.extend(made);
     }
     let mut runs = Vec::new();
     if !options.systems.is_empty() {

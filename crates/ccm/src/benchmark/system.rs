@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::baselines::container_folds;
 use super::matrix::inputs;
+use super::protocols::container_folds;
 use super::results::{Estimate, Rows};
 use crate::dataset::{DataSet, Filling, SequenceName};
 use crate::error::{CcmError, Result};
