@@ -63,6 +63,7 @@ __all__ = [
     "load_mask",
     "lode",
     "m1_stft",
+    "m2_capacity",
     "m2_mfcc",
     "m3_spectrogram",
     "m4_logmel",

@@ -374,6 +374,16 @@ def m2_capacity(depth: _Depth | Region, weights: StrPath) -> float | None:
     ------
     ParameterError
         The weights are another network's, or an image cannot be read.
+
+    Examples
+    --------
+    >>> network = corsmal_feat.nets.build("m2_capacity", seed=0)   # nobody has trained it
+    >>> np.savez("untrained.npz", **network.state_dict())
+    >>> depth = np.zeros((720, 1280), np.uint16)
+    >>> depth[300:500, 600:720] = 500
+    >>> capacity = corsmal_feat.vision.m2_capacity(depth, "untrained.npz")
+    >>> bool(np.isfinite(capacity))
+    True
     """
     found = depth if isinstance(depth, dict) else region(depth)
     if found is None:

@@ -155,7 +155,7 @@ def test_a_fitted_projection_is_applied(folder: Path, tmp_path: Path):
 
 def test_a_short_recording_warns(tmp_path: Path):
     write(tmp_path / "short.wav", pour(0, seconds=0.05))
-    with pytest.warns(UserWarning, match="shorter than n_fft"):
+    with pytest.warns(UserWarning, match="fewer than n_fft"):
         cf.extract(tmp_path, preset="logmel")
 
 
