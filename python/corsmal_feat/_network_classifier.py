@@ -126,23 +126,20 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         return estimator
 
     def _columns(self, X: Any) -> list[_Column]:
-        network = _core.Network.build(self.network, None, 0)
-        inputs = len(network.inputs())
+        inputs = _core.classifier_inputs(self.network)
         items = list(X)
         if not items:
             raise ParameterError("X has no items")
-        if inputs == 1:
-            return [_column(items, self._channels(network))]
-        if any(len(item) != inputs for item in items):
+        if len(inputs) == 1:
+            return [_column(items, self.network, inputs[0][1])]
+        if any(len(item) != len(inputs) for item in items):
             raise ParameterError(
-                f"{self.network}: each item of X is {inputs} arrays, one for each input"
+                f"{self.network}: each item of X is {len(inputs)} arrays, one for each input"
             )
-        return [_column([item[k] for item in items], 1) for k in range(inputs)]
-
-    @staticmethod
-    def _channels(network: _core.Network) -> int:
-        shape = network.inputs()[0][1].split(" x ")
-        return int(shape[0]) if len(shape) == 3 else 1
+        return [
+            _column([item[k] for item in items], f"{self.network}, {name}", shape)
+            for k, (name, shape) in enumerate(inputs)
+        ]
 
     def __getstate__(self) -> dict[str, Any]:
         state = dict(self.__dict__)
@@ -156,13 +153,20 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         self.__dict__.update(state)
 
 
-def _column(items: list[Any], channels: int) -> _Column:
-    """Items one after another, images channels last."""
+def _column(items: list[Any], place: str, shape: str) -> _Column:
+    """Items one after another, images channels last. `shape` is "steps x 128" or the like."""
+    expected = shape.split(" x ")
     arrays = []
-    for item in items:
+    for number, item in enumerate(items):
         array = np.asarray(item, dtype=np.float32)
-        if channels > 1 and array.ndim == 3:
-            array = np.moveaxis(array, 0, -1)
-        arrays.append(array.ravel())
+        known = [
+            size if size == "steps" and given else str(given)
+            for size, given in zip(expected, array.shape, strict=False)
+        ]
+        if array.ndim != len(expected) or known != expected:
+            raise ParameterError(
+                f"{place}: item {number} of X has shape {array.shape}, expected {shape}"
+            )
+        arrays.append((np.moveaxis(array, 0, -1) if array.ndim == 3 else array).ravel())
     offsets = np.concatenate([[0], np.cumsum([a.size for a in arrays])])
     return np.concatenate(arrays), offsets.astype(int).tolist()

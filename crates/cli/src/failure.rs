@@ -13,18 +13,32 @@ pub const INTERRUPTED: u8 = 130;
 
 /// One message for the user: path or key, the value, and what is allowed.
 #[derive(Debug)]
-pub struct Failure(String);
+pub struct Failure {
+    message: String,
+    code: u8,
+}
 
 impl Failure {
     /// A failure with its message.
     pub fn new(message: impl Into<String>) -> Self {
-        Self(message.into())
+        Self { message: message.into(), code: COULD_NOT_RUN }
+    }
+
+    /// The same for work that the user stopped.
+    #[cfg_attr(not(feature = "nets"), expect(dead_code, reason = "for networks"))]
+    pub fn interrupted(message: impl Into<String>) -> Self {
+        Self { message: message.into(), code: INTERRUPTED }
+    }
+
+    /// The exit code.
+    pub fn code(&self) -> u8 {
+        self.code
     }
 }
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&printable(&self.0))
+        f.write_str(&printable(&self.message))
     }
 }
 
@@ -41,6 +55,6 @@ impl<E: std::error::Error> From<E> for Failure {
             }
             cause = c.source();
         }
-        Self(message)
+        Self::new(message)
     }
 }

@@ -26,7 +26,7 @@ fn main() -> ExitCode {
         Ok(code) => code,
         Err(failure) => {
             eprintln!("error: {failure}");
-            ExitCode::from(failure::COULD_NOT_RUN)
+            ExitCode::from(failure.code())
         }
     }
 }

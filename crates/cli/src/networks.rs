@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use corsmal_ccm::CcmError;
 use corsmal_ccm::dataset::SequenceName;
 use corsmal_extract::config::Config;
 use corsmal_extract::inputs;
@@ -24,7 +25,7 @@ use corsmal_nets::items::{Column, Items};
 use corsmal_nets::model::{self, NetModel};
 use corsmal_nets::network::Network;
 use corsmal_nets::networks::{self, Definition};
-use corsmal_nets::recipe::Recipe;
+use corsmal_nets::recipe::{Recipe, Select};
 use corsmal_systems::recordings;
 use ndarray::Array2;
 use serde_json::{Value, json};
@@ -86,23 +87,21 @@ pub struct Validated {
     pub result: CrossValidation,
     /// name, recipe and histories
     pub report: Value,
+    /// what must be said beside the scores
+    pub caution: Option<&'static str>,
 }
 
 impl Request<'_> {
     fn load(&self, name: &str) -> Result<Loaded, Failure> {
-        let definition = networks::named(name)?;
-        if !definition.classifies {
-            return Err(Failure::new(format!(
-                "{} gives numbers and no classes: it cannot be trained here",
-                definition.name
-            )));
-        }
+        let definition = networks::classifier(name)?;
         let recipe = definition.recipe_with(&self.pipeline.changes()?)?;
         let path = self.dataset.path();
         let network = definition.build(None, 0)?;
         let (mut table, items, row_of, made) = match is_npz(path) {
             true => {
-                let Dataset { ids, mut columns, items } = Dataset::read(path, &network)?;
+                let names = self.dataset.members.names();
+                let read = Dataset::read_members(path, &network, &names.x, names.ids.as_deref());
+                let Dataset { ids, mut columns, items } = read?;
                 columns.extend(named_labels(&columns));
                 let row_of = (0..ids.len()).collect();
                 (LabelledTable::of_columns(path, ids, columns), items, row_of, Made::default())
@@ -121,6 +120,7 @@ impl Request<'_> {
         network: &Network,
     ) -> Result<(LabelledTable, Items, Vec<usize>, Made), Failure> {
         let path = self.dataset.path();
+        self.dataset.members.refuse()?;
         let front_end = front_end(definition)?;
         let collected = inputs::collect(&[path])?;
         if let Some(skipped) = collected.warning() {
@@ -129,7 +129,10 @@ impl Request<'_> {
         let config = recordings::configuration(&front_end)?;
         let stop = interrupt::flag();
         let shared = Arc::new(config.clone());
-        let mut kept = recordings::temporary(&collected.inputs, &shared, self.jobs, stop)?;
+        let mut kept = match recordings::temporary(&collected.inputs, &shared, self.jobs, stop) {
+            Err(e @ CcmError::Interrupted) => return Err(Failure::interrupted(e.to_string())),
+            kept => kept?,
+        };
         let outcomes = std::mem::take(&mut kept.outcomes);
         let (mut heard, mut ids, mut row_of) = (Vec::new(), Vec::new(), Vec::new());
         let mut items: Vec<Item> = Vec::new();
@@ -225,7 +228,7 @@ impl Request<'_> {
         let Loaded { definition, recipe, items, row_of, table, target, labels, classes, .. } =
             self.load(name)?;
         let groups = self.dataset.groups.as_deref();
-        let folds = Folds::new(plan, &table, groups, (&labels, &classes), self.pipeline.seed)?;
+        let folds = Folds::new(plan, &table, groups, (&labels, &classes), self.pipeline.seed())?;
         for (class, fold) in folds.untrained(&classes) {
             let name = &labels.names()[class];
             eprintln!("warning: fold {fold}: class {name} has no training rows");
@@ -279,7 +282,10 @@ impl Request<'_> {
         };
         let folds_found: Vec<_> = found.into_iter().zip(&folds.outer).map(of_fold).collect();
         let result = CrossValidation::of_probabilities(folds_found, &classes)?;
-        Ok(Validated { table, target, labels, classes, folds, result, report })
+        let caution = (recipe.select == Select::Published).then_some(
+            "each epoch was chosen by the fold that it is scored on (select=published): too good",
+        );
+        Ok(Validated { table, target, labels, classes, folds, result, report, caution })
     }
 
     fn folder(&self) -> Result<Option<&Path>, Failure> {
@@ -289,9 +295,9 @@ impl Request<'_> {
         Ok(Some(folder))
     }
 
-    /// A line for each epoch; false once the user asked to stop.
+    /// A line for each epoch; before any step, false once the user asked to stop.
     fn tell(&self, name: &str, progress: Progress<'_>) -> bool {
-        if !self.quiet {
+        if !self.quiet && progress.step.is_none() {
             let (done, total) = (progress.epochs.len(), progress.total);
             let left = span(progress.left.as_secs());
             match progress.epochs.last() {
@@ -315,11 +321,11 @@ impl Request<'_> {
     fn stopped(&self, error: NetError) -> Failure {
         match (&error, &self.network.checkpoints) {
             (NetError::Stopped { .. }, Some(_)) => {
-                Failure::new(format!("{error}; run the same command again to continue"))
+                Failure::interrupted(format!("{error}; run the same command again to continue"))
             }
-            (NetError::Stopped { .. }, None) => {
-                Failure::new(format!("{error}; with --checkpoints they would have been kept"))
-            }
+            (NetError::Stopped { .. }, None) => Failure::interrupted(format!(
+                "{error}; with --checkpoints they would have been kept"
+            )),
             _ => error.into(),
         }
     }

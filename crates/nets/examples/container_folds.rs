@@ -68,6 +68,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         let path = path.as_deref();
         let found =
             cross_validate(definition, input, &folds, &recipe, path, score, |fold, now| {
+                if now.step.is_some() {
+                    return true;
+                }
                 let last = now.epochs.last();
                 let values = last.map(|e| format!("loss {:.4}, F1 {:.4?}", e.loss, e.score));
                 let (done, left) = (now.epochs.len(), now.left.as_secs());

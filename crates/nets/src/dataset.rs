@@ -64,13 +64,27 @@ impl Dataset {
     /// # Errors
     /// [`DatasetError`].
     pub fn read(path: &Path, network: &Network) -> Result<Self, DatasetError> {
+        Self::read_members(path, network, "X", None)
+    }
+
+    /// The same with other names of `X` and `ids`.
+    ///
+    /// # Errors
+    /// [`DatasetError`].
+    pub fn read_members(
+        path: &Path,
+        network: &Network,
+        x: &str,
+        named: Option<&str>,
+    ) -> Result<Self, DatasetError> {
         let mut npz = NpzFile::open(path)?;
         let refuse =
             |reason: String| DatasetError::Content { path: path.display().to_string(), reason };
-        if !npz.contains("X") {
-            return Err(refuse(format!("no member X: there are {}", npz.names().join(", "))));
+        if let Some(name) = [Some(x), named].into_iter().flatten().find(|name| !npz.contains(name))
+        {
+            return Err(refuse(format!("no member {name}: there are {}", npz.names().join(", "))));
         }
-        let array = npz.f32("X")?;
+        let array = npz.f32(x)?;
         let shape = array.shape().to_vec();
         let values: Vec<f32> = array.as_standard_layout().iter().copied().collect();
         let ends = match npz.contains("offsets") {
@@ -78,20 +92,25 @@ impl Dataset {
             false => None,
         };
         let count = ends.as_ref().map_or(shape.first().copied().unwrap_or(0), |e| e.len() - 1);
-        let mut columns = columns(&mut npz, count)?;
+        let mut columns = columns(&mut npz, x, count)?;
         let column = match ends {
             Some(ends) => {
-                let numbers: usize = shape[1..].iter().product();
-                let taken = network.inputs()[0].shape.numbers();
+                let name = network.name();
+                let Shape::Sequence { numbers: taken, .. } = network.inputs()[0].shape else {
+                    return Err(refuse(format!("offsets: {name} takes no sequences")));
+                };
+                let &[_, numbers] = &shape[..] else {
+                    let text = format!("{x} has shape {shape:?}, expected [rows, {taken}]");
+                    return Err(refuse(text));
+                };
                 if numbers != taken {
-                    let name = network.name();
                     return Err(refuse(format!(
-                        "X has {numbers} numbers a row, {name} takes {taken}"
+                        "{x} has {numbers} numbers a row, {name} takes {taken}"
                     )));
                 }
                 Column { values, offsets: ends.into_iter().map(|e| e * numbers).collect() }
             }
-            None => fixed(&shape, &values, network).map_err(refuse)?,
+            None => fixed(x, &shape, values, network).map_err(refuse)?,
         };
         let items = match columns.iter().position(|(name, _)| name == "view") {
             Some(at) if network.inputs().len() > 1 => {
@@ -103,7 +122,14 @@ impl Dataset {
         items
             .check(network)
             .map_err(|source| DatasetError::Items { path: path.display().to_string(), source })?;
-        let ids = ids(&columns, items.len());
+        let ids = match named {
+            Some(name) => columns.iter().find(|(n, _)| n == name).map(|(_, v)| v.clone()),
+            None => Some(ids(&columns, items.len())),
+        };
+        let ids = ids.ok_or_else(|| {
+            let name = named.unwrap_or_default();
+            refuse(format!("{name}: expected a value for each of the {count} items"))
+        })?;
         let mut seen = std::collections::HashSet::new();
         if let Some(twice) = ids.iter().find(|id| !seen.insert(id.as_str())) {
             return Err(refuse(format!("id {twice:?} occurs twice")));
@@ -163,10 +189,14 @@ fn offsets(npz: &mut NpzFile, rows: usize) -> Result<Vec<usize>, String> {
 }
 
 /// Members of one dimension and this many values.
-fn columns(npz: &mut NpzFile, count: usize) -> Result<Vec<(String, Vec<String>)>, DatasetError> {
+fn columns(
+    npz: &mut NpzFile,
+    x: &str,
+    count: usize,
+) -> Result<Vec<(String, Vec<String>)>, DatasetError> {
     let mut columns = Vec::new();
     for name in npz.names().to_vec() {
-        if name == "X" || name == "offsets" || name.starts_with("__") {
+        if name == x || name == "offsets" || name.starts_with("__") {
             continue;
         }
         let Ok(header) = npz.header(&name) else { continue };
@@ -186,20 +216,18 @@ fn columns(npz: &mut NpzFile, count: usize) -> Result<Vec<(String, Vec<String>)>
 }
 
 /// Items of one shape, channels last.
-fn fixed(shape: &[usize], values: &[f32], network: &Network) -> Result<Column, String> {
+fn fixed(x: &str, shape: &[usize], values: Vec<f32>, network: &Network) -> Result<Column, String> {
     let input = &network.inputs()[0];
     let items = shape.first().copied().unwrap_or(0);
     let each: usize = shape.iter().skip(1).product();
+    if !input.takes(shape.get(1..).unwrap_or_default()) {
+        return Err(format!("{x} has shape {shape:?}, expected {}", input.layout()));
+    }
     let values = match input.shape {
-        image @ Shape::Image { height, width, channels } => {
-            if shape.len() != 4 || shape[1..] != [channels, height, width] {
-                return Err(format!(
-                    "X has shape {shape:?}, expected [items, {channels}, {height}, {width}]"
-                ));
-            }
-            Batch::from_channels_first(values, image).values.into_values()
+        image @ Shape::Image { .. } => {
+            Batch::from_channels_first(&values, image).values.into_values()
         }
-        _ => values.to_vec(),
+        _ => values,
     };
     Ok(Column { values, offsets: (0..=items).map(|i| i * each).collect() })
 }

@@ -54,14 +54,14 @@ pub enum NetError {
         /// each name or shape that differs
         differences: Vec<String>,
     },
-    /// A loss or a gradient that is not a number.
+    /// A number of a training that is not finite.
     #[error(
         "training step {step}: {what} is {value}; a smaller learning rate or clip_grad_norm may help, and inputs must be finite"
     )]
     Diverged {
         /// step, counted from 1
         step: u64,
-        /// loss, or the parameter whose gradient it is
+        /// the loss, or the parameter that it is of
         what: String,
         /// its value
         value: f32,
@@ -97,11 +97,29 @@ pub enum NetError {
         /// the number
         value: f32,
     },
+    /// An output that is not finite: inputs or numbers of the network beyond single precision.
+    #[error(
+        "{network}, item {item}: the output is {value}, so its inputs are too large for this network"
+    )]
+    Output {
+        /// the network
+        network: String,
+        /// index of the item
+        item: usize,
+        /// the output
+        value: f32,
+    },
+    /// A network whose outputs are not classes.
+    #[error("{network} gives numbers and no classes: it cannot be trained here")]
+    NoClasses {
+        /// the network
+        network: String,
+    },
     /// A checkpoint that cannot be read or written, or is another training's.
     #[error("checkpoint {0}")]
     Checkpoint(#[from] crate::weights::WeightsError),
     /// Training was ended from outside.
-    #[error("stopped after {epochs} epochs")]
+    #[error("stopped after {epochs} epoch{}", if *epochs == 1 { "" } else { "s" })]
     Stopped {
         /// epochs done
         epochs: usize,

@@ -21,8 +21,8 @@ pub use crate::task::Task;
 const TOGETHER: usize = 64;
 
 /// Trains a network from initial values of the recipe's seed. `score` rates classes against
-/// predicted ones, more is better; `progress` is told before the first epoch and after each, and
-/// ends the training by returning false. With a `checkpoint`, the training is kept there after each
+/// predicted ones, more is better; `progress` is told before the first epoch, before each step and after
+/// each epoch, and ends the training by returning false. With a `checkpoint`, the training is kept there after each
 /// epoch and goes on from there.
 ///
 /// # Errors
@@ -64,21 +64,22 @@ pub fn fit(
         None => (Vec::new(), None),
     };
     let resumed = epochs.len();
-    let mut tell = |epochs: &[Epoch]| {
+    let mut tell = |epochs: &[Epoch], step: Option<usize>| {
         let (elapsed, total) = (began.elapsed(), recipe.epochs);
         let to_come = total - epochs.len();
         let left = match epochs.len() - resumed {
             0 => expected.mul_f64(to_come as f64 / total as f64),
             n => elapsed.mul_f64(to_come as f64 / n as f64),
         };
-        let goes_on = progress(Progress { epochs, total, elapsed, left, memory });
+        let goes_on = progress(Progress { epochs, step, total, elapsed, left, memory });
         if goes_on { Ok(()) } else { Err(NetError::Stopped { epochs: epochs.len() }) }
     };
-    tell(&epochs)?;
+    tell(&epochs, None)?;
     for epoch in resumed..recipe.epochs {
         let mut sum = 0.0;
         let steps = steps_of(task.train, recipe, epoch);
-        for rows in &steps {
+        for (step, rows) in steps.iter().enumerate() {
+            tell(&epochs, Some(step))?;
             let chance = Stream::new(recipe.seed, "offset").part(epoch as u64);
             let inputs = task.items.laid(trainer.network, rows, recipe, chance);
             let classes = rows.iter().map(|&r| task.classes[r]).collect();
@@ -98,7 +99,7 @@ pub fn fit(
         if let Some((path, key)) = place {
             checkpoint::save(path, key, &trainer, &epochs, &best)?;
         }
-        tell(&epochs)?;
+        tell(&epochs, None)?;
     }
     let mut kept = recipe.epochs - 1;
     if let Some((_, epoch, parameters)) = best {
@@ -111,7 +112,7 @@ pub fn fit(
 /// Probability of each class for these items, in batches in their order.
 ///
 /// # Errors
-/// Items that the network does not take.
+/// Items that the network does not take; [`NetError::Output`].
 pub fn probabilities(
     network: &Network,
     items: &Items,
@@ -124,6 +125,10 @@ pub fn probabilities(
         let out = network.logits(&items.laid(network, rows, recipe, chance))?;
         let n = out.shape.len();
         let mut values = out.values.into_values();
+        if let Some(at) = values.iter().position(|v| !v.is_finite()) {
+            let network = network.name().into();
+            return Err(NetError::Output { network, item: rows[at / n], value: values[at] });
+        }
         softmax(&mut values, n);
         all.extend(values.chunks_exact(n).map(|p| p.iter().map(|&v| f64::from(v)).collect()));
     }

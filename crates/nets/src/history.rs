@@ -29,6 +29,8 @@ pub struct History {
 pub struct Progress<'a> {
     /// epochs done
     pub epochs: &'a [Epoch],
+    /// the step of an epoch that is about to begin, from 0; `None` between epochs
+    pub step: Option<usize>,
     /// epochs in all
     pub total: usize,
     /// time since the start

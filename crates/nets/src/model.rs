@@ -11,6 +11,7 @@ use crate::fit::{self, History};
 use crate::items::Items;
 use crate::network::Network;
 use crate::networks;
+use crate::parameters;
 use crate::recipe::Recipe;
 use crate::weights::{self, State, WeightsError};
 
@@ -56,11 +57,15 @@ impl NetModel {
     /// From its parts.
     ///
     /// # Errors
-    /// [`NetError::Targets`] when the labels are not as many as the outputs.
+    /// [`NetError::Targets`] when the labels are not as many as the outputs, or a number of the network
+    /// is not finite.
     pub fn new(mut header: Header, network: Network) -> Result<Self> {
         if header.labels.len() != network.outputs() {
             let (labels, outputs) = (header.labels.len(), network.outputs());
             return Err(NetError::Targets(format!("{labels} labels for {outputs} outputs")));
+        }
+        if let Some((name, value)) = network.parameters().not_finite() {
+            return Err(NetError::Targets(format!("{name} holds {value}: no network to keep")));
         }
         header.format = FORMAT;
         Ok(Self { header, network })
@@ -103,7 +108,16 @@ impl NetModel {
         }
         let header: Header = serde_json::from_value(value).map_err(|e| e.to_string())?;
         header.recipe.check().map_err(|e| e.to_string())?;
-        let definition = networks::named(&header.network).map_err(|e| e.to_string())?;
+        let definition = networks::classifier(&header.network).map_err(|e| e.to_string())?;
+        // Before a network is made: a few labels too many would ask for any amount of numbers.
+        let declared = definition.declared(header.labels.len()).map_err(|e| e.to_string())?;
+        let shapes = weights::safetensors_shapes(bytes)?;
+        let shapes = shapes.iter().map(|(name, shape)| (name.as_str(), shape.as_slice()));
+        let differences = parameters::differences(&declared, shapes);
+        if !differences.is_empty() {
+            let network = definition.name.into();
+            return Err(NetError::Weights { network, differences }.to_string());
+        }
         let mut network =
             definition.build(Some(header.labels.len()), 0).map_err(|e| e.to_string())?;
         let state = weights::from_safetensors(bytes)?;

@@ -24,6 +24,29 @@ impl Input {
     pub fn new(name: impl Into<String>, shape: Shape) -> Self {
         Self { name: name.into(), shape }
     }
+
+    /// Whether an item of this shape in PyTorch's layout is one.
+    pub fn takes(&self, item: &[usize]) -> bool {
+        match (self.shape, item) {
+            (Shape::Vector(n), &[m]) => n == m,
+            (Shape::Image { height, width, channels }, &[c, h, w]) => {
+                (c, h, w) == (channels, height, width)
+            }
+            (Shape::Sequence { numbers, .. }, &[steps, m]) => numbers == m && steps > 0,
+            _ => false,
+        }
+    }
+
+    /// Items in PyTorch's layout, for people.
+    pub fn layout(&self) -> String {
+        match self.shape {
+            Shape::Vector(n) => format!("[items, {n}]"),
+            Shape::Image { height, width, channels } => {
+                format!("[items, {channels}, {height}, {width}]")
+            }
+            Shape::Sequence { numbers, .. } => format!("[items, steps, {numbers}]"),
+        }
+    }
 }
 
 /// The layers between inputs and outputs.
@@ -243,26 +266,9 @@ impl Network {
             return Err(NetError::InputCount { network, expected, actual });
         }
         let one = |(input, (shape, values)): (&Input, &(Vec<usize>, Vec<f32>))| {
-            let refuse = || {
-                let expected = match input.shape {
-                    Shape::Vector(n) => format!("[items, {n}]"),
-                    Shape::Image { height, width, channels } => {
-                        format!("[items, {channels}, {height}, {width}]")
-                    }
-                    Shape::Sequence { numbers, .. } => format!("[items, steps, {numbers}]"),
-                };
-                refusal(&input.name, expected, shape)
-            };
-            let fits = match (input.shape, &shape[..]) {
-                (Shape::Vector(n), &[_, m]) => n == m,
-                (Shape::Image { height, width, channels }, &[_, c, h, w]) => {
-                    (c, h, w) == (channels, height, width)
-                }
-                (Shape::Sequence { numbers, .. }, &[_, steps, m]) => numbers == m && steps > 0,
-                _ => false,
-            };
+            let fits = input.takes(shape.get(1..).unwrap_or_default());
             if !fits || values.len() != shape.iter().product::<usize>() || values.is_empty() {
-                return Err(refuse());
+                return Err(refusal(&input.name, input.layout(), shape));
             }
             Ok(match input.shape {
                 Shape::Image { .. } => Batch::from_channels_first(values, input.shape),

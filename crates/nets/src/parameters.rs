@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use rayon::prelude::*;
+
 use crate::error::{NetError, Result};
 use crate::matrix::Matrix;
 use crate::random::Stream;
@@ -104,43 +106,69 @@ impl Parameters {
         self.declared.iter().filter(|d| d.trained).map(Declared::len).sum()
     }
 
+    /// The first parameter with a number that is not finite, and that number.
+    pub(crate) fn not_finite(&self) -> Option<(&str, f32)> {
+        self.iter().find_map(|(d, values)| Some((d.name.as_str(), not_finite(values)?)))
+    }
+
     /// Replaces all values by those given under PyTorch's names. `num_batches_tracked` may be there.
     ///
     /// # Errors
     /// [`NetError::Weights`] with every name and shape that differs; nothing is changed then.
     pub fn load(&mut self, network: &str, state: &[(String, Vec<usize>, Vec<f32>)]) -> Result<()> {
-        let mut differences = Vec::new();
-        let mut given: HashMap<&str, (&[usize], &[f32])> = HashMap::new();
-        for (name, shape, values) in state {
-            if name.ends_with("num_batches_tracked") {
-                continue;
-            }
-            if !self.index.contains_key(name) {
-                differences.push(format!("{name} {shape:?} is not one of its parameters"));
-            } else if values.len() != shape.iter().product::<usize>() {
+        let shapes = state.iter().map(|(name, shape, _)| (name.as_str(), shape.as_slice()));
+        let mut differences = differences(&self.declared, shapes);
+        let mut given: HashMap<&str, &[f32]> = HashMap::new();
+        for (name, shape, values) in state.iter().filter(|s| self.index.contains_key(&s.0)) {
+            if values.len() != shape.iter().product::<usize>() {
                 differences.push(format!("{name} has {} values for {shape:?}", values.len()));
             } else if let Some(i) = values.iter().position(|v| !v.is_finite()) {
                 differences.push(format!("{name}: value {i} is {}", values[i]));
             }
-            given.insert(name, (shape, values));
-        }
-        for d in &self.declared {
-            match given.get(d.name.as_str()) {
-                None => differences.push(format!("{} {:?} is missing", d.name, d.shape)),
-                Some((shape, _)) if *shape != d.shape => {
-                    differences.push(format!("{} is {shape:?}, expected {:?}", d.name, d.shape));
-                }
-                Some(_) => (),
-            }
+            given.insert(name, values);
         }
         if !differences.is_empty() {
             return Err(NetError::Weights { network: network.into(), differences });
         }
         for (d, value) in self.declared.iter().zip(&mut self.values) {
-            *value = matrix_of(d, given[d.name.as_str()].1.to_vec());
+            *value = matrix_of(d, given[d.name.as_str()].to_vec());
         }
         Ok(())
     }
+}
+
+/// Names and shapes that are not those declared; `num_batches_tracked` may be there.
+pub(crate) fn differences<'a>(
+    declared: &[Declared],
+    given: impl Iterator<Item = (&'a str, &'a [usize])>,
+) -> Vec<String> {
+    let known: HashMap<&str, &Declared> = declared.iter().map(|d| (d.name.as_str(), d)).collect();
+    let mut shapes: HashMap<&str, &[usize]> = HashMap::new();
+    let mut differences = Vec::new();
+    for (name, shape) in given.filter(|(name, _)| !name.ends_with("num_batches_tracked")) {
+        if !known.contains_key(name) {
+            differences.push(format!("{name} {shape:?} is not one of its parameters"));
+        }
+        shapes.insert(name, shape);
+    }
+    for d in declared {
+        match shapes.get(d.name.as_str()) {
+            None => differences.push(format!("{} {:?} is missing", d.name, d.shape)),
+            Some(shape) if *shape != d.shape => {
+                differences.push(format!("{} is {shape:?}, expected {:?}", d.name, d.shape));
+            }
+            Some(_) => (),
+        }
+    }
+    differences
+}
+
+/// The first number that is not finite.
+pub(crate) fn not_finite(values: &[f32]) -> Option<f32> {
+    // A whole piece at a time, so that the processor looks at many numbers at once.
+    let odd = |piece: &&[f32]| piece.iter().fold(false, |odd, v| odd | !v.is_finite());
+    let piece = values.par_chunks(1 << 15).find_first(odd)?;
+    piece.iter().copied().find(|v| !v.is_finite())
 }
 
 fn matrix_of(declared: &Declared, values: Vec<f32>) -> Matrix {

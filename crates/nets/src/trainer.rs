@@ -8,6 +8,7 @@ use crate::kernels;
 use crate::loss::{Loss, Targets};
 use crate::network::{Gradients, Network};
 use crate::optimiser::{Optimiser, OptimiserSpec, clip};
+use crate::parameters::not_finite;
 use crate::random::Stream;
 
 /// What a step needs beyond the network.
@@ -56,13 +57,20 @@ impl<'a> Trainer<'a> {
     /// One step: forward, backward, change.
     ///
     /// # Errors
-    /// Inputs or targets that do not fit; [`NetError::Diverged`]. The network is as it was then.
+    /// Inputs or targets that do not fit, and [`NetError::Diverged`] by a loss, a gradient or a
+    /// running statistic: the network is as it was then. [`NetError::Diverged`] by a parameter that
+    /// the step drove out of single precision: the network is of no use any more.
     pub fn step(&mut self, inputs: &[Batch], targets: &Targets) -> Result<Step> {
         let number = self.optimiser.steps + 1;
         let dropout = self.settings.dropout.map(|s| Stream::new(s, "dropout").part(number));
         let StepSettings { loss, class_weights, clip_grad_norm, .. } = &self.settings;
         let mut found = self.network.gradients(inputs, targets, loss, class_weights, dropout)?;
         let norms = finite_norms(self.network, &found, number)?;
+        for (name, values) in &found.running {
+            if let Some(value) = not_finite(values) {
+                return Err(NetError::Diverged { step: number, what: name.clone(), value });
+            }
+        }
         if let Some(largest) = clip_grad_norm {
             // In the parameters' order: a sum over a hash map would change from run to run.
             let declared = self.network.parameters().declared();
@@ -73,6 +81,9 @@ impl<'a> Trainer<'a> {
         self.optimiser.step(self.network.parameters_mut(), &found.by_parameter);
         for (name, values) in found.running {
             self.network.parameters_mut().get_mut(&name).values_mut().copy_from_slice(&values);
+        }
+        if let Some((name, value)) = self.network.parameters().not_finite() {
+            return Err(NetError::Diverged { step: number, what: name.into(), value });
         }
         Ok(Step { loss: found.loss, norms, outputs: found.outputs })
     }

@@ -56,8 +56,8 @@ mod _core {
     use crate::mel::{apply_mel, delta, mel, melspectrogram, mfcc, power_to_db};
     #[pymodule_export]
     use crate::nets::{
-        PyNetwork, PyTrainedNetwork, network_recipe, networks_published, read_weights,
-        write_weights,
+        PyNetwork, PyTrainedNetwork, classifier_inputs, network_recipe, networks_published,
+        read_weights, write_weights,
     };
     #[pymodule_export]
     use crate::onset::{detrend, onset_backtrack, onset_detect, onset_rises, onset_strength};

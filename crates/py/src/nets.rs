@@ -148,7 +148,7 @@ impl PyNetwork {
     }
 
     /// Steps over the whole batch. Losses, and the gradients' norms at the first step. After a
-    /// refusal the network is as it was before the step that failed.
+    /// refusal the network is as it was before the first of them.
     #[allow(clippy::too_many_arguments, reason = "one private caller, by name")]
     fn train_steps<'py>(
         &mut self,
@@ -168,7 +168,8 @@ impl PyNetwork {
             (Some(classes), _) => loss::Targets::Classes(classes),
             (None, numbers) => loss::Targets::Numbers(numbers.unwrap_or_default()),
         };
-        compute(py, || {
+        let before = self.0.parameters().clone();
+        let done = compute(py, || {
             let mut trainer = Trainer::new(&mut self.0, settings);
             let (mut losses, mut norms) = (Vec::new(), HashMap::new());
             for step in 0..steps {
@@ -179,8 +180,11 @@ impl PyNetwork {
                 }
             }
             Ok::<_, corsmal_nets::NetError>((losses, norms))
-        })?
-        .map_err(value_error)
+        });
+        if !matches!(done, Ok(Ok(_))) {
+            *self.0.parameters_mut() = before;
+        }
+        done?.map_err(value_error)
     }
 }
 
@@ -198,6 +202,13 @@ pub(crate) fn network_recipe(name: &str, changes: &str) -> PyResult<String> {
     let recipe =
         networks::named(name).and_then(|d| d.recipe_with(&changes)).map_err(value_error)?;
     serde_json::to_string(&recipe).map_err(value_error)
+}
+
+/// Name and shape of each input of a network that classifies.
+#[pyfunction]
+pub(crate) fn classifier_inputs(name: &str) -> PyResult<Vec<(String, String)>> {
+    let inputs = networks::classifier(name).map_err(value_error)?.inputs();
+    Ok(inputs.into_iter().map(|i| (i.name, i.shape.to_string())).collect())
 }
 
 #[pymethods]
@@ -222,7 +233,7 @@ impl PyTrainedNetwork {
         let recipe: FitRecipe = serde_json::from_str(recipe).map_err(value_error)?;
         let provenance = serde_json::from_str(provenance).map_err(value_error)?;
         let items = items(&columns)?;
-        let definition = networks::named(name).map_err(value_error)?;
+        let definition = networks::classifier(name).map_err(value_error)?;
         let mut network = definition.build(Some(labels.len()), recipe.seed).map_err(value_error)?;
         let task = Task { items: &items, classes: &classes, train: &train, watched: &watched };
         let score = |truth: &[usize], found: &[usize]| {
@@ -232,7 +243,9 @@ impl PyTrainedNetwork {
         let tell = |told: Progress<'_>| {
             let result = Python::attach(|py| {
                 py.check_signals()?;
-                let Some(progress) = &progress else { return Ok(()) };
+                let Some(progress) = progress.as_ref().filter(|_| told.step.is_none()) else {
+                    return Ok(());
+                };
                 let last = told.epochs.last();
                 let arguments = (
                     told.epochs.len(),

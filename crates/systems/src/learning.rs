@@ -158,7 +158,7 @@ impl<'a> Learning<'a> {
         let mut net = definition.build(Some(outputs), recipe.seed).map_err(refuse)?;
         let task = Task { items, classes, train, watched: &[] };
         let told = |progress: fit::Progress<'_>| {
-            if let Some(epoch) = progress.epochs.last() {
+            if let (None, Some(epoch)) = (progress.step, progress.epochs.last()) {
                 let (done, total) = (progress.epochs.len(), progress.total);
                 let left = progress.left.as_secs();
                 (self.work.progress)(&format!(

@@ -35,6 +35,15 @@ impl MemberArgs {
     pub fn names(&self) -> MemberNames {
         MemberNames { x: self.x.clone(), ids: self.ids.clone() }
     }
+
+    /// Refuses names of members where there is no file of another program.
+    #[cfg_attr(not(feature = "nets"), expect(dead_code, reason = "for networks"))]
+    pub fn refuse(&self) -> Result<(), Failure> {
+        match (self.x.as_str(), &self.ids) {
+            ("X", None) => Ok(()),
+            _ => Err(Failure::new("--x and --ids name members of an .npz: recordings have none")),
+        }
+    }
 }
 
 /// Where labels come from.
@@ -91,7 +100,7 @@ pub struct DatasetArgs {
     #[arg(long, value_name = "FILE", conflicts_with = "table")]
     features: Option<PathBuf>,
     #[command(flatten)]
-    members: MemberArgs,
+    pub members: MemberArgs,
     #[command(flatten)]
     labels: LabelArgs,
     /// Label column to learn; the only one where there is one. `joint` is type and level together

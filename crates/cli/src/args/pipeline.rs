@@ -26,21 +26,32 @@ pub struct PipelineArgs {
     /// folds inside the training rows.
     #[arg(long, value_name = "KEY=V1,V2")]
     tune: Vec<String>,
-    /// Seed of the classifier and of shuffled folds.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub seed: u32,
+    /// Seed of the classifier or network and of shuffled folds; 0 where it is not given.
+    #[arg(long, value_name = "N")]
+    seed: Option<u32>,
 }
 
 impl PipelineArgs {
-    /// What --set says, key by key.
+    /// The seed.
+    pub fn seed(&self) -> u32 {
+        self.seed.unwrap_or(0)
+    }
+
+    /// What --set and --seed say of a network's recipe, key by key.
     #[cfg_attr(not(feature = "nets"), expect(dead_code, reason = "for networks"))]
     pub fn changes(&self) -> Result<Map<String, Value>, Failure> {
-        Ok(key_values(&self.parameters)?)
+        let mut changes = key_values(&self.parameters)?;
+        if let Some(seed) = self.seed
+            && changes.insert("seed".into(), seed.into()).is_some()
+        {
+            return Err(Failure::new("--seed and --set seed=… say the same twice: give one"));
+        }
+        Ok(changes)
     }
 
     /// The pipelines to choose from: one, unless something is tuned.
     pub fn candidates(&self) -> Result<Vec<PipelineSpec>, Failure> {
-        self.candidates_with(self.seed)
+        self.candidates_with(self.seed())
     }
 
     /// The same with another seed.

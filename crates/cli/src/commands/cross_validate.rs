@@ -37,7 +37,7 @@ Examples:
 With --tune the parameters are chosen anew in every fold, on inner folds of its training rows.
 `score` says more of the --predictions, `compare-predictions` tests whether those of two runs differ.
 
-Exit codes: 0 fine, 2 could not run.")]
+Exit codes: 0 fine, 2 could not run, 130 interrupted.")]
 pub struct Args {
     #[command(flatten)]
     dataset: DatasetArgs,
@@ -64,7 +64,7 @@ pub struct Args {
     report: Option<PathBuf>,
     /// Repeat with N seeds, from --seed on: how much of a difference between two classifiers is
     /// chance?
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "N", conflicts_with = "net", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     seeds: u32,
     /// Replace an existing file of predictions.
     #[arg(long)]
@@ -95,7 +95,7 @@ fn cross_validate(args: &Args) -> Result<ExitCode, Failure> {
     let (table, target) = args.dataset.load()?;
     let groups = args.dataset.groups.as_deref();
     let plan = (args.cv.as_ref(), groups);
-    let validation = validate(&table, &target, candidates, plan, args.pipeline.seed)?;
+    let validation = validate(&table, &target, candidates, plan, args.pipeline.seed())?;
     for warning in &validation.warnings {
         eprintln!("warning: {warning}");
     }
@@ -105,14 +105,14 @@ fn cross_validate(args: &Args) -> Result<ExitCode, Failure> {
     if let Some(path) = &args.predictions {
         draft::write(path, &predictions.to_csv()?)?;
     }
-    let others = (1..args.seeds).map(|more| args.pipeline.seed.wrapping_add(more));
+    let others = (1..args.seeds).map(|more| args.pipeline.seed().wrapping_add(more));
     let others = others.map(|seed| {
         let candidates = args.pipeline.candidates_with(seed)?;
         let found = validate(&table, &target, candidates, plan, seed)?;
         Ok((seed, found.result.pooled))
     });
     let others = others.collect::<Result<Vec<_>, Failure>>()?;
-    let all_seeds = Seeds::of(args.pipeline.seed, &validation.result.pooled, &others);
+    let all_seeds = Seeds::of(args.pipeline.seed(), &validation.result.pooled, &others);
     if args.json {
         let output = Output { validation: &validation, seeds: all_seeds };
         println!("{}", serde_json::to_string_pretty(&output)?);
@@ -262,6 +262,9 @@ fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
     if let Some(path) = &args.predictions {
         draft::write(path, &predictions.to_csv()?)?;
     }
+    if let Some(caution) = found.caution.filter(|_| args.json || quiet) {
+        eprintln!("warning: {caution}");
+    }
     if args.json {
         let report = serde_json::json!({
             "target": found.target,
@@ -270,13 +273,18 @@ fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
             "training": found.report,
             "result": found.result,
             "held_out": scores,
+            "caution": found.caution,
         });
         println!("{}", serde_json::to_string_pretty(&report)?);
     } else if !args.quiet {
         println!("features  {}: {} items", found.table.path.display(), ids.len());
         println!("target    {}, {} classes", found.target, found.labels.len());
         println!("network   {name}");
-        println!("held out  {}\n", found.folds.description);
+        println!("held out  {}", found.folds.description);
+        if let Some(caution) = found.caution {
+            println!("caution   {caution}");
+        }
+        println!();
         print_folds(&found.result, &[], &found.folds);
         print_held_out(&scores);
     }
@@ -290,7 +298,9 @@ fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
             predictions: &predictions,
             scores: &scores,
             seeds: &[],
-            facts: vec![Fact::new("Network", name)],
+            facts: std::iter::once(Fact::new("Network", name))
+                .chain(found.caution.map(|caution| Fact::new("Caution", caution)))
+                .collect(),
             quiet,
         };
         held_out.write(folder, None)?;

@@ -58,6 +58,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 
     use corsmal_ccm::CcmError;
     use corsmal_extract::inputs;
+    use corsmal_files::outcome::Status;
     use corsmal_nets::dataset::Dataset;
     use corsmal_nets::items::{Column, Items};
     use corsmal_nets::recipe::Padding;
@@ -130,10 +131,17 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         let all = Column::of(patches.iter().map(|item| item.values.as_slice()));
         let items = Items { columns: vec![all] };
         let rows: Vec<usize> = (0..items.len()).collect();
+        let begin = column.values.len();
         for rows in rows.chunks(TOGETHER) {
             let batch = items.batch(&network, rows, Padding::Masked);
             let found = pool.install(|| network.forward(&batch))?;
             column.values.extend_from_slice(found.values.values());
+        }
+        if let Some(odd) = column.values[begin..].iter().find(|v| !v.is_finite()) {
+            eprintln!("{}: {}: the embedding holds {odd}", input.id, Status::NonFinite);
+            column.values.truncate(begin);
+            failed += 1;
+            continue;
         }
         column.offsets.push(column.values.len());
         if columns.is_empty() {

@@ -29,7 +29,7 @@ The model file holds classifier, scaling, label names, the feature configuration
 rates and channels of the recordings, so `corsmal-feat classify` needs nothing else.
 `corsmal-feat classifiers` explains the classifiers and their parameters.
 
-Exit codes: 0 fine, 2 could not run.")]
+Exit codes: 0 fine, 2 could not run, 130 interrupted.")]
 pub struct Args {
     #[command(flatten)]
     dataset: DatasetArgs,
@@ -78,7 +78,7 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
     let mut chosen = 0;
     let mut choice = Value::Null;
     if candidates.len() > 1 {
-        let (seed, named) = (args.pipeline.seed, args.dataset.groups.as_deref());
+        let (seed, named) = (args.pipeline.seed(), args.dataset.groups.as_deref());
         let folds = Folds::new(None, &table, named, (&labels, &classes), seed)?;
         let data = Data { dataset: &dataset, merge: None };
         let all: Vec<usize> = (0..classes.len()).collect();
@@ -93,7 +93,7 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
         "rows": classes.len(),
         "rows_per_class": rows_of.iter().map(|(n, r)| (n.clone(), (*r).into())).collect::<Map<_, _>>(),
         "groups": groups.map(|g| Labels::of(&g).0),
-        "seed": args.pipeline.seed,
+        "seed": args.pipeline.seed(),
         "choice": choice,
     });
     let trained_on = table.trained_on();

@@ -6,7 +6,7 @@ use corsmal_files::npy::{DType, Header};
 use corsmal_files::npz::{Compression, NpzWriter};
 use serde_json::Value;
 
-use crate::command::{done, refused, text};
+use crate::command::{done, interrupt, refused, run, text, tool};
 
 /// Sequences of 128 numbers, each higher where the container is full, of three containers.
 fn sequences(path: &Path) {
@@ -114,6 +114,18 @@ fn what_a_network_cannot_learn_from_is_refused() {
     refuse(&[&level[..], &["--set", "select=validation"]].concat(), "groups");
     refuse(&[&level[..], &["--set", "recipe=book"]].concat(), "code or paper");
     refuse(&[&level[..], &["--device", "cuda"]].concat(), "cpu only");
+    refuse(&[&level[..], &["--x", "OTHER"]].concat(), "no member OTHER");
+    refuse(&[&level[..], &["--ids", "names"]].concat(), "no member names");
+    refuse(&[&level[..], &["--seed", "1", "--set", "seed=1"]].concat(), "give one");
+    refuse(&[&level[..], &["--set", "epochs=1", "--set", "lr=1e39"]].concat(), "training step 1");
+    let recordings = folder.path().join("audio");
+    tone(&recordings.join("a/1.wav"), 0, 0.1, 16_000);
+    let words = ["train", text(&recordings), "--net", "m4-type", "--labels", "folders", "--x", "Y"];
+    assert!(
+        refused(&[&words[..], &["-o", text(&model)]].concat()).contains("recordings have none")
+    );
+    let words = ["cross-validate", text(&features), "--seeds", "3"];
+    assert!(refused(&[&words[..], &level[..]].concat()).contains("--seeds"));
 }
 
 #[test]
@@ -195,7 +207,7 @@ fn a_network_learns_from_recordings_and_hears_them() {
     let model = path("type.safetensors");
     let learn = ["train", text(&audio), "--net", "m4-type", "--labels", "folders"];
     let recipe = ["--set", "epochs=4", "--set", "batch=6", "--set", "lr=0.001", "-o", text(&model)];
-    let output = crate::command::run(&[&learn[..], &recipe[..]].concat());
+    let output = run(&[&learn[..], &recipe[..]].concat());
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{message}");
     assert!(
@@ -205,7 +217,7 @@ fn a_network_learns_from_recordings_and_hears_them() {
 
     // A line for each window of a recording, and the reason for the one that has none.
     let classify = ["classify", "-m", text(&model), text(&audio)];
-    let output = crate::command::run(&classify);
+    let output = run(&classify);
     assert_eq!(output.status.code(), Some(1));
     let table = String::from_utf8(output.stdout).unwrap();
     let of = |id: &str| table.lines().filter(|l| l.starts_with(&format!("{id},"))).count();
@@ -215,7 +227,7 @@ fn a_network_learns_from_recordings_and_hears_them() {
     assert!(table.contains("too_short"), "{table}");
 
     // One decision for each, by their votes; right, since the network was trained on them.
-    let votes = crate::command::run(&[&classify[..], &["--vote", "majority"]].concat());
+    let votes = run(&[&classify[..], &["--vote", "majority"]].concat());
     let votes = String::from_utf8(votes.stdout).unwrap();
     assert_eq!(votes.lines().count(), 8, "{votes}");
 
@@ -223,14 +235,14 @@ fn a_network_learns_from_recordings_and_hears_them() {
     let wav = audio.join("noise/1.wav");
     let live = ["classify", "-m", text(&model), "-", "--window", "0.7", "--hop", "0.1"];
     let stdin = std::fs::File::open(&wav).unwrap();
-    let output = crate::command::tool().args(live).stdin(stdin).output().unwrap();
+    let output = tool().args(live).stdin(stdin).output().unwrap();
     let live = String::from_utf8(output.stdout).unwrap();
     assert_eq!(live.lines().count(), 5, "{live}");
 
     // Other formats are refused file by file.
     let other = path("other.wav");
     tone(&other, 0, 1.0, 22_050);
-    let output = crate::command::run(&["classify", "-m", text(&model), text(&other)]);
+    let output = run(&["classify", "-m", text(&model), text(&other)]);
     assert_eq!(output.status.code(), Some(1));
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(message.contains("mismatch"), "{message}");
@@ -275,4 +287,56 @@ fn embedding_needs_the_weights_of_its_network() {
     refuse("vggish", &path("none.pth"), "none.pth");
     refuse("m2-type", &weights, "gives classes");
     refuse("yamnet", &weights, "vggish");
+}
+
+#[test]
+fn the_seed_is_that_of_the_training() {
+    let folder = tempfile::tempdir().unwrap();
+    let features = folder.path().join("x.npz");
+    sequences(&features);
+    let train = |seed: &[&str]| {
+        let out = folder.path().join(format!("{}.safetensors", seed.join("")));
+        let words = ["train", text(&features), "--net", "m5-vggish-level", "--target", "level"];
+        let more = ["--set", "epochs=1", "-q", "-o", text(&out)];
+        done(&[&words[..], &more[..], seed].concat());
+        std::fs::read(out).unwrap()
+    };
+    assert!(train(&["--seed", "7"]) == train(&["--set", "seed=7"]));
+}
+
+#[test]
+fn a_score_that_chose_its_epoch_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let features = folder.path().join("x.npz");
+    sequences(&features);
+    let words =
+        ["cross-validate", text(&features), "--net", "m5-vggish-level", "--target", "level"];
+    let more = ["--cv", "2", "--set", "epochs=1", "--set", "select=published"];
+    let words = [&words[..], &more[..]].concat();
+    let said = "chosen by the fold that it is scored on";
+    assert!(done(&words).contains(said));
+    let output = run(&[&words[..], &["--json"]].concat());
+    assert!(String::from_utf8_lossy(&output.stderr).contains(said));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(report["caution"].as_str().is_some_and(|text| text.contains(said)), "{report}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_training_can_be_interrupted() {
+    use std::io::{BufRead, BufReader};
+
+    let folder = tempfile::tempdir().unwrap();
+    let (features, model) = (folder.path().join("x.npz"), folder.path().join("x.safetensors"));
+    sequences(&features);
+    let words = ["train", text(&features), "--net", "m5-vggish-level", "--target", "level"];
+    let more = ["--set", "epochs=100000", "-o", text(&model)];
+    let mut command = tool();
+    command.args(words).args(more).stderr(std::process::Stdio::piped());
+    let mut process = command.spawn().unwrap();
+    let mut lines = BufReader::new(process.stderr.take().unwrap()).lines().map(Result::unwrap);
+    assert!(lines.any(|line| line.contains("epoch 1 of 100000")));
+    assert_eq!(interrupt(&mut process), Some(130));
+    assert!(lines.any(|line| line.contains("stopped after")));
+    assert!(!model.exists());
 }

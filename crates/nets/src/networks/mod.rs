@@ -6,7 +6,8 @@ use serde_json::{Map, Value, json};
 
 use crate::error::{NetError, Result};
 use crate::front_end::FrontEnd;
-use crate::network::{Architecture, Network};
+use crate::network::{Architecture, Input, Network};
+use crate::parameters::Declared;
 use crate::recipe::Recipe;
 
 /// A published network.
@@ -67,6 +68,18 @@ pub fn named(name: &str) -> Result<&'static Definition> {
     })
 }
 
+/// The same, where its outputs are classes.
+///
+/// # Errors
+/// [`NetError::UnknownNetwork`], [`NetError::NoClasses`].
+pub fn classifier(name: &str) -> Result<&'static Definition> {
+    let definition = named(name)?;
+    match definition.classifies {
+        true => Ok(definition),
+        false => Err(NetError::NoClasses { network: definition.name.into() }),
+    }
+}
+
 /// Most outputs a network may be given.
 pub const MAX_OUTPUTS: usize = 1 << 16;
 
@@ -105,6 +118,24 @@ impl Definition {
     /// # Errors
     /// No outputs, or more than [`MAX_OUTPUTS`].
     pub fn build(&self, outputs: Option<usize>, seed: u64) -> Result<Network> {
+        Network::new(self.name, self.layers(outputs)?, seed)
+    }
+
+    /// Its parameters without their numbers.
+    ///
+    /// # Errors
+    /// As [`Definition::build`].
+    pub(crate) fn declared(&self, outputs: usize) -> Result<Vec<Declared>> {
+        let layers = self.layers(Some(outputs))?;
+        Ok(layers.body.layers().flat_map(|layer| layer.parameters()).collect())
+    }
+
+    /// What an item is: name and shape of each input.
+    pub fn inputs(&self) -> Vec<Input> {
+        (self.architecture)(self.outputs).inputs
+    }
+
+    fn layers(&self, outputs: Option<usize>) -> Result<Architecture> {
         let outputs = outputs.unwrap_or(self.outputs);
         if outputs == 0 || outputs > MAX_OUTPUTS {
             return Err(NetError::Recipe {
@@ -113,7 +144,7 @@ impl Definition {
                 allowed: format!("1 to {MAX_OUTPUTS}"),
             });
         }
-        Network::new(self.name, (self.architecture)(outputs), seed)
+        Ok((self.architecture)(outputs))
     }
 }
 

@@ -11,7 +11,7 @@ use std::path::Path;
 
 pub use error::WeightsError;
 pub use numbers::{MAX_FILE, State};
-pub use safetensors::{from_safetensors, safetensors_text, to_safetensors};
+pub use safetensors::{from_safetensors, safetensors_shapes, safetensors_text, to_safetensors};
 
 /// Reads weights, the format by the file's ending. Nothing in the file is run.
 ///

@@ -48,6 +48,10 @@ pub(super) struct Tensor {
 
 /// Longest stack and memo accepted.
 const MAX_VALUES: usize = 1 << 20;
+/// Values made and copied in all; a long text counts for several.
+const MAX_WORK: usize = 2 * MAX_VALUES;
+/// Deepest nesting accepted; weights have a few levels.
+const MAX_DEPTH: usize = 16;
 
 /// Reads one pickle.
 pub(super) fn read(bytes: &[u8]) -> Result<Value, String> {
@@ -64,7 +68,7 @@ struct Machine<'a> {
     at: usize,
     stack: Vec<Value>,
     memo: Vec<Value>,
-    /// values copied so far
+    /// values made and copied so far
     work: usize,
 }
 
@@ -100,8 +104,14 @@ impl Machine<'_> {
         if self.stack.len() >= MAX_VALUES {
             return Err(format!("more than {MAX_VALUES} values"));
         }
+        self.spend(1)?;
         self.stack.push(value);
         Ok(())
+    }
+
+    fn spend(&mut self, values: usize) -> Result<(), String> {
+        self.work += values;
+        if self.work > MAX_WORK { Err("too many values".into()) } else { Ok(()) }
     }
 
     fn pop(&mut self) -> Result<Value, String> {
@@ -138,8 +148,7 @@ impl Machine<'_> {
 
     /// Copies are counted: a pickle of a few bytes could double its values again and again.
     fn count(&mut self, value: &Value) -> Result<(), String> {
-        self.work += size(value, 0)?;
-        if self.work > 16 * MAX_VALUES { Err("too many values".into()) } else { Ok(()) }
+        self.spend(size(value, 0)?)
     }
 
     fn step(&mut self) -> Result<Option<Value>, String> {
@@ -202,19 +211,20 @@ impl Machine<'_> {
             }
             b')' => self.push(Value::Tuple(Vec::new()))?,
             b't' => {
-                let items = self.since_mark()?;
+                let items = shallow(self.since_mark()?)?;
                 self.push(Value::Tuple(items))?;
             }
             0x85..=0x87 => {
                 let n = usize::from(code - 0x84);
                 let at = self.stack.len().checked_sub(n).ok_or("the stack is empty")?;
-                let items = self.stack.split_off(at);
+                let items = shallow(self.stack.split_off(at))?;
                 self.push(Value::Tuple(items))?;
             }
             b']' => self.push(Value::List(Vec::new()))?,
             b'}' => self.push(Value::Dict(Vec::new()))?,
             b'a' | b'e' => {
                 let items = if code == b'a' { vec![self.pop()?] } else { self.since_mark()? };
+                let items = shallow(items)?;
                 match self.stack.last_mut() {
                     Some(Value::List(list)) => list.extend(items),
                     _ => return Err("a value is appended to something that is not a list".into()),
@@ -227,6 +237,7 @@ impl Machine<'_> {
                 } else {
                     self.since_mark()?
                 };
+                let items = shallow(items)?;
                 let Some(Value::Dict(dict)) = self.stack.last_mut() else {
                     return Err("a value is set in something that is not a dictionary".into());
                 };
@@ -290,15 +301,25 @@ impl Machine<'_> {
     }
 }
 
+/// Values that are about to go into another one; refuses those that would lie too deep there. A value
+/// nested deeper could not even be dropped: each level takes a piece of the stack.
+fn shallow(items: Vec<Value>) -> Result<Vec<Value>, String> {
+    items.iter().try_for_each(|item| size(item, 1).map(|_| ()))?;
+    Ok(items)
+}
+
 /// Values in a value; refuses nesting beyond what weights have.
 fn size(value: &Value, depth: usize) -> Result<usize, String> {
-    if depth > 16 {
+    if depth > MAX_DEPTH {
         return Err("values nested too deep".into());
     }
     let add = |n: usize, item: &Value| Ok::<_, String>(n + size(item, depth + 1)?);
     match value {
         Value::Tuple(items) | Value::List(items) => items.iter().try_fold(1, add),
         Value::Dict(items) => items.iter().flat_map(|(k, v)| [k, v]).try_fold(1, add),
+        Value::Text(text) => Ok(1 + text.len() / 64),
+        Value::Storage(storage) => Ok(1 + storage.key.len() / 64),
+        Value::Tensor(tensor) => Ok(1 + (tensor.storage.key.len() + 16 * tensor.shape.len()) / 64),
         _ => Ok(1),
     }
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use zip::ZipArchive;
 
 use super::numbers::{MAX_FILE, State, numbers};
-use super::pickle::{self, Tensor, Value};
+use super::pickle::{self, Storage, Tensor, Value};
 
 /// Longest pickle read.
 const MAX_PICKLE: u64 = 64 << 20;
@@ -39,27 +39,42 @@ pub(super) fn read(path: &Path) -> Result<State, String> {
     }
     let bytes = member(&mut archive, pickle, MAX_PICKLE)?;
     let entries = entries(pickle::read(&bytes)?)?;
-    let mut state = State::new();
+    // Tensors that share a storage one after another: each is read once, and one is held at a time.
+    let mut order: Vec<usize> = (0..entries.len()).collect();
+    order.sort_by_key(|&i| (&entries[i].1.storage.key, entries[i].1.storage.kind));
+    let mut state: Vec<(usize, Vec<f32>)> = Vec::with_capacity(entries.len());
+    let mut held: Option<(&Storage, Vec<f32>)> = None;
     let mut total = 0u64;
-    for (name, tensor) in entries {
+    for i in order {
+        let (name, tensor) = &entries[i];
         let wrong = |reason: String| format!("{name}: {reason}");
         // A storage may be shared; what all tensors together take is bounded by the file.
-        let count = count(&tensor).ok_or_else(|| wrong("its shape is too large".into()))?;
-        total = total.saturating_add(count as u64 * tensor.storage.kind.size() as u64);
+        let count = count(tensor).ok_or_else(|| wrong("its shape is too large".into()))?;
+        let size = tensor.storage.kind.size() as u64;
+        total = total.saturating_add((count as u64).saturating_mul(size));
         if total > length.saturating_mul(2) {
             return Err(wrong("the tensors are larger than the file".into()));
         }
-        let key = format!("{root}data/{}", tensor.storage.key);
-        let raw = member(&mut archive, &key, MAX_FILE.min(length)).map_err(wrong)?;
-        let values = numbers(tensor.storage.kind, &raw);
+        let same = |s: &Storage| (&s.key, s.kind) == (&tensor.storage.key, tensor.storage.kind);
+        let values = match held.take().filter(|(storage, _)| same(storage)) {
+            Some((_, values)) => values,
+            None => {
+                let key = format!("{root}data/{}", tensor.storage.key);
+                let raw = member(&mut archive, &key, MAX_FILE.min(length)).map_err(wrong)?;
+                numbers(tensor.storage.kind, &raw)
+            }
+        };
         if values.len() < tensor.storage.len {
             return Err(wrong(format!("{} numbers of {}", values.len(), tensor.storage.len)));
         }
-        let values = view(&tensor, count, &values)
+        let seen = view(tensor, count, &values)
             .ok_or_else(|| wrong("its shape reaches beyond its numbers".into()))?;
-        state.push((name, tensor.shape, values));
+        state.push((i, seen));
+        held = Some((&tensor.storage, values));
     }
-    Ok(state)
+    state.sort_by_key(|&(i, _)| i);
+    let state = entries.into_iter().zip(state);
+    Ok(state.map(|((name, tensor), (_, values))| (name, tensor.shape, values)).collect())
 }
 
 fn member(

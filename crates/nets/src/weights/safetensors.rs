@@ -32,6 +32,17 @@ pub fn from_safetensors(bytes: &[u8]) -> Result<State, String> {
     Ok(state)
 }
 
+/// Names and shapes of a file's tensors, without their numbers.
+///
+/// # Errors
+/// A text when it is not such a file.
+pub fn safetensors_shapes(bytes: &[u8]) -> Result<Vec<(String, Vec<usize>)>, String> {
+    let (_, metadata) =
+        SafeTensors::read_metadata(bytes).map_err(|e| format!("not a safetensors file: {e}"))?;
+    let tensors = metadata.tensors();
+    Ok(tensors.into_iter().map(|(name, info)| (name, info.shape.clone())).collect())
+}
+
 /// A text entry of a file, from its bytes.
 ///
 /// # Errors

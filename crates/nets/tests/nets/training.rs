@@ -1,5 +1,6 @@
 //! The training loop, recipes, data sets and model files.
 
+use std::collections::HashMap;
 use std::time::Duration;
 
 use corsmal_files::npy::{DType, Header};
@@ -9,11 +10,13 @@ use corsmal_nets::cross_validation::{Data, Fold, cross_validate};
 use corsmal_nets::dataset::Dataset;
 use corsmal_nets::fit::{History, Task, fit, labels, probabilities};
 use corsmal_nets::items::{Column, Items};
+use corsmal_nets::loss::{Loss, Targets};
 use corsmal_nets::model::{self, NetModel};
 use corsmal_nets::network::Network;
 use corsmal_nets::networks;
 use corsmal_nets::random::Stream;
 use corsmal_nets::recipe::Recipe;
+use corsmal_nets::trainer::{StepSettings, Trainer};
 use serde_json::{Value, json};
 
 /// Part of the classes that is right.
@@ -91,12 +94,17 @@ fn progress_tells_the_time_and_can_end_the_training() {
     let mut told = Vec::new();
     let error =
         fit(&mut network, task, &recipe(json!({"epochs": 5})), None, accuracy, |progress| {
-            told.push((progress.epochs.len(), progress.left));
+            told.push((progress.epochs.len(), progress.step, progress.left));
             progress.epochs.len() < 2
         });
     assert!(matches!(error, Err(NetError::Stopped { epochs: 2 })), "{error:?}");
-    assert_eq!(told.iter().map(|t| t.0).collect::<Vec<_>>(), [0, 1, 2]);
-    assert!(told[0].1 > Duration::ZERO, "the duration is predicted before the first epoch");
+    let places: Vec<_> = told.iter().map(|t| (t.0, t.1)).collect();
+    assert_eq!(places, [(0, None), (0, Some(0)), (1, None), (1, Some(0)), (2, None)]);
+    assert!(told[0].2 > Duration::ZERO, "the duration is predicted before the first epoch");
+    // Between two steps of an epoch, too.
+    let recipe = recipe(json!({"epochs": 5, "batch": 2}));
+    let error = fit(&mut network, task, &recipe, None, accuracy, |p| p.step != Some(1));
+    assert!(matches!(error, Err(NetError::Stopped { epochs: 0 })), "{error:?}");
 }
 
 #[test]
@@ -209,6 +217,20 @@ fn a_model_file_gives_back_the_network() {
     for cut in [0, 7, 300, bytes.len() - 1] {
         assert!(NetModel::from_bytes(&bytes[..cut]).is_err());
     }
+    // As many outputs as labels: told before numbers are made for them.
+    for (network, labels, expected) in [
+        ("m3_mlp", 1 << 16, "is missing"),
+        ("m3_mlp", 1 << 20, "65536"),
+        ("m2_capacity", 1, "no classes"),
+    ] {
+        let labels = (0..labels).map(|i| i.to_string()).collect();
+        let header = model::Header { network: network.into(), labels, ..model.header.clone() };
+        let text = serde_json::to_string(&header).unwrap();
+        let texts = HashMap::from([("corsmal-feat".to_owned(), text)]);
+        let bytes = corsmal_nets::weights::to_safetensors(&Vec::new(), Some(texts)).unwrap();
+        let text = NetModel::from_bytes(&bytes).unwrap_err();
+        assert!(text.contains(expected), "{text}");
+    }
     let plain = corsmal_nets::weights::to_safetensors(&Vec::new(), None).unwrap();
     let text = NetModel::from_bytes(&plain).unwrap_err();
     assert!(text.contains("weights alone"), "{text}");
@@ -248,4 +270,90 @@ fn four_views_are_joined_to_recordings() {
     let other = networks::named("m5_vggish_level").unwrap().build(None, 0).unwrap();
     let text = Dataset::read(&path, &other).unwrap_err().to_string();
     assert!(text.contains("views.npz") && text.contains("512 numbers a row"), "{text}");
+}
+
+#[test]
+fn numbers_that_are_not_finite_end_the_training_or_the_prediction() {
+    let (mut items, classes) = vectors(6);
+    let mut network = networks::named("m3_mlp").unwrap().build(None, 0).unwrap();
+    let rows: Vec<usize> = (0..6).collect();
+    let task = Task { items: &items, classes: &classes, train: &rows, watched: &[] };
+    // The first step's loss and gradients are fine, what it makes of the parameters is not.
+    let recipe = recipe(json!({"epochs": 1, "lr": 1e39}));
+    let error = fit(&mut network, task, &recipe, None, accuracy, |_| true).unwrap_err();
+    let NetError::Diverged { step: 1, what, .. } = &error else { panic!("{error}") };
+    assert!(what.ends_with(".weight"), "{error}");
+
+    network.start(0);
+    let n = 6193;
+    items.columns[0].values[n..2 * n].fill(3e38);
+    let error = probabilities(&network, &items, &rows, &recipe).unwrap_err();
+    assert!(matches!(error, NetError::Output { item: 1, .. }), "{error}");
+
+    // Large inputs: the loss is as always behind a normalisation, whose running variance is not.
+    let definition = networks::named("m4_type").unwrap();
+    let mut network = definition.build(None, 0).unwrap();
+    let before: Vec<f32> = network.parameters().iter().flat_map(|(_, v)| v.to_vec()).collect();
+    let values: Vec<f32> = (0..2 * 8 * 64 * 64).map(|i| (i % 7) as f32 * 1e24).collect();
+    let items = Items { columns: vec![Column::of(values.chunks(8 * 64 * 64))] };
+    let settings = StepSettings {
+        optimiser: definition.recipe.optimiser(),
+        clip_grad_norm: None,
+        loss: Loss::CrossEntropy,
+        class_weights: Vec::new(),
+        dropout: None,
+    };
+    let inputs = items.batch(&network, &[0, 1], definition.recipe.padding);
+    let mut trainer = Trainer::new(&mut network, settings);
+    let error = trainer.step(&inputs, &Targets::Classes(vec![0, 1])).unwrap_err();
+    assert!(error.to_string().contains("running_var is inf"), "{error}");
+    let after: Vec<f32> = network.parameters().iter().flat_map(|(_, v)| v.to_vec()).collect();
+    assert!(after == before, "as it was");
+}
+
+#[test]
+fn items_of_another_layout_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.npz");
+    let refuse = |name: &str, shape: &[usize], offsets: Option<&[i64]>, expected: &str| {
+        let mut npz = NpzWriter::create(&path, Compression::Stored).unwrap();
+        npz.floats("X", shape, &vec![0.5; shape.iter().product()]).unwrap();
+        if let Some(offsets) = offsets {
+            let bytes: Vec<u8> = offsets.iter().flat_map(|v| v.to_le_bytes()).collect();
+            let header = Header::new(DType::parse("<i8").unwrap(), &[offsets.len()]);
+            npz.array("offsets", &header, &bytes).unwrap();
+        }
+        npz.finish().unwrap();
+        let network = networks::named(name).unwrap().build(None, 0).unwrap();
+        let text = Dataset::read(&path, &network).unwrap_err().to_string();
+        assert!(text.contains(expected), "{text}");
+    };
+    // All have as many numbers an item as the network takes.
+    refuse("m5_vggish_level", &[2, 128, 6], None, "expected [items, steps, 128]");
+    refuse("m5_vggish_level", &[2, 640], None, "expected [items, steps, 128]");
+    refuse("m5_vggish_level", &[4, 2, 64], Some(&[0, 1, 4]), "expected [rows, 128]");
+    refuse("m1", &[2, 41, 50], None, "expected [items, 2050]");
+    refuse("m1", &[2, 2050], Some(&[0, 1, 2]), "m1 takes no sequences");
+    refuse("m6_action", &[2, 9216], None, "expected [items, 1, 96, 96]");
+}
+
+#[test]
+fn members_of_other_names_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.npz");
+    let mut npz = NpzWriter::create(&path, Compression::Stored).unwrap();
+    npz.floats("X", &[2, 2050], &[0.0; 4100]).unwrap();
+    npz.floats("other", &[2, 2050], &[1.0; 4100]).unwrap();
+    npz.strings("file", &["a", "b"]).unwrap();
+    npz.finish().unwrap();
+    let network = networks::named("m1").unwrap().build(None, 0).unwrap();
+    let data = Dataset::read_members(&path, &network, "other", Some("file")).unwrap();
+    assert_eq!(
+        (data.ids, data.items.columns[0].values[0]),
+        (vec!["a".to_owned(), "b".to_owned()], 1.0)
+    );
+    for (x, ids) in [("none", None), ("X", Some("none")), ("X", Some("other"))] {
+        let error = Dataset::read_members(&path, &network, x, ids).unwrap_err();
+        assert!(error.to_string().contains(ids.unwrap_or(x)), "{error}");
+    }
 }

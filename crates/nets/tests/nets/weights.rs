@@ -102,6 +102,32 @@ fn hostile_pickles_are_refused() {
     refuse(&pickle([2, 3], [3, 1], 6), &six()[..20], "5 numbers of 6");
     refuse(&pickle([2, 3], [3, 1], 6)[..40], &six(), "ends");
     refuse(b"\x80\x02]q\x00(h\x00e.", &six(), "not hold a dictionary");
+    // Nesting, which dropping would follow down until the stack ends.
+    let nested = |begin: &[u8], deeper: &[u8], times: usize, end: &[u8]| {
+        [b"\x80\x02", begin, &deeper.repeat(times), end, b"."].concat()
+    };
+    let key = b"X\x05\x00\x00\x00model";
+    refuse(&nested(b")", b"\x85", 200_000, b""), &six(), "too deep");
+    refuse(&nested(b")", b"(K\x00t\x85", 1, b"\x85".repeat(50).as_slice()), &six(), "too deep");
+    refuse(&nested(b"", b"]", 50_000, &b"a".repeat(49_999)), &six(), "too deep");
+    let dicts = [b"}", &key[..]].concat();
+    refuse(
+        &nested(b"", &dicts, 50_000, &[b"}", &b"s".repeat(50_000)[..]].concat()),
+        &six(),
+        "deep",
+    );
+    // Values and texts that a few bytes recall again and again, and lists of any length.
+    let long = [b"X\x00\x00\x10\x00", &[b'w'; 1 << 20][..], b"q\x00"].concat();
+    refuse(&nested(&long, b"h\x00", 1000, b""), &six(), "too many values");
+    let million = [b"(", &b"N".repeat(1_000_000)[..], b"e"].concat();
+    refuse(&nested(b"]", &million, 4, b""), &six(), "too many values");
+    // 2^61 numbers of eight bytes.
+    let mut huge = b"\x80\x02}X\x01\x00\x00\x00wctorch._utils\n_rebuild_tensor_v2\n".to_vec();
+    huge.extend(b"((X\x07\x00\x00\x00storagectorch\nDoubleStorage\nX\x01\x00\x00\x000");
+    huge.extend(
+        b"X\x03\x00\x00\x00cpuK\x06tQK\x00\x8a\x08\0\0\0\0\0\0\0\x20\x85K\x01\x85\x89}tRs.",
+    );
+    refuse(&huge, &six(), "larger than the file");
     // Each recall doubles the list: 2^40 values from a few hundred bytes.
     let mut bomb = b"\x80\x02]q\x00K\x01a".to_vec();
     for _ in 0..40 {

@@ -38,9 +38,12 @@ pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Fail
         if vote.is_some() {
             return Err(Failure::new("--vote decides over windows of recordings"));
         }
-        let data = Dataset::read(path, &model.network)?;
+        let names = args.members.names();
+        let ids = names.ids.as_deref();
+        let data = Dataset::read_members(path, &model.network, &names.x, ids)?;
         return of_inputs(args, model, &labels, &data);
     }
+    args.members.refuse()?;
     let listener = Listener::new(args, model, vote)?;
     let windowed = args.window.is_some() || listener.front_end.windows.is_some();
     let unit = match (windowed, vote) {
@@ -353,7 +356,7 @@ fn status_of(error: &NetError) -> Option<Status> {
     match error {
         NetError::TooShort { .. } => Some(Status::TooShort),
         NetError::InputShape { .. } => Some(Status::Mismatch),
-        NetError::NonFinite { .. } => Some(Status::NonFinite),
+        NetError::NonFinite { .. } | NetError::Output { .. } => Some(Status::NonFinite),
         _ => None,
     }
 }
