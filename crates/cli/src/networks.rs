@@ -303,7 +303,8 @@ impl Request<'_> {
             match progress.epochs.last() {
                 None => {
                     let mib = progress.memory.div_ceil(1 << 20);
-                    eprintln!("{name}: {total} epochs, about {left}, {mib} MiB of memory");
+                    let epochs = if total == 1 { "epoch" } else { "epochs" };
+                    eprintln!("{name}: {total} {epochs}, about {left}, {mib} MiB of memory");
                 }
                 Some(epoch) => {
                     let score = epoch.score.map(|s| format!(", weighted F1 {:.2}", 100.0 * s));
