@@ -24,12 +24,14 @@ pub enum InputError {
         source: io::Error,
     },
     /// A folder or glob without recordings.
-    #[error("{path}: no file with an audio extension ({extensions})")]
+    #[error("{path}: no file with an audio extension ({extensions}){skipped}")]
     NoAudio {
         /// The folder or glob.
         path: PathBuf,
         /// The extensions looked for.
         extensions: String,
+        /// What is there instead and is not read, if anything.
+        skipped: String,
     },
     /// A glob that cannot be understood.
     #[error("{pattern}: not a glob: {reason}")]

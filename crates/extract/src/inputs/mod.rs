@@ -46,17 +46,29 @@ pub struct Collected {
 impl Collected {
     /// A sentence about the files skipped, if there are any.
     pub fn warning(&self) -> Option<String> {
-        const SHOWN: usize = 3;
-        let names: Vec<_> =
-            self.skipped.iter().take(SHOWN).map(|p| p.display().to_string()).collect();
-        let more = if self.skipped.len() > SHOWN { ", ..." } else { "" };
-        let files = match self.skipped.len() {
-            0 => return None,
-            1 => "1 file was skipped because its format is".to_string(),
-            n => format!("{n} files were skipped because their formats are"),
-        };
-        Some(format!("{files} not read from folders: {}{more}", names.join(", ")))
+        told(&self.skipped)
     }
+}
+
+fn told(skipped: &[PathBuf]) -> Option<String> {
+    const SHOWN: usize = 3;
+    let names: Vec<_> = skipped.iter().take(SHOWN).map(|p| p.display().to_string()).collect();
+    let more = if skipped.len() > SHOWN { ", ..." } else { "" };
+    let files = match skipped.len() {
+        0 => return None,
+        1 => "1 file was skipped because its format is".to_string(),
+        n => format!("{n} files were skipped because their formats are"),
+    };
+    Some(format!("{files} not read from folders: {}{more}", names.join(", ")))
+}
+
+/// That nothing at `path` is read, and what is there instead.
+fn no_audio(path: &Path, skipped: &[PathBuf]) -> InputError {
+    let extensions = corsmal_audio::EXTENSIONS.join(", ");
+    let mut skipped = skipped.to_vec();
+    skipped.sort_unstable();
+    let skipped = told(&skipped).map(|told| format!("; {told}")).unwrap_or_default();
+    InputError::NoAudio { path: path.into(), extensions, skipped }
 }
 
 /// Finds the recordings that `names` stand for, in a stable order, with unique ids.
@@ -72,8 +84,7 @@ pub fn collect<S: AsRef<OsStr>>(names: &[S]) -> Result<Collected, InputError> {
     skipped.dedup();
     // Where nothing but such files was named, the first of them says so.
     if let (true, Some(path)) = (found.is_empty(), skipped.first()) {
-        let extensions = corsmal_audio::EXTENSIONS.join(", ");
-        return Err(InputError::NoAudio { path: path.clone(), extensions });
+        return Err(no_audio(path, &[]));
     }
     let ids = ids::assign(&found)?;
     let mut columns: Vec<String> = Vec::new();
@@ -114,9 +125,13 @@ fn find(
     let path = Path::new(name);
     match std::fs::metadata(path) {
         Ok(meta) if meta.is_dir() => {
-            let mut files = Vec::new();
+            let (mut files, before) = (Vec::new(), skipped.len());
             walk(path, &mut files, skipped)?;
-            push_sorted(path, path, files, found)
+            if files.is_empty() {
+                return Err(no_audio(path, &skipped[before..]));
+            }
+            push_sorted(path, files, found);
+            Ok(())
         }
         Ok(_) if is_apple_double(path) => {
             skipped.push(path.into());
@@ -175,23 +190,18 @@ fn find_glob(
     found: &mut Vec<Found>,
     skipped: &mut Vec<PathBuf>,
 ) -> Result<(), InputError> {
-    let mut files = Vec::new();
+    let (mut files, before) = (Vec::new(), skipped.len());
     for path in wildcard::expand(pattern)? {
         walk(&path, &mut files, skipped)?;
     }
-    push_sorted(Path::new(pattern), &wildcard::root(pattern), files, found)
+    if files.is_empty() {
+        return Err(no_audio(Path::new(pattern), &skipped[before..]));
+    }
+    push_sorted(&wildcard::root(pattern), files, found);
+    Ok(())
 }
 
-fn push_sorted(
-    name: &Path,
-    root: &Path,
-    mut files: Vec<PathBuf>,
-    found: &mut Vec<Found>,
-) -> Result<(), InputError> {
-    if files.is_empty() {
-        let extensions = corsmal_audio::EXTENSIONS.join(", ");
-        return Err(InputError::NoAudio { path: name.into(), extensions });
-    }
+fn push_sorted(root: &Path, mut files: Vec<PathBuf>, found: &mut Vec<Found>) {
     files.sort_unstable_by(|a, b| {
         a.as_os_str().as_encoded_bytes().cmp(b.as_os_str().as_encoded_bytes())
     });
@@ -201,5 +211,4 @@ fn push_sorted(
         let relative = path.strip_prefix(root).unwrap_or(&path).to_path_buf();
         found.push(Found::file(path, relative));
     }
-    Ok(())
 }

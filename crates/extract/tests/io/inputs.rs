@@ -70,6 +70,11 @@ fn what_is_not_there_is_named() {
     let dir = folder(&["notes.txt"]);
     assert!(ids(&[text(dir.path())]).unwrap_err().contains("no file with an audio extension"));
     assert!(in_folder(dir.path(), &["x[.wav"]).unwrap_err().contains("not a glob"));
+    let unread = folder(&["a.wma", "b/c.wma"]);
+    let error = in_folder(unread.path(), &["*"]).unwrap_err();
+    assert!(error.contains("*: no file with an audio extension (wav, "), "{error}");
+    assert!(error.contains("; 2 files were skipped because"), "{error}");
+    assert!(ids(&[text(unread.path())]).unwrap_err().contains("a.wma, "));
     // A file named outright is taken at its word; its outcome row will say what it is.
     assert_eq!(in_folder(dir.path(), &["notes.txt"]).unwrap(), ["notes"]);
     assert_eq!(ids(&["-"]).unwrap(), ["stdin"]);
