@@ -18,36 +18,39 @@ from . import (
 )
 from ._audio import get_duration, get_samplerate, load, stream
 from ._core import __version__
+from ._cqt import cqt
 from ._decibels import amplitude_to_db, db_to_amplitude, db_to_power, magphase, power_to_db
 from ._evaluate import Scores, evaluate
 from ._extract import SignalExtractor, extract
 from ._features import Features, load_features
-from ._harmonic import cqt, istft
+from ._frequencies import (
+    cqt_frequencies,
+    fft_frequencies,
+    fourier_tempo_frequencies,
+    mel_frequencies,
+    tempo_frequencies,
+)
+from ._istft import istft
 from ._mono import to_mono
 from ._pcen import pcen
 from ._pitch import estimate_tuning, piptrack, pitch_tuning
 from ._pitches import (
     A4_to_tuning,
-    cqt_frequencies,
-    fft_frequencies,
-    fourier_tempo_frequencies,
     hz_to_mel,
     hz_to_midi,
     hz_to_octs,
-    mel_frequencies,
     mel_to_hz,
     midi_to_hz,
     note_to_hz,
     note_to_midi,
     octs_to_hz,
-    tempo_frequencies,
     tuning_to_A4,
 )
+from ._predictions import Predictions
 from ._resample import resample
 from ._scoring import (
     Comparison,
     CrossValidation,
-    Predictions,
     ScoreReport,
     compare_predictions,
     cross_validate,

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ._arrays import Floats, size
+from ._chroma_cqt import chroma_cqt
 from ._filters import Window, get_window
-from ._harmonic import chroma_cqt
 from .errors import ParameterError
 from .util import normalize
 

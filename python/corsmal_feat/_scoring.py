@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from . import _core
+from ._predictions import Predictions, StrPath, parse
 from .errors import ParameterError
 
 __all__ = [
     "Comparison",
     "CrossValidation",
-    "Predictions",
     "ScoreReport",
     "compare_predictions",
     "cross_validate",
@@ -28,41 +24,8 @@ __all__ = [
     "score",
 ]
 
-StrPath = str | os.PathLike[str]
-
 #: What `labels` says where each recording lies in a folder named like its class.
 FOLDERS = "folders"
-
-
-@dataclass(frozen=True)
-class Predictions:
-    """Predictions of recordings, as the command writes them.
-
-    Attributes
-    ----------
-    columns : text of the columns beside prediction and probabilities, such as `id`, `fold`, `true`
-    predicted : name of each class predicted; "" without a prediction, "unknown" where rejected
-    labels : names of the classes
-    proba : probabilities [shape=(rows, classes)]; NaN where there are none
-    """
-
-    columns: dict[str, list[str]]
-    predicted: list[str]
-    labels: list[str]
-    proba: npt.NDArray[np.float64]
-    _text: str = field(repr=False)
-
-    @property
-    def ids(self) -> list[str]:
-        """What names each recording."""
-        return next(iter(self.columns.values()))
-
-    def __len__(self) -> int:
-        return len(self.predicted)
-
-    def save(self, path: StrPath) -> None:
-        """Writes the prediction file: CSV that `score`, `fuse` and the command read."""
-        Path(path).write_text(self._text, encoding="utf-8", newline="")
 
 
 @dataclass(frozen=True)
@@ -208,7 +171,7 @@ def cross_validate(
         accuracy=result["accuracy"],
         weighted_f1=result["weighted_f1"],
         macro_f1=result["macro_f1"],
-        predictions=_predictions(held_out),
+        predictions=parse(held_out),
         report=report,
     )
 
@@ -256,7 +219,7 @@ def fuse(
         raise ParameterError("fuse needs at least one prediction file")
     chosen = None if weights is None else [float(weight) for weight in weights]
     least = _whole("least", least, 2**32)
-    return _predictions(_core.fuse(paths, chosen, vote, background, least))
+    return parse(_core.fuse(paths, chosen, vote, background, least))
 
 
 def compare_predictions(
@@ -407,13 +370,3 @@ def _whole(name: str, value: int, limit: int) -> int:
     if not 0 <= int(value) < limit:
         raise ParameterError(f"{name} must be a whole number below {limit}, not {value}")
     return int(value)
-
-
-def _predictions(text: str) -> Predictions:
-    header, *rows = csv.reader(io.StringIO(text))
-    at = header.index("predicted")
-    labels = [name.removeprefix("p_") for name in header[at + 1 :]]
-    columns = {name: [row[i] for row in rows] for i, name in enumerate(header[:at])}
-    numbers = [[float(cell) if cell else np.nan for cell in row[at + 1 :]] for row in rows]
-    proba = np.asarray(numbers, dtype=np.float64).reshape(len(rows), len(labels))
-    return Predictions(columns, [row[at] for row in rows], labels, proba, text)

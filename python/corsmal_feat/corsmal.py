@@ -1,5 +1,6 @@
 """Compound inputs of the benchmark's systems: re-exported from one private module per family."""
 
+from ._af193 import af193
 from ._compound import (
     a34_short,
     a34f136,
@@ -11,6 +12,7 @@ from ._compound import (
     pca_project,
     sk_resize,
 )
+from ._cqt import abs_cqt
 from ._frontends import (
     esc26,
     m1_stft,
@@ -23,7 +25,7 @@ from ._frontends import (
     m6_spectrogram,
     spec9216,
 )
-from ._harmonic import abs_cqt, af193, hpss_audio, hpss_mags, hpss_masks
+from ._hpss import hpss_audio, hpss_mags, hpss_masks
 from ._mono import to_mono
 from ._pitch import piptrack_both
 

@@ -1,5 +1,5 @@
 """Decomposition of spectrograms (librosa.decompose)."""
 
-from ._harmonic import hpss
+from ._hpss import hpss
 
 __all__ = ["hpss"]

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ._pitches import cqt_frequencies, fft_frequencies, mel_frequencies, midi_to_hz
+from ._frequencies import cqt_frequencies, fft_frequencies, mel_frequencies
+from ._pitches import midi_to_hz
 from ._times import times_like
 from .errors import ParameterError
 

@@ -2,7 +2,7 @@
 
 from ._cens import chroma_cens
 from ._chroma import chroma_stft
-from ._harmonic import chroma_cqt, tonnetz
+from ._chroma_cqt import chroma_cqt
 from ._mel import delta, melspectrogram, mfcc
 from ._memory import stack_memory
 from ._spectral import (
@@ -14,6 +14,7 @@ from ._spectral import (
     spectral_rolloff,
 )
 from ._time_domain import rms, zero_crossing_rate
+from ._tonnetz import tonnetz
 
 __all__ = [
     "chroma_cens",

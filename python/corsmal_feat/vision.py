@@ -8,13 +8,26 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal, TypedDict
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _core
+from ._views import (
+    Calibration,
+    Camera,
+    Depth,
+    Doubles,
+    Mask,
+    StrPath,
+    camera_numbers,
+    depth_pixels,
+    load_calibration,
+    load_depth,
+    load_mask,
+    mask_pixels,
+)
 from .errors import ParameterError
 
 __all__ = [
@@ -34,46 +47,6 @@ __all__ = [
     "upright_box",
 ]
 
-StrPath = str | os.PathLike[str]
-_Doubles = npt.NDArray[np.float64]
-_Mask = StrPath | npt.NDArray[np.bool_]
-_Depth = StrPath | npt.NDArray[np.uint16]
-
-
-@dataclass(frozen=True, eq=False)
-class Camera:
-    """A camera without lens distortion.
-
-    Attributes
-    ----------
-    intrinsic : ndarray [3, 3], focal lengths and principal point in px
-    rotation : ndarray [3, 3], world to camera (the data set calls it `rvec`)
-    translation : ndarray [3], world to camera, in m
-    projection : ndarray [3, 4], world to pixels, homogeneous
-    """
-
-    intrinsic: _Doubles
-    rotation: _Doubles
-    translation: _Doubles
-    projection: _Doubles
-
-
-@dataclass(frozen=True, eq=False)
-class Calibration:
-    """The cameras of one view.
-
-    Attributes
-    ----------
-    rgb : Camera
-        Colour.
-    ir1, ir2 : Camera, optional
-        Infrared, where the file has them.
-    """
-
-    rgb: Camera
-    ir1: Camera | None = None
-    ir2: Camera | None = None
-
 
 class LodeEstimate(TypedDict):
     """What `lode` measures."""
@@ -83,16 +56,16 @@ class LodeEstimate(TypedDict):
     capacity: float
     capacity_low: float | None
     capacity_high: float | None
-    centre: _Doubles
-    profile: _Doubles
+    centre: Doubles
+    profile: Doubles
 
 
 class Cuboid(TypedDict):
     """What `cuboid` measures."""
 
     capacity: float
-    low: _Doubles
-    high: _Doubles
+    low: Doubles
+    high: Doubles
     share: float
     points: int
 
@@ -101,7 +74,7 @@ class UprightBox(TypedDict):
     """What `upright_box` measures."""
 
     volume: float
-    sides: _Doubles
+    sides: Doubles
     points: int
 
 
@@ -113,79 +86,8 @@ class Region(TypedDict):
     size: tuple[float, float]
 
 
-def load_calibration(path: StrPath) -> Calibration:
-    """Reads a calibration file of the data set, or the same as JSON.
-
-    A pickle is not executed: lists, dictionaries, strings, numbers and numpy arrays are read,
-    anything else is refused.
-
-    Parameters
-    ----------
-    path : path
-        The file.
-
-    Returns
-    -------
-    Calibration
-
-    Raises
-    ------
-    ParameterError
-        The file cannot be read, does more than make arrays, or lacks the colour camera.
-
-    Examples
-    --------
-    >>> corsmal_feat.vision.load_calibration("c1.json").rgb.translation.tolist()
-    [0.0, 0.05, 1.0]
-    """
-    return Calibration(**{name: _camera(n) for name, n in _core.load_calibration(os.fspath(path))})
-
-
-def load_mask(path: StrPath) -> npt.NDArray[np.bool_]:
-    """Reads a mask's PNG.
-
-    Parameters
-    ----------
-    path : path
-        The file.
-
-    Returns
-    -------
-    bool [shape=(height, width)]
-        True where its first channel is not 0.
-
-    Examples
-    --------
-    >>> mask = corsmal_feat.vision.load_mask("c1.png")
-    >>> mask.shape, int(mask.sum())
-    ((700, 640), 5005)
-    """
-    return _core.load_mask(os.fspath(path))
-
-
-def load_depth(path: StrPath) -> npt.NDArray[np.uint16]:
-    """Reads a 16-bit depth PNG.
-
-    Parameters
-    ----------
-    path : path
-        The file.
-
-    Returns
-    -------
-    uint16 [shape=(height, width)]
-        mm, 0 where nothing was measured.
-
-    Examples
-    --------
-    >>> corsmal_feat.vision.load_depth("c1_depth.png").max()
-    np.uint16(997)
-    """
-    return _core.load_depth(os.fspath(path))
-
-
 def lode(
-    masks: Sequence[_Mask],
+    masks: Sequence[Mask],
     calibrations: Sequence[Calibration | StrPath],
     *,
     variant: Literal["published", "corrected"] = "corrected",
@@ -225,8 +127,8 @@ def lode(
         raise ParameterError(
             f"{len(masks)} masks and {len(calibrations)} calibrations: lode takes two of each"
         )
-    first, second = (_mask(m) for m in masks)
-    left, right = (_numbers(c) for c in calibrations)
+    first, second = (mask_pixels(m) for m in masks)
+    left, right = (camera_numbers(c) for c in calibrations)
     height, width, capacity, low, high, profile, centre = _core.lode(
         (first, second), (left, right), variant == "published"
     )
@@ -242,8 +144,8 @@ def lode(
 
 
 def cuboid(
-    depth: _Depth,
-    mask: _Mask,
+    depth: Depth,
+    mask: Mask,
     calibration: Calibration | StrPath,
     *,
     outliers: Literal["published", "corrected", "kept"] = "corrected",
@@ -279,7 +181,7 @@ def cuboid(
     if not 0 <= int(seed) < 2**64:
         raise ParameterError(f"seed must be a whole number from 0 to 2**64 - 1, not {seed}")
     low, high, share, capacity, points = _core.cuboid(
-        _depth(depth), _mask(mask), _numbers(calibration), outliers, int(seed)
+        depth_pixels(depth), mask_pixels(mask), camera_numbers(calibration), outliers, int(seed)
     )
     return {
         "capacity": capacity,
@@ -291,8 +193,8 @@ def cuboid(
 
 
 def upright_box(
-    depths: Sequence[_Depth],
-    masks: Sequence[_Mask],
+    depths: Sequence[Depth],
+    masks: Sequence[Mask],
     calibrations: Sequence[Calibration | StrPath],
 ) -> UprightBox:
     """The smallest upright box around an object's points from the depth of several views.
@@ -320,14 +222,14 @@ def upright_box(
             "each view has one of each"
         )
     views = [
-        (_depth(d), _mask(m), _numbers(c))
+        (depth_pixels(d), mask_pixels(m), camera_numbers(c))
         for d, m, c in zip(depths, masks, calibrations, strict=True)
     ]
     sides, volume, points = _core.upright_box(views)
     return {"volume": volume, "sides": np.array(sides), "points": points}
 
 
-def region(depth: _Depth) -> Region | None:
+def region(depth: Depth) -> Region | None:
     """M2's region of interest in a depth image; None where nothing near is large enough.
 
     Parameters
@@ -349,14 +251,14 @@ def region(depth: _Depth) -> Region | None:
     >>> corsmal_feat.vision.region(depth)["bounds"]
     (597, 295, 723, 505)
     """
-    found = _core.region(_depth(depth))
+    found = _core.region(depth_pixels(depth))
     if found is None:
         return None
     (left, top, right, bottom), image, (height, width) = found
     return {"bounds": (left, top, right, bottom), "image": image, "size": (height, width)}
 
 
-def m2_capacity(depth: _Depth | Region, weights: StrPath) -> float | None:
+def m2_capacity(depth: Depth | Region, weights: StrPath) -> float | None:
     """M2's capacity in mL from a depth image of the robot's view, or from its region of interest.
 
     Parameters
@@ -393,42 +295,3 @@ def m2_capacity(depth: _Depth | Region, weights: StrPath) -> float | None:
         raise ParameterError(f"a region's image with shape {image.shape}; expected [112, 112]")
     height, width = found["size"]
     return _core.m2_capacity(image, (float(height), float(width)), os.fspath(weights))
-
-
-def _camera(numbers: Sequence[float]) -> Camera:
-    n = np.array(numbers)
-    return Camera(n[:9].reshape(3, 3), n[9:18].reshape(3, 3), n[18:21], n[21:].reshape(3, 4))
-
-
-def _numbers(calibration: Calibration | StrPath) -> list[float]:
-    if not isinstance(calibration, Calibration):
-        calibration = load_calibration(calibration)
-    camera = calibration.rgb
-    parts = (camera.intrinsic, camera.rotation, camera.translation, camera.projection)
-    numbers = np.concatenate([np.asarray(part, dtype=np.float64).ravel() for part in parts])
-    if numbers.size != 33:
-        raise ParameterError(
-            f"a camera of {numbers.size} numbers; expected matrices of 3 by 3, 3 by 3, 3, 3 by 4"
-        )
-    return [float(n) for n in numbers]
-
-
-def _mask(mask: _Mask) -> npt.NDArray[np.bool_]:
-    if isinstance(mask, np.ndarray):
-        if mask.dtype != np.bool_ or mask.ndim != 2:
-            raise ParameterError(
-                f"a mask of {mask.dtype} with shape {mask.shape}; expected booleans [height, width]"
-            )
-        return mask
-    return load_mask(mask)
-
-
-def _depth(depth: _Depth) -> npt.NDArray[np.uint16]:
-    if isinstance(depth, np.ndarray):
-        if depth.dtype != np.uint16 or depth.ndim != 2:
-            raise ParameterError(
-                f"a depth image of {depth.dtype} with shape {depth.shape}; expected uint16 "
-                "[height, width] in mm"
-            )
-        return depth
-    return load_depth(depth)

@@ -1,0 +1,72 @@
+"""Inverse short-time Fourier transform (librosa.istft)."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._arrays import Floats, room, size
+from ._filters import Window
+from ._spectrum import stft_params
+from .errors import ParameterError
+
+
+def istft(
+    stft_matrix: npt.ArrayLike,
+    *,
+    hop_length: int | None = None,
+    win_length: int | None = None,
+    n_fft: int | None = None,
+    window: Window = "hann",
+    center: bool = True,
+    dtype: npt.DTypeLike | None = None,
+    length: int | None = None,
+    out: Floats | None = None,
+) -> Floats:
+    """Signal [shape=(..., n)] of a spectrogram [shape=(..., 1 + n_fft/2, frames)]
+    (librosa.istft).
+
+    Parameters
+    ----------
+    stft_matrix : complex64 or complex128 [shape=(..., 1 + n_fft // 2, t)]
+        Spectrogram.
+    hop_length, win_length, n_fft, window, center
+        As they were in `stft`.
+    length : int, optional
+        Samples of the result.
+    dtype : float32 or float64, optional
+        Of the result; the precision of `stft_matrix` by default.
+    out : array, optional
+        Where to put the result.
+
+    Returns
+    -------
+    float32 or float64 [shape=(..., n)]
+
+    Examples
+    --------
+    >>> y = np.random.default_rng(0).normal(size=8000)
+    >>> np.allclose(corsmal_feat.istft(corsmal_feat.stft(y), length=8000), y)
+    True
+    """
+    d = np.asarray(stft_matrix)
+    if d.ndim < 2:
+        raise ParameterError(f"stft_matrix has {d.ndim} dimensions, expected at least 2")
+    if d.dtype not in (np.complex64, np.complex128):
+        d = d.astype(np.complex64 if d.dtype == np.float32 else np.complex128)
+    if n_fft is None:
+        n_fft = 2 * (d.shape[-2] - 1)
+    params = stft_params(n_fft, hop_length, win_length, window, center, "constant")
+    samples = size("length", length) if length else None
+    room("a signal", d.size // (d.shape[-2] * d.shape[-1] or 1), samples or 0)
+    flat = _core.istft(np.ascontiguousarray(d.reshape(-1, *d.shape[-2:])), params, samples)
+    y: Floats = flat.reshape(*d.shape[:-2], flat.shape[-1])
+    if dtype is not None:
+        y = y.astype(dtype, copy=False)
+    if out is None:
+        return y
+    if out.shape != y.shape:
+        raise ParameterError(f"out has shape {out.shape}, expected {y.shape}")
+    out[...] = y
+    return out

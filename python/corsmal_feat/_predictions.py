@@ -1,0 +1,56 @@
+"""Predictions, as prediction files hold them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+StrPath = str | os.PathLike[str]
+
+
+@dataclass(frozen=True)
+class Predictions:
+    """Predictions of recordings, as the command writes them.
+
+    Attributes
+    ----------
+    columns : text of the columns beside prediction and probabilities, such as `id`, `fold`, `true`
+    predicted : name of each class predicted; "" without a prediction, "unknown" where rejected
+    labels : names of the classes
+    proba : probabilities [shape=(rows, classes)]; NaN where there are none
+    """
+
+    columns: dict[str, list[str]]
+    predicted: list[str]
+    labels: list[str]
+    proba: npt.NDArray[np.float64]
+    _text: str = field(repr=False)
+
+    @property
+    def ids(self) -> list[str]:
+        """What names each recording."""
+        return next(iter(self.columns.values()))
+
+    def __len__(self) -> int:
+        return len(self.predicted)
+
+    def save(self, path: StrPath) -> None:
+        """Writes the prediction file: CSV that `score`, `fuse` and the command read."""
+        Path(path).write_text(self._text, encoding="utf-8", newline="")
+
+
+def parse(text: str) -> Predictions:
+    """Predictions of the text of a prediction file."""
+    header, *rows = csv.reader(io.StringIO(text))
+    at = header.index("predicted")
+    labels = [name.removeprefix("p_") for name in header[at + 1 :]]
+    columns = {name: [row[i] for row in rows] for i, name in enumerate(header[:at])}
+    numbers = [[float(cell) if cell else np.nan for cell in row[at + 1 :]] for row in rows]
+    proba = np.asarray(numbers, dtype=np.float64).reshape(len(rows), len(labels))
+    return Predictions(columns, [row[at] for row in rows], labels, proba, text)

@@ -1,0 +1,166 @@
+"""Calibrations, masks and depth images of views."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from .errors import ParameterError
+
+StrPath = str | os.PathLike[str]
+Doubles = npt.NDArray[np.float64]
+Mask = StrPath | npt.NDArray[np.bool_]
+Depth = StrPath | npt.NDArray[np.uint16]
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A camera without lens distortion.
+
+    Attributes
+    ----------
+    intrinsic : ndarray [3, 3], focal lengths and principal point in px
+    rotation : ndarray [3, 3], world to camera (the data set calls it `rvec`)
+    translation : ndarray [3], world to camera, in m
+    projection : ndarray [3, 4], world to pixels, homogeneous
+    """
+
+    intrinsic: Doubles
+    rotation: Doubles
+    translation: Doubles
+    projection: Doubles
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """The cameras of one view.
+
+    Attributes
+    ----------
+    rgb : Camera
+        Colour.
+    ir1, ir2 : Camera, optional
+        Infrared, where the file has them.
+    """
+
+    rgb: Camera
+    ir1: Camera | None = None
+    ir2: Camera | None = None
+
+
+def load_calibration(path: StrPath) -> Calibration:
+    """Reads a calibration file of the data set, or the same as JSON.
+
+    A pickle is not executed: lists, dictionaries, strings, numbers and numpy arrays are read,
+    anything else is refused.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    ParameterError
+        The file cannot be read, does more than make arrays, or lacks the colour camera.
+
+    Examples
+    --------
+    >>> corsmal_feat.vision.load_calibration("c1.json").rgb.translation.tolist()
+    [0.0, 0.05, 1.0]
+    """
+    return Calibration(**{name: _camera(n) for name, n in _core.load_calibration(os.fspath(path))})
+
+
+def load_mask(path: StrPath) -> npt.NDArray[np.bool_]:
+    """Reads a mask's PNG.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+
+    Returns
+    -------
+    bool [shape=(height, width)]
+        True where its first channel is not 0.
+
+    Examples
+    --------
+    >>> mask = corsmal_feat.vision.load_mask("c1.png")
+    >>> mask.shape, int(mask.sum())
+    ((700, 640), 5005)
+    """
+    return _core.load_mask(os.fspath(path))
+
+
+def load_depth(path: StrPath) -> npt.NDArray[np.uint16]:
+    """Reads a 16-bit depth PNG.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+
+    Returns
+    -------
+    uint16 [shape=(height, width)]
+        mm, 0 where nothing was measured.
+
+    Examples
+    --------
+    >>> corsmal_feat.vision.load_depth("c1_depth.png").max()
+    np.uint16(997)
+    """
+    return _core.load_depth(os.fspath(path))
+
+
+def _camera(numbers: Sequence[float]) -> Camera:
+    n = np.array(numbers)
+    return Camera(n[:9].reshape(3, 3), n[9:18].reshape(3, 3), n[18:21], n[21:].reshape(3, 4))
+
+
+def camera_numbers(calibration: Calibration | StrPath) -> list[float]:
+    """The 33 numbers of the colour camera, as the extension module takes them."""
+    if not isinstance(calibration, Calibration):
+        calibration = load_calibration(calibration)
+    camera = calibration.rgb
+    parts = (camera.intrinsic, camera.rotation, camera.translation, camera.projection)
+    numbers = np.concatenate([np.asarray(part, dtype=np.float64).ravel() for part in parts])
+    if numbers.size != 33:
+        raise ParameterError(
+            f"a camera of {numbers.size} numbers; expected matrices of 3 by 3, 3 by 3, 3, 3 by 4"
+        )
+    return [float(n) for n in numbers]
+
+
+def mask_pixels(mask: Mask) -> npt.NDArray[np.bool_]:
+    """A mask, read where it is a path."""
+    if isinstance(mask, np.ndarray):
+        if mask.dtype != np.bool_ or mask.ndim != 2:
+            raise ParameterError(
+                f"a mask of {mask.dtype} with shape {mask.shape}; expected booleans [height, width]"
+            )
+        return mask
+    return load_mask(mask)
+
+
+def depth_pixels(depth: Depth) -> npt.NDArray[np.uint16]:
+    """A depth image, read where it is a path."""
+    if isinstance(depth, np.ndarray):
+        if depth.dtype != np.uint16 or depth.ndim != 2:
+            raise ParameterError(
+                f"a depth image of {depth.dtype} with shape {depth.shape}; expected uint16 "
+                "[height, width] in mm"
+            )
+        return depth
+    return load_depth(depth)
