@@ -1,4 +1,4 @@
-"""Hertz, mel, octaves, notes and the frequencies of bins (librosa.core.convert)."""
+"""Hertz, mel, octaves, notes and tuning (librosa.core.convert)."""
 
 from __future__ import annotations
 
