@@ -1,5 +1,6 @@
 //! One logical stream of Ogg: its headers, its decoder and the lengths of its packets.
 
+use super::lazy::Lazy;
 use super::opus::{self, Opus};
 use super::page::Page;
 use super::surround::Surround;
@@ -180,19 +181,22 @@ impl Link {
 
 fn vorbis_link(headers: &[Vec<u8>]) -> Result<Link, Refusal> {
     let broken = || Refusal::Corrupt("broken headers of Vorbis".into());
-    let [first, _, setup] = headers else { return Err(broken()) };
+    let [first, _, setup_packet] = headers else { return Err(broken()) };
     let identification = Identification::parse(first).ok_or_else(broken)?;
     let Identification { channels, sample_rate, .. } = identification;
-    let Setup { modes, is_simple } = Setup::parse(setup, channels).ok_or_else(broken)?;
-    let codec: Box<dyn PacketDecoder> = if is_simple {
-        Box::new(Codec::vorbis(&[first.as_slice(), setup].concat(), channels.into(), sample_rate)?)
-    } else {
-        Box::new(Surround::new(first, setup)?)
-    };
+    let Setup { modes, is_simple } = Setup::parse(setup_packet, channels).ok_or_else(broken)?;
+    let (first, setup_packet) = (first.clone(), setup_packet.clone());
+    let codec = Lazy::new(move || -> Result<Box<dyn PacketDecoder>, Refusal> {
+        if !is_simple {
+            return Ok(Box::new(Surround::new(&first, &setup_packet)?));
+        }
+        let headers = [first.as_slice(), &setup_packet].concat();
+        Ok(Box::new(Codec::vorbis(&headers, channels.into(), sample_rate)?))
+    });
     let mended = (!is_simple).then_some(None);
     let kind = Kind::Vorbis { identification, modes, before: None, mended };
     let (channels, name) = (channels.into(), "ogg vorbis");
-    Ok(Link { serial: 0, sample_rate, channels, name, kind, codec, skip: 0 })
+    Ok(Link { serial: 0, sample_rate, channels, name, kind, codec: Box::new(codec), skip: 0 })
 }
 
 fn opus_link(headers: &[Vec<u8>]) -> Result<Link, Refusal> {

@@ -3,6 +3,7 @@
 //!
 //! Positions in the pages say what to drop at both ends and how much is missing in between.
 
+mod lazy;
 mod link;
 mod opus;
 mod order;
