@@ -135,7 +135,7 @@ impl fmt::Display for Repair {
                 write!(f, "{count} damaged or missing frames, from frame {first} on, are silence")
             }
             Self::LongerThanDeclared { declared, actual } => {
-                write!(f, "the header states {declared} frames, {actual} are there and were read")
+                write!(f, "the header states {declared} frames, the file has {actual}, all read")
             }
             Self::Concatenated { at } => {
                 write!(f, "another recording follows in the file, read from frame {at} on")
@@ -147,7 +147,7 @@ impl fmt::Display for Repair {
                 write!(f, "{bytes} bytes between frames, from byte {offset} on, left out")
             }
             Self::MoreData { offset } => {
-                write!(f, "more samples behind the first data chunk, at byte {offset}, not read")
+                write!(f, "more samples after the first data chunk, at byte {offset}, not read")
             }
         }
     }

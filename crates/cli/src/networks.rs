@@ -162,7 +162,7 @@ impl Request<'_> {
         }
         if ids.is_empty() {
             let place = path.display();
-            return Err(Failure::new(format!("{place}: no recording that can be trained on")));
+            return Err(Failure::new(format!("{place}: no recording to train on")));
         }
         let trained_on = TrainedOn::of(heard.iter().map(|o| (o.sample_rate, o.channels)));
         let mut table = LabelledTable::of_columns(path, ids, columns);
@@ -283,7 +283,7 @@ impl Request<'_> {
         let folds_found: Vec<_> = found.into_iter().zip(&folds.outer).map(of_fold).collect();
         let result = CrossValidation::of_probabilities(folds_found, &classes)?;
         let caution = (recipe.select == Select::Published).then_some(
-            "each epoch was chosen by the fold that it is scored on (select=published): too good",
+            "the fold that scores each epoch also chose it (select=published): too good",
         );
         Ok(Validated { table, target, labels, classes, folds, result, report, caution })
     }

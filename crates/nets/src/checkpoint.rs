@@ -106,7 +106,7 @@ pub(crate) fn resume(
     let bytes = weights::bytes(path)?;
     let text = weights::safetensors_text(&bytes, ENTRY)
         .map_err(content)?
-        .ok_or_else(|| content("no checkpoint of a training".into()))?;
+        .ok_or_else(|| content("not a training checkpoint".into()))?;
     let text: Text = serde_json::from_str(&text).map_err(|e| content(e.to_string()))?;
     if text.key != key {
         return Err(content(

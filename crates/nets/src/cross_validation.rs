@@ -93,8 +93,8 @@ pub fn watched(
         Select::Validation => {
             let refuse = || {
                 NetError::Targets(
-                    "select = validation holds a group of the training items out: it needs groups, \
-                     two of them in training at least"
+                    "select = validation holds out a group of the training items: it needs groups, \
+                     at least two of them in training"
                         .into(),
                 )
             };

@@ -179,7 +179,7 @@ fn offsets(npz: &mut NpzFile, rows: usize) -> Result<Vec<usize>, String> {
     let raw = npz.integers("offsets").map_err(|e| e.to_string())?;
     let ends: Vec<usize> = raw
         .iter()
-        .map(|&v| usize::try_from(v).map_err(|_| format!("offsets: {v} is no row")))
+        .map(|&v| usize::try_from(v).map_err(|_| format!("offsets: {v} is not a row")))
         .collect::<Result<_, _>>()?;
     let ascending = ends.windows(2).all(|w| w[0] < w[1]);
     if ends.len() < 2 || ends[0] != 0 || !ascending || ends.last() != Some(&rows) {
@@ -252,7 +252,7 @@ fn views_of(
         let number = view.parse::<usize>().ok().filter(|n| (1..=inputs).contains(n));
         let number = number.ok_or_else(|| format!("view {view}: expected 1 to {inputs}"))?;
         if found[place][number - 1].replace(row).is_some() {
-            return Err(format!("row {row}: view {view} of its recording is there twice"));
+            return Err(format!("row {row}: view {view} of its recording occurs twice"));
         }
     }
     for (name, values) in columns.iter_mut() {

@@ -164,7 +164,7 @@ fn check(network: &Network, task: Task<'_>, recipe: &Recipe) -> Result<()> {
         return refuse(format!("{items} items do not fill a batch of {batch} (drop_last)"));
     }
     if recipe.select != Select::Last && task.watched.is_empty() {
-        return refuse("choosing an epoch needs items that are watched".into());
+        return refuse("choosing an epoch needs validation items".into());
     }
     Ok(())
 }

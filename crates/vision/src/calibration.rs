@@ -65,7 +65,7 @@ impl Camera {
         let point = [cx, cy, skew].iter().all(|p| p.abs() <= MAX_PX);
         if !focal || !point || zero != 0.0 || last != [0.0, 0.0, 1.0] {
             return Err(format!(
-                "'intrinsic' is no camera matrix: expected focal lengths and a principal point of at \
+                "'intrinsic' is not a camera matrix: expected focal lengths and a principal point of at \
                  most {MAX_PX} px over a row 0, 0, 1"
             ));
         }
@@ -77,7 +77,9 @@ impl Camera {
             })
         });
         if !unit || matrix::determinant(r) <= 0.0 {
-            return Err("'rvec' is no rotation: expected rows of length 1 at right angles".into());
+            return Err(
+                "'rvec' is not a rotation: expected rows of length 1 at right angles".into()
+            );
         }
         if !self.translation.iter().all(|t| t.abs() <= MAX_DISTANCE) {
             return Err(format!(
@@ -289,10 +291,10 @@ mod tests {
             (&CAMERA.replace("[2]", "[1e39]"), "'tvec' puts the camera more than 100 m away"),
             (
                 &CAMERA.replace("[0,0,0]", "[[1e-39,0,0],[0,1,0],[0,0,1]]"),
-                "camera 'rgb': 'rvec' is no rotation",
+                "camera 'rgb': 'rvec' is not a rotation",
             ),
-            (&CAMERA.replace("[0,0,0]", "[[1,0,0],[0,1,0],[0,0,-1]]"), "'rvec' is no rotation"),
-            (&CAMERA.replace("[0,0,0]", "[1e200,0,0]"), "'rvec' is no rotation"),
+            (&CAMERA.replace("[0,0,0]", "[[1,0,0],[0,1,0],[0,0,-1]]"), "'rvec' is not a rotation"),
+            (&CAMERA.replace("[0,0,0]", "[1e200,0,0]"), "'rvec' is not a rotation"),
         ] {
             let error = parse(text).unwrap_err().to_string();
             assert!(error.starts_with("c.json: ") && error.contains(part), "{error}");

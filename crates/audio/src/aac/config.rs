@@ -30,7 +30,7 @@ pub(crate) struct Config {
 impl Config {
     /// Reads an AudioSpecificConfig.
     pub(crate) fn parse(bytes: &[u8]) -> Result<Self, Refusal> {
-        let cut = || Refusal::Corrupt("a configuration of AAC that is cut off".into());
+        let cut = || Refusal::Corrupt("an AAC configuration cut off".into());
         let mut bits = Bits::new(bytes);
         let object = object_type(&mut bits).ok_or_else(cut)?;
         let sample_rate = sample_rate(&mut bits).ok_or_else(cut)?;

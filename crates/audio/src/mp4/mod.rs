@@ -191,7 +191,7 @@ fn hold(input: &mut Input) -> Result<(), AudioError> {
         return Ok(());
     }
     let actual = format!(
-        "MP4 in a pipe whose packets stand before their index or out of order, more than {} MiB",
+        "MP4 in a pipe with more than {} MiB of packets before their index or out of order",
         MOST_HELD >> 20
     );
     Err(AudioError::unsupported(at, actual, "a file, or the index first (-movflags +faststart)"))
@@ -222,7 +222,7 @@ fn index(input: &mut Input) -> Result<(Vec<u8>, u64), AudioError> {
         }
         has_data |= &head.kind == b"mdat";
         if has_data && input.len().is_none() {
-            let actual = "MP4 in a pipe with 64 KiB before packets that stand before their index";
+            let actual = "MP4 in a pipe with 64 KiB before packets that come before their index";
             let expected = "a file, or the index first (-movflags +faststart)";
             return Err(AudioError::unsupported(at, actual, expected));
         }

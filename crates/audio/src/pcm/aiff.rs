@@ -67,7 +67,7 @@ pub(super) fn read(input: &mut Input) -> Result<Header, AudioError> {
     };
     input.consume(16);
     if !input.skip(offset.into())? {
-        let actual = format!("samples {offset} bytes behind their chunk");
+        let actual = format!("samples {offset} bytes after their chunk");
         return Err(AudioError::corrupt(at, actual, "samples inside the file"));
     }
     let mut repairs = Vec::new();

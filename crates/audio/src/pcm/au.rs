@@ -42,7 +42,7 @@ pub(super) fn read(input: &mut Input) -> Result<Header, AudioError> {
     let format = Format::new(channels, sample_rate.into(), encoding, start + 16)?;
     if offset < 24 || !input.skip(offset.into())? {
         let actual = format!("samples from byte {offset} on");
-        return Err(AudioError::corrupt(start + 4, actual, "a place behind the header"));
+        return Err(AudioError::corrupt(start + 4, actual, "a place after the header"));
     }
     let mut repairs = Vec::new();
     let declared = match size {

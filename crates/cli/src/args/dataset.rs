@@ -107,8 +107,8 @@ pub struct DatasetArgs {
     /// where there is no such column.
     #[arg(long, visible_alias = "y", value_name = "COLUMN")]
     target: Option<String>,
-    /// Label column of groups that must not be split between training and test. A column called
-    /// container or group is taken by itself where no --cv is given.
+    /// Label column of groups that must not be split between training and test. Without --cv,
+    /// a column called container or group is the default.
     #[arg(long, value_name = "COLUMN")]
     pub groups: Option<String>,
 }
@@ -163,7 +163,7 @@ impl DatasetArgs {
                 self.path().display()
             ))),
             several => Err(Failure::new(format!(
-                "{}: which column is to be learned? --target is one of {}",
+                "{}: name the column to learn: --target is one of {}",
                 self.path().display(),
                 several.join(", ")
             ))),

@@ -10,10 +10,10 @@ pub struct NetworkArgs {
     #[arg(long, value_name = "NAME")]
     #[arg(conflicts_with_all = ["classifier", "standardize", "pca", "tune"])]
     pub net: Option<String>,
-    /// Where the network is computed: cpu, the only device that there is in this build.
+    /// Where the network runs: cpu, the only device of this build.
     #[arg(long, value_name = "DEVICE", default_value = "cpu", requires = "net", value_parser = device)]
     pub device: String,
-    /// Folder in which the training is kept after each epoch, and from which it goes on.
+    /// Folder that keeps the training after each epoch; the next run continues from it.
     #[arg(long, value_name = "FOLDER", requires = "net")]
     pub checkpoints: Option<PathBuf>,
 }
@@ -22,8 +22,8 @@ fn device(name: &str) -> Result<String, String> {
     match name {
         "cpu" => Ok(name.into()),
         _ => Err(
-            "no such device in this build: networks are computed on the cpu only, of which they \
-                  take every core (--jobs); docs/networks.md says why"
+            "no such device in this build: networks run on the cpu only, on every core (--jobs); \
+                  docs/networks.md says why"
                 .into(),
         ),
     }

@@ -26,7 +26,7 @@ pub struct PipelineArgs {
     /// folds inside the training rows.
     #[arg(long, value_name = "KEY=V1,V2")]
     tune: Vec<String>,
-    /// Seed of the classifier or network and of shuffled folds; 0 where it is not given.
+    /// Seed of the classifier or network and of shuffled folds; 0 by default.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
 }
@@ -44,7 +44,7 @@ impl PipelineArgs {
         if let Some(seed) = self.seed
             && changes.insert("seed".into(), seed.into()).is_some()
         {
-            return Err(Failure::new("--seed and --set seed=… say the same twice: give one"));
+            return Err(Failure::new("--seed and --set seed=… set the same value: give one"));
         }
         Ok(changes)
     }

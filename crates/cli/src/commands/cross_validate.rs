@@ -35,7 +35,7 @@ Examples:
   corsmal-feat cross-validate feats.npz --labels labels.csv --report report
 
 With --tune the parameters are chosen anew in every fold, on inner folds of its training rows.
-`score` says more of the --predictions, `compare-predictions` tests whether those of two runs differ.
+`score` reports more about the --predictions, `compare-predictions` tests whether those of two runs differ.
 
 Exit codes: 0 fine, 2 could not run, 130 interrupted.")]
 pub struct Args {
@@ -58,8 +58,8 @@ pub struct Args {
     predictions: Option<PathBuf>,
     /// Write a report into this folder: report.html with scores, confusion matrix, curves, the errors
     /// to listen to, what the recordings are like, which features matter and whether more rows would
-    /// help; tables as CSV and LaTeX, figures as SVG and PDF. Trains about six times as often. For
-    /// --net without what trains again.
+    /// help; tables as CSV and LaTeX, figures as SVG and PDF. Trains about six times as often. With
+    /// --net, without the parts that train again.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
     /// Repeat with N seeds, from --seed on: how much of a difference between two classifiers is

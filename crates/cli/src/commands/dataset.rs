@@ -21,7 +21,7 @@ pub struct Args {
 
 #[derive(Subcommand)]
 enum Action {
-    /// Say what is there, what is missing and what is odd.
+    /// Report what is present, missing and odd.
     ///
     /// Known are the folder tree of 2020 (train/1/audio/s0_fi0_fu0_b0_l0_audio.wav) and the flat
     /// release of 2021 (train/audio/000000.wav with its annotation file). Exit code 1 when

@@ -16,7 +16,7 @@ Example:
 Everything that it shows is computed from synthetic recordings: scores on them say nothing about
 real data.")]
 pub struct Args {
-    /// Folder for everything that is made; it may be from an earlier demo.
+    /// Folder for the output, new or from an earlier demo.
     #[arg(long, value_name = "DIR", default_value = "corsmal-feat-demo")]
     out: PathBuf,
 }

@@ -14,10 +14,10 @@ Examples:
   corsmal-feat train vggish.npz --net m5-vggish-level --target level -o level.safetensors
   corsmal-feat benchmark --data CCM --out report --methods m5 --embeddings vggish=vggish.npz
 
-The weights are yours to bring, under the names of the usual PyTorch port (features.0.weight to
+Bring your own weights, under the names of the usual PyTorch port (features.0.weight to
 embeddings.4.bias); a .pth is read without running it. The .npz has X, rows of 128 numbers for each
 .96 s of one recording after another, offsets, where each recording begins, and ids; label columns of
-a manifest go along.
+a manifest are kept.
 
 Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 interrupted.")]
 pub struct Args {

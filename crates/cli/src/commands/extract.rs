@@ -46,11 +46,11 @@ pub struct Args {
     config: ConfigArgs,
     #[command(flatten)]
     jobs: Jobs,
-    /// Cut recordings into windows of so many seconds: each is a row or arrays of its own with the id
+    /// Cut recordings into windows of this many seconds: each gets a row or arrays, with the id
     /// RECORDING@START, the labels, and the label `recording`.
     #[arg(long, value_name = "SECONDS", value_parser = window_seconds)]
     window: Option<f64>,
-    /// Seconds from the begin of one window to that of the next; half a window by default.
+    /// Seconds from the start of one window to that of the next; half a window by default.
     #[arg(long, value_name = "SECONDS", value_parser = window_seconds, requires = "window")]
     hop: Option<f64>,
     /// Only the i-th of n parts of the inputs, counted from 0; `merge` joins the outputs.
@@ -91,15 +91,15 @@ pub struct ConfigArgs {
     /// A configuration file (TOML).
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Change one key, such as melspectrogram.n_mels=64 or signal.sample_rate=16000; librosa=0.8 is
-    /// everything that gives the numbers of librosa 0.8.
+    /// Change one key, such as melspectrogram.n_mels=64 or signal.sample_rate=16000; librosa=0.8
+    /// sets everything that gives the numbers of librosa 0.8.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
     /// Add a feature with its defaults (see `corsmal-feat features`), under another name where one
     /// is given.
     #[arg(long = "add", value_name = "[NAME=]FEATURE")]
     pub added: Vec<String>,
-    /// Put the statistics of each recording through a projection that `corsmal-feat pca` fitted.
+    /// Project the statistics of each recording by a file of `corsmal-feat pca`.
     #[arg(long, value_name = "FILE")]
     pub project: Option<PathBuf>,
 }

@@ -64,9 +64,9 @@ enum Command {
     Features(features::Args),
     /// Show format and health of a recording, with a picture on request.
     Inspect(inspect::Args),
-    /// Show how two feature files differ, and why they probably do.
+    /// Show how two feature files differ, and the likely causes.
     Compare(compare::Args),
-    /// Show the main job end to end on synthetic recordings.
+    /// Show the whole workflow on synthetic recordings.
     Demo(demo::Args),
     /// List and explain the networks of the paper.
     Nets(nets::Args),
@@ -94,7 +94,7 @@ enum Command {
     Capacity(capacity::Args),
     /// Print shell completions or the man page.
     Completions(completions::Args),
-    /// Look at a CORSMAL data set on disk.
+    /// Check a CORSMAL data set on disk.
     Dataset(dataset::Args),
     /// Score CORSMAL submissions by the paper's or the official evaluators' rules.
     Evaluate(evaluate::Args),

@@ -44,7 +44,7 @@ pub struct Args {
     /// Predictions with a highest probability below P are unknown, and count as wrong.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = crate::args::share)]
     reject: f64,
-    /// The target is a number although all its values are whole.
+    /// Treat the target as a number although all its values are whole.
     #[arg(long)]
     numeric: bool,
     /// Draws of the bootstrap.

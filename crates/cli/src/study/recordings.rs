@@ -29,10 +29,10 @@ pub(super) fn add(study: &mut Study, sources: Vec<Source>, quiet: bool) {
     let gone = sources.iter().filter(|source| !source.path.is_file()).count();
     if let Some(first) = sources.iter().find(|source| !source.path.is_file()) {
         eprintln!(
-            "warning: {gone} of {} recordings are no longer where the features were made from, such as {}{}",
+            "warning: {gone} of {} recordings are no longer at their paths, such as {}{}",
             sources.len(),
             first.path.display(),
-            if gone == sources.len() { "; the report says nothing of their sound" } else { "" }
+            if gone == sources.len() { "; the report leaves out their sound" } else { "" }
         );
     }
     if gone == sources.len() {

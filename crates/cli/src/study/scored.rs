@@ -24,8 +24,8 @@ pub fn write_scored(
     let mut study = Study {
         title: format!("Scores of {}", file_name(&predictions.path)),
         target: target.unwrap_or("class").into(),
-        protocol: "Whether these recordings were held out from the training of the model is not \
-                   known here: the scores are honest only if they were."
+        protocol: "The scores are honest only if the model was trained without these recordings, which this \
+                   report cannot know."
             .into(),
         ..of_predictions(predictions, target, scores)?
     };

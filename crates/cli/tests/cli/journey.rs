@@ -162,7 +162,7 @@ fn windows_are_listened_to_where_they_are() {
     let moved = run(&[&validate[..], &["--report", text(&report), "-q"]].concat());
     let message = String::from_utf8_lossy(&moved.stderr).into_owned();
     assert!(moved.status.success() && moved.stdout.is_empty(), "{message}");
-    assert!(message.contains("24 of 24 recordings are no longer where"), "{message}");
+    assert!(message.contains("24 of 24 recordings are no longer at their paths"), "{message}");
     assert!(!sections(&j.report("report")).contains(&"data"));
 }
 

@@ -314,7 +314,7 @@ fn a_score_that_chose_its_epoch_says_so() {
         ["cross-validate", text(&features), "--net", "m5-vggish-level", "--target", "level"];
     let more = ["--cv", "2", "--set", "epochs=1", "--set", "select=published"];
     let words = [&words[..], &more[..]].concat();
-    let said = "chosen by the fold that it is scored on";
+    let said = "the fold that scores each epoch also chose it";
     assert!(done(&words).contains(said));
     let output = run(&[&words[..], &["--json"]].concat());
     assert!(String::from_utf8_lossy(&output.stderr).contains(said));

@@ -157,7 +157,7 @@ impl Machine<'_> {
             0x80 => {
                 let version = self.array::<1>()?[0];
                 if version > 5 {
-                    return Err(format!("pickle protocol {version} is not known"));
+                    return Err(format!("pickle protocol {version} is unknown"));
                 }
             }
             0x95 => {
@@ -266,7 +266,7 @@ impl Machine<'_> {
                 // State of an object: an OrderedDict's attributes (PyTorch's `_metadata`).
                 self.pop()?;
                 if !matches!(self.stack.last(), Some(Value::Dict(_))) {
-                    return Err("an object of a class that is not known".into());
+                    return Err("an object of an unknown class".into());
                 }
             }
             b'Q' => {

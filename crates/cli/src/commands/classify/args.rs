@@ -32,7 +32,7 @@ status other than ok and no prediction. With --window one line per window, with 
 end in seconds, written as soon as the window is complete; memory does not grow with the stream.
 
 A network of `train --net` that takes windows, such as m4-type, has a line for each of them, or one
-decision with --vote; one of whole recordings is as good as its --window is like them.
+decision with --vote; one trained on whole recordings does best without --window.
 
 Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 interrupted.")]
 pub struct Args {
@@ -61,7 +61,7 @@ pub struct Args {
     /// Predictions with a highest probability below P are unknown.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = crate::args::share)]
     pub(super) reject: f64,
-    /// Predict windows of so many seconds instead of whole recordings.
+    /// Predict windows of this many seconds instead of whole recordings.
     #[arg(long, value_name = "SECONDS")]
     pub(super) window: Option<f64>,
     /// Seconds from one window to the next; default half a window.

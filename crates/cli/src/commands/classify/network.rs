@@ -264,12 +264,11 @@ impl<'a> Listener<'a> {
     fn windows(&self, window: f64, found: &[Input], records: &mut Records) -> Result<End, Failure> {
         let hop = self.args.hop.unwrap_or(window / 2.0);
         let windowing = Windowing::new(window, hop).ok_or_else(|| {
-            Failure::new(format!("--window {window} --hop {hop}: 0.01 to 600 seconds are possible"))
+            Failure::new(format!("--window {window} --hop {hop}: each must be 0.01 to 600 seconds"))
         })?;
         if self.front_end.windows.is_none() && !self.args.quiet {
             eprintln!(
-                "warning: {} was trained on whole recordings: windows of {window} s are another \
-                 thing to it",
+                "warning: {} was trained on whole recordings: it may do worse on windows of {window} s",
                 self.model.header.network
             );
         }
