@@ -94,7 +94,7 @@ class TrainedModel:
         if isinstance(X, (list, tuple)) and X and isinstance(X[0], (str, os.PathLike)):
             strange = [path for path in X if not isinstance(path, (str, os.PathLike))]
             if strange:
-                raise ParameterError(f"X mixes paths and others: {strange[0]!r} is no path")
+                raise ParameterError(f"X mixes paths and others: {strange[0]!r} is not a path")
             return self._of_recordings([os.fspath(path) for path in X], any_rate)
         rows = features(X, "TrainedModel")
         if rows.shape[1] != self.n_features_in_:
