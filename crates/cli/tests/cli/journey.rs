@@ -187,7 +187,7 @@ fn predictions_and_estimates_have_reports_of_their_own() {
     let errors = &found["sections"][3];
     assert!(errors["text"][0].as_str().unwrap().ends_with("1 without an answer."));
     assert_eq!(errors["tables"][0]["rows"].as_array().unwrap().len(), 1);
-    holds(&report.join("report.html"), &["Whether these recordings were held out"]);
+    holds(&report.join("report.html"), &["was trained without these recordings"]);
 
     std::fs::write(&csv, "id,capacity,predicted\n1,100.5,90\n2,200.5,300\n3,50,-1\n").unwrap();
     done(&["score", text(&csv), "--target", "capacity", "--report", text(&report)]);
