@@ -286,7 +286,10 @@ mod tests {
             (&CAMERA.replace("900,0,640", "900,0"), "'intrinsic' of camera 'rgb' is not 3 by 3"),
             ("no pickle", "byte 1: operation 'n'"),
             // Finite numbers that would leave the range of single precision, or any room.
-            (&CAMERA.replace("900,0,640", "1e39,0,640"), "camera 'rgb': 'intrinsic' is not a camera"),
+            (
+                &CAMERA.replace("900,0,640", "1e39,0,640"),
+                "camera 'rgb': 'intrinsic' is not a camera",
+            ),
             (&CAMERA.replace("[0,0,1]", "[0,0,0]"), "'intrinsic' is not a camera"),
             (&CAMERA.replace("[2]", "[1e39]"), "'tvec' puts the camera more than 100 m away"),
             (
