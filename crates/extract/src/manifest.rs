@@ -29,7 +29,7 @@ pub const MAX_COLUMNS: usize = 4096;
 pub const MAX_CELLS: usize = 1 << 24;
 
 const PATH: &str = "path";
-const ID: &str = "id";
+pub(crate) const ID: &str = "id";
 const START: &str = "start";
 const END: &str = "end";
 
@@ -223,20 +223,13 @@ fn json_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
         if text.trim().is_empty() {
             continue;
         }
-        let Object(fields) =
-            serde_json::from_str(&text).map_err(|e| wrong(path, line, e.to_string()))?;
+        let fields = fields(&text).map_err(|reason| wrong(path, line, reason))?;
         let mut cells = Vec::with_capacity(fields.len());
         for (name, value) in fields {
-            let value = match value {
-                Value::Null => String::new(),
-                Value::String(text) => text,
-                Value::Bool(_) | Value::Number(_) => value.to_string(),
-                Value::Array(_) | Value::Object(_) => {
-                    let name = quoted(&name);
-                    let reason = format!("{name} must be a string, a number or a boolean");
-                    return Err(wrong(path, line, reason));
-                }
-            };
+            let value = label(value).ok_or_else(|| {
+                let name = quoted(&name);
+                wrong(path, line, format!("{name} must be a string, a number or a boolean"))
+            })?;
             let place = columns.place(&name).map_err(|reason| wrong(path, line, reason))?;
             cells.push((place, value));
         }
@@ -250,6 +243,22 @@ fn json_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
         columns.entry(path, line, |place| std::mem::take(&mut values[place]))
     });
     entries.collect()
+}
+
+/// The keys and values of a JSON object, in the order written; no key is empty or there twice.
+pub(crate) fn fields(text: &str) -> Result<Vec<(String, Value)>, String> {
+    let object: Object = serde_json::from_str(text).map_err(|e| e.to_string())?;
+    Ok(object.0)
+}
+
+/// The text of a value that can be a label.
+pub(crate) fn label(value: Value) -> Option<String> {
+    match value {
+        Value::Null => Some(String::new()),
+        Value::String(text) => Some(text),
+        Value::Bool(_) | Value::Number(_) => Some(value.to_string()),
+        Value::Array(_) | Value::Object(_) => None,
+    }
 }
 
 /// A JSON object with its keys in the order written, each once.

@@ -2,7 +2,6 @@
 //! they fit into one table.
 
 use std::collections::HashMap;
-use std::path::Path;
 
 use corsmal_audio::{AudioError, BlockSource};
 use rayon::prelude::*;
@@ -31,20 +30,18 @@ pub struct Header {
 /// The header of each input, every file opened once; `None` for standard input and for what cannot
 /// be read, which the run will say.
 pub fn headers(inputs: &[Input]) -> Vec<Option<Header>> {
-    let mut paths: Vec<&Path> = inputs.iter().filter_map(path).collect();
-    paths.sort_unstable();
-    paths.dedup();
-    let read = |path: &&Path| corsmal_audio::open(path).ok().map(|source| of(source.as_ref()));
-    let found: Vec<Option<Header>> = paths.par_iter().map(read).collect();
-    let known: HashMap<&Path, Option<Header>> = paths.into_iter().zip(found).collect();
-    inputs.iter().map(|input| path(input).and_then(|path| known.get(path).copied()?)).collect()
+    let mut sources: Vec<&InputSource> = inputs.iter().filter_map(again).collect();
+    sources.sort_unstable();
+    sources.dedup();
+    let read = |source: &&InputSource| source.open().ok().map(|source| of(source.as_ref()));
+    let found: Vec<Option<Header>> = sources.par_iter().map(read).collect();
+    let known: HashMap<&InputSource, Option<Header>> = sources.into_iter().zip(found).collect();
+    inputs.iter().map(|input| again(input).and_then(|s| known.get(s).copied()?)).collect()
 }
 
-fn path(input: &Input) -> Option<&Path> {
-    match &input.source {
-        InputSource::File(path) => Some(path),
-        InputSource::Stdin => None,
-    }
+/// What can be read again afterwards.
+fn again(input: &Input) -> Option<&InputSource> {
+    (input.source != InputSource::Stdin).then_some(&input.source)
 }
 
 fn of(source: &dyn BlockSource) -> Header {
@@ -57,27 +54,28 @@ fn of(source: &dyn BlockSource) -> Header {
 /// The frames of each input, those of every file counted once; `None` for what cannot be read to its
 /// end, which the run will say. `headers` are those of [`headers`].
 pub fn lengths(inputs: &[Input], headers: &[Option<Header>]) -> Vec<Option<u64>> {
-    let mut paths: Vec<(&Path, Header)> = inputs
+    let mut sources: Vec<(&InputSource, Header)> = inputs
         .iter()
         .zip(headers)
-        .filter_map(|(input, header)| Some((path(input)?, (*header)?)))
+        .filter_map(|(input, header)| Some((again(input)?, (*header)?)))
         .collect();
-    paths.sort_unstable_by_key(|(path, _)| *path);
-    paths.dedup_by_key(|(path, _)| *path);
-    let count =
-        |(path, header): &(&Path, Header)| header.frames.or_else(|| count_frames(path).ok());
-    let found: Vec<Option<u64>> = paths.par_iter().map(count).collect();
-    let known: HashMap<&Path, Option<u64>> =
-        paths.into_iter().map(|(path, _)| path).zip(found).collect();
-    inputs.iter().map(|input| path(input).and_then(|path| known.get(path).copied()?)).collect()
+    sources.sort_unstable_by_key(|(source, _)| *source);
+    sources.dedup_by_key(|(source, _)| *source);
+    let count = |(source, header): &(&InputSource, Header)| {
+        header.frames.or_else(|| count_frames(source).ok())
+    };
+    let found: Vec<Option<u64>> = sources.par_iter().map(count).collect();
+    let known: HashMap<&InputSource, Option<u64>> =
+        sources.into_iter().map(|(source, _)| source).zip(found).collect();
+    inputs.iter().map(|input| again(input).and_then(|s| known.get(s).copied()?)).collect()
 }
 
 /// Frames of a recording whose header does not say: decodes it.
 ///
 /// # Errors
 /// It cannot be read to its end.
-fn count_frames(path: &Path) -> Result<u64, AudioError> {
-    let mut source = corsmal_audio::open(path)?;
+fn count_frames(source: &InputSource) -> Result<u64, AudioError> {
+    let mut source = source.open()?;
     let channels = usize::from(source.spec().channels);
     let mut block = vec![0.0; (BLOCK / channels).max(1) * channels];
     let mut frames = 0;
@@ -115,10 +113,10 @@ struct Group<T> {
 impl Survey {
     /// Looks at the headers of `inputs`, where `config` asks for a summary table.
     pub fn of(inputs: &[Input], config: &Config) -> Self {
-        let Some(summary) = &config.summary else { return Self::default() };
-        let apart = config.signal.channels == Channels::All
-            && !summary.average_channels
-            && config.projection.is_none();
+        if config.summary.is_none() {
+            return Self::default();
+        }
+        let apart = depends_on_channels(config);
         let own_rate = config.signal.sample_rate == 0.0;
         if !apart && !own_rate {
             return Self::default();
@@ -133,6 +131,23 @@ impl Survey {
             survey.rates = groups(known().map(|(input, header)| (input, header.sample_rate)));
         }
         survey
+    }
+
+    /// For recordings that come a few at a time: all tables are as wide as recordings of `channels`
+    /// channels make them.
+    pub fn of_channels(channels: u16, config: &Config) -> Self {
+        let mut survey = Self::default();
+        if depends_on_channels(config) {
+            let first = format!("channels = {channels} says");
+            survey.channels.push(Group { value: channels, count: 0, first });
+        }
+        survey
+    }
+
+    /// The number of channels that sets the width of the table; `None` where it does not depend on
+    /// them, and where no header can be read.
+    pub fn channels(&self) -> Option<u16> {
+        self.channels.first().map(|width| width.value)
     }
 
     /// What the user should know before the run.
@@ -174,6 +189,13 @@ impl Survey {
             width.first
         ))
     }
+}
+
+/// Whether the width of the table depends on the number of channels.
+fn depends_on_channels(config: &Config) -> bool {
+    config.signal.channels == Channels::All
+        && config.summary.as_ref().is_some_and(|summary| !summary.average_channels)
+        && config.projection.is_none()
 }
 
 /// What the user can do.

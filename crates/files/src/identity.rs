@@ -30,6 +30,19 @@ pub fn of_file(path: &Path) -> io::Result<String> {
     }
     let mut file = File::open(path)?;
     let size = file.metadata()?.len();
+    of_reader(&mut file, size)
+}
+
+/// As [`of_file`], of bytes in memory.
+pub fn of_bytes(bytes: &[u8]) -> String {
+    of_reader(&mut io::Cursor::new(bytes), bytes.len() as u64).unwrap_or_default()
+}
+
+/// As [`of_file`], of `size` bytes that can be read and seeked in.
+///
+/// # Errors
+/// Whatever seeking or reading reports.
+pub fn of_reader(file: &mut (impl Read + Seek), size: u64) -> io::Result<String> {
     let mut hasher = blake3::Hasher::new();
     hasher.update(&size.to_le_bytes());
     let mut buffer = Vec::new();

@@ -27,10 +27,10 @@ const SPAN: u64 = 1 << 20;
 /// Opens an input. A stream on standard input fails once `stop` is set, also while nothing comes.
 pub fn open(input: &Input, stop: &Arc<AtomicBool>) -> Result<Box<dyn BlockSource>, Failed> {
     Ok(match &input.source {
-        InputSource::File(path) => corsmal_audio::open(path)?,
         InputSource::Stdin => {
             corsmal_audio::from_reader(Live::new(std::io::stdin(), stop.clone()))?
         }
+        source => source.open()?,
     })
 }
 

@@ -1,9 +1,8 @@
 //! Tells whether a recording is still the file that it was when its first byte was read.
 
 use std::io;
-use std::path::PathBuf;
 
-use corsmal_files::identity::{self, Stamp};
+use corsmal_files::identity::Stamp;
 use corsmal_files::outcome::Status;
 
 use super::failed::Failed;
@@ -13,7 +12,7 @@ use crate::inputs::{Input, InputSource};
 #[derive(Debug, Clone)]
 pub struct Watch {
     /// Streams and devices cannot be looked at twice.
-    seen: Option<(PathBuf, Stamp)>,
+    seen: Option<(InputSource, Stamp)>,
     /// Whether a change could keep the stamp, so that only the content tells.
     fresh: bool,
 }
@@ -21,13 +20,9 @@ pub struct Watch {
 impl Watch {
     /// Looks at an input that is about to be read.
     pub fn begin(input: &Input) -> Self {
-        let seen = match &input.source {
-            InputSource::Stdin => None,
-            // What cannot be looked at cannot be opened either, which says more.
-            InputSource::File(path) => {
-                Stamp::of_path(path).ok().flatten().map(|stamp| (path.clone(), stamp))
-            }
-        };
+        // What cannot be looked at cannot be opened either, which says more.
+        let stamp = input.source.file().and_then(|path| Stamp::of_path(path).ok().flatten());
+        let seen = stamp.map(|stamp| (input.source.clone(), stamp));
         let fresh = seen.as_ref().is_some_and(|(_, stamp)| stamp.is_fresh());
         Self { seen, fresh }
     }
@@ -37,7 +32,8 @@ impl Watch {
     /// # Errors
     /// [`Status::Changed`] and what happened to the file.
     pub fn check(&self) -> Result<(), Failed> {
-        let Some((path, before)) = &self.seen else { return Ok(()) };
+        let Some((source, before)) = &self.seen else { return Ok(()) };
+        let Some(path) = source.file() else { return Ok(()) };
         let changed =
             |what: String| Err(Failed::new(Status::Changed, format!("{what} while it was read")));
         let now = match Stamp::of_path(path) {
@@ -56,18 +52,17 @@ impl Watch {
     }
 
     /// Looks again, at the content too where the file is so new that its stamp may not tell:
-    /// `identity` is that of [`identity::of_file`] from before the first read.
+    /// `identity` is that of [`InputSource::identity`] from before the first read.
     ///
     /// # Errors
     /// As [`Watch::check`].
     pub fn check_content(&self, identity: &str) -> Result<(), Failed> {
         self.check()?;
         match &self.seen {
-            Some((path, _))
-                if self.fresh && identity::of_file(path).is_ok_and(|now| now != identity) =>
-            {
-                Err(Failed::new(Status::Changed, "was written to while it was read"))
-            }
+            Some((source, _)) if self.fresh => match source.identity() {
+                now if now.is_empty() || now == identity => Ok(()),
+                _ => Err(Failed::new(Status::Changed, "was written to while it was read")),
+            },
             _ => Ok(()),
         }
     }

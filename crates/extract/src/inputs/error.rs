@@ -23,6 +23,17 @@ pub enum InputError {
         /// Its reason.
         source: io::Error,
     },
+    /// An object of a store.
+    #[error(
+        "{name}: objects of stores ({store}://) are not read; mount the bucket (s3fs, gcsfuse, \
+         rclone mount) or copy what is needed"
+    )]
+    Store {
+        /// The URI given.
+        name: String,
+        /// Its scheme.
+        store: &'static str,
+    },
     /// A folder or glob without recordings.
     #[error("{path}: no file with an audio extension ({extensions}){skipped}")]
     NoAudio {
@@ -49,6 +60,14 @@ pub enum InputError {
         /// Line, from 1.
         line: u64,
         /// What is wrong, and what is allowed.
+        reason: String,
+    },
+    /// An archive that cannot be used.
+    #[error("{path}: {reason}")]
+    Archive {
+        /// The archive.
+        path: PathBuf,
+        /// What is wrong, and where.
         reason: String,
     },
     /// The manifests together have too many labels.

@@ -86,9 +86,14 @@ pub(super) fn assign(found: &[Found]) -> Result<Vec<String>, InputError> {
 fn forms(found: &Found) -> Vec<String> {
     match (&found.naming, &found.source) {
         (Naming::Given(id), _) => vec![id.clone()],
-        (Naming::Derived(relative), InputSource::File(path)) => {
+        (Naming::Derived(relative), source) => {
+            let path = match source {
+                InputSource::File(path) => path.clone(),
+                InputSource::Member(member) => member.path.clone(),
+                InputSource::Memory(_) | InputSource::Stdin => return vec![id_of(relative)],
+            };
             let mut forms = Vec::new();
-            for path in [relative, path] {
+            for path in [relative, &path] {
                 forms.push(id_of(&path.with_extension("")));
                 forms.push(id_of(path));
             }
@@ -98,7 +103,6 @@ fn forms(found: &Found) -> Vec<String> {
             }
             forms
         }
-        (Naming::Derived(relative), InputSource::Stdin) => vec![id_of(relative)],
     }
 }
 
@@ -106,7 +110,7 @@ fn forms(found: &Found) -> Vec<String> {
 fn place(found: &Found) -> Option<&Path> {
     match &found.source {
         InputSource::File(path) => Some(path),
-        InputSource::Stdin => None,
+        InputSource::Member(_) | InputSource::Memory(_) | InputSource::Stdin => None,
     }
 }
 

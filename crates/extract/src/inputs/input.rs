@@ -1,13 +1,24 @@
 //! A recording of a run.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::io::{self, Cursor};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use corsmal_audio::{AudioError, BlockSource};
+use corsmal_files::identity;
+
+use super::archive::Member;
 
 /// Where the bytes of a recording come from.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum InputSource {
     /// A file.
     File(PathBuf),
+    /// A member of a tar archive.
+    Member(Box<Member>),
+    /// Bytes in memory.
+    Memory(Arc<[u8]>),
     /// Standard input.
     Stdin,
 }
@@ -16,7 +27,44 @@ impl fmt::Display for InputSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::File(path) => path.display().fmt(f),
+            Self::Member(member) => member.path.display().fmt(f),
+            // What tells them apart.
+            Self::Memory(bytes) => f.write_str(&identity::of_bytes(bytes)),
             Self::Stdin => f.write_str("-"),
+        }
+    }
+}
+
+impl InputSource {
+    /// The file that holds the bytes, where there is one.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::File(path) => Some(path),
+            Self::Member(member) => Some(&member.archive),
+            Self::Memory(_) | Self::Stdin => None,
+        }
+    }
+
+    /// Opens the recording.
+    ///
+    /// # Errors
+    /// As [`corsmal_audio::open`].
+    pub fn open(&self) -> Result<Box<dyn BlockSource>, AudioError> {
+        match self {
+            Self::File(path) => corsmal_audio::open(path),
+            Self::Member(member) => member.open(),
+            Self::Memory(bytes) => corsmal_audio::from_seekable(Cursor::new(bytes.clone())),
+            Self::Stdin => corsmal_audio::from_reader(io::stdin()),
+        }
+    }
+
+    /// What its bytes are known by; empty where they cannot be read.
+    pub fn identity(&self) -> String {
+        match self {
+            Self::File(path) => identity::of_file(path).unwrap_or_default(),
+            Self::Member(member) => member.identity().unwrap_or_default(),
+            Self::Memory(bytes) => identity::of_bytes(bytes),
+            Self::Stdin => identity::STREAM.to_string(),
         }
     }
 }

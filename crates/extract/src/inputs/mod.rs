@@ -1,19 +1,22 @@
 //! From what the user names to the list of recordings of a run.
 //!
 //! A name is, in this order of interpretation: `-` (a WAV stream on standard input), an existing
-//! file (a manifest if its extension is one of [`manifest::EXTENSIONS`], else a recording), an
-//! existing folder, or a glob. Folders and globs give files with an audio extension only, follow
+//! file (a manifest if its extension is one of [`manifest::EXTENSIONS`], an archive if it is `.tar`,
+//! else a recording), an existing folder, a list in braces as `{000..012}.tar` or `{a,b}.wav`, or a
+//! glob. Folders and globs give files with an audio extension only, follow
 //! symbolic links, skip names that begin with a dot, and are sorted by the bytes of the path
 //! relative to their root; names keep the order in which they are given.
 //!
 //! **Ids.** A recording's id is its path relative to its root, without extension, with `/` between
 //! the parts. The root is the folder named, the part of a glob before its first wildcard, or the
-//! folder of a file named; paths in a manifest are taken as written. Where ids collide, all those
+//! folder of a file named; the id of a recording in a tar begins with the name of the tar; paths in a manifest are taken as written. Where ids collide, all those
 //! that do keep their extension; where that does not help, they take the path as given on the
 //! command line. Of several stretches of one file, each has its times behind the id, as
 //! `x@0.5-1.0`. What still collides is refused. Ids from a manifest stand as they are. Ids that
 //! would begin with `__`, the prefix of an output's own arrays, get `./` in front.
 
+mod archive;
+mod braces;
 mod error;
 mod folder;
 mod found;
@@ -30,6 +33,7 @@ use crate::manifest;
 use folder::{has_extension, is_apple_double, walk};
 use found::{Found, Naming};
 
+pub use archive::{Fault, Member};
 pub use error::InputError;
 pub use input::{Input, InputSource, list_hash};
 
@@ -41,12 +45,23 @@ pub struct Collected {
     /// Files in folders whose names are those of recordings, of formats that are not read, and
     /// metadata of macOS (`._x.wav`) wherever it is named.
     pub skipped: Vec<PathBuf>,
+    /// Archives without the blocks of zeros that end one: members may be missing.
+    pub unended: Vec<PathBuf>,
 }
 
 impl Collected {
-    /// A sentence about the files skipped, if there are any.
+    /// A sentence about the files skipped and one about archives without an end, if there are any.
     pub fn warning(&self) -> Option<String> {
-        told(&self.skipped)
+        let unended = self.unended.first().map(|first| {
+            format!(
+                "{} of the tars have no end mark and may be cut: {}{}",
+                self.unended.len(),
+                first.display(),
+                if self.unended.len() > 1 { ", ..." } else { "" }
+            )
+        });
+        let sentences: Vec<String> = told(&self.skipped).into_iter().chain(unended).collect();
+        (!sentences.is_empty()).then(|| sentences.join("; "))
     }
 }
 
@@ -76,9 +91,9 @@ fn no_audio(path: &Path, skipped: &[PathBuf]) -> InputError {
 /// # Errors
 /// [`InputError`] names the path, and in a manifest the line.
 pub fn collect<S: AsRef<OsStr>>(names: &[S]) -> Result<Collected, InputError> {
-    let (mut found, mut skipped) = (Vec::new(), Vec::new());
+    let (mut found, mut skipped, mut unended) = (Vec::new(), Vec::new(), Vec::new());
     for name in names {
-        find(name.as_ref(), &mut found, &mut skipped)?;
+        find(name.as_ref(), &mut found, &mut skipped, &mut unended)?;
     }
     skipped.sort_unstable();
     skipped.dedup();
@@ -108,13 +123,14 @@ pub fn collect<S: AsRef<OsStr>>(names: &[S]) -> Result<Collected, InputError> {
             labels: labels.collect(),
         }
     });
-    Ok(Collected { inputs: inputs.collect(), skipped })
+    Ok(Collected { inputs: inputs.collect(), skipped, unended })
 }
 
 fn find(
     name: &OsStr,
     found: &mut Vec<Found>,
     skipped: &mut Vec<PathBuf>,
+    unended: &mut Vec<PathBuf>,
 ) -> Result<(), InputError> {
     if name == "-" {
         let naming = Naming::Given("stdin".into());
@@ -138,19 +154,62 @@ fn find(
             Ok(())
         }
         Ok(_) if has_extension(path, &manifest::EXTENSIONS) => find_manifest(path, found, skipped),
+        Ok(_) if archive::is_archive(path) => find_archive(path, found, skipped, unended),
         Ok(_) => {
+            if let Some(refusal) = archive::refusal(path) {
+                return Err(refusal);
+            }
             let relative = path.file_name().map_or_else(|| path.into(), PathBuf::from);
             found.push(Found::file(path.into(), relative));
             Ok(())
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            match name.to_str().filter(|name| wildcard::is_glob(name)) {
-                Some(pattern) => find_glob(pattern, found, skipped),
-                None => Err(InputError::Missing { path: path.into() }),
+            let missing = || InputError::Missing { path: path.into() };
+            let pattern = name.to_str().ok_or_else(missing)?;
+            if let Some(store) = store(pattern) {
+                return Err(InputError::Store { name: pattern.into(), store });
+            }
+            match braces::expand(pattern)? {
+                Some(names) => {
+                    names.iter().try_for_each(|name| find(name.as_ref(), found, skipped, unended))
+                }
+                None if wildcard::is_glob(pattern) => find_glob(pattern, found, skipped, unended),
+                None => Err(missing()),
             }
         }
         Err(error) => Err(InputError::io(path, error)),
     }
+}
+
+/// The store that a URI names.
+fn store(name: &str) -> Option<&'static str> {
+    let stores = ["s3", "gs", "gcs", "az", "abfs", "abfss", "http", "https", "hdfs"];
+    let (scheme, _) = name.split_once("://")?;
+    stores.into_iter().find(|store| scheme.eq_ignore_ascii_case(store))
+}
+
+/// The recordings of an archive; their ids begin with its name.
+fn find_archive(
+    path: &Path,
+    found: &mut Vec<Found>,
+    skipped: &mut Vec<PathBuf>,
+    unended: &mut Vec<PathBuf>,
+) -> Result<(), InputError> {
+    let contents = archive::contents(path)?;
+    if contents.recordings.is_empty() {
+        return Err(no_audio(path, &contents.skipped));
+    }
+    let shard = PathBuf::from(path.file_stem().unwrap_or_default());
+    for archive::Entry { member, name, labels } in contents.recordings {
+        let naming = Naming::Derived(shard.join(name));
+        let source = InputSource::Member(Box::new(member));
+        found.push(Found { source, naming, start: None, end: None, labels });
+    }
+    skipped.extend(contents.skipped);
+    if !contents.is_ended {
+        unended.push(path.into());
+    }
+    Ok(())
 }
 
 fn find_manifest(
@@ -163,6 +222,12 @@ fn find_manifest(
         match std::fs::metadata(&entry.path) {
             Ok(meta) if meta.is_dir() => {
                 return Err(wrong(format!("{} is a folder", entry.path.display())));
+            }
+            Ok(_) if archive::is_archive(&entry.path) => {
+                return Err(wrong(format!(
+                    "{} is an archive of recordings: name it on its own, not in a manifest",
+                    entry.path.display()
+                )));
             }
             Ok(_) if is_apple_double(&entry.path) => {
                 skipped.push(entry.path);
@@ -189,12 +254,20 @@ fn find_glob(
     pattern: &str,
     found: &mut Vec<Found>,
     skipped: &mut Vec<PathBuf>,
+    unended: &mut Vec<PathBuf>,
 ) -> Result<(), InputError> {
     let (mut files, before) = (Vec::new(), skipped.len());
-    for path in wildcard::expand(pattern)? {
+    let (mut archives, paths): (Vec<_>, Vec<_>) = wildcard::expand(pattern)?
+        .into_iter()
+        .partition(|path| archive::is_archive(path) && path.is_file());
+    archives.sort_unstable();
+    for path in &archives {
+        find_archive(path, found, skipped, unended)?;
+    }
+    for path in paths {
         walk(&path, &mut files, skipped)?;
     }
-    if files.is_empty() {
+    if files.is_empty() && archives.is_empty() {
         return Err(no_audio(Path::new(pattern), &skipped[before..]));
     }
     push_sorted(&wildcard::root(pattern), files, found);

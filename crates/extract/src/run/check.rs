@@ -10,7 +10,7 @@ use corsmal_files::{draft, identity};
 use super::error::RunError;
 use super::options::{MAX_JOBS, RunOptions, RunReport};
 use crate::config::Config;
-use crate::inputs::{Input, InputSource, list_hash};
+use crate::inputs::{Input, list_hash};
 use crate::ledger::{self, Ledger};
 
 /// What is known of a run before it starts.
@@ -31,9 +31,9 @@ pub fn check(inputs: &[Input], config: &Config, options: &RunOptions) -> Result<
     let format = check_output(options, config)?;
     let out = &draft::destination(&options.out);
     require_jobs(options.jobs)?;
-    let is_out = |i: &&Input| match &i.source {
-        InputSource::File(path) => path.file_name() == out.file_name() && draft::same(path, out),
-        InputSource::Stdin => false,
+    let is_out = |i: &&Input| {
+        let same = |path: &Path| path.file_name() == out.file_name() && draft::same(path, out);
+        i.source.file().is_some_and(same)
     };
     if let Some(input) = inputs.iter().find(is_out) {
         let why = format!("is the input {} itself", input.id);
@@ -120,17 +120,9 @@ fn finished(
         return Err(refuse("holds features of a stream, which cannot be read again to compare"));
     }
     let same = outcomes.len() == inputs.len()
-        && outcomes.iter().zip(inputs).all(|(o, i)| o.identity == identity_of(i));
+        && outcomes.iter().zip(inputs).all(|(o, i)| o.identity == i.source.identity());
     if !same {
         return Err(refuse("holds features of files that have changed since"));
     }
     Ok(Some(RunReport { resumed: outcomes.len(), outcomes, up_to_date: true }))
-}
-
-/// Identity of an input as it is now; empty where it cannot be read.
-pub(super) fn identity_of(input: &Input) -> String {
-    match &input.source {
-        InputSource::Stdin => identity::STREAM.to_string(),
-        InputSource::File(path) => identity::of_file(path).unwrap_or_default(),
-    }
 }

@@ -13,14 +13,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 
 use corsmal_files::npz::Compression;
-use corsmal_files::outcome::{Outcome, Status};
+use corsmal_files::outcome::Outcome;
 use rayon::Scope;
 
 use super::error::RunError;
 use super::options::Progress;
 use super::output::{Finished, Output};
 use super::queue::{Partial, Queue, Work};
-use super::work::{self, Opened, Parts, SpanJob, outcome_of};
+use super::work::{self, Parts, SpanJob, broken, outcome_of};
 use crate::config::Config;
 use crate::engine::{Failed, Planned, Plans, Recording, Watch, reading};
 use crate::inputs::{Input, InputSource};
@@ -153,25 +153,22 @@ impl<'a> Collector<'a> {
         let watch = Watch::begin(input);
         let mut outcome = outcome_of(input);
         let opened = work::open(input, &watch, (&self.plans, self.survey), self.stop, &mut outcome);
-        let Opened { mut source, planned, crop, spans } = match opened {
+        let opened = match opened {
             Ok(opened) => opened,
             Err(failed) => return self.fail(index, outcome, failed),
         };
-        let mut recording = Recording::new(planned.plan.clone(), &self.folder);
-        if let [span] = spans.as_slice() {
-            let decoded = &mut outcome.decoded_frames;
-            let span = (&crop, span);
-            let computed =
-                reading::compute(source.as_mut(), &planned, span, self.stop, decoded, |part| {
-                    recording.add(part).map_err(Failed::temporary)
-                });
-            reading::describe(&mut outcome, source.as_ref());
-            return match watch.settle(computed) {
-                Ok(false) => {}
-                Ok(true) => self.complete(index, outcome, (&planned, &watch), Ok(recording)),
+        let planned = opened.planned.clone();
+        if opened.spans.len() == 1 {
+            return match work::whole(opened, &watch, &self.folder, self.stop, &mut outcome) {
+                Ok(None) => {}
+                Ok(Some(recording)) => {
+                    self.complete(index, outcome, (&planned, &watch), Ok(recording));
+                }
                 Err(failed) => self.fail(index, outcome, failed),
             };
         }
+        let recording = Recording::new(planned.plan.clone(), &self.folder);
+        let spans = opened.spans;
         let partial = Partial {
             outcome,
             planned: planned.clone(),
@@ -286,13 +283,7 @@ impl<'a> Collector<'a> {
             // The stream did not fail: it was no longer listened to.
             return;
         }
-        if failed.status == Status::Changed {
-            // It is of a file that is no more: what is there now is to be read again.
-            outcome.identity.clear();
-        }
-        outcome.status = failed.status;
-        outcome.reason = failed.reason;
-        outcome.byte_offset = failed.byte_offset;
+        work::note(&mut outcome, failed);
         self.hand_over(index, Finished { outcome, arrays: Vec::new(), row: None });
     }
 
@@ -354,8 +345,4 @@ impl<'a> Collector<'a> {
             }
         }
     }
-}
-
-fn broken() -> Failed {
-    Failed::new(Status::Unsupported, "a fault of this program, please report it")
 }

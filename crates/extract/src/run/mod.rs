@@ -6,6 +6,7 @@ mod error;
 mod options;
 mod output;
 mod queue;
+mod recordings;
 mod work;
 
 use std::cell::RefCell;
@@ -22,13 +23,13 @@ use crate::inputs::Input;
 use crate::ledger::{self, Ledger, Record, Resumed};
 use crate::survey::Survey;
 
-use check::identity_of;
 use collector::{Collector, Limits};
 use output::Output;
 
 pub use check::{Checked, check};
 pub use error::RunError;
 pub use options::{MAX_JOBS, Progress, Quiet, RunOptions, RunReport};
+pub use recordings::{Batch, Recordings};
 
 /// Extracts the features of `inputs` into one output. `stop` ends the run early, its ledger intact.
 ///
@@ -126,7 +127,7 @@ fn resume(
         let Some(input) = inputs.get(i).filter(|input| input.id == record.outcome.id) else {
             return false;
         };
-        let now = identity_of(input);
+        let now = input.source.identity();
         if now.is_empty() && !record.outcome.identity.is_empty() {
             unreadable.replace(Some(input.source.to_string()));
             return true;

@@ -161,9 +161,7 @@ impl Output {
                 }
                 Err(TableError::Renamed { expected, actual, .. }) => {
                     finished.outcome.status = Status::Mismatch;
-                    finished.outcome.reason = format!(
-                        "gives {actual} numbers, earlier recordings gave {expected}: it has another number of channels"
-                    );
+                    finished.outcome.reason = other_width(actual, expected);
                 }
                 Err(other) => return Err(other.into()),
             }
@@ -206,6 +204,13 @@ impl Output {
         }
         Ok(table)
     }
+}
+
+/// Why a row does not fit.
+pub(super) fn other_width(actual: usize, expected: usize) -> String {
+    format!(
+        "gives {actual} numbers, earlier recordings gave {expected}: it has another number of channels"
+    )
 }
 
 /// A table with the label columns of the inputs.

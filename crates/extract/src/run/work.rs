@@ -1,6 +1,7 @@
 //! What a job does with a recording: open it, compute a span of it, finish it.
 
 use std::ops::Range;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -8,7 +9,6 @@ use corsmal_audio::BlockSource;
 use corsmal_files::npz::Compression;
 use corsmal_files::outcome::{Outcome, Status};
 
-use super::check::identity_of;
 use super::output::Member;
 use crate::engine::{Failed, Features, Planned, Plans, Recording, Span, Watch, reading};
 use crate::inputs::Input;
@@ -17,7 +17,7 @@ use crate::survey::Survey;
 /// The outcome of an input before anything is known of it but what its bytes are.
 pub(super) fn outcome_of(input: &Input) -> Outcome {
     let mut outcome = Outcome::new(&input.id, input.source.to_string(), Status::Ok, "");
-    outcome.identity = identity_of(input);
+    outcome.identity = input.source.identity();
     outcome
 }
 
@@ -48,6 +48,26 @@ pub(super) fn open(
     let crop = reading::crop(signal, (input.start, input.end), source.spec().sample_rate);
     let spans = reading::spans(source.as_ref(), &planned, &crop);
     Ok(Opened { source, planned, crop, spans })
+}
+
+/// Computes a recording as one span; `None` where the run was stopped. Adds to `outcome` what the
+/// reader has learned.
+pub(super) fn whole(
+    mut opened: Opened,
+    watch: &Watch,
+    folder: &Path,
+    stop: &AtomicBool,
+    outcome: &mut Outcome,
+) -> Result<Option<Recording>, Failed> {
+    let Opened { source, planned, crop, .. } = &mut opened;
+    let mut recording = Recording::new(planned.plan.clone(), folder);
+    let decoded = &mut outcome.decoded_frames;
+    let span = (&*crop, &(0..u64::MAX));
+    let computed = reading::compute(source.as_mut(), planned, span, stop, decoded, |part| {
+        recording.add(part).map_err(Failed::temporary)
+    });
+    reading::describe(outcome, source.as_ref());
+    Ok(watch.settle(computed)?.then_some(recording))
 }
 
 /// A span of a recording that was cut.
@@ -110,16 +130,43 @@ pub(super) fn finish(
     outcome: &mut Outcome,
 ) -> Result<Parts, Failed> {
     let plan = &planned.plan;
-    let stretch = reading::check_stretch(input, &plan.config.signal, outcome);
-    let recording = recording?;
-    watch.check_content(&outcome.identity)?;
-    stretch?;
-    let total = recording.total();
-    Ok(match recording.complete()? {
+    let (features, total) = complete(input, (planned, watch), recording, outcome)?;
+    Ok(match features {
         Features::Summary(row) => Parts { arrays: Vec::new(), row: Some(row), total },
         Features::Frames(arrays) => {
             let arrays = Member::of(&input.id, plan, arrays, compression);
             Parts { arrays: arrays.map_err(Failed::temporary)?, row: None, total }
         }
     })
+}
+
+/// The features of a recording whose spans are all added, and its samples.
+pub(super) fn complete(
+    input: &Input,
+    (planned, watch): (&Planned, &Watch),
+    recording: Result<Recording, Failed>,
+    outcome: &mut Outcome,
+) -> Result<(Features, u64), Failed> {
+    let stretch = reading::check_stretch(input, &planned.plan.config.signal, outcome);
+    let recording = recording?;
+    watch.check_content(&outcome.identity)?;
+    stretch?;
+    let total = recording.total();
+    Ok((recording.complete()?, total))
+}
+
+/// Why an input has no features, in its outcome.
+pub(super) fn note(outcome: &mut Outcome, failed: Failed) {
+    if failed.status == Status::Changed {
+        // It is of a file that is no more: what is there now is to be read again.
+        outcome.identity.clear();
+    }
+    outcome.status = failed.status;
+    outcome.reason = failed.reason;
+    outcome.byte_offset = failed.byte_offset;
+}
+
+/// A fault of this program.
+pub(super) fn broken() -> Failed {
+    Failed::new(Status::Unsupported, "a fault of this program, please report it")
 }

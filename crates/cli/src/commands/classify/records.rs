@@ -23,6 +23,8 @@ pub(super) enum End {
 pub(super) fn path_of(input: &Input) -> &str {
     match &input.source {
         InputSource::File(path) => path.to_str().unwrap_or(&input.id),
+        InputSource::Member(member) => member.path.to_str().unwrap_or(&input.id),
+        InputSource::Memory(_) => &input.id,
         InputSource::Stdin => "-",
     }
 }

@@ -118,10 +118,8 @@ struct Prediction {
 fn by_format(found: &[Input], formats: &FormatRule, args: &Args) -> Vec<Input> {
     let mut accepted = Vec::new();
     for input in found {
-        let header = match &input.source {
-            InputSource::File(path) => corsmal_audio::open(path).ok(),
-            InputSource::Stdin => None,
-        };
+        let can_be_read_again = input.source != InputSource::Stdin;
+        let header = can_be_read_again.then(|| input.source.open().ok()).flatten();
         let spec = header.as_ref().map(|source| source.spec());
         let channels = spec.map(|spec| u32::from(spec.channels));
         match formats.check(spec.map(|spec| spec.sample_rate), channels) {
@@ -214,8 +212,5 @@ fn refuse(args: &Args, name: &str, reason: &str) {
 }
 
 fn path(input: &Input) -> String {
-    match &input.source {
-        InputSource::File(path) => path.display().to_string(),
-        InputSource::Stdin => "-".into(),
-    }
+    input.source.to_string()
 }

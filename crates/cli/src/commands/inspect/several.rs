@@ -44,14 +44,19 @@ pub fn inspect(paths: &[PathBuf], json: bool) -> Result<ExitCode, Failure> {
     if let Some(warning) = found.warning() {
         eprintln!("warning: {warning}");
     }
-    let files: Vec<PathBuf> = found
-        .inputs
-        .into_iter()
-        .filter_map(|input| match input.source {
-            InputSource::File(path) => Some(path),
-            InputSource::Stdin => None,
-        })
-        .collect();
+    let mut files: Vec<PathBuf> = Vec::new();
+    for input in found.inputs {
+        match input.source {
+            InputSource::File(path) => files.push(path),
+            InputSource::Member(member) => {
+                return Err(Failure::new(format!(
+                    "{}: inspect looks at files; extract and classify read recordings in tars",
+                    member.path.display()
+                )));
+            }
+            InputSource::Memory(_) | InputSource::Stdin => {}
+        }
+    }
     let lines: Vec<Line> = files.par_iter().map(|path| Line::of(path)).collect();
     let failed = lines.iter().filter(|line| line.sound.is_none()).count();
     print!("{}", if json { to_json(&lines)? } else { text(&lines) });

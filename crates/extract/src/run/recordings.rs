@@ -1,0 +1,182 @@
+//! Recordings a few at a time, outside a run: for engines that decide themselves what is computed where
+//! and when. Same features and outcomes as in a run.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use corsmal_audio::{AudioSpec, SampleEncoding};
+use corsmal_files::outcome::{Outcome, Status};
+use rayon::prelude::*;
+
+use super::check::require_jobs;
+use super::error::RunError;
+use super::output::other_width;
+use super::work::{self, broken, outcome_of};
+use crate::config::Config;
+use crate::engine::{Failed, FeatureArray, Features, Plan, Plans, Watch};
+use crate::inputs::Input;
+use crate::survey::Survey;
+
+/// Where a configuration does not say: a rate and channels that most features can be planned for.
+const USUAL_RATE: f64 = 44_100.0;
+const USUAL_CHANNELS: [u16; 5] = [1, 2, 4, 8, 64];
+
+/// Computes recordings by one configuration; transforms and filter banks are made once per sample rate
+/// and number of channels.
+pub struct Recordings {
+    config: Arc<Config>,
+    plans: Plans<'static>,
+    folder: PathBuf,
+}
+
+/// What recordings gave, in their order.
+#[derive(Default)]
+pub struct Batch {
+    /// One for each recording.
+    pub outcomes: Vec<Outcome>,
+    /// Names of the summary's columns; empty without a summary.
+    pub names: Vec<String>,
+    /// Summary rows of the recordings that have features, one behind the other.
+    pub values: Vec<f32>,
+    /// Plan and frames of each recording; `None` with a summary, and where there are no features.
+    pub frames: Vec<Option<(Arc<Plan>, Vec<FeatureArray>)>>,
+}
+
+type Computed = Option<(Arc<Plan>, Features)>;
+
+impl Recordings {
+    /// Recordings by `config`. What does not fit in memory goes to the system's temporary folder.
+    pub fn new(config: Arc<Config>) -> Self {
+        let plans = Plans::new(config.clone(), |_| {});
+        Self { config, plans, folder: std::env::temp_dir() }
+    }
+
+    /// The configuration.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// Computes recordings with `jobs` threads. A summary is as wide as recordings of `channels`
+    /// channels make it; `None` is the number that most of these have, as in a run.
+    ///
+    /// # Errors
+    /// A temporary file fails, or `stop` was set; whatever is wrong with a recording is in its
+    /// outcome.
+    pub fn extract(
+        &self,
+        inputs: &[Input],
+        channels: Option<u16>,
+        jobs: usize,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Batch, RunError> {
+        require_jobs(jobs)?;
+        // Threads of this call alone: they cannot be missing in a process that was forked.
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(jobs)
+            .build()
+            .map_err(|e| RunError::Jobs { jobs, why: e.to_string() })?;
+        let computed: Result<Vec<(Outcome, Computed)>, RunError> = pool.install(|| {
+            let survey = match channels {
+                Some(channels) => Survey::of_channels(channels, &self.config),
+                None => Survey::of(inputs, &self.config),
+            };
+            inputs.par_iter().map(|input| self.recording(input, &survey, stop)).collect()
+        });
+        Ok(self.batch(computed?, channels))
+    }
+
+    fn recording(
+        &self,
+        input: &Input,
+        survey: &Survey,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<(Outcome, Computed), RunError> {
+        let mut outcome = outcome_of(input);
+        let computed =
+            catch_unwind(AssertUnwindSafe(|| self.features(input, survey, stop, &mut outcome)));
+        match computed.unwrap_or_else(|_| Err(broken())) {
+            Ok(None) => Err(RunError::Interrupted),
+            Ok(features) => Ok((outcome, features)),
+            Err(Failed { temporary: Some(source), .. }) => {
+                Err(RunError::Temporary { path: self.folder.clone(), source })
+            }
+            Err(failed) => {
+                work::note(&mut outcome, failed);
+                Ok((outcome, None))
+            }
+        }
+    }
+
+    fn features(
+        &self,
+        input: &Input,
+        survey: &Survey,
+        stop: &Arc<AtomicBool>,
+        outcome: &mut Outcome,
+    ) -> Result<Computed, Failed> {
+        let watch = Watch::begin(input);
+        let opened = work::open(input, &watch, (&self.plans, survey), stop, outcome)?;
+        let planned = opened.planned.clone();
+        let Some(recording) = work::whole(opened, &watch, &self.folder, stop, outcome)? else {
+            return Ok(None);
+        };
+        let (features, _) = work::complete(input, (&planned, &watch), Ok(recording), outcome)?;
+        Ok(Some((planned.plan, features)))
+    }
+
+    fn batch(&self, computed: Vec<(Outcome, Computed)>, channels: Option<u16>) -> Batch {
+        let mut batch = Batch::default();
+        for (mut outcome, features) in computed {
+            let mut frames = None;
+            match features {
+                None => {}
+                Some((plan, Features::Frames(arrays))) => frames = Some((plan, arrays)),
+                Some((plan, Features::Summary(row))) => {
+                    let names = plan.summary_names();
+                    if batch.names.is_empty() {
+                        batch.names = names;
+                        batch.values.extend(row);
+                    } else if batch.names == names {
+                        batch.values.extend(row);
+                    } else {
+                        outcome.status = Status::Mismatch;
+                        outcome.reason = other_width(names.len(), batch.names.len());
+                    }
+                }
+            }
+            batch.outcomes.push(outcome);
+            batch.frames.push(frames);
+        }
+        if batch.names.is_empty() {
+            batch.names = self.summary_names(channels);
+        }
+        batch
+    }
+
+    /// Names of the summary's columns where no recording has told them: those for `channels`, or for
+    /// whatever number the configuration can be planned for.
+    fn summary_names(&self, channels: Option<u16>) -> Vec<String> {
+        if self.config.summary.is_none() {
+            return Vec::new();
+        }
+        let rate = self.config.signal.sample_rate;
+        let rate = if rate > 0.0 { rate } else { USUAL_RATE };
+        let names = |channels: u16| {
+            let spec = AudioSpec {
+                sample_rate: rate as u32,
+                channels,
+                format: "none".into(),
+                encoding: SampleEncoding::Float { bytes: 4 },
+                declared_frames: None,
+            };
+            self.plans.of(&spec).ok().map(|planned| planned.plan.summary_names())
+        };
+        let found = match channels {
+            Some(channels) => names(channels),
+            None => USUAL_CHANNELS.into_iter().find_map(names),
+        };
+        found.unwrap_or_default()
+    }
+}
