@@ -26,6 +26,7 @@ from ._params import (
 __all__ = [
     "Network",
     "Recording",
+    "Recordings",
     "Signal",
     "Signals",
     "TrainedModel",
@@ -42,6 +43,7 @@ __all__ = [
     "chroma_of_cqt",
     "classifier_inputs",
     "classifier_parameters",
+    "collect",
     "compare_predictions",
     "cqt",
     "cross_validate",
@@ -240,6 +242,23 @@ def extract(
     overwrite: bool,
     progress: Callable[[int, int], object] | None,
 ) -> list[str]: ...
+
+@final
+class Recordings:
+    def __new__(cls, config: tuple[str, str], overrides: list[str]) -> Recordings: ...
+    def extract(
+        self, rows: list[Any], channels: int | None, jobs: int
+    ) -> tuple[str, list[str], _Singles, list[list[_Singles] | None]]: ...
+    def usual_channels(self, rows: list[Any]) -> int | None: ...
+
+_Place = tuple[str, int, int, str | None]
+
+def collect(
+    paths: list[str],
+) -> tuple[
+    list[tuple[str, str, _Place | None, float | None, float | None, list[tuple[str, str]]]],
+    str | None,
+]: ...
 
 @final
 class Recording:

@@ -23,6 +23,8 @@ class TrainedModel:
 
     Attributes
     ----------
+    path : str
+        The file.
     header : dict
         What the file says about the model.
     classes_ : array
@@ -32,8 +34,8 @@ class TrainedModel:
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        self._path = os.fspath(path)
-        self._model = _core.TrainedModel.load(self._path)
+        self.path = os.fspath(path)
+        self._model = _core.TrainedModel.load(self.path)
         self.header: dict[str, Any] = json.loads(self._model.header())
         self.classes_ = class_labels(self.header)
         self.n_features_in_ = self._model.n_features()
@@ -44,7 +46,7 @@ class TrainedModel:
         more = ", ..." if len(self.classes_) > 4 else ""
         of = "recordings" if self.feature_config else "rows"
         return (
-            f"<TrainedModel {self._path}: {classifier} of {self.n_features_in_} features of {of},"
+            f"<TrainedModel {self.path}: {classifier} of {self.n_features_in_} features of {of},"
             f" {len(self.classes_)} classes ({wanted}{more})>"
         )
 
@@ -88,6 +90,32 @@ class TrainedModel:
         """
         return self._model.predict_proba(self._rows(X, any_rate))
 
+    def has_probabilities(self) -> bool:
+        """Whether `predict_proba` has an answer."""
+        try:
+            self._model.predict_proba(np.zeros((1, self.n_features_in_)))
+        except ParameterError:
+            return False
+        return True
+
+    def refusal(self, sample_rate: int | None, channels: int | None) -> str | None:
+        """Why a recording of this format is none that the model takes; None where it is one."""
+        try:
+            rates, known_channels = self._model.format_rule()
+        except ModelError as error:
+            raise ModelError(
+                f"{self.path} does not say which sample rates and channels it was trained on:"
+                " train it again, or any_rate=True takes every recording as it is"
+            ) from error
+        for found, known, what in (
+            (sample_rate, rates, "Hz"),
+            (channels, known_channels, "channels"),
+        ):
+            if found is not None and known is not None and found not in known:
+                trained = ", ".join(map(str, known))
+                return f"{found} {what} where {self.path} was trained on {trained}"
+        return None
+
     def _rows(self, X: Any, any_rate: bool) -> Matrix:
         if isinstance(X, (str, os.PathLike)):
             X = [X]
@@ -99,7 +127,7 @@ class TrainedModel:
         rows = features(X, "TrainedModel")
         if rows.shape[1] != self.n_features_in_:
             raise ParameterError(
-                f"X has {rows.shape[1]} features, but {self._path} was trained on"
+                f"X has {rows.shape[1]} features, but {self.path} was trained on"
                 f" {self.n_features_in_}"
             )
         return rows
@@ -107,7 +135,7 @@ class TrainedModel:
     def _of_recordings(self, paths: list[str], any_rate: bool) -> Matrix:
         if not self.feature_config:
             raise ModelError(
-                f"{self._path} was trained on rows of numbers: it does not say which features of a"
+                f"{self.path} was trained on rows of numbers: it does not say which features of a"
                 " recording they are; save(path, features=...) keeps it"
             )
         # The same file may be in X twice.
@@ -125,12 +153,12 @@ class TrainedModel:
             self._check_formats(found.outcomes)
         if found.summary is None or len(found.names) != self.n_features_in_:
             raise ParameterError(
-                f"X gives {len(found.names)} values for each recording where {self._path} was"
+                f"X gives {len(found.names)} values for each recording where {self.path} was"
                 f" trained on {self.n_features_in_}: another number of channels?"
             )
         if found.config_hash != self.header["feature_config_hash"]:
             raise ModelError(
-                f"{self._path}: its feature configuration was written by version"
+                f"{self.path}: its feature configuration was written by version"
                 f" {self.header['tool_version']} and reads differently in this one: train it again"
             )
         row_of = dict(zip(different, found.summary.astype(np.float64), strict=True))
@@ -138,24 +166,10 @@ class TrainedModel:
 
     def _check_formats(self, outcomes: list[dict[str, Any]]) -> None:
         """Refuses recordings of a format that changes their features."""
-        try:
-            rates, channels = self._model.format_rule()
-        except ModelError as error:
-            raise ModelError(
-                f"{self._path} does not say which sample rates and channels it was trained on:"
-                " train it again, or any_rate=True takes every recording as it is"
-            ) from error
         for row in outcomes:
-            for found, known, what in (
-                (row.get("sample_rate"), rates, "Hz"),
-                (row.get("channels"), channels, "channels"),
-            ):
-                if found is not None and known is not None and found not in known:
-                    trained = ", ".join(map(str, known))
-                    raise ParameterError(
-                        f"{row['path']}: {found} {what} where {self._path} was trained on"
-                        f" {trained}: any_rate=True takes it as it is"
-                    )
+            reason = self.refusal(row.get("sample_rate"), row.get("channels"))
+            if reason is not None:
+                raise ParameterError(f"{row['path']}: {reason}: any_rate=True takes it as it is")
 
 
 def load_model(path: str | os.PathLike[str]) -> TrainedModel:

@@ -33,7 +33,7 @@ fn config_error(error: impl std::fmt::Display) -> PyErr {
 }
 
 /// The configuration from `(kind, text)`, `kind` being "preset", "path", "toml" or "json".
-fn config_of((kind, text): (&str, &str), overrides: &[String]) -> PyResult<Arc<Config>> {
+pub(crate) fn config_of((kind, text): (&str, &str), overrides: &[String]) -> PyResult<Arc<Config>> {
     let config = match kind {
         "preset" => Preset::find(text)
             .and_then(|preset| Config::with_overrides(preset.toml, text, overrides)),
@@ -146,7 +146,7 @@ pub(crate) fn fit_projection(
 
 /// Does `work` in another thread; between looks at it this one calls `tell`. Raises the flag of
 /// `work` when Python, or `tell`, has an exception.
-fn interruptible<T: Send>(
+pub(crate) fn interruptible<T: Send>(
     work: impl FnOnce(&Arc<AtomicBool>) -> PyResult<T> + Send,
     tell: &mut (impl FnMut(Python<'_>) -> PyResult<()> + Send),
 ) -> PyResult<T> {

@@ -5,6 +5,7 @@
 //! file per family, exported below. The GIL is released while we compute.
 
 mod arrays;
+mod batch;
 mod chroma;
 mod classifiers;
 mod compound;
@@ -33,6 +34,8 @@ use pyo3::prelude::*;
 mod _core {
     use pyo3::prelude::*;
 
+    #[pymodule_export]
+    use crate::batch::{PyRecordings, collect};
     #[pymodule_export]
     use crate::chroma::{chroma, chroma_filter, estimate_tuning, piptrack, pitch_tuning};
     #[pymodule_export]

@@ -1,0 +1,162 @@
+//! Recordings one by one, for tables of Arrow.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use corsmal_extract::engine::{FeatureArray, Plan};
+use corsmal_extract::inputs::{self, Input, InputSource, Member};
+use corsmal_extract::run::{Recordings, RunError as Stopped};
+use corsmal_extract::survey::Survey;
+use ndarray::{Array2, Array3};
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
+
+use crate::arrays::into_numpy;
+use crate::errors::{RunError, value_error};
+use crate::extract::{config_of, interruptible};
+use crate::pool::compute;
+
+/// Where the bytes of a row come from.
+#[derive(FromPyObject)]
+pub(crate) enum Source {
+    /// The bytes themselves.
+    Bytes(PyBackedBytes),
+    /// A member of an archive: path, archive, offset, size, fault.
+    Member(PathBuf, PathBuf, u64, u64, Option<String>),
+    /// A file.
+    Path(PathBuf),
+}
+
+impl Source {
+    fn known(self) -> PyResult<InputSource> {
+        Ok(match self {
+            Self::Bytes(bytes) => InputSource::Memory(bytes.as_ref().into()),
+            Self::Member(path, archive, offset, size, fault) => {
+                let read = |text: String| serde_json::from_str(&text).map_err(value_error);
+                let fault = fault.map(read).transpose()?;
+                InputSource::Member(Box::new(Member { archive, path, offset, size, fault }))
+            }
+            Self::Path(path) => InputSource::File(path),
+        })
+    }
+}
+
+/// A row: id, source, start and end in seconds.
+type Row = (String, Source, Option<f64>, Option<f64>);
+
+/// The frames of a recording by feature [frames, coefficients, channels].
+type Frames<'py> = Vec<Bound<'py, PyAny>>;
+
+/// Outcomes as JSON lines; names of the summary's columns; the summary
+/// [rows with features, names]; for each row its frames.
+type Columns<'py> = (String, Vec<String>, Bound<'py, PyAny>, Vec<Option<Frames<'py>>>);
+
+/// Computes recordings by one configuration.
+#[pyclass(frozen, name = "Recordings", module = "corsmal_feat._core")]
+pub(crate) struct PyRecordings(Recordings);
+
+#[pymethods]
+impl PyRecordings {
+    #[new]
+    fn new(config: (String, String), overrides: Vec<String>) -> PyResult<Self> {
+        config_of((&config.0, &config.1), &overrides).map(|c| Self(Recordings::new(c)))
+    }
+
+    /// The channels that most of `rows` have, where the width of a summary depends on them.
+    fn usual_channels(&self, py: Python<'_>, rows: Vec<Row>) -> PyResult<Option<u16>> {
+        let inputs = inputs_of(rows)?;
+        compute(py, || Survey::of(&inputs, self.0.config()).channels())
+    }
+
+    /// Computes `rows` with `jobs` threads.
+    fn extract<'py>(
+        &self,
+        py: Python<'py>,
+        rows: Vec<Row>,
+        channels: Option<u16>,
+        jobs: usize,
+    ) -> PyResult<Columns<'py>> {
+        let inputs = inputs_of(rows)?;
+        let work = |stop: &Arc<AtomicBool>| {
+            self.0.extract(&inputs, channels, jobs, stop).map_err(|error| match error {
+                Stopped::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
+                other => RunError::new_err(other.to_string()),
+            })
+        };
+        let batch = py.detach(|| interruptible(work, &mut |_| Ok(())))?;
+        let mut outcomes = String::new();
+        for outcome in &batch.outcomes {
+            outcomes.push_str(&serde_json::to_string(outcome).map_err(value_error)?);
+            outcomes.push('\n');
+        }
+        let width = batch.names.len();
+        let shape = (batch.values.len().checked_div(width).unwrap_or(0), width);
+        let summary = Array2::from_shape_vec(shape, batch.values).map_err(value_error)?;
+        let frames = batch.frames.into_iter().map(|frames| {
+            let Some((plan, arrays)) = frames else { return Ok(None) };
+            arrays.into_iter().map(|a| frames_of(py, &plan, a)).collect::<PyResult<_>>().map(Some)
+        });
+        let frames = frames.collect::<PyResult<_>>()?;
+        Ok((outcomes, batch.names, into_numpy(py, summary)?, frames))
+    }
+}
+
+fn inputs_of(rows: Vec<Row>) -> PyResult<Vec<Input>> {
+    let input = |(id, source, start, end): Row| {
+        Ok(Input { id, source: source.known()?, start, end, labels: Vec::new() })
+    };
+    rows.into_iter().map(input).collect()
+}
+
+/// The frames of a feature [frames, coefficients, channels].
+fn frames_of<'py>(
+    py: Python<'py>,
+    plan: &Plan,
+    feature: FeatureArray,
+) -> PyResult<Bound<'py, PyAny>> {
+    if feature.complex {
+        let name = feature.name;
+        let reason = format!("{name} is complex, which Arrow has no type for: output = magnitude");
+        return Err(value_error(reason));
+    }
+    let shape = (feature.frames, feature.coefficients, plan.channels);
+    let values = feature.values.into_vec()?;
+    into_numpy(py, Array3::from_shape_vec(shape, values).map_err(value_error)?)
+}
+
+/// A recording that names stand for: id, path, where it lies in an archive, start, end, labels.
+type Found = (
+    String,
+    String,
+    Option<(PathBuf, u64, u64, Option<String>)>,
+    Option<f64>,
+    Option<f64>,
+    Vec<(String, String)>,
+);
+
+/// The recordings that `paths` stand for, and what is to be warned of.
+#[pyfunction]
+pub(crate) fn collect(
+    py: Python<'_>,
+    paths: Vec<String>,
+) -> PyResult<(Vec<Found>, Option<String>)> {
+    let found = py
+        .detach(|| inputs::collect(&paths))
+        .map_err(|error| RunError::new_err(error.to_string()))?;
+    let warning = found.warning();
+    let rows = found.inputs.into_iter().map(|input| {
+        let path = input.source.to_string();
+        let place = match input.source {
+            InputSource::Member(member) => {
+                let fault = member.fault.as_ref().map(serde_json::to_string);
+                let fault = fault.transpose().map_err(value_error)?;
+                Some((member.archive, member.offset, member.size, fault))
+            }
+            _ => None,
+        };
+        Ok((input.id, path, place, input.start, input.end, input.labels))
+    });
+    Ok((rows.collect::<PyResult<_>>()?, warning))
+}

@@ -1,0 +1,74 @@
+"""What the rows of a batch of Arrow say is to be read."""
+
+from __future__ import annotations
+
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+import numpy as np
+
+from ._batch_columns import arrow
+from .errors import ParameterError
+
+#: Columns that say what to read.
+ID, PATH, BYTES, START, END = "id", "path", "bytes", "start", "end"
+#: Columns that say where in an archive a recording lies, as `corsmal_feat.ray.manifest` has them.
+PLACE = ("archive", "offset", "size", "fault")
+
+
+def rows_of(batch: Any) -> list[Any]:
+    """The rows of a batch as the extension takes them: id, source, start, end."""
+    pa = arrow()
+    if not isinstance(batch, pa.RecordBatch | pa.Table):
+        raise ParameterError(f"batch must be a RecordBatch or Table of pyarrow, not {type(batch)}")
+    names = batch.schema.names
+    if len({*names}) != len(names):
+        raise ParameterError(f"batch has a column twice: {', '.join(names)}")
+    if PATH not in names and BYTES not in names:
+        raise ParameterError(f"batch needs a column path or bytes, it has {', '.join(names)}")
+
+    def column(name: str, kind: Any) -> list[Any]:
+        if name not in names:
+            return [None] * batch.num_rows
+        try:
+            values: list[Any] = batch.column(name).cast(kind).to_pylist()
+        except (pa.ArrowInvalid, pa.ArrowNotImplementedError) as error:
+            raise ParameterError(f"the column {name}: {error}") from error
+        return values
+
+    paths, contents = column(PATH, pa.string()), column(BYTES, pa.large_binary())
+    archives, offsets, sizes, faults = (
+        column(name, kind)
+        for name, kind in zip(
+            PLACE, (pa.string(), pa.uint64(), pa.uint64(), pa.string()), strict=True
+        )
+    )
+    ids = column(ID, pa.string())
+    starts, ends = column(START, pa.float64()), column(END, pa.float64())
+    rows = []
+    for i in range(batch.num_rows):
+        path = "" if paths[i] is None else _local(paths[i])
+        source: Any = path
+        if contents[i] is not None:
+            source = contents[i]
+        elif archives[i] is not None:
+            source = (path, archives[i], offsets[i] or 0, sizes[i] or 0, faults[i])
+        for time in (starts[i], ends[i]):
+            if time is not None and not 0 <= time < np.inf:
+                raise ParameterError(f"row {i}: {time} is not a time in seconds")
+        name = ids[i] if ids[i] is not None else (path or str(i))
+        rows.append((name, source, starts[i], ends[i]))
+    return rows
+
+
+def _local(path: str) -> str:
+    """The path that a URI names."""
+    if "://" not in path:
+        return path
+    parts = urlsplit(path)
+    if parts.scheme != "file" or parts.netloc not in ("", "localhost"):
+        raise ParameterError(
+            f"{path}: only paths and file:// URIs are read; mount the store, or let the engine"
+            " put the content into a column bytes"
+        )
+    return unquote(parts.path)
