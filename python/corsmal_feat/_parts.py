@@ -1,0 +1,58 @@
+"""Files of a job on a cluster, and the task that computes one."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from . import arrow
+from ._batch_columns import arrow as pyarrow
+
+#: Folders of a job.
+PARTS, ATTEMPTS = "parts", "attempts"
+#: Times that a recording may take its process with it.
+DEATHS = 2
+_CRASHED = f"its process ended {DEATHS} times while it was computed"
+
+
+def compute_part(table: Any, folder: str, name: str, options: dict[str, Any]) -> None:
+    """Computes a file, in a worker. The log of attempts says which recording was open when a
+    process ended."""
+    pa = pyarrow()
+    log = Path(folder, ATTEMPTS, name).with_suffix(".log")
+    opened: Counter[int] = Counter()
+    if log.exists():
+        for line in log.read_text().splitlines():
+            kind, _, number = line.partition(" ")
+            if number.isdigit():
+                opened[int(number)] += 1 if kind == "open" else -1
+    pieces = []
+    # Lines are short and appended at once: one that a kill has cut is none.
+    with log.open("ab", buffering=0) as attempts:
+        attempts.write(b"\n")
+        for row in range(table.num_rows):
+            one = table.slice(row, 1)
+            if opened[row] >= DEATHS:
+                pieces.append(arrow.failed_batch(one, "crashed", _CRASHED, **options))
+                continue
+            attempts.write(b"open %d\n" % row)
+            pieces.append(arrow.extract_batch(one, **options))
+            attempts.write(b"done %d\n" % row)
+    whole = pa.concat_tables(pieces).combine_chunks()
+    sink = pa.BufferOutputStream()
+    import_module("pyarrow.parquet").write_table(whole, sink, compression="zstd")
+    write_whole(Path(folder, PARTS, name), sink.getvalue())
+    log.unlink(missing_ok=True)
+
+
+def write_whole(path: Path, content: Any) -> None:
+    """Writes a file that appears when it is whole and on the disk."""
+    draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
+    with draft.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    draft.replace(path)
