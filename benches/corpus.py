@@ -96,6 +96,13 @@ def at_rate(corpus: pathlib.Path, folder: pathlib.Path, rate: int) -> None:
         write(folder / name, pcm, rate)
 
 
+def shortened(corpus: pathlib.Path, folder: pathlib.Path, longest: float) -> None:
+    """A half of the corpus, cut to the usual length of the takes in CORSMAL's data set."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, pcm in subset(corpus, 2):
+        write(folder / name, pcm[: int(longest * RATE)])
+
+
 def joined(corpus: pathlib.Path, path: pathlib.Path, every: int) -> None:
     """Every so-many-th recording in one long one."""
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -4,7 +4,8 @@
     python benches/macro.py all                  # measures everything, writes docs/benchmarks.*
     python benches/macro.py peers --repeats 5    # one part; `report` writes the documents anew
 
-Needs numpy here, the peers in the interpreter named by --python (librosa, pyAudioAnalysis, scipy),
+Needs numpy here, the peers in the interpreter named by --python (librosa, resampy, scikit-image,
+pyAudioAnalysis, scipy),
 and valgrind for `instructions`. The corpus is made on the first run; --corpus takes another.
 Results gather in --results until `report` writes them between the markers of docs/speed.md and
 draws docs/speed.svg. Every timed command runs in a process of its own, contenders in turn;
@@ -31,6 +32,7 @@ from typing import Any
 import corpus
 import numpy as np
 import numpy.typing as npt
+import originals
 import peers
 import report
 
@@ -232,6 +234,23 @@ def measure_peers(bench: Bench) -> None:
     bench.keep("peers", {"workloads": {**merged, **rows}, "seconds": seconds})
 
 
+def measure_presets(bench: Bench) -> None:
+    """Every preset under librosa 0.8's conventions against the code that it stands for."""
+    folder = bench.work / "takes"
+    if not folder.exists():
+        corpus.shortened(bench.corpus, folder, 7.0)
+    commands: dict[Any, Callable[[], list[str]]] = {}
+    for preset in originals.PRESETS:
+        arguments = ["--preset", preset, "--set", "librosa=0.8"]
+        whose = ("pyAudioAnalysis", preset) if preset == "a34f136" else ("original", preset)
+        commands[preset, "ours"] = lambda a=arguments: bench.extract(a, folder)
+        commands[preset, "theirs"] = lambda w=whose: bench.peer(*w, folder)
+    runs = bench.median(commands)
+    rows = {p: {side: runs[p, side] for side in ("ours", "theirs")} for p in originals.PRESETS}
+    number = len(list(folder.glob("*.wav")))
+    bench.keep("presets", {"runs": rows, "seconds": corpus.seconds(folder), "number": number})
+
+
 def measure_scaling(bench: Bench) -> None:
     """One job and two: many files, one long file in spans of time, one by channels."""
     long, short = bench.work / "long" / "all.wav", bench.work / "long" / "eighth.wav"
@@ -333,6 +352,7 @@ PARTS: dict[str, Callable[[Bench], None]] = {
     "startup": measure_startup,
     "memory": measure_memory,
     "peers": measure_peers,
+    "presets": measure_presets,
     "scaling": measure_scaling,
     "channels": measure_channels,
     "nfft": measure_nfft,

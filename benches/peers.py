@@ -79,10 +79,17 @@ def pyaudioanalysis(workload: str, n_fft: int, n_mels: int) -> Compute:
     return a34f136
 
 
+def original(workload: str, n_fft: int, n_mels: int) -> Compute:
+    import originals
+
+    return originals.of(workload)
+
+
 #: by name: factory and the name of the distribution
 PEERS: dict[str, tuple[Callable[[str, int, int], Compute], str]] = {
     "librosa": (librosa, "librosa"),
     "pyAudioAnalysis": (pyaudioanalysis, "pyAudioAnalysis"),
+    "original": (original, "librosa"),
 }
 
 

@@ -27,6 +27,8 @@ def write(results: dict[str, Any], docs: pathlib.Path) -> None:
     page.write_text(text)
     if "peers" in results:
         (docs / "speed.svg").write_text(chart(results["peers"]))
+    if "presets" in results:
+        (docs / "speed-presets.svg").write_text(preset_chart(results["presets"]))
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
@@ -67,6 +69,18 @@ def peers(rows: dict[str, Any]) -> list[str]:
         )
     repeats = min(len(row["ours"]["seconds"]) for row in rows["workloads"].values())
     note = f"Medians (least-most) of {repeats} runs in turn; {seconds:.0f} s of recordings."
+    return [*table(head, cells), "", note]
+
+
+def presets(rows: dict[str, Any]) -> list[str]:
+    cells = []
+    for preset, run in rows["runs"].items():
+        mine, theirs = median(run["ours"], "cpu"), median(run["theirs"], "cpu")
+        each = 1e3 * mine / rows["number"]
+        cells.append([f"`{preset}`", f"{mine:.2f}", f"{theirs:.2f}", f"**{theirs / mine:.1f}**"])
+        cells[-1].append(f"{each:.1f} ms")
+    head = ["preset", "corsmal-feat, CPU s", "original, CPU s", "ratio", "ours a recording"]
+    note = f"{rows['number']} recordings of 8 channels, {rows['seconds']:.0f} s together."
     return [*table(head, cells), "", note]
 
 
@@ -121,6 +135,7 @@ def instructions(rows: dict[str, Any]) -> list[str]:
 
 SECTIONS: dict[str, Callable[[Any], list[str]]] = {
     "peers": peers,
+    "presets": presets,
     "scaling": scaling,
     "channels": channels,
     "nfft": nfft,
@@ -173,6 +188,35 @@ def chart(result: dict[str, Any]) -> str:
             parts.append(f'<text class="note" {place}>{label}</text>')
     height = 58 + len(workloads) * group
     label = 'role="img" aria-label="Speed of corsmal-feat and its peers"'
+    size = f'viewBox="0 0 {width} {height}"'
+    open_tag = f'<svg xmlns="http://www.w3.org/2000/svg" {size} {label}>'
+    return "\n".join([open_tag, f"<style>{STYLE}</style>", *parts, "</svg>", ""])
+
+
+def preset_chart(result: dict[str, Any]) -> str:
+    """A bar for each preset: how many times the original's CPU seconds are ours."""
+    runs = result["rows"]["runs"]
+    ratios = {
+        preset: median(run["theirs"], "cpu") / median(run["ours"], "cpu")
+        for preset, run in runs.items()
+    }
+    width, left, bar, step = 720, 130, 15, 22
+    scale = (width - left - 90) / max(ratios.values())
+    head = "CPU seconds of the original code over those of the preset"
+    parts = [
+        f'<text class="head" x="10" y="22">{head}</text>',
+        f'<text class="note" x="10" y="40">{result["date"]}, {result["machine"]}</text>',
+    ]
+    for i, (preset, ratio) in enumerate(ratios.items()):
+        top = 54 + i * step
+        length = ratio * scale
+        parts.append(f'<text x="10" y="{top + 12}">{preset}</text>')
+        shape = f'x="{left}" y="{top}" width="{length:.1f}" height="{bar}" rx="2"'
+        parts.append(f'<rect class="ours" {shape}/>')
+        place = f'x="{left + length + 6:.1f}" y="{top + 12}"'
+        parts.append(f'<text class="note" {place}>{ratio:.0f} times</text>')
+    height = 62 + len(ratios) * step
+    label = 'role="img" aria-label="Speed of every preset against its original"'
     size = f'viewBox="0 0 {width} {height}"'
     open_tag = f'<svg xmlns="http://www.w3.org/2000/svg" {size} {label}>'
     return "\n".join([open_tag, f"<style>{STYLE}</style>", *parts, "</svg>", ""])
