@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -53,6 +55,8 @@ def istft(
     d = np.asarray(stft_matrix)
     if d.ndim < 2:
         raise ParameterError(f"stft_matrix has {d.ndim} dimensions, expected at least 2")
+    if d.shape[-1] == 0:
+        raise ParameterError("stft_matrix has no frames; the inverse needs at least 1")
     if d.dtype not in (np.complex64, np.complex128):
         d = d.astype(np.complex64 if d.dtype == np.float32 else np.complex128)
     if n_fft is None:
@@ -60,7 +64,9 @@ def istft(
     params = stft_params(n_fft, hop_length, win_length, window, center, "constant")
     samples = size("length", length) if length else None
     room("a signal", d.size // (d.shape[-2] * d.shape[-1] or 1), samples or 0)
-    flat = _core.istft(np.ascontiguousarray(d.reshape(-1, *d.shape[-2:])), params, samples)
+    flat = _core.istft(
+        np.ascontiguousarray(d.reshape(math.prod(d.shape[:-2]), *d.shape[-2:])), params, samples
+    )
     y: Floats = flat.reshape(*d.shape[:-2], flat.shape[-1])
     if dtype is not None:
         y = y.astype(dtype, copy=False)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy.typing as npt
 
 from . import _core
@@ -28,4 +30,4 @@ def to_mono(y: npt.ArrayLike) -> Floats:
     y = audio(y)
     if y.ndim == 1:
         return y
-    return _core.to_mono(y.reshape((-1, y.shape[-1])).copy(order="C"))
+    return _core.to_mono(y.reshape((math.prod(y.shape[:-1]), y.shape[-1])).copy(order="C"))

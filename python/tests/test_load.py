@@ -56,6 +56,7 @@ PARTS: list[dict[str, Any]] = [
     {"sr": None, "offset": 0.1, "duration": 0.2},
     {"sr": None, "offset": 0.123456, "dtype": np.float64},
     {"sr": None, "duration": 99.0, "mono": False},
+    {"sr": None, "duration": 0},
 ]
 
 

@@ -254,7 +254,7 @@ def test_onset_detection(options: dict[str, Any], dtype: Any) -> None:
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("shape", [(1,), (50,), (1, 50), (7, 50), (2, 3, 50)])
+@pytest.mark.parametrize("shape", [(0,), (2, 0), (1,), (50,), (1, 50), (7, 50), (2, 3, 50)])
 def test_mono(shape: tuple[int, ...], dtype: Any) -> None:
     y = np.random.default_rng(1).normal(size=shape).astype(dtype)
     ours, theirs = both("to_mono", y)
