@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use corsmal_files::csv_text;
+
 use crate::error::{CcmError, Result};
 
 /// Largest table that is read; the official ones have under 70 kB.
@@ -15,7 +17,7 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// Reads a file. The separator is `;` when the header has one and no comma, else `,`.
+    /// Reads a file.
     pub(crate) fn read(path: &Path) -> Result<Self> {
         let size = std::fs::metadata(path).map_err(|e| CcmError::io(path, e))?.len();
         if size > MAX_BYTES {
@@ -30,14 +32,8 @@ impl Table {
 
     /// Parses bytes; `path` is named in errors.
     pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
-        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         let fault = |reason: String| CcmError::Table { path: path.to_path_buf(), reason };
-        let first = bytes.split(|&b| b == b'\n').next().unwrap_or_default();
-        let semicolons = first.contains(&b';') && !first.contains(&b',');
-        let mut reader = csv::ReaderBuilder::new()
-            .delimiter(if semicolons { b';' } else { b',' })
-            .trim(csv::Trim::All)
-            .from_reader(bytes);
+        let mut reader = csv_text::reader(bytes).map_err(|e| fault(e.to_string()))?;
         let header: Vec<String> = reader
             .headers()
             .map_err(|e| fault(e.to_string()))?

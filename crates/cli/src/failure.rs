@@ -38,8 +38,21 @@ impl Failure {
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&printable(&self.message))
+        f.write_str(&without_numbers(&printable(&self.message)))
     }
+}
+
+/// Leaves out the numbers of the system's errors, ` (os error 2)`: their words say the same.
+fn without_numbers(message: &str) -> String {
+    let mut parts = message.split(" (os error ");
+    let mut text = parts.next().unwrap_or_default().to_string();
+    for part in parts {
+        match part.split_once(')') {
+            Some((number, rest)) if number.parse::<u32>().is_ok() => text.push_str(rest),
+            _ => text.extend([" (os error ", part]),
+        }
+    }
+    text
 }
 
 impl<E: std::error::Error> From<E> for Failure {
@@ -56,5 +69,22 @@ impl<E: std::error::Error> From<E> for Failure {
             cause = c.source();
         }
         Self::new(message)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_systems_errors_are_words() {
+        for (message, shown) in [
+            ("a: No such file or directory (os error 2)", "a: No such file or directory"),
+            ("a: gone (os error 2); b: full (os error 28)", "a: gone; b: full"),
+            ("label (os error x) (os error 3", "label (os error x) (os error 3"),
+            ("plain", "plain"),
+        ] {
+            assert_eq!(Failure::new(message).to_string(), shown);
+        }
     }
 }

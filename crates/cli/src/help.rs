@@ -59,3 +59,29 @@ pub fn grouped(command: Command) -> Command {
          {EXIT_CODES}\n"
     ))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn all(command: &Command, check: &mut dyn FnMut(&Command)) {
+        check(command);
+        command.get_subcommands().for_each(|subcommand| all(subcommand, check));
+    }
+
+    #[test]
+    fn options_have_the_same_letters_in_every_command() {
+        all(&Cli::command(), &mut |command| {
+            for (long, short) in [("out", 'o'), ("jobs", 'j'), ("quiet", 'q')] {
+                for argument in command.get_arguments().filter(|a| a.get_long() == Some(long)) {
+                    assert_eq!(
+                        argument.get_short(),
+                        Some(short),
+                        "{}: --{long}",
+                        command.get_name()
+                    );
+                }
+            }
+        });
+    }
+}

@@ -5,6 +5,7 @@ mod streams;
 
 mod args;
 mod commands;
+mod configuration;
 mod failure;
 mod help;
 mod interrupt;
@@ -13,6 +14,7 @@ mod made;
 mod networks;
 mod output;
 mod paragraphs;
+mod plural;
 mod progress;
 mod publish;
 mod study;

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use corsmal_files::draft::folder;
+use corsmal_files::draft::{check_place, folder};
 
 use crate::failure::Failure;
 
 /// Refuses a name that is taken, unless it is of a file that may be replaced, and a folder that is
-/// not there.
+/// not there or takes no files.
 pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
     if path.exists() && !path.is_file() {
         return Err(Failure::new(format!("{} exists and is not a regular file", path.display())));
@@ -16,7 +16,7 @@ pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
         return Err(Failure::new(format!("{} exists; --overwrite replaces it", path.display())));
     }
     if folder(path).is_dir() {
-        return Ok(());
+        return Ok(check_place(path)?);
     }
     Err(Failure::new(format!("{}: there is no folder {}", path.display(), folder(path).display())))
 }

@@ -12,6 +12,7 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use corsmal_files::csv_text;
 use corsmal_files::quote::{printable, quoted, shown};
 use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor};
 use serde_json::Value;
@@ -94,12 +95,7 @@ impl<R: Read> Read for Short<R> {
 
 fn open(path: &Path) -> Result<BufReader<Short<File>>, InputError> {
     let inner = File::open(path).map_err(|e| InputError::io(path, e))?;
-    let mut reader = BufReader::new(Short { inner, line: 1, length: 0 });
-    // Spreadsheets put a byte order mark in front of UTF-8.
-    if reader.fill_buf().map_err(|e| InputError::io(path, e))?.starts_with(b"\xef\xbb\xbf") {
-        reader.consume(3);
-    }
-    Ok(reader)
+    Ok(BufReader::new(Short { inner, line: 1, length: 0 }))
 }
 
 /// The columns of a manifest: which are labels, in order, and where the others are.
@@ -170,7 +166,7 @@ fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
         };
         wrong(path, line, error.to_string())
     };
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(open(path)?);
+    let mut reader = csv_text::reader(open(path)?).map_err(|e| InputError::io(path, e))?;
     let mut columns = ManifestColumns::default();
     let names = match reader.headers().cloned() {
         Ok(names) => names,
@@ -192,8 +188,11 @@ fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
     }
     if !columns.places.contains_key(PATH) {
         let names: Vec<&str> = columns.labels.iter().map(|(_, name)| name.as_str()).collect();
+        let likely = names.iter().find(|name| corsmal_names::names_files(name));
+        let remedy = likely.map(|name| format!("; if {name} names the recordings, call it `path`"));
         let names = shown(&names.join(", "));
-        return Err(wrong(path, 1, format!("the first line names no column `path`: {names}")));
+        let reason = format!("the first line names no column `path`: {names}");
+        return Err(wrong(path, 1, reason + &remedy.unwrap_or_default()));
     }
     let mut rows = Vec::new();
     let mut record = csv::StringRecord::new();
@@ -220,10 +219,11 @@ fn json_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
     let mut rows = Vec::new();
     for (line, text) in (1..).zip(open(path)?.lines()) {
         let text = text.map_err(|e| wrong(path, line, e.to_string()))?;
+        let text = text.trim_start_matches('\u{feff}'); // a byte order mark
         if text.trim().is_empty() {
             continue;
         }
-        let fields = fields(&text).map_err(|reason| wrong(path, line, reason))?;
+        let fields = fields(text).map_err(|reason| wrong(path, line, reason))?;
         let mut cells = Vec::with_capacity(fields.len());
         for (name, value) in fields {
             let value = label(value).ok_or_else(|| {

@@ -41,7 +41,7 @@ impl Draft {
             // As any new file: the process's umask applies, where temporary files are private.
             builder.permissions(std::fs::Permissions::from_mode(0o666));
         }
-        let file = builder.tempfile_in(folder(&path)).map_err(|e| named(&path, &e))?;
+        let file = builder.tempfile_in(folder(&path)).map_err(|e| refused(&path, &e))?;
         // Where a file system knows no locks, others cannot lock it either and leave it alone.
         let _ = file.as_file().try_lock();
         Ok(Self { path, file })
@@ -130,6 +130,30 @@ pub fn folder(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
+/// Refuses a path in whose folder no file can be made. What it makes to find out is gone again.
+///
+/// # Errors
+/// The path and the reason.
+pub fn check_place(path: &Path) -> io::Result<()> {
+    tempfile::tempfile_in(folder(path)).map(drop).map_err(|error| refused(path, &error))
+}
+
+/// Why a file cannot be made, without the name of its draft.
+fn refused(path: &Path, error: &io::Error) -> io::Error {
+    let folder = folder(path);
+    let cause = error.get_ref().and_then(|wrapped| wrapped.source());
+    let why = match error.kind() {
+        io::ErrorKind::PermissionDenied => {
+            format!("no permission to write into {}", folder.display())
+        }
+        io::ErrorKind::NotFound if !folder.is_dir() => {
+            format!("there is no folder {}", folder.display())
+        }
+        _ => cause.map_or_else(|| error.to_string(), ToString::to_string),
+    };
+    io::Error::new(error.kind(), format!("{}: {why}", path.display()))
+}
+
 /// Whether two names lead to one existing file.
 pub fn same(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
@@ -148,6 +172,20 @@ mod tests {
         let file = File::options().write(true).open(path).unwrap();
         file.set_modified(std::time::SystemTime::now() - Duration::from_secs(3600)).unwrap();
         file
+    }
+
+    #[test]
+    fn a_folder_that_takes_no_file_is_named_and_its_draft_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        check_place(&folder.path().join("a.npz")).unwrap();
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        let gone = folder.path().join("gone");
+        let path = gone.join("a.npz");
+        for error in [check_place(&path).unwrap_err(), Draft::create(&path).map(drop).unwrap_err()]
+        {
+            let expected = format!("{}: there is no folder {}", path.display(), gone.display());
+            assert_eq!(error.to_string(), expected);
+        }
     }
 
     #[test]

@@ -24,6 +24,15 @@ pub enum FeatureFileError {
         /// Its reason.
         source: std::io::Error,
     },
+    /// A folder, probably of recordings.
+    #[error(
+        "{path} is a folder, where a feature file is expected: \
+         corsmal-feat extract {path} -o feats.npz makes one of the recordings in it"
+    )]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+    },
     /// The first bytes are of no format that is read.
     #[error("{path}: expected {expected}, found neither")]
     Content {
@@ -74,6 +83,9 @@ impl FeatureFile {
     /// # Errors
     /// [`FeatureFileError`].
     pub fn open(path: &Path) -> Result<Self, FeatureFileError> {
+        if path.is_dir() {
+            return Err(FeatureFileError::Folder { path: path.into() });
+        }
         let content = Content::of(path)
             .map_err(|source| FeatureFileError::Io { path: path.into(), source })?;
         match content {

@@ -46,6 +46,13 @@ pub fn closest<'k>(given: &str, known: impl IntoIterator<Item = &'k str>) -> Opt
     }
 }
 
+/// Whether other programs call the column so that names recordings.
+pub fn names_files(column: &str) -> bool {
+    const NAMES: [&str; 9] =
+        ["file", "filename", "file_name", "fname", "name", "clip", "wav", "audio", "recording"];
+    NAMES.contains(&&*column.to_lowercase())
+}
+
 /// What a message about an unknown name ends with: the probable one, and those that there are (the
 /// first forty of them).
 pub fn choices<'k>(given: &str, known: impl IntoIterator<Item = &'k str>) -> String {

@@ -72,6 +72,10 @@ impl LabelArgs {
                     Err(Failure::new("--id-column goes with a label file, not with folders"))
                 }
             },
+            Some(path) if !path.exists() && is_like_folders(path) => Err(Failure::new(format!(
+                "--labels {}: there is no such file; did you mean {FOLDERS}?",
+                path.display()
+            ))),
             Some(path) => {
                 Ok(Some(LabelSource::File { path: path.clone(), key: self.id_column.clone() }))
             }
@@ -87,6 +91,10 @@ impl LabelArgs {
     pub fn folders(&self) -> bool {
         self.labels.as_deref() == Some(Path::new(FOLDERS))
     }
+}
+
+fn is_like_folders(path: &Path) -> bool {
+    corsmal_names::closest(&path.to_string_lossy(), [FOLDERS]).is_some()
 }
 
 /// Labelled features, as `train` and `cross-validate` take them.

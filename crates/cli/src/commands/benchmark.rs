@@ -25,7 +25,7 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
     /// Folder for the report, tables, pictures, submissions, models and cached features.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
     /// Baselines to run, such as zcr-mfcc-knn or spectrogram-pca-rf; default all twelve, none with
     /// --methods.

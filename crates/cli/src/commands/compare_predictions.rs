@@ -77,23 +77,31 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     println!("{}", table.text());
     let test = &report.mcnemar;
     println!(
-        "\nMcNemar: {} right only in the first, {} only in the second of {}; p = {:.4}",
-        test.only_first, test.only_second, report.rows, test.p_value
+        "\nMcNemar: {} right only in the first, {} only in the second of {}; p {}",
+        test.only_first,
+        test.only_second,
+        report.rows,
+        probability(test.p_value, 1e-4)
     );
-    print("recordings", &report.bootstrap_rows);
+    print("recordings", &report.bootstrap_rows, args.resamples);
     if let Some(by_fold) = &report.bootstrap_folds {
-        print(&format!("{} folds", report.folds), by_fold);
+        print(&format!("{} folds", report.folds), by_fold, args.resamples);
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn print(unit: &str, result: &Bootstrap) {
+fn print(unit: &str, result: &Bootstrap, draws: u32) {
     println!(
         "bootstrap over {unit}: weighted F1 of the second {:+.2} points, 95 % interval {:+.2} to \
-         {:+.2}; p = {:.4}",
+         {:+.2}; p {}",
         100.0 * result.difference,
         100.0 * result.low,
         100.0 * result.high,
-        result.p_value
+        probability(result.p_value, 1.0 / f64::from(draws))
     );
+}
+
+/// `= 0.0312`, or that it is below the least that can be told.
+fn probability(p: f64, least: f64) -> String {
+    if p < least { format!("< {least}") } else { format!("= {p:.4}") }
 }

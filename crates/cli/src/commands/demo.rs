@@ -17,7 +17,7 @@ Everything that it shows is computed from synthetic recordings: scores on them s
 real data.")]
 pub struct Args {
     /// Folder for the output, new or from an earlier demo.
-    #[arg(long, value_name = "DIR", default_value = "corsmal-feat-demo")]
+    #[arg(long, short, value_name = "DIR", default_value = "corsmal-feat-demo")]
     out: PathBuf,
 }
 

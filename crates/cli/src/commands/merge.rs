@@ -22,7 +22,7 @@ pub struct Args {
     #[arg(required = true)]
     shards: Vec<PathBuf>,
     /// The merged output.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
     /// Replace an existing output.
     #[arg(long)]

@@ -28,7 +28,7 @@ pub struct Args {
     #[arg(long, value_name = "N")]
     n_components: Option<usize>,
     /// Projection file to write (.npz).
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
     /// Replace an existing file.
     #[arg(long)]

@@ -8,6 +8,7 @@ use corsmal_models::scores::{ClassReport, Interval, NumericScores, ScoreReport, 
 
 use crate::args::LabelArgs;
 use crate::failure::Failure;
+use crate::plural::plural;
 use crate::study;
 use crate::text_table::{TextTable, confusion, percent};
 
@@ -107,7 +108,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     }
     match report {
         ScoreReport::Classes(report) => {
-            println!("{} rows, {} classes", report.rows, report.labels.len());
+            println!("{}, {}", plural(report.rows, "row"), plural(report.labels.len(), "class"));
             print_overall(&report);
             println!();
             print_classes(&report);
@@ -198,7 +199,7 @@ fn number_measures(scores: &NumericScores) -> [(&'static str, String); 7] {
 }
 
 fn print_numbers(scores: &NumericScores) {
-    println!("{} rows, {} without an estimate\n", scores.rows, scores.unknown);
+    println!("{}, {} without an estimate\n", plural(scores.rows, "row"), scores.unknown);
     let mut table = TextTable::new(["error", "value"]);
     for (name, value) in number_measures(scores) {
         table.row([name.to_string(), value]);

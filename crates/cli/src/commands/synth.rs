@@ -19,7 +19,7 @@ use crate::failure::Failure;
 )]
 pub struct Args {
     /// Folder to write to: new, empty, or of an earlier run.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
     /// Seed of everything random.
     #[arg(long, default_value_t = 1)]

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use corsmal_models::cross_validation::{Data, choose};
+use corsmal_models::dataset::LabelledTable;
 use corsmal_models::folds::Folds;
 use corsmal_models::labels::Labels;
 use corsmal_models::model_file::{Model, ModelHeader};
@@ -13,6 +14,7 @@ use serde_json::{Map, Value, json};
 use crate::args::{DatasetArgs, Jobs, NetworkArgs, PipelineArgs};
 use crate::failure::Failure;
 use crate::paragraphs::wrapped;
+use crate::plural::plural;
 use crate::publish;
 
 /// Arguments of `train`.
@@ -107,7 +109,7 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
              extract with --set signal.sample_rate={} makes them one",
             table.path.display(),
             rates.join(", "),
-            rates[0]
+            usual_rate(&table)
         );
     }
     let header = ModelHeader {
@@ -139,9 +141,9 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
             rows_of.iter().map(|(name, rows)| format!("{name} ({rows})")).collect();
         println!("{out}: {}", spec.describe());
         let learned = format!(
-            "{} rows, {} features, {target}: {}",
-            classes.len(),
-            table.x.ncols(),
+            "{}, {}, {target}: {}",
+            plural(classes.len(), "row"),
+            plural(table.x.ncols(), "feature"),
             classes_text.join(", ")
         );
         println!("{}", wrapped(&learned, ""));
@@ -181,4 +183,18 @@ fn train_network(_: &Args, _: &str) -> Result<ExitCode, Failure> {
 fn counts(labels: &Labels, y: &[usize]) -> Vec<(String, usize)> {
     let rows = |class: usize| y.iter().filter(|&&c| c == class).count();
     labels.names().iter().enumerate().map(|(class, name)| (name.clone(), rows(class))).collect()
+}
+
+/// The sample rate of most recordings in Hz, 0 where none is known.
+fn usual_rate(table: &LabelledTable) -> u32 {
+    let mut counts: Vec<(u32, usize)> = Vec::new();
+    for rate in table.outcomes.iter().filter_map(|outcome| outcome.sample_rate) {
+        match counts.iter_mut().find(|(known, _)| *known == rate) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((rate, 1)),
+        }
+    }
+    // The first of those that are equally many, as `extract` has it.
+    counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    counts.first().map_or(0, |(rate, _)| *rate)
 }

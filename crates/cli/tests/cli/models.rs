@@ -82,7 +82,7 @@ fn from_recordings_to_predictions() {
     r.extract("esc28", "other.npz");
     let other = r.path("other.npz");
     let wrong = [&classify[..], &["--features", text(&other), "--out", "-"]].concat();
-    assert!(refused(&wrong).contains("the model was trained on features with configuration"));
+    assert!(refused(&wrong).contains("preset esc26 is expected, found preset esc28"));
     let table = [&classify[..], &["--in", text(&feats), "--out", "-"]].concat();
     assert!(refused(&table).contains("give it as --features"));
 

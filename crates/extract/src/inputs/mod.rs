@@ -217,6 +217,8 @@ fn find_manifest(
     found: &mut Vec<Found>,
     skipped: &mut Vec<PathBuf>,
 ) -> Result<(), InputError> {
+    // A manifest beside the wrong folder, or one with files that are gone, is mended before the run.
+    let mut unreadable: Option<(u64, String, usize)> = None;
     for entry in manifest::read(path)? {
         let wrong = |reason| InputError::Manifest { path: path.into(), line: entry.line, reason };
         match std::fs::metadata(&entry.path) {
@@ -234,7 +236,11 @@ fn find_manifest(
                 continue;
             }
             Ok(_) => {}
-            Err(error) => return Err(wrong(format!("{}: {error}", entry.path.display()))),
+            Err(error) => {
+                let first = || (entry.line, format!("{}: {error}", entry.path.display()), 0);
+                unreadable.get_or_insert_with(first).2 += 1;
+                continue;
+            }
         }
         if let Some(reason) = entry.id.as_deref().and_then(ids::refusal) {
             return Err(wrong(reason));
@@ -247,7 +253,11 @@ fn find_manifest(
         let (start, end, labels) = (entry.start, entry.end, entry.labels);
         found.push(Found { source, naming, start, end, labels });
     }
-    Ok(())
+    let Some((line, mut reason, number)) = unreadable else { return Ok(()) };
+    if number > 1 {
+        reason.push_str(&format!("; {} other lines name such files", number - 1));
+    }
+    Err(InputError::Manifest { path: path.into(), line, reason })
 }
 
 fn find_glob(

@@ -81,6 +81,7 @@ fn check_output(options: &RunOptions, config: &Config) -> Result<OutputFormat, R
     if !folder.is_dir() {
         return refuse(format!("there is no folder {}", folder.display()));
     }
+    draft::check_place(&target).map_err(RunError::Folder)?;
     Ok(format)
 }
 

@@ -49,6 +49,9 @@ pub enum RunError {
         /// Why, and what is allowed.
         why: String,
     },
+    /// No file can be made in the folder of the output; says which and why.
+    #[error(transparent)]
+    Folder(std::io::Error),
     /// More failures than allowed.
     #[error("stopped after {failed} failed files ({limit} allowed), the last: {last}")]
     TooManyErrors {

@@ -234,7 +234,11 @@ fn metadata_of_macos_is_skipped_wherever_it_is_named() {
 fn manifest_errors_name_the_line() {
     let dir = folder(&["a.wav"]);
     let cases = [
-        ("m.csv", "file\na.wav\n", "line 1: the first line names no column `path`: file"),
+        (
+            "m.csv",
+            "file\na.wav\n",
+            "no column `path`: file; if file names the recordings, call it `path`",
+        ),
         (
             "m.csv",
             "path,x,x\na.wav,1,2\n",

@@ -1,14 +1,14 @@
 //! Label files: CSV with a column that names the recording, and label columns.
 
 use std::collections::HashMap;
+use std::fs::File;
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
+
+use corsmal_files::csv_text;
 
 use super::error::{DatasetError, Result};
 use crate::words::count;
-
-/// What other programs call the column that names recordings.
-const FILE_COLUMNS: [&str; 9] =
-    ["file", "filename", "file_name", "fname", "name", "clip", "wav", "audio", "recording"];
 
 /// Where labels come from.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -54,8 +54,9 @@ impl LabelFile {
     /// twice, or names a recording twice.
     pub fn read(path: &Path, key: Option<&str>) -> Result<Self> {
         let fault = |e: csv::Error| DatasetError::content(path, e.to_string());
-        let mut reader =
-            csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path).map_err(fault)?;
+        let other = |e: std::io::Error| DatasetError::content(path, e.to_string());
+        let text = BufReader::new(File::open(path).map_err(other)?);
+        let mut reader = csv_text::reader(text).map_err(other)?;
         let header = reader.headers().map_err(fault)?.clone();
         let find = |wanted: &str| header.iter().position(|h| h == wanted);
         let (key, at) = match (key, find("id"), find("path")) {
@@ -72,8 +73,7 @@ impl LabelFile {
             (None, None, Some(at)) => (Key::Path, at),
             (None, None, None) => {
                 let found = header.iter().collect::<Vec<_>>().join(", ");
-                let likely =
-                    header.iter().find(|name| FILE_COLUMNS.contains(&&*name.to_lowercase()));
+                let likely = header.iter().find(|name| corsmal_names::names_files(name));
                 let remedy = match likely {
                     Some(name) => format!("does {name} name the recordings? --id-column {name}"),
                     None => "--id-column NAME says which column names the recordings".into(),

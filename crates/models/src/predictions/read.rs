@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use corsmal_files::csv_text;
+
 use super::{
     Id, KEYS, MAX_BYTES, PredictionError, PredictionRow, PredictionTable, Result, SUM_TOLERANCE,
     content,
@@ -34,13 +36,7 @@ impl PredictionTable {
     /// # Errors
     /// As [`PredictionTable::read`].
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
-        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        let first = bytes.split(|&b| b == b'\n').next().unwrap_or_default();
-        let semicolons = first.contains(&b';') && !first.contains(&b',');
-        let mut reader = csv::ReaderBuilder::new()
-            .delimiter(if semicolons { b';' } else { b',' })
-            .trim(csv::Trim::All)
-            .from_reader(bytes);
+        let mut reader = csv_text::reader(bytes).map_err(|e| content(path, e.to_string()))?;
         let fault = |e: csv::Error| content(path, format!("not a readable table: {e}"));
         let header: Vec<String> =
             reader.headers().map_err(fault)?.iter().map(String::from).collect();

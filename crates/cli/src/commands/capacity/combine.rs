@@ -23,7 +23,7 @@ pub struct Args {
     #[arg(long = "in", value_name = "CSV", num_args = 1.., required = true)]
     inputs: Vec<PathBuf>,
     /// Table to write.
-    #[arg(long, value_name = "CSV")]
+    #[arg(long, short, value_name = "CSV")]
     out: PathBuf,
     /// What stands where there is no estimate, in mL; -1 for none.
     #[arg(long, value_name = "ML", default_value_t = PRIOR_ML, allow_negative_numbers = true)]

@@ -74,7 +74,7 @@ struct Estimate {
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Table to write.
-    #[arg(long, value_name = "CSV")]
+    #[arg(long, short, value_name = "CSV")]
     out: PathBuf,
     /// Replace an existing output.
     #[arg(long)]

@@ -24,7 +24,7 @@ pub struct Args {
     #[command(flatten)]
     source: Source,
     /// Model to write.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
     /// Replace an existing output.
     #[arg(long)]

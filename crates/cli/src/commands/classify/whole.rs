@@ -16,6 +16,7 @@ use ndarray::Axis;
 
 use super::args::{Args, configuration, recordings};
 use super::records::{End, Records, delivered};
+use crate::configuration::difference;
 use crate::failure::Failure;
 use crate::progress::{LogFormat, Meter};
 
@@ -73,9 +74,14 @@ pub fn of_features(
     table: &LabelledTable,
 ) -> Result<(End, Option<Records>), Failure> {
     let place = table.path.display();
-    model
-        .check_configuration(&table.config_hash)
-        .map_err(|e| Failure::new(format!("{place}: {e}")))?;
+    if model.check_configuration(&table.config_hash).is_err() {
+        let wanted = &model.header().feature_config;
+        let why = match wanted.is_null() || table.config.is_null() {
+            true => "made by another program, or the model's were".into(),
+            false => difference(wanted, &table.config),
+        };
+        return Err(Failure::new(format!("{place}: not the features of this model: {why}")));
+    }
     // Files of other programs say nothing of recordings.
     let formats = match table.outcomes.is_empty() {
         true => FormatRule::default(),

@@ -3,12 +3,12 @@
 
 use std::collections::BTreeMap;
 
-use corsmal_extract::config::{Config, PRESETS};
 use corsmal_files::layout;
 use corsmal_files::outcome::Outcome;
 use corsmal_files::table::Table;
 use serde::Serialize;
-use serde_json::Value;
+
+use crate::plural::plural;
 
 /// Different values that a line names.
 const NAMED: usize = 6;
@@ -94,68 +94,6 @@ fn listed<T>(counts: &BTreeMap<T, usize>, name: impl Fn(&T) -> String) -> String
     }
 }
 
-/// The preset with the fewest other values among those of the same features, or a configuration of
-/// these features with every default; then every key that differs from it, `key = value (there)`.
-pub fn differences(config: &Value) -> (String, Vec<String>) {
-    let mut bases: Vec<(String, Value)> = Vec::new();
-    for preset in PRESETS {
-        if let Ok(preset_config) = Config::preset(preset.name) {
-            bases.push((format!("preset {}", preset.name), preset_config.to_value()));
-        }
-    }
-    let kinds = config["features"].as_object().into_iter().flatten();
-    let defaults = kinds.map(|(name, feature)| {
-        let kind = feature.get("kind").and_then(Value::as_str).unwrap_or(name);
-        (name.clone(), serde_json::json!({"kind": kind}))
-    });
-    let defaults = serde_json::json!({"features": defaults.collect::<serde_json::Map<_, _>>()});
-    if let Ok(defaults) = Config::from_value(defaults) {
-        bases.push(("every key at its default".into(), defaults.to_value()));
-    }
-    let found = bases.into_iter().filter(|(_, base)| names(base) == names(config));
-    let compared = found.map(|(name, base)| {
-        let mut lines = Vec::new();
-        compare("", config, &base, &mut lines);
-        (name, lines)
-    });
-    compared.min_by_key(|(_, lines)| lines.len()).unwrap_or_else(|| {
-        let mut lines = Vec::new();
-        compare("", config, &Value::Null, &mut lines);
-        ("nothing that this version knows".into(), lines)
-    })
-}
-
-/// Names of the features.
-fn names(config: &Value) -> Vec<&String> {
-    config["features"].as_object().into_iter().flatten().map(|(name, _)| name).collect()
-}
-
-/// Adds a line for every key whose value is another one than in `base`.
-fn compare(key: &str, value: &Value, base: &Value, lines: &mut Vec<String>) {
-    let Value::Object(table) = value else {
-        if value != base {
-            let there = match base {
-                Value::Null => String::new(),
-                there => format!("  ({there})"),
-            };
-            lines.push(format!("{key} = {value}{there}"));
-        }
-        return;
-    };
-    for (name, value) in table {
-        let key = match key {
-            "" | "features" => name.clone(),
-            key => format!("{key}.{name}"),
-        };
-        compare(&key, value, base.get(name).unwrap_or(&Value::Null), lines);
-    }
-    for (name, there) in base.as_object().into_iter().flatten() {
-        if !table.contains_key(name) {
-            lines.push(format!("{key}.{name} is not there  ({there})"));
-        }
-    }
-}
-
 /// What the arrays of an output are, in a line: `3 recordings: mfcc 2 × 20 × 16–44 frames`, or the
 /// size of its table. `members` are all of its arrays with their shapes.
 pub fn shapes<'m>(
@@ -199,8 +137,4 @@ pub fn shapes<'m>(
     };
     let arrays: Vec<String> = features.iter().filter_map(array).collect();
     vec![format!("  {}: {}", plural(recordings, "recording"), arrays.join(", "))]
-}
-
-fn plural(n: u64, noun: &str) -> String {
-    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }

@@ -2,16 +2,18 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::Read;
+use std::io::{BufReader, Read};
 use std::path::Path;
 use std::process::ExitCode;
 
+use corsmal_files::csv_text;
 use corsmal_models::model_file::{Model, ModelHeader};
 use serde::Serialize;
 use serde_json::Value;
 
 use super::refusal::{Refusal, to_json};
 use crate::failure::Failure;
+use crate::plural::plural;
 
 /// First bytes of a model file.
 const MODEL: &[u8] = b"CORSMDL\0";
@@ -60,7 +62,7 @@ fn model_text(name: &str, header: &ModelHeader) -> Result<String, Failure> {
         "{name}\n  model · corsmal-feat {} · predicts {} from {}\n",
         header.tool_version,
         header.target,
-        counted(header.feature_names.len(), "feature")
+        plural(header.feature_names.len(), "feature")
     );
     let classes: Vec<&str> = match &document["labels"] {
         Value::Array(names) => names.iter().filter_map(Value::as_str).collect(),
@@ -73,6 +75,7 @@ fn model_text(name: &str, header: &ModelHeader) -> Result<String, Failure> {
         _ => Vec::new(),
     };
     out.push_str(&format!("\n  classes        {}\n", classes.join(", ")));
+    out.push_str(&format!("  recordings     {}\n", recordings(header)));
     for (key, value) in
         [("pipeline", &document["pipeline"]), ("trained on", &document["provenance"])]
     {
@@ -87,6 +90,16 @@ fn model_text(name: &str, header: &ModelHeader) -> Result<String, Failure> {
     }
     out.push_str(&format!("\n  corsmal-feat classify --model {name} RECORDINGS\n"));
     Ok(out)
+}
+
+/// The recordings that the model was trained on: what `classify` refuses others by.
+fn recordings(header: &ModelHeader) -> String {
+    let Some(trained) = &header.trained_on else {
+        return "sample rates and channels not recorded: classify needs --any-rate".into();
+    };
+    let listed = |values: &[u32]| values.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
+    let ending = if trained.channels == [1] { "" } else { "s" };
+    format!("{} Hz, {} channel{ending}", listed(&trained.sample_rates), listed(&trained.channels))
 }
 
 /// One line `key = value` for every value.
@@ -135,7 +148,7 @@ pub fn table(path: &Path, json: bool) -> Result<ExitCode, Failure> {
 }
 
 fn read(path: &Path, name: &str) -> Result<Contents, csv::Error> {
-    let mut reader = csv::ReaderBuilder::new().from_path(path)?;
+    let mut reader = csv_text::reader(BufReader::new(File::open(path)?))?;
     let columns: Vec<String> = reader.headers()?.iter().map(str::to_owned).collect();
     let place = |wanted: &str| columns.iter().position(|c| c == wanted);
     let counted: Vec<(&str, usize)> =
@@ -167,8 +180,8 @@ impl Contents {
         let mut out = format!(
             "{}\n  table · {} · {}\n\n  columns    {}\n",
             self.path,
-            counted(self.rows, "row"),
-            counted(self.columns.len(), "column"),
+            plural(self.rows, "row"),
+            plural(self.columns.len(), "column"),
             self.columns.join(", ")
         );
         for (column, values) in &self.counts {
@@ -185,8 +198,4 @@ impl Contents {
         }
         out
     }
-}
-
-fn counted(count: usize, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }

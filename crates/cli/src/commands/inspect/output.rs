@@ -15,9 +15,11 @@ use corsmal_files::table::Table;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::extracted::{Recordings, differences, shapes};
+use super::extracted::{Recordings, shapes};
 use super::refusal::{Refusal, to_json};
+use crate::configuration::nearest;
 use crate::failure::Failure;
+use crate::plural::plural;
 use crate::progress::{counts, failure_line};
 
 /// Members shown as text; JSON has all.
@@ -190,7 +192,7 @@ impl Run {
             lines.push("\n  without features".into());
             lines.extend(self.failed.iter().map(|o| format!("    {}", failure_line(o))));
         }
-        let (base, changes) = differences(&self.config);
+        let (base, changes) = nearest(&self.config);
         lines.push(format!("\n  configuration {}", self.meta.config_hash));
         let others = if changes.is_empty() { "" } else { ", but for (there in brackets)" };
         lines.push(format!("  is {base}{others}"));
@@ -207,7 +209,7 @@ impl Contents {
             Some(run) => {
                 let statuses: Vec<_> =
                     run.statuses.iter().map(|(status, n)| format!("{n} {status}")).collect();
-                let inputs = plural(run.statuses.values().sum(), "input");
+                let inputs = plural(run.statuses.values().sum::<usize>(), "input");
                 let Provenance { tool_version, shard, .. } = &run.meta;
                 format!(
                     "  {arrays} · corsmal-feat {tool_version} · shard {shard} · {inputs}: {}",
@@ -243,8 +245,4 @@ impl Contents {
         }
         lines.join("\n") + "\n"
     }
-}
-
-fn plural(n: usize, noun: &str) -> String {
-    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }

@@ -11,6 +11,7 @@ use serde::Serialize;
 use super::picture::Picture;
 use super::refusal::{Refusal, to_json};
 use crate::failure::Failure;
+use crate::plural::plural;
 
 /// Frames read at once.
 const BLOCK: usize = 8192;
@@ -135,7 +136,7 @@ impl Inspection<'_> {
         let AudioSpec { sample_rate, channels, format, .. } = self.spec;
         format!(
             "{format} · {} · {sample_rate} Hz · {:.3} s ({})",
-            plural((*channels).into(), "channel"),
+            plural(*channels, "channel"),
             self.seconds,
             plural(self.health.frames, "frame")
         )
@@ -191,11 +192,6 @@ impl Inspection<'_> {
             most.1
         ))
     }
-}
-
-/// A count with its noun.
-pub fn plural(count: u64, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Five decimals, without a sign where they are all zero.

@@ -9,9 +9,10 @@ use corsmal_report::{Look, ReportError, look};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::recording::{decibels, length, plural};
+use super::recording::{decibels, length};
 use super::refusal::to_json;
 use crate::failure::{FAILED_FILES, Failure};
+use crate::plural::plural;
 
 /// The line of one recording.
 #[derive(Serialize)]
@@ -144,15 +145,13 @@ fn summary(lines: &[Line]) -> String {
     }
     let kinds: Vec<String> = counts
         .iter()
-        .map(|((rate, channels), n)| {
-            format!("{n} at {rate} Hz, {}", plural(u64::from(*channels), "channel"))
-        })
+        .map(|((rate, channels), n)| format!("{n} at {rate} Hz, {}", plural(*channels, "channel")))
         .collect();
     let total: f64 = sounds.iter().map(|s| s.seconds).sum();
     let shortest = sounds.iter().map(|s| s.seconds).fold(f64::INFINITY, f64::min);
     let longest = sounds.iter().map(|s| s.seconds).fold(0.0, f64::max);
     let noted = sounds.iter().filter(|s| !s.notes.is_empty()).count();
-    let mut out = format!("{}: {}", plural(sounds.len() as u64, "recording"), length(total));
+    let mut out = format!("{}: {}", plural(sounds.len(), "recording"), length(total));
     if sounds.len() > 1 {
         let (shortest, longest) = (length(shortest), length(longest));
         match shortest == longest {
@@ -165,10 +164,10 @@ fn summary(lines: &[Line]) -> String {
         out.push_str(&format!("{}\n", kinds.join("; ")));
     }
     if noted > 0 {
-        out.push_str(&format!("{} with notes\n", plural(noted as u64, "recording")));
+        out.push_str(&format!("{} with notes\n", plural(noted, "recording")));
     }
     if failed > 0 {
-        out.push_str(&format!("{} cannot be read\n", plural(failed as u64, "file")));
+        out.push_str(&format!("{} cannot be read\n", plural(failed, "file")));
     }
     out
 }

@@ -1,0 +1,63 @@
+//! CSV as spreadsheets and other programs write it: separated by commas, semicolons or tabs, with or
+//! without a byte order mark.
+
+use std::io::{self, BufRead};
+
+/// A reader of the table in `text`, whose first line says what separates its fields: commas where
+/// it has one, else semicolons, else tabs. Space around fields is left out.
+///
+/// # Errors
+/// Reading fails, or the text is not UTF-8 but UTF-16, a feature file or a model; the error says so.
+pub fn reader<R: BufRead>(mut text: R) -> io::Result<csv::Reader<R>> {
+    let start = text.fill_buf()?;
+    let other = |what: &str| Err(io::Error::new(io::ErrorKind::InvalidData, what.to_string()));
+    if start.starts_with(b"\xff\xfe") || start.starts_with(b"\xfe\xff") {
+        return other("text in UTF-16, where CSV in UTF-8 is expected: save it as \"CSV UTF-8\"");
+    }
+    if start.starts_with(b"PK\x03\x04") {
+        return other("an .npz file or another ZIP archive, where a CSV table is expected");
+    }
+    if start.starts_with(b"PAR1") {
+        return other("a Parquet file, where a CSV table is expected");
+    }
+    let marked = start.starts_with(b"\xef\xbb\xbf");
+    let line = start.split(|&byte| byte == b'\n').next().unwrap_or_default();
+    let delimiter =
+        [b',', b';', b'\t'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b',');
+    if marked {
+        text.consume(3);
+    }
+    let mut builder = csv::ReaderBuilder::new();
+    Ok(builder.delimiter(delimiter).trim(csv::Trim::All).from_reader(text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn separators_and_marks_are_recognised() {
+        for text in
+            ["a,b;c\n1, 2;3\n", "a;b;c\n1;2;3\n", "a\tb\tc\n1\t2\t3\r\n", "\u{feff}a,b\n1,2\n"]
+        {
+            let mut table = reader(text.as_bytes()).unwrap();
+            let header = table.headers().unwrap().clone();
+            assert_eq!(&header[0], "a");
+            let row = table.records().next().unwrap().unwrap();
+            assert_eq!((row.len(), &row[0]), (header.len(), "1"));
+        }
+        assert_eq!(reader(&b""[..]).unwrap().headers().unwrap().len(), 0);
+    }
+
+    #[test]
+    fn other_files_are_named() {
+        for (bytes, what) in [
+            (&b"\xff\xfea\0"[..], "UTF-16"),
+            (b"\xfe\xff\0a", "UTF-16"),
+            (b"PK\x03\x04rest", ".npz"),
+            (b"PAR1rest", "Parquet"),
+        ] {
+            assert!(reader(bytes).map(drop).unwrap_err().to_string().contains(what));
+        }
+    }
+}
