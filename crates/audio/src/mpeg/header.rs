@@ -23,10 +23,14 @@ pub(crate) struct Header {
     pub(crate) mpeg1: bool,
     pub(crate) sample_rate: u32,
     pub(crate) channels: u16,
-    /// Bits per second; 0: free format, whose frames do not tell their size.
+    /// Free format: the header does not tell the size of the frame, [`Header::sized`] does.
+    pub(crate) is_free: bool,
+    /// Bits per second; 0 where the size is not known.
     pub(crate) bit_rate: u32,
-    /// Bytes of the frame with its header; 0 in free format.
+    /// Bytes of the frame with its header; 0 where it is not known.
     pub(crate) size: usize,
+    /// Bytes of padding in it.
+    padding: usize,
     /// Samples per channel.
     pub(crate) samples: usize,
 }
@@ -66,15 +70,34 @@ impl Header {
             mpeg1,
             sample_rate,
             channels: if b3 >> 6 == 3 { 1 } else { 2 },
+            is_free: bit_rate == 0,
             bit_rate,
             size: if bit_rate == 0 { 0 } else { size },
+            padding: padding * slot,
             samples,
         })
     }
 
+    /// The header with the size that a frame of free format has: `plain` bytes without padding, 0
+    /// where it is not known.
+    pub(crate) fn sized(mut self, plain: usize) -> Self {
+        if self.is_free && plain > 0 {
+            self.size = plain + self.padding;
+            let bits = plain as u64 * 8 * u64::from(self.sample_rate);
+            self.bit_rate = (bits / self.samples as u64) as u32;
+        }
+        self
+    }
+
+    /// Bytes of the largest frame without padding that has a bit rate of the standard.
+    pub(crate) fn largest_size(&self) -> usize {
+        let kbits = KBITS[row(self.mpeg1, self.layer)][14];
+        slots(self.samples, self.slot(), 1000 * u32::from(kbits), self.sample_rate)
+    }
+
     /// Bytes of a frame of the same bit rate without padding.
     pub(crate) fn plain_size(&self) -> usize {
-        slots(self.samples, self.slot(), self.bit_rate, self.sample_rate)
+        self.size - self.padding
     }
 
     /// Bytes of padding, where there is some.
@@ -89,7 +112,8 @@ impl Header {
         let plain = move |kbits: &u16| {
             slots(self.samples, slot, 1000 * u32::from(*kbits), self.sample_rate)
         };
-        rates.map(plain).flat_map(move |size| [size, size + slot])
+        let own = self.is_free.then(|| self.plain_size());
+        own.into_iter().chain(rates.map(plain)).flat_map(move |size| [size, size + slot])
     }
 
     /// Whether frames with these headers can follow each other in one recording.
@@ -98,7 +122,7 @@ impl Header {
             && self.mpeg1 == other.mpeg1
             && self.sample_rate == other.sample_rate
             && self.channels == other.channels
-            && (self.bit_rate == 0) == (other.bit_rate == 0)
+            && self.is_free == other.is_free
     }
 
     /// Bytes of side information behind the header of layer 3.

@@ -3,6 +3,7 @@
 //! The recording ends where the data do, whatever a header says of its length. LAME's tag says how
 //! many samples to drop at both ends.
 
+mod free;
 mod header;
 mod sync;
 mod tag;
@@ -14,12 +15,13 @@ use crate::report::{ReadReport, Repair};
 use crate::source::{AudioSpec, BlockSource, SampleEncoding};
 use crate::stream::{LONGEST_GAP, Next, Stream, StreamSource};
 use crate::tags;
+use free::Repacker;
 use header::{HEADER, Header, MAX_FRAME};
 use tag::Tag;
 
-pub(crate) use sync::{WINDOW, find, is_free_format};
+pub(crate) use sync::{WINDOW, find, free_size};
 
-const EXPECTED: &str = "MPEG audio of layers 1 to 3 with frames of stated size";
+const EXPECTED: &str = "MPEG audio of layers 1 to 3";
 
 /// Frames whose mean size tells how many are missing: rates of MP3 vary slowly.
 const RECENT: usize = 8;
@@ -32,6 +34,8 @@ pub(crate) fn is_header(bytes: &[u8]) -> bool {
 /// Frames as they follow each other.
 struct Frames {
     input: Input,
+    /// Bytes of a frame of free format without padding; 0 in other recordings.
+    free: usize,
     /// The header of the first frame with audio.
     first: Option<Header>,
     /// The frame that ends where the input stands.
@@ -51,9 +55,10 @@ impl Frames {
     fn next(&mut self, report: &mut ReadReport) -> Result<Option<Header>, AudioError> {
         tags::skip(&mut self.input)?;
         let offset = self.input.position();
-        let first = self.first;
+        let (first, free) = (self.first, self.free);
+        let parse = |bytes: &[u8]| Header::parse(bytes).map(|header| header.sized(free));
         let continues = |h: &Header| h.size > HEADER && first.is_none_or(|f| h.continues(&f));
-        let mut header = Header::parse(self.input.peek(HEADER)?).filter(continues);
+        let mut header = parse(self.input.peek(HEADER)?).filter(continues);
         let mut foreign = Foreign::default();
         while header.is_none() {
             let position = self.input.position();
@@ -61,8 +66,8 @@ impl Frames {
             let shown = &shown[..shown.len().min(WINDOW)];
             let is_end = shown.len() < WINDOW;
             // Behind other bytes a single header may be chance.
-            let next = sync::find_where(shown, is_end, 1, continues);
-            let other = sync::find_where(shown, is_end, sync::CHAIN, |h| !continues(h));
+            let next = sync::find_where(shown, is_end, 1, free, continues);
+            let other = sync::find_where(shown, is_end, sync::CHAIN, free, |h| !continues(h));
             if let Some(at) = other.filter(|at| next.is_none_or(|next| *at < next)) {
                 return Err(changed(position + at as u64, &shown[at..]));
             }
@@ -70,7 +75,7 @@ impl Frames {
                 return Ok(None);
             }
             let step = next.unwrap_or(WINDOW / 2);
-            header = next.and_then(|at| Header::parse(&shown[at..]));
+            header = next.and_then(|at| parse(&shown[at..]));
             foreign.add(&shown[..step]);
             self.input.consume(step);
         }
@@ -213,6 +218,7 @@ struct MpegStream {
     frames: Frames,
     first: Header,
     codec: Codec,
+    repacker: Repacker,
     part: Part,
     /// Decoded samples that are dropped if the part ends with them.
     held: Vec<f32>,
@@ -229,13 +235,17 @@ struct MpegStream {
 /// Opens MPEG audio at the position of `input`, where a frame begins.
 pub(crate) fn open(mut input: Input) -> Result<Box<dyn BlockSource>, AudioError> {
     let at = input.position();
-    if is_free_format(input.peek(WINDOW)?) {
-        return Err(AudioError::unsupported(at, "MPEG audio in free format", EXPECTED));
+    let shown = input.peek(WINDOW)?;
+    let free = free_size(shown).unwrap_or(0);
+    if let Some(layer @ 1..=2) = Header::parse(shown).filter(|h| h.is_free).map(|h| h.layer) {
+        let actual = format!("layer {layer} in free format");
+        return Err(AudioError::unsupported(at, actual, "layer 3 where the format is free"));
     }
     let mut report = ReadReport::default();
     let no_frame = || AudioError::corrupt(at, "no whole frame of MPEG audio", EXPECTED);
     let mut frames = Frames {
         input,
+        free,
         first: None,
         before: None,
         missing: 0,
@@ -265,6 +275,7 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn BlockSource>, AudioError>
         frames,
         first,
         codec,
+        repacker: Repacker::default(),
         part,
         held: Vec::new(),
         scratch: Vec::new(),
@@ -327,6 +338,7 @@ impl MpegStream {
         if std::mem::take(&mut self.frames.is_gap) {
             // What the decoder holds of the frames before does not fit.
             self.codec.reset();
+            self.repacker.reset();
         }
         let frame = &self.frames.input.peek(header.size)?[..header.size];
         if let Some(tag) = Tag::parse(frame, header) {
@@ -334,10 +346,28 @@ impl MpegStream {
             self.finish(samples, report);
             report.note(Repair::Concatenated { at: self.given });
             self.codec.reset();
+            self.repacker.reset();
             self.part = Part::new(Some(tag));
             return Ok(());
         }
-        let decoded = self.codec.decode(frame, &mut self.scratch);
+        let decoded = match header.is_free {
+            false => self.codec.decode(frame, &mut self.scratch),
+            true => {
+                let both = self.frames.input.peek(header.size + MAX_FRAME)?;
+                let (frame, rest) = both.split_at(header.size);
+                let next = Header::parse(rest).map(|next| next.sized(self.frames.free));
+                let next = next.filter(|next| next.continues(header));
+                let next = next.as_ref().and_then(|next| Some((next, rest.get(..next.size)?)));
+                if let Some(primer) = self.repacker.primer(header, frame) {
+                    // Its silence belongs to no frame.
+                    self.codec.decode(primer, &mut self.scratch).ok();
+                }
+                match self.repacker.packet(header, frame, next) {
+                    Some(packet) => self.codec.decode(packet, &mut self.scratch),
+                    None => Ok(Decoded::Damaged),
+                }
+            }
+        };
         self.frames.input.consume(header.size);
         self.frames.decoded(header.size);
         self.part.frames += 1;

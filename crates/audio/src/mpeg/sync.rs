@@ -9,9 +9,11 @@ pub(super) const CHAIN: usize = 3;
 pub(crate) const WINDOW: usize = 2 * (CHAIN + 1) * MAX_FRAME;
 
 /// Whether frames follow each other from byte `at` on: [`CHAIN`] of them, or at least `least` up to
-/// the end of the file (`is_end`: the buffer holds it) or to a tag.
-fn is_chain(buffer: &[u8], at: usize, is_end: bool, least: usize) -> bool {
-    let Some(first) = buffer.get(at..).and_then(Header::parse).filter(|h| h.size > HEADER) else {
+/// the end of the file (`is_end`: the buffer holds it) or to a tag. Those of free format have `free`
+/// bytes.
+fn is_chain(buffer: &[u8], at: usize, is_end: bool, least: usize, free: usize) -> bool {
+    let parse = |bytes: &[u8]| Header::parse(bytes).map(|header| header.sized(free));
+    let Some(first) = buffer.get(at..).and_then(parse).filter(|h| h.size > HEADER) else {
         return false;
     };
     let (mut at, mut count) = (at + first.size, 1);
@@ -23,7 +25,7 @@ fn is_chain(buffer: &[u8], at: usize, is_end: bool, least: usize) -> bool {
         if rest.len() < HEADER || tags::starts(rest) {
             return (is_end || rest.len() >= HEADER) && count >= least;
         }
-        match Header::parse(rest).filter(|h| h.continues(&first)) {
+        match parse(rest).filter(|h| h.continues(&first)) {
             Some(header) => at += header.size,
             None => return false,
         }
@@ -35,35 +37,41 @@ fn is_chain(buffer: &[u8], at: usize, is_end: bool, least: usize) -> bool {
 /// The first byte of `buffer` at which a chain of frames begins, of at least `least` frames where it
 /// ends with the file.
 pub(crate) fn find(buffer: &[u8], is_end: bool, least: usize) -> Option<usize> {
-    find_where(buffer, is_end, least, |_| true)
+    find_where(buffer, is_end, least, 0, |_| true)
 }
 
-/// As [`find`], of frames with such a header.
+/// As [`find`], of frames with such a header; those of free format have `free` bytes.
 pub(super) fn find_where(
     buffer: &[u8],
     is_end: bool,
     least: usize,
+    free: usize,
     admits: impl Fn(&Header) -> bool,
 ) -> Option<usize> {
     let last = if is_end { buffer.len() } else { buffer.len().saturating_sub(WINDOW / 2) };
     (0..last).find(|&at| {
         buffer[at] == 0xff
-            && Header::parse(&buffer[at..]).is_some_and(|header| admits(&header))
-            && is_chain(buffer, at, is_end, least)
+            && Header::parse(&buffer[at..]).is_some_and(|header| admits(&header.sized(free)))
+            && is_chain(buffer, at, is_end, least, free)
     })
 }
 
-/// Whether frames of free format follow each other from the start of `buffer` on: their headers are
-/// alike and equally far from each other.
-pub(crate) fn is_free_format(buffer: &[u8]) -> bool {
-    let Some(first) = Header::parse(buffer).filter(|h| h.bit_rate == 0) else {
-        return false;
+/// Bytes without padding of the frames of free format that begin with `buffer`: their headers are
+/// alike, and as far from each other as their padding says.
+pub(crate) fn free_size(buffer: &[u8]) -> Option<usize> {
+    let first = Header::parse(buffer).filter(|h| h.is_free)?;
+    let next = |at: usize| {
+        buffer.get(at..).and_then(Header::parse).filter(|header| header.continues(&first))
     };
-    let is_next =
-        |at: usize| buffer.get(at..).and_then(Header::parse).is_some_and(|h| h.continues(&first));
-    // A padding byte makes every other frame longer by one.
-    (HEADER..MAX_FREE).any(|size| {
-        is_next(size) && [2 * size - 1, 2 * size, 2 * size + 1].into_iter().any(is_next)
+    (HEADER + 1..MAX_FREE).find(|&plain| {
+        let mut at = first.sized(plain).size;
+        (1..CHAIN).all(|_| match next(at) {
+            Some(header) => {
+                at += header.sized(plain).size;
+                true
+            }
+            None => false,
+        })
     })
 }
 

@@ -7,7 +7,7 @@ use corsmal_audio::from_reader;
 use crate::common::{read_file, read_with, shared};
 
 /// File, frames, repairs.
-const CASES: [(&str, usize, &[&str]); 20] = [
+const CASES: [(&str, usize, &[&str]); 21] = [
     ("vbr_notag_loud_then_silent.mp3", 531_072, &[]),
     ("cbr_notag_short.mp3", 32_256, &[]),
     ("cbr_notag_sox.mp3", 32_256, &[]),
@@ -20,6 +20,7 @@ const CASES: [(&str, usize, &[&str]); 20] = [
     ("mp3_cat.mp3", 60_000, &["concatenated"]),
     ("mp3_zeros_head2.mp3", 30_000, &[]),
     ("mp3_junk_head.mp3", 32_256, &[]),
+    ("free.mp3", 30_000, &[]),
     ("flac_tail_id3v1.flac", 30_000, &[]),
     ("fltail_nl.flac", 30_000, &[]),
     ("flac_minblk0.flac", 30_000, &[]),
@@ -48,6 +49,4 @@ fn every_reported_file_is_read_rightly() {
         let pipe = read_with(source.as_mut(), [1, 700, 37].into_iter().cycle()).unwrap();
         assert_eq!(file.samples, pipe.samples, "{name}");
     }
-    let free = std::fs::read(root.join("free.mp3")).unwrap();
-    assert!(read_file(free).unwrap_err().to_string().contains("free format"));
 }

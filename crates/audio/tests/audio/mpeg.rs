@@ -76,3 +76,49 @@ fn silence_is_never_longer_than_an_hour() {
         assert!(got.report.loss().is_some());
     }
 }
+
+/// Frames of one size, the first of which is a tag.
+const CONSTANT: &[u8] = include_bytes!("samples/bursts-2ch-cbr.mp3");
+
+/// The frames of [`CONSTANT`] with headers that do not tell their size.
+fn free_format() -> Vec<Vec<u8>> {
+    let (mut frames, mut rest) = (Vec::new(), CONSTANT);
+    while rest.len() > 4 {
+        let (frame, more) = rest.split_at(313 + usize::from(rest[2] >> 1 & 1));
+        assert_eq!((&frame[..2], frame[2] >> 4), (b"\xff\xfb".as_slice(), 7));
+        frames.push([&frame[..2], &[frame[2] & 0x0f], &frame[3..]].concat());
+        rest = more;
+    }
+    frames
+}
+
+#[test]
+fn free_format_gives_the_same_samples() {
+    let (plain, frames) = (read_both(CONSTANT), free_format());
+    assert_eq!(plain.samples.len(), 24_000);
+    let got = read_both(&frames.concat());
+    assert_eq!(got.samples, plain.samples);
+    assert_eq!((got.repairs(), got.declared_frames), (plain.repairs(), plain.declared_frames));
+    // With check sums, which nobody compares, and tags around; without the tag that tells the delay.
+    let without = read_both(&CONSTANT[frames[0].len()..]);
+    let mut checked: Vec<u8> = b"ID3\x04\0\0\0\0\0\x0a0123456789".to_vec();
+    for frame in &frames[1..] {
+        checked.extend([frame[0], frame[1] & 0xfe, frame[2], frame[3], 0, 0]);
+        checked.extend(&frame[4..]);
+    }
+    checked.extend([b"TAG".as_slice(), &[0; 125]].concat());
+    assert_eq!(read_both(&checked).samples, without.samples);
+}
+
+#[test]
+fn frames_of_free_format_that_are_damaged_are_silence() {
+    let (plain, mut frames) = (read_both(CONSTANT), free_format());
+    let whole = frames.concat();
+    frames[6][..4].fill(0);
+    let got = read_both(&frames.concat());
+    assert_eq!(got.samples.len(), plain.samples.len());
+    assert!(got.repairs().contains(&"lost_frames"), "{:?}", got.repairs());
+    // Cut in the middle of a frame.
+    let cut = read_both(&whole[..whole.len() - 150]);
+    assert!(cut.samples.len() < plain.samples.len() && cut.repairs().contains(&"partial_frame"));
+}

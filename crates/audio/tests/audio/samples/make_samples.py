@@ -1,6 +1,7 @@
 """Writes the samples beside it: python make_samples.py.
 
-Needs soundfile 0.13 (libsndfile 1.2), ffmpeg 5 with libvorbis and libopus, flac and sndfile-convert.
+Needs soundfile 0.13 (libsndfile 1.2), ffmpeg 5 with libvorbis and libopus, flac, sndfile-convert and
+lame 3.100.
 """
 
 import subprocess
@@ -32,6 +33,11 @@ soundfile.write(HERE / "sine-1ch.mp3", sines[:, 0], 44100)
 
 with tempfile.TemporaryDirectory() as folder:
     folder = Path(folder)
+    # Bursts, so that frames of constant size lend each other room.
+    decay = np.exp(-(np.arange(12000) % 3000) / 300)
+    bursts = np.random.default_rng(1).standard_normal((12000, 2)) * decay[:, None]
+    soundfile.write(folder / "bursts.wav", 0.2 * bursts, 44100)
+    run("lame", "--cbr", "-b", "96", "--resample", "44.1", folder / "bursts.wav", HERE / "bursts-2ch-cbr.mp3")
     # Sixteen blocks of 192 samples, the last one shorter.
     soundfile.write(folder / "steps.wav", steps[:, :2], 48000)
     run("flac", "-s", "-f", "-b", "192", "-o", HERE / "steps-2ch-blocks.flac", folder / "steps.wav")
