@@ -50,6 +50,9 @@ impl Adpcm {
     }
 }
 
+/// Finds the byte at which more samples begin behind so many bytes of them.
+pub(super) type More = fn(&mut Input, u64) -> Result<Option<u64>, AudioError>;
+
 /// The blocks of one recording.
 pub(super) struct Blocks {
     input: Input,
@@ -57,23 +60,40 @@ pub(super) struct Blocks {
     channels: usize,
     /// Bytes of blocks still to come; `None`: to the end of a pipe.
     left: Option<u64>,
+    /// Bytes of blocks by the header.
+    size: Option<u64>,
+    more: More,
     declared: Option<u64>,
     given: u64,
     is_over: bool,
 }
 
 impl Blocks {
-    /// Blocks from the position of `input` on: `left` bytes, or to the end of a pipe; `declared`
-    /// frames by the header.
+    /// Blocks from the position of `input` on: `left` bytes, or to the end of a pipe; `size` bytes and
+    /// `declared` frames by the header.
     pub(super) fn new(
         input: Input,
         adpcm: Adpcm,
         channels: u16,
         left: Option<u64>,
+        (size, more): (Option<u64>, More),
         declared: Option<u64>,
     ) -> Self {
         let channels = channels.into();
-        Self { input, adpcm, channels, left, declared, given: 0, is_over: false }
+        Self { input, adpcm, channels, left, size, more, declared, given: 0, is_over: false }
+    }
+}
+
+impl Blocks {
+    /// Notes samples behind those of the header, of whose `rest` bytes no block was made.
+    fn note_more(&mut self, rest: u64, report: &mut ReadReport) {
+        // A pipe may stay open behind its samples.
+        let whole = self.input.len().is_some() && self.left.is_some_and(|left| left == rest);
+        let Some(size) = self.size.filter(|_| whole && !report.truncated) else { return };
+        let more = self.input.skip(rest).and_then(|_| (self.more)(&mut self.input, size));
+        if let Ok(Some(offset)) = more {
+            report.note(Repair::MoreData { offset });
+        }
     }
 }
 
@@ -87,6 +107,7 @@ impl Stream for Blocks {
         let shown = self.input.peek(wanted)?;
         let block = &shown[..shown.len().min(wanted)];
         let frames = self.adpcm.frames_of(block.len(), self.channels);
+        let block_rest = block.len() as u64;
         if self.is_over || frames == 0 {
             if !block.is_empty() && !self.is_over {
                 report.note(Repair::PartialFrame { bytes: block.len() as u64 });
@@ -94,6 +115,7 @@ impl Stream for Blocks {
             if self.declared.is_some_and(|declared| self.given < declared) && !report.truncated {
                 report.note_truncated(self.declared, self.given);
             }
+            self.note_more(block_rest, report);
             return Ok(Next::End);
         }
         samples.resize(frames * self.channels, 0.0);

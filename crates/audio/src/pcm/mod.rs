@@ -77,7 +77,10 @@ pub(crate) fn open(
     let report = ReadReport { decoded_frames: 0, truncated, repairs: header.repairs.clone() };
     if let Encoding::Adpcm(adpcm) = format.encoding {
         let left = header.extent.len;
-        let blocks = adpcm::Blocks::new(input, adpcm, format.channels, left, declared_frames);
+        let more: adpcm::More = |input, size| wav::more_data(input, size, Endian::Little);
+        let behind = (header.extent.declared, more);
+        let blocks =
+            adpcm::Blocks::new(input, adpcm, format.channels, left, behind, declared_frames);
         return Ok(Box::new(StreamSource::new(blocks, spec, report)));
     }
     Ok(Box::new(PcmSource::new(input, &header, spec, report)))

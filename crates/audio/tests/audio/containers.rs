@@ -192,6 +192,13 @@ fn adpcm_is_that_of_libsndfile() {
         let cut = read_file(wav[..wav.len() - 101].to_vec()).unwrap();
         assert!(cut.report.truncated && !cut.samples.is_empty());
         assert_eq!(cut.samples, expected[..cut.samples.len()]);
+        // Samples behind them.
+        for second in [&b"data\x04\0\0\0\x01\0\x02\0"[..], wav] {
+            let more = read_file([wav, second].concat()).unwrap();
+            assert_eq!(more.report.repairs, [Repair::MoreData { offset: wav.len() as u64 }]);
+            assert_eq!(more.samples, expected);
+        }
+        assert!(read_file([wav, b"LIST\0\0\0\0"].concat()).unwrap().repairs().is_empty());
     }
 }
 

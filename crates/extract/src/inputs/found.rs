@@ -11,6 +11,8 @@ pub(super) struct Found {
     pub(super) start: Option<f64>,
     pub(super) end: Option<f64>,
     pub(super) labels: Vec<(String, String)>,
+    /// Of the manifest that lists it.
+    pub(super) line: Option<u64>,
 }
 
 /// What the id is made of.
@@ -29,6 +31,15 @@ impl Found {
             start: None,
             end: None,
             labels: Vec::new(),
+            line: None,
+        }
+    }
+
+    /// The input as messages name it.
+    pub(super) fn described(&self) -> String {
+        match self.line {
+            Some(line) => format!("{} (line {line})", self.source),
+            None => self.source.to_string(),
         }
     }
 }

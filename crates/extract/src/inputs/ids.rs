@@ -70,8 +70,8 @@ pub(super) fn assign(found: &[Found]) -> Result<Vec<String>, InputError> {
             if changed.len() == before {
                 return Err(InputError::Duplicate {
                     id: ids[group[0]].clone(),
-                    first: found[group[0]].source.to_string(),
-                    second: found[group[1]].source.to_string(),
+                    first: found[group[0]].described(),
+                    second: found[group[1]].described(),
                 });
             }
         }

@@ -135,7 +135,8 @@ fn find(
     if name == "-" {
         let naming = Naming::Given("stdin".into());
         let (start, end, labels) = (None, None, Vec::new());
-        found.push(Found { source: InputSource::Stdin, naming, start, end, labels });
+        let line = None;
+        found.push(Found { source: InputSource::Stdin, naming, start, end, labels, line });
         return Ok(());
     }
     let path = Path::new(name);
@@ -250,8 +251,8 @@ fn find_manifest(
             None => Naming::Derived(entry.written.into()),
         };
         let source = InputSource::File(entry.path);
-        let (start, end, labels) = (entry.start, entry.end, entry.labels);
-        found.push(Found { source, naming, start, end, labels });
+        let (start, end, labels, line) = (entry.start, entry.end, entry.labels, Some(entry.line));
+        found.push(Found { source, naming, start, end, labels, line });
     }
     let Some((line, mut reason, number)) = unreadable else { return Ok(()) };
     if number > 1 {

@@ -185,6 +185,7 @@ fn stretches_of_one_file_get_ids_by_their_times() {
     fs::write(&csv, "path,start,end\na.wav,0.5,1\na.wav,0.5,1\n").unwrap();
     let error = ids(&[text(&csv)]).unwrap_err();
     assert!(error.contains("both have the id") && error.contains("a.wav@0.5-1.0"), "{error}");
+    assert!(error.contains("(line 2)") && error.contains("(line 3)"), "{error}");
 }
 
 #[test]
