@@ -6,6 +6,8 @@
 mod boxes;
 mod edits;
 mod fragments;
+mod index;
+mod packets;
 mod table;
 mod track;
 
@@ -21,20 +23,14 @@ use crate::stream::{LONGEST_GAP, Next, Stream, StreamSource};
 use boxes::Head;
 use edits::Timeline;
 use fragments::Fragments;
+use index::{data_come_first, hold, index};
+use packets::{Found, Source};
 use table::{Packet, Packets};
 use track::{Coding, Track};
 
 const EXPECTED: &str = "MP4 with AAC-LC of 1 or 2 channels, or ALAC";
-/// Largest index (`moov`) that is read.
-const MAX_MOOV: u64 = 64 << 20;
-/// What of a pipe is held at most where its packets stand before their index.
-const MOST_HELD: usize = 64 << 20;
 /// Bytes of a pipe in which its order is looked for.
 const LOOKED_THROUGH: usize = 64 << 10;
-/// Files with more boxes before their index are hostile.
-const MAX_BOXES: usize = 4096;
-/// Largest packet: 8 channels of 32 bits in the largest frame of ALAC, and more.
-const MAX_PACKET: u32 = 4 << 20;
 
 /// Boxes that can start a file.
 const FIRST: [&[u8; 4]; 8] =
@@ -44,25 +40,6 @@ const FIRST: [&[u8; 4]; 8] =
 pub(crate) fn is_mp4(start: &[u8]) -> bool {
     start.get(4..8).is_some_and(|kind| FIRST.iter().any(|first| kind == *first))
         && Head::parse(start).is_some()
-}
-
-/// Where packets come from.
-struct Source {
-    packets: Packets,
-    /// Whether the packets of the table follow each other, from `floor` on.
-    is_in_order: bool,
-    floor: u64,
-    base: u64,
-    fragments: Option<Fragments>,
-}
-
-/// What became of the bytes of a packet.
-enum Found {
-    Bytes(Vec<u8>),
-    /// They cannot be a packet.
-    Senseless,
-    /// The file ends before them.
-    Missing,
 }
 
 /// What comes next.
@@ -167,124 +144,6 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn BlockSource>, AudioError>
 /// `n` frames in units of a track's time scale.
 fn frames_in_scale(n: u32, sample_rate: u32, scale: u32) -> u32 {
     u32::try_from(edits::frames(n.into(), sample_rate, scale)).unwrap_or(u32::MAX)
-}
-
-/// Whether packets stand before their index in the first bytes of a file.
-fn data_come_first(mut shown: &[u8]) -> bool {
-    while let Some(head) = Head::parse(shown) {
-        match &head.kind {
-            b"mdat" => return true,
-            b"moov" => return false,
-            _ => {}
-        }
-        let next = head.size().and_then(|size| shown.get(usize::try_from(size).ok()?..));
-        let Some(next) = next else { return false };
-        shown = next;
-    }
-    false
-}
-
-/// Keeps the rest of a pipe, so that it can be gone through in any order.
-fn hold(input: &mut Input) -> Result<(), AudioError> {
-    let at = input.position();
-    if input.hold(MOST_HELD)? {
-        return Ok(());
-    }
-    let actual = format!(
-        "MP4 in a pipe with more than {} MiB of packets before their index or out of order",
-        MOST_HELD >> 20
-    );
-    Err(AudioError::unsupported(at, actual, "a file, or the index first (-movflags +faststart)"))
-}
-
-/// Reads the index, and goes to the box behind it. Also gives the first byte at which packets can be
-/// that are of use: behind the index, unless packets stand before it.
-fn index(input: &mut Input) -> Result<(Vec<u8>, u64), AudioError> {
-    let base = input.position();
-    let mut has_data = false;
-    for _ in 0..MAX_BOXES {
-        let at = input.position();
-        let Some(head) = Head::parse(input.peek(boxes::SHOWN)?) else { break };
-        if &head.kind == b"moov" {
-            let size = head.body.unwrap_or(MAX_MOOV);
-            if size > MAX_MOOV {
-                let actual = format!("an index (moov) of {size} bytes");
-                return Err(AudioError::unsupported(at, actual, "at most 64 MiB"));
-            }
-            input.consume(head.length as usize);
-            let moov = boxes::take(input, size as usize)?;
-            if (moov.len() as u64) < size && head.body.is_some() {
-                let actual = format!("{} of {size} bytes of the index (moov)", moov.len());
-                return Err(AudioError::corrupt(at, actual, "a whole index"));
-            }
-            let floor = if has_data { base } else { input.position() };
-            return Ok((moov, floor));
-        }
-        has_data |= &head.kind == b"mdat";
-        if has_data && input.len().is_none() {
-            let actual = "MP4 in a pipe with 64 KiB before packets that come before their index";
-            let expected = "a file, or the index first (-movflags +faststart)";
-            return Err(AudioError::unsupported(at, actual, expected));
-        }
-        let Some(size) = head.size() else { break };
-        if !input.skip(size)? {
-            break;
-        }
-    }
-    let actual = if has_data {
-        "MP4 without its index (moov), which a recorder writes last: it was stopped, or the file is cut off"
-    } else {
-        "MP4 without an index (moov)"
-    };
-    Err(AudioError::corrupt(base, actual, "boxes moov and mdat"))
-}
-
-impl Source {
-    fn next(&mut self, input: &mut Input) -> Result<Option<Packet>, AudioError> {
-        if let Some(packet) = self.packets.next() {
-            return Ok(Some(packet));
-        }
-        match &mut self.fragments {
-            Some(fragments) => {
-                let packet = fragments.next(input)?;
-                // From here on, bytes are counted as in the file.
-                self.base = 0;
-                Ok(packet)
-            }
-            None => Ok(None),
-        }
-    }
-
-    /// Takes the bytes of a packet.
-    fn bytes(&mut self, input: &mut Input, packet: &Packet) -> Result<Found, AudioError> {
-        let offset = packet.offset.saturating_add(self.base);
-        if !packet.is_described || packet.size == 0 || packet.size > MAX_PACKET {
-            return Ok(Found::Senseless);
-        }
-        if offset < self.floor {
-            return Ok(Found::Senseless);
-        }
-        let is_there = match (&mut self.fragments, offset.checked_sub(input.position())) {
-            (Some(fragments), _) => {
-                if offset < input.position() {
-                    return Ok(Found::Senseless);
-                }
-                fragments.reach(input, offset)?
-            }
-            (None, Some(ahead)) => input.skip(ahead)?,
-            (None, None) if input.len().is_some() => {
-                input.seek(offset)?;
-                true
-            }
-            (None, None) => return Ok(Found::Senseless),
-        };
-        if !is_there {
-            return Ok(Found::Missing);
-        }
-        let size = packet.size as usize;
-        let bytes = boxes::take(input, size)?;
-        Ok(if bytes.len() == size { Found::Bytes(bytes) } else { Found::Missing })
-    }
 }
 
 impl Mp4Stream {
