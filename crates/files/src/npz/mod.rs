@@ -10,6 +10,7 @@ mod entry;
 mod error;
 mod headers;
 mod intact;
+pub mod limits;
 mod packed;
 pub mod reader;
 pub mod writer;

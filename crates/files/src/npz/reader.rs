@@ -16,16 +16,9 @@ use zip::{CompressionMethod, ZipArchive};
 
 use super::entry::{Compression, EntryRecord};
 use super::error::NpzError;
+use super::limits::{MAX_INFLATED, MAX_RATIO, MAX_STRINGS};
 use crate::npy::{self, DType, Endian, Header, Kind, NpyError};
 use crate::quote::quoted;
-
-/// What is made of a deflated member may always take this many bytes (128 MiB), and so may all text
-/// of an archive together.
-pub const MAX_INFLATED: u64 = 128 << 20;
-/// Beyond that it may take this many times the compressed size.
-pub const MAX_RATIO: u64 = 200;
-/// Most strings of a member.
-pub const MAX_STRINGS: u64 = 1 << 26;
 
 const EXTENSION: &str = ".npy";
 

@@ -310,6 +310,38 @@ fn sizes_that_lie_are_refused_before_anything_is_allocated() {
     );
 }
 
+/// What the writer makes is read, however long its silence is, and has the same bytes however it
+/// arrives.
+#[test]
+fn long_silence_is_written_so_that_it_can_be_read() {
+    let folder = TempDir::new().unwrap();
+    let count = 35 << 20;
+    let header = Header::new(DType::F32, &[count]);
+    let files = [1 << 16, (5 << 20) + 4].map(|piece: usize| {
+        let path = folder.path().join(format!("{piece}.npz"));
+        let mut writer = NpzWriter::create(&path, Compression::Deflated).unwrap();
+        let zeros = vec![0; piece];
+        let put = |out: &mut dyn Write| {
+            let mut left = 4 * count;
+            while left > 0 {
+                let next = piece.min(left);
+                out.write_all(&zeros[..next])?;
+                left -= next;
+            }
+            Ok(())
+        };
+        writer.array_with("x", &header, put).unwrap();
+        writer.finish().unwrap();
+        path
+    });
+    let [one, other] = files.each_ref().map(|path| fs::read(path).unwrap());
+    assert!(one == other);
+    let mut npz = NpzFile::open(&files[0]).unwrap();
+    for value in npz.f64("x").unwrap() {
+        assert_eq!(value, 0.0);
+    }
+}
+
 /// Zeros deflate to a thousandth: what is made of them is limited, too, however little they are.
 #[test]
 fn members_that_would_burst_are_refused() {
