@@ -204,7 +204,7 @@ fn find_archive(
     for archive::Entry { member, name, labels } in contents.recordings {
         let naming = Naming::Derived(shard.join(name));
         let source = InputSource::Member(Box::new(member));
-        found.push(Found { source, naming, start: None, end: None, labels });
+        found.push(Found { source, naming, start: None, end: None, labels, line: None });
     }
     skipped.extend(contents.skipped);
     if !contents.is_ended {
