@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use corsmal_ccm::benchmark::{
-    Baseline, BenchmarkOptions, Estimate, FeatureSet, Made, Prepared, System, Work,
+    Baseline, BenchmarkOptions, CapacityTable, Estimate, FeatureSet, Made, Prepared, System, Work,
 };
 use corsmal_ccm::synth::{self, Size};
 use corsmal_extract::engine::{Features, Signals};
@@ -65,6 +65,7 @@ fn options(data: &Path, out: &Path, baselines: Vec<Baseline>) -> BenchmarkOption
         baselines,
         systems: Vec::new(),
         added: Vec::new(),
+        capacities: Vec::new(),
         jobs: 2,
         seed: 1,
         made: Made {
@@ -232,6 +233,7 @@ fn one_name_is_not_added_twice() {
         baselines: Vec::new(),
         systems: Vec::new(),
         added: vec![("x".into(), "a.csv".into()), ("x".into(), "b.csv".into())],
+        capacities: Vec::new(),
         jobs: 1,
         seed: 1,
         made: Made::default(),
@@ -250,6 +252,7 @@ fn an_unusable_file_to_add_stops_before_the_work() {
         baselines: Vec::new(),
         systems: Vec::new(),
         added: vec![("x".into(), file)],
+        capacities: Vec::new(),
         jobs: 1,
         seed: 1,
         made: Made::default(),
@@ -295,6 +298,7 @@ impl Adding {
             baselines: Vec::new(),
             systems: Vec::new(),
             added: vec![("theirs".into(), path)],
+            capacities: Vec::new(),
             jobs: 1,
             seed: 1,
             made: Made::default(),
@@ -366,6 +370,7 @@ fn a_file_of_ids_is_about_the_part_that_it_fits() {
             baselines: Vec::new(),
             systems: Vec::new(),
             added: vec![("theirs".into(), path.clone())],
+            capacities: Vec::new(),
             jobs: 1,
             seed: 1,
             made: Made::default(),
@@ -443,4 +448,70 @@ fn a_system_is_run_on_containers_that_it_never_heard() {
     let systems: Vec<Box<dyn System>> = vec![Box::new(Constant), Box::new(Constant)];
     let twice = BenchmarkOptions { systems, ..options(&data, &out, Vec::new()) };
     assert_eq!(run(&twice).unwrap_err().to_string(), "M4 is given twice");
+}
+
+/// Capacities have their rows, complete what is heard, and give whole submissions and figures of their errors.
+#[test]
+fn capacities_complete_what_is_heard() {
+    let dir = tempfile::tempdir().unwrap();
+    let (data, out) = (dir.path().join("data"), dir.path().join("report"));
+    synth::generate(&data, Size::Reduced, 3).unwrap();
+    let set = corsmal_ccm::dataset::DataSet::open(&data).unwrap();
+    let mut table = String::from(
+        "fileName,capacity[mL],width top[mm],width bottom[mm],height[mm],execution[ms]\n",
+    );
+    let known = |r: &&corsmal_ccm::dataset::Recording| set.annotation(r).is_some();
+    let silent = set.recordings.iter().find(known).unwrap().path.clone();
+    for recording in &set.recordings {
+        let (container, sequence) =
+            (recording.container.unwrap().number(), recording.sequence.unwrap());
+        // A tenth too large where it is known, and nothing for one recording.
+        let capacity = set.annotation(recording).map_or(700.0, |a| 1.1 * a.capacity_ml);
+        let capacity = if recording.path == silent { -1.0 } else { capacity };
+        table += &format!("id{container}_{sequence:04}.png,{capacity},80,60,120,4.5\n");
+    }
+    let file = dir.path().join("capacity.csv");
+    std::fs::write(&file, table).unwrap();
+    let forest = Baseline::all().into_iter().filter(|b| b.slug() == "zcr-mfcc-rf").collect();
+    let capacities = vec![CapacityTable { name: "M 2".into(), path: file, own: None }];
+    let report = run(&BenchmarkOptions { capacities, ..options(&data, &out, forest) }).unwrap();
+
+    let tables: Vec<_> = report.sections.iter().flat_map(|s| &s.tables).collect();
+    let find = |table: &str, method: &str| {
+        let table = tables.iter().find(|t| t.name == table).unwrap();
+        let row = table.rows.iter().find(|r| r.cells[0] == Cell::text(method));
+        let place = table.columns.iter().position(|c| c == "Training").unwrap();
+        row.map(|row| row.cells[place].value())
+    };
+    let (heard, whole) = ("ZCR + MFCCs + RF", "ZCR + MFCCs + RF, capacity M 2");
+    let set_size = set.recordings.iter().filter(|r| r.container.unwrap().number() < 10).count();
+    let expected = 100.0 * (-0.1f64).exp() * (set_size - 1) as f64 / set_size as f64;
+    assert!((find("capacity", "M 2").unwrap().unwrap() - expected).abs() < 1e-9);
+    let mass = |method| find("mass", method).unwrap().unwrap();
+    assert!(mass(whole) > mass(heard), "{} {}", mass(whole), mass(heard));
+    assert!(find("weight", whole).unwrap().unwrap() > 0.0);
+    assert_eq!((find("weight", heard), find("level", whole)), (None, None));
+    let by_container = tables.iter().find(|t| t.name == "mass-by-container-training").unwrap();
+    assert!(by_container.rows.iter().any(|r| r.cells[0] == Cell::text(whole)));
+    assert!(by_container.rows.iter().all(|r| r.cells[0] != Cell::text(heard)));
+
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
+    let submission = read("submissions/zcr-mfcc-rf-corrected-m-2-held-out-2022.csv");
+    let rows: Vec<Vec<&str>> = submission.lines().skip(1).map(|l| l.split(',').collect()).collect();
+    assert_eq!(rows.len(), set_size);
+    assert_eq!(rows.iter().filter(|row| row[1] == "-1").count(), 1);
+    for row in rows {
+        let given = [2, 13, 14, 15, 19].map(|place| row[place]);
+        assert_eq!(given, ["15", "80", "60", "120", "4.5"], "{row:?}");
+        let sum: f64 = row[4..8].iter().map(|p| p.parse::<f64>().unwrap()).sum();
+        assert!((sum - 1.0).abs() < 1e-5, "{row:?}");
+    }
+    let public = read("submissions/zcr-mfcc-rf-corrected-m-2-public-test.csv");
+    assert!(public.lines().count() > 1 && !public.contains(",-1\n"), "{public}");
+    for by in ["container", "type-and-level"] {
+        let figure = read(&format!("figures/capacity-error-m-2-by-{by}.svg"));
+        assert!(figure.contains("median 10.0"), "{figure}");
+    }
+    // Of what is only completed no figure says anything new.
+    assert!(!out.join("figures/zcr-mfcc-rf-corrected-m-2-type-confusion.svg").exists());
 }

@@ -50,6 +50,10 @@ impl RegionNetwork for Height {
         assert_eq!(region.image.len(), 112 * 112);
         Ok(f64::from(region.size[0]) * self.0)
     }
+
+    fn identity(&self) -> &str {
+        "height"
+    }
 }
 
 fn options(dir: &Path, method: Method) -> CapacityOptions {
@@ -211,7 +215,33 @@ fn methods_measure_synthetic_views_and_faults_are_rows() {
     assert_eq!((learned.recordings, &failed[..]), (18, &[1, 3, 5, 7][..]));
     assert!(learned.failed[0].1.contains("c1_calib.pickle"), "{:?}", learned.failed);
     let out = root.join("capacity.csv");
-    capacity::write(&out, "m4", &m4).unwrap();
+    let made = options(root, Method::M4);
+    capacity::write(&out, &made, &m4).unwrap();
+    let mut table = csv::Reader::from_path(&out).unwrap();
+    let head = table.headers().unwrap().clone();
+    let place = |name: &str| head.iter().position(|h| h == name).unwrap();
+    let (version, hash) = (place("tool_version"), place("config_hash"));
+    for row in table.records().map(|row| row.unwrap()) {
+        assert_eq!((&row[version], &row[hash]), (env!("CARGO_PKG_VERSION"), &*made.config_hash()));
+    }
+    // The hash tells how a table was made, not where or by how many threads.
+    let elsewhere = CapacityOptions { data: "elsewhere".into(), jobs: 1, ..made.clone() };
+    assert_eq!(elsewhere.config_hash(), made.config_hash());
+    let model = Some(learned.model);
+    assert_eq!(
+        CapacityOptions { model: model.clone(), ..made.clone() }.config_hash(),
+        made.config_hash()
+    );
+    for other in [
+        CapacityOptions { seed: 2, ..made.clone() },
+        CapacityOptions { outliers: Outliers::Kept, ..made.clone() },
+        CapacityOptions { variant: Variant::Published, ..made.clone() },
+        options(root, Method::M5),
+    ] {
+        assert_ne!(other.config_hash(), made.config_hash(), "{other:?}");
+    }
+    let fused = options(root, Method::Fused);
+    assert_ne!(CapacityOptions { model, ..fused.clone() }.config_hash(), fused.config_hash());
     let read = read_capacities(&out).unwrap();
     assert_eq!(read.len(), 18);
     assert_eq!(

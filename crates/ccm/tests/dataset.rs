@@ -178,6 +178,7 @@ fn annotation_files_must_not_contradict_each_other() {
             baselines: Vec::new(),
             systems: Vec::new(),
             added: Vec::new(),
+            capacities: Vec::new(),
             jobs: 1,
             seed: 1,
             made: Default::default(),

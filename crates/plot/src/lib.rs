@@ -21,6 +21,7 @@
 //! ```
 
 mod axis;
+mod box_plot;
 mod color;
 mod confusion;
 mod drawing;
@@ -38,6 +39,7 @@ mod scores;
 mod slopes;
 mod ticks;
 
+pub use box_plot::{BoxPlot, BoxRow};
 pub use color::{Paint, Rgb, sequential};
 pub use confusion::ConfusionMatrix;
 pub use drawing::Drawing;

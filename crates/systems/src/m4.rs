@@ -129,7 +129,7 @@ impl Prepared for Ready<'_> {
             kind_probabilities: array(shares),
             level: Some(best(level)),
             level_probabilities: array(level),
-            capacity_ml: None,
+            ..Estimate::default()
         };
         Ok(kinds.iter().zip(&levels).map(estimate).collect())
     }

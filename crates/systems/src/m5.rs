@@ -192,7 +192,7 @@ impl Prepared for Ready<'_> {
             kind: Some(best(kind)),
             level_probabilities: array(level),
             kind_probabilities: array(kind),
-            capacity_ml: None,
+            ..Estimate::default()
         };
         Ok(levels.iter().zip(&types).map(estimate).collect())
     }

@@ -4,9 +4,9 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::results::{Estimate, Rows, Target};
-use crate::dataset::{Container, Subset};
+use crate::capacity;
+use crate::dataset::{Container, Dimensions, Subset};
 use crate::error::{CcmError, Result};
-use crate::predictions::read_capacities;
 use crate::submission::{RowKey, Submission, listed};
 use crate::table::Table;
 
@@ -42,13 +42,26 @@ impl Added {
     pub fn read(name: &str, path: &Path) -> Result<Self> {
         let table = Table::read(path)?;
         let by_key = if table.find("fileName").is_some() {
-            let capacities = read_capacities(path)?.into_iter();
-            capacities
-                .map(|(k, capacity_ml)| (k, Estimate { capacity_ml, ..Estimate::default() }))
-                .collect()
+            return Self::capacities(name, path);
         } else {
             submission(&Submission::from_table(&table)?)
         };
+        Ok(Self { name: name.to_string(), path: path.to_path_buf(), by_key })
+    }
+
+    /// Reads a table of `corsmal-feat capacity`, or another with the columns `fileName` and `capacity[mL]`.
+    ///
+    /// # Errors
+    /// [`CcmError`] as [`capacity::read`].
+    pub fn capacities(name: &str, path: &Path) -> Result<Self> {
+        let estimate = |measured: capacity::Measured| Estimate {
+            capacity_ml: measured.capacity_ml,
+            dimensions: measured.dimensions,
+            execution_ms: measured.execution_ms,
+            ..Estimate::default()
+        };
+        let rows = capacity::read(path)?.into_iter();
+        let by_key = rows.map(|(key, measured)| (key, estimate(measured))).collect();
         Ok(Self { name: name.to_string(), path: path.to_path_buf(), by_key })
     }
 
@@ -183,11 +196,18 @@ fn submission(submission: &Submission) -> HashMap<RowKey, Estimate> {
             90.0 => 2.0,
             other => other,
         };
-        let capacity = submission.capacity.values[row];
+        let amount = |value: f64| (value > -1.0).then_some(value);
+        let [width_top, width_bottom, height] =
+            [&submission.width_top, &submission.width_bottom, &submission.height]
+                .map(|column| amount(column.values[row]));
         let estimate = Estimate {
             kind: class(submission.kind.values[row]),
             level: class(level),
-            capacity_ml: (capacity > -1.0).then_some(capacity),
+            capacity_ml: amount(submission.capacity.values[row]),
+            container_mass_g: amount(submission.container_mass.values[row]),
+            dimensions: width_top.zip(width_bottom).zip(height).map(|((top, bottom), height)| {
+                Dimensions { width_top: top, width_bottom: bottom, height }
+            }),
             ..Estimate::default()
         };
         (key, estimate)

@@ -8,6 +8,8 @@ use corsmal_models::pipeline::{Pipeline, PipelineSpec};
 
 use super::baselines::Outcome;
 use super::matrix::Matrices;
+use super::method::methods;
+use super::predicted::Predicted;
 use super::results::{Estimate, Rows, Target};
 use super::system::Run;
 use crate::dataset::{Filling, Subset};
@@ -71,6 +73,29 @@ pub(super) fn write_model(
 /// Writes the submissions of a system.
 pub(super) fn write_run(out: &Path, run: &Run, rows: &Rows) -> Result<()> {
     write_estimates(out, &run.name.to_lowercase(), rows, &run.held_out, &run.tests)
+}
+
+/// Writes the submissions of all methods that a table of capacities completes.
+pub(super) fn write_completed(
+    out: &Path,
+    rows: &Rows,
+    predicted: &Predicted<'_>,
+    seed: u64,
+) -> Result<()> {
+    for method in methods(rows, predicted, seed).iter().filter(|m| m.completes()) {
+        let Some(slug) = &method.slug else { continue };
+        if !method.training().is_empty() {
+            let held_out = method.training().iter().map(|(row, e)| (&rows.training[*row], e));
+            let name = format!("{slug}-held-out");
+            write_submissions(out, &name, &held_out.collect::<Vec<_>>())?;
+        }
+        for (part, estimates) in rows.tests.iter().zip(method.tests()) {
+            let Some(estimates) = estimates else { continue };
+            let pairs: Vec<_> = part.rows.iter().zip(estimates).collect();
+            write_submissions(out, &format!("{slug}-{}", self::slug(part.subset)), &pairs)?;
+        }
+    }
+    Ok(())
 }
 
 /// Writes estimates of held-out training recordings and of each test part.

@@ -1,9 +1,11 @@
 //! The lines of the tables: methods with their estimates.
 
+use super::added::Placed;
 use super::baselines::Variant;
 use super::interval::bootstrap;
 use super::predicted::Predicted;
 use super::results::{Estimate, PartScores, Rows, Target, score};
+use crate::capacity::PRIOR_MASS_G;
 use crate::dataset::{Filling, FillingLevel, FillingType, Subset};
 use crate::paper::Task;
 use crate::scores::ConfusionMatrix;
@@ -18,11 +20,19 @@ pub(super) struct Method {
     pub(super) inputs: String,
     pub(super) protocol: String,
     pub(super) source: Source,
+    /// What it is scored at: one that only completes another has its rows in the filling mass alone.
+    pub(super) tasks: &'static [Task],
     /// Estimates of training recordings that were not trained on, by row number.
     training: Vec<(usize, Estimate)>,
     /// Estimates of each test part, where there are any.
     tests: Vec<Option<Vec<Estimate>>>,
 }
+
+/// What [`Method::addressed`] says of one that estimates all three tasks.
+const ALL_ADDRESSED: &str = "level, type, capacity";
+
+/// Name of the recordings of training that were not trained on.
+pub(super) const HELD_OUT: &str = "held-out training containers";
 
 /// A part of the recordings.
 #[derive(Clone, Copy)]
@@ -74,9 +84,60 @@ impl Method {
         score(&targets, &estimates, seed)
     }
 
-    /// The tasks of which it estimates something in training recordings.
+    /// Estimates of training recordings that were not trained on, by row number.
+    pub(super) fn training(&self) -> &[(usize, Estimate)] {
+        &self.training
+    }
+
+    /// Estimates of each test part, where there are any.
+    pub(super) fn tests(&self) -> &[Option<Vec<Estimate>>] {
+        &self.tests
+    }
+
+    /// Whether it estimates level, type and capacity.
+    pub(super) fn addresses_all(&self) -> bool {
+        self.addressed() == ALL_ADDRESSED
+    }
+
+    /// Whether it completes another method with capacities.
+    pub(super) fn completes(&self) -> bool {
+        self.tasks.len() < Task::ALL.len()
+    }
+
+    /// The recordings whose capacity is known, with their estimates.
+    pub(super) fn with_capacity<'a>(&'a self, rows: &'a Rows) -> Vec<(&'a Target, f64, f64)> {
+        let training = self.training.iter().map(|(row, e)| (&rows.training[*row], e));
+        let tests = rows.tests.iter().zip(&self.tests);
+        let tests = tests.flat_map(|(part, e)| part.rows.iter().zip(e.iter().flatten()));
+        let known = training.chain(tests).filter_map(|(target, estimate)| {
+            let truth = target.annotation.as_ref().map(|a| a.capacity_ml).filter(|c| *c > 0.0)?;
+            Some((target, truth, estimate.capacity_ml?))
+        });
+        known.collect()
+    }
+
+    /// The scores of the first part that is labelled and estimated, and its name.
+    pub(super) fn first_scores(
+        &self,
+        rows: &Rows,
+        seed: u64,
+    ) -> Option<(&'static str, PartScores)> {
+        let parts = [
+            (Part::Training, HELD_OUT),
+            (Part::Combined, "both test parts"),
+            (Part::Test(Subset::Public), "public test part"),
+            (Part::Test(Subset::Private), "private test part"),
+        ];
+        parts
+            .into_iter()
+            .find_map(|(part, name)| Some((name, self.scores(rows, part, seed, &|_| true)?)))
+    }
+
+    /// The tasks of which it estimates something.
     pub(super) fn addressed(&self) -> String {
-        let has = |known: fn(&Estimate) -> bool| self.training.iter().any(|(_, e)| known(e));
+        let tests = self.tests.iter().flatten().flatten();
+        let all: Vec<&Estimate> = self.training.iter().map(|(_, e)| e).chain(tests).collect();
+        let has = |known: fn(&Estimate) -> bool| all.iter().any(|e| known(e));
         let tasks = [
             ("level", has(|e| e.level.is_some())),
             ("type", has(|e| e.kind.is_some())),
@@ -91,6 +152,9 @@ impl Method {
     /// whole containers in the training part, recordings in the test parts, whose three containers
     /// are too few.
     pub(super) fn cell(&self, rows: &Rows, part: Part, task: Task, seed: u64) -> Cell {
+        if !self.tasks.contains(&task) {
+            return Cell::None;
+        }
         let scores = self.scores(rows, part, seed, &|_| true);
         match scores.and_then(|s| of_task(task, &s)) {
             Some(value) => Cell::Score(value, self.interval(rows, part, task, seed)),
@@ -155,6 +219,7 @@ pub(super) fn methods(rows: &Rows, predicted: &Predicted<'_>, seed: u64) -> Vec<
                 Variant::Corrected => "corrected".into(),
             },
             source: Source::Ours,
+            tasks: &Task::ALL,
             training: o.held_out.clone(),
             tests: o.tests.iter().cloned().map(Some).collect(),
         })
@@ -165,6 +230,7 @@ pub(super) fn methods(rows: &Rows, predicted: &Predicted<'_>, seed: u64) -> Vec<
         inputs: run.inputs.clone(),
         protocol: "corrected".into(),
         source: Source::Ours,
+        tasks: &Task::ALL,
         training: run.held_out.clone(),
         tests: run.tests.iter().cloned().map(Some).collect(),
     }));
@@ -178,6 +244,7 @@ pub(super) fn methods(rows: &Rows, predicted: &Predicted<'_>, seed: u64) -> Vec<
         inputs: String::new(),
         protocol: format!("seed {seed}"),
         source: Source::Ours,
+        tasks: &Task::ALL,
         training: random(&rows.training).into_iter().enumerate().collect(),
         tests: rows.tests.iter().map(|t| Some(random(&t.rows))).collect(),
     });
@@ -187,10 +254,70 @@ pub(super) fn methods(rows: &Rows, predicted: &Predicted<'_>, seed: u64) -> Vec<
         inputs: String::new(),
         protocol: "given".into(),
         source: Source::Added,
+        tasks: &Task::ALL,
         training: a.training.iter().flatten().cloned().enumerate().collect(),
         tests: a.tests.clone(),
     }));
+    list.extend(predicted.capacities.iter().filter(|(a, _)| a.is_any()).map(|(a, own)| Method {
+        name: a.name.clone(),
+        slug: None,
+        inputs: own.unwrap_or_default().into(),
+        protocol: if own.is_some() { "corrected" } else { "given" }.into(),
+        source: if own.is_some() { Source::Ours } else { Source::Added },
+        tasks: &Task::ALL,
+        training: a.training.iter().flatten().cloned().enumerate().collect(),
+        tests: a.tests.clone(),
+    }));
+    let completed: Vec<Method> = list
+        .iter()
+        .filter(|m| m.protocol == "corrected" && m.slug.is_some())
+        .flat_map(|m| predicted.capacities.iter().filter_map(|(c, _)| m.completed(c)))
+        .collect();
+    list.extend(completed);
     list
+}
+
+impl Method {
+    /// Type and level of this method with the capacities and sizes of a table, where it covers the same parts;
+    /// container masses are the training containers' median.
+    fn completed(&self, capacities: &Placed) -> Option<Self> {
+        let both = |own: &Estimate, measured: &Estimate| Estimate {
+            capacity_ml: measured.capacity_ml,
+            dimensions: measured.dimensions,
+            execution_ms: measured.execution_ms,
+            container_mass_g: Some(PRIOR_MASS_G),
+            ..own.clone()
+        };
+        let all = capacities.training.as_deref();
+        let training: Vec<(usize, Estimate)> = match all {
+            Some(all) => self.training.iter().map(|(row, e)| (*row, both(e, &all[*row]))).collect(),
+            None => Vec::new(),
+        };
+        let tests = self.tests.iter().zip(&capacities.tests).map(|(own, measured)| {
+            let (own, measured) = (own.as_ref()?, measured.as_ref()?);
+            Some(own.iter().zip(measured).map(|(e, m)| both(e, m)).collect())
+        });
+        let tests: Vec<Option<Vec<Estimate>>> = tests.collect();
+        if training.is_empty() && tests.iter().all(Option::is_none) {
+            return None;
+        }
+        Some(Self {
+            name: format!("{}, capacity {}", self.name, capacities.name),
+            slug: self.slug.as_ref().map(|slug| format!("{slug}-{}", file_name(&capacities.name))),
+            inputs: self.inputs.clone(),
+            protocol: self.protocol.clone(),
+            source: self.source,
+            tasks: &[Task::Mass],
+            training,
+            tests,
+        })
+    }
+}
+
+/// A name as a part of file names.
+pub(super) fn file_name(name: &str) -> String {
+    let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
+    words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("-")
 }
 
 pub(super) fn level_names() -> Vec<String> {

@@ -39,6 +39,17 @@ use matrix::Store;
 use predicted::Predicted;
 use protocols::{Setting, Unit};
 
+/// Capacities of a method.
+#[derive(Clone, Debug)]
+pub struct CapacityTable {
+    /// Name in the tables.
+    pub name: String,
+    /// A table of `corsmal-feat capacity`, or another with `fileName` and `capacity[mL]`.
+    pub path: PathBuf,
+    /// What a method that was run on these recordings takes, such as `rgb1+rgb2`; `None` for a table that was given.
+    pub own: Option<&'static str>,
+}
+
 /// What to run.
 pub struct BenchmarkOptions {
     /// Folder of the data set.
@@ -51,6 +62,8 @@ pub struct BenchmarkOptions {
     pub systems: Vec<Box<dyn System>>,
     /// Prediction files of other methods that join the tables, by name.
     pub added: Vec<(String, PathBuf)>,
+    /// Tables of capacities: each has its rows, and completes the baselines and systems.
+    pub capacities: Vec<CapacityTable>,
     /// Recordings that are extracted at a time, at least 1.
     pub jobs: usize,
     /// Seed of the forests and of the pseudo-random estimates.
@@ -77,7 +90,9 @@ pub fn run(
     stop: &Arc<AtomicBool>,
 ) -> Result<Report> {
     let mut names = HashSet::new();
-    if let Some((name, _)) = options.added.iter().find(|(name, _)| !names.insert(name)) {
+    let named = options.added.iter().map(|(name, _)| name);
+    let named = named.chain(options.capacities.iter().map(|table| &table.name));
+    if let Some(name) = named.into_iter().find(|name| !names.insert(*name)) {
         return Err(CcmError::Request(format!("{name}: added twice; names must differ")));
     }
     let mut slugs = HashSet::new();
@@ -93,10 +108,17 @@ pub fn run(
         .iter()
         .map(|(name, path)| Added::read(name, path))
         .collect::<Result<Vec<_>>>()?;
+    let tables = options.capacities.iter();
+    let tables: Vec<Added> =
+        tables.map(|t| Added::capacities(&t.name, &t.path)).collect::<Result<_>>()?;
     let set = DataSet::open(&options.data)?;
     let rows = results::Rows::of(&set)?;
     let added = added.iter().map(|a| a.place(&rows)).collect::<Result<Vec<_>>>()?;
-    for nowhere in added.iter().filter(|a| !a.is_any()) {
+    let tables = tables.iter().zip(&options.capacities);
+    let capacities =
+        tables.map(|(table, of)| Ok((table.place(&rows)?, of.own))).collect::<Result<Vec<_>>>()?;
+    let given = added.iter().chain(capacities.iter().map(|(table, _)| table));
+    for nowhere in given.filter(|a| !a.is_any()) {
         progress(&format!("{}: has no recording of this data set", nowhere.name));
     }
     files::prepare(&options.out)?;
@@ -142,7 +164,9 @@ pub fn run(
     }
     files::write_random(&options.out, &rows, options.seed)?;
     let made = &options.made;
-    let predicted = Predicted { outcomes: &outcomes, runs: &runs, added: &added };
+    let predicted =
+        Predicted { outcomes: &outcomes, runs: &runs, added: &added, capacities: &capacities };
+    files::write_completed(&options.out, &rows, &predicted, options.seed)?;
     let report = report::report(&set, &rows, &predicted, options.seed, made)?;
     let figures = options.out.join("figures");
     report::write_figures(&figures, &rows, &predicted, options.seed)?;

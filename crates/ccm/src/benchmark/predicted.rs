@@ -4,9 +4,11 @@ use super::added::Placed;
 use super::baselines::Outcome;
 use super::system::Run;
 
-/// Baselines, systems and prediction files.
+/// Baselines, systems, prediction files and capacities.
 pub(super) struct Predicted<'a> {
     pub(super) outcomes: &'a [Outcome],
     pub(super) runs: &'a [Run],
     pub(super) added: &'a [Placed],
+    /// Tables of capacities, with what a method that was run here takes.
+    pub(super) capacities: &'a [(Placed, Option<&'static str>)],
 }

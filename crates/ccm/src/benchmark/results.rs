@@ -1,7 +1,8 @@
 //! What is predicted for which recordings.
 
 use crate::dataset::{
-    Annotation, Annotations, DataSet, Filling, FillingLevel, FillingType, Recording, Subset,
+    Annotation, Annotations, DataSet, Dimensions, Filling, FillingLevel, FillingType, Recording,
+    Subset,
 };
 use crate::error::{CcmError, Result};
 use crate::scores::{self, ConfusionMatrix, RuleSet};
@@ -93,6 +94,12 @@ pub struct Estimate {
     pub level_probabilities: Option<[f64; 3]>,
     /// Capacity in mL.
     pub capacity_ml: Option<f64>,
+    /// Mass of the empty container in g.
+    pub container_mass_g: Option<f64>,
+    /// Widths and height in mm.
+    pub dimensions: Option<Dimensions>,
+    /// Time that the estimate took, in ms.
+    pub execution_ms: Option<f64>,
 }
 
 impl Estimate {
@@ -110,7 +117,7 @@ impl Estimate {
             level: filling.map(|f| f.level() as usize),
             kind_probabilities: probabilities.map(|_| kinds),
             level_probabilities: probabilities.map(|_| levels),
-            capacity_ml: None,
+            ..Self::default()
         }
     }
 
@@ -122,7 +129,10 @@ impl Estimate {
             kind_probabilities: self.kind_probabilities,
             level_probabilities: self.level_probabilities,
             capacity_ml: self.capacity_ml,
-            ..Prediction::empty(key)
+            container_mass_g: self.container_mass_g,
+            dimensions: self.dimensions,
+            execution_ms: self.execution_ms,
+            key,
         }
     }
 }
@@ -135,6 +145,9 @@ impl From<Prediction> for Estimate {
             kind_probabilities: p.kind_probabilities,
             level_probabilities: p.level_probabilities,
             capacity_ml: p.capacity_ml,
+            container_mass_g: p.container_mass_g,
+            dimensions: p.dimensions,
+            execution_ms: p.execution_ms,
         }
     }
 }
@@ -147,6 +160,8 @@ pub(super) struct PartScores {
     pub(super) joint: Option<f64>,
     pub(super) capacity: Option<f64>,
     pub(super) mass: Option<f64>,
+    /// Mean absolute error of the object's weight in N, the container's mass being known.
+    pub(super) weight_error: Option<f64>,
     pub(super) level_matrix: ConfusionMatrix,
     pub(super) kind_matrix: ConfusionMatrix,
     pub(super) joint_matrix: ConfusionMatrix,
@@ -187,6 +202,7 @@ pub(super) fn score(targets: &[&Target], estimates: &[Estimate], seed: u64) -> O
         joint: (has_level && has_kind).then(|| 100.0 * joint_matrix.weighted_f1()),
         capacity: of("T3").filter(|_| has_capacity),
         mass: of("mass"),
+        weight_error: of("weight_error_N"),
         level_matrix,
         kind_matrix,
         joint_matrix,
@@ -201,7 +217,16 @@ fn by_paper(targets: &[&Target], estimates: &[Estimate], seed: u64) -> Option<sc
     let keys: Vec<RowKey> = (0..rows.len() as u32).map(RowKey::Id).collect();
     rows.iter_mut().zip(0..).for_each(|(row, place)| row.id = Some(place));
     let annotations = Annotations { path: "annotations".into(), rows, levels_in_percent: false };
-    let predictions: Vec<_> = estimates.iter().zip(&keys).map(|(e, &k)| e.prediction(k)).collect();
+    // The weight of an object takes the container's mass as known, as the paper does.
+    let known = |a: &Annotation| a.container_mass_g >= 0.0 && a.filling_mass_g >= 0.0;
+    let known = annotations.rows.iter().all(known);
+    let named = estimates.iter().zip(&annotations.rows).zip(&keys);
+    let predictions: Vec<_> = named
+        .map(|((estimate, row), &key)| Prediction {
+            container_mass_g: known.then_some(row.container_mass_g),
+            ..estimate.prediction(key)
+        })
+        .collect();
     let submission = Submission::from_predictions("estimates", Format::Y2022, &predictions);
     let random = pseudo_random(&keys, seed);
     let baseline = Submission::from_predictions("random", Format::Y2022, &random);

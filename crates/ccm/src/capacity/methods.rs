@@ -180,6 +180,9 @@ pub trait RegionNetwork: std::fmt::Debug + Send + Sync {
     /// # Errors
     /// A text when the network cannot be run.
     fn capacity_ml(&self, region: &Region) -> Result<f64, String>;
+
+    /// What tells its weights from others, such as a hash.
+    fn identity(&self) -> &str;
 }
 
 /// M2: its network on the region of interest of the last depth image of view 3 that has one.

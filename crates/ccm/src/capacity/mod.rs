@@ -79,6 +79,24 @@ pub struct CapacityOptions {
     pub seed: u64,
 }
 
+impl CapacityOptions {
+    /// Hash of everything that decides about an estimate, apart from the recordings: method, variants, seed, and
+    /// the content of a model or of weights where the method takes them.
+    pub fn config_hash(&self) -> String {
+        let learned = matches!(self.method, Method::M3 | Method::Fused);
+        let network = (self.method == Method::M2).then_some(self.network.as_ref()).flatten();
+        let config = serde_json::json!({
+            "method": self.method.name(),
+            "variant": format!("{:?}", self.variant),
+            "outliers": format!("{:?}", self.outliers),
+            "seed": self.seed,
+            "model": self.model.as_ref().filter(|_| learned),
+            "weights": network.map(|network| network.identity()),
+        });
+        blake3::hash(config.to_string().as_bytes()).to_hex().to_string()
+    }
+}
+
 /// Estimates every recording of a data set, in its order. `progress` hears how many are done.
 ///
 /// # Errors

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use corsmal_files::draft;
 
+use super::CapacityOptions;
 use super::methods::Estimate;
 use super::views::Problem;
 use crate::dataset::Dimensions;
@@ -14,7 +15,7 @@ use crate::submission::{Prediction, RowKey};
 use crate::table::Table;
 
 /// Columns of the table; the first two are those of M5's published files.
-const HEADER: [&str; 13] = [
+const HEADER: [&str; 15] = [
     "fileName",
     "capacity[mL]",
     "low[mL]",
@@ -28,6 +29,8 @@ const HEADER: [&str; 13] = [
     "method",
     "status",
     "reason",
+    "tool_version",
+    "config_hash",
 ];
 
 /// What became of a recording.
@@ -57,7 +60,7 @@ impl Row {
         self.estimate.as_ref().map_or(-1.0, |e| e.capacity)
     }
 
-    fn cells(&self, method: &str) -> Vec<String> {
+    fn cells(&self, method: &str, config_hash: &str) -> Vec<String> {
         let number = |v: Option<f64>| v.map_or(String::new(), |v| v.to_string());
         let estimate = self.estimate.as_ref().ok();
         let sizes = estimate.and_then(|e| e.sizes);
@@ -80,6 +83,8 @@ impl Row {
             method.into(),
             self.status().into(),
             reason,
+            env!("CARGO_PKG_VERSION").into(),
+            config_hash.into(),
         ]
     }
 }
@@ -153,16 +158,17 @@ pub fn read(path: &Path) -> Result<HashMap<RowKey, Measured>> {
     Ok(measured)
 }
 
-/// Writes the table; the file appears only when complete.
+/// Writes the table of what [`run`](super::run) made by these options; the file appears only when complete.
 ///
 /// # Errors
 /// [`CcmError`] when it cannot be written.
-pub fn write(path: &Path, method: &str, rows: &[Row]) -> Result<()> {
+pub fn write(path: &Path, options: &CapacityOptions, rows: &[Row]) -> Result<()> {
+    let config_hash = options.config_hash();
     let mut writer = csv::Writer::from_writer(Vec::new());
     let fault = |e: csv::Error| CcmError::Request(format!("{}: {e}", path.display()));
     writer.write_record(HEADER).map_err(fault)?;
     for row in rows {
-        writer.write_record(row.cells(method)).map_err(fault)?;
+        writer.write_record(row.cells(options.method.name(), &config_hash)).map_err(fault)?;
     }
     let bytes =
         writer.into_inner().map_err(|e| CcmError::Request(format!("{}: {e}", path.display())))?;

@@ -4,8 +4,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use corsmal_ccm::CcmError;
-use corsmal_ccm::benchmark::{self, Baseline, BenchmarkOptions, Made, System};
+use corsmal_ccm::benchmark::{self, Baseline, BenchmarkOptions, CapacityTable, Made, System};
+use corsmal_ccm::capacity::{self, CapacityOptions, Method};
 use corsmal_report::{Cell, Report, Row, Source};
+use corsmal_vision::cuboid::Outliers;
+use corsmal_vision::lode::Variant;
 
 use crate::args::Jobs;
 use crate::failure::{Failure, INTERRUPTED};
@@ -16,7 +19,8 @@ use crate::made;
 #[command(after_help = "Examples:\n  corsmal-feat benchmark --data ~/CCM --out report\n  \
                         corsmal-feat benchmark --data ~/CCM --out report --baselines zcr-mfcc-rf \
                         --add M6=m6_acc.csv\n  corsmal-feat benchmark --data ~/CCM --out report \
-                        --methods m1,m2,m4,m6 --epochs 5\n\nSystems are trained on whole containers \
+                        --methods m1,m2,m4,m6 --epochs 5\n  corsmal-feat benchmark --data ~/CCM --out report \
+                        --capacity m5 --capacity M2=m2.csv\n\nSystems are trained on whole containers \
                         held out in three folds, by their published recipes; `corsmal-feat nets` \
                         lists them.\n\nThe report is report/report.html; the same tables \
                         are in report/tables and report/report.json.")]
@@ -46,6 +50,11 @@ pub struct Args {
     /// capacity estimates by file name.
     #[arg(long, value_parser = named_file, value_name = "NAME=CSV")]
     add: Vec<(String, PathBuf)>,
+    /// Capacities that have their rows and complete the submissions of every baseline and system, so
+    /// that the filling mass has all three tasks: a table of `capacity` with its name, or m4 or m5 to
+    /// run it on the views of the data set first (by the detections beside the recordings).
+    #[arg(long, value_parser = capacity_source, value_name = "NAME=CSV|m4|m5")]
+    capacity: Vec<CapacitySource>,
     /// Seed of the forests and of the pseudo-random estimates.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -76,6 +85,65 @@ fn named_file(text: &str) -> Result<(String, PathBuf), String> {
     }
 }
 
+/// Where capacities come from.
+#[derive(Clone)]
+enum CapacitySource {
+    Given(String, PathBuf),
+    Run(Method),
+}
+
+fn capacity_source(text: &str) -> Result<CapacitySource, String> {
+    match text {
+        "m4" => Ok(CapacitySource::Run(Method::M4)),
+        "m5" => Ok(CapacitySource::Run(Method::M5)),
+        _ if text.contains('=') => {
+            named_file(text).map(|(name, path)| CapacitySource::Given(name, path))
+        }
+        _ => Err(
+            "expected m4, m5, or NAME=FILE such as M2=m2.csv; `corsmal-feat capacity` makes such \
+                  files, also by methods that need weights or a model"
+                .into(),
+        ),
+    }
+}
+
+/// The tables of capacities; methods are run and their tables kept in `capacity/` below the output.
+fn capacities(args: &Args) -> Result<Vec<CapacityTable>, CcmError> {
+    let mut tables = Vec::with_capacity(args.capacity.len());
+    for source in &args.capacity {
+        let method = match source {
+            CapacitySource::Given(name, path) => {
+                tables.push(CapacityTable { name: name.clone(), path: path.clone(), own: None });
+                continue;
+            }
+            CapacitySource::Run(method) => *method,
+        };
+        let name = method.name().to_uppercase();
+        if !args.quiet {
+            eprintln!("{name}: capacities");
+        }
+        let options = CapacityOptions {
+            data: args.data.clone(),
+            detections: None,
+            method,
+            variant: Variant::Corrected,
+            outliers: Outliers::Corrected,
+            model: None,
+            network: None,
+            jobs: args.jobs.count(),
+            seed: args.seed,
+        };
+        let rows = capacity::run(&options, &|_, _| {}, crate::interrupt::flag())?;
+        let folder = args.out.join("capacity");
+        std::fs::create_dir_all(&folder).map_err(|e| CcmError::io(&folder, e))?;
+        let path = folder.join(format!("{}.csv", method.name()));
+        capacity::write(&path, &options, &rows)?;
+        let own = if method == Method::M4 { "rgb1+depth1" } else { "rgb1+rgb2" };
+        tables.push(CapacityTable { name, path, own: Some(own) });
+    }
+    Ok(tables)
+}
+
 #[cfg(feature = "nets")]
 fn systems(args: &Args) -> Result<Vec<Box<dyn System>>, Failure> {
     let settings = corsmal_systems::Settings {
@@ -98,14 +166,23 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let systems = systems(&args)?;
     let baselines = match (args.baselines.is_empty(), systems.is_empty()) {
         (true, true) => Baseline::all(),
-        _ => args.baselines,
+        _ => args.baselines.clone(),
+    };
+    let interrupted = |error: CcmError| {
+        eprintln!("{error}");
+        Ok(ExitCode::from(INTERRUPTED))
+    };
+    let capacities = match capacities(&args) {
+        Err(error @ CcmError::Interrupted) => return interrupted(error),
+        tables => tables?,
     };
     let options = BenchmarkOptions {
-        data: args.data,
-        out: args.out,
+        data: args.data.clone(),
+        out: args.out.clone(),
         baselines,
         systems,
-        added: args.add,
+        added: args.add.clone(),
+        capacities,
         jobs: args.jobs.count(),
         seed: args.seed,
         made: Made { on: Some(made::today()), command: Some(made::command()) },
@@ -118,22 +195,73 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         }
     };
     let report = match benchmark::run(&options, &progress, stop) {
-        Err(error @ CcmError::Interrupted) => {
-            eprintln!("{error}");
-            return Ok(ExitCode::from(INTERRUPTED));
-        }
+        Err(error @ CcmError::Interrupted) => return interrupted(error),
         report => report?,
     };
     if args.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
     } else if !quiet {
-        print!("{}", scores(&report));
+        print!("{}{}", scores(&report), amounts(&report));
         if let Some(warning) = &report.warning {
             println!("{warning}\n");
         }
         println!("{}", options.out.join("report.html").display());
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The scores of capacity and filling mass, and the error of the weight, of the methods that
+/// estimate them; nothing where there is none.
+fn amounts(report: &Report) -> String {
+    let tables: Vec<_> = report.sections.iter().flat_map(|s| &s.tables).collect();
+    let table = |name: &str| tables.iter().find(|t| t.name == name);
+    let weighed = |row: &&Row| {
+        let same = |other: &Row| other.cells.first() == row.cells.first();
+        table("weight").is_some_and(|weight| weight.rows.iter().any(same))
+    };
+    let mut out = String::new();
+    for (name, about) in [
+        ("capacity", "capacity, percent"),
+        ("mass", "filling mass, percent"),
+        ("weight", "error of the object's weight, newtons"),
+    ] {
+        let Some(table) = table(name) else { continue };
+        let own = |row: &&Row| row.source != Source::Paper && row.cells.first() != Some(&random());
+        // Of the filling mass those that estimate all of it, which are those with a weight.
+        let whole = |row: &&Row| name != "mass" || weighed(row);
+        let rows: Vec<&Row> = table.rows.iter().filter(own).filter(whole).collect();
+        if rows.is_empty() {
+            continue;
+        }
+        let text = |cell: &Cell| match cell {
+            Cell::Text(text) => text.clone(),
+            _ => String::new(),
+        };
+        let width = rows.iter().map(|r| text(&r.cells[0]).chars().count()).max().unwrap_or(6);
+        let parts = ["Training", "Public", "Private", "Combined"];
+        let places: Vec<(usize, &str)> = parts
+            .into_iter()
+            .filter_map(|part| Some((table.columns.iter().position(|c| c == part)?, part)))
+            .filter(|(place, _)| rows.iter().any(|row| row.cells[*place] != Cell::None))
+            .collect();
+        let heads: String = places.iter().map(|(_, part)| format!("{part:>10}")).collect();
+        out.push_str(&format!("{about}\n\n{:width$}{heads}\n", "method"));
+        for row in rows {
+            let number = |(place, _): &(usize, &str)| match row.cells[*place].value() {
+                Some(value) if name == "weight" => format!("{value:10.3}"),
+                Some(value) => format!("{value:10.2}"),
+                None => format!("{:>10}", "\u{2013}"),
+            };
+            let numbers: String = places.iter().map(number).collect();
+            out.push_str(&format!("{:width$}{numbers}\n", text(&row.cells[0])));
+        }
+        out.push('\n');
+    }
+    out
+}
+
+fn random() -> Cell {
+    Cell::text("Random")
 }
 
 /// The scores of this run on recordings that were not trained on, from the report's tables of the

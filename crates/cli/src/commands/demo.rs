@@ -37,21 +37,34 @@ pub fn run(
     let (picture, baselines) = (path("recording.png"), "zcr-mfcc-knn,zcr-mfcc-svm,zcr-mfcc-rf");
     let model = path("report/models/zcr-mfcc-rf-corrected.model");
     let (folder, predictions) = (path("ccm/train/1"), path("predictions.csv"));
-    let submission = path("report/submissions/zcr-mfcc-rf-corrected-held-out.csv");
+    let submission = path("report/submissions/zcr-mfcc-rf-corrected-m5-held-out.csv");
     let annotations = path("ccm/ccm_train_annotation.csv");
-    let mut benchmark =
-        vec!["benchmark", "--data", &data, "--out", &report, "--baselines", baselines, "--quiet"];
+    let mut benchmark = vec![
+        "benchmark",
+        "--data",
+        &data,
+        "--out",
+        &report,
+        "--baselines",
+        baselines,
+        "--capacity",
+        "m5",
+    ];
     let trained = match cfg!(feature = "nets") {
         true => {
             benchmark.extend(["--methods", "m1", "--epochs", "5"]);
-            "Three audio baselines and a network trained, held-out containers predicted, all scored"
+            "Sound and sight: three audio baselines and a network trained, held-out containers predicted, their \
+             capacity measured in two views (LoDE), and from both the filling mass; all scored"
         }
-        false => "Three audio baselines trained, held-out containers predicted, all scored",
+        false => {
+            "Sound and sight: three audio baselines trained, held-out containers predicted, their capacity \
+             measured in two views (LoDE), and from both the filling mass; all scored"
+        }
     };
     let steps: &[(&str, Vec<&str>)] = &[
         (
-            "Synthetic recordings, 8 channels, in the layout of the CCM data set",
-            vec!["synth", "--out", &data, "--small"],
+            "Synthetic recordings, 8 channels, and what four cameras see, in the layout of the CCM data set",
+            vec!["synth", "--out", &data, "--small", "--vision"],
         ),
         (
             "Log-mel tensors of every recording",
@@ -87,7 +100,7 @@ pub fn run(
             ],
         ),
         (
-            "Scores of its held-out predictions by the paper's rules. SYNTHETIC data: they mean \
+            "Scores of its held-out predictions, with the capacities, by the paper's rules. SYNTHETIC data: they mean \
              nothing about real recordings",
             vec![
                 "evaluate",

@@ -72,11 +72,18 @@ fn the_demo_ends_with_model_predictions_scores_and_report() {
         "$ corsmal-feat evaluate --submission",
         "SYNTHETIC",
         "rules paper, 57 recordings",
+        "--capacity m5",
+        "capacity, percent",
+        "ZCR + MFCCs + RF, capacity M5",
+        "error of the object's weight, newtons",
         "report/report.html",
     ] {
         assert!(shown.contains(part), "{part}: {shown}");
     }
     let made = |name: &str| std::fs::read_to_string(dir.path().join(name)).unwrap();
+    let measured = made("report/capacity/m5.csv");
+    assert_eq!(measured.matches(",m5,ok,").count() + measured.matches(",m5,prior,").count(), 57);
+    assert!(made("report/tables/mass.csv").contains("ZCR + MFCCs + RF, capacity M5"));
     assert_eq!(made("predictions.csv").lines().count(), 1 + 7);
     assert!(made("report/report.html").contains("SYNTHETIC"));
 }
@@ -95,6 +102,7 @@ fn unusable_input_is_one_message_and_exit_code_2() {
         vec!["synth", "--out", text(dir.path())],
         [&["benchmark", "--data", "x", "--out", "y"], &["--baselines", "af193-rf", "af193-rf"][..]]
             .concat(),
+        vec!["benchmark", "--data", text(&none), "--out", text(&none), "--capacity", "m5", "-q"],
     ] {
         let output = run(&arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");

@@ -4,32 +4,45 @@ use corsmal_plot::ConfusionMatrix as Plot;
 use corsmal_report::{Figure, FigureGroup, Section, Source};
 use ndarray::Array2;
 
-use crate::benchmark::method::{Method, Part, joint_names, kind_names, level_names};
+use crate::benchmark::method::{HELD_OUT, Method, file_name, joint_names, kind_names, level_names};
 use crate::benchmark::results::{PartScores, Rows};
 use crate::error::Result;
 use crate::scores::ConfusionMatrix;
 
 /// Class by class: the method that is best at the joint class first, then the others.
 pub(super) fn section(rows: &Rows, methods: &[Method], seed: u64) -> Result<Option<Section>> {
-    let shown = methods.iter().filter(|m| m.protocol == "corrected" || m.source == Source::Added);
-    let mut scored: Vec<(&Method, PartScores)> =
-        shown.filter_map(|m| Some((m, m.scores(rows, Part::Training, seed, &|_| true)?))).collect();
-    // One that does not address both tasks comes last.
-    let joint = |s: &PartScores| s.joint.unwrap_or(-1.0);
-    scored.sort_by(|a, b| joint(&b.1).total_cmp(&joint(&a.1)));
-    let Some((best, _)) = scored.first() else { return Ok(None) };
+    let shown = methods
+        .iter()
+        .filter(|m| !m.completes() && (m.protocol == "corrected" || m.source == Source::Added));
+    let mut scored: Vec<(&Method, &str, PartScores)> = shown
+        .filter_map(|m| {
+            let (part, scores) = m.first_scores(rows, seed)?;
+            Some((m, part, scores))
+        })
+        .filter(|(.., s)| s.level.is_some() || s.kind.is_some())
+        .collect();
+    // One that does not address both tasks, or was given for test recordings alone, comes last.
+    let held_out = |part: &str| part == HELD_OUT;
+    let order =
+        |(_, part, s): &(&Method, &str, PartScores)| (held_out(part), s.joint.unwrap_or(-1.0));
+    scored.sort_by(|a, b| {
+        let (a, b) = (order(a), order(b));
+        b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
+    });
+    let Some((best, best_part, _)) = scored.first() else { return Ok(None) };
     let text = format!(
-        "Held-out training containers; {} is the best at the joint class. Shades are shares of the \
-         true class. The folder figures has these pictures for every baseline, of both protocols, \
-         and for every system.",
+        "Held-out training containers, unless a heading says otherwise; {} is the best at the joint \
+         class ({best_part}). Shades are shares of the true class. The folder figures has these \
+         pictures for every baseline, of both protocols, and for every system.",
         best.name
     );
-    let groups = scored.iter().map(|(method, scores)| {
-        let slug = format!("classes-{}", slug(&method.name));
+    let groups = scored.iter().map(|(method, part, scores)| {
+        let slug = format!("classes-{}", file_name(&method.name));
+        let of = if held_out(part) { String::new() } else { format!(" ({part})") };
         Ok(FigureGroup {
             title: match scores.joint {
-                Some(joint) => format!("{}, joint class {joint:.2} %", method.name),
-                None => method.name.clone(),
+                Some(joint) => format!("{}, joint class {joint:.2} %{of}", method.name),
+                None => format!("{}{of}", method.name),
             },
             figures: figures(&slug, &method.name, scores)?,
         })
@@ -39,11 +52,6 @@ pub(super) fn section(rows: &Rows, methods: &[Method], seed: u64) -> Result<Opti
         groups: groups.collect::<Result<_>>()?,
         ..Section::new("confusions", "Class by class")
     }))
-}
-
-fn slug(name: &str) -> String {
-    let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
-    words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("-")
 }
 
 /// The confusion matrices of the tasks that a method addresses.

@@ -12,7 +12,7 @@ use crate::paper::{self, Task};
 
 pub(super) fn section(rows: &Rows, methods: &[Method], seed: u64) -> Result<Section> {
     let mut tables = Vec::new();
-    for task in [Task::Level, Task::Type, Task::Capacity] {
+    for task in Task::ALL {
         for (part, containers, name) in
             [(Part::Training, 1..=9u8, "training"), (Part::Combined, 10..=15, "test")]
         {
@@ -27,7 +27,13 @@ pub(super) fn section(rows: &Rows, methods: &[Method], seed: u64) -> Result<Sect
                     }
                 }));
             }
-            for method in methods.iter().filter(|m| m.protocol != "published") {
+            let of_task_here = |m: &&Method| match task {
+                // Stand-ins for tasks that are not addressed say nothing about containers.
+                Task::Mass => m.addresses_all(),
+                _ => !m.completes(),
+            };
+            for method in methods.iter().filter(|m| m.protocol != "published").filter(of_task_here)
+            {
                 // One test part alone still has scores by container.
                 let figure = |keep: &dyn Fn(&Target) -> bool| {
                     let whole = [part, Part::Test(Subset::Public), Part::Test(Subset::Private)];

@@ -1,6 +1,7 @@
 //! The report of the benchmark.
 
 mod about;
+mod capacities;
 mod classes;
 mod containers;
 mod corrections;
@@ -29,7 +30,7 @@ pub(super) fn report(
     seed: u64,
     made: &Made,
 ) -> Result<Report> {
-    let &Predicted { outcomes, runs, added } = predicted;
+    let &Predicted { outcomes, runs, added, capacities } = predicted;
     let methods = methods(rows, predicted, seed);
     let mut sections = vec![glance::section(set.synthetic, rows, &methods, seed)?];
     for task in Task::ALL {
@@ -39,18 +40,20 @@ pub(super) fn report(
         sections.push(corrections::section(rows, outcomes, seed)?);
     }
     sections.push(containers::section(rows, &methods, seed)?);
+    sections.extend(capacities::section(rows, &methods)?);
     sections.extend(classes::section(rows, &methods, seed)?);
     sections.push(about::methods());
-    let nowhere = added.iter().filter(|a| !a.is_any()).map(|a| a.name.as_str());
+    let given = added.iter().chain(capacities.iter().map(|(table, _)| table));
+    let nowhere = given.filter(|a| !a.is_any()).map(|a| a.name.as_str());
     sections.push(about::notes(nowhere, runs));
     sections.push(about::cite());
     Ok(Report {
-        title: match runs {
-            [] => "CORSMAL benchmark: audio baselines".into(),
+        title: match (runs, capacities) {
+            ([], []) => "CORSMAL benchmark: audio baselines".into(),
             _ => "CORSMAL benchmark".into(),
         },
         summary: "Filling level, filling type, capacity and filling mass of containers, estimated \
-                  from the sound of pouring and shaking, next to the results published in the \
+                  from the sound of pouring and shaking and from views, next to the results published in the \
                   paper."
             .into(),
         warning: set.synthetic.then(|| SYNTHETIC.to_string()),
@@ -67,7 +70,7 @@ pub(super) fn write_figures(
     predicted: &Predicted<'_>,
     seed: u64,
 ) -> Result<()> {
-    for method in methods(rows, predicted, seed) {
+    for method in methods(rows, predicted, seed).iter().filter(|m| !m.completes()) {
         let Some(slug) = &method.slug else { continue };
         let Some(scores) = method.scores(rows, Part::Training, seed, &|_| true) else { continue };
         let title = format!("{}, {}", method.name, method.protocol);

@@ -8,6 +8,10 @@ use crate::dataset::Subset;
 use crate::error::Result;
 use crate::paper::{self, Task};
 
+/// The parts in the order of the tables' columns.
+const PARTS: [Part; 4] =
+    [Part::Training, Part::Test(Subset::Public), Part::Test(Subset::Private), Part::Combined];
+
 /// `audio+rgb1+rgb2` as "audio, RGB 1 2".
 pub(super) fn short_inputs(inputs: &str) -> String {
     let mut text = String::new();
@@ -47,19 +51,13 @@ pub(super) fn section(task: Task, rows: &Rows, methods: &[Method], seed: u64) ->
         })
         .collect();
     for method in methods {
-        let figures = [
-            Part::Training,
-            Part::Test(Subset::Public),
-            Part::Test(Subset::Private),
-            Part::Combined,
-        ]
-        .map(|part| method.cell(rows, part, task, seed));
+        let figures = PARTS.map(|part| method.cell(rows, part, task, seed));
         if figures.iter().all(|f| *f == Cell::None) {
             continue;
         }
         // The paper's mass table has the tasks that a method addresses in this place.
         let inputs = match task {
-            Task::Mass if !method.inputs.is_empty() => method.addressed(),
+            Task::Mass => method.addressed(),
             _ => short_inputs(&method.inputs),
         };
         let names = [&method.name, &inputs, &method.protocol];
@@ -82,20 +80,50 @@ pub(super) fn section(task: Task, rows: &Rows, methods: &[Method], seed: u64) ->
              rows, the inputs are the tasks addressed."
         }
     };
-    Ok(Section {
-        text: vec![text.into()],
-        tables: vec![Table {
-            name: task.name().into(),
-            caption: format!(
-                "{}: the paper's results and those of this run. Training: recordings not trained \
+    let mut tables = vec![Table {
+        name: task.name().into(),
+        caption: format!(
+            "{}: the paper's results and those of this run. Training: recordings not trained \
                  on, a random 20 % (published) or whole containers (corrected)",
-                task.title()
-            ),
-            columns: ["Method", "Inputs", "Protocol", "Training", "Public", "Private", "Combined"]
-                .map(String::from)
-                .to_vec(),
-            rows: lines,
-        }],
-        ..Section::new(task.name(), task.title())
-    })
+            task.title()
+        ),
+        columns: ["Method", "Inputs", "Protocol", "Training", "Public", "Private", "Combined"]
+            .map(String::from)
+            .to_vec(),
+        rows: lines,
+    }];
+    if task == Task::Mass {
+        tables.extend(weight(rows, methods, seed));
+    }
+    Ok(Section { text: vec![text.into()], tables, ..Section::new(task.name(), task.title()) })
+}
+
+/// The error of the object's weight, for the methods that estimate all three tasks.
+fn weight(rows: &Rows, methods: &[Method], seed: u64) -> Option<Table> {
+    let mut lines = Vec::new();
+    for method in methods.iter().filter(|m| m.addresses_all()) {
+        let figures = PARTS.map(|part| {
+            let scores = method.scores(rows, part, seed, &|_| true);
+            let error = scores.and_then(|s| s.weight_error);
+            error.map_or(Cell::None, |error| Cell::Number(error, format!("{error:.3}")))
+        });
+        if figures.iter().any(|f| *f != Cell::None) {
+            let names = [&method.name, &method.protocol].map(|t| Cell::Text(t.to_string()));
+            lines.push(Row {
+                source: method.source,
+                cells: names.into_iter().chain(figures).collect(),
+            });
+        }
+    }
+    let table = Table {
+        name: "weight".into(),
+        caption: "Mean absolute error in newtons of the weight of container and filling, the mass \
+                  of the empty container being known; recordings with an estimated filling mass"
+            .into(),
+        columns: ["Method", "Protocol", "Training", "Public", "Private", "Combined"]
+            .map(String::from)
+            .to_vec(),
+        rows: lines,
+    };
+    (!table.rows.is_empty()).then(|| table.without_empty_columns())
 }

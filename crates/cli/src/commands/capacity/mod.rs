@@ -152,7 +152,7 @@ fn estimate(args: Estimate) -> Result<ExitCode, Failure> {
         }
         rows => rows?,
     };
-    capacity::write(&args.out, method.name(), &rows)?;
+    capacity::write(&args.out, &options, &rows)?;
     let count = |status: &str| rows.iter().filter(|r| r.status() == status).count();
     let failed = count("failed");
     if !args.quiet {

@@ -14,11 +14,15 @@ pub(super) fn read(weights: Option<&Path>) -> Result<Arc<dyn RegionNetwork>, Fai
     use corsmal_vision::region::Region;
 
     #[derive(Debug)]
-    struct Published(CapacityNetwork);
+    struct Published(CapacityNetwork, String);
 
     impl RegionNetwork for Published {
         fn capacity_ml(&self, region: &Region) -> Result<f64, String> {
             self.0.millilitres(&region.image, region.size).map_err(|e| e.to_string())
+        }
+
+        fn identity(&self) -> &str {
+            &self.1
         }
     }
 
@@ -28,7 +32,9 @@ pub(super) fn read(weights: Option<&Path>) -> Result<Arc<dyn RegionNetwork>, Fai
         )
     })?;
     let network = CapacityNetwork::read(weights).map_err(|e| Failure::new(e.to_string()))?;
-    Ok(Arc::new(Published(network)))
+    let identity = corsmal_files::identity::of_file(weights)
+        .map_err(|e| Failure::new(format!("{}: {e}", weights.display())))?;
+    Ok(Arc::new(Published(network, identity)))
 }
 
 /// There is none in this program.
