@@ -9,6 +9,7 @@ mod array;
 mod check;
 mod converter;
 mod design;
+mod kaiser;
 mod kernel;
 mod low_pass;
 mod sinc;
@@ -25,7 +26,7 @@ use stage::{Frames, Stage};
 
 pub use array::resample;
 pub use converter::{Converter, ConverterStream};
-pub(crate) use sinc::halving;
+pub(crate) use kaiser::halving;
 pub use sinc::{SincPlan, SincStream};
 pub use stream::ResampleStream;
 
