@@ -350,7 +350,7 @@ def score(
 def _labels(labels: StrPath | None, id_column: str | None, target: str) -> dict[str, str | None]:
     folders = labels is not None and os.fspath(labels) == FOLDERS
     if id_column is not None and (labels is None or folders):
-        raise ParameterError("id_column goes with a label file")
+        raise ParameterError("id_column needs a label file")
     return {
         "file": None if labels is None or folders else os.fspath(labels),
         "folders": target if folders else None,

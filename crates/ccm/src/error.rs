@@ -71,7 +71,7 @@ pub enum CcmError {
     #[error(transparent)]
     Report(#[from] corsmal_report::ReportError),
     /// The user stopped the work; what is done is kept for the next run.
-    #[error("interrupted; the same command continues")]
+    #[error("interrupted; run the same command again to continue")]
     Interrupted,
     /// A request that cannot be met; the text says why and what is possible.
     #[error("{0}")]

@@ -8,6 +8,7 @@ use corsmal_ccm::CcmError;
 use corsmal_ccm::dataset::SequenceName;
 use corsmal_extract::config::Config;
 use corsmal_extract::inputs;
+use corsmal_files::format::Content;
 use corsmal_models::cross_validation::CrossValidation;
 use corsmal_models::dataset::LabelledTable;
 use corsmal_models::folds::{CvPlan, Folds};
@@ -162,7 +163,9 @@ impl Request<'_> {
         }
         if ids.is_empty() {
             let place = path.display();
-            return Err(Failure::new(format!("{place}: no recording to train on")));
+            return Err(Failure::new(format!(
+                "{place}: no recording has features: nothing to train on"
+            )));
         }
         let trained_on = TrainedOn::of(heard.iter().map(|o| (o.sample_rate, o.channels)));
         let mut table = LabelledTable::of_columns(path, ids, columns);
@@ -283,7 +286,7 @@ impl Request<'_> {
         let folds_found: Vec<_> = found.into_iter().zip(&folds.outer).map(of_fold).collect();
         let result = CrossValidation::of_probabilities(folds_found, &classes)?;
         let caution = (recipe.select == Select::Published).then_some(
-            "the fold that scores each epoch also chose it (select=published): too good",
+            "scores are too good: with select=published, the held-out fold also chose the epoch",
         );
         Ok(Validated { table, target, labels, classes, folds, result, report, caution })
     }
@@ -332,9 +335,9 @@ impl Request<'_> {
     }
 }
 
-/// Whether a path names a file of a network's inputs, and not recordings.
+/// Whether a path names a file of a network's inputs, and not recordings; a stream is not looked into.
 fn is_npz(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz"))
+    path.is_file() && Content::of(path).is_ok_and(|content| content == Content::Npz)
 }
 
 /// How a network's input comes from recordings.
@@ -344,7 +347,7 @@ fn is_npz(path: &Path) -> bool {
 pub fn front_end(definition: &Definition) -> Result<FrontEnd, Failure> {
     definition.front_end.ok_or_else(|| {
         Failure::new(format!(
-            "{}: takes {} and no recordings: give an .npz of that",
+            "{} takes {}, not recordings: give an .npz of these",
             definition.name, definition.takes
         ))
     })

@@ -35,7 +35,7 @@ pub enum MergeError {
     #[error(transparent)]
     Ledger(#[from] LedgerError),
     /// The result is there already, or an interrupted run that was to write it.
-    #[error("{path} exists; --overwrite replaces it, --resume goes on with an interrupted merge")]
+    #[error("{path} exists; --overwrite replaces it, --resume continues an interrupted merge")]
     Exists {
         /// The output or its ledger.
         path: PathBuf,

@@ -34,7 +34,7 @@ pub enum FeatureFileError {
         path: PathBuf,
     },
     /// The first bytes are of no format that is read.
-    #[error("{path}: expected {expected}, found neither")]
+    #[error("{path}: expected {expected}, found another kind of file")]
     Content {
         /// The file.
         path: PathBuf,

@@ -41,7 +41,9 @@ pub enum LayoutError {
         source: TableError,
     },
     /// Written by a newer version of the tool.
-    #[error("{path}: layout version {found} is newer than this tool reads ({LAYOUT_VERSION})")]
+    #[error(
+        "{path}: layout version {found} is too new: this version reads up to {LAYOUT_VERSION}; update corsmal-feat"
+    )]
     Version {
         /// The output.
         path: std::path::PathBuf,

@@ -45,7 +45,9 @@ pub enum TableError {
         name: String,
     },
     /// The features are already named otherwise.
-    #[error("the table has {expected} features from {first:?} on, cannot take {actual} others")]
+    #[error(
+        "the table has {expected} features, the first {first:?}; a row with {actual} other features does not fit"
+    )]
     Renamed {
         /// First feature of the table.
         first: String,

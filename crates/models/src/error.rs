@@ -159,7 +159,7 @@ pub enum ModelError {
         which: &'static str,
     },
     /// A weight of a training row that is no weight.
-    #[error("the weight of row {row} is {value}: a finite number of at least 0")]
+    #[error("the weight of row {row} must be a finite number of at least 0, not {value}")]
     SampleWeight {
         /// the row
         row: usize,

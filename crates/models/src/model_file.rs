@@ -140,7 +140,7 @@ pub enum ModelFileError {
         version: String,
     },
     /// Recordings would be brought to a rate that the model was not trained on.
-    #[error("signal.sample_rate = {rate}: the model was trained on {trained}")]
+    #[error("signal.sample_rate must be {trained}, as in training, not {rate}")]
     Rate {
         /// the rate asked
         rate: f64,

@@ -74,8 +74,8 @@ fn weights_that_are_none_are_refused() {
     };
     assert!(refusal("rf", &[1.0; 5]).contains("sample weights"));
     let bad = [1.0, 1.0, -0.5, 1.0, 1.0, 1.0];
-    assert!(refusal("svm", &bad).contains("the weight of row 2 is -0.5"));
-    assert!(refusal("svm", &[f64::NAN; 6]).contains("row 0 is NaN"));
+    assert!(refusal("svm", &bad).ends_with("at least 0, not -0.5"));
+    assert!(refusal("svm", &[f64::NAN; 6]).ends_with("at least 0, not NaN"));
     // Only rows of one class count.
     let one: Vec<f64> = y.iter().map(|&class| class as f64).collect();
     assert!(refusal("logistic", &one).contains("at least 2 classes"));

@@ -56,7 +56,7 @@ pub enum NetError {
     },
     /// A number of a training that is not finite.
     #[error(
-        "training step {step}: {what} is {value}; a smaller learning rate or clip_grad_norm may help, and inputs must be finite"
+        "training step {step}: {what} is {value}; check that all inputs are finite, or try a smaller learning rate or clip_grad_norm"
     )]
     Diverged {
         /// step, counted from 1
@@ -67,7 +67,7 @@ pub enum NetError {
         value: f32,
     },
     /// A recording that does not fill a window.
-    #[error("too short: {frames} frames, {network} takes windows of {needed}")]
+    #[error("too short: {frames} frames; {network} needs at least {needed}")]
     TooShort {
         /// the network
         network: String,
@@ -99,7 +99,7 @@ pub enum NetError {
     },
     /// An output that is not finite: inputs or numbers of the network beyond single precision.
     #[error(
-        "{network}, item {item}: the output is {value}, so its inputs are too large for this network"
+        "{network}, item {item}: the output is {value}: the inputs are too large for this network"
     )]
     Output {
         /// the network
@@ -110,7 +110,7 @@ pub enum NetError {
         value: f32,
     },
     /// A network whose outputs are not classes.
-    #[error("{network} gives numbers and no classes: it cannot be trained here")]
+    #[error("{network} gives numbers, not classes, so it cannot be trained as a classifier")]
     NoClasses {
         /// the network
         network: String,

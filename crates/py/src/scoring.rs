@@ -127,7 +127,7 @@ pub(crate) fn fuse(
     let averaged = tables.len() != 1 || weights.is_some();
     if averaged && background.is_some() {
         return Err(value_error(
-            "background decides over the windows of one file, not together with an average of files",
+            "background works on the windows of one file: it cannot be combined with an average of files",
         ));
     }
     let fused = if averaged {

@@ -69,7 +69,7 @@ impl LabelArgs {
                     Ok(Some(LabelSource::Folders { column }))
                 }
                 Some(_) => {
-                    Err(Failure::new("--id-column goes with a label file, not with folders"))
+                    Err(Failure::new("--id-column needs a label file; --labels folders has none"))
                 }
             },
             Some(path) if !path.exists() && is_like_folders(path) => Err(Failure::new(format!(
@@ -104,7 +104,7 @@ pub struct DatasetArgs {
     /// recordings: a file, a folder or a manifest.
     #[arg(value_name = "FEATURES", required_unless_present = "features")]
     table: Option<PathBuf>,
-    /// The same by name.
+    /// The same as the positional argument.
     #[arg(long, value_name = "FILE", conflicts_with = "table")]
     features: Option<PathBuf>,
     #[command(flatten)]

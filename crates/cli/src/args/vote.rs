@@ -36,7 +36,7 @@ impl VoteArgs {
     pub fn refuse_background(&self, with: &str) -> Result<(), Failure> {
         match self.background {
             Some(_) => Err(Failure::new(format!(
-                "--background decides over the windows of one file, not together with {with}"
+                "--background works on the windows of one file: it cannot be combined with {with}"
             ))),
             None => Ok(()),
         }
@@ -53,9 +53,7 @@ impl VoteArgs {
                     .map_err(|e| Failure::new(format!("--background: {e}")))
             }
             (Some(How::Mean), None) => Ok(Some(VotingRule::Mean)),
-            (Some(How::Mean), Some(_)) => {
-                Err(Failure::new("--background goes with --vote majority only"))
-            }
+            (Some(How::Mean), Some(_)) => Err(Failure::new("--background needs --vote majority")),
         }
     }
 }

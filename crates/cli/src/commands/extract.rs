@@ -36,7 +36,7 @@ pub struct Args {
     /// WAV stream on standard input.
     #[arg(value_name = "PATH", required_unless_present = "named")]
     inputs: Vec<OsString>,
-    /// The same by name; these follow the others.
+    /// The same as the positional argument; these follow the others.
     #[arg(long = "in", short = 'i', value_name = "PATH", num_args = 1..)]
     named: Vec<OsString>,
     /// Output: .npz, or .parquet for summary tables.

@@ -25,7 +25,7 @@ pub fn write_scored(
         title: format!("Scores of {}", file_name(&predictions.path)),
         target: target.unwrap_or("class").into(),
         protocol: "The scores are honest only if the model was trained without these recordings, which this \
-                   report cannot know."
+                   report cannot check."
             .into(),
         ..of_predictions(predictions, target, scores)?
     };

@@ -109,7 +109,7 @@ fn submissions_are_checked_before_they_are_written() {
         (&["--vote", "majority", "--background", "tea"], "tea"),
         (
             &["--vote", "majority", "--background", "none", "--feasible"],
-            "--background decides over the windows of one file, not together with --feasible",
+            "--background works on the windows of one file: it cannot be combined with --feasible",
         ),
         (&["--vote", "majority", "--background", "none", "--least", "0"], "--least"),
     ] {
@@ -127,7 +127,7 @@ fn submissions_are_checked_before_they_are_written() {
     for files in [&[text(&kind), text(&kind)][..], &[text(&kind), "--weights", "2"]] {
         let fuse = ["fuse", "--out", text(&out), "--predictions"];
         let found = refused(&[&fuse[..], files, &vote].concat());
-        assert!(found.contains("not together with an average of files"), "{found}");
+        assert!(found.contains("cannot be combined with an average of files"), "{found}");
     }
     for (lines, message) in [
         ("id,p_none,p_rice\nx,5,3\n", "line 2, column 'p_none': '5' is not a probability"),

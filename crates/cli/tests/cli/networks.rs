@@ -91,7 +91,7 @@ fn a_network_is_validated_trained_and_applied() {
     assert_eq!(table.lines().count(), 13, "{table}");
     assert!(table.lines().nth(1).is_some_and(|line| line.starts_with("r00,")), "{table}");
     let message = refused(&["classify", "-m", text(&model), "x.wav"]);
-    assert!(message.contains("takes VGGish embeddings and no recordings"), "{message}");
+    assert!(message.contains("takes VGGish embeddings, not recordings"), "{message}");
 }
 
 #[test]

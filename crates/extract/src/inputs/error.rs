@@ -25,8 +25,8 @@ pub enum InputError {
     },
     /// An object of a store.
     #[error(
-        "{name}: objects of stores ({store}://) are not read; mount the bucket (s3fs, gcsfuse, \
-         rclone mount) or copy what is needed"
+        "{name}: {store}:// cannot be read; mount the bucket (s3fs, gcsfuse, rclone mount) or copy \
+         the files that you need"
     )]
     Store {
         /// The URI given.

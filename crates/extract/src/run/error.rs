@@ -31,7 +31,9 @@ pub enum RunError {
         path: PathBuf,
     },
     /// Frames have no place in a table.
-    #[error("a table holds statistics: the configuration needs a [summary]")]
+    #[error(
+        "a .parquet table holds statistics: add a [summary] to the configuration, or write .npz"
+    )]
     NoSummary,
     /// An input of the interrupted run cannot be read any more.
     #[error(
@@ -81,7 +83,7 @@ pub enum RunError {
     #[error(transparent)]
     Name(#[from] FormatError),
     /// A fault of this program while writing the output.
-    #[error("a fault of this program, please report it; --resume continues the run")]
+    #[error("this is a bug in corsmal-feat: please report it; --resume continues the run")]
     Broken,
     /// A temporary file beside the output failed.
     #[error("{path}: temporary file: {source}")]

@@ -135,7 +135,7 @@ fn resume(
         let same = record.outcome.identity == now;
         if !same {
             let id = &record.outcome.id;
-            progress.warning(&format!("{id} has changed; the run goes on from there"));
+            progress.warning(&format!("{id} has changed; the run continues from there"));
         }
         same
     };
@@ -144,7 +144,7 @@ fn resume(
         return Err(RunError::Unreadable { path });
     }
     if let Some(reason) = dropped {
-        progress.warning(&format!("{reason}; the run goes on from there"));
+        progress.warning(&format!("{reason}; the run continues from there"));
     }
     Ok((ledger, records))
 }

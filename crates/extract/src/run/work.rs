@@ -168,5 +168,5 @@ pub(super) fn note(outcome: &mut Outcome, failed: Failed) {
 
 /// A fault of this program.
 pub(super) fn broken() -> Failed {
-    Failed::new(Status::Unsupported, "a fault of this program, please report it")
+    Failed::new(Status::Unsupported, "this is a bug in corsmal-feat: please report it")
 }

@@ -87,7 +87,7 @@ fn a_panic_is_an_outcome() {
     }
     let report = run(folder.path(), "logmel", &Faulty, |_| {}).unwrap();
     assert_eq!(statuses(&report), [Status::Ok, Status::Unsupported, Status::Ok, Status::Ok]);
-    assert!(report.outcomes[1].reason.contains("fault of this program"));
+    assert!(report.outcomes[1].reason.contains("bug in corsmal-feat"));
 }
 
 /// Stands for a fault while the output is written.

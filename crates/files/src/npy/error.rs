@@ -19,7 +19,7 @@ pub enum NpyError {
         actual: String,
     },
     /// Python objects: only unpickling could read them, which runs code.
-    #[error("holds Python objects (pickle), which are never read; save it as numbers")]
+    #[error("holds Python objects (pickle), which are never read; save the array as numbers")]
     Pickled,
     /// The elements are not what was asked for.
     #[error("expected {expected}, found {actual}")]

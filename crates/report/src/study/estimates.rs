@@ -113,7 +113,7 @@ impl Estimates {
             )],
             tables: vec![Table {
                 name: "errors".into(),
-                caption: "Rows from the largest error on".into(),
+                caption: "Rows, largest error first".into(),
                 columns: ["Recording", "True", "Estimate", "Error"].map(String::from).to_vec(),
                 rows: rows.iter().take(LISTED).map(row).collect(),
             }],

@@ -80,7 +80,7 @@ fn measures(study: &Study) -> Option<Table> {
     };
     (!study.measures.is_empty()).then(|| Table {
         name: "measures".into(),
-        caption: "Measures of the probabilities, 0 to 1 unless said otherwise".into(),
+        caption: "Measures of the probabilities, 0 to 1 unless stated otherwise".into(),
         columns: ["Measure", "Value", "Meaning"].map(String::from).to_vec(),
         rows: study.measures.iter().map(row).collect(),
     })
@@ -172,7 +172,7 @@ pub(super) fn curves(study: &Study) -> Result<Option<Section>> {
         rows: study.curves.iter().map(row).collect(),
     };
     let shown = match study.curves.len() > CURVES {
-        true => format!(" The {CURVES} classes that are hardest to tell are drawn."),
+        true => format!(" The figure has the {CURVES} classes that are hardest to tell apart."),
         false => String::new(),
     };
     Ok(Some(Section {

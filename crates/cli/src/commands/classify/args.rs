@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use corsmal_extract::config::Config;
 use corsmal_extract::inputs::{self, Input};
+use corsmal_files::format::Content;
 use corsmal_models::labels::Labels;
 use corsmal_models::model_file::{FormatRule, Model};
 use corsmal_models::predictions::{Form, Unit};
@@ -42,7 +43,7 @@ pub struct Args {
     /// Recordings: files, folders, globs, manifests, or - for one WAV stream on standard input.
     #[arg(value_name = "PATH", required_unless_present_any = ["features", "inputs"])]
     pub(super) paths: Vec<String>,
-    /// The same by name.
+    /// The same as the positional argument.
     #[arg(long = "in", short = 'i', value_name = "PATH", num_args = 1.., conflicts_with = "paths")]
     pub(super) inputs: Vec<String>,
     /// Features instead of recordings.
@@ -75,7 +76,7 @@ pub struct Args {
     /// Form of the predictions.
     #[arg(long, value_enum, default_value = "csv")]
     pub(super) format: Format,
-    /// The same as --format jsonl: a JSON object a line.
+    /// The same as --format jsonl: one JSON object per line.
     #[arg(long, conflicts_with = "format")]
     pub(super) json: bool,
     /// Replace an existing output.
@@ -181,9 +182,9 @@ pub(super) fn changed(args: &Args, tree: &serde_json::Value) -> Result<Arc<Confi
 /// The recordings named.
 pub(super) fn recordings(args: &Args) -> Result<Vec<Input>, Failure> {
     let is_table = |name: &&String| {
-        let extension = Path::new(name.as_str()).extension();
-        extension
-            .is_some_and(|e| e.eq_ignore_ascii_case("npz") || e.eq_ignore_ascii_case("parquet"))
+        let path = Path::new(name.as_str());
+        let holds = |content| matches!(content, Content::Npz | Content::Parquet);
+        path.is_file() && Content::of(path).is_ok_and(holds)
     };
     if let Some(name) = args.names().iter().find(is_table) {
         return Err(Failure::new(format!("{name} is a feature file: give it as --features")));

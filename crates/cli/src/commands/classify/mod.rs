@@ -35,7 +35,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     })?;
     let vote = args.vote.rule(&model.header().labels)?;
     if vote.is_some() && args.window.is_none() {
-        return Err(Failure::new("--vote decides over windows: give --window"));
+        return Err(Failure::new("--vote needs --window"));
     }
     let (end, records) = match (&args.features, args.window) {
         (Some(path), _) => {

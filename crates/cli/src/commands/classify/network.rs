@@ -36,7 +36,7 @@ pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Fail
     let vote = args.vote.rule(&labels)?;
     if let Some(path) = &args.features {
         if vote.is_some() {
-            return Err(Failure::new("--vote decides over windows of recordings"));
+            return Err(Failure::new("--vote works on windows of recordings, not on --features"));
         }
         let names = args.members.names();
         let ids = names.ids.as_deref();
@@ -48,7 +48,7 @@ pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Fail
     let windowed = args.window.is_some() || listener.front_end.windows.is_some();
     let unit = match (windowed, vote) {
         (false, Some(_)) => {
-            return Err(Failure::new("--vote decides over windows: give --window"));
+            return Err(Failure::new("--vote needs --window"));
         }
         (false, None) => Unit::Recording,
         (true, None) => Unit::Window,

@@ -31,7 +31,7 @@ pub struct Args {
     /// Prediction files of the same recordings and classes.
     #[arg(value_name = "CSV", conflicts_with_all = ["kind", "level", "joint"])]
     pub(super) files: Vec<PathBuf>,
-    /// The same by name.
+    /// The same as the positional argument.
     #[arg(long, value_name = "CSV", num_args = 1.., conflicts_with = "files")]
     pub(super) predictions: Vec<PathBuf>,
     /// Prediction files of the filling type.

@@ -34,7 +34,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
         (true, true) => Rule::JointDryBoxes,
     };
     if rule != Rule::Separate && (kind.is_none() || level.is_none()) {
-        return Err(Failure::new("--feasible decides over --type and --level together"));
+        return Err(Failure::new("--feasible needs both --type and --level"));
     }
     let mut predictions = match (&joint, &kind, &level) {
         (Some(joint), ..) => decide_joint(joint)?,
