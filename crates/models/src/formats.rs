@@ -38,6 +38,8 @@ pub struct FormatRule {
     pub(crate) sample_rates: Option<Vec<u32>>,
     /// numbers of channels that are taken
     pub(crate) channels: Option<Vec<u32>>,
+    /// Whether the features are of some of the channels only.
+    pub(crate) selected: bool,
 }
 
 impl FormatRule {
@@ -75,12 +77,20 @@ impl FormatRule {
             && !known.contains(&count)
         {
             let trained: Vec<String> = known.iter().map(u32::to_string).collect();
-            let remedy = match known.as_slice() {
-                [1] => "--set signal.channels=mean mixes them",
-                _ => "features with signal.channels=mean or summary.average_channels=true take any",
+            let remedy = match (known.as_slice(), self.selected) {
+                (_, true) => {
+                    "--set signal.channels=mean mixes them, --any-rate takes the channels that the \
+                     model reads"
+                }
+                ([1], false) => "--set signal.channels=mean mixes them",
+                _ => {
+                    "a model for any number needs training features with signal.channels=mean or \
+                     summary.average_channels=true"
+                }
             };
+            let ending = if known == &[1] { "" } else { "s" };
             return Err(format!(
-                "{}; the model was trained on recordings of {}: {remedy}",
+                "{}; the model was trained on recordings of {} channel{ending}: {remedy}",
                 words::count(count as usize, "channel"),
                 trained.join(", ")
             ));

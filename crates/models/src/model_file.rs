@@ -255,9 +255,15 @@ impl Model {
             let trained = rates.iter().map(|rate| hertz(*rate)).collect::<Vec<_>>().join(", ");
             return Err(ModelFileError::Rate { rate: rate(config), trained });
         }
+        // One channel of eight is another signal than the one channel of a mono recording. Whoever
+        // sets other channels than the model's has decided.
+        let own = &self.header.feature_config["signal"]["channels"];
+        let selected =
+            config["signal"]["channels"].is_array() && config["signal"]["channels"] == *own;
         Ok(FormatRule {
             sample_rates: own_rate.then(|| rates.clone()),
-            channels: every_channel.then(|| trained.channels.clone()),
+            channels: (every_channel || selected).then(|| trained.channels.clone()),
+            selected,
         })
     }
 

@@ -9,6 +9,9 @@ use crate::error::{ModelError, Result};
 use crate::mt19937::RandomState;
 use crate::table::class_counts;
 
+/// Longest list of groups that names a fold; longer ones are counted.
+const LONGEST_NAME: usize = 40;
+
 /// Row numbers of one round.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fold {
@@ -107,7 +110,11 @@ pub fn group_k_fold<S: AsRef<str>>(groups: &[S], folds: usize) -> Result<Vec<Fol
     }
     let members = |fold| {
         let held = (0..names.len()).filter(|&g| fold_of_group[g] == fold);
-        held.map(|g| names[g].as_str()).collect::<Vec<_>>().join(",")
+        let held: Vec<&str> = held.map(|g| names[g].as_str()).collect();
+        match held.iter().map(|name| name.len() + 1).sum::<usize>() {
+            0..=LONGEST_NAME => held.join(","),
+            _ => format!("{} ({} groups)", fold + 1, held.len()),
+        }
     };
     let fold_of: Vec<usize> = of_row.iter().map(|&g| fold_of_group[g]).collect();
     Ok(from_assignment(&fold_of, (0..folds).map(members).collect()))

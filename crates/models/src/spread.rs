@@ -9,7 +9,8 @@ pub struct Spread {
     pub mean: f64,
     /// standard deviation (divisor folds − 1); 0 for one fold
     pub std: f64,
-    /// lower end of the 95 % interval of the mean by Student's t; the mean itself for one fold
+    /// lower end of the 95 % interval of the mean by Student's t, within 0 to 1 where the values are;
+    /// the mean itself for one fold
     pub low: f64,
     /// its upper end
     pub high: f64,
@@ -29,7 +30,11 @@ impl Spread {
         let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
         let std = (squares / (n - 1) as f64).sqrt();
         let half = student_975(n - 1) * std / (n as f64).sqrt();
-        Self { mean, std, low: mean - half, high: mean + half }
+        let (mut low, mut high) = (mean - half, mean + half);
+        if values.iter().all(|v| (0.0..=1.0).contains(v)) {
+            (low, high) = (low.max(0.0), high.min(1.0));
+        }
+        Self { mean, std, low, high }
     }
 }
 

@@ -118,10 +118,14 @@ pub(crate) fn fuse(
     };
     let mut tables = Vec::with_capacity(paths.len());
     for path in &paths {
-        let table = compute(py, || predictions::read(path))?.map_err(value_error)?;
+        let table = compute(py, || PredictionTable::read(path))?.map_err(value_error)?;
         tables.push(match rule(&table.labels)? {
-            Some(rule) => table.vote(rule).map_err(value_error)?,
-            None => table,
+            Some(rule) => {
+                let windows =
+                    predictions::named(table.windows_by_recording()).map_err(value_error)?;
+                windows.vote(rule).map_err(value_error)?
+            }
+            None => predictions::named(table).map_err(value_error)?,
         });
     }
     let averaged = tables.len() != 1 || weights.is_some();

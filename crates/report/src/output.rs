@@ -15,7 +15,8 @@ impl Report {
     }
 
     /// Writes `report.html`, `report.json`, `tables/NAME.csv`, `tables/NAME.tex`,
-    /// `figures/NAME.svg` and `figures/NAME.pdf` below `dir`.
+    /// `figures/NAME.svg` and `figures/NAME.pdf` below `dir`. Tables and figures of a report that was
+    /// there before are removed.
     ///
     /// # Errors
     /// [`ReportError`] when something cannot be written.
@@ -27,6 +28,19 @@ impl Report {
             Ok::<_, ReportError>(path)
         };
         let (tables, figures) = (folder("tables")?, folder("figures")?);
+        // What another report left here would pass as part of this one.
+        if dir.join("report.json").is_file() {
+            for (folder, extensions) in [(&tables, ["csv", "tex"]), (&figures, ["svg", "pdf"])] {
+                for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+                    let path = entry.path();
+                    if extensions.iter().any(|e| path.extension().is_some_and(|found| found == *e))
+                    {
+                        std::fs::remove_file(&path)
+                            .map_err(|source| ReportError::Folder { path: path.clone(), source })?;
+                    }
+                }
+            }
+        }
         let put = |path: &Path, bytes: &[u8]| draft::write(path, bytes).map_err(ReportError::Write);
         for table in self.sections.iter().flat_map(|s| &s.tables) {
             put(&tables.join(format!("{}.csv", table.name)), table.csv()?.as_bytes())?;

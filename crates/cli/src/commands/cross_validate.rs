@@ -66,7 +66,7 @@ pub struct Args {
     /// chance?
     #[arg(long, value_name = "N", conflicts_with = "net", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     seeds: u32,
-    /// Replace an existing file of predictions.
+    /// Replace an existing file of predictions, and the report in its folder.
     #[arg(long)]
     overwrite: bool,
     #[command(flatten)]
@@ -86,7 +86,7 @@ fn cross_validate(args: &Args) -> Result<ExitCode, Failure> {
         publish::check(path, args.overwrite)?;
     }
     if let Some(folder) = &args.report {
-        study::prepare(folder)?;
+        study::prepare(folder, args.overwrite)?;
     }
     if let Some(name) = &args.network.net {
         return validate_network(args, name);

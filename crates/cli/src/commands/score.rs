@@ -59,6 +59,9 @@ pub struct Args {
     /// and LaTeX, figures as SVG and PDF.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
+    /// Replace the report that is in this folder.
+    #[arg(long)]
+    overwrite: bool,
     /// Print everything as JSON, curves included.
     #[arg(long)]
     json: bool,
@@ -67,7 +70,7 @@ pub struct Args {
 /// Scores and prints.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     if let Some(folder) = &args.report {
-        study::prepare(folder)?;
+        study::prepare(folder, args.overwrite)?;
     }
     let mut table = PredictionTable::read(&args.predictions)?;
     let mut target = args.target.clone();
@@ -102,6 +105,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
             }
         }
     }
+    warn(&table, &report);
     if args.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
         return Ok(ExitCode::SUCCESS);
@@ -205,4 +209,28 @@ fn print_numbers(scores: &NumericScores) {
         table.row([name.to_string(), value]);
     }
     println!("{}", table.text());
+}
+
+/// Says what the scores may not be meant to be.
+fn warn(table: &PredictionTable, report: &ScoreReport) {
+    let ScoreReport::Classes(report) = report else { return };
+    let place = table.path.display();
+    let (known, strange) = report.labels.split_at(table.labels.len().min(report.labels.len()));
+    if let Some(first) = strange.first() {
+        let like = corsmal_names::closest(first, known.iter().map(String::as_str));
+        let like = like.map(|name| format!("; did you mean {name:?}?")).unwrap_or_default();
+        let listed = strange.iter().take(6).map(|name| format!("{name:?}"));
+        eprintln!(
+            "warning: {place}: no prediction can be one of the true classes {}, so their rows are \
+             wrong{like}",
+            listed.collect::<Vec<_>>().join(", ")
+        );
+    }
+    let whole = |name: &String| name.parse::<i64>().is_ok();
+    let has_proba = table.rows.iter().any(|row| row.proba.is_some());
+    if !has_proba && !report.labels.is_empty() && report.labels.iter().all(whole) {
+        eprintln!(
+            "note: {place}: whole numbers are scored as classes; --numeric scores them as numbers"
+        );
+    }
 }

@@ -7,8 +7,17 @@ use corsmal_report::{Fact, Report};
 use crate::failure::Failure;
 use crate::made;
 
-/// Makes the folder of a report before anything is computed for it.
-pub fn prepare(folder: &Path) -> Result<(), Failure> {
+/// Makes the folder of a report before anything is computed for it. Refuses a folder that holds
+/// something else, and a report that may not be replaced.
+pub fn prepare(folder: &Path, overwrite: bool) -> Result<(), Failure> {
+    let refuse = |why: &str| Err(Failure::new(format!("--report {}: {why}", folder.display())));
+    if std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) {
+        match folder.join("report.json").is_file() {
+            true if overwrite => {}
+            true => return refuse("holds a report; --overwrite replaces it"),
+            false => return refuse("holds other files; name a new or an empty folder"),
+        }
+    }
     std::fs::create_dir_all(folder)
         .map_err(|e| Failure::new(format!("--report {}: {e}", folder.display())))
 }

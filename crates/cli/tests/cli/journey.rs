@@ -159,7 +159,13 @@ fn windows_are_listened_to_where_they_are() {
 
     // Recordings that were moved away are no reason to fail.
     std::fs::rename(&audio, j.path("elsewhere")).unwrap();
-    let moved = run(&[&validate[..], &["--report", text(&report), "-q"]].concat());
+    let again = [&validate[..], &["--report", text(&report), "-q"]].concat();
+    let refused = run(&again);
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(message.contains("holds a report; --overwrite replaces it"), "{message}");
+    std::fs::write(report.join("tables/of-another.csv"), "a\n").unwrap();
+    let moved = run(&[&again[..], &["--overwrite"]].concat());
+    assert!(!report.join("tables/of-another.csv").exists());
     let message = String::from_utf8_lossy(&moved.stderr).into_owned();
     assert!(moved.status.success() && moved.stdout.is_empty(), "{message}");
     assert!(message.contains("24 of 24 recordings are no longer at their paths"), "{message}");
@@ -193,4 +199,117 @@ fn predictions_and_estimates_have_reports_of_their_own() {
     done(&["score", text(&csv), "--target", "capacity", "--report", text(&report)]);
     assert_eq!(j.report("report")["summary"], "capacity: 3 rows, 1 of them without an estimate.");
     assert!(names(&report.join("figures")).contains(&"estimates.pdf".into()));
+}
+
+/// Windows go the whole way, and count as what they are: parts of recordings.
+#[test]
+fn windows_are_scored_and_voted_on() {
+    let j = Journey::begin();
+    std::fs::remove_file(j.path("audio/hum/broken.wav")).unwrap();
+    let (audio, table, model) = (j.path("audio"), j.path("w.npz"), j.path("w.model"));
+    let cut = ["--preset", "esc26", "--window", "0.5", "-q"];
+    done(&[&["extract", text(&audio), "-o", text(&table)], &cut[..]].concat());
+    let learn = ["--labels", "folders", "--set", "trees=25", "-q", "-o", text(&model)];
+    done(&[&["train", text(&table)], &learn[..]].concat());
+
+    let (windows, rows) = (j.path("windows.csv"), j.path("rows.csv"));
+    let classify = ["classify", "-m", text(&model), "-q", "-o"];
+    done(&[&classify[..], &[text(&windows), text(&audio), "--window", "0.5"]].concat());
+    done(&[&classify[..], &[text(&rows), "--features", text(&table)]].concat());
+    let score = ["score", text(&windows), "--labels", "folders", "--json"];
+    let scored: Value = serde_json::from_str(&done(&score)).unwrap();
+    assert_eq!((&scored["rows"], &scored["units"]), (&72.into(), &24.into()), "{scored}");
+    assert_eq!(scored["drawn"], "recording");
+    for file in [&windows, &rows] {
+        let voted = j.path("voted.csv");
+        let vote = ["fuse", text(file), "--vote", "majority", "--overwrite", "-o", text(&voted)];
+        done(&vote);
+        assert_eq!(std::fs::read_to_string(&voted).unwrap().lines().count(), 1 + 24);
+    }
+    let nothing = run(&["fuse", text(&j.path("voted.csv")), "--vote", "majority", "-o", "-"]);
+    let message = String::from_utf8_lossy(&nothing.stderr).into_owned();
+    assert!(message.contains("nothing to vote on"), "{message}");
+}
+
+/// Stretches of one file are never on both sides of a split; predictions of cross-validation find
+/// the labels of the manifest.
+#[test]
+fn stretches_of_a_file_are_held_out_together() {
+    let j = Journey::begin();
+    let mut manifest = String::from("path,start,end,class\n");
+    for class in CLASSES {
+        for number in 0..8 {
+            for start in [0.0, 0.5, 1.0] {
+                let end = start + 0.5;
+                manifest += &format!("audio/{class}/{class}{number}.wav,{start},{end},{class}\n");
+            }
+        }
+    }
+    let (list, table, held) = (j.path("list.csv"), j.path("table.npz"), j.path("held.csv"));
+    std::fs::write(&list, manifest).unwrap();
+    done(&["extract", text(&list), "-o", text(&table), "--preset", "esc26", "-q"]);
+    let validate = ["cross-validate", text(&table), "--target", "class", "--set", "trees=25"];
+    let told = done(&[&validate[..], &["--cv", "4", "-o", text(&held)]].concat());
+    assert!(told.contains("k=4 (recording)") && told.contains("(6 groups)"), "{told}");
+    assert!(told.lines().all(|line| line.chars().count() <= 80), "{told}");
+    let csv = std::fs::read_to_string(&held).unwrap();
+    let mut folds = std::collections::BTreeMap::new();
+    for line in csv.lines().skip(1) {
+        let cells: Vec<&str> = line.split(',').collect();
+        let file = cells[0].split('@').next().unwrap().to_string();
+        assert_eq!(*folds.entry(file).or_insert(cells[1]), cells[1], "{line}");
+    }
+    assert_eq!(folds.len(), 24);
+
+    let whole = j.path("whole.csv");
+    let files = |class: &'static str| {
+        (0..8).map(move |n| format!("audio/{class}/{class}{n}.wav,{class}\n"))
+    };
+    let lines: String = CLASSES.into_iter().flat_map(files).collect();
+    std::fs::write(&whole, format!("path;class\n{}", lines.replace(',', ";"))).unwrap();
+    done(&["extract", text(&whole), "-o", text(&table), "--preset", "esc26", "-q", "--overwrite"]);
+    done(&[&validate[..], &["-o", text(&held), "--overwrite", "-q"]].concat());
+    done(&["score", text(&held), "--labels", text(&whole), "--target", "class"]);
+    // A class that no prediction can be.
+    std::fs::write(&whole, format!("path,class\n{}", lines.replacen(",rain", ",Rain", 2))).unwrap();
+    let score = run(&["score", text(&held), "--labels", text(&whole), "--target", "class"]);
+    let message = String::from_utf8_lossy(&score.stderr).into_owned();
+    assert!(
+        message.contains("\"Rain\"") && message.contains("did you mean \"rain\"?"),
+        "{message}"
+    );
+}
+
+/// A model that reads one channel was trained on one channel of recordings of a certain number.
+#[test]
+fn other_numbers_of_channels_are_refused_where_one_is_read() {
+    let j = Journey::begin();
+    std::fs::remove_file(j.path("audio/hum/broken.wav")).unwrap();
+    let (table, model) = (j.path("table.npz"), j.path("a.model"));
+    let set = ["--preset", "esc26", "--set", "signal.channels=[0]", "-q"];
+    done(&[&["extract", text(&j.path("audio")), "-o", text(&table)], &set[..]].concat());
+    done(&["train", text(&table), "--labels", "folders", "-q", "-o", text(&model)]);
+    let stereo = j.path("stereo.wav");
+    let spec = hound::WavSpec {
+        channels: 2,
+        sample_rate: RATE,
+        bits_per_sample: 16,
+        sample_format: hound::SampleFormat::Int,
+    };
+    let mut writer = hound::WavWriter::create(&stereo, spec).unwrap();
+    sound("hum", 1).into_iter().flat_map(|s| [s, 0]).for_each(|s| writer.write_sample(s).unwrap());
+    writer.finalize().unwrap();
+    let classify = ["classify", "-m", text(&model), text(&stereo)];
+    let refused = run(&classify);
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!(refused.status.code(), Some(1), "{message}");
+    assert!(
+        message.contains("2 channels; the model was trained on recordings of 1 channel:"),
+        "{message}"
+    );
+    assert!(String::from_utf8_lossy(&refused.stdout).contains(",mismatch,"));
+    done(&[&classify[..], &["--set", "signal.channels=mean"]].concat());
+    done(&[&classify[..], &["--any-rate"]].concat());
+    let shown = done(&["inspect", text(&model)]);
+    assert!(shown.contains("recordings     16000 Hz, 1 channel\n"), "{shown}");
 }

@@ -35,6 +35,8 @@ pub struct LabelFile {
     columns: Vec<String>,
     /// line in the file and values, by the key's text
     rows: HashMap<String, (u64, Vec<String>)>,
+    /// keys by their path without extension, as ids are made, where that is unique
+    stems: HashMap<String, String>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,7 +103,13 @@ impl LabelFile {
             }
         }
         let columns = label_at.iter().map(|&i| header[i].to_string()).collect();
-        Ok(Self { path: path.into(), key, columns, rows })
+        let mut stems: HashMap<String, Option<String>> = HashMap::new();
+        for key in rows.keys() {
+            let stem = Path::new(key).with_extension("").to_string_lossy().into_owned();
+            stems.entry(stem).and_modify(|key| *key = None).or_insert_with(|| Some(key.clone()));
+        }
+        let stems = stems.into_iter().filter_map(|(stem, key)| Some((stem, key?))).collect();
+        Ok(Self { path: path.into(), key, columns, rows, stems })
     }
 
     /// Label columns in the order of these recordings, given as (id, path). Lines of recordings
@@ -178,7 +186,9 @@ impl LabelFile {
             let extension = file.extension().and_then(|e| e.to_str())?;
             get(&format!("{id}.{extension}"))
         };
-        let by_path = get(path).or_else(with_extension);
+        // Predictions may lack paths.
+        let by_stem = || self.stems.get(id).filter(|_| path.is_empty()).and_then(|key| get(key));
+        let by_path = get(path).or_else(with_extension).or_else(by_stem);
         if self.key == Key::Path {
             return by_path;
         }

@@ -1,5 +1,6 @@
 //! Features of recordings with labels.
 
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use corsmal_files::outcome::Outcome;
@@ -159,6 +160,11 @@ impl LabelledTable {
         if let Some((_, values)) = find(name) {
             return Ok(values.clone());
         }
+        if name == "recording"
+            && let Some(paths) = self.shared_paths()
+        {
+            return Ok(paths);
+        }
         if name == "joint"
             && let (Some((_, kind)), Some((_, level))) = (find("type"), find("level"))
         {
@@ -211,6 +217,17 @@ impl LabelledTable {
     pub fn trained_on(&self) -> Option<TrainedOn> {
         let with_features = self.outcomes.iter().filter(|o| o.status.has_features());
         TrainedOn::of(with_features.map(|o| (o.sample_rate, o.channels)))
+    }
+
+    /// The path of each row where some rows are stretches of one file.
+    fn shared_paths(&self) -> Option<Vec<String>> {
+        let path_of: HashMap<&str, &str> =
+            self.outcomes.iter().map(|o| (o.id.as_str(), o.path.as_str())).collect();
+        let paths: Option<Vec<&str>> =
+            self.ids.iter().map(|id| path_of.get(id.as_str()).copied()).collect();
+        let paths = paths?;
+        let different: HashSet<&str> = paths.iter().copied().collect();
+        (different.len() < paths.len()).then(|| paths.into_iter().map(String::from).collect())
     }
 
     /// Name of a feature, or its number.

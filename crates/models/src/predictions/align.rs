@@ -6,7 +6,7 @@ use std::hash::Hash;
 
 use ndarray::Array2;
 
-use super::{OF_LINES, PredictionError, PredictionRow, PredictionTable, Result, content};
+use super::{Id, OF_LINES, PredictionError, PredictionRow, PredictionTable, Result, content};
 use crate::fusion::{self, WindowVotes};
 use crate::table::argmax;
 use crate::voting::VotingRule;
@@ -90,6 +90,20 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         }
     }
 
+    /// Whether the rows are windows: several of a recording, told apart by a column `start`.
+    ///
+    /// # Errors
+    /// Several rows of a recording that are no windows, or of one window.
+    pub(crate) fn check_windows(&self) -> Result<bool> {
+        let Err(repeated) = self.check_once_each() else { return Ok(false) };
+        let Some(starts) = self.column("start") else { return Err(repeated) };
+        let mut seen = HashSet::new();
+        match self.rows.iter().zip(starts).find(|(row, start)| !seen.insert((&row.key, *start))) {
+            Some((row, _)) => Err(self.rows_fault("more than one row", &row.key, self)),
+            None => Ok(true),
+        }
+    }
+
     /// The same without the columns that tell how a single line came about: times, status, windows.
     pub fn of_recordings(self) -> Self {
         let keep: Vec<usize> = (0..self.columns.len())
@@ -150,5 +164,27 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
             row: key.to_string(),
             expected: format!("the {} lines of {}", other.rows.len(), other.path.display()),
         }
+    }
+}
+
+impl PredictionTable {
+    /// The same with the recordings as ids where the rows are windows that `extract --window` made:
+    /// ids `RECORDING@TIMES` beside a column `recording`.
+    pub fn windows_by_recording(mut self) -> Self {
+        let Some(at) = self.columns.iter().position(|column| column == "recording") else {
+            return self;
+        };
+        let is_window = |row: &PredictionRow<Id>| {
+            let times = row.key.0.strip_prefix(row.cells[at].as_str());
+            times.is_some_and(|times| times.starts_with('@'))
+        };
+        let id = self.columns.iter().position(|column| column == "id");
+        if let Some(id) = id.filter(|_| self.rows.iter().all(is_window)) {
+            for row in &mut self.rows {
+                row.key = Id(row.cells[at].clone());
+                row.cells[id].clone_from(&row.key.0);
+            }
+        }
+        self
     }
 }

@@ -29,6 +29,7 @@ use crate::dataset::{DatasetError, LabelFile, LabelSource};
 use crate::error::ModelError;
 use crate::fusion;
 
+pub use read::UNKNOWN;
 pub use record::{Record, RecordWriter, Unit};
 pub use write::{Cell, Form, PredictionWriter};
 
@@ -273,6 +274,10 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     /// # Errors
     /// [`PredictionError::Content`] where a prediction has no probabilities.
     pub fn reject_below(&mut self, least: f64) -> Result<()> {
+        if self.labels.iter().any(|label| label == UNKNOWN) {
+            let reason = format!("rejected predictions are called {UNKNOWN:?}, as a class is");
+            return Err(self.content(reason));
+        }
         let uncertain = |row: &PredictionRow<K>| row.class.is_some() && row.proba.is_none();
         if let Some(row) = self.rows.iter().find(|row| uncertain(row)) {
             let reason = format!("{}: has no probabilities to reject predictions by", row.key);

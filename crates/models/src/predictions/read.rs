@@ -12,7 +12,7 @@ use crate::labels::Labels;
 use crate::table::argmax;
 
 /// What a prediction is called that was rejected.
-pub(super) const UNKNOWN: &str = "unknown";
+pub const UNKNOWN: &str = "unknown";
 
 impl PredictionTable {
     /// Reads a file; a recording may have several lines, one for each of its windows. Columns

@@ -33,19 +33,19 @@ pub struct CalibrationBin {
 }
 
 impl Calibration {
-    /// Of the rows' true classes and their probabilities, one for each class.
-    pub(super) fn new<'a>(rows: &[(usize, ArrayView1<'a, f64>)]) -> Self {
+    /// Of the rows' true classes, of which there are `classes`, and their probabilities, one for each
+    /// class that the model knows: those of the others are 0.
+    pub(super) fn new<'a>(rows: &[(usize, ArrayView1<'a, f64>)], classes: usize) -> Self {
         let n = rows.len().max(1) as f64;
         let mut brier = 0.0;
         let mut bins = [(0usize, 0.0, 0usize); BINS];
-        let mut n_classes = 0;
         for (truth, proba) in rows {
-            n_classes = proba.len();
             brier += proba
                 .iter()
                 .enumerate()
                 .map(|(class, p)| (p - f64::from(u8::from(class == *truth))).powi(2))
                 .sum::<f64>();
+            brier += f64::from(u8::from(*truth >= proba.len()));
             let best = argmax(proba.iter());
             let highest = proba[best];
             let bin = ((highest * BINS as f64).ceil() as usize).clamp(1, BINS) - 1;
@@ -63,7 +63,24 @@ impl Calibration {
             .collect();
         let gap = |bin: &CalibrationBin| bin.rows as f64 * (bin.accuracy - bin.confidence).abs();
         let ece = bins.iter().map(gap).sum::<f64>() / n;
-        let scale = if n_classes == 2 { 0.5 } else { 1.0 };
+        let scale = if classes == 2 { 0.5 } else { 1.0 };
         Self { brier: scale * brier / n, ece, bins }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::array;
+
+    use super::*;
+
+    #[test]
+    fn classes_without_probabilities_have_none() {
+        let p = array![[0.8, 0.2], [0.5, 0.5]];
+        let known = Calibration::new(&[(0, p.row(0)), (1, p.row(1))], 2);
+        assert!((known.brier - (0.08 + 0.5) / 4.0).abs() < 1e-12);
+        // The second row is of a third class: its probability is 0 where 1 is right.
+        let strange = Calibration::new(&[(0, p.row(0)), (2, p.row(1))], 3);
+        assert!((strange.brier - (0.08 + 1.5) / 2.0).abs() < 1e-12);
     }
 }

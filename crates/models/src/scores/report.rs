@@ -97,7 +97,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     /// # Errors
     /// [`PredictionError`] for missing columns or values, and recordings with several lines.
     pub fn score(&self, how: &Scoring) -> Result<ScoreReport, PredictionError> {
-        self.check_once_each()?;
+        let of_windows = self.check_windows()?;
         let truth = self.truth(how.target.as_deref())?;
         let several = |column: &str| {
             self.column(column).is_some_and(|values| Labels::of(&values).0.len() > 1)
@@ -113,7 +113,15 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
                 self.content(format!("no column {name:?} of groups; {choices}"))
             })?),
         };
-        let drawn = column.unwrap_or("rows").to_string();
+        // Windows of one recording are not independent of each other.
+        let recordings: Option<Vec<String>> = (of_windows && groups.is_none())
+            .then(|| self.rows.iter().map(|row| row.key.to_string()).collect());
+        let groups = match &recordings {
+            Some(names) => Some(names.iter().map(String::as_str).collect()),
+            None => groups,
+        };
+        let by_default = if of_windows { "recording" } else { "rows" };
+        let drawn = column.unwrap_or(by_default).to_string();
         let decimal = |text: &&str| text.parse::<f64>().is_ok() && text.parse::<i128>().is_err();
         let has_proba = self.rows.iter().any(|row| row.proba.is_some());
         if how.numeric || (!has_proba && truth.iter().any(decimal)) {
@@ -212,7 +220,8 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
             intervals: ScoreIntervals { accuracy, weighted_f1, macro_f1 },
             drawn,
             units: units.len(),
-            calibration: (!with_proba.is_empty()).then(|| Calibration::new(&with_proba)),
+            calibration: (!with_proba.is_empty())
+                .then(|| Calibration::new(&with_proba, labels.len())),
             roc_auc: mean(|c| c.roc_auc),
             average_precision: mean(|c| c.average_precision),
             curves,

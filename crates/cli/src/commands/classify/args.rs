@@ -8,7 +8,7 @@ use corsmal_extract::inputs::{self, Input};
 use corsmal_files::format::Content;
 use corsmal_models::labels::Labels;
 use corsmal_models::model_file::{FormatRule, Model};
-use corsmal_models::predictions::{Form, Unit};
+use corsmal_models::predictions::{Form, UNKNOWN, Unit};
 use corsmal_models::voting::VotingRule;
 
 use super::records::Records;
@@ -117,6 +117,11 @@ impl Args {
         unit: Unit,
         columns: &[String],
     ) -> Result<Records, Failure> {
+        if self.reject > 0.0 && labels.names().iter().any(|name| name == UNKNOWN) {
+            return Err(Failure::new(format!(
+                "--reject calls what it rejects {UNKNOWN:?}, and the model has a class of that name"
+            )));
+        }
         let output = Output::open(&self.out)?;
         Ok(Records::new(output, (self.form(), unit), labels, (columns, target), self.reject))
     }

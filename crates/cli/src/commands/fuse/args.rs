@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use corsmal_ccm::predictions::{self, RecordingPredictions};
 use corsmal_models::labels::Labels;
+use corsmal_models::predictions::PredictionTable;
 
 use crate::args::VoteArgs;
 use crate::failure::Failure;
@@ -90,8 +91,19 @@ impl Args {
         }
         let mut tables = Vec::with_capacity(paths.len());
         for path in paths {
-            let mut table = predictions::read(path)?;
-            if let Some(rule) = self.vote.rule(&Labels::new(table.labels.clone())?)? {
+            let mut table = PredictionTable::read(path)?;
+            let rule = self.vote.rule(&Labels::new(table.labels.clone())?)?;
+            if rule.is_some() {
+                table = table.windows_by_recording();
+                if table.check_once_each().is_ok() {
+                    eprintln!(
+                        "warning: {}: one line for each recording, so there is nothing to vote on",
+                        path.display()
+                    );
+                }
+            }
+            let mut table = predictions::named(table)?;
+            if let Some(rule) = rule {
                 table = table.vote(rule)?;
             }
             tables.push(table);
