@@ -196,7 +196,7 @@ fn predictions_and_estimates_have_reports_of_their_own() {
     holds(&report.join("report.html"), &["was trained without these recordings"]);
 
     std::fs::write(&csv, "id,capacity,predicted\n1,100.5,90\n2,200.5,300\n3,50,-1\n").unwrap();
-    done(&["score", text(&csv), "--target", "capacity", "--report", text(&report)]);
+    done(&["score", text(&csv), "--target", "capacity", "--report", text(&report), "--overwrite"]);
     assert_eq!(j.report("report")["summary"], "capacity: 3 rows, 1 of them without an estimate.");
     assert!(names(&report.join("figures")).contains(&"estimates.pdf".into()));
 }
@@ -218,7 +218,7 @@ fn windows_are_scored_and_voted_on() {
     done(&[&classify[..], &[text(&rows), "--features", text(&table)]].concat());
     let score = ["score", text(&windows), "--labels", "folders", "--json"];
     let scored: Value = serde_json::from_str(&done(&score)).unwrap();
-    assert_eq!((&scored["rows"], &scored["units"]), (&72.into(), &24.into()), "{scored}");
+    assert_eq!((&scored["rows"], &scored["units"]), (&120.into(), &24.into()), "{scored}");
     assert_eq!(scored["drawn"], "recording");
     for file in [&windows, &rows] {
         let voted = j.path("voted.csv");
@@ -250,7 +250,7 @@ fn stretches_of_a_file_are_held_out_together() {
     done(&["extract", text(&list), "-o", text(&table), "--preset", "esc26", "-q"]);
     let validate = ["cross-validate", text(&table), "--target", "class", "--set", "trees=25"];
     let told = done(&[&validate[..], &["--cv", "4", "-o", text(&held)]].concat());
-    assert!(told.contains("k=4 (recording)") && told.contains("(6 groups)"), "{told}");
+    assert!(told.contains("4 folds (recording)") && told.contains("(6 groups)"), "{told}");
     assert!(told.lines().all(|line| line.chars().count() <= 80), "{told}");
     let csv = std::fs::read_to_string(&held).unwrap();
     let mut folds = std::collections::BTreeMap::new();
