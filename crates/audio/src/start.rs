@@ -154,8 +154,9 @@ fn has_likely_fields(bytes: &[u8]) -> bool {
 /// MPEG audio and AAC have no mark but the headers of their frames.
 #[cfg(feature = "symphonia")]
 fn frames(shown: &[u8], is_end: bool) -> Option<(usize, Format)> {
-    let free = crate::mpeg::free_size(shown).map(|_| 0);
-    let mpeg = crate::mpeg::find(shown, is_end, 2).or(free).map(|at| (at, Format::Mpeg));
+    let standard = crate::mpeg::find(shown, is_end, 2);
+    let free = crate::mpeg::find_free(shown);
+    let mpeg = [standard, free].into_iter().flatten().min().map(|at| (at, Format::Mpeg));
     let aac = crate::aac::find(shown, is_end, 2).map(|at| (at, Format::Aac));
     [mpeg, aac].into_iter().flatten().min_by_key(|(at, _)| *at)
 }

@@ -118,11 +118,15 @@ impl Header {
 
     /// Whether frames with these headers can follow each other in one recording.
     pub(crate) fn continues(&self, other: &Self) -> bool {
+        self.is_alike(other) && self.is_free == other.is_free
+    }
+
+    /// Whether frames with these headers sound alike, of free format or not.
+    pub(crate) fn is_alike(&self, other: &Self) -> bool {
         self.layer == other.layer
             && self.mpeg1 == other.mpeg1
             && self.sample_rate == other.sample_rate
             && self.channels == other.channels
-            && self.is_free == other.is_free
     }
 
     /// Bytes of side information behind the header of layer 3.

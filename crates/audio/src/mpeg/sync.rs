@@ -75,5 +75,35 @@ pub(crate) fn free_size(buffer: &[u8]) -> Option<usize> {
     })
 }
 
+/// The first byte of `buffer` at which frames of free format begin.
+pub(crate) fn find_free(buffer: &[u8]) -> Option<usize> {
+    find_free_where(buffer, |_| true).map(|(at, _)| at)
+}
+
+fn find_free_where(buffer: &[u8], admits: impl Fn(&Header) -> bool) -> Option<(usize, usize)> {
+    (0..buffer.len().min(WINDOW / 2)).filter(|at| buffer[*at] == 0xff).find_map(|at| {
+        Header::parse(&buffer[at..]).filter(|header| header.is_free && admits(header))?;
+        Some((at, free_size(&buffer[at..])?))
+    })
+}
+
+/// Where frames begin that continue those of `first` but for their format: free with another size
+/// than `free`, or standard behind free. With the size of frames of free format from there on, or 0.
+pub(super) fn find_other_format(
+    buffer: &[u8],
+    is_end: bool,
+    first: &Header,
+    free: usize,
+) -> Option<(usize, usize)> {
+    let other = find_free_where(buffer, |header| header.is_alike(first));
+    let other = other.filter(|(_, size)| *size != free);
+    if !first.is_free {
+        return other;
+    }
+    let standard = |header: &Header| !header.is_free && header.is_alike(first);
+    let standard = find_where(buffer, is_end, 1, 0, standard).map(|at| (at, 0));
+    [other, standard].into_iter().flatten().min()
+}
+
 /// Frames of free format are not larger in practice: 640 kbit/s at 32 kHz.
 const MAX_FREE: usize = 2880;

@@ -218,7 +218,10 @@ impl Format {
             (tag::IMA_ADPCM, 4) => adpcm(Kind::Ima, block_align, channels, at)?,
             (tag::MS_ADPCM, 4) => adpcm(Kind::Microsoft, block_align, channels, at)?,
             (tag, bits) => {
-                let actual = format!("format tag {tag:#06x} with {bits} bits");
+                let actual = match named(tag) {
+                    Some(name) => format!("{name} in WAV"),
+                    None => format!("format tag {tag:#06x} with {bits} bits"),
+                };
                 return Err(AudioError::unsupported(at, actual, ENCODINGS));
             }
         };
@@ -240,6 +243,26 @@ fn adpcm(kind: Kind, block: u16, channels: u16, at: u64) -> Result<Encoding, Aud
 
 fn integer(bytes: u16) -> Encoding {
     if bytes == 1 { Encoding::U8 } else { Encoding::Int(bytes as u8) }
+}
+
+/// Formats in WAV that are not read.
+fn named(tag: u32) -> Option<&'static str> {
+    Some(match tag {
+        0x0020 => "Yamaha ADPCM",
+        0x0031 | 0x0032 => "GSM 6.10",
+        0x0040 | 0x0045 | 0x0064 => "G.726",
+        0x0050 => "MP1 or MP2",
+        0x0055 => "MP3",
+        0x0092 | 0x2000 => "AC-3",
+        0x00ff | 0x1600 | 0x1602 | 0x1610 | 0x4143 => "AAC",
+        0x0160..=0x0163 => "Windows Media Audio",
+        0x2001 => "DTS",
+        0x5346 => "Flash ADPCM",
+        0x674f | 0x6750 | 0x6751 | 0x676f | 0x6770 | 0x6771 => "Vorbis",
+        0x704f => "Opus",
+        0xf1ac => "FLAC",
+        _ => return None,
+    })
 }
 
 /// The format tag in the GUID of WAVE_FORMAT_EXTENSIBLE: its first field, followed by the same

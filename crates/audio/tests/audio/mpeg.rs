@@ -122,3 +122,18 @@ fn frames_of_free_format_that_are_damaged_are_silence() {
     let cut = read_both(&whole[..whole.len() - 150]);
     assert!(cut.samples.len() < plain.samples.len() && cut.repairs().contains(&"partial_frame"));
 }
+
+#[test]
+fn free_format_before_behind_and_within_other_bytes() {
+    let (plain, free) = (read_both(CONSTANT), free_format().concat());
+    let twice = plain.samples.repeat(2);
+    // Without the tag of the second recording there is no delay to drop.
+    for bytes in [[CONSTANT, &free].concat(), [&free, CONSTANT].concat()] {
+        let got = read_both(&bytes);
+        assert_eq!(got.samples.len(), twice.len());
+        assert_eq!(got.samples[..plain.samples.len()], plain.samples);
+        assert!(got.repairs().contains(&"concatenated"), "{:?}", got.repairs());
+    }
+    let front = [vec![0x55; 1000], free].concat();
+    assert_eq!(read_both(&front).samples, plain.samples);
+}
