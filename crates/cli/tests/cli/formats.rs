@@ -95,7 +95,7 @@ fn recordings_of_another_rate_or_channel_count_are_rows_without_prediction() {
     assert_eq!(t.classify(&[text(&slow), "--any-rate"]).0, Some(0));
     let (code, _, told) = t.classify(&[text(&slow), "--set", "signal.sample_rate=16000"]);
     assert_eq!(code, Some(2));
-    assert!(told.contains("the model was trained on 44,100 Hz"), "{told}");
+    assert!(told.contains("signal.sample_rate must be 44,100 Hz, as in training"), "{told}");
     let (code, _, told) = t.classify(&[text(&slow), "--set", "mfcc.n_mfcc=3"]);
     assert_eq!(code, Some(2));
     assert!(told.contains("the model's features are fixed"), "{told}");

@@ -107,7 +107,7 @@ fn what_a_network_cannot_learn_from_is_refused() {
     };
     refuse(&["--net", "m5-vggish-level", "--target", "weight"], "weight");
     refuse(&["--net", "m5-r21d-type", "--target", "type"], "X has 128 numbers a row");
-    refuse(&["--net", "m2-capacity", "--target", "type"], "no classes");
+    refuse(&["--net", "m2-capacity", "--target", "type"], "numbers, not classes");
     let level = ["--net", "m5-vggish-level", "--target", "level"];
     refuse(&[&level[..], &["--set", "epoch=3"]].concat(), "epochs");
     refuse(&[&level[..], &["--set", "lr=-1"]].concat(), "above 0");
@@ -314,7 +314,7 @@ fn a_score_that_chose_its_epoch_says_so() {
         ["cross-validate", text(&features), "--net", "m5-vggish-level", "--target", "level"];
     let more = ["--cv", "2", "--set", "epochs=1", "--set", "select=published"];
     let words = [&words[..], &more[..]].concat();
-    let said = "the fold that scores each epoch also chose it";
+    let said = "the held-out fold also chose the epoch";
     assert!(done(&words).contains(said));
     let output = run(&[&words[..], &["--json"]].concat());
     assert!(String::from_utf8_lossy(&output.stderr).contains(said));

@@ -187,7 +187,9 @@ impl LabelFile {
             get(&format!("{id}.{extension}"))
         };
         // Predictions may lack paths.
-        let by_stem = || self.stems.get(id).filter(|_| path.is_empty()).and_then(|key| get(key));
+        let by_stem = || {
+            self.stems.get(id).filter(|_| path.is_empty() || path == id).and_then(|key| get(key))
+        };
         let by_path = get(path).or_else(with_extension).or_else(by_stem);
         if self.key == Key::Path {
             return by_path;
