@@ -86,6 +86,9 @@ mod tests {
         }
         let spread = Spread::of(&[0.9, 0.8, 1.0]);
         assert!((spread.mean - 0.9).abs() < 1e-12 && (spread.std - 0.1).abs() < 1e-12);
-        assert!((spread.high - 0.9 - 4.302_652_7 * 0.1 / 3f64.sqrt()).abs() < 1e-6);
+        assert!((spread.low - 0.9 + 4.302_652_7 * 0.1 / 3f64.sqrt()).abs() < 1e-6);
+        assert_eq!(spread.high, 1.0, "no share is above 1");
+        let percent = Spread::of(&[90.0, 80.0, 100.0]);
+        assert!((percent.high - 90.0 - 4.302_652_7 * 10.0 / 3f64.sqrt()).abs() < 1e-4);
     }
 }

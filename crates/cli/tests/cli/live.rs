@@ -343,7 +343,10 @@ fn what_is_no_window_is_refused() {
         (&["--window", "NaN"], "0.01 to 600 seconds"),
         (&["--window", "1", "--hop", "700"], "not 1 and 700"),
         (&["--vote", "majority"], "--vote needs --window"),
-        (&["--window", "1", "--vote", "mean", "--background", "tone"], "--vote majority only"),
+        (
+            &["--window", "1", "--vote", "mean", "--background", "tone"],
+            "--background needs --vote majority",
+        ),
         (&["--window", "1", "--vote", "majority", "--background", "tea"], "no label tea"),
         (&["--hop", "1"], "--window"),
     ] {

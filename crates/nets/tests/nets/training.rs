@@ -221,7 +221,7 @@ fn a_model_file_gives_back_the_network() {
     for (network, labels, expected) in [
         ("m3_mlp", 1 << 16, "is missing"),
         ("m3_mlp", 1 << 20, "65536"),
-        ("m2_capacity", 1, "no classes"),
+        ("m2_capacity", 1, "numbers, not classes"),
     ] {
         let labels = (0..labels).map(|i| i.to_string()).collect();
         let header = model::Header { network: network.into(), labels, ..model.header.clone() };
