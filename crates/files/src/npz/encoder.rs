@@ -24,7 +24,7 @@ pub(super) struct Encoder<W: Write> {
 
 enum Body<W: Write> {
     Stored(BufWriter<W>),
-    Deflated(Deflated<W>),
+    Deflated(Box<Deflated<W>>),
 }
 
 struct Deflated<W: Write> {
@@ -101,7 +101,7 @@ impl<W: Write> Encoder<W> {
             Compression::Deflated => {
                 let out = BufWriter::with_capacity(BUFFER, Checked::new(out));
                 let encoder = DeflateEncoder::new(out, flate2::Compression::new(LEVEL));
-                Body::Deflated(Deflated { encoder, padding: 0 })
+                Body::Deflated(Box::new(Deflated { encoder, padding: 0 }))
             }
         };
         Self { body, crc: crc32fast::Hasher::new(), size: 0 }
