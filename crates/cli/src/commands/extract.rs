@@ -164,7 +164,10 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
         meter.warning(&skipped);
     }
     if args.dry_run {
-        run::check(&found, &config, &options)?;
+        let checked = run::check(&found, &config, &options)?;
+        if let Some(advice) = checked.advice() {
+            meter.warning(advice);
+        }
         let inputs = options.shard.of(&found);
         for input in inputs {
             println!("{}\t{}", input.id, input.source);

@@ -21,6 +21,31 @@ pub struct Checked {
     pub(super) provenance: Provenance,
     /// The report of an output that is there already.
     pub(super) done: Option<RunReport>,
+    advice: Option<String>,
+}
+
+/// Members of an `.npz` above which it is hard to use: numpy reads the names of all when it opens one.
+const MANY_MEMBERS: usize = 50_000;
+
+impl Checked {
+    /// What the user should think of before a long run.
+    pub fn advice(&self) -> Option<&str> {
+        self.advice.as_deref()
+    }
+}
+
+/// Whether another kind of output would serve better.
+fn advice(inputs: usize, config: &Config, format: OutputFormat) -> Option<String> {
+    let frames = config.summary.is_none() && format != OutputFormat::Parquet;
+    // Each array has its times beside it.
+    let members = inputs.saturating_mul(2 * config.features.len());
+    (frames && members > MANY_MEMBERS).then(|| {
+        format!(
+            "the output will have {members} members, and archives of more than {MANY_MEMBERS} open \
+             slowly: --shard i/n makes several; a configuration with a [summary] and --out x.parquet \
+             makes one table; corsmal_feat.ray and corsmal_feat.arrow (Python) write frames to Parquet"
+        )
+    })
 }
 
 /// Everything that a run refuses before it starts.
@@ -49,7 +74,12 @@ pub fn check(inputs: &[Input], config: &Config, options: &RunOptions) -> Result<
             return Err(RunError::Pending { path: ledger::ledger_path(out) });
         }
     }
-    Ok(Checked { out: out.clone(), format, provenance, done })
+    // A run that is done already has nothing to be advised of.
+    let advice = match done {
+        Some(_) => None,
+        None => advice(options.shard.of(inputs).len(), config, format),
+    };
+    Ok(Checked { out: out.clone(), format, provenance, done, advice })
 }
 
 /// Refuses numbers of threads that cannot be.
@@ -126,4 +156,21 @@ fn finished(
         return Err(refuse("holds features of files that have changed since"));
     }
     Ok(Some(RunReport { resumed: outcomes.len(), outcomes, up_to_date: true }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use corsmal_files::npz::Compression;
+
+    #[test]
+    fn many_members_are_advised_against_before_the_run() {
+        let npz = OutputFormat::Npz(Compression::Stored);
+        let frames = Config::preset("logmel").unwrap();
+        assert_eq!(advice(25_000, &frames, npz), None);
+        let said = advice(25_001, &frames, npz).unwrap();
+        assert!(said.contains("50002 members") && said.contains("parquet"), "{said}");
+        let summary = Config::preset("mfcc-zcr").unwrap();
+        assert_eq!(advice(usize::MAX, &summary, npz), None);
+    }
 }

@@ -42,7 +42,11 @@ pub fn run(
     progress: &dyn Progress,
     stop: &Arc<AtomicBool>,
 ) -> Result<RunReport, RunError> {
-    let Checked { out, format, provenance, done } = check(inputs, config, options)?;
+    let checked = check(inputs, config, options)?;
+    if let Some(advice) = checked.advice() {
+        progress.warning(advice);
+    }
+    let Checked { out, format, provenance, done, .. } = checked;
     let all = inputs;
     let inputs = options.shard.of(all);
     let header = ledger::Header::new(&provenance, format);
