@@ -49,8 +49,30 @@ pub struct Collected {
     pub unended: Vec<PathBuf>,
 }
 
+/// What other programs call the ends of a stretch.
+const TIMES: [&str; 8] =
+    ["start_time", "end_time", "begin", "begin_time", "stop", "stop_time", "onset", "offset"];
+
 impl Collected {
-    /// A sentence about the files skipped and one about archives without an end, if there are any.
+    /// That labels look like the stretches that nothing is cut to.
+    fn unused_times(&self) -> Option<String> {
+        let first = self.inputs.first()?;
+        if self.inputs.iter().any(|input| input.start.is_some() || input.end.is_some()) {
+            return None;
+        }
+        let names = first.labels.iter().map(|(name, _)| name.as_str());
+        let times: Vec<&str> = names.filter(|name| TIMES.contains(name)).collect();
+        (!times.is_empty()).then(|| {
+            format!(
+                "the columns {} are labels, and whole recordings are read: columns called `start` and `end`, in \
+                 seconds, cut stretches",
+                times.join(", ")
+            )
+        })
+    }
+
+    /// A sentence about the files skipped, one about archives without an end and one about columns of
+    /// manifests that look like times and are none, if there are any.
     pub fn warning(&self) -> Option<String> {
         let unended = self.unended.first().map(|first| {
             format!(
@@ -60,7 +82,8 @@ impl Collected {
                 if self.unended.len() > 1 { ", ..." } else { "" }
             )
         });
-        let sentences: Vec<String> = told(&self.skipped).into_iter().chain(unended).collect();
+        let told = told(&self.skipped).into_iter();
+        let sentences: Vec<String> = told.chain(unended).chain(self.unused_times()).collect();
         (!sentences.is_empty()).then(|| sentences.join("; "))
     }
 }

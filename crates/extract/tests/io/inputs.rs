@@ -361,3 +361,20 @@ proptest! {
         let _ = ids(&[text(&path)]);
     }
 }
+
+#[test]
+fn columns_that_look_like_times_are_told() {
+    let dir = folder(&["a.wav"]);
+    let csv = dir.path().join("m.csv");
+    let told = |lines: &str| {
+        fs::write(&csv, lines).unwrap();
+        inputs::collect(&[text(&csv)]).unwrap().warning()
+    };
+    let warning = told("path,start_time,class\na.wav,0.5,x\n").unwrap();
+    assert!(
+        warning.starts_with("the columns start_time are labels, and whole recordings are read"),
+        "{warning}"
+    );
+    assert_eq!(told("path,start,onset\na.wav,0.5,1\n"), None);
+    assert_eq!(told("path,class\na.wav,x\n"), None);
+}
