@@ -10,6 +10,7 @@ from typing import Any
 
 from . import arrow
 from ._batch_columns import arrow as pyarrow
+from ._batches import failed_batch
 
 #: Folders of a job.
 PARTS, ATTEMPTS = "parts", "attempts"
@@ -36,7 +37,7 @@ def compute_part(table: Any, folder: str, name: str, options: dict[str, Any]) ->
         for row in range(table.num_rows):
             one = table.slice(row, 1)
             if opened[row] >= DEATHS:
-                pieces.append(arrow.failed_batch(one, "crashed", _CRASHED, **options))
+                pieces.append(failed_batch(one, "crashed", _CRASHED, **options))
                 continue
             attempts.write(b"open %d\n" % row)
             pieces.append(arrow.extract_batch(one, **options))

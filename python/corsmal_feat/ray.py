@@ -22,9 +22,9 @@ from . import _core
 from ._accounting import Accounting, account
 from ._batch_columns import arrow as pyarrow
 from ._batch_rows import rows_of
+from ._batches import Job
 from ._extract import Config, StrPath
 from ._parts import ATTEMPTS, DEATHS, PARTS, compute_part, write_whole
-from .arrow import Job
 from .errors import CorsmalFeatError, ParameterError, RunError
 
 __all__ = ["Accounting", "extract", "manifest"]
@@ -261,7 +261,7 @@ def _compute(
                 progress(done, total)
 
 
-def main(arguments: list[str] | None = None) -> int:
+def _main(arguments: list[str] | None = None) -> int:
     """The command: 0 fine, 1 recordings without features, 2 could not run, 130 interrupted."""
     parser = argparse.ArgumentParser(
         prog="python -m corsmal_feat.ray",
@@ -298,4 +298,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 if __name__ == "__main__":
     # Under its own name, so that workers can import what they run.
-    sys.exit(import_module("corsmal_feat.ray").main())
+    sys.exit(import_module("corsmal_feat.ray")._main())

@@ -16,9 +16,14 @@ ROOT = Path(__file__).parents[2]
 STUB = ast.parse(Path(corsmal_feat.__file__).with_name("_core.pyi").read_text(encoding="utf-8"))
 STUBS = {n.name: n for n in STUB.body if isinstance(n, ast.FunctionDef | ast.ClassDef)}
 MODULES = (
-    "", "classifiers", "corsmal", "decompose", "display", "effects", "errors", "feature",
-    "filters", "nets", "onset", "util", "vision",
+    "", "arrow", "classifiers", "corsmal", "decompose", "display", "effects", "errors", "feature",
+    "filters", "nets", "onset", "ray", "util", "vision",
 )  # fmt: skip
+
+
+def test_every_public_module_is_listed() -> None:
+    files = {path.stem for path in (ROOT / "python/corsmal_feat").glob("[!_]*.py")}
+    assert files | {""} == set(MODULES)
 
 
 def parameters(stub: ast.FunctionDef) -> list[str]:
