@@ -171,6 +171,9 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         if self.errors not in ("raise", "nan"):
             raise ParameterError(f"errors must be 'raise' or 'nan', not {self.errors!r}")
         different = list(dict.fromkeys(names))
+        absent = [name for name in different if self.errors == "nan" and not os.path.exists(name)]
+        if absent:
+            return self._around(absent, names)
         preset = "esc26" if self.preset is None and self.config is None else self.preset
         found = extract(
             different,
@@ -195,6 +198,18 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
             warnings.warn(f"a row of NaN for {reason}", stacklevel=4)
             row_of[name] = np.full(len(columns), np.nan, dtype=np.float32)
         return columns, np.stack([row_of[name] for name in names])
+
+    def _around(self, absent: list[str], names: list[str]) -> tuple[list[str], Matrix]:
+        """The rows of the files that are there, and NaN for the others."""
+        there = [name for name in names if name not in absent]
+        columns, found = self._of_files(there) if there else (self._names or [], np.zeros((0, 0)))
+        if not columns:
+            raise DecodeError(f"{absent[0]}: no such file, nor any other of X")
+        for name in absent:
+            warnings.warn(f"a row of NaN for {name}: no such file", stacklevel=5)
+        rows = iter(found)
+        empty = np.full(len(columns), np.nan, dtype=np.float32)
+        return columns, np.stack([empty if name in absent else next(rows) for name in names])
 
     def _of_signals(self, signals: list[Any], by: _core.Signals) -> tuple[list[str], Matrix]:
         rate = whole_rate(self.sr)

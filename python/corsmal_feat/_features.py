@@ -78,8 +78,11 @@ class Features:
         return cls(**(_of_parquet(name) if name.lower().endswith(".parquet") else _of_npz(name)))
 
     def __repr__(self) -> str:
-        failed = len(self.outcomes) - len(self.ids)
-        return f"<Features: {len(self.ids)} recordings, {failed} failed, {self._what()}>"
+        # A table that another program wrote again has no outcomes.
+        failed = "outcomes unknown"
+        if self.outcomes:
+            failed = f"{len(self.outcomes) - len(self.ids)} failed"
+        return f"<Features: {len(self.ids)} recordings, {failed}, {self._what()}>"
 
     def _what(self) -> str:
         if self.summary is None:

@@ -40,6 +40,10 @@ class TrainedModel:
         self.classes_ = class_labels(self.header)
         self.n_features_in_ = self._model.n_features()
 
+    def __reduce__(self) -> tuple[type[TrainedModel], tuple[str]]:
+        # As the file that it is: other processes read it again.
+        return TrainedModel, (os.path.abspath(self.path),)
+
     def __repr__(self) -> str:
         classifier = self.header["pipeline"]["classifier"]["name"]
         wanted = ", ".join(map(str, self.classes_[:4].tolist()))
@@ -119,6 +123,8 @@ class TrainedModel:
     def _rows(self, X: Any, any_rate: bool) -> Matrix:
         if isinstance(X, (str, os.PathLike)):
             X = [X]
+        if getattr(X, "ndim", 2) == 1 and not np.issubdtype(np.asarray(X).dtype, np.number):
+            X = list(X)  # an array or a pandas Series of paths
         if isinstance(X, (list, tuple)) and X and isinstance(X[0], (str, os.PathLike)):
             strange = [path for path in X if not isinstance(path, (str, os.PathLike))]
             if strange:

@@ -91,6 +91,13 @@ def test_rows_of_nan(folder: Path) -> None:
     with pytest.warns(UserWarning, match="a row of NaN"):
         rows = cf.FeatureExtractor("esc26", errors="nan").fit_transform(paths)
     assert np.isnan(rows[1]).all() and np.isfinite(rows[[0, 2]]).all()
+    with pytest.warns(UserWarning, match="no such file"):
+        around = cf.FeatureExtractor("esc26", errors="nan").fit_transform(
+            [str(folder / "gone.wav"), *paths[::2]]
+        )
+    assert np.isnan(around[0]).all() and np.array_equal(around[1:], rows[[0, 2]])
+    with pytest.raises(cf.DecodeError, match="no such file"):
+        cf.FeatureExtractor("esc26", errors="nan").fit_transform([str(folder / "gone.wav")])
     with pytest.raises(cf.ParameterError, match="'raise' or 'nan'"):
         cf.FeatureExtractor("esc26", errors="skip").fit_transform(paths)
 
@@ -136,6 +143,7 @@ def test_parquet_edited_by_polars(tmp_path: Path, folder: Path) -> None:
     assert again.ids == kept.ids[::-1] and again.names == kept.names
     assert np.array_equal(again.summary, kept.summary[::-1])
     assert list(again.labels["rating"]) == ["bad", "good"]
+    assert "2 recordings, outcomes unknown, summary" in repr(again)
     assert again.to_frame().shape == (2, len(kept.names) + 1)
 
 

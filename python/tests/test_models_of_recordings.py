@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import pickle
 import subprocess
 from pathlib import Path
 
 import corsmal_feat as cf
 import numpy as np
+import pandas
 import pytest
 import soundfile
 
@@ -47,6 +49,11 @@ def test_a_model_with_its_features_takes_recordings(
         assert model.predict(paths).tolist() == kinds
         assert model.predict([*paths[:2], paths[0]]).tolist() == ["low", "high", "low"]
         assert model.predict(str(paths[1])).tolist() == ["high"]
+        texts = [str(path) for path in paths]
+        for others in (np.array(texts), np.array(paths, dtype=object), pandas.Series(texts)):
+            assert model.predict(others).tolist() == kinds
+        again = pickle.loads(pickle.dumps(model))
+        assert again.predict(paths[:2]).tolist() == kinds[:2]
         assert np.array_equal(model.predict_proba(paths), of_run.predict_proba(features.summary))
         assert model.header["trained_on"] == {"sample_rates": [RATE], "channels": [1]}
         assert model.header["feature_names"] == features.names
