@@ -1,8 +1,8 @@
 """What the code behind each preset computes, in the packages that it was written with.
 
 Written anew from the descriptions of the methods, with librosa 0.11 under the conventions of the
-librosa that they ran on (reflected edges, resampy's kernels): its cost is theirs. Where a method has
-only a paper, this is what its words say in numpy and librosa. The values are held against the
+librosa that they ran on (reflected edges, resampy's kernels): its cost is theirs. Where a method
+has only a paper, this is what its words say in numpy and librosa. The values are held against the
 published ones elsewhere (docs/parity.md); here they are only timed.
 """
 
@@ -19,7 +19,7 @@ Compute = Callable[[str], Any]
 def of(preset: str) -> Compute:
     """The function of a preset, from a path to an array."""
     import librosa
-    import resampy  # noqa: F401 (librosa loads it on its first use otherwise)
+    import resampy
     import soundfile
     from skimage.transform import resize
 
@@ -91,7 +91,9 @@ def of(preset: str) -> Compute:
         hertz = 700.0 * (10.0 ** (np.linspace(0.0, top, 66) / 2595.0) - 1.0)
         corners = np.floor((n_fft + 1) * hertz / sr).astype(int)
         bank = np.zeros((64, n_fft // 2 + 1))
-        for band, (low, centre, high) in enumerate(zip(corners, corners[1:], corners[2:])):
+        for band, (low, centre, high) in enumerate(
+            zip(corners[:-2], corners[1:-1], corners[2:], strict=True)
+        ):
             bank[band, low:centre] = (np.arange(low, centre) - low) / max(centre - low, 1)
             bank[band, centre:high] = (high - np.arange(centre, high)) / max(high - centre, 1)
         window = np.hamming(length)

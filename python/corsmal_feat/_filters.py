@@ -33,6 +33,8 @@ def window_spec(window: Window, length: int) -> WindowSpec:
         if not 0 < length <= _LONGEST:
             raise ParameterError(f"a window must have 1 to {_LONGEST} points, not {length}")
         window = window(length)
+    if np.iscomplexobj(window):
+        raise ParameterError("window must be real: it has complex values")
     try:
         values = np.ascontiguousarray(window, dtype=np.float64)
     except (TypeError, ValueError):

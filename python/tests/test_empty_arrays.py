@@ -52,6 +52,11 @@ CALLS: dict[str, Callable[[Any], Any]] = {
 }
 
 
+def test_complex_windows_are_refused() -> None:
+    with pytest.raises(corsmal_feat.ParameterError, match="must be real"):
+        corsmal_feat.stft(np.ones(2048), n_fft=512, window=np.ones(512) * 1j)
+
+
 @pytest.mark.parametrize("name", CALLS)
 @pytest.mark.filterwarnings("ignore")
 def test_nothing_in(name: str) -> None:

@@ -99,7 +99,7 @@ cluster = Cluster(initialize_head=True, head_node_args={
     "num_cpus": 1, "object_store_memory": memory, "include_dashboard": False})
 cluster.add_node(num_cpus=1, object_store_memory=memory)
 ray.init(address=cluster.address, log_to_driver=False)
-sys.exit(corsmal_feat.ray.main(sys.argv[1:]))
+sys.exit(corsmal_feat.ray._main(sys.argv[1:]))
 """
 
 
