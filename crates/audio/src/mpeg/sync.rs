@@ -75,9 +75,13 @@ pub(crate) fn free_size(buffer: &[u8]) -> Option<usize> {
     })
 }
 
-/// The first byte of `buffer` at which frames of free format begin.
+/// The first byte of `buffer` at which frames of free format begin. Behind other bytes, frames that are
+/// all the same are none: samples of a periodic signal look like that.
 pub(crate) fn find_free(buffer: &[u8]) -> Option<usize> {
-    find_free_where(buffer, |_| true).map(|(at, _)| at)
+    let (at, plain) = find_free_where(buffer, |_| true)?;
+    let mut frames = buffer[at..].chunks_exact(plain);
+    let is_repeated = frames.next().zip(frames.next()).is_some_and(|(one, next)| one == next);
+    (at == 0 || !is_repeated).then_some(at)
 }
 
 fn find_free_where(buffer: &[u8], admits: impl Fn(&Header) -> bool) -> Option<(usize, usize)> {

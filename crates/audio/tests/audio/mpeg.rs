@@ -137,3 +137,14 @@ fn free_format_before_behind_and_within_other_bytes() {
     let front = [vec![0x55; 1000], free].concat();
     assert_eq!(read_both(&front).samples, plain.samples);
 }
+
+/// Samples without a header: where a tone crosses zero its bytes look like a header of free format.
+#[test]
+fn samples_of_a_tone_are_no_frames() {
+    let period = [-20_000i16, -100, 250, 20_000, 9_000, 300, -9_000, -15_000].map(i16::to_le_bytes);
+    for length in [24, 96, 200] {
+        let mut one = period.concat();
+        one.resize(2 * length, 1);
+        assert_eq!(refusal(&one.repeat(400)).verdict().name(), "not_audio", "{length}");
+    }
+}
