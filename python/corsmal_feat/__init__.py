@@ -87,6 +87,8 @@ from .errors import (
     CorsmalFeatError,
     DataTypeError,
     DecodeError,
+    FileError,
+    MissingFileError,
     ModelError,
     NotFittedError,
     ParameterError,
@@ -125,7 +127,9 @@ __all__ = [
     "ExtraTrees",
     "FeatureExtractor",
     "Features",
+    "FileError",
     "LogisticRegression",
+    "MissingFileError",
     "ModelError",
     "NotFittedError",
     "ParameterError",
@@ -225,7 +229,10 @@ _LATER = {"FeatureExtractor": "._estimator", "classifiers": ".classifiers"} | di
 
 def __getattr__(name: str) -> Any:
     if name not in _LATER:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        raise AttributeError(
+            f'module {__name__!r} has no attribute {name!r}; the page "Coming from librosa" lists'
+            " what is here, and librosa can be used beside it"
+        )
     module = _import_module(_LATER[name], __name__)
     return module if name == "classifiers" else getattr(module, name)
 

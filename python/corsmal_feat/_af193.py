@@ -12,11 +12,13 @@ from ._arrays import Floats, audio, number, rows, unrows
 from ._chroma import chroma_stft
 from ._hpss import harmonic
 from ._mel import melspectrogram, mfcc
+from ._refusals import refuses
 from ._spectral import spectral_contrast
 from ._spectrum import stft
 from ._tonnetz import tonnetz
 
 
+@refuses
 def af193(y: npt.ArrayLike, sr: float, *, librosa: str = "0.11") -> Floats:
     """The baseline's vector: means over time of 40 MFCC, 12 chroma, 128 mel, 7 spectral contrast
     and 6 tonnetz rows; leading axes are independent.

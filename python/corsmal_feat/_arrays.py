@@ -44,6 +44,14 @@ def number(name: str, value: Any) -> float:
     raise ParameterError(f"{name} must be a number, not {value!r}")
 
 
+def precision(dtype: npt.DTypeLike) -> np.dtype[Any]:
+    """A type of samples or results: float32 or float64."""
+    kind = np.dtype(dtype)
+    if kind not in (np.float32, np.float64):
+        raise ParameterError(f"dtype must be float32 or float64, not {dtype}")
+    return kind
+
+
 def room(what: str, *shape: int) -> None:
     """Refuses an array of doubles for which there is no memory, before anything is computed: the
     Rust side would end the process."""
@@ -63,6 +71,8 @@ def room(what: str, *shape: int) -> None:
 def floats(name: str, value: Any, min_ndim: int = 1) -> Floats:
     """A float32 or float64 array; others are refused with a hint."""
     array = np.asarray(value)
+    if array.dtype.kind == "f" and not array.dtype.isnative:
+        array = array.astype(array.dtype.newbyteorder("="))
     if array.dtype not in (np.float32, np.float64):
         hint = ""
         if array.dtype.kind in "iu" and name == "y":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Iterator
 from typing import Any, BinaryIO
 
@@ -11,16 +10,20 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, size
+from ._arrays import Floats, number, precision, size
 from ._mono import to_mono
+from ._refusals import refuses
 from ._resample import resample
-from .errors import DecodeError, ParameterError
+from ._warnings import warn
+from .errors import DecodeError, MissingFileError, ParameterError
 
 Source = str | os.PathLike[str] | BinaryIO
 
 
 def _open(path: Source) -> _core.Recording:
     if isinstance(path, (str, os.PathLike)):
+        if not os.path.exists(path):
+            raise MissingFileError(f"{os.fspath(path)}: no such file")
         try:
             return _core.Recording.open(path)
         except DecodeError as error:
@@ -36,13 +39,6 @@ def _open(path: Source) -> _core.Recording:
     raise ParameterError(f"path must be a path or a file opened as binary, not {path!r}")
 
 
-def _dtype(dtype: npt.DTypeLike) -> np.dtype[Any]:
-    kind = np.dtype(dtype)
-    if kind not in (np.float32, np.float64):
-        raise ParameterError(f"dtype must be float32 or float64, not {dtype}")
-    return kind
-
-
 def _seconds(name: str, value: float, rate: int) -> int:
     """Seconds as frames, cut as librosa does."""
     if not 0 <= value * rate <= 2**53:
@@ -52,9 +48,10 @@ def _seconds(name: str, value: float, rate: int) -> int:
 
 def _tell(recording: _core.Recording, path: Source) -> None:
     for repair in recording.repairs:
-        warnings.warn(f"{path}: {repair}", stacklevel=3)
+        warn(f"{path}: {repair}")
 
 
+@refuses
 def load(
     path: Source,
     *,
@@ -92,7 +89,7 @@ def load(
     >>> y.shape, sr
     ((22050,), 22050)
     """
-    kind = _dtype(dtype)
+    kind = precision(dtype)
     recording = _open(path)
     rate = recording.sample_rate
     start = _seconds("offset", offset, rate)
@@ -113,6 +110,7 @@ def load(
     return (resample(y, orig_sr=rate, target_sr=sr, res_type=res_type) if y.size else y), sr
 
 
+@refuses
 def stream(
     path: Source,
     *,
@@ -160,11 +158,13 @@ def stream(
         if not isinstance(value, (int, np.integer)) or value < 1:
             raise ParameterError(f"{name}={value} must be a positive integer")
         size(name, value)
+    if fill_value is not None:
+        number("fill_value", fill_value)
     if hop_length > frame_length:
         raise ParameterError(
             f"hop_length must be at most frame_length ({frame_length}), not {hop_length}"
         )
-    kind = _dtype(dtype)
+    kind = precision(dtype)
     recording = _open(path)
     rate = recording.sample_rate
     start = _seconds("offset", offset, rate)
@@ -172,7 +172,7 @@ def stream(
     if start:
         recording.skip(start)
     wanted = frame_length + (block_length - 1) * hop_length
-    return _blocks(recording, wanted, frame_length - hop_length, left, mono, fill_value, kind)
+    return _blocks(recording, wanted, frame_length - hop_length, left, bool(mono), fill_value, kind)
 
 
 def _blocks(
@@ -200,6 +200,7 @@ def _blocks(
         yield to_mono(y) if mono else y
 
 
+@refuses
 def get_samplerate(path: Source) -> float:
     """Sample rate of a recording in Hz (librosa.get_samplerate).
 
@@ -220,6 +221,7 @@ def get_samplerate(path: Source) -> float:
     return _open(path).sample_rate
 
 
+@refuses
 def get_duration(
     *,
     y: npt.ArrayLike | None = None,
@@ -257,9 +259,10 @@ def get_duration(
         return (recording.count() if frames is None else frames) / recording.sample_rate
     if not sr > 0:
         raise ParameterError(f"sr must be a positive sample rate in Hz, not {sr}")
+    given = np.asarray(S if y is None else y)
+    if given.ndim == 0:
+        raise ParameterError("At least one of (y, sr), S, or path must be provided, with an axis")
     if y is not None:
-        return float(np.shape(y)[-1]) / sr
-    if S is None:
-        raise ParameterError("At least one of (y, sr), S, or path must be provided")
-    samples = n_fft + hop_length * (np.shape(S)[-1] - 1)
+        return float(given.shape[-1] / sr)
+    samples = n_fft + hop_length * (given.shape[-1] - 1)
     return float(samples - 2 * int(n_fft // 2) if center else samples) / sr

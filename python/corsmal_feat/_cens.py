@@ -10,6 +10,7 @@ import numpy.typing as npt
 from ._arrays import Floats, size
 from ._chroma_cqt import chroma_cqt
 from ._filters import Window, get_window
+from ._refusals import refuses
 from .errors import ParameterError
 from .util import normalize
 
@@ -19,6 +20,7 @@ _STEPS = (0.4, 0.2, 0.1, 0.05)
 _LONGEST = 1 << 20
 
 
+@refuses
 def chroma_cens(
     *,
     y: npt.ArrayLike | None = None,

@@ -9,9 +9,11 @@ from . import _core
 from ._arrays import Floats, number, rows, unrows
 from ._filters import Window, chroma_params
 from ._pitch import estimate_tuning
+from ._refusals import refuses
 from ._spectrum import spectrogram
 
 
+@refuses
 def chroma_stft(
     *,
     y: npt.ArrayLike | None = None,

@@ -12,9 +12,11 @@ from ._arrays import Floats, audio, floats, number, room, rows, size, unrows
 from ._cqt import C1, cqt_params
 from ._params import CqtChromaParams
 from ._pitch import estimate_tuning
+from ._refusals import refuses
 from .errors import ParameterError
 
 
+@refuses
 def chroma_cqt(
     *,
     y: npt.ArrayLike | None = None,
@@ -27,7 +29,7 @@ def chroma_cqt(
     tuning: float | None = None,
     n_chroma: int = 12,
     n_octaves: int = 7,
-    window: Any = None,
+    window: npt.ArrayLike | None = None,
     bins_per_octave: int | None = 36,
     cqt_mode: str = "full",
 ) -> Floats:
@@ -68,7 +70,7 @@ def chroma_cqt(
     room("a chromagram", n_chroma)
     bins_per_octave = n_chroma if bins_per_octave is None else bins_per_octave
     bins_per_octave = size("bins_per_octave", bins_per_octave)
-    weights = None if window is None else np.ravel(window)
+    weights = None if window is None else np.asarray(window).ravel()
     chroma = CqtChromaParams(
         bins_per_octave=bins_per_octave,
         n_chroma=n_chroma,

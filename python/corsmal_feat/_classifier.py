@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
+from ._arrays import size
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
 from ._validation import Matrix, features, labels_of, names_of, weights_of
 from .errors import ModelError, ParameterError
@@ -219,7 +220,7 @@ def _seed(value: Any) -> int:
         return 0
     if isinstance(value, np.random.RandomState):
         return int(value.randint(2**31 - 1))
-    return int(value)
+    return size("random_state", value, 0)
 
 
 def class_labels(header: dict[str, Any]) -> npt.NDArray[Any]:

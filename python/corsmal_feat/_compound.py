@@ -11,6 +11,7 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import Doubles, Floats, floats, number, room, rows, size, unrows
 from ._params import PaaFrames
+from ._refusals import refuses
 from .errors import ParameterError
 
 __all__ = [
@@ -36,6 +37,7 @@ def _doubles(name: str, value: Any, ndim: int) -> Doubles:
     return array.astype(np.float64, copy=False)
 
 
+@refuses
 def paa_fbank(sr: float, num_fft: int) -> Doubles:
     """pyAudioAnalysis' mel filters (`mfcc_filter_banks`).
 
@@ -59,6 +61,7 @@ def paa_fbank(sr: float, num_fft: int) -> Doubles:
     return _core.paa_fbank(number("sr", sr), int(num_fft))
 
 
+@refuses
 def a34_short(y: npt.ArrayLike, sr: float, window: int, step: int, deltas: bool = True) -> Doubles:
     """pyAudioAnalysis' short-term features (`feature_extraction`).
 
@@ -90,6 +93,7 @@ def a34_short(y: npt.ArrayLike, sr: float, window: int, step: int, deltas: bool 
     return unrows(_core.a34_short(rows(y, 1), number("sr", sr), window, step, bool(deltas)), y, 1)
 
 
+@refuses
 def a34f136(
     y: npt.ArrayLike, sr: float, mid_window: int, mid_step: int, window: int, step: int
 ) -> Doubles:
@@ -129,6 +133,7 @@ def a34f136(
     return unrows(_core.a34f136(rows(y, 1), number("sr", sr), frames), y, 1)
 
 
+@refuses
 def a34f136_mean(
     y: npt.ArrayLike, sr: float, mid_window: int, mid_step: int, window: int, step: int
 ) -> Doubles:
@@ -159,6 +164,7 @@ def a34f136_mean(
     return np.asarray(a34f136(y, sr, mid_window, mid_step, window, step).mean(axis=-1))
 
 
+@refuses
 def sk_resize(
     S: npt.ArrayLike,
     shape: tuple[int, int],
@@ -196,6 +202,7 @@ def sk_resize(
     return _core.sk_resize(rows(s, 1), height, width, mode, anti_aliasing)
 
 
+@refuses
 def pca_fit(X: npt.ArrayLike, n_components: int) -> Doubles:
     """Principal components in one matrix: the components, the column means, the explained variances
     (padded with zeros). The largest entry of each component is positive.
@@ -223,6 +230,7 @@ def pca_fit(X: npt.ArrayLike, n_components: int) -> Doubles:
     return np.vstack([components, mean, padded])
 
 
+@refuses
 def pca_fit_transform(X: npt.ArrayLike, n_components: int) -> Doubles:
     """Coordinates of the very data that the components are fitted to.
 
@@ -250,6 +258,7 @@ def pca_fit_transform(X: npt.ArrayLike, n_components: int) -> Doubles:
     return pca_project(X, components, mean)
 
 
+@refuses
 def pca_project(
     X: npt.ArrayLike,
     components: npt.ArrayLike,
@@ -289,6 +298,7 @@ def pca_project(
     return _core.pca_project(x, components, _doubles("mean", mean, 1).ravel().tolist(), scale)
 
 
+@refuses
 def fit_projection(
     features: str | os.PathLike[str],
     out: str | os.PathLike[str],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,9 @@ from ._arrays import Complexes, Floats, audio, number, room, rows, size, unrows
 from ._filters import Window, wavelet_window
 from ._params import CqtParams
 from ._pitch import estimate_tuning
+from ._refusals import refuses
 from ._resample import CONVERTERS
+from ._warnings import warn
 from .errors import ParameterError
 
 #: Lowest frequency by default, in Hz.
@@ -50,6 +51,7 @@ def cqt_params(
     )
 
 
+@refuses
 def cqt(
     y: npt.ArrayLike,
     *,
@@ -112,10 +114,9 @@ def cqt(
     """
     y = audio(y)
     if res_type is None:
-        warnings.warn(
+        warn(
             "Support for VQT with res_type=None is deprecated: it stands for 'soxr_hq'",
             FutureWarning,
-            stacklevel=2,
         )
     elif res_type not in CONVERTERS:
         names = ", ".join(CONVERTERS)
@@ -132,6 +133,7 @@ def cqt(
     return transform
 
 
+@refuses
 def abs_cqt(y: npt.ArrayLike, **kwargs: Any) -> Floats:
     """Constant-Q magnitudes.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -11,9 +10,12 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import Complexes, Floats, floats, number
+from ._refusals import refuses
+from ._warnings import warn
 from .errors import ParameterError
 
 
+@refuses
 def power_to_db(
     S: npt.ArrayLike,
     *,
@@ -45,7 +47,7 @@ def power_to_db(
     """
     array: Any = np.asarray(S)
     if np.iscomplexobj(array):
-        warnings.warn("power_to_db was called on complex input: phase is discarded", stacklevel=2)
+        warn("power_to_db was called on complex input: phase is discarded")
         array = np.abs(array)
     scalar = array.ndim == 0
     array = floats("S", array.astype(np.float64) if array.dtype.kind in "iu" else array, 0)
@@ -58,6 +60,7 @@ def power_to_db(
     return decibels
 
 
+@refuses
 def amplitude_to_db(
     S: npt.ArrayLike,
     *,
@@ -85,9 +88,7 @@ def amplitude_to_db(
     """
     S = np.asarray(S)
     if np.iscomplexobj(S):
-        warnings.warn(
-            "amplitude_to_db was called on complex input: phase is discarded", stacklevel=2
-        )
+        warn("amplitude_to_db was called on complex input: phase is discarded")
     if amin <= 0:
         raise ParameterError(f"amin must be above 0, not {amin}")
     magnitude = np.abs(S)
@@ -96,6 +97,7 @@ def amplitude_to_db(
     return power_to_db(squares, ref=reference**2, amin=amin**2, top_db=top_db)
 
 
+@refuses
 def db_to_power(S_db: npt.ArrayLike, *, ref: float = 1.0) -> Floats:
     """Decibels to power (librosa.db_to_power).
 
@@ -119,6 +121,7 @@ def db_to_power(S_db: npt.ArrayLike, *, ref: float = 1.0) -> Floats:
     return power
 
 
+@refuses
 def db_to_amplitude(S_db: npt.ArrayLike, *, ref: float = 1.0) -> Floats:
     """Decibels to amplitude (librosa.db_to_amplitude).
 
@@ -142,6 +145,7 @@ def db_to_amplitude(S_db: npt.ArrayLike, *, ref: float = 1.0) -> Floats:
     return amplitude
 
 
+@refuses
 def magphase(D: npt.ArrayLike, *, power: float = 1) -> tuple[Floats, Complexes]:
     """Magnitudes, and values of magnitude 1 with the phases (librosa.magphase).
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import warnings
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Self
@@ -15,7 +14,9 @@ import numpy.typing as npt
 from . import _core
 from ._extract import MOST_JOBS, Config, configuration, extract, interleaved, whole_rate
 from ._features import GOOD
+from ._refusals import refuses
 from ._sklearn import BaseEstimator, TransformerMixin, not_fitted
+from ._warnings import warn
 from .errors import DataTypeError, DecodeError, ParameterError
 
 __all__ = ["FeatureExtractor"]
@@ -82,6 +83,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
     def __sklearn_is_fitted__(self) -> bool:
         return True
 
+    @refuses
     def fit(self, X: Any, y: Any = None) -> Self:
         """Learns the names of the columns from the first of `X`: the channels are part of them."""
         recordings = _recordings(X)
@@ -92,6 +94,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         self._formats = self._formats_of(recordings)
         return self
 
+    @refuses
     def fit_transform(self, X: Any, y: Any = None) -> Matrix:
         """`fit(X).transform(X)`."""
         recordings = _recordings(X)
@@ -99,6 +102,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         self._formats = self._formats_of(recordings)
         return matrix
 
+    @refuses
     def transform(self, X: Any) -> Matrix:
         """Features [shape=(recordings, values)] of the recordings `X`.
 
@@ -158,11 +162,8 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
     def _compute(self, recordings: list[Any]) -> tuple[list[str], Matrix]:
         """Names of the columns, and rows."""
         config, overrides = self._configuration()
-        of_files = [_is_path(recording) for recording in recordings]
-        if all(of_files):
+        if _is_path(recordings[0]):
             return self._of_files(recordings)
-        if any(of_files):
-            raise ParameterError("X mixes paths and arrays: either of them")
         return self._of_signals(recordings, _core.Signals(config, overrides))
 
     def _of_files(self, paths: list[Any]) -> tuple[list[str], Matrix]:
@@ -195,7 +196,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
             reason = f"{name}: {outcome['status']}: {outcome['reason']}"
             if self.errors == "raise" or not columns:
                 raise DecodeError(reason)
-            warnings.warn(f"a row of NaN for {reason}", stacklevel=4)
+            warn(f"a row of NaN for {reason}")
             row_of[name] = np.full(len(columns), np.nan, dtype=np.float32)
         return columns, np.stack([row_of[name] for name in names])
 
@@ -206,7 +207,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         if not columns:
             raise DecodeError(f"{absent[0]}: no such file, nor any other of X")
         for name in absent:
-            warnings.warn(f"a row of NaN for {name}: no such file", stacklevel=5)
+            warn(f"a row of NaN for {name}: no such file")
         rows = iter(found)
         empty = np.full(len(columns), np.nan, dtype=np.float32)
         return columns, np.stack([empty if name in absent else next(rows) for name in names])
@@ -241,9 +242,13 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
 def _recordings(X: Any) -> list[Any]:
     if hasattr(X, "toarray") and hasattr(X, "tocsr"):
         raise DataTypeError("sparse data was passed, but dense data is required; use .toarray()")
+    if X is None:
+        raise ParameterError("X must be paths or signals, not None")
     recordings = [X] if _is_path(X) else list(X if hasattr(X, "__iter__") else np.asarray(X))
     if not recordings:
         raise ParameterError("Found array with 0 sample(s): at least one recording is needed")
+    if len({_is_path(recording) for recording in recordings}) > 1:
+        raise ParameterError("X mixes paths and signals: give either of them")
     return recordings
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from . import _core
+from ._refusals import refuses
 from .errors import ParameterError
 
 __all__ = ["Scores", "evaluate"]
@@ -25,6 +26,12 @@ class Scores:
     rules : name of the rule set
     recordings : recordings that were scored
     notes : what a reader of the scores should know
+
+    Examples
+    --------
+    >>> scores = corsmal_feat.evaluate("team.csv", "annotations.csv")
+    >>> scores.recordings, scores.rules
+    (2, 'toolkit')
     """
 
     values: dict[str, float]
@@ -36,6 +43,7 @@ class Scores:
         return self.values[name]
 
 
+@refuses
 def evaluate(
     submission: StrPath,
     annotations: StrPath,

@@ -6,7 +6,6 @@ import json
 import os
 import sys
 import tempfile
-import warnings
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,8 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import audio
 from ._features import Features, load_features
+from ._refusals import refuses
+from ._warnings import warn
 from .errors import ParameterError
 
 StrPath = str | os.PathLike[str]
@@ -27,6 +28,7 @@ Progress = Callable[[int, int], object]
 MOST_JOBS = 4096
 
 
+@refuses
 def extract(
     paths: StrPath | Iterable[StrPath],
     *,
@@ -99,12 +101,14 @@ def _run(
     overwrite: bool,
     progress: bool | Progress,
 ) -> Features:
+    if not isinstance(progress, bool) and not callable(progress):
+        raise ParameterError(f"progress must be True, False or a function, not {progress!r}")
     tell = _to_stderr if progress is True else progress or None
     found = _core.extract(inputs, config, overrides, out, jobs, resume, overwrite, tell)
     if progress is True:
         print(file=sys.stderr)
     for message in found:
-        warnings.warn(message, stacklevel=3)
+        warn(message)
     return load_features(out)
 
 
@@ -160,8 +164,17 @@ class SignalExtractor:
     sr : sample rate in Hz, a whole number
     channels : channels of every block
     preset, config, set : see `extract`
+
+    Examples
+    --------
+    >>> signal = corsmal_feat.SignalExtractor(44100, channels=8, preset="mfcc-zcr")
+    >>> for _ in range(10):
+    ...     signal.push(np.zeros((8, 4410), np.float32))
+    >>> signal.finish().shape
+    (336,)
     """
 
+    @refuses
     def __init__(
         self,
         sr: float,
@@ -179,7 +192,8 @@ class SignalExtractor:
         #: names of the values of a summary; empty where frames are asked for
         self.names = self._signal.summary_names()
 
-    def push(self, block: Any) -> None:
+    @refuses
+    def push(self, block: npt.ArrayLike) -> None:
         """Takes the next samples, float [shape=(channels, n)], or [shape=(n,)] of one channel."""
         samples = interleaved(block)
         if samples.shape[1] != self._channels:

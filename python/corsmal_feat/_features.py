@@ -14,6 +14,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from ._refusals import refuses
 from .errors import ParameterError, UnknownIdError
 
 StrPath = str | os.PathLike[str]
@@ -49,6 +50,14 @@ class Features:
         The whole configuration and its hash.
     outcomes : list of dict
         One row for each input, also for those without features: id, path, status, ...
+
+    Examples
+    --------
+    >>> features = corsmal_feat.Features.load("features.npz")
+    >>> len(features), features.ids[0], features.outcomes[0]["status"]
+    (12, 'rice/0', 'ok')
+    >>> features["rice/0"].shape
+    (26,)
     """
 
     ids: list[str]
@@ -62,6 +71,7 @@ class Features:
     outcomes: list[dict[str, Any]]
 
     @classmethod
+    @refuses
     def load(cls, path: StrPath) -> Self:
         """Reads an output of `extract` or of the command `corsmal-feat extract`, whole.
 
@@ -75,7 +85,9 @@ class Features:
         Features
         """
         name = os.fspath(path)
-        return cls(**(_of_parquet(name) if name.lower().endswith(".parquet") else _of_npz(name)))
+        with open(name, "rb") as file:
+            parquet = file.read(4) == b"PAR1"
+        return cls(**(_of_parquet(name) if parquet else _of_npz(name)))
 
     def __repr__(self) -> str:
         # A table that another program wrote again has no outcomes.
@@ -168,6 +180,11 @@ class Features:
         """What a model file says about features."""
         if self.summary is None:
             raise ParameterError("features has frames: a model is fitted on rows of a summary")
+        if not self.config:
+            raise ParameterError(
+                "features does not say how it was made, since another program wrote the table anew:"
+                " give what corsmal_feat wrote"
+            )
         return {
             "feature_names": self.names,
             "feature_config": self.config,
@@ -220,6 +237,7 @@ def _next(times: Values) -> Values:
 _COLUMNS = ("id", "status", "reason", "sample_rate", "channels", "decoded_frames")
 
 
+@refuses
 def load_features(path: StrPath) -> Features:
     """Reads an output of `extract` or of the command `corsmal-feat extract`, whole.
 
@@ -255,7 +273,11 @@ def _of_npz(name: str) -> dict[str, Any]:
         raise ParameterError(f"{name} is not an output of corsmal-feat: a single array")
     with archive:
         if "__meta__" not in archive.files:
-            raise ParameterError(f"{name} is not an output of corsmal-feat: it has no __meta__")
+            objects = [member for member in archive.files if _holds_objects(archive, member)]
+            why = f"{objects[0]} holds Python objects, which are never read" if objects else ""
+            raise ParameterError(
+                f"{name} is not an output of corsmal-feat: {why or 'it has no __meta__'}"
+            )
         members = {member: _member(archive, name, member) for member in archive.files}
     run = {k: v for k, v in members.items() if not _is_frames(k)}
     config = json.loads(run["__config__"].tobytes())
@@ -295,12 +317,34 @@ def _member(archive: Any, name: str, member: str) -> Values:
     return values
 
 
+def _holds_objects(archive: Any, member: str) -> bool:
+    """Whether the head of a member says so; its values are not read."""
+    try:
+        with archive.zip.open(f"{member}.npy") as file:
+            return b"'|O'" in file.read(256)
+    except (KeyError, EOFError, zipfile.BadZipFile):
+        return False
+
+
 def _is_frames(member: str) -> bool:
     return member.startswith("__times__/") or not member.startswith("__")
 
 
 def _lines(text: str | bytes) -> list[dict[str, Any]]:
     return [json.loads(line) for line in text.splitlines() if line]
+
+
+def _ids(name: str, column: list[Any]) -> list[str]:
+    ids: dict[str, int] = {}
+    for row, value in enumerate(column):
+        if value is None:
+            raise ParameterError(f"{name}: row {row} has no id")
+        if str(value) in ids:
+            raise ParameterError(
+                f"{name}: rows {ids[str(value)]} and {row} have the same id, {str(value)!r}"
+            )
+        ids[str(value)] = row
+    return list(ids)
 
 
 def _of_parquet(name: str) -> dict[str, Any]:
@@ -319,10 +363,18 @@ def _of_parquet(name: str) -> dict[str, Any]:
     metadata = table.schema.metadata or {}
     if "id" not in table.column_names:
         raise ParameterError(f"{name} is not an output of corsmal-feat: it has no column id")
+    nested = [field.name for field in table.schema if field.type.num_fields != 0]
+    if nested:
+        raise ParameterError(f"{name}: the column {nested[0]} holds lists; numbers or text go")
     columns = {k: table.column(k).to_numpy() for k in table.column_names if k != "id"}
-    # Other tools write the summary in double precision and their own metadata only.
-    names = [k for k, v in columns.items() if v.dtype.kind == "f" and not k.startswith("__")]
-    ids = [str(i) for i in table.column("id").to_pylist()]
+    # Other tools write the summary in double precision or, where all values are whole, as integers,
+    # and their own metadata only.
+    names = [
+        k
+        for k, v in columns.items()
+        if not k.startswith("__") and (v.dtype.kind == "f" or (v.dtype.kind in "iu" and "[" in k))
+    ]
+    ids = _ids(name, table.column("id").to_pylist())
     empty = np.zeros((len(ids), 0), np.float32)
     meta = json.loads(metadata.get(b"corsmal.meta", b"{}"))
     return {

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -12,10 +11,21 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import number, room, size
 from ._params import ChromaParams, MelParams, WindowSpec
+from ._refusals import refuses
+from ._warnings import warn
 from .errors import ParameterError
 
 #: a window by name, as ("kaiser", 8.6), as the beta of a Kaiser window, as values, as a function
-Window = str | tuple[Any, ...] | float | npt.ArrayLike | Callable[[int], npt.ArrayLike]
+Window = (
+    str
+    | tuple[Any, ...]
+    | float
+    | Sequence[float]
+    | npt.NDArray[Any]
+    | Callable[[int], npt.ArrayLike]
+)
+#: how the bands of a mel filter bank are scaled
+Norm = Literal["slaney"] | float | None
 
 #: Longest window of a function; bounds the memory that a number from outside can take.
 _LONGEST = 1 << 26
@@ -32,11 +42,13 @@ def window_spec(window: Window, length: int) -> WindowSpec:
     if callable(window):
         if not 0 < length <= _LONGEST:
             raise ParameterError(f"a window must have 1 to {_LONGEST} points, not {length}")
-        window = window(length)
-    if np.iscomplexobj(window):
-        raise ParameterError("window must be real: it has complex values")
+        window = np.asarray(window(length))
     try:
+        if np.iscomplexobj(np.asarray(window)):
+            raise ParameterError("window must be real: it has complex values")
         values = np.ascontiguousarray(window, dtype=np.float64)
+    except ParameterError:
+        raise
     except (TypeError, ValueError):
         values = np.empty(())
     if values.ndim != 1:
@@ -73,6 +85,7 @@ def _parameters(window: tuple[Any, ...]) -> list[str]:
     return words
 
 
+@refuses
 def get_window(window: Window, Nx: int, *, fftbins: bool = True) -> npt.NDArray[np.float64]:
     """A window of `Nx` points, periodic unless `fftbins=False` (librosa.filters.get_window).
 
@@ -107,7 +120,7 @@ def mel_params(
     fmin: float,
     fmax: float | None,
     htk: bool,
-    norm: Any,
+    norm: Norm,
 ) -> MelParams:
     """Filter bank parameters as the Rust side takes them."""
     n_fft, n_mels = size("n_fft", n_fft), size("n_mels", n_mels)
@@ -119,6 +132,7 @@ def mel_params(
     )
 
 
+@refuses
 def mel(
     *,
     sr: float,
@@ -127,7 +141,7 @@ def mel(
     fmin: float = 0.0,
     fmax: float | None = None,
     htk: bool = False,
-    norm: Any = "slaney",
+    norm: Norm = "slaney",
     dtype: npt.DTypeLike = np.float32,
 ) -> npt.NDArray[Any]:
     """Mel filter bank [shape=(n_mels, 1 + n_fft/2)], float32 (librosa.filters.mel).
@@ -164,10 +178,7 @@ def mel(
 
 def warn_empty() -> None:
     """What librosa warns of: bands too narrow to hold a bin."""
-    warnings.warn(
-        "Empty filters detected in the mel bank: fewer n_mels or a longer n_fft avoid them",
-        stacklevel=3,
-    )
+    warn("Empty filters detected in the mel bank: fewer n_mels or a longer n_fft avoid them")
 
 
 def chroma_params(
@@ -197,6 +208,7 @@ def chroma_params(
     )
 
 
+@refuses
 def chroma(
     *,
     sr: float,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy.typing as npt
 from ._classifier import Learned, WeightedClassifier
 from ._sklearn import not_fitted
 from ._validation import Matrix
+from ._warnings import warn
 from .errors import NotFittedError
 
 
@@ -69,10 +69,9 @@ class Forest(GrownClassifier):
         fractions[used] = known
         asked = ~np.isnan(fractions).any(axis=1)
         if (used & ~asked).any():
-            warnings.warn(
+            warn(
                 "Some inputs do not have OOB scores: too few trees, so that every one has seen "
-                f"{(used & ~asked).sum()} of {rows} rows",
-                stacklevel=3,
+                f"{(used & ~asked).sum()} of {rows} rows"
             )
         right = fractions[asked].argmax(axis=1) == learned.positions[asked]
         self.oob_decision_function_ = fractions

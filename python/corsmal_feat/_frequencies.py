@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._pitches import hz_to_mel, mel_to_hz
+from ._refusals import refuses
 from ._times import Doubles
 from .errors import ParameterError
 
@@ -18,6 +19,7 @@ def _count(name: str, value: int) -> int:
     return int(value)
 
 
+@refuses
 def fft_frequencies(*, sr: float = 22050, n_fft: int = 2048) -> Doubles:
     """Frequencies of the bins of `stft` (librosa.fft_frequencies).
 
@@ -44,6 +46,7 @@ def fft_frequencies(*, sr: float = 22050, n_fft: int = 2048) -> Doubles:
     return np.asarray(np.fft.rfftfreq(int(n_fft), 1.0 / sr), dtype=np.float64)
 
 
+@refuses
 def cqt_frequencies(
     n_bins: int, *, fmin: float, bins_per_octave: int = 12, tuning: float = 0.0
 ) -> Doubles:
@@ -74,6 +77,7 @@ def cqt_frequencies(
     return np.asarray(correction * fmin * 2.0**steps)
 
 
+@refuses
 def mel_frequencies(
     n_mels: int = 128, *, fmin: float = 0.0, fmax: float = 11025.0, htk: bool = False
 ) -> Doubles:
@@ -101,6 +105,7 @@ def mel_frequencies(
     return mel_to_hz(np.linspace(low, high, _count("n_mels", n_mels)), htk=htk)
 
 
+@refuses
 def tempo_frequencies(n_bins: int, *, hop_length: int = 512, sr: float = 22050) -> Doubles:
     """Tempi of the rows of a tempogram in beats per minute (librosa.tempo_frequencies).
 
@@ -129,6 +134,7 @@ def tempo_frequencies(n_bins: int, *, hop_length: int = 512, sr: float = 22050) 
     return np.concatenate([[np.inf], tempi])
 
 
+@refuses
 def fourier_tempo_frequencies(
     *, sr: float = 22050, win_length: int = 384, hop_length: int = 512
 ) -> Doubles:

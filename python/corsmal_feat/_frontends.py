@@ -14,6 +14,7 @@ from . import _core
 from ._arrays import Doubles, Floats, Singles, audio, floats, number, room, rows, size
 from ._mel import mfcc
 from ._mono import to_mono
+from ._refusals import refuses
 from ._time_domain import zero_crossing_rate
 from .errors import ParameterError
 
@@ -38,6 +39,7 @@ def _recording(y: Any) -> Singles:
     return np.ascontiguousarray(np.atleast_2d(y), dtype=np.float32)
 
 
+@refuses
 def spec9216(
     y: npt.ArrayLike, sr: float, fixed_len: int | None = None, *, librosa: str = "0.11"
 ) -> Floats:
@@ -75,6 +77,7 @@ def spec9216(
     return values
 
 
+@refuses
 def esc26(y: npt.ArrayLike, sr: float) -> Doubles:
     """The baseline's vector: means, then standard deviations over frames of MFCC 1 to 12, then mean
     and standard deviation of the zero-crossing rate, of the mean channel.
@@ -103,6 +106,7 @@ def esc26(y: npt.ArrayLike, sr: float) -> Doubles:
     return np.concatenate(list(parts)).astype(np.float64)
 
 
+@refuses
 def m1_stft(y: npt.ArrayLike, *, n_fft: int = 2048, hop_length: int = 512) -> Singles:
     """M1's input: magnitudes of the mean channel. The paper gives no parameters; these are our
     choice.
@@ -127,6 +131,7 @@ def m1_stft(y: npt.ArrayLike, *, n_fft: int = 2048, hop_length: int = 512) -> Si
     return _core.m1_stft(_recording(y), size("n_fft", n_fft), size("hop_length", hop_length))
 
 
+@refuses
 def m2_mfcc(y: npt.ArrayLike, sr: float, *, padded: bool = True, librosa: str = "0.8") -> Singles:
     """M2's input: 40 standardised MFCCs of the first 30 s.
 
@@ -154,6 +159,7 @@ def m2_mfcc(y: npt.ArrayLike, sr: float, *, padded: bool = True, librosa: str = 
     return _core.m2_mfcc(_recording(y), number("sr", sr), bool(padded), librosa)
 
 
+@refuses
 def m3_spectrogram(
     y: npt.ArrayLike, sr: float, *, n_fft: int = 1124, hop_length: int = 3087
 ) -> Singles:
@@ -184,6 +190,7 @@ def m3_spectrogram(
     )
 
 
+@refuses
 def m4_logmel(y: npt.ArrayLike, sr: float, *, variant: str = "code") -> Singles:
     """M4's input: 64 log-mel bands of every channel.
 
@@ -210,6 +217,7 @@ def m4_logmel(y: npt.ArrayLike, sr: float, *, variant: str = "code") -> Singles:
     return _core.m4_logmel(_recording(y), number("sr", sr), variant)
 
 
+@refuses
 def m4_windows(features: npt.ArrayLike) -> Singles:
     """M4's windows of 64 frames with 75 % overlap.
 
@@ -233,6 +241,7 @@ def m4_windows(features: npt.ArrayLike) -> Singles:
     return _core.m4_windows(np.ascontiguousarray(features, dtype=np.float32))
 
 
+@refuses
 def m5_a34f136(y: npt.ArrayLike, sr: float) -> Doubles:
     """M5's vector: 136 pyAudioAnalysis values of a recording of 8 channels (mixed as 7.1), 2 or 1.
 
@@ -256,6 +265,7 @@ def m5_a34f136(y: npt.ArrayLike, sr: float) -> Doubles:
     return _core.m5_a34f136(_recording(y), number("sr", sr))
 
 
+@refuses
 def m5_vggish_patches(y: npt.ArrayLike, sr: float, *, res_type: str = "kaiser_best") -> Singles:
     """M5's log-mel patches for VGGish.
 
@@ -281,6 +291,7 @@ def m5_vggish_patches(y: npt.ArrayLike, sr: float, *, res_type: str = "kaiser_be
     return _core.m5_vggish_patches(_recording(y), number("sr", sr), res_type)
 
 
+@refuses
 def m6_spectrogram(
     y: npt.ArrayLike, sr: float, *, start: float | None = None, librosa: str = "0.8"
 ) -> Singles:

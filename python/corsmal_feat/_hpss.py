@@ -12,6 +12,7 @@ from . import _core
 from ._arrays import Floats, audio, floats, number, rows, size, unrows
 from ._filters import Window
 from ._params import HpssParams
+from ._refusals import refuses
 from ._spectrum import stft_params, warn_short
 from .errors import ParameterError
 
@@ -31,11 +32,12 @@ def _hpss_params(kernel_size: Any, power: float, margin: Any) -> HpssParams:
         kernel_harmonic=size("kernel_size", kernels[0]),
         kernel_percussive=size("kernel_size", kernels[1]),
         power=number("power", power),
-        margin_harmonic=float(margins[0]),
-        margin_percussive=float(margins[1]),
+        margin_harmonic=number("margin", margins[0]),
+        margin_percussive=number("margin", margins[1]),
     )
 
 
+@refuses
 def hpss(
     S: npt.ArrayLike,
     *,
@@ -98,11 +100,12 @@ def _separate(
     y = audio(y)
     stft_tuple = stft_params(n_fft, hop_length, win_length, "hann", center, pad_mode)
     params = _hpss_params(kernel_size, power, margin)
-    warn_short(y, n_fft, stacklevel=3)
+    warn_short(y, n_fft)
     separated = _core.separate(rows(y, 1), stft_tuple, params, bool(mask), *parts)
     return [unrows(part, y, 1) for part in separated]
 
 
+@refuses
 def effects_hpss(
     y: npt.ArrayLike,
     *,
@@ -148,6 +151,7 @@ def effects_hpss(
     return harmonic, percussive
 
 
+@refuses
 def harmonic(
     y: npt.ArrayLike,
     *,
@@ -191,6 +195,7 @@ def harmonic(
     return part
 
 
+@refuses
 def percussive(
     y: npt.ArrayLike,
     *,
@@ -234,6 +239,7 @@ def percussive(
     return part
 
 
+@refuses
 def hpss_masks(S: npt.ArrayLike, **kwargs: Any) -> Floats:
     """Harmonic and percussive mask, stacked.
 
@@ -256,6 +262,7 @@ def hpss_masks(S: npt.ArrayLike, **kwargs: Any) -> Floats:
     return np.stack(hpss(S, mask=True, **kwargs))
 
 
+@refuses
 def hpss_mags(S: npt.ArrayLike, **kwargs: Any) -> Floats:
     """Harmonic and percussive part of a spectrogram, stacked.
 
@@ -278,6 +285,7 @@ def hpss_mags(S: npt.ArrayLike, **kwargs: Any) -> Floats:
     return np.stack(hpss(S, **kwargs))
 
 
+@refuses
 def hpss_audio(y: npt.ArrayLike, **kwargs: Any) -> Floats:
     """Harmonic and percussive part of a signal, stacked.
 

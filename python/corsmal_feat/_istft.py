@@ -10,10 +10,12 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import Floats, room, size
 from ._filters import Window
+from ._refusals import refuses
 from ._spectrum import stft_params
 from .errors import ParameterError
 
 
+@refuses
 def istft(
     stft_matrix: npt.ArrayLike,
     *,

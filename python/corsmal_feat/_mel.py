@@ -8,13 +8,15 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, channels, floats, number, room, rows, size, spectrum, unrows
+from ._arrays import Floats, channels, floats, number, precision, room, rows, size, spectrum, unrows
 from ._decibels import power_to_db
-from ._filters import Window, mel_params, warn_empty
+from ._filters import Norm, Window, mel_params, warn_empty
+from ._refusals import refuses
 from ._spectrum import length_of, signal
 from .errors import ParameterError
 
 
+@refuses
 def melspectrogram(
     *,
     y: npt.ArrayLike | None = None,
@@ -31,7 +33,8 @@ def melspectrogram(
     fmin: float = 0.0,
     fmax: float | None = None,
     htk: bool = False,
-    norm: Any = "slaney",
+    norm: Norm = "slaney",
+    dtype: npt.DTypeLike = np.float32,
 ) -> Floats:
     """Mel spectrogram (librosa.feature.melspectrogram).
 
@@ -47,6 +50,8 @@ def melspectrogram(
         Exponent of the magnitudes.
     n_mels, fmin, fmax, htk, norm
         See `filters.mel`.
+    dtype : float32 or float64
+        Of the filter bank, which is computed as float32; with float64 the result has this type.
 
     Returns
     -------
@@ -70,9 +75,11 @@ def melspectrogram(
         leading = y.shape[:-1]
     if empty:
         warn_empty()
-    return result.reshape((*leading, *result.shape[1:]))
+    mel: Floats = result.reshape((*leading, *result.shape[1:]))
+    return mel.astype(np.result_type(mel, precision(dtype)), copy=False)
 
 
+@refuses
 def mfcc(
     *,
     y: npt.ArrayLike | None = None,
@@ -82,7 +89,7 @@ def mfcc(
     dct_type: int = 2,
     norm: str | None = "ortho",
     lifter: float = 0,
-    mel_norm: Any = "slaney",
+    mel_norm: Norm = "slaney",
     **kwargs: Any,
 ) -> Floats:
     """Mel-frequency cepstral coefficients (librosa.feature.mfcc).
@@ -129,8 +136,15 @@ def mfcc(
     )
 
 
+@refuses
 def delta(
-    data: npt.ArrayLike, *, width: int = 9, order: int = 1, axis: int = -1, mode: str = "interp"
+    data: npt.ArrayLike,
+    *,
+    width: int = 9,
+    order: int = 1,
+    axis: int = -1,
+    mode: str = "interp",
+    **kwargs: Any,
 ) -> Floats:
     """Local derivative along an axis, by a Savitzky-Golay fit (librosa.feature.delta).
 
@@ -144,6 +158,9 @@ def delta(
         Order of the derivative and degree of the polynomial.
     mode : {"interp", "nearest", "mirror", "constant", "wrap"}
         What happens at the ends.
+    **kwargs
+        `cval`, what lies beyond the ends with "constant", and `delta`, the time between frames, as
+        in `scipy.signal.savgol_filter`.
 
     Returns
     -------
@@ -158,7 +175,19 @@ def delta(
     if width < 3 or width % 2 == 0:
         raise ParameterError(f"width must be an odd number of at least 3, not {width}")
     room("a filter", width)
+    step, beyond = number("delta", kwargs.pop("delta", 1.0)), kwargs.pop("cval", 0.0)
+    kwargs.pop("deriv", None)  # as librosa, which sets it to `order`
+    if kwargs.pop("polyorder", order) != order:
+        raise ParameterError("polyorder is always order here: leave it out")
+    if kwargs:
+        raise ParameterError(f"delta does not take {', '.join(map(repr, kwargs))}")
     array = floats("data", data)
+    if mode == "constant" and beyond != 0:
+        # The derivative of a constant is 0: the ends are zeros after a shift.
+        array = array - array.dtype.type(number("cval", beyond))
     moved = np.moveaxis(array, axis, -1)
-    result = _core.delta(rows(moved, 1), int(width), int(order), str(mode))
-    return np.moveaxis(result.reshape(moved.shape), -1, axis)
+    result: Any = _core.delta(rows(moved, 1), int(width), int(order), str(mode))
+    if step != 1.0:
+        result = result / array.dtype.type(step) ** order
+    slope: Floats = np.moveaxis(result.reshape(moved.shape), -1, axis)
+    return slope

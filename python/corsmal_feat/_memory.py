@@ -8,9 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ._arrays import MOST
+from ._refusals import refuses
 from .errors import ParameterError
 
 
+@refuses
 def stack_memory(
     data: npt.ArrayLike, *, n_steps: int = 2, delay: int = 1, **kwargs: Any
 ) -> npt.NDArray[Any]:

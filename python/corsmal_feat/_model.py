@@ -14,6 +14,7 @@ from . import _core
 from ._classifier import class_labels
 from ._extract import extract
 from ._features import GOOD
+from ._refusals import refuses
 from ._validation import Matrix, features
 from .errors import DecodeError, ModelError, ParameterError
 
@@ -31,6 +32,12 @@ class TrainedModel:
         Labels, in the order of `predict_proba`.
     n_features_in_ : int
         Features of a row.
+
+    Examples
+    --------
+    >>> model = corsmal_feat.load_model("bottles.model")
+    >>> model.n_features_in_, model.classes_.tolist(), model.has_probabilities()
+    (26, ['rice', 'water'], True)
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -59,6 +66,7 @@ class TrainedModel:
         """The full configuration of the features, or None."""
         return self.header["feature_config"]
 
+    @refuses
     def predict(self, X: Any, *, any_rate: bool = False) -> npt.NDArray[Any]:
         """The label of each row, or of each recording.
 
@@ -80,6 +88,7 @@ class TrainedModel:
         """
         return self.classes_[self._model.predict(self._rows(X, any_rate))]
 
+    @refuses
     def predict_proba(self, X: Any, *, any_rate: bool = False) -> Matrix:
         """Probabilities of rows or recordings.
 
@@ -178,6 +187,7 @@ class TrainedModel:
                 raise ParameterError(f"{row['path']}: {reason}: any_rate=True takes it as it is")
 
 
+@refuses
 def load_model(path: str | os.PathLike[str]) -> TrainedModel:
     """Reads any model file, of `corsmal-feat train` or of `save`.
 

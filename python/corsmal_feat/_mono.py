@@ -8,8 +8,10 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import Floats, audio
+from ._refusals import refuses
 
 
+@refuses
 def to_mono(y: npt.ArrayLike) -> Floats:
     """Mean over all leading axes [shape=(n,)] (librosa.to_mono).
 

@@ -34,6 +34,13 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
     random_state : seed; the recipe's own if None
     checkpoint : file in which the training is kept after each epoch, and from which it goes on
     progress : called with epochs done, epochs in all, last loss, last score and seconds left
+
+    Examples
+    --------
+    >>> x = np.random.default_rng(0).standard_normal((12, 9, 128)).astype(np.float32)
+    >>> network = corsmal_feat.nets.NetworkClassifier("m5_vggish_type", recipe={"epochs": 1})
+    >>> network.fit(x, ["rice", "water"] * 6).predict(x).shape
+    (12,)
     """
 
     _model: _core.TrainedNetwork

@@ -14,6 +14,7 @@ from ._arrays import Floats, audio, floats, number, rows, size, unrows
 from ._decibels import power_to_db
 from ._mel import melspectrogram
 from ._params import PeakParams
+from ._refusals import refuses
 from .errors import ParameterError
 from .util import fix_frames
 
@@ -31,6 +32,7 @@ def _double_melspectrogram(*, y: Any, **kwargs: Any) -> Any:
     return melspectrogram(y=y.astype(np.float64), **kwargs).astype(y.dtype)
 
 
+@refuses
 def onset_strength(
     *,
     y: npt.ArrayLike | None = None,
@@ -38,7 +40,7 @@ def onset_strength(
     S: npt.ArrayLike | None = None,
     lag: int = 1,
     max_size: int = 1,
-    ref: Any = None,
+    ref: npt.ArrayLike | None = None,
     detrend: bool = False,
     center: bool = True,
     feature: Callable[..., Any] | None = None,
@@ -84,21 +86,22 @@ def onset_strength(
         )
     lag, max_size = _count("lag", lag), _count("max_size", max_size)
     n_fft, hop_length = _count("n_fft", n_fft), _count("hop_length", hop_length)
-    s, ref = _compared((y, sr, S), ref, feature, (n_fft, hop_length), kwargs)
+    s, before = _compared((y, sr, S), ref, feature, (n_fft, hop_length), kwargs)
     delay = n_fft // (2 * hop_length) if center else None
     envelope: Any
     if callable(aggregate) and aggregate is not np.mean:
-        rises: Any = unrows(_core.onset_rises(rows(s, 2), ref, lag, max_size), s, 2)
+        rises: Any = unrows(_core.onset_rises(rows(s, 2), before, lag, max_size), s, 2)
         flux = np.asarray(aggregate(rises, axis=-2), dtype=s.dtype)
         envelope = _delayed(flux, lag, delay, s.shape[-1])
     else:
-        envelope = unrows(_core.onset_strength(rows(s, 2), ref, lag, max_size, delay), s, 2)
+        envelope = unrows(_core.onset_strength(rows(s, 2), before, lag, max_size, delay), s, 2)
     if detrend:
         envelope = unrows(_core.detrend(rows(envelope, 1)), envelope, 1)
     strength: Floats = envelope
     return strength
 
 
+@refuses
 def onset_strength_multi(
     *,
     y: npt.ArrayLike | None = None,
@@ -108,7 +111,7 @@ def onset_strength_multi(
     hop_length: int = 512,
     lag: int = 1,
     max_size: int = 1,
-    ref: Any = None,
+    ref: npt.ArrayLike | None = None,
     detrend: bool = False,
     center: bool = True,
     feature: Callable[..., Any] | None = None,
@@ -140,8 +143,8 @@ def onset_strength_multi(
     """
     lag, max_size = _count("lag", lag), _count("max_size", max_size)
     n_fft, hop_length = _count("n_fft", n_fft), _count("hop_length", hop_length)
-    s, ref = _compared((y, sr, S), ref, feature, (n_fft, hop_length), kwargs)
-    flux: Any = unrows(_core.onset_rises(rows(s, 2), ref, lag, max_size), s, 2)
+    s, before = _compared((y, sr, S), ref, feature, (n_fft, hop_length), kwargs)
+    flux: Any = unrows(_core.onset_rises(rows(s, 2), before, lag, max_size), s, 2)
     if aggregate is not False:
         mean = aggregate if callable(aggregate) else np.mean
         groups = [mean(flux[..., group, :], axis=-2) for group in _groups(channels)]
@@ -200,6 +203,7 @@ def _groups(channels: Sequence[int] | Sequence[slice] | None) -> list[slice]:
     return groups
 
 
+@refuses
 def onset_detect(
     *,
     y: npt.ArrayLike | None = None,
@@ -299,6 +303,7 @@ def _frames(name: str, value: float | None) -> int | None:
     return size(name, np.ceil(value), 0)
 
 
+@refuses
 def onset_backtrack(events: npt.ArrayLike, energy: npt.ArrayLike) -> npt.NDArray[np.int64]:
     """The minimum of `energy` at or before each event (librosa.onset.onset_backtrack).
 
@@ -327,6 +332,8 @@ def onset_backtrack(events: npt.ArrayLike, energy: npt.ArrayLike) -> npt.NDArray
         low = (array[1:-1] <= array[:-2]) & (array[1:-1] < array[2:])
         minima = fix_frames(1 + np.flatnonzero(low))
         return minima[np.searchsorted(minima, events, side="right") - 1]
+    if events.ndim != 1:
+        raise ParameterError(f"events has {events.ndim} dimensions, expected 1")
     if events.size and (events.min() < 0 or events.max() >= array.size):
         raise ParameterError(f"events reach beyond the {array.size} frames of energy")
     return np.asarray(_core.onset_backtrack(events.tolist(), array), dtype=np.int64)

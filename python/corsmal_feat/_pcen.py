@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
@@ -11,9 +10,12 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import rows, size, spectrum, unrows
 from ._params import PcenParams
+from ._refusals import refuses
+from ._warnings import warn
 from .errors import ParameterError
 
 
+@refuses
 def pcen(
     S: npt.ArrayLike,
     *,
@@ -64,7 +66,7 @@ def pcen(
     (128, 44)
     """
     if np.iscomplexobj(S):
-        warnings.warn("pcen uses the magnitudes of a complex S", stacklevel=2)
+        warn("pcen uses the magnitudes of a complex S")
         S = np.abs(np.asarray(S))
     s: Any = spectrum(S, 1)
     time = axis % s.ndim if -s.ndim <= axis < s.ndim else None
@@ -105,6 +107,7 @@ def pcen(
             found = np.shape(zi)
             raise ParameterError(f"zi has shape {found}, expected {tuple(shape)}") from None
         state = np.ascontiguousarray(rows(in_order(begun), 2)[..., 0])
+    hop_length = size("hop_length", hop_length)
     keys = PcenParams(sr, hop_length, gain, bias, power, time_constant, eps, b, max_size)
     out, end = _core.pcen(rows(ordered, 2), levels, state, keys)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -13,7 +12,9 @@ from . import _core
 from ._arrays import Floats, number, rows, size, unrows
 from ._filters import Window
 from ._params import PitchParams
+from ._refusals import refuses
 from ._spectrum import spectrogram
+from ._warnings import warn
 from .errors import ParameterError
 
 
@@ -58,6 +59,7 @@ def _tracked(
     return s, rows(levels.astype(s.dtype), 1), params
 
 
+@refuses
 def piptrack(
     *,
     y: npt.ArrayLike | None = None,
@@ -110,6 +112,7 @@ def piptrack(
     return unrows(pitches, s, 2), unrows(magnitudes, s, 2)
 
 
+@refuses
 def estimate_tuning(
     *,
     y: npt.ArrayLike | None = None,
@@ -167,6 +170,7 @@ def estimate_tuning(
     return _or_untuned(tuning)
 
 
+@refuses
 def pitch_tuning(
     frequencies: npt.ArrayLike, *, resolution: float = 0.01, bins_per_octave: int = 12
 ) -> float:
@@ -200,13 +204,12 @@ def pitch_tuning(
 
 def _or_untuned(tuning: float | None) -> float:
     if tuning is None:
-        warnings.warn(
-            "Trying to estimate tuning from empty frequency set: 0 is assumed", stacklevel=3
-        )
+        warn("Trying to estimate tuning from empty frequency set: 0 is assumed")
         return 0.0
     return tuning
 
 
+@refuses
 def piptrack_both(**kwargs: Any) -> npt.NDArray[Any]:
     """Pitches and magnitudes of `piptrack`, stacked.
 

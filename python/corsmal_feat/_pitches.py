@@ -8,6 +8,7 @@ from typing import Any, overload
 import numpy as np
 import numpy.typing as npt
 
+from ._refusals import refuses
 from ._times import Doubles, Number
 from .errors import ParameterError
 
@@ -22,7 +23,8 @@ _LOG_STEP = np.log(6.4) / 27.0
 def hz_to_mel(frequencies: Number, *, htk: bool = False) -> np.float64: ...
 @overload
 def hz_to_mel(frequencies: npt.ArrayLike, *, htk: bool = False) -> Doubles: ...
-def hz_to_mel(frequencies: Any, *, htk: bool = False) -> Any:
+@refuses
+def hz_to_mel(frequencies: npt.ArrayLike, *, htk: bool = False) -> Any:
     """Hertz to mel (librosa.hz_to_mel).
 
     Parameters
@@ -57,7 +59,8 @@ def hz_to_mel(frequencies: Any, *, htk: bool = False) -> Any:
 def mel_to_hz(mels: Number, *, htk: bool = False) -> np.float64: ...
 @overload
 def mel_to_hz(mels: npt.ArrayLike, *, htk: bool = False) -> Doubles: ...
-def mel_to_hz(mels: Any, *, htk: bool = False) -> Any:
+@refuses
+def mel_to_hz(mels: npt.ArrayLike, *, htk: bool = False) -> Any:
     """Mel to hertz (librosa.mel_to_hz).
 
     Parameters
@@ -92,7 +95,8 @@ def mel_to_hz(mels: Any, *, htk: bool = False) -> Any:
 def hz_to_midi(frequencies: Number) -> np.float64: ...
 @overload
 def hz_to_midi(frequencies: npt.ArrayLike) -> Doubles: ...
-def hz_to_midi(frequencies: Any) -> Any:
+@refuses
+def hz_to_midi(frequencies: npt.ArrayLike) -> Any:
     """Hertz to MIDI note numbers with fractions (librosa.hz_to_midi).
 
     Parameters
@@ -116,7 +120,8 @@ def hz_to_midi(frequencies: Any) -> Any:
 def midi_to_hz(notes: Number) -> np.float64: ...
 @overload
 def midi_to_hz(notes: npt.ArrayLike) -> Doubles: ...
-def midi_to_hz(notes: Any) -> Any:
+@refuses
+def midi_to_hz(notes: npt.ArrayLike) -> Any:
     """MIDI note numbers to hertz (librosa.midi_to_hz).
 
     Parameters
@@ -144,7 +149,10 @@ def hz_to_octs(
 def hz_to_octs(
     frequencies: npt.ArrayLike, *, tuning: float = 0.0, bins_per_octave: int = 12
 ) -> Doubles: ...
-def hz_to_octs(frequencies: Any, *, tuning: float = 0.0, bins_per_octave: int = 12) -> Any:
+@refuses
+def hz_to_octs(
+    frequencies: npt.ArrayLike, *, tuning: float = 0.0, bins_per_octave: int = 12
+) -> Any:
     """Hertz to octaves, A0 being 0 (librosa.hz_to_octs).
 
     Parameters
@@ -174,7 +182,8 @@ def octs_to_hz(octs: Number, *, tuning: float = 0.0, bins_per_octave: int = 12) 
 def octs_to_hz(
     octs: npt.ArrayLike, *, tuning: float = 0.0, bins_per_octave: int = 12
 ) -> Doubles: ...
-def octs_to_hz(octs: Any, *, tuning: float = 0.0, bins_per_octave: int = 12) -> Any:
+@refuses
+def octs_to_hz(octs: npt.ArrayLike, *, tuning: float = 0.0, bins_per_octave: int = 12) -> Any:
     """Octaves to hertz (librosa.octs_to_hz).
 
     Parameters
@@ -204,7 +213,8 @@ def _a440(tuning: float, bins_per_octave: int) -> float:
 def A4_to_tuning(A4: Number, *, bins_per_octave: int = 12) -> np.float64: ...
 @overload
 def A4_to_tuning(A4: npt.ArrayLike, *, bins_per_octave: int = 12) -> Doubles: ...
-def A4_to_tuning(A4: Any, *, bins_per_octave: int = 12) -> Any:
+@refuses
+def A4_to_tuning(A4: npt.ArrayLike, *, bins_per_octave: int = 12) -> Any:
     """The frequency of A4 as a tuning (librosa.A4_to_tuning).
 
     Parameters
@@ -230,7 +240,8 @@ def A4_to_tuning(A4: Any, *, bins_per_octave: int = 12) -> Any:
 def tuning_to_A4(tuning: Number, *, bins_per_octave: int = 12) -> np.float64: ...
 @overload
 def tuning_to_A4(tuning: npt.ArrayLike, *, bins_per_octave: int = 12) -> Doubles: ...
-def tuning_to_A4(tuning: Any, *, bins_per_octave: int = 12) -> Any:
+@refuses
+def tuning_to_A4(tuning: npt.ArrayLike, *, bins_per_octave: int = 12) -> Any:
     """A tuning as the frequency of A4 (librosa.tuning_to_A4).
 
     Parameters
@@ -266,7 +277,8 @@ _ACCIDENTALS = {"#": 1, "♯": 1, "𝄪": 2, "b": -1, "!": -1, "♭": -1, "𝄫"
 def note_to_midi(note: str, *, round_midi: bool = True) -> float: ...
 @overload
 def note_to_midi(note: Names, *, round_midi: bool = True) -> npt.NDArray[Any]: ...
-def note_to_midi(note: Any, *, round_midi: bool = True) -> Any:
+@refuses
+def note_to_midi(note: str | Names, *, round_midi: bool = True) -> Any:
     """Note names to MIDI note numbers (librosa.note_to_midi).
 
     Parameters
@@ -286,6 +298,8 @@ def note_to_midi(note: Any, *, round_midi: bool = True) -> Any:
     array([69, 61])
     """
     if not isinstance(note, str):
+        if np.ndim(note) == 0:
+            raise ParameterError(f"note must be text or several of them, not {note!r}")
         return np.array([note_to_midi(one, round_midi=round_midi) for one in note])
     found = _NOTE.match(note)
     if found is None:
@@ -300,7 +314,8 @@ def note_to_midi(note: Any, *, round_midi: bool = True) -> Any:
 def note_to_hz(note: str, *, round_midi: bool = True) -> np.float64: ...
 @overload
 def note_to_hz(note: Names, *, round_midi: bool = True) -> Doubles: ...
-def note_to_hz(note: Any, *, round_midi: bool = True) -> Any:
+@refuses
+def note_to_hz(note: str | Names, *, round_midi: bool = True) -> Any:
     """Note names to hertz (librosa.note_to_hz).
 
     Parameters

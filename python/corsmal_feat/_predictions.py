@@ -24,6 +24,14 @@ class Predictions:
     predicted : name of each class predicted; "" without a prediction, "unknown" where rejected
     labels : names of the classes
     proba : probabilities [shape=(rows, classes)]; NaN where there are none
+
+    Examples
+    --------
+    >>> fused = corsmal_feat.fuse(["rf.csv", "knn.csv"])
+    >>> len(fused), fused.ids[0], fused.predicted[0], fused.labels
+    (12, 'rice/0', 'rice', ['rice', 'water'])
+    >>> fused.proba.shape
+    (12, 2)
     """
 
     columns: dict[str, list[str]]

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import MOST, Floats, audio, number, rows, unrows
+from ._refusals import refuses
 from .errors import ParameterError
 from .util import fix_length
 
@@ -30,6 +31,7 @@ CONVERTERS = _OWN + _WHOLE + _AS_SOXR_HQ
 _MOST_PHASES = 100_000
 
 
+@refuses
 def resample(
     y: npt.ArrayLike,
     *,

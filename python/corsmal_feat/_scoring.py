@@ -12,6 +12,7 @@ import numpy as np
 
 from . import _core
 from ._predictions import Predictions, StrPath, parse
+from ._refusals import refuses
 from .errors import ParameterError
 
 __all__ = [
@@ -39,6 +40,12 @@ class CrossValidation:
     predictions : of the held-out rows
     report : everything, as `corsmal-feat cross-validate --json` prints it; `report["held_out"]` has
         the bootstrap intervals and the calibration of all held-out rows
+
+    Examples
+    --------
+    >>> result = corsmal_feat.cross_validate("features.npz", labels="folders", cv=3)
+    >>> result.accuracy["mean"], result.report["held_out"]["rows"]
+    (1.0, 12)
     """
 
     accuracy: dict[str, float]
@@ -59,6 +66,12 @@ class Comparison:
     difference, low, high : weighted F1 of the second minus that of the first, with its 95 %
         bootstrap interval over recordings
     report : everything, as `corsmal-feat compare-predictions --json` prints it
+
+    Examples
+    --------
+    >>> compared = corsmal_feat.compare_predictions("rf.csv", "knn.csv")
+    >>> compared.only_first, compared.only_second, compared.p_value
+    (0, 0, 1.0)
     """
 
     only_first: int
@@ -82,6 +95,12 @@ class ScoreReport:
         `mean_absolute_error`, `root_mean_squared_error`, `mean_relative_error`, `r2`, `score`
     report : everything, as `corsmal-feat score --json` prints it: classes, confusion, intervals,
         curves
+
+    Examples
+    --------
+    >>> scored = corsmal_feat.score("rf.csv", labels="folders")
+    >>> scored.kind, scored["accuracy"]
+    ('classes', 1.0)
     """
 
     kind: str
@@ -92,6 +111,7 @@ class ScoreReport:
         return self.values[name]
 
 
+@refuses
 def cross_validate(
     features: StrPath,
     target: str = "class",
@@ -176,6 +196,7 @@ def cross_validate(
     )
 
 
+@refuses
 def fuse(
     predictions: StrPath | Iterable[StrPath],
     *,
@@ -222,6 +243,7 @@ def fuse(
     return parse(_core.fuse(paths, chosen, vote, background, least))
 
 
+@refuses
 def compare_predictions(
     first: StrPath,
     second: StrPath,
@@ -273,6 +295,7 @@ def compare_predictions(
     )
 
 
+@refuses
 def score(
     predictions: StrPath,
     *,

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ._arrays import Floats, audio
 from ._decibels import amplitude_to_db
+from ._refusals import refuses
 from ._time_domain import rms
 from ._times import frames_to_samples
 from .errors import ParameterError
@@ -35,6 +36,7 @@ def _with_sound(
     return loud
 
 
+@refuses
 def trim(
     y: npt.ArrayLike,
     *,
@@ -78,6 +80,7 @@ def trim(
     return signal[..., start:end], np.asarray([start, end])
 
 
+@refuses
 def split(
     y: npt.ArrayLike,
     *,
@@ -128,6 +131,7 @@ def preemphasis(
     zi: npt.ArrayLike | None = None,
     return_zf: Literal[True],
 ) -> tuple[Floats, Floats]: ...
+@refuses
 def preemphasis(
     y: npt.ArrayLike,
     *,

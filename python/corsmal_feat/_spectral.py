@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,9 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import Doubles, Floats, number, room, rows, size
 from ._filters import Window
+from ._refusals import refuses
 from ._spectrum import Framing, Spectra, spectra, spectrogram
+from ._warnings import warn
 from .errors import ParameterError
 
 
@@ -45,6 +46,7 @@ def _fitting(name: str, array: Any, shape: tuple[int, ...]) -> Any:
         raise ParameterError(f"{name} has shape {array.shape}, expected {shape}") from None
 
 
+@refuses
 def spectral_centroid(
     *,
     y: npt.ArrayLike | None = None,
@@ -87,6 +89,7 @@ def spectral_centroid(
     return s.restored(_core.spectral_centroid(s.source, at))
 
 
+@refuses
 def spectral_bandwidth(
     *,
     y: npt.ArrayLike | None = None,
@@ -145,6 +148,7 @@ def spectral_bandwidth(
     return s.restored(result)
 
 
+@refuses
 def spectral_rolloff(
     *,
     y: npt.ArrayLike | None = None,
@@ -191,6 +195,7 @@ def spectral_rolloff(
     return s.restored(_core.spectral_rolloff(s.source, at, number("roll_percent", roll_percent)))
 
 
+@refuses
 def spectral_flatness(
     *,
     y: npt.ArrayLike | None = None,
@@ -237,6 +242,7 @@ def spectral_flatness(
     )
 
 
+@refuses
 def spectral_contrast(
     *,
     y: npt.ArrayLike | None = None,
@@ -304,15 +310,15 @@ def spectral_contrast(
         bool(linear),
     )
     if empty:
-        warnings.warn(
+        warn(
             f"no bin lies in the lowest band (0 to {fmin} Hz): its contrast is NaN, and in dB"
             " so is all of it; a longer n_fft or a higher fmin avoids this",
             RuntimeWarning,
-            stacklevel=2,
         )
     return s.restored(result)
 
 
+@refuses
 def poly_features(
     *,
     y: npt.ArrayLike | None = None,
@@ -359,9 +365,8 @@ def poly_features(
     at = _frequencies(freq, sr, s)
     result, deficient = _core.poly_features(s.source, at, int(order))
     if deficient:
-        warnings.warn(
+        warn(
             f"the frequencies cannot determine a polynomial of order {order}",
             np.exceptions.RankWarning,
-            stacklevel=2,
         )
     return s.restored(result)

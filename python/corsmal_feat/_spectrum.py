@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +11,8 @@ from . import _core
 from ._arrays import Complexes, Floats, Same, audio, channels, number, rows, size, spectrum, unrows
 from ._filters import Window, window_spec
 from ._params import StftParams
+from ._refusals import refuses
+from ._warnings import warn
 from .errors import ParameterError
 
 #: hop_length, win_length, window, center, pad_mode as they were given
@@ -34,6 +35,7 @@ def stft_params(
     return StftParams(n_fft, hop_length, win_length, spec, bool(center), str(pad_mode))
 
 
+@refuses
 def stft(
     y: npt.ArrayLike,
     *,
@@ -84,7 +86,7 @@ def stft(
     """
     y = audio(y)
     params = stft_params(n_fft, hop_length, win_length, window, center, pad_mode)
-    warn_short(y, n_fft, stacklevel=3)
+    warn_short(y, n_fft)
     result: Any = unrows(_core.stft(channels(y), params), y, 1)
     if dtype is not None:
         if np.dtype(dtype).kind != "c":
@@ -109,13 +111,10 @@ def _put(result: Any, out: npt.NDArray[Any]) -> Any:
     return part
 
 
-def warn_short(y: Floats, n_fft: int, stacklevel: int) -> None:
+def warn_short(y: Floats, n_fft: int) -> None:
     """librosa's warning where one frame is longer than the signal."""
     if y.shape[-1] < n_fft:
-        warnings.warn(
-            f"n_fft={n_fft} is larger than the signal of {y.shape[-1]} samples",
-            stacklevel=stacklevel,
-        )
+        warn(f"n_fft={n_fft} is larger than the signal of {y.shape[-1]} samples")
 
 
 class Spectra(NamedTuple):
@@ -150,7 +149,7 @@ def signal(
         raise ParameterError("y or S must be given")
     y = audio(y)
     params = stft_params(n_fft, hop_length, win_length, window, center, pad_mode)
-    warn_short(y, n_fft, stacklevel=4)
+    warn_short(y, n_fft)
     return y, params
 
 

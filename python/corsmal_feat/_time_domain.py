@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Doubles, Singles, audio, channels, floats, number, room, rows, size, unrows
+from ._arrays import (
+    Doubles,
+    Floats,
+    audio,
+    channels,
+    floats,
+    number,
+    precision,
+    room,
+    rows,
+    size,
+    unrows,
+)
 from ._params import FrameParams
+from ._refusals import refuses
 from .errors import ParameterError
 
 
+@refuses
 def zero_crossing_rate(
     y: npt.ArrayLike,
     *,
@@ -19,7 +35,7 @@ def zero_crossing_rate(
     hop_length: int = 512,
     center: bool = True,
     threshold: float = 1e-10,
-    ref_magnitude: Any = None,
+    ref_magnitude: float | Callable[..., Any] | None = None,
     pad: bool = False,
     zero_pos: bool = True,
 ) -> Doubles:
@@ -65,6 +81,7 @@ def zero_crossing_rate(
     return unrows(rate, y, 1)
 
 
+@refuses
 def rms(
     *,
     y: npt.ArrayLike | None = None,
@@ -73,7 +90,8 @@ def rms(
     hop_length: int = 512,
     center: bool = True,
     pad_mode: str = "constant",
-) -> Singles:
+    dtype: npt.DTypeLike = np.float32,
+) -> Floats:
     """Root-mean-square level of each frame (librosa.feature.rms).
 
     Parameters
@@ -86,24 +104,29 @@ def rms(
         Samples of a frame, and between frames.
     center, pad_mode
         See `stft`.
+    dtype : float32 or float64
+        Of the result, which is computed as float32.
 
     Returns
     -------
-    float32 [shape=(..., 1, t)]
+    [shape=(..., 1, t)]
 
     Examples
     --------
     >>> corsmal_feat.feature.rms(y=np.full(4096, 0.5, np.float32))[0, 4]
     np.float32(0.5)
     """
+    kind = precision(dtype)
     if S is not None:
         s = floats("S", S, 2)
-        return unrows(_core.rms_of_spectrogram(rows(s, 2), int(frame_length)), s, 2)
+        level = unrows(_core.rms_of_spectrogram(rows(s, 2), int(frame_length)), s, 2)
+        return level.astype(kind, copy=False)
     if y is None:
         raise ParameterError("y or S must be given")
     y = audio(y)
     frame = framing(frame_length, hop_length, center)
-    return unrows(_core.rms(channels(y), frame, str(pad_mode)), y, 1)
+    level = unrows(_core.rms(channels(y), frame, str(pad_mode)), y, 1)
+    return level.astype(kind, copy=False)
 
 
 def framing(frame_length: int, hop_length: int, center: bool) -> FrameParams:

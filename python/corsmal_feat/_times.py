@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._arrays import number, size
+from ._refusals import refuses
 from .errors import ParameterError
 
 Number = int | float | np.integer[Any] | np.floating[Any]
@@ -37,7 +38,10 @@ def frames_to_samples(
 def frames_to_samples(
     frames: npt.ArrayLike, *, hop_length: int = 512, n_fft: int | None = None
 ) -> Integers: ...
-def frames_to_samples(frames: Any, *, hop_length: int = 512, n_fft: int | None = None) -> Any:
+@refuses
+def frames_to_samples(
+    frames: npt.ArrayLike, *, hop_length: int = 512, n_fft: int | None = None
+) -> Any:
     """First sample of each frame (librosa.frames_to_samples).
 
     Parameters
@@ -69,7 +73,10 @@ def samples_to_frames(
 def samples_to_frames(
     samples: npt.ArrayLike, *, hop_length: int = 512, n_fft: int | None = None
 ) -> Integers: ...
-def samples_to_frames(samples: Any, *, hop_length: int = 512, n_fft: int | None = None) -> Any:
+@refuses
+def samples_to_frames(
+    samples: npt.ArrayLike, *, hop_length: int = 512, n_fft: int | None = None
+) -> Any:
     """The frame that each sample lies in (librosa.samples_to_frames).
 
     Parameters
@@ -96,7 +103,8 @@ def samples_to_frames(samples: Any, *, hop_length: int = 512, n_fft: int | None 
 def samples_to_time(samples: Number, *, sr: float = 22050) -> np.float64: ...
 @overload
 def samples_to_time(samples: npt.ArrayLike, *, sr: float = 22050) -> Doubles: ...
-def samples_to_time(samples: Any, *, sr: float = 22050) -> Any:
+@refuses
+def samples_to_time(samples: npt.ArrayLike, *, sr: float = 22050) -> Any:
     """Seconds at each sample (librosa.samples_to_time).
 
     Parameters
@@ -122,7 +130,8 @@ def samples_to_time(samples: Any, *, sr: float = 22050) -> Any:
 def time_to_samples(times: Number, *, sr: float = 22050) -> np.int64: ...
 @overload
 def time_to_samples(times: npt.ArrayLike, *, sr: float = 22050) -> Integers: ...
-def time_to_samples(times: Any, *, sr: float = 22050) -> Any:
+@refuses
+def time_to_samples(times: npt.ArrayLike, *, sr: float = 22050) -> Any:
     """The sample at each time (librosa.time_to_samples).
 
     Parameters
@@ -152,8 +161,9 @@ def frames_to_time(
 def frames_to_time(
     frames: npt.ArrayLike, *, sr: float = 22050, hop_length: int = 512, n_fft: int | None = None
 ) -> Doubles: ...
+@refuses
 def frames_to_time(
-    frames: Any, *, sr: float = 22050, hop_length: int = 512, n_fft: int | None = None
+    frames: npt.ArrayLike, *, sr: float = 22050, hop_length: int = 512, n_fft: int | None = None
 ) -> Any:
     """Seconds at each frame (librosa.frames_to_time).
 
@@ -187,8 +197,9 @@ def time_to_frames(
 def time_to_frames(
     times: npt.ArrayLike, *, sr: float = 22050, hop_length: int = 512, n_fft: int | None = None
 ) -> Integers: ...
+@refuses
 def time_to_frames(
-    times: Any, *, sr: float = 22050, hop_length: int = 512, n_fft: int | None = None
+    times: npt.ArrayLike, *, sr: float = 22050, hop_length: int = 512, n_fft: int | None = None
 ) -> Any:
     """The frame at each time (librosa.time_to_frames).
 
@@ -216,7 +227,8 @@ def time_to_frames(
 def blocks_to_frames(blocks: Number, *, block_length: int) -> np.int64: ...
 @overload
 def blocks_to_frames(blocks: npt.ArrayLike, *, block_length: int) -> Integers: ...
-def blocks_to_frames(blocks: Any, *, block_length: int) -> Any:
+@refuses
+def blocks_to_frames(blocks: npt.ArrayLike, *, block_length: int) -> Any:
     """First frame of each block of `stream` (librosa.blocks_to_frames).
 
     Parameters
@@ -242,7 +254,8 @@ def blocks_to_frames(blocks: Any, *, block_length: int) -> Any:
 def blocks_to_samples(blocks: Number, *, block_length: int, hop_length: int) -> np.int64: ...
 @overload
 def blocks_to_samples(blocks: npt.ArrayLike, *, block_length: int, hop_length: int) -> Integers: ...
-def blocks_to_samples(blocks: Any, *, block_length: int, hop_length: int) -> Any:
+@refuses
+def blocks_to_samples(blocks: npt.ArrayLike, *, block_length: int, hop_length: int) -> Any:
     """First sample of each block of `stream` (librosa.blocks_to_samples).
 
     Parameters
@@ -273,7 +286,8 @@ def blocks_to_time(
 def blocks_to_time(
     blocks: npt.ArrayLike, *, block_length: int, hop_length: int, sr: float
 ) -> Doubles: ...
-def blocks_to_time(blocks: Any, *, block_length: int, hop_length: int, sr: float) -> Any:
+@refuses
+def blocks_to_time(blocks: npt.ArrayLike, *, block_length: int, hop_length: int, sr: float) -> Any:
     """Seconds at the start of each block of `stream` (librosa.blocks_to_time).
 
     Parameters
@@ -298,6 +312,7 @@ def blocks_to_time(blocks: Any, *, block_length: int, hop_length: int, sr: float
     return samples_to_time(samples, sr=sr)
 
 
+@refuses
 def samples_like(
     X: npt.NDArray[Any] | int,
     *,
@@ -325,10 +340,11 @@ def samples_like(
     >>> corsmal_feat.samples_like(np.zeros((128, 3)))
     array([   0,  512, 1024])
     """
-    count = int(X) if np.ndim(X) == 0 else np.shape(X)[axis]
+    count = int(np.ceil(X)) if np.ndim(X) == 0 else np.shape(X)[axis]
     return frames_to_samples(np.arange(count), hop_length=hop_length, n_fft=n_fft)
 
 
+@refuses
 def times_like(
     X: npt.NDArray[Any] | int,
     *,

@@ -9,9 +9,11 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import Floats, floats, rows, unrows
 from ._chroma_cqt import chroma_cqt
+from ._refusals import refuses
 from .errors import ParameterError
 
 
+@refuses
 def tonnetz(
     *,
     y: npt.ArrayLike | None = None,

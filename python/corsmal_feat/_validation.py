@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._sklearn import DataConversionWarning
+from ._warnings import warn
 from .errors import DataTypeError, ParameterError
 
 Matrix = npt.NDArray[np.float64]
@@ -138,8 +138,7 @@ def _is_missing(label: Any) -> bool:
 
 
 def _warn_column(labels: npt.NDArray[Any]) -> None:
-    warnings.warn(
+    warn(
         f"A column-vector y was passed when a 1d array was expected: its shape is {labels.shape}.",
         DataConversionWarning,
-        stacklevel=5,
     )

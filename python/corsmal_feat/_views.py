@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
+from ._refusals import refuses
 from .errors import ParameterError
 
 StrPath = str | os.PathLike[str]
@@ -28,6 +29,12 @@ class Camera:
     rotation : ndarray [3, 3], world to camera (the data set calls it `rvec`)
     translation : ndarray [3], world to camera, in m
     projection : ndarray [3, 4], world to pixels, homogeneous
+
+    Examples
+    --------
+    >>> camera = corsmal_feat.vision.load_calibration("c1.json").rgb
+    >>> camera.projection @ [0.0, 0.0, 0.0, 1.0]  # where the world's origin is seen
+    array([320., 365.,   1.])
     """
 
     intrinsic: Doubles
@@ -46,6 +53,12 @@ class Calibration:
         Colour.
     ir1, ir2 : Camera, optional
         Infrared, where the file has them.
+
+    Examples
+    --------
+    >>> calibration = corsmal_feat.vision.load_calibration("c1.json")
+    >>> calibration.rgb.intrinsic[0, 0], calibration.ir1
+    (np.float64(900.0), None)
     """
 
     rgb: Camera
@@ -53,6 +66,7 @@ class Calibration:
     ir2: Camera | None = None
 
 
+@refuses
 def load_calibration(path: StrPath) -> Calibration:
     """Reads a calibration file of the data set, or the same as JSON.
 
@@ -81,6 +95,7 @@ def load_calibration(path: StrPath) -> Calibration:
     return Calibration(**{name: _camera(n) for name, n in _core.load_calibration(os.fspath(path))})
 
 
+@refuses
 def load_mask(path: StrPath) -> npt.NDArray[np.bool_]:
     """Reads a mask's PNG.
 
@@ -103,6 +118,7 @@ def load_mask(path: StrPath) -> npt.NDArray[np.bool_]:
     return _core.load_mask(os.fspath(path))
 
 
+@refuses
 def load_depth(path: StrPath) -> npt.NDArray[np.uint16]:
     """Reads a 16-bit depth PNG.
 

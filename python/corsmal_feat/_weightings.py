@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._decibels import power_to_db
+from ._refusals import refuses
 from ._times import Doubles, Number
 from .errors import ParameterError
 
@@ -25,7 +26,8 @@ def _squares(frequencies: Any) -> Any:
 def A_weighting(frequencies: Number, *, min_db: float | None = -80.0) -> np.float64: ...
 @overload
 def A_weighting(frequencies: npt.ArrayLike, *, min_db: float | None = -80.0) -> Doubles: ...
-def A_weighting(frequencies: Any, *, min_db: float | None = -80.0) -> Any:
+@refuses
+def A_weighting(frequencies: npt.ArrayLike, *, min_db: float | None = -80.0) -> Any:
     """A weighting in dB (librosa.A_weighting, IEC 61672).
 
     Parameters
@@ -57,7 +59,8 @@ def A_weighting(frequencies: Any, *, min_db: float | None = -80.0) -> Any:
 def B_weighting(frequencies: Number, *, min_db: float | None = -80.0) -> np.float64: ...
 @overload
 def B_weighting(frequencies: npt.ArrayLike, *, min_db: float | None = -80.0) -> Doubles: ...
-def B_weighting(frequencies: Any, *, min_db: float | None = -80.0) -> Any:
+@refuses
+def B_weighting(frequencies: npt.ArrayLike, *, min_db: float | None = -80.0) -> Any:
     """B weighting in dB (librosa.B_weighting).
 
     Parameters
@@ -86,7 +89,8 @@ def B_weighting(frequencies: Any, *, min_db: float | None = -80.0) -> Any:
 def C_weighting(frequencies: Number, *, min_db: float | None = -80.0) -> np.float64: ...
 @overload
 def C_weighting(frequencies: npt.ArrayLike, *, min_db: float | None = -80.0) -> Doubles: ...
-def C_weighting(frequencies: Any, *, min_db: float | None = -80.0) -> Any:
+@refuses
+def C_weighting(frequencies: npt.ArrayLike, *, min_db: float | None = -80.0) -> Any:
     """C weighting in dB (librosa.C_weighting, IEC 61672).
 
     Parameters
@@ -115,7 +119,8 @@ def C_weighting(frequencies: Any, *, min_db: float | None = -80.0) -> Any:
 def D_weighting(frequencies: Number, *, min_db: float | None = -80.0) -> np.float64: ...
 @overload
 def D_weighting(frequencies: npt.ArrayLike, *, min_db: float | None = -80.0) -> Doubles: ...
-def D_weighting(frequencies: Any, *, min_db: float | None = -80.0) -> Any:
+@refuses
+def D_weighting(frequencies: npt.ArrayLike, *, min_db: float | None = -80.0) -> Any:
     """D weighting in dB (librosa.D_weighting).
 
     Parameters
@@ -142,6 +147,7 @@ def D_weighting(frequencies: Any, *, min_db: float | None = -80.0) -> Any:
     return _clamped(20.0 * gain, min_db)
 
 
+@refuses
 def Z_weighting(frequencies: npt.ArrayLike, *, min_db: float | None = None) -> Doubles:
     """Zeros: no weighting (librosa.Z_weighting).
 
@@ -175,6 +181,7 @@ _KINDS: dict[str | None, Callable[..., Any]] = {
 }
 
 
+@refuses
 def frequency_weighting(
     frequencies: npt.ArrayLike, *, kind: str | None = "A", **kwargs: Any
 ) -> Doubles:
@@ -205,6 +212,7 @@ def frequency_weighting(
     return weights
 
 
+@refuses
 def multi_frequency_weighting(
     frequencies: npt.ArrayLike, *, kinds: Iterable[str] = "ZAC", **kwargs: Any
 ) -> Doubles:
@@ -231,6 +239,7 @@ def multi_frequency_weighting(
     return np.stack([frequency_weighting(frequencies, kind=k, **kwargs) for k in kinds])
 
 
+@refuses
 def perceptual_weighting(
     S: npt.NDArray[Any], frequencies: npt.ArrayLike, *, kind: str | None = "A", **kwargs: Any
 ) -> npt.NDArray[Any]:

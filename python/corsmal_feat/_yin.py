@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ._arrays import Floats, audio, number
+from ._refusals import refuses
+from ._warnings import warn
 from .errors import ParameterError
 from .util import frame, tiny
 
@@ -18,6 +19,7 @@ _NOT_GIVEN: Any = object()
 _PADDINGS = ("constant", "edge", "reflect", "symmetric", "wrap", "linear_ramp")
 
 
+@refuses
 def yin(
     y: npt.ArrayLike,
     *,
@@ -25,7 +27,7 @@ def yin(
     fmax: float,
     sr: float = 22050,
     frame_length: int = 2048,
-    win_length: Any = _NOT_GIVEN,
+    win_length: int | None = _NOT_GIVEN,
     hop_length: int | None = None,
     trough_threshold: float = 0.1,
     center: bool = True,
@@ -66,11 +68,7 @@ def yin(
     if fmin is None or fmax is None:
         raise ParameterError('both "fmin" and "fmax" must be provided')
     if win_length is not _NOT_GIVEN:
-        warnings.warn(
-            "win_length is deprecated in librosa 0.11 and has no effect",
-            category=FutureWarning,
-            stacklevel=2,
-        )
+        warn("win_length is deprecated in librosa 0.11 and has no effect", category=FutureWarning)
     sr, fmin, fmax = number("sr", sr), number("fmin", fmin), number("fmax", fmax)
     _check(sr, fmin, fmax, frame_length)
     signal = audio(y)
@@ -111,12 +109,11 @@ def _check(sr: float, fmin: float, fmax: float, frame_length: int) -> None:
             f"frame_length={int(np.ceil(sr / fmin) + 1)}"
         )
     if sr / fmin >= frame_length // 2:
-        warnings.warn(
+        warn(
             f"With fmin={fmin:.3f}, sr={sr} and frame_length={frame_length}, less than two "
             "periods of fmin fit into the frame, which can cause inaccurate pitch detection. "
             f"Consider increasing to fmin={sr / (frame_length / 2):.3f} or "
-            f"frame_length={int(np.ceil(sr / fmin) * 2 + 1)}.",
-            stacklevel=3,
+            f"frame_length={int(np.ceil(sr / fmin) * 2 + 1)}."
         )
 
 

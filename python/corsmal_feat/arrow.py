@@ -5,21 +5,24 @@ Needs pyarrow (`pip install pyarrow`).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from ._batches import Job
 from ._extract import MOST_JOBS, Config, StrPath
+from ._refusals import refuses
 from .errors import ParameterError
 
 __all__ = ["extract_batch"]
 
 
+@refuses
 def extract_batch(
     batch: Any,
     *,
     preset: str | None = None,
     config: Config | None = None,
-    set: Any = None,
+    set: Mapping[str, Any] | None = None,
     projection: StrPath | None = None,
     model: StrPath | None = None,
     summary: str = "columns",

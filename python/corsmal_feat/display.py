@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from ._frequencies import cqt_frequencies, fft_frequencies, mel_frequencies
 from ._pitches import midi_to_hz
+from ._refusals import refuses
 from ._times import times_like
+from ._warnings import warn
 from .errors import ParameterError
 
 __all__ = ["specshow", "waveshow"]
@@ -22,6 +24,12 @@ _TIMES = {"time": 1.0, "s": 1.0, "ms": 1e3}
 _PLAIN = ("frames", "off", "none", None)
 _HERTZ = ("linear", "fft", "hz", "log", "mel", "cqt_hz", "cqt_note")
 _CLASSES = ("chroma", "tonnetz")
+#: Axes of one kind, which have one scale where they have the same limits.
+_ALIKE = (set(_TIMES), {"linear", "fft", "hz"}, {"frames"}, {"chroma"}, {"tonnetz"})
+#: What only librosa's ticks of Indian and just intonation, keys and tempograms need.
+_LEFT_OUT = (
+    "Sa", "intervals", "key", "mela", "tempo_max", "tempo_min", "thaat", "unicode", "unison",
+)  # fmt: skip
 
 
 def _pyplot() -> Any:
@@ -33,6 +41,7 @@ def _pyplot() -> Any:
         ) from error
 
 
+@refuses
 def specshow(
     data: npt.ArrayLike,
     *,
@@ -46,7 +55,9 @@ def specshow(
     win_length: int | None = None,
     fmin: float | None = None,
     fmax: float | None = None,
+    tuning: float = 0.0,
     bins_per_octave: int = 12,
+    auto_aspect: bool = True,
     htk: bool = False,
     ax: Any = None,
     **kwargs: Any,
@@ -68,8 +79,12 @@ def specshow(
         Of the transform.
     fmin, fmax : float, optional
         Range of mel bands, lowest bin of a constant-Q transform, in Hz.
+    tuning : float
+        Of a constant-Q transform, in fractions of a bin.
     bins_per_octave : int
         Of a constant-Q transform, or of a chromagram.
+    auto_aspect : bool
+        Draw squares where both axes are of one kind and have the same limits.
     htk : bool
         Scale of the mel bands.
     ax : matplotlib axes, optional
@@ -87,6 +102,9 @@ def specshow(
     >>> mesh.axes.get_ylabel()
     'Hz'
     """
+    left_out = [name for name in _LEFT_OUT if name in kwargs]
+    if left_out:
+        raise ParameterError(f"{left_out[0]} is not here: use librosa.display.specshow for it")
     values = np.asarray(data)
     if values.ndim != 2:
         raise ParameterError(f"data has {values.ndim} dimensions, expected 2")
@@ -108,13 +126,25 @@ def specshow(
         if axis in _TIMES:
             return times_like(count, sr=sr, hop_length=hop_length)
         if axis in ("linear", "fft", "hz", "log"):
-            return np.resize(fft_frequencies(sr=sr, n_fft=length), count)
+            bins = fft_frequencies(sr=sr, n_fft=length)
+            if len(bins) != count:
+                raise ParameterError(
+                    f"n_fft = {length} has {len(bins)} bins, data has {count}: give the n_fft of"
+                    " the transform"
+                )
+            return bins
         if axis == "mel":
             high = sr / 2 if fmax is None else fmax
             return mel_frequencies(count, fmin=fmin or 0.0, fmax=high, htk=htk)
         if axis in ("cqt_hz", "cqt_note"):
             low = _C1 if fmin is None else fmin
-            return cqt_frequencies(count, fmin=low, bins_per_octave=bins_per_octave)
+            found = cqt_frequencies(count, fmin=low, bins_per_octave=bins_per_octave, tuning=tuning)
+            if (found > sr / 2).any():
+                warn(
+                    f"the frequencies reach {found[-1]:.0f} Hz, beyond sr / 2: give sr, fmin and"
+                    " bins_per_octave of the transform"
+                )
+            return found
         if axis in _PLAIN or axis in _CLASSES:
             return np.arange(count)
         names = ", ".join(str(name) for name in (*_TIMES, *_HERTZ, *_CLASSES, *_PLAIN))
@@ -127,6 +157,9 @@ def specshow(
         plot.sci(mesh)
     _decorate(axes.xaxis, axes.set_xscale, x_axis, bins_per_octave)
     _decorate(axes.yaxis, axes.set_yscale, y_axis, bins_per_octave)
+    alike = any(x_axis in kind and y_axis in kind for kind in _ALIKE)
+    if auto_aspect and alike and axes.get_xlim() == axes.get_ylim():
+        axes.set_aspect("equal")
     return mesh
 
 
@@ -165,6 +198,7 @@ def _decorate(axis: Any, scale: Callable[..., Any], kind: str | None, bins: int)
     axis.set_label_text(labels.get(kind or "", ""))
 
 
+@refuses
 def waveshow(
     y: npt.ArrayLike,
     *,
@@ -172,6 +206,10 @@ def waveshow(
     max_points: int = 11025,
     axis: str | None = "time",
     offset: float = 0.0,
+    marker: Any = "",
+    where: Literal["pre", "post", "mid"] = "post",
+    label: str | None = None,
+    transpose: bool = False,
     ax: Any = None,
     **kwargs: Any,
 ) -> Any:
@@ -190,10 +228,18 @@ def waveshow(
         Label of the horizontal axis.
     offset : float
         Seconds at the first sample.
+    marker : matplotlib marker
+        Of the samples.
+    where : {"post", "pre", "mid"}
+        Where a value begins or ends.
+    label : str, optional
+        For the legend.
+    transpose : bool
+        Time goes upwards.
     ax : matplotlib axes, optional
         Where to draw; the current ones by default.
     **kwargs
-        Of matplotlib's `plot` or `fill_between`.
+        Of matplotlib's `step` or `fill_between`.
 
     Returns
     -------
@@ -214,7 +260,10 @@ def waveshow(
     axes = plot.gca() if ax is None else ax
     samples = signal.shape[1]
     if samples <= max_points and len(signal) == 1:
-        (drawn,) = axes.plot(offset + np.arange(samples) / sr, signal[0], **kwargs)
+        points = [offset + np.arange(samples) / sr, signal[0]]
+        if transpose:
+            points.reverse()
+        (drawn,) = axes.step(*points, marker=marker, where=where, label=label, **kwargs)
     else:
         piece = -(-samples // max_points)
         padded = np.pad(np.abs(signal).max(axis=0), (0, -samples % piece))
@@ -224,6 +273,8 @@ def waveshow(
             padded = np.pad(signal[0], (0, -samples % piece), mode="edge").reshape(-1, piece)
             upper, lower = padded.max(axis=1), padded.min(axis=1)
         times = offset + np.arange(len(upper)) * piece / sr
-        drawn = axes.fill_between(times, lower, upper, step="post", **kwargs)
-    _decorate(axes.xaxis, axes.set_xscale, axis, 12)
+        fill = axes.fill_betweenx if transpose else axes.fill_between
+        drawn = fill(times, lower, upper, step=where, label=label, **kwargs)
+    along, scale = (axes.yaxis, axes.set_yscale) if transpose else (axes.xaxis, axes.set_xscale)
+    _decorate(along, scale, axis, 12)
     return drawn

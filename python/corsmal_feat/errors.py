@@ -7,6 +7,8 @@ __all__ = [
     "CorsmalFeatError",
     "DataTypeError",
     "DecodeError",
+    "FileError",
+    "MissingFileError",
     "ModelError",
     "NotFittedError",
     "ParameterError",
@@ -52,3 +54,14 @@ class RunError(CorsmalFeatError, RuntimeError):
 
 class DecodeError(RunError):
     """A recording has no features where each needs them."""
+
+
+class FileError(RunError, OSError):
+    """A file cannot be read or written."""
+
+    # An OSError shows its arguments.
+    __str__ = Exception.__str__
+
+
+class MissingFileError(FileError, DecodeError, FileNotFoundError):
+    """A file is not there."""

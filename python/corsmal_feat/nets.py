@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
+from ._refusals import refuses
 from .errors import ParameterError
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ class TrainingSteps(TypedDict):
     gradient_norms: dict[str, float]
 
 
+@refuses
 def names() -> dict[str, str]:
     """The published networks.
 
@@ -58,6 +60,7 @@ def names() -> dict[str, str]:
     return dict(_core.networks_published())
 
 
+@refuses
 def build(name: str, *, outputs: int | None = None, seed: int = 0) -> Network:
     """The published network of this name; hyphen and underscore are equal.
 
@@ -84,6 +87,7 @@ def build(name: str, *, outputs: int | None = None, seed: int = 0) -> Network:
     return Network(_core.Network.build(name, outputs, _seed(seed)))
 
 
+@refuses
 def read_weights(path: str | os.PathLike[str]) -> dict[str, _Singles]:
     """Reads weights; nothing in the file is run.
 
@@ -106,6 +110,7 @@ def read_weights(path: str | os.PathLike[str]) -> dict[str, _Singles]:
     return _core.read_weights(os.fspath(path))
 
 
+@refuses
 def write_weights(path: str | os.PathLike[str], state: Mapping[str, Any]) -> None:
     """Writes weights, whole or not at all.
 
@@ -134,6 +139,12 @@ class Network:
         Numbers that training changes.
     layers : list
         Layers in their order, each with the shape of an item after it.
+
+    Examples
+    --------
+    >>> network = corsmal_feat.nets.build("m3-mlp", seed=1)
+    >>> network.name, network.num_parameters
+    ('m3_mlp', 20763827)
     """
 
     def __init__(self, network: _core.Network) -> None:

@@ -11,9 +11,8 @@ import hashlib
 import json
 import os
 import sys
-import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -25,6 +24,8 @@ from ._batch_rows import rows_of
 from ._batches import Job
 from ._extract import Config, StrPath
 from ._parts import ATTEMPTS, DEATHS, PARTS, compute_part, write_whole
+from ._refusals import refuses
+from ._warnings import warn
 from .errors import CorsmalFeatError, ParameterError, RunError
 
 __all__ = ["Accounting", "extract", "manifest"]
@@ -34,6 +35,7 @@ _JOB = "job.json"
 _AHEAD = 2
 
 
+@refuses
 def manifest(paths: StrPath | Iterable[StrPath]) -> Any:
     """The recordings that names stand for, as the command `corsmal-feat extract` takes them.
 
@@ -61,7 +63,7 @@ def manifest(paths: StrPath | Iterable[StrPath]) -> Any:
             raise RunError(f"{names[0]}: {error}") from error
     found, warning = _core.collect(names)
     if warning is not None:
-        warnings.warn(warning, stacklevel=2)
+        warn(warning)
     text, seconds, bytes_ = pa.string(), pa.float64(), pa.uint64()
     columns = {
         "id": pa.array([row[0] for row in found], text),
@@ -82,13 +84,14 @@ def manifest(paths: StrPath | Iterable[StrPath]) -> Any:
     return pa.table(columns)
 
 
+@refuses
 def extract(
     paths: Any,
     out: StrPath,
     *,
     preset: str | None = None,
     config: Config | None = None,
-    set: Any = None,
+    set: Mapping[str, Any] | None = None,
     projection: StrPath | None = None,
     model: StrPath | None = None,
     summary: str = "columns",

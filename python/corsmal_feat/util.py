@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._arrays import size as whole
+from ._refusals import refuses
 from .errors import ParameterError
 
 __all__ = ["fix_frames", "fix_length", "frame", "normalize", "pad_center", "tiny", "valid_audio"]
@@ -23,6 +24,7 @@ def _along(x: Array, axis: int) -> int:
     return int(x.shape[axis])
 
 
+@refuses
 def frame(
     x: npt.ArrayLike,
     *,
@@ -79,6 +81,7 @@ def frame(
     return windows[tuple(steps)]
 
 
+@refuses
 def fix_length(data: npt.ArrayLike, *, size: int, axis: int = -1, **kwargs: Any) -> Array:
     """Cuts or pads an axis to `size` (librosa.util.fix_length).
 
@@ -124,6 +127,7 @@ def _padded(array: Array, widths: list[tuple[int, int]], kwargs: dict[str, Any])
     return padded
 
 
+@refuses
 def pad_center(data: npt.ArrayLike, *, size: int, axis: int = -1, **kwargs: Any) -> Array:
     """Pads an axis on both sides to `size` (librosa.util.pad_center).
 
@@ -157,6 +161,7 @@ def pad_center(data: npt.ArrayLike, *, size: int, axis: int = -1, **kwargs: Any)
     return _padded(array, widths, kwargs)
 
 
+@refuses
 def fix_frames(
     frames: npt.ArrayLike, *, x_min: int | None = 0, x_max: int | None = None, pad: bool = True
 ) -> npt.NDArray[np.int64]:
@@ -193,6 +198,7 @@ def fix_frames(
     return np.unique(values).astype(np.int64)
 
 
+@refuses
 def tiny(x: npt.ArrayLike) -> np.floating[Any]:
     """Smallest normal number of the precision of `x`, float32 where it holds integers
     (librosa.util.tiny).
@@ -216,6 +222,7 @@ def tiny(x: npt.ArrayLike) -> np.floating[Any]:
     return smallest
 
 
+@refuses
 def valid_audio(y: Any) -> bool:
     """True, or an error that says why `y` is not a signal (librosa.util.valid_audio).
 
@@ -244,6 +251,7 @@ def valid_audio(y: Any) -> bool:
     return True
 
 
+@refuses
 def normalize(
     S: npt.ArrayLike,
     *,

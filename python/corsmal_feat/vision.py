@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
+from ._refusals import refuses
 from ._views import (
     Calibration,
     Camera,
@@ -86,6 +87,7 @@ class Region(TypedDict):
     size: tuple[float, float]
 
 
+@refuses
 def lode(
     masks: Sequence[Mask],
     calibrations: Sequence[Calibration | StrPath],
@@ -143,6 +145,7 @@ def lode(
     }
 
 
+@refuses
 def cuboid(
     depth: Depth,
     mask: Mask,
@@ -192,6 +195,7 @@ def cuboid(
     }
 
 
+@refuses
 def upright_box(
     depths: Sequence[Depth],
     masks: Sequence[Mask],
@@ -229,6 +233,7 @@ def upright_box(
     return {"volume": volume, "sides": np.array(sides), "points": points}
 
 
+@refuses
 def region(depth: Depth) -> Region | None:
     """M2's region of interest in a depth image; None where nothing near is large enough.
 
@@ -258,6 +263,7 @@ def region(depth: Depth) -> Region | None:
     return {"bounds": (left, top, right, bottom), "image": image, "size": (height, width)}
 
 
+@refuses
 def m2_capacity(depth: Depth | Region, weights: StrPath) -> float | None:
     """M2's capacity in mL from a depth image of the robot's view, or from its region of interest.
 

@@ -117,6 +117,27 @@ def test_delta(seed: int) -> None:
     agree(*both("feature.delta", data, **options), scale(data, 3e-6, 1e-10), least=1.0)
 
 
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("more", [{"cval": 3.5, "mode": "constant"}, {"delta": 0.02}, {"deriv": 1}])
+def test_delta_passes_on_what_the_filter_takes(order: int, more: dict[str, Any]) -> None:
+    data = np.random.default_rng(order).standard_normal((3, 40))
+    ours, theirs = both("feature.delta", data, order=order, **more)
+    np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
+    with pytest.raises(corsmal_feat.ParameterError, match="does not take 'polyorders'"):
+        corsmal_feat.feature.delta(data, polyorders=3)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_types_of_results(dtype: Any) -> None:
+    y = np.random.default_rng(1).standard_normal(5000).astype(np.float32)
+    for name in ("feature.rms", "feature.melspectrogram", "feature.mfcc"):
+        ours, theirs = both(name, y=y, dtype=dtype)
+        assert ours.dtype == theirs.dtype, name
+        np.testing.assert_allclose(ours, theirs, rtol=2e-5, atol=2e-4)
+    with pytest.raises(corsmal_feat.ParameterError, match="float32 or float64"):
+        corsmal_feat.feature.rms(y=y, dtype=np.int16)
+
+
 @pytest.mark.parametrize("rates", [(44100, 22050), (22050, 44100), (48000, 16000), (8000, 8000)])
 @pytest.mark.parametrize("signal", ["one sample", "short", "noise", "silence", "stereo", "nested"])
 def test_resample(signal: str, rates: tuple[int, int]) -> None:

@@ -140,6 +140,7 @@ def test_classes_are_typed_and_documented(kind: type) -> None:
     if is_error or is_dict:
         return
     assert "Parameters\n" in kind.__doc__ or "Attributes\n" in kind.__doc__, kind
+    assert ">>> " in kind.__doc__, kind
     for name in dir(kind):
         if name.startswith("_") or not (kind.__module__ or "").startswith("corsmal_feat"):
             continue

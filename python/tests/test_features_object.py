@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 from pathlib import Path
 
 import corsmal_feat as cf
@@ -111,6 +112,9 @@ def test_files_of_others_are_refused_in_words(tmp_path: Path, folder: Path) -> N
     np.savez(tmp_path / "other.npz", a=np.zeros(3))
     with pytest.raises(cf.ParameterError, match="no __meta__"):
         cf.Features.load(tmp_path / "other.npz")
+    np.savez(tmp_path / "named.npz", a=np.zeros(3), b=np.array([None, {}], dtype=object))
+    with pytest.raises(cf.ParameterError, match="b holds Python objects"):
+        cf.load_features(tmp_path / "named.npz")
     objects = {"__meta__": np.array([None, {}], dtype=object)}
     np.savez(tmp_path / "objects.npz", **objects)
     with pytest.raises(cf.ParameterError, match="holds Python objects"):
@@ -129,6 +133,65 @@ def test_parquet_edited_by_pandas(tmp_path: Path, folder: Path) -> None:
     assert again.ids == kept.ids and again.names == kept.names
     assert np.array_equal(again.summary, kept.summary)
     assert list(again.labels["rating"]) == ["good", "bad"]
+
+
+def test_edited_tables_that_cannot_be_right_are_refused(tmp_path: Path, folder: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    path = tmp_path / "table.parquet"
+    kept = cf.extract([folder], preset="mfcc-zcr", out=path)
+    table = pandas.read_parquet(path)
+    name = kept.names[3]
+
+    whole = table.assign(**{name: [3, 4]})
+    whole.to_parquet(path)
+    again = cf.load_features(path)
+    assert again.names == kept.names
+    assert list(again.summary[:, 3]) == [3.0, 4.0]
+    model = cf.DecisionTree().fit(again.summary, ["a", "b"])
+    with pytest.raises(cf.ParameterError, match="does not say how it was made"):
+        model.save(tmp_path / "tree.model", features=again)
+
+    pandas.concat([table, table]).to_parquet(path)
+    with pytest.raises(cf.ParameterError, match="rows 0 and 2 have the same id, 'a'"):
+        cf.load_features(path)
+    table.assign(id=["a", None]).to_parquet(path)
+    with pytest.raises(cf.ParameterError, match="row 1 has no id"):
+        cf.load_features(path)
+    table.assign(takes=[[1, 2], [3]]).to_parquet(path)
+    with pytest.raises(cf.ParameterError, match="takes holds lists"):
+        cf.load_features(path)
+
+
+def test_the_command_and_python_read_edited_tables_alike(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    command = os.environ.get("CORSMAL_FEAT")
+    if not command:
+        pytest.skip("CORSMAL_FEAT is not set: the path of the command")
+    for take in range(8):
+        noise = np.random.default_rng(take).standard_normal(4000)
+        soundfile.write(tmp_path / f"{take}.wav", 0.1 * noise, 8000)
+    path = tmp_path / "table.parquet"
+    kept = cf.extract([tmp_path], preset="mfcc-zcr", out=path)
+    table = pandas.read_parquet(path)
+    table[kept.names[0]] = np.arange(8)
+    table["class"] = ["a", "b"] * 4
+    table["take"] = np.arange(8)
+    table.to_parquet(path)
+    assert cf.load_features(path).names == kept.names
+    model = tmp_path / "tree.model"
+    args = ["train", path, "--target", "class", "--classifier", "tree", "-o", model]
+    subprocess.run([command, *args], check=True)
+    assert cf.load_model(model).n_features_in_ == len(kept.names)
+
+
+def test_a_file_is_known_by_its_content(tmp_path: Path, folder: Path) -> None:
+    pytest.importorskip("pyarrow")
+    for ending in (".npz", ".parquet"):
+        kept = cf.extract([folder], preset="mfcc-zcr", out=tmp_path / f"f{ending}")
+        (tmp_path / f"f{ending}").rename(tmp_path / "features")
+        assert np.array_equal(cf.load_features(tmp_path / "features").summary, kept.summary)
 
 
 def test_parquet_edited_by_polars(tmp_path: Path, folder: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from importlib import import_module
 from pathlib import Path
@@ -47,3 +48,35 @@ def test_names_and_states(section: str) -> None:
         assert bool(note) == (state == "differs"), name
     there = sum(state != "absent" for state, _ in table.values())
     assert f"\n{there} of {len(table)}.\n" in TABLES[section]
+
+
+def parameters(function: object) -> dict[str, tuple[str, str]]:
+    """Kind and default of each, without what librosa no longer wants and what it passes on."""
+    assert callable(function)
+    found = inspect.signature(inspect.unwrap(function)).parameters.values()
+    return {
+        p.name: (p.kind.name, repr(p.default))
+        for p in found
+        if p.kind is not inspect.Parameter.VAR_KEYWORD and "DEPRECATED" not in repr(p.default)
+    }
+
+
+@pytest.mark.parametrize("section", TABLES)
+def test_parameters_and_defaults(section: str) -> None:
+    theirs = import_module(section)
+    for name, (state, note) in rows(section).items():
+        if state == "absent" or inspect.isclass(getattr(theirs, name)):
+            continue
+        ours: object = corsmal_feat
+        for part in (*section.split(".")[1:], name):
+            ours = getattr(ours, part)
+        if not callable(ours):
+            continue
+        wanted, found = parameters(getattr(theirs, name)), parameters(ours)
+        missing = {key for key, value in wanted.items() if found.get(key) != value}
+        if state == "equal":
+            assert not missing, f"{name}: {missing}"
+            order = [key for key in found if key in wanted]
+            assert order == list(wanted), name
+        else:
+            assert not [key for key in missing if f"`{key}`" not in note], f"{name}: {missing}"

@@ -139,12 +139,24 @@ def test_durations_and_rates(recordings: dict[str, Path]) -> None:
         assert cf.get_samplerate(path) == RATE
 
 
+@pytest.mark.parametrize("name", ["stereo.wav", "stereo.mp3"])
+def test_no_samples_of_several_channels(recordings: dict[str, Path], name: str) -> None:
+    for mono, shape in ((False, (2, 0)), (True, (0,))):
+        for duration in (0, 1e-6):
+            y, sr = cf.load(recordings[name], mono=mono, duration=duration)
+            assert y.shape == shape and sr == 22050
+
+
 def test_impossible_parts_are_refused(recordings: dict[str, Path], tmp_path: Path) -> None:
     path = recordings["mono.wav"]
     with pytest.raises(cf.DecodeError, match="beyond its end"):
         cf.load(path, offset=100.0)
-    with pytest.raises(cf.DecodeError, match=r"nothing\.wav"):
-        cf.load(tmp_path / "nothing.wav")
+    for read in (cf.load, cf.get_samplerate, cf.load_features):
+        with pytest.raises(cf.MissingFileError, match=r"nothing\.wav") as caught:
+            read(tmp_path / "nothing.wav")
+        assert isinstance(caught.value, FileNotFoundError)
+    with pytest.raises(cf.CorsmalFeatError, match="directory"):
+        cf.load_features(tmp_path)
     np.savez(tmp_path / "features.npz", a=np.zeros(3))
     with pytest.raises(cf.DecodeError, match="load_features"):
         cf.load(tmp_path / "features.npz")

@@ -91,7 +91,8 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
 }
 
 /// Columns of decimal numbers are features, all others label columns: so pandas and polars leave a
-/// table of ours.
+/// table of ours. Where all values of a column are whole, they may make it one of integers: names
+/// such as `mfcc[0].mean` stay features.
 pub(super) fn read_parquet(
     path: &Path,
     parquet: &ParquetFile,
@@ -105,7 +106,7 @@ pub(super) fn read_parquet(
     let mut features = Vec::new();
     for (at, (name, kind)) in names.iter().zip(&types).enumerate() {
         if name.starts_with(RESERVED) {
-        } else if kind.starts_with("float") {
+        } else if kind.starts_with("float") || (kind.starts_with("int") && name.contains('[')) {
             features.push(at);
         } else {
             let whole = |v: &f64| if v.is_nan() { String::new() } else { format!("{v:.0}") };
