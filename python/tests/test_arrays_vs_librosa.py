@@ -127,6 +127,13 @@ def test_delta_passes_on_what_the_filter_takes(order: int, more: dict[str, Any])
         corsmal_feat.feature.delta(data, polyorders=3)
 
 
+def test_foreign_byte_order_gives_the_same_numbers() -> None:
+    y = np.random.default_rng(1).standard_normal(5000)
+    for kind in ("f4", "f8"):
+        native, foreign = y.astype(kind), y.astype(">" + kind)
+        assert np.array_equal(corsmal_feat.stft(foreign), corsmal_feat.stft(native))
+
+
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_types_of_results(dtype: Any) -> None:
     y = np.random.default_rng(1).standard_normal(5000).astype(np.float32)
@@ -199,7 +206,6 @@ def test_channels_are_independent_and_leading_axes_are_kept() -> None:
         (np.zeros(3000, np.int16), r"divide int16 samples by 2\*\*15"),
         (np.zeros(3000, np.float16), "cast it first"),
         (np.zeros(3000, complex), "dtype complex128"),
-        (np.zeros(3000, ">f4"), "expected float32 or float64"),
         (np.full(3000, np.nan), "NaN or infinite"),
         (np.full((2, 3000), np.inf, np.float32)[:, ::2], "NaN or infinite"),
         (np.zeros(0, np.float32), "y has 0"),
