@@ -17,6 +17,7 @@ mod paragraphs;
 mod plural;
 mod progress;
 mod publish;
+mod recordings;
 mod study;
 mod text_table;
 

@@ -11,10 +11,23 @@ use crate::npz::Compression;
 
 /// A name that no output can have.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("{path}: must end in .npz or .parquet")]
+#[error("{path}: must end in {allowed}")]
 pub struct FormatError {
     /// The name.
     pub path: PathBuf,
+    /// The extensions that are allowed.
+    pub allowed: &'static str,
+}
+
+/// Refuses a name for an `.npz` that does not say so.
+///
+/// # Errors
+/// [`FormatError`].
+pub fn require_npz(path: &Path) -> Result<(), FormatError> {
+    match path.extension() {
+        Some(e) if e.eq_ignore_ascii_case("npz") => Ok(()),
+        _ => Err(FormatError { path: path.into(), allowed: ".npz" }),
+    }
 }
 
 /// The formats that a run writes.
@@ -34,9 +47,9 @@ impl OutputFormat {
     /// [`FormatError`] for any other extension.
     pub fn of_name(path: &Path, compression: Compression) -> Result<Self, FormatError> {
         match path.extension() {
-            Some(e) if e.eq_ignore_ascii_case("npz") => Ok(Self::Npz(compression)),
             Some(e) if e.eq_ignore_ascii_case("parquet") => Ok(Self::Parquet),
-            _ => Err(FormatError { path: path.into() }),
+            _ if require_npz(path).is_ok() => Ok(Self::Npz(compression)),
+            _ => Err(FormatError { path: path.into(), allowed: ".npz or .parquet" }),
         }
     }
 }
@@ -92,6 +105,9 @@ mod tests {
         assert_eq!(of("a.parquet").unwrap(), OutputFormat::Parquet);
         let error = of("a.npz.gz").unwrap_err().to_string();
         assert_eq!(error, "a.npz.gz: must end in .npz or .parquet");
+        assert!(require_npz(Path::new("a.NPZ")).is_ok());
+        let error = require_npz(Path::new("a.parquet")).unwrap_err().to_string();
+        assert_eq!(error, "a.parquet: must end in .npz");
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.npz");
         for (bytes, content) in [

@@ -182,8 +182,16 @@ impl Folds {
         splits::group_k_fold(&inside, different.clamp(2, FOLDS))
     }
 
+    /// What is odd, in words: classes that some fold tests without having trained on them.
+    pub fn warnings(&self, classes: &Classes) -> Vec<String> {
+        let one = |(class, fold): (usize, &str)| {
+            format!("fold {fold}: class {} has no training rows", self.names[class])
+        };
+        self.untrained(classes).into_iter().map(one).collect()
+    }
+
     /// Classes that some fold tests without having trained on them, each with the fold.
-    pub fn untrained(&self, classes: &Classes) -> Vec<(usize, &str)> {
+    fn untrained(&self, classes: &Classes) -> Vec<(usize, &str)> {
         let y = classes.indices();
         let mut found = Vec::new();
         for fold in &self.outer {

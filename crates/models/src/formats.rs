@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use thiserror::Error;
 
 use crate::words;
 
@@ -29,20 +31,74 @@ impl TrainedOn {
             (rates.into_iter().collect(), channels.into_iter().collect());
         known.then_some(Self { sample_rates, channels })
     }
+
+    /// Which recordings may have features by the configuration `used`, where those trained on were
+    /// made by `own`.
+    ///
+    /// # Errors
+    /// [`OtherRate`] for a rate to which no training recording was brought.
+    pub fn rule(&self, own: &Value, used: &Value) -> std::result::Result<FormatRule, OtherRate> {
+        let averaged = used["summary"]["average_channels"] == Value::Bool(true);
+        let every_channel = used["signal"]["channels"] == "all" && !averaged;
+        let own_rate = rate(used) == 0.0;
+        let rates = &self.sample_rates;
+        let known = own_rate || is_resampled_alike(own, used);
+        if !known && !rates.iter().any(|r| f64::from(*r) == rate(used)) {
+            let trained = rates.iter().map(|rate| hertz(*rate)).collect::<Vec<_>>().join(", ");
+            return Err(OtherRate { rate: rate(used), trained });
+        }
+        // One channel of eight is another signal than the one channel of a mono recording. Whoever
+        // sets other channels than the model's has decided.
+        let channels = &used["signal"]["channels"];
+        let selected = channels.is_array() && *channels == own["signal"]["channels"];
+        Ok(FormatRule {
+            sample_rates: own_rate.then(|| rates.clone()),
+            channels: (every_channel || selected).then(|| self.channels.clone()),
+            selected,
+            fixed: false,
+        })
+    }
+}
+
+/// The rate that a configuration resamples to; 0 where recordings keep their own.
+fn rate(config: &Value) -> f64 {
+    config["signal"]["sample_rate"].as_f64().unwrap_or(0.0)
+}
+
+/// Whether `used` resamples, and to the same rate as `own`.
+pub(crate) fn is_resampled_alike(own: &Value, used: &Value) -> bool {
+    rate(used) != 0.0 && rate(used) == rate(own)
+}
+
+/// Recordings would be brought to a rate that the model was not trained on.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error("signal.sample_rate must be {trained}, as in training, not {rate}")]
+pub struct OtherRate {
+    /// the rate asked for in Hz
+    pub rate: f64,
+    /// the rates in the model
+    pub trained: String,
 }
 
 /// Which recordings a model may be applied to, as far as their format matters to its features.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FormatRule {
     /// rates that are taken; every one where it is `None`
-    pub(crate) sample_rates: Option<Vec<u32>>,
+    sample_rates: Option<Vec<u32>>,
     /// numbers of channels that are taken
-    pub(crate) channels: Option<Vec<u32>>,
-    /// Whether the features are of some of the channels only.
-    pub(crate) selected: bool,
+    channels: Option<Vec<u32>>,
+    /// whether the features are of some of the channels only
+    selected: bool,
+    /// whether the model takes no other features
+    fixed: bool,
 }
 
 impl FormatRule {
+    /// The same for a network: no other configuration of its features gives what it takes.
+    pub fn of_fixed_features(self) -> Self {
+        Self { fixed: true, ..self }
+    }
+
     /// The sample rates in Hz that are taken; `None` for any.
     pub fn sample_rates(&self) -> Option<&[u32]> {
         self.sample_rates.as_deref()
@@ -83,6 +139,7 @@ impl FormatRule {
                      model reads"
                 }
                 ([1], false) => "--set signal.channels=mean mixes them",
+                _ if self.fixed => "give recordings of as many channels",
                 _ => {
                     "a model for any number needs training features with signal.channels=mean or \
                      summary.average_channels=true"
@@ -100,7 +157,7 @@ impl FormatRule {
 }
 
 /// `44,100 Hz`
-pub(crate) fn hertz(rate: u32) -> String {
+fn hertz(rate: u32) -> String {
     let (thousands, rest) = (rate / 1000, rate % 1000);
     if thousands == 0 { format!("{rest} Hz") } else { format!("{thousands},{rest:03} Hz") }
 }

@@ -28,11 +28,11 @@ use thiserror::Error;
 
 use crate::classifiers::Predicted;
 use crate::error::{ModelError, Result};
-use crate::formats::hertz;
+use crate::formats::is_resampled_alike;
 use crate::labels::Labels;
 use crate::pipeline::{Pipeline, PipelineSpec};
 
-pub use crate::formats::{FormatRule, TrainedOn};
+pub use crate::formats::{FormatRule, OtherRate, TrainedOn};
 
 const MAGIC: &[u8; 8] = b"CORSMDL\0";
 /// Version of the file format written.
@@ -140,13 +140,8 @@ pub enum ModelFileError {
         version: String,
     },
     /// Recordings would be brought to a rate that the model was not trained on.
-    #[error("signal.sample_rate must be {trained}, as in training, not {rate}")]
-    Rate {
-        /// the rate asked
-        rate: f64,
-        /// the rates in the model
-        trained: String,
-    },
+    #[error(transparent)]
+    Rate(#[from] OtherRate),
     /// The features offered were made with another configuration.
     #[error(
         "the model was trained on features with {}, these have {}",
@@ -235,36 +230,16 @@ impl Model {
     /// [`ModelFileError::FormatUnknown`] for a model that does not know what it was trained on, where
     /// that matters; [`ModelFileError::Rate`] for a rate to which no training recording was brought.
     pub fn format_rule(&self, config: &Value) -> std::result::Result<FormatRule, ModelFileError> {
-        let rate = |config: &Value| config["signal"]["sample_rate"].as_f64().unwrap_or(0.0);
-        let averaged = config["summary"]["average_channels"] == Value::Bool(true);
-        let every_channel = config["signal"]["channels"] == "all" && !averaged;
-        let own_rate = rate(config) == 0.0;
-        let resampled_alike = !own_rate && rate(config) == rate(&self.header.feature_config);
-        let Some(trained) = &self.header.trained_on else {
+        let own = &self.header.feature_config;
+        match &self.header.trained_on {
+            Some(trained) => Ok(trained.rule(own, config)?),
             // Another number of channels gives another number of features, which is refused anyway.
-            return match resampled_alike {
-                true => Ok(FormatRule::default()),
-                false => {
-                    let version = self.header.tool_version.clone();
-                    Err(ModelFileError::FormatUnknown { version })
-                }
-            };
-        };
-        let rates = &trained.sample_rates;
-        if !own_rate && !resampled_alike && !rates.iter().any(|r| f64::from(*r) == rate(config)) {
-            let trained = rates.iter().map(|rate| hertz(*rate)).collect::<Vec<_>>().join(", ");
-            return Err(ModelFileError::Rate { rate: rate(config), trained });
+            None if is_resampled_alike(own, config) => Ok(FormatRule::default()),
+            None => {
+                let version = self.header.tool_version.clone();
+                Err(ModelFileError::FormatUnknown { version })
+            }
         }
-        // One channel of eight is another signal than the one channel of a mono recording. Whoever
-        // sets other channels than the model's has decided.
-        let own = &self.header.feature_config["signal"]["channels"];
-        let selected =
-            config["signal"]["channels"].is_array() && config["signal"]["channels"] == *own;
-        Ok(FormatRule {
-            sample_rates: own_rate.then(|| rates.clone()),
-            channels: (every_channel || selected).then(|| trained.channels.clone()),
-            selected,
-        })
     }
 
     /// Writes the file, whole or not at all.

@@ -60,10 +60,7 @@ pub fn validate(
 ) -> Result<Validation> {
     let (labels, classes) = table.classes(target)?;
     let folds = Folds::new(plan, table, groups, (&labels, &classes), seed)?;
-    let untrained = folds.untrained(&classes).into_iter().map(|(class, fold)| {
-        format!("fold {fold}: class {} has no training rows", labels.names()[class])
-    });
-    let warnings = untrained.collect();
+    let warnings = folds.warnings(&classes);
     let dataset = table.dataset(classes.clone());
     let data = Data { dataset: &dataset, merge: None };
     let result = match candidates.as_slice() {

@@ -122,7 +122,7 @@ fn a_model_knows_which_recordings_it_may_be_applied_to() {
     assert!(rule.check(Some(44_100), Some(2)).is_ok() && rule.check(Some(8000), None).is_err());
     assert!(matches!(
         model.format_rule(&config(16_000.0, "all", false)),
-        Err(ModelFileError::Rate { .. })
+        Err(ModelFileError::Rate(_))
     ));
     // A model of version 0.1.0 matters only where recordings keep their own rate.
     let old = with(None, own.clone());

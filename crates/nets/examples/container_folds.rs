@@ -11,7 +11,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use corsmal_nets::cross_validation::{Data, Fold, cross_validate};
+use corsmal_nets::cross_validation::{Data, FoldItems, cross_validate};
 use corsmal_nets::dataset::Dataset;
 use corsmal_nets::networks;
 use serde_json::{Map, Value};
@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folds = FOLDS.map(|held| {
         let (test, train) =
             (0..data.ids.len()).partition(|&i| held.contains(&containers[i].as_str()));
-        Fold { name: held.join(","), train, test }
+        FoldItems { name: held.join(","), train, test }
     });
     let score = |truth: &[usize], found: &[usize]| weighted_f1(truth, found, definition.outputs);
     let input = Data {

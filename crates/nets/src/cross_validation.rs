@@ -11,7 +11,7 @@ use crate::recipe::{Recipe, Select};
 
 /// Items trained on and items held out.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fold {
+pub struct FoldItems {
     /// its name
     pub name: String,
     /// items trained on
@@ -56,11 +56,11 @@ pub struct Data<'a> {
 pub fn cross_validate(
     definition: &Definition,
     data: Data<'_>,
-    folds: &[Fold],
+    folds: &[FoldItems],
     recipe: &Recipe,
     folder: Option<&Path>,
     score: impl Fn(&[usize], &[usize]) -> f64,
-    mut progress: impl FnMut(&Fold, Progress<'_>) -> bool,
+    mut progress: impl FnMut(&FoldItems, Progress<'_>) -> bool,
 ) -> Result<Vec<FoldResult>> {
     let mut results = Vec::new();
     for (number, fold) in folds.iter().enumerate() {
@@ -84,7 +84,7 @@ pub fn cross_validate(
 /// A validation group without groups.
 pub fn watched(
     data: Data<'_>,
-    fold: &Fold,
+    fold: &FoldItems,
     recipe: &Recipe,
 ) -> Result<(Vec<usize>, Vec<usize>, Option<String>)> {
     match recipe.select {

@@ -216,13 +216,6 @@ pub fn single(items: Vec<Vec<Item>>) -> Items {
 /// Class numbers of a recording that has none, where all items need one; never trained on.
 pub const UNKNOWN: usize = 0;
 
-/// The most probable class; the lowest among equals.
-pub fn best(probabilities: &[f64]) -> usize {
-    (1..probabilities.len()).fold(0, |best, class| {
-        if probabilities[class] > probabilities[best] { class } else { best }
-    })
-}
-
 /// Probabilities as an array of known length.
 pub fn array<const N: usize>(probabilities: &[f64]) -> Option<[f64; N]> {
     probabilities.try_into().ok()

@@ -3,10 +3,17 @@
 //!
 //! Adding one: a file here with a [`Definition`], and one line in the list below.
 
+pub mod embedding;
+mod error;
+pub mod examples;
 mod learning;
+pub mod listening;
 pub mod recordings;
+pub mod training;
 
 use std::path::PathBuf;
+
+pub use error::SystemError;
 
 use corsmal_ccm::benchmark::System;
 use corsmal_ccm::{CcmError, Result};

@@ -1,8 +1,9 @@
 use corsmal_ccm::Result;
 use corsmal_ccm::benchmark::{Estimate, Prepared, System, Work};
+use corsmal_models::argmax;
 use corsmal_nets::items::Items;
 
-use crate::learning::{self, Learning, array, best};
+use crate::learning::{self, Learning, array};
 use crate::{Definition, Settings};
 
 /// Challengers' system.
@@ -48,8 +49,8 @@ impl Prepared for Ready<'_> {
         };
         let (levels, types) = (proba(3, &self.levels)?, proba(4, &self.types)?);
         let estimate = |(level, kind): (&Vec<f64>, &Vec<f64>)| Estimate {
-            level: Some(best(level)),
-            kind: Some(best(kind)),
+            level: Some(argmax(level)),
+            kind: Some(argmax(kind)),
             level_probabilities: array(level),
             kind_probabilities: array(kind),
             ..Estimate::default()

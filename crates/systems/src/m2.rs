@@ -1,8 +1,9 @@
 use corsmal_ccm::Result;
 use corsmal_ccm::benchmark::{Estimate, Prepared, System, Work};
+use corsmal_models::argmax;
 use corsmal_nets::items::Items;
 
-use crate::learning::{self, Learning, array, best};
+use crate::learning::{self, Learning, array};
 use crate::{Definition, Settings};
 
 /// NTNU-ERC's system.
@@ -46,7 +47,7 @@ impl Prepared for Ready<'_> {
         let trained = self.learning.train("m2_type", 4, &self.items, &self.types, train)?;
         let found = self.learning.probabilities(&trained, &self.items, wanted)?;
         let estimate = |kind: &Vec<f64>| Estimate {
-            kind: Some(best(kind)),
+            kind: Some(argmax(kind)),
             kind_probabilities: array(kind),
             ..Estimate::default()
         };

@@ -1,9 +1,10 @@
 use corsmal_ccm::Result;
 use corsmal_ccm::benchmark::{Estimate, Prepared, Subject, System, Work};
+use corsmal_models::argmax;
 use corsmal_models::fusion::{Background, WindowVotes};
 use corsmal_nets::items::{Column, Items};
 
-use crate::learning::{Learning, array, best};
+use crate::learning::{Learning, array};
 use crate::{Definition, Settings};
 
 /// HVRL's system.
@@ -101,7 +102,7 @@ impl Prepared for Ready<'_> {
             let rows = self.windows_of(&[subject]);
             let mut votes = WindowVotes::new(4);
             for proba in learning.probabilities(&hears, &self.windows, &rows)? {
-                votes.add(best(&proba), Some(&proba)).map_err(|e| learning.fault(&e))?;
+                votes.add(argmax(&proba), Some(&proba)).map_err(|e| learning.fault(&e))?;
             }
             let kind = votes.majority(Some(Background { class: 0, least: LEAST }));
             kinds.push((kind, votes.shares()));
@@ -127,7 +128,7 @@ impl Prepared for Ready<'_> {
         let estimate = |((kind, shares), level): (&(Option<usize>, Vec<f64>), &Vec<f64>)| Estimate {
             kind: *kind,
             kind_probabilities: array(shares),
-            level: Some(best(level)),
+            level: Some(argmax(level)),
             level_probabilities: array(level),
             ..Estimate::default()
         };

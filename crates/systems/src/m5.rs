@@ -2,13 +2,14 @@ use std::collections::HashMap;
 
 use corsmal_ccm::Result;
 use corsmal_ccm::benchmark::{Estimate, Prepared, System, Work};
+use corsmal_models::argmax;
 use corsmal_models::classifiers::RandomForestParams;
 use corsmal_models::pipeline::PipelineSpec;
 use corsmal_nets::dataset::Dataset;
 use corsmal_nets::items::{Column, Items};
 use ndarray::{Array2, Axis};
 
-use crate::learning::{Learning, array, best};
+use crate::learning::{Learning, array};
 use crate::{Definition, Settings};
 
 /// Because It's Tactile's system.
@@ -188,8 +189,8 @@ impl Prepared for Ready<'_> {
         }
         let (levels, types) = (mean(&levels), mean(&types));
         let estimate = |(level, kind): (&Vec<f64>, &Vec<f64>)| Estimate {
-            level: Some(best(level)),
-            kind: Some(best(kind)),
+            level: Some(argmax(level)),
+            kind: Some(argmax(kind)),
             level_probabilities: array(level),
             kind_probabilities: array(kind),
             ..Estimate::default()

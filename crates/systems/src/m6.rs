@@ -1,9 +1,10 @@
 use corsmal_ccm::Result;
 use corsmal_ccm::benchmark::{Estimate, Prepared, System, Work};
 use corsmal_ccm::dataset::Filling;
+use corsmal_models::argmax;
 use corsmal_nets::items::Items;
 
-use crate::learning::{self, Learning, UNKNOWN, best};
+use crate::learning::{self, Learning, UNKNOWN};
 use crate::{Definition, Settings};
 
 /// ACC's system.
@@ -85,9 +86,9 @@ impl Prepared for Ready<'_> {
             for (p, filling) in [(action[POURED], poured), (action[SHAKEN], shaken)] {
                 filling.iter().zip(&mut joint[1..]).for_each(|(q, all)| *all += p * q);
             }
-            let decided = match best(action) {
-                POURED => 1 + best(poured),
-                SHAKEN => 1 + best(shaken),
+            let decided = match argmax(action) {
+                POURED => 1 + argmax(poured),
+                SHAKEN => 1 + argmax(shaken),
                 _ => 0,
             };
             Estimate::joint(decided, Some(&joint))

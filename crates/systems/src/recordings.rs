@@ -1,4 +1,7 @@
 //! Features of recordings, as the front ends of networks take them.
+//!
+//! They come one recording after another, straight from the engine; [`extract`] keeps them in a file,
+//! for work that goes over them many times and may be continued, as a benchmark does.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,8 +17,20 @@ use corsmal_files::npz::{Compression, NpzFile};
 use corsmal_files::outcome::Outcome;
 use corsmal_files::shard::Shard;
 use corsmal_nets::front_end::{FrontEnd, Tensor};
+use corsmal_nets::networks::Definition;
 use ndarray::Ix3;
-use tempfile::TempDir;
+
+use crate::error::SystemError;
+
+/// How the input of a network comes from recordings.
+///
+/// # Errors
+/// [`SystemError::TakesNoRecordings`].
+pub fn front_end(definition: &Definition) -> std::result::Result<FrontEnd, SystemError> {
+    definition
+        .front_end
+        .ok_or(SystemError::TakesNoRecordings { network: definition.name, takes: definition.takes })
+}
 
 /// The configuration of a front end.
 ///
@@ -44,14 +59,22 @@ pub fn tensor(features: Features) -> std::result::Result<Tensor, String> {
     }
 }
 
+/// The label columns of recordings, by name.
+pub fn labels(inputs: &[&Input]) -> Vec<(String, Vec<String>)> {
+    let names = inputs.first().into_iter().flat_map(|input| &input.labels);
+    let column = |(at, (name, _)): (usize, &(String, String))| {
+        let value = |input: &&Input| input.labels.get(at).map_or(String::new(), |l| l.1.clone());
+        (name.clone(), inputs.iter().map(value).collect())
+    };
+    names.enumerate().map(column).collect()
+}
+
 /// Features of recordings in a file that is made where it is not there yet.
 pub struct Kept {
     npz: NpzFile,
     rows: Option<corsmal_files::table::Table>,
-    /// Where the file lies, if it goes with this.
-    _folder: Option<TempDir>,
     /// What became of each recording.
-    pub outcomes: Vec<Outcome>,
+    outcomes: Vec<Outcome>,
 }
 
 /// Extracts the features of `inputs` into `path`, or takes them from there.
@@ -92,22 +115,7 @@ pub fn extract(
         Some(_) => Some(layout::read_table(&mut npz).map_err(|e| fault(&e))?.0),
         None => None,
     };
-    Ok(Kept { npz, rows, _folder: None, outcomes: report.outcomes })
-}
-
-/// Extracts the features of `inputs` into a file that goes with what is returned.
-///
-/// # Errors
-/// As [`extract`].
-pub fn temporary(
-    inputs: &[Input],
-    config: &Arc<Config>,
-    jobs: usize,
-    stop: &Arc<AtomicBool>,
-) -> Result<Kept> {
-    let folder = tempfile::tempdir().map_err(CcmError::Write)?;
-    let kept = extract(inputs, config, &folder.path().join("features.npz"), jobs, stop)?;
-    Ok(Kept { _folder: Some(folder), ..kept })
+    Ok(Kept { npz, rows, outcomes: report.outcomes })
 }
 
 impl Kept {

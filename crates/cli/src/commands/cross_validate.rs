@@ -252,10 +252,10 @@ fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
     let Args { dataset, pipeline, network, quiet, jobs, .. } = args;
     let (jobs, quiet) = (jobs.count(), *quiet);
     let request = crate::networks::Request { dataset, pipeline, network, jobs, quiet };
-    let found = request.cross_validate(name, args.cv.as_ref())?;
+    let (target, examples, folds, found) = request.cross_validate(name, args.cv.as_ref())?;
     let held_out = args.predictions.as_deref().unwrap_or(Path::new("the held-out predictions"));
-    let ids = &found.table.ids;
-    let groups = found.folds.dependent();
+    let ids = &examples.table.ids;
+    let groups = folds.dependent();
     let predictions =
         found.result.predictions(ids, groups, &found.labels, &found.classes, held_out);
     let scores = corsmal_models::validation::held_out(&predictions)?;
@@ -267,9 +267,9 @@ fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
     }
     if args.json {
         let report = serde_json::json!({
-            "target": found.target,
+            "target": target,
             "labels": found.labels,
-            "folds_by": found.folds.description,
+            "folds_by": folds.description,
             "training": found.report,
             "result": found.result,
             "held_out": scores,
@@ -277,23 +277,23 @@ fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
         });
         println!("{}", serde_json::to_string_pretty(&report)?);
     } else if !args.quiet {
-        println!("features  {}: {} items", found.table.path.display(), ids.len());
-        println!("target    {}, {} classes", found.target, found.labels.len());
+        println!("features  {}: {} items", examples.table.path.display(), ids.len());
+        println!("target    {}, {} classes", target, found.labels.len());
         println!("network   {name}");
-        println!("held out  {}", found.folds.description);
+        println!("held out  {}", folds.description);
         if let Some(caution) = found.caution {
             println!("caution   {caution}");
         }
         println!();
-        print_folds(&found.result, &[], &found.folds);
+        print_folds(&found.result, &[], &folds);
         print_held_out(&scores);
     }
     if let Some(folder) = &args.report {
         let held_out = HeldOut {
-            table: &found.table,
-            target: &found.target,
+            table: &examples.table,
+            target: &target,
             classes: &found.classes,
-            folds: &found.folds,
+            folds: &folds,
             result: &found.result,
             predictions: &predictions,
             scores: &scores,

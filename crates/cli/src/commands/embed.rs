@@ -53,109 +53,36 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 /// Embeds and writes.
 #[cfg(feature = "nets")]
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
-    use std::sync::Arc;
-    use std::sync::atomic::Ordering;
-
-    use corsmal_ccm::CcmError;
-    use corsmal_extract::inputs;
-    use corsmal_files::outcome::Status;
-    use corsmal_nets::dataset::Dataset;
-    use corsmal_nets::items::{Column, Items};
-    use corsmal_nets::recipe::Padding;
-    use corsmal_nets::{networks, weights};
-    use corsmal_systems::recordings;
-    use serde_json::json;
+    use corsmal_files::format::require_npz;
+    use corsmal_systems::SystemError;
+    use corsmal_systems::embedding::Embedder;
 
     use crate::failure::{FAILED_FILES, INTERRUPTED};
+    use crate::recordings;
 
-    /// Items of a pass.
-    const TOGETHER: usize = 64;
-
-    if !args.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
-        return Err(Failure::new(format!("{}: must end in .npz", args.out.display())));
-    }
+    require_npz(&args.out)?;
     crate::publish::check(&args.out, args.overwrite)?;
-    let definition = networks::named(&args.network)?;
-    if definition.classifies {
-        return Err(Failure::new(format!(
-            "{} gives classes: `corsmal-feat classify` applies it; vggish embeds",
-            definition.name
-        )));
-    }
-    let front_end = crate::networks::front_end(definition)?;
-    let mut network = definition.build(None, 0)?;
-    network
-        .load_state(&weights::read(&args.weights)?)
-        .map_err(|e| Failure::new(format!("{}: {e}", args.weights.display())))?;
-    let collected = inputs::collect(&args.paths)?;
-    if let Some(skipped) = collected.warning() {
-        eprintln!("warning: {skipped}");
-    }
-    if collected.inputs.is_empty() {
-        return Err(Failure::new(format!("{}: no recordings found", args.paths.join(" "))));
-    }
-    let config = recordings::configuration(&front_end)?;
-    let about = json!({
-        "tool_version": env!("CARGO_PKG_VERSION"),
-        "network": definition.name,
-        "weights": corsmal_files::identity::of_file(&args.weights)?,
-        "config": config.to_value(),
-        "config_hash": config.hash(),
-        "inputs": inputs::list_hash(&collected.inputs),
-    });
+    let embedder = Embedder::new(&args.network, &args.weights)?;
+    let found = recordings::named(&args.paths, recordings::warn)?;
     let stop = crate::interrupt::flag();
-    let interrupted = || {
-        eprintln!("interrupted; nothing was written");
-        Ok(ExitCode::from(INTERRUPTED))
+    let mut failed = 0;
+    let embedded = embedder.embed(&found, args.jobs.count(), stop, |input, status, reason| {
+        eprintln!("{}: {status}: {reason}", input.id);
+        failed += 1;
+    });
+    let dataset = match embedded {
+        Err(SystemError::Interrupted) => {
+            eprintln!("interrupted; nothing was written");
+            return Ok(ExitCode::from(INTERRUPTED));
+        }
+        embedded => embedded?,
     };
-    let (jobs, config) = (args.jobs.count(), Arc::new(config));
-    let mut kept = match recordings::temporary(&collected.inputs, &config, jobs, stop) {
-        Err(CcmError::Interrupted) => return interrupted(),
-        kept => kept?,
-    };
-    let outcomes = std::mem::take(&mut kept.outcomes);
-    let (pool, width) = (args.jobs.pool()?, network.outputs());
-    let mut column = Column { values: Vec::new(), offsets: vec![0] };
-    let (mut ids, mut failed) = (Vec::new(), 0);
-    let mut columns: Vec<(String, Vec<String>)> = Vec::new();
-    for (input, outcome) in collected.inputs.iter().zip(outcomes) {
-        if stop.load(Ordering::Relaxed) {
-            return interrupted();
-        }
-        if !outcome.status.has_features() {
-            eprintln!("{}: {}: {}", input.id, outcome.status, outcome.reason);
-            failed += 1;
-            continue;
-        }
-        let patches = front_end.items(&network, kept.tensor(&input.id)?)?;
-        let all = Column::of(patches.iter().map(|item| item.values.as_slice()));
-        let items = Items { columns: vec![all] };
-        let rows: Vec<usize> = (0..items.len()).collect();
-        let begin = column.values.len();
-        for rows in rows.chunks(TOGETHER) {
-            let batch = items.batch(&network, rows, Padding::Masked);
-            let found = pool.install(|| network.forward(&batch))?;
-            column.values.extend_from_slice(found.values.values());
-        }
-        if let Some(odd) = column.values[begin..].iter().find(|v| !v.is_finite()) {
-            eprintln!("{}: {}: the embedding holds {odd}", input.id, Status::NonFinite);
-            column.values.truncate(begin);
-            failed += 1;
-            continue;
-        }
-        column.offsets.push(column.values.len());
-        if columns.is_empty() {
-            columns = input.labels.iter().map(|(name, _)| (name.clone(), Vec::new())).collect();
-        }
-        columns.iter_mut().zip(&input.labels).for_each(|((_, all), (_, v))| all.push(v.clone()));
-        ids.push(input.id.clone());
-    }
-    if ids.is_empty() {
+    if dataset.ids.is_empty() {
         return Err(Failure::new("no recording has an embedding: nothing was written"));
     }
-    let (recordings, rows) = (ids.len(), column.values.len() / width);
-    let dataset = Dataset { ids, columns, items: Items { columns: vec![column] } };
-    dataset.write_sequences(&args.out, width, &about.to_string())?;
+    let (recordings, width) = (dataset.ids.len(), embedder.width());
+    let rows = dataset.items.columns[0].values.len() / width;
+    dataset.write_sequences(&args.out, width, &embedder.provenance(&found).to_string())?;
     if !args.quiet {
         println!("{}: {recordings} recordings, {rows} x {width}", args.out.display());
     }

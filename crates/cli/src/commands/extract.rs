@@ -7,7 +7,6 @@ use std::sync::Arc;
 
 use corsmal_extract::config::Config;
 use corsmal_extract::cut::{WindowSpan, into_windows};
-use corsmal_extract::inputs;
 use corsmal_extract::run::{self, Progress, RunError, RunOptions};
 use corsmal_extract::survey::Survey;
 use corsmal_files::npz::Compression;
@@ -17,6 +16,7 @@ use serde_json::json;
 use crate::args::Jobs;
 use crate::failure::{COULD_NOT_RUN, FAILED_FILES, Failure, INTERRUPTED};
 use crate::progress::{LogFormat, Meter};
+use crate::recordings;
 
 /// Arguments of `extract`.
 #[derive(clap::Args)]
@@ -140,13 +140,8 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 fn extract(args: Args) -> Result<ExitCode, Failure> {
     let config = Arc::new(args.config.load()?);
     let names: Vec<OsString> = args.inputs.into_iter().chain(args.named).collect();
-    let collected = inputs::collect(&names)?;
-    let skipped = collected.warning();
-    let mut found = collected.inputs;
-    if found.is_empty() {
-        let names: Vec<_> = names.iter().map(|name| name.to_string_lossy()).collect();
-        return Err(Failure::new(format!("{}: no recordings found", names.join(" "))));
-    }
+    let meter = Meter::new(args.log_format, args.quiet);
+    let mut found = recordings::named(&names, |warning| meter.warning(warning))?;
     if let Some(window) = args.window {
         found = into_windows(found, WindowSpan { window, hop: args.hop.unwrap_or(window / 2.0) })?;
     }
@@ -159,10 +154,6 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
         overwrite: args.overwrite,
         max_errors: if args.strict { Some(0) } else { args.max_errors },
     };
-    let meter = Meter::new(args.log_format, args.quiet);
-    if let Some(skipped) = skipped {
-        meter.warning(&skipped);
-    }
     if args.dry_run {
         let checked = run::check(&found, &config, &options)?;
         if let Some(advice) = checked.advice() {

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use corsmal_extract::projection::Projection;
 use corsmal_files::draft;
+use corsmal_files::format::require_npz;
 
 use crate::failure::Failure;
 use crate::publish;
@@ -43,9 +44,7 @@ pub struct Args {
 
 /// Fits and writes the projection.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
-    if !args.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
-        return Err(Failure::new(format!("{}: must end in .npz", args.out.display())));
-    }
+    require_npz(&args.out)?;
     publish::check(&args.out, args.overwrite)?;
     if draft::same(&args.features, &args.out) {
         return Err(Failure::new(format!("{}: would replace the features", args.out.display())));

@@ -105,8 +105,8 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
     {
         let rates: Vec<String> = rates.iter().map(u32::to_string).collect();
         eprintln!(
-            "warning: {}: the recordings have the sample rates {} Hz, which give different features; \
-             extract with --set signal.sample_rate={} makes them one",
+            "warning: {}: the recordings have sample rates of {} Hz, so their features differ; \
+             extract with --set signal.sample_rate={} to resample them",
             table.path.display(),
             rates.join(", "),
             usual_rate(&table)
@@ -158,14 +158,25 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
 
 #[cfg(feature = "nets")]
 fn train_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
+    use corsmal_systems::training::Trained;
+
     let Args { dataset, pipeline, network, quiet, jobs, .. } = args;
     let (jobs, quiet) = (jobs.count(), *quiet);
     let request = crate::networks::Request { dataset, pipeline, network, jobs, quiet };
-    let (model, summary) = request.train(name)?;
+    let Trained { model, items, validation_group } = request.train(name)?;
     let bytes = model.to_bytes().map_err(Failure::new)?;
     corsmal_files::draft::write(&args.out, &bytes)?;
     let (out, header) = (args.out.display(), &model.header);
     if args.json {
+        let summary = json!({
+            "network": header.network,
+            "target": header.target,
+            "items": items,
+            "labels": header.labels,
+            "recipe": header.recipe,
+            "validation_group": validation_group,
+            "history": header.history,
+        });
         println!("{}", serde_json::to_string_pretty(&summary)?);
     } else if !args.quiet {
         let (name, target) = (&header.network, &header.target);

@@ -29,7 +29,7 @@ use output::Output;
 pub use check::{Checked, check};
 pub use error::RunError;
 pub use options::{MAX_JOBS, Progress, Quiet, RunOptions, RunReport};
-pub use recordings::{Batch, Recordings};
+pub use recordings::{Batch, InOrder, Recorded, Recordings};
 
 /// Extracts the features of `inputs` into one output. `stop` ends the run early, its ledger intact.
 ///

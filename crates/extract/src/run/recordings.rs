@@ -1,6 +1,7 @@
 //! Recordings a few at a time, outside a run: for engines that decide themselves what is computed where
 //! and when. Same features and outcomes as in a run.
 
+use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -22,6 +23,9 @@ use crate::survey::Survey;
 /// Where a configuration does not say: a rate and channels that most features can be planned for.
 const USUAL_RATE: f64 = 44_100.0;
 const USUAL_CHANNELS: [u16; 5] = [1, 2, 4, 8, 64];
+
+/// Recordings of each thread whose features are held in memory until they are asked for.
+const AHEAD: usize = 2;
 
 /// Computes recordings by one configuration; transforms and filter banks are made once per sample rate
 /// and number of channels.
@@ -71,13 +75,7 @@ impl Recordings {
         jobs: usize,
         stop: &Arc<AtomicBool>,
     ) -> Result<Batch, RunError> {
-        require_jobs(jobs)?;
-        // Threads of this call alone: they cannot be missing in a process that was forked.
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(jobs)
-            .build()
-            .map_err(|e| RunError::Jobs { jobs, why: e.to_string() })?;
-        let computed: Result<Vec<(Outcome, Computed)>, RunError> = pool.install(|| {
+        let computed: Result<Vec<(Outcome, Computed)>, RunError> = pool(jobs)?.install(|| {
             let survey = match channels {
                 Some(channels) => Survey::of_channels(channels, &self.config),
                 None => Survey::of(inputs, &self.config),
@@ -85,6 +83,23 @@ impl Recordings {
             inputs.par_iter().map(|input| self.recording(input, &survey, stop)).collect()
         });
         Ok(self.batch(computed?, channels))
+    }
+
+    /// Computes recordings with `jobs` threads and gives them one by one, in their order; few are
+    /// held in memory. A summary is as wide as in a run.
+    ///
+    /// # Errors
+    /// The threads cannot be started.
+    pub fn in_order<'a>(
+        &'a self,
+        inputs: &'a [Input],
+        jobs: usize,
+        stop: &'a Arc<AtomicBool>,
+    ) -> Result<InOrder<'a>, RunError> {
+        let pool = pool(jobs)?;
+        let survey = pool.install(|| Survey::of(inputs, &self.config));
+        let ready = VecDeque::new();
+        Ok(InOrder { recordings: self, rest: inputs, ready, pool, survey, stop })
     }
 
     fn recording(
@@ -179,4 +194,60 @@ impl Recordings {
         };
         found.unwrap_or_default()
     }
+}
+
+/// Recordings one by one, in their order.
+pub struct InOrder<'a> {
+    recordings: &'a Recordings,
+    rest: &'a [Input],
+    ready: VecDeque<Recorded<'a>>,
+    pool: rayon::ThreadPool,
+    survey: Survey,
+    stop: &'a Arc<AtomicBool>,
+}
+
+/// A recording that was computed.
+pub struct Recorded<'a> {
+    /// The recording.
+    pub input: &'a Input,
+    /// What became of it.
+    pub outcome: Outcome,
+    /// Its features; `None` where the outcome says that it has none.
+    pub features: Option<Features>,
+}
+
+impl<'a> Iterator for InOrder<'a> {
+    /// An error where a temporary file fails, or `stop` was set; nothing follows it.
+    type Item = Result<Recorded<'a>, RunError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.ready.is_empty() {
+            let together = self.rest.len().min(AHEAD * self.pool.current_num_threads());
+            let (part, rest) = self.rest.split_at(together);
+            self.rest = rest;
+            let compute = |input: &'a Input| {
+                let (outcome, found) = self.recordings.recording(input, &self.survey, self.stop)?;
+                let features = found.map(|(_, features)| features);
+                Ok(Recorded { input, outcome, features })
+            };
+            match self.pool.install(|| part.par_iter().map(compute).collect::<Result<Vec<_>, _>>())
+            {
+                Ok(found) => self.ready = found.into(),
+                Err(error) => {
+                    self.rest = &[];
+                    return Some(Err(error));
+                }
+            }
+        }
+        self.ready.pop_front().map(Ok)
+    }
+}
+
+/// Threads of one call alone: they cannot be missing in a process that was forked.
+fn pool(jobs: usize) -> Result<rayon::ThreadPool, RunError> {
+    require_jobs(jobs)?;
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(jobs)
+        .build()
+        .map_err(|e| RunError::Jobs { jobs, why: e.to_string() })
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 use corsmal_files::npy::{DType, Header};
 use corsmal_files::npz::{Compression, NpzWriter};
 use corsmal_nets::NetError;
-use corsmal_nets::cross_validation::{Data, Fold, cross_validate};
+use corsmal_nets::cross_validation::{Data, FoldItems, cross_validate};
 use corsmal_nets::dataset::Dataset;
 use corsmal_nets::fit::{History, Task, fit, labels, probabilities};
 use corsmal_nets::items::{Column, Items};
@@ -135,8 +135,8 @@ fn a_training_that_was_stopped_goes_on_to_the_same_bytes() {
 fn folds_are_scored_on_what_they_hold_out() {
     let (items, classes) = vectors(12);
     let groups: Vec<String> = (0..12).map(|i| format!("g{}", i / 3)).collect();
-    let folds: Vec<Fold> = [(0, 6), (6, 12)]
-        .map(|(from, to)| Fold {
+    let folds: Vec<FoldItems> = [(0, 6), (6, 12)]
+        .map(|(from, to)| FoldItems {
             name: format!("{from}"),
             train: (0..12).filter(|i| !(from..to).contains(i)).collect(),
             test: (from..to).collect(),

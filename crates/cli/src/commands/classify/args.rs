@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use corsmal_extract::config::Config;
-use corsmal_extract::inputs::{self, Input};
+use corsmal_extract::engine::Windowing;
+use corsmal_extract::inputs::Input;
 use corsmal_files::format::Content;
 use corsmal_models::labels::Labels;
 use corsmal_models::model_file::{FormatRule, Model};
@@ -126,6 +127,18 @@ impl Args {
         Ok(Records::new(output, (self.form(), unit), labels, (columns, target), self.reject))
     }
 
+    /// Length and distance of windows, where they are wanted.
+    pub(super) fn windowing(&self) -> Result<Option<Windowing>, Failure> {
+        let Some(window) = self.window else { return Ok(None) };
+        let hop = self.hop.unwrap_or(window / 2.0);
+        let windowing = Windowing::new(window, hop).ok_or_else(|| {
+            Failure::new(format!(
+                "--window and --hop must be 0.01 to 600 seconds, not {window} and {hop}"
+            ))
+        })?;
+        Ok(Some(windowing))
+    }
+
     /// What a line of a classifier's predictions is about.
     pub(super) fn unit(&self, vote: Option<VotingRule>) -> Unit {
         match (self.window, vote) {
@@ -168,11 +181,12 @@ pub(super) fn configuration(args: &Args, model: &Model) -> Result<Arc<Config>, F
             header.tool_version
         )));
     }
-    changed(args, &header.feature_config)
+    check_changes(args)?;
+    Ok(Arc::new(Config::from_tree(header.feature_config.clone(), &args.overrides)?))
 }
 
-/// A model's configuration with what --set changes of the recordings' format.
-pub(super) fn changed(args: &Args, tree: &serde_json::Value) -> Result<Arc<Config>, Failure> {
+/// Refuses --set of anything but the recordings' format.
+pub(super) fn check_changes(args: &Args) -> Result<(), Failure> {
     const FORMAT: [&str; 2] = ["signal.sample_rate", "signal.channels"];
     let key = |text: &String| text.split('=').next().unwrap_or_default().trim().to_string();
     if let Some(other) = args.overrides.iter().find(|text| !FORMAT.contains(&key(text).as_str())) {
@@ -181,7 +195,7 @@ pub(super) fn changed(args: &Args, tree: &serde_json::Value) -> Result<Arc<Confi
              signal.channels may bring recordings to the format that it was trained on"
         )));
     }
-    Ok(Arc::new(Config::from_tree(tree.clone(), &args.overrides)?))
+    Ok(())
 }
 
 /// The recordings named.
@@ -194,14 +208,5 @@ pub(super) fn recordings(args: &Args) -> Result<Vec<Input>, Failure> {
     if let Some(name) = args.names().iter().find(is_table) {
         return Err(Failure::new(format!("{name} is a feature file: give it as --features")));
     }
-    let collected = inputs::collect(args.names())?;
-    if let Some(skipped) = collected.warning() {
-        eprintln!("warning: {skipped}");
-    }
-    let found = collected.inputs;
-    if found.is_empty() {
-        let names = args.names().join(" ");
-        return Err(Failure::new(format!("{names}: no recordings found")));
-    }
-    Ok(found)
+    crate::recordings::named(args.names(), crate::recordings::warn)
 }

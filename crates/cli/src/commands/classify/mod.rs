@@ -37,13 +37,13 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     if vote.is_some() && args.window.is_none() {
         return Err(Failure::new("--vote needs --window"));
     }
-    let (end, records) = match (&args.features, args.window) {
+    let (end, records) = match (&args.features, args.windowing()?) {
         (Some(path), _) => {
             let table = LabelledTable::read(path, &args.members.names())?;
             whole::of_features(&args, &model, &table)?
         }
         (None, None) => whole::run(&args, &model)?,
-        (None, Some(window)) => windows::run(&args, &model, window, vote)?,
+        (None, Some(windowing)) => windows::run(&args, &model, windowing, vote)?,
     };
     finish(&args, &model.header().target, end, records)
 }

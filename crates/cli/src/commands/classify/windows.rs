@@ -26,15 +26,9 @@ const AHEAD: usize = 4;
 pub fn run(
     args: &Args,
     model: &Model,
-    window: f64,
+    windowing: Windowing,
     vote: Option<VotingRule>,
 ) -> Result<(End, Option<Records>), Failure> {
-    let hop = args.hop.unwrap_or(window / 2.0);
-    let windowing = Windowing::new(window, hop).ok_or_else(|| {
-        Failure::new(format!(
-            "--window and --hop must be 0.01 to 600 seconds, not {window} and {hop}"
-        ))
-    })?;
     let config = configuration(args, model)?;
     let formats = args.rule(model, &config.to_value())?;
     let signals = Signals::new(config);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use corsmal_extract::inputs::{self, InputSource};
+use corsmal_extract::inputs::InputSource;
 use corsmal_report::{Look, ReportError, look};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -13,6 +13,7 @@ use super::recording::{decibels, length};
 use super::refusal::to_json;
 use crate::failure::{FAILED_FILES, Failure};
 use crate::plural::plural;
+use crate::recordings;
 
 /// The line of one recording.
 #[derive(Serialize)]
@@ -41,12 +42,8 @@ struct Sound {
 
 /// Prints a line for each recording that `paths` stand for.
 pub fn inspect(paths: &[PathBuf], json: bool) -> Result<ExitCode, Failure> {
-    let found = inputs::collect(paths)?;
-    if let Some(warning) = found.warning() {
-        eprintln!("warning: {warning}");
-    }
     let mut files: Vec<PathBuf> = Vec::new();
-    for input in found.inputs {
+    for input in recordings::named(paths, recordings::warn)? {
         match input.source {
             InputSource::File(path) => files.push(path),
             InputSource::Member(member) => {

@@ -1,0 +1,132 @@
+//! Recordings as the numbers that a network makes of them.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use corsmal_extract::config::Config;
+use corsmal_extract::inputs::{self, Input};
+use corsmal_extract::run::Recordings;
+use corsmal_files::identity;
+use corsmal_files::outcome::Status;
+use corsmal_nets::dataset::Dataset;
+use corsmal_nets::front_end::{FrontEnd, Tensor};
+use corsmal_nets::items::{Column, Items};
+use corsmal_nets::network::Network;
+use corsmal_nets::networks::{self, Definition};
+use corsmal_nets::recipe::Padding;
+use corsmal_nets::weights;
+use serde_json::{Value, json};
+
+use crate::error::{Result, SystemError};
+use crate::recordings;
+
+/// Items of a pass.
+const TOGETHER: usize = 64;
+
+/// A network that embeds recordings.
+pub struct Embedder {
+    definition: &'static Definition,
+    front_end: FrontEnd,
+    config: Config,
+    network: Network,
+    /// identity of the file of weights
+    weights: String,
+}
+
+impl Embedder {
+    /// The network of this name with weights from a file.
+    ///
+    /// # Errors
+    /// A network that does not embed; weights that are not its own.
+    pub fn new(name: &str, path: &Path) -> Result<Self> {
+        let definition = networks::named(name)?;
+        if definition.classifies {
+            return Err(SystemError::NoEmbeddings { network: definition.name });
+        }
+        let front_end = recordings::front_end(definition)?;
+        let config = recordings::configuration(&front_end)?;
+        let mut network = definition.build(None, 0)?;
+        network
+            .load_state(&weights::read(path)?)
+            .map_err(|source| SystemError::OtherWeights { path: path.into(), source })?;
+        let weights = identity::of_file(path)
+            .map_err(|source| SystemError::Io { path: path.into(), source })?;
+        Ok(Self { definition, front_end, config, network, weights })
+    }
+
+    /// Numbers of a row.
+    pub fn width(&self) -> usize {
+        self.network.outputs()
+    }
+
+    /// How embeddings of these recordings were made, for the file that holds them.
+    pub fn provenance(&self, recordings: &[Input]) -> Value {
+        json!({
+            "tool_version": env!("CARGO_PKG_VERSION"),
+            "network": self.definition.name,
+            "weights": self.weights,
+            "config": self.config.to_value(),
+            "config_hash": self.config.hash(),
+            "inputs": inputs::list_hash(recordings),
+        })
+    }
+
+    /// The rows of each recording, with its label columns, by `jobs` threads. `failed` is told each
+    /// that has none, and why.
+    ///
+    /// # Errors
+    /// Recordings that the network does not take; [`SystemError::Interrupted`] once `stop` is set.
+    pub fn embed(
+        &self,
+        recordings: &[Input],
+        jobs: usize,
+        stop: &Arc<AtomicBool>,
+        mut failed: impl FnMut(&Input, Status, &str),
+    ) -> Result<Dataset> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build()?;
+        let engine = Recordings::new(Arc::new(self.config.clone()));
+        let mut column = Column { values: Vec::new(), offsets: vec![0] };
+        let mut embedded = Vec::new();
+        for recorded in engine.in_order(recordings, jobs, stop)? {
+            let recorded = recorded?;
+            let (input, outcome) = (recorded.input, recorded.outcome);
+            let tensor = match recorded.features.map(recordings::tensor) {
+                None => {
+                    failed(input, outcome.status, &outcome.reason);
+                    continue;
+                }
+                Some(Err(reason)) => {
+                    failed(input, Status::Io, &reason);
+                    continue;
+                }
+                Some(Ok(tensor)) => tensor,
+            };
+            let rows = pool.install(|| self.rows(tensor))?;
+            if let Some(odd) = rows.iter().find(|v| !v.is_finite()) {
+                failed(input, Status::NonFinite, &format!("the embedding holds {odd}"));
+                continue;
+            }
+            column.values.extend(rows);
+            column.offsets.push(column.values.len());
+            embedded.push(input);
+        }
+        let ids = embedded.iter().map(|input| input.id.clone()).collect();
+        let columns = recordings::labels(&embedded);
+        Ok(Dataset { ids, columns, items: Items { columns: vec![column] } })
+    }
+
+    /// The rows of one recording, one after another.
+    fn rows(&self, tensor: Tensor) -> Result<Vec<f32>> {
+        let patches = self.front_end.items(&self.network, tensor)?;
+        let column = Column::of(patches.iter().map(|item| item.values.as_slice()));
+        let items = Items { columns: vec![column] };
+        let all: Vec<usize> = (0..items.len()).collect();
+        let mut rows = Vec::with_capacity(all.len() * self.width());
+        for part in all.chunks(TOGETHER) {
+            let batch = items.batch(&self.network, part, Padding::Masked);
+            rows.extend_from_slice(self.network.forward(&batch)?.values.values());
+        }
+        Ok(rows)
+    }
+}

@@ -1,0 +1,108 @@
+//! Why networks cannot learn from recordings, hear or embed them.
+
+use std::path::PathBuf;
+
+use corsmal_extract::config::ConfigError;
+use corsmal_extract::run::RunError;
+use corsmal_models::ModelError;
+use corsmal_models::dataset::DatasetError;
+use corsmal_models::model_file::OtherRate;
+use corsmal_nets::NetError;
+use corsmal_nets::weights::WeightsError;
+use thiserror::Error;
+
+/// Why a network cannot be trained or applied. What is wrong with a single recording is said of that
+/// recording instead.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SystemError {
+    /// The user stopped the work.
+    #[error("interrupted")]
+    Interrupted,
+    /// A network that takes something else.
+    #[error("{network} takes {takes}, not recordings: give an .npz of these")]
+    TakesNoRecordings {
+        /// the network
+        network: &'static str,
+        /// what it takes
+        takes: &'static str,
+    },
+    /// A trained network that does not know how its inputs come from recordings.
+    #[error(
+        "{network} was trained on inputs that came from a file, and cannot make them from recordings; \
+         give --features, or train it on recordings"
+    )]
+    TrainedOnInputs {
+        /// the network
+        network: String,
+    },
+    /// A network that gives classes where embeddings are wanted.
+    #[error(
+        "{network} gives classes, not embeddings: use vggish, or `corsmal-feat classify` for classes"
+    )]
+    NoEmbeddings {
+        /// the network
+        network: &'static str,
+    },
+    /// Recordings without features.
+    #[error("{path}: no recording has features: nothing to train on")]
+    NoExamples {
+        /// where they lie
+        path: PathBuf,
+    },
+    /// Weights that cannot be read.
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
+    /// Weights of another network.
+    #[error("{path}: {source}")]
+    OtherWeights {
+        /// the file
+        path: PathBuf,
+        /// how they differ
+        source: NetError,
+    },
+    /// A file that cannot be read.
+    #[error("{path}: {source}")]
+    Io {
+        /// the file
+        path: PathBuf,
+        /// why
+        source: std::io::Error,
+    },
+    /// The feature configuration.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Recordings would be brought to a rate that the network was not trained on.
+    #[error(transparent)]
+    Rate(#[from] OtherRate),
+    /// The extraction cannot start or go on.
+    #[error(transparent)]
+    Extraction(RunError),
+    /// The threads cannot be started.
+    #[error(transparent)]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+    /// A file of a network's inputs.
+    #[error(transparent)]
+    Inputs(#[from] corsmal_nets::dataset::DatasetError),
+    /// Labels or groups.
+    #[error(transparent)]
+    Labels(#[from] DatasetError),
+    /// Classes, folds or votes.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The network.
+    #[error(transparent)]
+    Network(#[from] NetError),
+}
+
+impl From<RunError> for SystemError {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::Interrupted => Self::Interrupted,
+            error => Self::Extraction(error),
+        }
+    }
+}
+
+/// Result with this error.
+pub type Result<T> = std::result::Result<T, SystemError>;

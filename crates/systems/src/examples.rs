@@ -1,0 +1,149 @@
+//! What a network learns from: its items with their labels, from a file or from recordings.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use corsmal_ccm::dataset::SequenceName;
+use corsmal_extract::config::Config;
+use corsmal_extract::inputs::Input;
+use corsmal_extract::run::Recordings;
+use corsmal_models::dataset::{LabelledTable, MemberNames};
+use corsmal_models::model_file::TrainedOn;
+use corsmal_models::targets::Classes;
+use corsmal_nets::dataset::Dataset;
+use corsmal_nets::items::{Column, Items};
+use corsmal_nets::networks::Definition;
+
+use crate::error::{Result, SystemError};
+use crate::recordings;
+
+/// Items of a network and the table that labels them.
+pub struct Examples {
+    /// the network
+    pub definition: &'static Definition,
+    /// a row for each recording, or each item of a file
+    pub table: LabelledTable,
+    pub(crate) items: Items,
+    /// the row of each item: a recording may be several windows
+    row_of: Vec<usize>,
+    pub(crate) heard: Option<Heard>,
+}
+
+/// How recordings became items.
+pub(crate) struct Heard {
+    pub config: Config,
+    pub trained_on: Option<TrainedOn>,
+}
+
+impl Examples {
+    /// The items of an `.npz` of the network's inputs. Where a column holds names of CCM sequences,
+    /// there are the columns `type` and `level` as well.
+    ///
+    /// # Errors
+    /// A file that the network does not take.
+    pub fn of_file(
+        definition: &'static Definition,
+        path: &Path,
+        names: &MemberNames,
+    ) -> Result<Self> {
+        let network = definition.build(None, 0)?;
+        let read = Dataset::read_members(path, &network, &names.x, names.ids.as_deref());
+        let Dataset { ids, mut columns, items } = read?;
+        columns.extend(named_labels(&columns));
+        let row_of = (0..ids.len()).collect();
+        let table = LabelledTable::of_columns(path, ids, columns);
+        Ok(Self { definition, table, items, row_of, heard: None })
+    }
+
+    /// Recordings through the network's front end, with `jobs` threads. `path` is named in messages
+    /// about them; `left_out` is told each that has no items, and why.
+    ///
+    /// # Errors
+    /// A network that takes no recordings, or none that it takes; [`SystemError::Interrupted`] once
+    /// `stop` is set.
+    pub fn of_recordings(
+        definition: &'static Definition,
+        (path, inputs): (&Path, &[Input]),
+        jobs: usize,
+        stop: &Arc<AtomicBool>,
+        mut left_out: impl FnMut(&Input, &str),
+    ) -> Result<Self> {
+        let front_end = recordings::front_end(definition)?;
+        let network = definition.build(None, 0)?;
+        let engine = Recordings::new(Arc::new(recordings::configuration(&front_end)?));
+        let (mut heard, mut outcomes) = (Vec::new(), Vec::new());
+        let (mut items, mut row_of) = (Vec::new(), Vec::new());
+        for recorded in engine.in_order(inputs, jobs, stop)? {
+            let recorded = recorded?;
+            let (input, outcome) = (recorded.input, recorded.outcome);
+            let found = match recorded.features {
+                None => Err(format!("{}: {}", outcome.status, outcome.reason)),
+                Some(features) => recordings::tensor(features).and_then(|tensor| {
+                    front_end.items(&network, tensor).map_err(|e| e.to_string())
+                }),
+            };
+            match found {
+                Err(reason) => left_out(input, &reason),
+                Ok(found) => {
+                    row_of.extend(std::iter::repeat_n(heard.len(), found.len()));
+                    items.extend(found);
+                    heard.push(input);
+                    outcomes.push(outcome);
+                }
+            }
+        }
+        if heard.is_empty() {
+            return Err(SystemError::NoExamples { path: path.into() });
+        }
+        let ids = heard.iter().map(|input| input.id.clone()).collect();
+        let trained_on = TrainedOn::of(outcomes.iter().map(|o| (o.sample_rate, o.channels)));
+        let mut table = LabelledTable::of_columns(path, ids, recordings::labels(&heard));
+        table.outcomes = outcomes;
+        let column = Column::of(items.iter().map(|item| item.values.as_slice()));
+        let items = Items { columns: vec![column] };
+        let heard = Some(Heard { config: engine.config().clone(), trained_on });
+        Ok(Self { definition, table, items, row_of, heard })
+    }
+
+    /// Whether the items were made of recordings.
+    pub fn is_of_recordings(&self) -> bool {
+        self.heard.is_some()
+    }
+
+    /// The class of each item.
+    pub(crate) fn classes(&self, classes: &Classes) -> Vec<usize> {
+        self.row_of.iter().map(|&row| classes.indices()[row]).collect()
+    }
+
+    /// The value of each item's row.
+    pub(crate) fn of_items(&self, values: &[String]) -> Vec<String> {
+        self.row_of.iter().map(|&row| values[row].clone()).collect()
+    }
+
+    /// The items of each row.
+    pub(crate) fn items_of(&self) -> Vec<Vec<usize>> {
+        let mut items_of = vec![Vec::new(); self.table.ids.len()];
+        self.row_of.iter().enumerate().for_each(|(item, &row)| items_of[row].push(item));
+        items_of
+    }
+}
+
+/// Type and level as numbers, where a column has names of CCM sequences.
+fn named_labels(columns: &[(String, Vec<String>)]) -> Vec<(String, Vec<String>)> {
+    let has = |name: &str| columns.iter().any(|(column, _)| column == name);
+    let names = columns.iter().find(|(column, _)| column == "sequence").and_then(|(_, values)| {
+        values.iter().map(|v| SequenceName::parse(v)).collect::<Option<Vec<_>>>()
+    });
+    let Some(names) = names else { return Vec::new() };
+    let mut labels = Vec::new();
+    if !has("type") {
+        let number = |n: &SequenceName| (n.filling.kind() as u8).to_string();
+        labels.push(("type".to_owned(), names.iter().map(number).collect()));
+    }
+    if !has("level") {
+        let number = |n: &SequenceName| (n.filling.level() as u8).to_string();
+        labels.push(("level".to_owned(), names.iter().map(number).collect()));
+    }
+    labels
+}

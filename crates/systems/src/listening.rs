@@ -1,0 +1,319 @@
+//! Classes of recordings by a trained network, from all of a recording or window by window.
+
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use corsmal_extract::config::Config;
+use corsmal_extract::engine::{Signals, Windowing, Windows};
+use corsmal_extract::inputs::Input;
+use corsmal_extract::run::Recordings;
+use corsmal_files::outcome::Status;
+use corsmal_models::argmax;
+use corsmal_models::fusion::WindowVotes;
+use corsmal_models::model_file::{FormatRule, TrainedOn};
+use corsmal_models::voting::{Decision, VotingRule};
+use corsmal_nets::NetError;
+use corsmal_nets::front_end::{FrontEnd, Tensor};
+use corsmal_nets::items::{Column, Items};
+use corsmal_nets::model::NetModel;
+use corsmal_nets::networks;
+
+use crate::error::{Result, SystemError};
+use crate::recordings;
+
+/// Seconds from one frame of a windowed network to the next.
+const FRAME: f64 = 0.01;
+
+/// Which recordings a network is applied to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Formats {
+    /// Those of the sample rates and channels that it was trained on, where these matter.
+    AsTrained,
+    /// All.
+    Any,
+}
+
+/// What a network says of a recording, or of a window of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Verdict {
+    /// start and end of the window in seconds; `None` for all of the recording
+    pub span: Option<(f64, f64)>,
+    /// windows that were decided from
+    pub windows: usize,
+    /// as in the outcomes of an extraction
+    pub status: Status,
+    /// class and probabilities; `None` where the reason says why
+    pub decision: Option<Decision>,
+    /// why there is no decision, or one from a part of the windows only
+    pub reason: Option<String>,
+}
+
+impl Verdict {
+    fn none(span: Option<(f64, f64)>, trouble: Trouble) -> Self {
+        let Trouble { status, reason } = trouble;
+        Self { span, windows: 0, status, decision: None, reason: Some(reason) }
+    }
+}
+
+/// Why a recording, or a window of it, has no decision.
+struct Trouble {
+    status: Status,
+    reason: String,
+}
+
+/// Probabilities of a stretch of sound, and the frames that it covers where a network takes
+/// windows.
+type Heard = (Option<Range<usize>>, Vec<f64>);
+
+/// A trained network that hears recordings.
+pub struct Listener<'a> {
+    model: &'a NetModel,
+    front_end: FrontEnd,
+    config: Arc<Config>,
+    formats: FormatRule,
+    jobs: usize,
+    pool: rayon::ThreadPool,
+}
+
+impl<'a> Listener<'a> {
+    /// A network with the features that it was trained on; `changes` of `signal` bring recordings to
+    /// their format. It works with `jobs` threads.
+    ///
+    /// # Errors
+    /// A network that cannot make its inputs from recordings; changes that it does not take.
+    pub fn new(
+        model: &'a NetModel,
+        changes: &[String],
+        formats: Formats,
+        jobs: usize,
+    ) -> Result<Self> {
+        let header = &model.header;
+        let front_end = recordings::front_end(networks::named(&header.network)?)?;
+        let own = &header.feature_config;
+        if own.is_null() {
+            return Err(SystemError::TrainedOnInputs { network: header.network.clone() });
+        }
+        let config = Config::from_tree(own.clone(), changes)?;
+        let trained: Option<TrainedOn> =
+            serde_json::from_value(header.provenance["trained_on"].clone()).unwrap_or_default();
+        let formats = match trained.filter(|_| formats == Formats::AsTrained) {
+            Some(trained) => trained.rule(own, &config.to_value())?.of_fixed_features(),
+            None => FormatRule::default(),
+        };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build()?;
+        Ok(Self { model, front_end, config: Arc::new(config), formats, jobs, pool })
+    }
+
+    /// Whether the network takes windows of a recording one by one.
+    pub fn takes_windows(&self) -> bool {
+        self.front_end.windows.is_some()
+    }
+
+    /// Hears each recording as a whole. A network that takes windows gives a verdict for each of them,
+    /// or with `vote` one of all. `each` is told them in the order of the recordings, and ends the work
+    /// by returning false. False where `stop` ended it.
+    ///
+    /// # Errors
+    /// A fault of the network; an error of `each`.
+    pub fn recordings<E: From<SystemError>>(
+        &self,
+        inputs: &[Input],
+        vote: Option<VotingRule>,
+        stop: &Arc<AtomicBool>,
+        each: &mut dyn FnMut(&Input, Verdict) -> std::result::Result<bool, E>,
+    ) -> std::result::Result<bool, E> {
+        let engine = Recordings::new(self.config.clone());
+        let recordings = engine.in_order(inputs, self.jobs, stop).map_err(SystemError::from)?;
+        for recorded in recordings {
+            let recorded = match recorded.map_err(SystemError::from) {
+                Err(SystemError::Interrupted) => return Ok(false),
+                recorded => recorded?,
+            };
+            if stop.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
+            let (input, outcome) = (recorded.input, recorded.outcome);
+            let fits = self.check(outcome.sample_rate, outcome.channels);
+            let heard = match (recorded.features.map(recordings::tensor), fits) {
+                (None, _) => Err(Trouble { status: outcome.status, reason: outcome.reason }),
+                (Some(_), Err(trouble)) => Err(trouble),
+                (Some(Err(reason)), _) => Err(Trouble { status: Status::Io, reason }),
+                (Some(Ok(tensor)), Ok(())) => self.hear(tensor)?,
+            };
+            let status = outcome.status;
+            let verdict =
+                |span, windows, decision| Verdict { span, windows, status, decision, reason: None };
+            let verdicts = match (heard, vote) {
+                (Err(trouble), _) => vec![Verdict::none(None, trouble)],
+                (Ok(heard), Some(rule)) => {
+                    let votes = self.votes(&heard)?;
+                    let decision = rule.decide(&votes).map_err(SystemError::from)?;
+                    vec![verdict(None, votes.windows(), decision)]
+                }
+                (Ok(heard), None) => {
+                    let start = input.start.unwrap_or(0.0);
+                    let second = |frame: usize| start + frame as f64 * FRAME;
+                    let one = |(frames, proba): Heard| {
+                        let span = frames.map(|f| (second(f.start), second(f.end)));
+                        verdict(span, usize::from(span.is_some()), Some(decided(proba)))
+                    };
+                    heard.into_iter().map(one).collect()
+                }
+            };
+            for verdict in verdicts {
+                if !each(input, verdict)? {
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    /// Hears windows of recordings or of a stream, each as soon as it is complete. With `vote` there is
+    /// one verdict for each recording, from all of its windows. False where `stop` ended it.
+    ///
+    /// # Errors
+    /// As [`Self::recordings`].
+    pub fn windows<E: From<SystemError>>(
+        &self,
+        inputs: &[Input],
+        (windowing, vote): (Windowing, Option<VotingRule>),
+        stop: &Arc<AtomicBool>,
+        each: &mut dyn FnMut(&Input, Verdict) -> std::result::Result<bool, E>,
+    ) -> std::result::Result<bool, E> {
+        let signals = Signals::new(self.config.clone());
+        let stopped = || stop.load(Ordering::Relaxed);
+        for input in inputs {
+            let opened = Windows::open(input, &signals, windowing, stop);
+            if stopped() {
+                return Ok(false);
+            }
+            let opened = opened
+                .map_err(|e| Trouble { status: e.status, reason: e.reason })
+                .and_then(|windows| {
+                    let (rate, channels) = windows.format();
+                    self.check(Some(rate), Some(channels)).map(|()| windows)
+                });
+            let mut windows = match opened {
+                Ok(windows) => windows,
+                Err(trouble) => match each(input, Verdict::none(None, trouble))? {
+                    true => continue,
+                    false => return Ok(true),
+                },
+            };
+            let mut votes = WindowVotes::new(self.model.header.labels.len());
+            let (mut trouble, mut failures) = (None, 0);
+            for window in &mut windows {
+                if stopped() {
+                    return Ok(false);
+                }
+                let (span, features) = match window {
+                    Ok(window) => (Some((window.start, window.end)), window.features),
+                    Err(e) => (None, Err(e)),
+                };
+                let heard = match features.map(recordings::tensor) {
+                    Err(e) => Err(Trouble { status: e.status, reason: e.reason }),
+                    Ok(Err(reason)) => Err(Trouble { status: Status::Io, reason }),
+                    Ok(Ok(tensor)) => self.hear(tensor)?,
+                };
+                let verdict = match (heard, vote) {
+                    (Err(found), Some(_)) => {
+                        failures += 1;
+                        trouble.get_or_insert(found);
+                        continue;
+                    }
+                    (Ok(heard), Some(_)) => {
+                        self.add(&mut votes, &heard)?;
+                        continue;
+                    }
+                    (Err(trouble), None) => Verdict::none(span, trouble),
+                    (Ok(heard), None) => {
+                        let mean = self.votes(&heard)?.mean();
+                        let (windows, status) = (heard.len(), Status::Ok);
+                        Verdict { span, windows, status, decision: mean.map(decided), reason: None }
+                    }
+                };
+                if !each(input, verdict)? {
+                    return Ok(true);
+                }
+            }
+            if stopped() {
+                return Ok(false);
+            }
+            let Some(rule) = vote else { continue };
+            let decision = rule.decide(&votes).map_err(SystemError::from)?;
+            let verdict = match (decision, trouble) {
+                (None, Some(trouble)) => Verdict::none(None, trouble),
+                (decision, trouble) => {
+                    let status = match &trouble {
+                        Some(trouble) => trouble.status,
+                        None if windows.is_truncated() => Status::Truncated,
+                        None => Status::Ok,
+                    };
+                    let reason = trouble.map(|trouble| {
+                        let windows = if failures == 1 { "window" } else { "windows" };
+                        format!("{failures} {windows} failed, the first: {}", trouble.reason)
+                    });
+                    Verdict { span: None, windows: votes.windows(), status, decision, reason }
+                }
+            };
+            if !each(input, verdict)? {
+                return Ok(true);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Refuses a recording of a format that the network was not trained on.
+    fn check(&self, rate: Option<u32>, channels: Option<u32>) -> std::result::Result<(), Trouble> {
+        let refused = self.formats.check(rate, channels);
+        refused.map_err(|reason| Trouble { status: Status::Mismatch, reason })
+    }
+
+    /// Probabilities of each window that the network takes of a stretch of sound, or of all of it.
+    fn hear(&self, tensor: Tensor) -> Result<std::result::Result<Vec<Heard>, Trouble>> {
+        let items = self.front_end.items(&self.model.network, tensor);
+        let found: corsmal_nets::Result<Vec<Heard>> = items.and_then(|items| {
+            let column = Column::of(items.iter().map(|item| item.values.as_slice()));
+            let columns = vec![column];
+            let proba = self.pool.install(|| self.model.predict_proba(&Items { columns }))?;
+            Ok(items.into_iter().map(|item| item.frames).zip(proba).collect())
+        });
+        match found {
+            Ok(heard) => Ok(Ok(heard)),
+            Err(error) => match status_of(&error) {
+                Some(status) => Ok(Err(Trouble { status, reason: error.to_string() })),
+                None => Err(error.into()),
+            },
+        }
+    }
+
+    fn votes(&self, heard: &[Heard]) -> Result<WindowVotes> {
+        let mut votes = WindowVotes::new(self.model.header.labels.len());
+        self.add(&mut votes, heard)?;
+        Ok(votes)
+    }
+
+    fn add(&self, votes: &mut WindowVotes, heard: &[Heard]) -> Result<()> {
+        for (_, proba) in heard {
+            votes.add(argmax(proba), Some(proba))?;
+        }
+        Ok(())
+    }
+}
+
+/// The verdict on a recording that a network cannot take; `None` where the recording is not at fault.
+fn status_of(error: &NetError) -> Option<Status> {
+    match error {
+        NetError::TooShort { .. } => Some(Status::TooShort),
+        NetError::InputShape { .. } => Some(Status::Mismatch),
+        NetError::NonFinite { .. } | NetError::Output { .. } => Some(Status::NonFinite),
+        _ => None,
+    }
+}
+
+/// The most probable class and the probabilities.
+fn decided(proba: Vec<f64>) -> Decision {
+    (argmax(&proba), Some(proba))
+}

@@ -1,0 +1,192 @@
+//! Networks trained on labelled items, and validated on items that they were not trained on.
+
+use std::path::Path;
+
+use corsmal_models::argmax;
+use corsmal_models::cross_validation::CrossValidation;
+use corsmal_models::folds::{CvPlan, Folds};
+use corsmal_models::fusion::WindowVotes;
+use corsmal_models::labels::Labels;
+use corsmal_models::scores::Scores;
+use corsmal_models::targets::Classes;
+use corsmal_nets::cross_validation::{self, Data, FoldItems};
+use corsmal_nets::fit::{self, Progress, Task};
+use corsmal_nets::model::{Header, NetModel};
+use corsmal_nets::recipe::{Recipe, Select};
+use ndarray::Array2;
+use serde_json::{Value, json};
+
+use crate::error::Result;
+use crate::examples::Examples;
+
+/// What is learned, and how.
+#[derive(Clone, Debug)]
+pub struct Training<'a> {
+    /// label column to learn
+    pub target: &'a str,
+    /// label column of groups that must not be split
+    pub groups: Option<&'a str>,
+    /// how the network is trained
+    pub recipe: Recipe,
+    /// folder that keeps the training after each epoch; the next one continues from there
+    pub checkpoints: Option<&'a Path>,
+}
+
+/// A trained network.
+#[derive(Debug)]
+pub struct Trained {
+    /// the network, ready to be written
+    pub model: NetModel,
+    /// how many items it was trained on
+    pub items: usize,
+    /// the group that chose the epoch
+    pub validation_group: Option<String>,
+}
+
+/// A validation, in the terms of the classifiers'.
+#[derive(Debug)]
+pub struct Validated {
+    /// names of the classes
+    pub labels: Labels,
+    /// the class of each row
+    pub classes: Classes,
+    /// predictions and scores
+    pub result: CrossValidation,
+    /// name, recipe and histories
+    pub report: Value,
+    /// what must be said beside the scores
+    pub caution: Option<&'static str>,
+}
+
+impl Training<'_> {
+    /// Trains on all items. `files` says in the model where they came from; `progress` ends the
+    /// training by returning false.
+    ///
+    /// # Errors
+    /// Labels that cannot be learned; whatever training refuses.
+    pub fn train(
+        &self,
+        examples: &Examples,
+        files: Value,
+        progress: impl FnMut(Progress<'_>) -> bool,
+    ) -> Result<Trained> {
+        let Examples { definition, table, items, heard, .. } = examples;
+        let recipe = self.recipe;
+        let (labels, classes) = table.classes(self.target)?;
+        let y = examples.classes(&classes);
+        let groups = self.groups.map(|groups| table.column(groups)).transpose()?;
+        let groups = groups.map(|groups| examples.of_items(&groups));
+        let groups = groups.as_deref();
+        let data = Data { items, classes: &y, n_classes: labels.len(), groups };
+        let all = FoldItems { name: "all".into(), train: (0..y.len()).collect(), test: Vec::new() };
+        let (train, watched, validation_group) = cross_validation::watched(data, &all, &recipe)?;
+        let task = Task { items, classes: &y, train: &train, watched: &watched };
+        let mut network = definition.build(Some(labels.len()), recipe.seed)?;
+        let checkpoint = self.checkpoints.map(|folder| folder.join("training.safetensors"));
+        let score = |truth: &[usize], found: &[usize]| weighted_f1(truth, found, labels.len());
+        let history =
+            fit::fit(&mut network, task, &recipe, checkpoint.as_deref(), score, progress)?;
+        let header = Header {
+            format: 0,
+            network: definition.name.into(),
+            labels: labels.names().to_vec(),
+            target: self.target.into(),
+            recipe,
+            history,
+            feature_config: heard.as_ref().map_or(Value::Null, |heard| heard.config.to_value()),
+            provenance: json!({
+                "files": files,
+                "recordings": heard.as_ref().map(|_| table.ids.len()),
+                "items": y.len(),
+                "trained_on": heard.as_ref().and_then(|heard| heard.trained_on.as_ref()),
+            }),
+            tool_version: env!("CARGO_PKG_VERSION").into(),
+        };
+        let model = NetModel::new(header, network)?;
+        Ok(Trained { model, items: y.len(), validation_group })
+    }
+
+    /// The folds of a plan, or those that the labels ask for, and what is odd about them, in words.
+    ///
+    /// # Errors
+    /// Columns that are not there, classes or groups that cannot be divided.
+    pub fn folds(
+        &self,
+        examples: &Examples,
+        plan: Option<&CvPlan>,
+        seed: u32,
+    ) -> Result<(Folds, Vec<String>)> {
+        let (labels, classes) = examples.table.classes(self.target)?;
+        let folds = Folds::new(plan, &examples.table, self.groups, (&labels, &classes), seed)?;
+        let warnings = folds.warnings(&classes);
+        Ok((folds, warnings))
+    }
+
+    /// Holds out parts of the rows in turn; a recording of several windows has the mean of their
+    /// probabilities. `progress` is told with the name of the fold.
+    ///
+    /// # Errors
+    /// As [`Self::train`].
+    pub fn cross_validate(
+        &self,
+        examples: &Examples,
+        folds: &Folds,
+        mut progress: impl FnMut(&str, Progress<'_>) -> bool,
+    ) -> Result<Validated> {
+        let Examples { definition, table, items, .. } = examples;
+        let recipe = self.recipe;
+        let (labels, classes) = table.classes(self.target)?;
+        let y = examples.classes(&classes);
+        let groups = folds.groups().map(|groups| examples.of_items(groups));
+        let groups = groups.as_deref();
+        let data = Data { items, classes: &y, n_classes: labels.len(), groups };
+        let items_of = examples.items_of();
+        let of_rows = |rows: &[usize]| -> Vec<usize> {
+            rows.iter().flat_map(|&row| items_of[row].iter().copied()).collect()
+        };
+        let outer = folds.outer.iter().map(|fold| FoldItems {
+            name: fold.name.clone(),
+            train: of_rows(&fold.train),
+            test: of_rows(&fold.test),
+        });
+        let found = cross_validation::cross_validate(
+            definition,
+            data,
+            &outer.collect::<Vec<_>>(),
+            &recipe,
+            self.checkpoints,
+            |truth, found| weighted_f1(truth, found, labels.len()),
+            |fold, told| progress(&fold.name, told),
+        )?;
+        let histories = found.iter().map(
+            |f| json!({"fold": f.name, "validation_group": f.validation, "history": f.history}),
+        );
+        let report = json!({
+            "network": definition.name,
+            "recipe": recipe,
+            "folds": histories.collect::<Vec<_>>(),
+        });
+        let mut by_fold = Vec::with_capacity(found.len());
+        for (found, fold) in found.into_iter().zip(&folds.outer) {
+            let mut proba = Array2::zeros((fold.test.len(), labels.len()));
+            let mut windows = found.probabilities.iter();
+            for (mut row, &of) in proba.rows_mut().into_iter().zip(&fold.test) {
+                let mut votes = WindowVotes::new(labels.len());
+                for window in windows.by_ref().take(items_of[of].len()) {
+                    votes.add(argmax(window), Some(window))?;
+                }
+                row.iter_mut().zip(votes.mean().unwrap_or_default()).for_each(|(p, m)| *p = m);
+            }
+            by_fold.push((found.name, fold.test.clone(), proba));
+        }
+        let result = CrossValidation::of_probabilities(by_fold, &classes)?;
+        let caution = (recipe.select == Select::Published).then_some(
+            "scores are too good: with select=published, the held-out fold also chose the epoch",
+        );
+        Ok(Validated { labels, classes, result, report, caution })
+    }
+}
+
+fn weighted_f1(truth: &[usize], found: &[usize], n_classes: usize) -> f64 {
+    Scores::new(truth, found, n_classes).map_or(0.0, |s| s.weighted_f1)
+}
