@@ -9,7 +9,7 @@ use ndarray::{Array2, ArrayView1};
 use crate::dataset::{Category, Container, Filling, FillingLevel, FillingType};
 use crate::error::{CcmError, Result};
 use crate::predictions::{RecordingPredictions, RowName, classes};
-use crate::submission::{Prediction, RowKey};
+use crate::submission::{RowKey, SubmissionRow};
 
 /// How type and level are decided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,7 +31,7 @@ pub fn decide(
     kind: Option<&RecordingPredictions>,
     level: Option<&RecordingPredictions>,
     rule: Rule,
-) -> Result<Vec<Prediction>> {
+) -> Result<Vec<SubmissionRow>> {
     let kinds = kind.map(of_kind).transpose()?;
     let levels = level.map(of_level).transpose()?;
     let (mut estimates, other) = match (kinds, levels) {
@@ -68,7 +68,7 @@ pub fn decide(
 ///
 /// # Errors
 /// As [`decide`].
-pub fn decide_joint(table: &RecordingPredictions) -> Result<Vec<Prediction>> {
+pub fn decide_joint(table: &RecordingPredictions) -> Result<Vec<SubmissionRow>> {
     let what = "a filling such as 'pasta half', '1-1' or a joint class 0 to 6";
     let fillings = classes(table, Filling::parse, what)?;
     let into = |number: fn(&Filling) -> usize| fillings.iter().map(number).collect::<Vec<_>>();
@@ -87,7 +87,7 @@ pub fn decide_joint(table: &RecordingPredictions) -> Result<Vec<Prediction>> {
     Ok(estimates)
 }
 
-fn of_kind(table: &RecordingPredictions) -> Result<Vec<Prediction>> {
+fn of_kind(table: &RecordingPredictions) -> Result<Vec<SubmissionRow>> {
     let what = "a filling type: none, pasta, rice, water or 0 to 3";
     let classes = classes(table, FillingType::parse, what)?;
     let numbers: Vec<usize> = classes.iter().map(|&c| c as usize).collect();
@@ -101,7 +101,7 @@ fn of_kind(table: &RecordingPredictions) -> Result<Vec<Prediction>> {
     Ok(estimates)
 }
 
-fn of_level(table: &RecordingPredictions) -> Result<Vec<Prediction>> {
+fn of_level(table: &RecordingPredictions) -> Result<Vec<SubmissionRow>> {
     let what = "a filling level: empty, half, full, 0 to 2, 50 or 90";
     let classes = classes(table, FillingLevel::parse, what)?;
     let numbers: Vec<usize> = classes.iter().map(|&c| c as usize).collect();
@@ -120,7 +120,7 @@ fn fixed<const N: usize>(row: ArrayView1<'_, f64>) -> Option<[f64; N]> {
 }
 
 /// Nothing estimated, one for each line.
-fn blank(table: &RecordingPredictions) -> Result<Vec<Prediction>> {
+fn blank(table: &RecordingPredictions) -> Result<Vec<SubmissionRow>> {
     let mut seen = HashSet::new();
     let fault = |problem, rows: String| CcmError::Rows {
         path: table.path.clone(),
@@ -138,13 +138,13 @@ fn blank(table: &RecordingPredictions) -> Result<Vec<Prediction>> {
         RowName::Recording(key) if !seen.insert(*key) => {
             Err(fault("more than one row", key.to_string()))
         }
-        RowName::Recording(key) => Ok(Prediction::empty(*key)),
+        RowName::Recording(key) => Ok(SubmissionRow::empty(*key)),
     };
     table.rows.iter().map(|row| &row.key).map(key).collect()
 }
 
 /// Replaces type and level by the best feasible pair, where both have probabilities.
-fn together(estimate: &mut Prediction, dry_boxes: bool) -> Result<()> {
+fn together(estimate: &mut SubmissionRow, dry_boxes: bool) -> Result<()> {
     let both = estimate.kind_probabilities.zip(estimate.level_probabilities);
     let Some((kinds, levels)) = both else { return Ok(()) };
     let container = match estimate.key {

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use corsmal_ccm::dataset::{Annotations, Dimensions};
 use corsmal_ccm::scores::{RuleSet, Scores, evaluate};
-use corsmal_ccm::submission::{Format, Prediction, RowKey, Submission};
+use corsmal_ccm::submission::{Format, RowKey, Submission, SubmissionRow};
 use shared_data::ccm;
 
 const TOLERANCE: f64 = 0.0101;
@@ -81,13 +81,13 @@ fn from_annotations(name: &str, annotations: &Annotations) -> Option<Submission>
         .map(|row| {
             let has = |task| tasks.contains(&task);
             let filling = row.filling.unwrap();
-            Prediction {
+            SubmissionRow {
                 kind: has(2).then_some(filling.kind()),
                 level: has(1).then_some(filling.level()),
                 capacity_ml: has(3).then_some(row.capacity_ml),
                 container_mass_g: has(4).then_some(row.container_mass_g),
                 dimensions: row.dimensions.filter(|_| has(5)).map(|d| Dimensions { ..d }),
-                ..Prediction::empty(RowKey::Id(row.id.unwrap()))
+                ..SubmissionRow::empty(RowKey::Id(row.id.unwrap()))
             }
         })
         .collect();

@@ -33,10 +33,10 @@ pub struct Dataset {
     pub items: Items,
 }
 
-/// Why a file is not a data set for a network.
+/// Why a file holds no items of a network.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-pub enum DatasetError {
+pub enum ItemsError {
     /// The file cannot be read.
     #[error(transparent)]
     Npz(#[from] NpzError),
@@ -62,24 +62,24 @@ impl Dataset {
     /// Reads the items of a network.
     ///
     /// # Errors
-    /// [`DatasetError`].
-    pub fn read(path: &Path, network: &Network) -> Result<Self, DatasetError> {
+    /// [`ItemsError`].
+    pub fn read(path: &Path, network: &Network) -> Result<Self, ItemsError> {
         Self::read_members(path, network, "X", None)
     }
 
     /// The same with other names of `X` and `ids`.
     ///
     /// # Errors
-    /// [`DatasetError`].
+    /// [`ItemsError`].
     pub fn read_members(
         path: &Path,
         network: &Network,
         x: &str,
         named: Option<&str>,
-    ) -> Result<Self, DatasetError> {
+    ) -> Result<Self, ItemsError> {
         let mut npz = NpzFile::open(path)?;
         let refuse =
-            |reason: String| DatasetError::Content { path: path.display().to_string(), reason };
+            |reason: String| ItemsError::Content { path: path.display().to_string(), reason };
         if let Some(name) = [Some(x), named].into_iter().flatten().find(|name| !npz.contains(name))
         {
             return Err(refuse(format!("no member {name}: there are {}", npz.names().join(", "))));
@@ -121,7 +121,7 @@ impl Dataset {
         };
         items
             .check(network)
-            .map_err(|source| DatasetError::Items { path: path.display().to_string(), source })?;
+            .map_err(|source| ItemsError::Items { path: path.display().to_string(), source })?;
         let ids = match named {
             Some(name) => columns.iter().find(|(n, _)| n == name).map(|(_, v)| v.clone()),
             None => Some(ids(&columns, items.len())),
@@ -141,13 +141,13 @@ impl Dataset {
     /// `about` says how they were made.
     ///
     /// # Errors
-    /// [`DatasetError::Npz`].
+    /// [`ItemsError::Npz`].
     pub fn write_sequences(
         &self,
         path: &Path,
         numbers: usize,
         about: &str,
-    ) -> Result<(), DatasetError> {
+    ) -> Result<(), ItemsError> {
         let column = &self.items.columns[0];
         let io = |e| NpzError::io(path, e);
         let draft = Draft::create(path).map_err(io)?;
@@ -193,7 +193,7 @@ fn columns(
     npz: &mut NpzFile,
     x: &str,
     count: usize,
-) -> Result<Vec<(String, Vec<String>)>, DatasetError> {
+) -> Result<Vec<(String, Vec<String>)>, ItemsError> {
     let mut columns = Vec::new();
     for name in npz.names().to_vec() {
         if name == x || name == "offsets" || name.starts_with("__") {

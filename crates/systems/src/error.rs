@@ -83,7 +83,7 @@ pub enum SystemError {
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// A file of a network's inputs.
     #[error(transparent)]
-    Inputs(#[from] corsmal_nets::dataset::DatasetError),
+    Inputs(#[from] corsmal_nets::dataset::ItemsError),
     /// Labels or groups.
     #[error(transparent)]
     Labels(#[from] DatasetError),

@@ -1,4 +1,4 @@
-//! M3's category of a container, by vote, and the sizes of its regions in the four views.
+//! The category of a container; M3's, by vote, and the sizes of its regions in the four views.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +20,7 @@ pub enum Category {
     Cup,
     /// Drinking glass.
     Glass,
-    /// Food box.
+    /// Food box: shaken, never filled with water.
     Box,
 }
 

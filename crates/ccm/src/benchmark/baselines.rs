@@ -83,7 +83,7 @@ impl Learner {
 }
 
 /// What a baseline predicts.
-pub(super) struct Outcome {
+pub(super) struct BaselineResult {
     pub(super) baseline: Baseline,
     pub(super) variant: Variant,
     /// Row numbers of training recordings that were not trained on, with their estimates: the held

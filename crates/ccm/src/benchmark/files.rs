@@ -6,7 +6,7 @@ use corsmal_models::labels::Labels;
 use corsmal_models::model_file::{Model, ModelHeader};
 use corsmal_models::pipeline::{Pipeline, PipelineSpec};
 
-use super::baselines::Outcome;
+use super::baselines::BaselineResult;
 use super::matrix::Matrices;
 use super::method::methods;
 use super::predicted::Predicted;
@@ -26,18 +26,18 @@ pub(super) fn prepare(out: &Path) -> Result<()> {
 }
 
 /// Writes the submissions of a baseline.
-pub(super) fn write_outcome(out: &Path, outcome: &Outcome, rows: &Rows) -> Result<()> {
+pub(super) fn write_outcome(out: &Path, outcome: &BaselineResult, rows: &Rows) -> Result<()> {
     write_estimates(out, &name_of(outcome), rows, &outcome.held_out, &outcome.tests)
 }
 
-fn name_of(outcome: &Outcome) -> String {
+fn name_of(outcome: &BaselineResult) -> String {
     format!("{}-{}", outcome.baseline.slug(), outcome.variant.name())
 }
 
 /// Writes the model of a baseline, a pipeline and what it is.
 pub(super) fn write_model(
     out: &Path,
-    outcome: &Outcome,
+    outcome: &BaselineResult,
     (spec, pipeline): (PipelineSpec, Pipeline),
     matrices: &Matrices,
     rows: &Rows,

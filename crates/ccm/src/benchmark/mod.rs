@@ -34,7 +34,7 @@ use rayon::prelude::*;
 
 use crate::dataset::DataSet;
 use crate::error::{CcmError, Result};
-use baselines::Outcome;
+use baselines::BaselineResult;
 use matrix::Store;
 use predicted::Predicted;
 use protocols::{Setting, Unit};
@@ -134,7 +134,7 @@ pub fn run(
         progress(&format!("features: {}", feature_set.name()));
         let matrices = store.load(&set, &rows, feature_set)?;
         let out = options.out.as_path();
-        let finish = |outcome: &Outcome, spec: PipelineSpec, model: Pipeline| {
+        let finish = |outcome: &BaselineResult, spec: PipelineSpec, model: Pipeline| {
             files::write_outcome(out, outcome, &rows)?;
             files::write_model(out, outcome, (spec, model), &matrices, &rows)?;
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
@@ -145,9 +145,10 @@ pub fn run(
         let seed = options.seed;
         let setting = Setting { rows: &rows, matrices: &matrices, seed, stop, finish: &finish };
         let units = Unit::all(&wanted);
-        let made: Vec<Result<Vec<Outcome>>> = units.par_iter().map(|u| u.run(&setting)).collect();
+        let made: Vec<Result<Vec<BaselineResult>>> =
+            units.par_iter().map(|u| u.run(&setting)).collect();
         let made = made.into_iter().collect::<Result<Vec<_>>>()?;
-        let mut made: Vec<Outcome> = made.into_iter().flatten().collect();
+        let mut made: Vec<BaselineResult> = made.into_iter().flatten().collect();
         // As they were asked for, whatever was finished first.
         made.sort_by_key(|o| (wanted.iter().position(|b| *b == o.baseline), o.variant));
         outcomes.extend(made);

@@ -1,12 +1,12 @@
 //! Everything that a benchmark predicted.
 
 use super::added::Placed;
-use super::baselines::Outcome;
+use super::baselines::BaselineResult;
 use super::system::Run;
 
 /// Baselines, systems, prediction files and capacities.
 pub(super) struct Predicted<'a> {
-    pub(super) outcomes: &'a [Outcome],
+    pub(super) outcomes: &'a [BaselineResult],
     pub(super) runs: &'a [Run],
     pub(super) added: &'a [Placed],
     /// Tables of capacities, with what a method that was run here takes.

@@ -16,7 +16,7 @@ use linfa::DatasetBase;
 use ndarray::{Array2, ArrayView2, Axis, CowArray, Ix2};
 use rayon::prelude::*;
 
-use super::baselines::{Baseline, Outcome, Variant};
+use super::baselines::{Baseline, BaselineResult, Variant};
 use super::matrix::Matrices;
 use super::results::{Estimate, Rows, Target};
 use crate::dataset::{CONTAINER_FOLDS, Filling, PublishedSplit};
@@ -36,7 +36,7 @@ pub(super) struct Setting<'a> {
     /// Ends the work at the next baseline.
     pub(super) stop: &'a AtomicBool,
     /// Takes what is finished, with the pipeline that predicted the tests.
-    pub(super) finish: &'a (dyn Fn(&Outcome, PipelineSpec, Pipeline) -> Result<()> + Sync),
+    pub(super) finish: &'a (dyn Fn(&BaselineResult, PipelineSpec, Pipeline) -> Result<()> + Sync),
 }
 
 /// Baselines on the same values under one protocol.
@@ -65,7 +65,7 @@ impl Unit {
     }
 
     /// The outcomes of all baselines, in their order.
-    pub(super) fn run(&self, setting: &Setting<'_>) -> Result<Vec<Outcome>> {
+    pub(super) fn run(&self, setting: &Setting<'_>) -> Result<Vec<BaselineResult>> {
         match self.variant {
             Variant::Published => self.published(setting),
             Variant::Corrected => self.corrected(setting),
@@ -81,9 +81,9 @@ impl Unit {
     fn each(
         &self,
         setting: &Setting<'_>,
-        one: impl Fn(usize, &Baseline) -> ModelResult<(Outcome, PipelineSpec, Pipeline)> + Sync,
-    ) -> Result<Vec<Outcome>> {
-        let finished: Vec<Result<Outcome>> = self
+        one: impl Fn(usize, &Baseline) -> ModelResult<(BaselineResult, PipelineSpec, Pipeline)> + Sync,
+    ) -> Result<Vec<BaselineResult>> {
+        let finished: Vec<Result<BaselineResult>> = self
             .baselines
             .par_iter()
             .enumerate()
@@ -100,7 +100,7 @@ impl Unit {
         finished.into_iter().collect()
     }
 
-    fn published(&self, setting: &Setting<'_>) -> Result<Vec<Outcome>> {
+    fn published(&self, setting: &Setting<'_>) -> Result<Vec<BaselineResult>> {
         let Setting { rows, matrices, seed, .. } = *setting;
         let fault = |e: ModelError| self.fault(&self.baselines[0], &e);
         let joint = rows.joint();
@@ -135,7 +135,7 @@ impl Unit {
             let classifier = spec.classifier.train(trained.view(), &y, Filling::COUNT)?;
             let seen = estimates(&classifier, x.view())?;
             let tests = tests.iter().map(|x| estimates(&classifier, x.view()));
-            let outcome = Outcome {
+            let outcome = BaselineResult {
                 baseline: *baseline,
                 variant: self.variant,
                 held_out: fold.test.iter().map(|&row| (row, seen[row].clone())).collect(),
@@ -147,7 +147,7 @@ impl Unit {
         })
     }
 
-    fn corrected(&self, setting: &Setting<'_>) -> Result<Vec<Outcome>> {
+    fn corrected(&self, setting: &Setting<'_>) -> Result<Vec<BaselineResult>> {
         let Setting { rows, matrices, seed, .. } = *setting;
         let fault = |e: ModelError| self.fault(&self.baselines[0], &e);
         let joint = rows.joint();
@@ -181,7 +181,7 @@ impl Unit {
             let spec = specs[i].clone();
             let classifier = spec.classifier.train(prepared.rows(), &joint, Filling::COUNT)?;
             let tests = tests.iter().map(|x| estimates(&classifier, x.view()));
-            let outcome = Outcome {
+            let outcome = BaselineResult {
                 baseline: *baseline,
                 variant: self.variant,
                 held_out,

@@ -6,7 +6,7 @@ use crate::dataset::{
 };
 use crate::error::{CcmError, Result};
 use crate::scores::{self, ConfusionMatrix, RuleSet};
-use crate::submission::{Format, Prediction, RowKey, Submission, pseudo_random};
+use crate::submission::{Format, RowKey, Submission, SubmissionRow, pseudo_random};
 
 /// A recording to train on or to predict.
 pub(super) struct Target {
@@ -122,8 +122,8 @@ impl Estimate {
     }
 
     /// As it is submitted under the name `key`.
-    pub(super) fn prediction(&self, key: RowKey) -> Prediction {
-        Prediction {
+    pub(super) fn prediction(&self, key: RowKey) -> SubmissionRow {
+        SubmissionRow {
             kind: self.kind.and_then(|k| FillingType::from_number(k as i64)),
             level: self.level.and_then(|l| FillingLevel::from_number(l as i64)),
             kind_probabilities: self.kind_probabilities,
@@ -137,8 +137,8 @@ impl Estimate {
     }
 }
 
-impl From<Prediction> for Estimate {
-    fn from(p: Prediction) -> Self {
+impl From<SubmissionRow> for Estimate {
+    fn from(p: SubmissionRow) -> Self {
         Self {
             kind: p.kind.map(|k| k as usize),
             level: p.level.map(|l| l as usize),
@@ -222,7 +222,7 @@ fn by_paper(targets: &[&Target], estimates: &[Estimate], seed: u64) -> Option<sc
     let known = annotations.rows.iter().all(known);
     let named = estimates.iter().zip(&annotations.rows).zip(&keys);
     let predictions: Vec<_> = named
-        .map(|((estimate, row), &key)| Prediction {
+        .map(|((estimate, row), &key)| SubmissionRow {
             container_mass_g: known.then_some(row.container_mass_g),
             ..estimate.prediction(key)
         })

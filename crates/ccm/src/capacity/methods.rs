@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use corsmal_vision::category::{self, Category, Vote};
+use corsmal_vision::category::{self, Vote};
 use corsmal_vision::cloud::{self, DepthView};
 use corsmal_vision::cuboid::{self, Outliers};
 use corsmal_vision::lode::{self, Variant, View};
@@ -302,13 +302,4 @@ fn upright(views: &Views, detections: &[Detection]) -> Result<(f64, usize), Prob
         return Err(Problem::Missing("no frame with depth and mask in both side views".into()));
     }
     Ok(((logs.iter().sum::<f64>() / n as f64).exp(), n))
-}
-
-/// The category of the data set's containers that a detector's vote means.
-pub(super) fn category_of(category: crate::dataset::Category) -> Category {
-    match category {
-        crate::dataset::Category::Cup => Category::Cup,
-        crate::dataset::Category::Glass => Category::Glass,
-        crate::dataset::Category::Box => Category::Box,
-    }
 }

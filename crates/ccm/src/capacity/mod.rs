@@ -285,7 +285,7 @@ fn sample(
     };
     Ok(Some(Sample {
         container: container.number(),
-        category: methods::category_of(container.category()),
+        category: container.category(),
         capacity,
         vote: methods::vote(&detections, options.seed).ok(),
         estimates,

@@ -11,7 +11,7 @@ use super::views::Problem;
 use crate::dataset::Dimensions;
 use crate::error::{CcmError, Result};
 use crate::predictions::{file_key, read_capacities};
-use crate::submission::{Prediction, RowKey};
+use crate::submission::{RowKey, SubmissionRow};
 use crate::table::Table;
 
 /// Columns of the table; the first two are those of M5's published files.
@@ -113,7 +113,7 @@ pub struct Measured {
 
 impl Measured {
     /// Fills in a recording's prediction.
-    pub fn complete(&self, prediction: &mut Prediction) {
+    pub fn complete(&self, prediction: &mut SubmissionRow) {
         prediction.capacity_ml = self.capacity_ml;
         prediction.dimensions = self.dimensions;
         prediction.execution_ms = self.execution_ms;

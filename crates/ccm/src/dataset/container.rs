@@ -1,5 +1,6 @@
 //! The 15 containers.
 
+use corsmal_vision::Category;
 use serde::Serialize;
 
 use super::filling::{Filling, FillingType};
@@ -11,17 +12,6 @@ pub const CONTAINER_FOLDS: [[u8; 3]; 3] = [[1, 4, 7], [2, 5, 8], [3, 6, 9]];
 /// Capacity in mL and mass in g of the training containers 1 to 9 (official annotations).
 const CAPACITY_ML: [f64; 9] = [520.0, 185.0, 202.0, 296.0, 363.0, 128.0, 3209.397, 1239.84, 471.6];
 const MASS_G: [f64; 9] = [10.0, 2.0, 3.0, 86.0, 134.0, 15.0, 59.0, 31.0, 15.0];
-
-/// Kind of container.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-pub enum Category {
-    /// Plastic or paper cup.
-    Cup,
-    /// Drinking glass.
-    Glass,
-    /// Food box: shaken, never filled with water.
-    Box,
-}
 
 /// Part of the data set that a container belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -97,17 +87,6 @@ impl Container {
     /// Number of recordings: 3 scenarios, 2 backgrounds, 2 illuminations per filling.
     pub fn recordings(self) -> usize {
         self.fillings().count() * 12
-    }
-}
-
-impl Category {
-    /// English name in lower case.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Cup => "cup",
-            Self::Glass => "glass",
-            Self::Box => "box",
-        }
     }
 }
 

@@ -4,7 +4,7 @@ use corsmal_models::argmax;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::{Prediction, RowKey};
+use super::{RowKey, SubmissionRow};
 use crate::dataset::{Dimensions, FillingLevel, FillingType};
 
 /// Random estimates of every task for the given recordings.
@@ -14,7 +14,7 @@ use crate::dataset::{Dimensions, FillingLevel, FillingType};
 /// 351 g, width at the top 50 to 350 mm, at the bottom 30 to 380 mm, height 20 to 370 mm, time
 /// 20 to 5020 ms. The official `random1.csv` came from an unseeded generator and cannot be made
 /// again; here the same seed gives the same file everywhere.
-pub fn pseudo_random(keys: &[RowKey], seed: u64) -> Vec<Prediction> {
+pub fn pseudo_random(keys: &[RowKey], seed: u64) -> Vec<SubmissionRow> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     keys.iter()
         .map(|&key| {
@@ -28,7 +28,7 @@ pub fn pseudo_random(keys: &[RowKey], seed: u64) -> Vec<Prediction> {
                 width_bottom: size(350.0, 30.0),
                 height: size(350.0, 20.0),
             };
-            Prediction {
+            SubmissionRow {
                 key,
                 kind: FillingType::from_number(argmax(&kind) as i64),
                 kind_probabilities: Some(kind),

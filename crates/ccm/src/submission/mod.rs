@@ -8,7 +8,7 @@ mod writer;
 pub use baseline::pseudo_random;
 pub(crate) use reader::listed;
 pub use stand_in::{official_stand_in, stand_in};
-pub use writer::Prediction;
+pub use writer::SubmissionRow;
 
 use std::fmt;
 use std::path::PathBuf;

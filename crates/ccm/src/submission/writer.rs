@@ -20,7 +20,7 @@ const HEADER_2020: &str = "Container ID,Sequence,Filling type,Filling level,Cont
 
 /// What is estimated for one recording; `None` is written as -1.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Prediction {
+pub struct SubmissionRow {
     /// The recording.
     pub key: RowKey,
     /// Filling type.
@@ -41,7 +41,7 @@ pub struct Prediction {
     pub execution_ms: Option<f64>,
 }
 
-impl Prediction {
+impl SubmissionRow {
     /// Nothing estimated.
     pub fn empty(key: RowKey) -> Self {
         Self {
@@ -86,9 +86,9 @@ impl Prediction {
 }
 
 impl Submission {
-    /// A submission held in memory, with all of [`Prediction`]'s estimates.
-    pub fn from_predictions(name: &str, format: Format, predictions: &[Prediction]) -> Self {
-        let column = |value: &dyn Fn(&Prediction) -> Option<f64>| Estimates {
+    /// A submission held in memory, with all of [`SubmissionRow`]'s estimates.
+    pub fn from_predictions(name: &str, format: Format, predictions: &[SubmissionRow]) -> Self {
+        let column = |value: &dyn Fn(&SubmissionRow) -> Option<f64>| Estimates {
             values: predictions.iter().map(|p| value(p).unwrap_or(-1.0)).collect(),
             float: false,
         };
@@ -120,7 +120,7 @@ impl Submission {
     pub fn write(
         path: &Path,
         format: Format,
-        predictions: &[Prediction],
+        predictions: &[SubmissionRow],
         expected: &[RowKey],
     ) -> Result<()> {
         let by_key = check(path, format, predictions, expected)?;
@@ -140,9 +140,9 @@ impl Submission {
 fn check<'a>(
     path: &Path,
     format: Format,
-    predictions: &'a [Prediction],
+    predictions: &'a [SubmissionRow],
     expected: &[RowKey],
-) -> Result<HashMap<RowKey, &'a Prediction>> {
+) -> Result<HashMap<RowKey, &'a SubmissionRow>> {
     let rows_error = |problem, rows: String| CcmError::Rows {
         path: path.to_path_buf(),
         problem,
@@ -180,7 +180,7 @@ fn check<'a>(
     }
 }
 
-fn row(p: &Prediction) -> String {
+fn row(p: &SubmissionRow) -> String {
     let number = |v: Option<f64>| v.map_or("-1".into(), |v| v.to_string());
     let label = |v: Option<usize>| v.map_or("-1".into(), |v| v.to_string());
     let kind = label(p.kind.map(|k| k as usize));
@@ -213,13 +213,13 @@ fn row(p: &Prediction) -> String {
 mod tests {
     use super::*;
 
-    fn example(key: RowKey) -> Prediction {
-        Prediction {
+    fn example(key: RowKey) -> SubmissionRow {
+        SubmissionRow {
             kind: Some(FillingType::Rice),
             kind_probabilities: Some([0.1, 0.2, 0.6, 0.1]),
             level: Some(FillingLevel::Full),
             capacity_ml: Some(320.5),
-            ..Prediction::empty(key)
+            ..SubmissionRow::empty(key)
         }
     }
 
@@ -231,7 +231,7 @@ mod tests {
             (Format::Y2020, [RowKey::Sequence(1, 0), RowKey::Sequence(1, 1)]),
         ] {
             let path = dir.path().join("s.csv");
-            let predictions = [example(keys[0]), Prediction::empty(keys[1])];
+            let predictions = [example(keys[0]), SubmissionRow::empty(keys[1])];
             let mixed = [predictions[1].clone(), predictions[0].clone()];
             Submission::write(&path, format, &mixed, &keys).unwrap();
             let read = Submission::read(&path).unwrap();

@@ -1,19 +1,19 @@
 //! Scores of predicted against true classes.
 
-mod calibration;
 mod confusion;
 mod curves;
 mod interval;
 mod numeric;
+mod reliability;
 mod report;
 
 use serde::Serialize;
 
-pub use calibration::{Calibration, CalibrationBin};
 pub use confusion::{ClassScores, ConfusionMatrix};
 pub use curves::ClassCurves;
 pub use interval::Interval;
 pub use numeric::NumericScores;
+pub use reliability::{Reliability, ReliabilityBin};
 pub use report::{ClassReport, ScoreIntervals, ScoreReport, Scoring};
 
 use crate::error::{ModelError, Result};

@@ -6,9 +6,9 @@ use std::hash::Hash;
 use ndarray::ArrayView1;
 use serde::Serialize;
 
-use super::calibration::Calibration;
 use super::curves::ClassCurves;
 use super::interval::{Interval, intervals, units};
+use super::reliability::Reliability;
 use super::{NumericScores, Scores};
 use crate::error::ModelError;
 use crate::labels::Labels;
@@ -68,7 +68,7 @@ pub struct ClassReport {
     /// number of different groups, or rows
     pub units: usize,
     /// scores of probabilities, over rows that have them
-    pub calibration: Option<Calibration>,
+    pub calibration: Option<Reliability>,
     /// curves of each class against the others; absent where a class or all others have no rows
     pub curves: Option<Vec<Option<ClassCurves>>>,
     /// mean of the areas under the ROC curves (`roc_auc_score(multi_class="ovr")`)
@@ -221,7 +221,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
             drawn,
             units: units.len(),
             calibration: (!with_proba.is_empty())
-                .then(|| Calibration::new(&with_proba, labels.len())),
+                .then(|| Reliability::new(&with_proba, labels.len())),
             roc_auc: mean(|c| c.roc_auc),
             average_precision: mean(|c| c.average_precision),
             curves,

@@ -3,21 +3,21 @@
 use corsmal_plot::{Slope, Slopes};
 use corsmal_report::{Cell, Figure, Row, Section, Source, Table};
 
-use crate::benchmark::baselines::{Outcome, Variant};
+use crate::benchmark::baselines::{BaselineResult, Variant};
 use crate::benchmark::results::{Estimate, Rows, Target, score};
 use crate::error::Result;
 
 /// Scores of a baseline on recordings that were mostly trained on, on a random fifth that shares its
 /// containers with the training part, and on containers never heard; level, type and joint class.
 struct Line<'a> {
-    outcome: &'a Outcome,
+    outcome: &'a BaselineResult,
     seen: Option<[f64; 3]>,
     random: Option<[f64; 3]>,
     held_out: Option<[f64; 3]>,
 }
 
-pub(super) fn section(rows: &Rows, outcomes: &[Outcome], seed: u64) -> Result<Section> {
-    let joint = |o: &Outcome, held_out: bool| -> Option<[f64; 3]> {
+pub(super) fn section(rows: &Rows, outcomes: &[BaselineResult], seed: u64) -> Result<Section> {
+    let joint = |o: &BaselineResult, held_out: bool| -> Option<[f64; 3]> {
         let (targets, estimates): (Vec<&Target>, Vec<Estimate>) = if held_out {
             o.held_out.iter().map(|(row, e)| (&rows.training[*row], e.clone())).unzip()
         } else {

@@ -10,7 +10,7 @@ const BINS: usize = 15;
 
 /// Scores of probabilities.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Calibration {
+pub struct Reliability {
     /// mean squared distance of the probabilities from the truth, 0 to 2; with two classes half of
     /// it, 0 to 1 (scikit-learn's `brier_score_loss` with `scale_by_half="auto"`)
     pub brier: f64,
@@ -18,12 +18,12 @@ pub struct Calibration {
     /// and the share of right predictions in its bin (15 bins of equal width)
     pub ece: f64,
     /// the bins that hold rows
-    pub bins: Vec<CalibrationBin>,
+    pub bins: Vec<ReliabilityBin>,
 }
 
 /// Rows whose highest probability is in one interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct CalibrationBin {
+pub struct ReliabilityBin {
     /// rows
     pub rows: usize,
     /// mean of their highest probabilities
@@ -32,7 +32,7 @@ pub struct CalibrationBin {
     pub accuracy: f64,
 }
 
-impl Calibration {
+impl Reliability {
     /// Of the rows' true classes, of which there are `classes`, and their probabilities, one for each
     /// class that the model knows: those of the others are 0.
     pub(super) fn new<'a>(rows: &[(usize, ArrayView1<'a, f64>)], classes: usize) -> Self {
@@ -54,14 +54,14 @@ impl Calibration {
             bins[bin].2 += usize::from(best == *truth);
         }
         let filled = bins.into_iter().filter(|bin| bin.0 > 0);
-        let bins: Vec<CalibrationBin> = filled
-            .map(|(rows, sum, right)| CalibrationBin {
+        let bins: Vec<ReliabilityBin> = filled
+            .map(|(rows, sum, right)| ReliabilityBin {
                 rows,
                 confidence: sum / rows as f64,
                 accuracy: right as f64 / rows as f64,
             })
             .collect();
-        let gap = |bin: &CalibrationBin| bin.rows as f64 * (bin.accuracy - bin.confidence).abs();
+        let gap = |bin: &ReliabilityBin| bin.rows as f64 * (bin.accuracy - bin.confidence).abs();
         let ece = bins.iter().map(gap).sum::<f64>() / n;
         let scale = if classes == 2 { 0.5 } else { 1.0 };
         Self { brier: scale * brier / n, ece, bins }
@@ -77,10 +77,10 @@ mod tests {
     #[test]
     fn classes_without_probabilities_have_none() {
         let p = array![[0.8, 0.2], [0.5, 0.5]];
-        let known = Calibration::new(&[(0, p.row(0)), (1, p.row(1))], 2);
+        let known = Reliability::new(&[(0, p.row(0)), (1, p.row(1))], 2);
         assert!((known.brier - (0.08 + 0.5) / 4.0).abs() < 1e-12);
         // The second row is of a third class: its probability is 0 where 1 is right.
-        let strange = Calibration::new(&[(0, p.row(0)), (2, p.row(1))], 3);
+        let strange = Reliability::new(&[(0, p.row(0)), (2, p.row(1))], 3);
         assert!((strange.brier - (0.08 + 1.5) / 2.0).abs() < 1e-12);
     }
 }
