@@ -35,5 +35,5 @@ pub use error::{ReportError, Result};
 pub use figure::{Figure, FigureGroup};
 pub use look::{Look, look};
 pub use overview::{Overview, View};
-pub use report::{Fact, Report, Section, Snippet};
+pub use report::{Fact, Report, Section, Snippet, capitalised};
 pub use table::{Cell, Row, Source, Table};

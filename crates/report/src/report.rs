@@ -89,3 +89,9 @@ impl Report {
         Self { title: title.into(), ..Self::default() }
     }
 }
+
+/// A text with a capital at its beginning, as the first cell of a row has it.
+pub fn capitalised(text: &str) -> String {
+    let mut chars = text.chars();
+    chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
+}

@@ -96,6 +96,77 @@ macro_rules! tree_parameters {
 }
 pub(super) use tree_parameters;
 
+/// Declares the parameters of an ensemble of trees, and trains it.
+macro_rules! forest {
+    (
+        $(#[$meta:meta])*
+        $name:ident, $owner:literal, bootstrap: $bootstrap:literal,
+        random_thresholds: $random_thresholds:literal
+    ) => {
+        $crate::classifiers::trees::tree_parameters! {
+            $(#[$meta])*
+            $name, $owner {
+                first {
+                    trees: usize = 100, "a whole number from 1 to 100000", "number of trees";
+                }
+                max_features: $crate::classifiers::cart::FeatureRule::Sqrt;
+                then {
+                    bootstrap: bool = $bootstrap, "true or false",
+                        "draw rows with replacement for each tree";
+                    #[serde(skip_serializing_if = "std::ops::Not::not")]
+                    oob_score: bool = false, "true or false (needs bootstrap=true)",
+                        "ask each tree about the rows that it has not seen (Python: oob_score_)";
+                }
+                last {}
+            }
+            random_thresholds: $random_thresholds;
+            check(this) {
+                let most = $crate::classifiers::trees::MAX_TREES;
+                Self::require((1..=most).contains(&this.trees), "trees", this.trees)?;
+                Self::require(this.bootstrap || !this.oob_score, "oob_score", this.oob_score)
+            }
+        }
+
+        impl $crate::classifiers::Train for $name {
+            type Fitted = $crate::classifiers::trees::Trees;
+            const FEWEST_CLASSES: usize = 1;
+
+            fn train(
+                &self,
+                x: ndarray::ArrayView2<'_, f64>,
+                y: &[usize],
+                n_classes: usize,
+            ) -> $crate::error::Result<Self::Fitted> {
+                Self::Fitted::grow(x, y, n_classes, None, &self.plan())
+            }
+
+            fn train_weighted(
+                &self,
+                x: ndarray::ArrayView2<'_, f64>,
+                y: &[usize],
+                n_classes: usize,
+                weights: &[f64],
+            ) -> $crate::error::Result<Self::Fitted> {
+                Self::Fitted::grow(x, y, n_classes, Some(weights), &self.plan())
+            }
+        }
+
+        impl $name {
+            fn plan(&self) -> $crate::classifiers::trees::Plan<'_> {
+                $crate::classifiers::trees::Plan {
+                    growth: self.growth(),
+                    n_trees: self.trees,
+                    bootstrap: self.bootstrap,
+                    out_of_bag: self.oob_score,
+                    class_weight: &self.class_weight,
+                    seed: self.seed,
+                }
+            }
+        }
+    };
+}
+pub(super) use forest;
+
 /// How an ensemble is grown.
 pub(super) struct Plan<'a> {
     pub growth: Growth,

@@ -3,7 +3,7 @@
 use corsmal_plot::{ConfusionMatrix, Line, LinePlot, Mark, ScorePlot, ScoreRow};
 
 use super::content::{self, Study};
-use crate::{Cell, Figure, Result, Row, Section, Source, Table};
+use crate::{Cell, Figure, Result, Row, Section, Source, Table, capitalised};
 
 /// Scores of all held-out rows and of each fold, and calibration.
 pub(super) fn section(study: &Study) -> Result<Option<Section>> {
@@ -60,7 +60,7 @@ pub(super) fn section(study: &Study) -> Result<Option<Section>> {
             joined: true,
         };
         let caption = "On the dashed line, 80 of 100 predictions with a confidence of 0.8 are right. \
-                       Below it, the classifier is too sure.";
+                       Below it, the classifier is overconfident.";
         figures.push(Figure::new("calibration", caption, &plot)?);
     }
     let mut tables = vec![table];
@@ -84,11 +84,6 @@ fn measures(study: &Study) -> Option<Table> {
         columns: ["Measure", "Value", "Meaning"].map(String::from).to_vec(),
         rows: study.measures.iter().map(row).collect(),
     })
-}
-
-fn capitalised(text: &str) -> String {
-    let mut chars = text.chars();
-    chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
 }
 
 /// Which classes are taken for which.
@@ -119,7 +114,7 @@ pub(super) fn confusion(study: &Study) -> Result<Option<Section>> {
         rows: study.classes.iter().zip(&study.class_scores).map(row).collect(),
     };
     let section = Section {
-        text: vec!["Shades are shares of the true class.".into()],
+        text: vec!["A cell's shade is its share of the true class.".into()],
         tables: vec![table],
         ..Section::new("confusion", "Class by class")
     };

@@ -1,9 +1,9 @@
 //! What was used, what the names mean, what to cite.
 
-use corsmal_report::{Fact, Section};
+use corsmal_report::{Fact, Section, capitalised};
 
 use crate::benchmark::Made;
-use crate::benchmark::baselines::Outcome;
+use crate::benchmark::baselines::BaselineResult;
 use crate::benchmark::results::Rows;
 use crate::benchmark::system::Run;
 use crate::citation;
@@ -12,7 +12,7 @@ use crate::dataset::DataSet;
 pub(super) fn facts(
     set: &DataSet,
     rows: &Rows,
-    outcomes: &[Outcome],
+    outcomes: &[BaselineResult],
     seed: u64,
     made: &Made,
 ) -> Vec<Fact> {
@@ -41,11 +41,6 @@ pub(super) fn facts(
     facts.extend(made.on.iter().map(|on| Fact::new("Date", on)));
     facts.extend(made.command.iter().map(|command| Fact::new("Command", command)));
     facts
-}
-
-fn capitalised(text: &str) -> String {
-    let mut chars = text.chars();
-    chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
 }
 
 /// Who M1 to M6 are.
