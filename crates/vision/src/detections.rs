@@ -76,10 +76,10 @@ impl Detection {
 /// [`VisionError`] with the line or entry at fault.
 pub fn read_detections(path: &Path) -> Result<Vec<Detection>> {
     let bytes = read(path, MAX_BYTES)?;
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
-        from_json(&bytes, path)
-    } else {
-        from_csv(&bytes, path)
+    // The header of a CSV begins with a letter, whatever the name of the file.
+    match bytes.trim_ascii_start().first() {
+        Some(b'[' | b'{') => from_json(&bytes, path),
+        _ => from_csv(&bytes, path),
     }
 }
 
@@ -321,7 +321,7 @@ mod tests {
         let csv = format!("{HEADER}0,c1,47,0.9,1,2,3.5,4,m.png\n8,2,Wine Glass,0.5,0,0,1,1,\n");
         let json = r#"[{"frame":0,"view":1,"label":"cup","score":0.9,"box":[1,2,3.5,4],"mask":"m.png"},
             {"frame":8,"view":"c2","label":46,"score":0.5,"box":[0,0,1,1]}]"#;
-        let (a, b) = (table("d.csv", &csv).unwrap(), table("d.json", json).unwrap());
+        let (a, b) = (table("d.json", &csv).unwrap(), table("d.csv", json).unwrap());
         for (a, b) in a.iter().zip(&b) {
             assert_eq!(
                 (a.frame, a.view, &a.label, a.score, a.bounds),

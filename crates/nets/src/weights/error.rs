@@ -16,13 +16,13 @@ pub enum WeightsError {
         /// why
         source: std::io::Error,
     },
-    /// The file's ending is none of those known.
-    #[error("{}: weights end in .npz, .safetensors, .pth or .pt", path.display())]
+    /// The name of a file to write says no format.
+    #[error("{}: must end in .npz or .safetensors", path.display())]
     Ending {
         /// the file
         path: PathBuf,
     },
-    /// The content is not what the ending says, or holds something else than weights.
+    /// The content is damaged, or no weights.
     #[error("{}: {reason}", path.display())]
     Content {
         /// the file

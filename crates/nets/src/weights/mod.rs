@@ -7,23 +7,49 @@ mod pickle;
 mod pth;
 mod safetensors;
 
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 pub use error::WeightsError;
 pub use numbers::{MAX_FILE, State};
 pub use safetensors::{from_safetensors, safetensors_shapes, safetensors_text, to_safetensors};
 
-/// Reads weights, the format by the file's ending. Nothing in the file is run.
+/// How weights are written.
+enum Format {
+    Npz,
+    Safetensors,
+    Pth,
+}
+
+impl Format {
+    /// By the first bytes of a file, whatever its name.
+    fn of(path: &Path) -> std::io::Result<Option<Self>> {
+        let mut start = Vec::new();
+        File::open(path)?.take(9).read_to_end(&mut start)?;
+        Ok(match start.as_slice() {
+            [b'P', b'K', 3 | 5, 4 | 6, ..] if pth::is_archive(path) => Some(Self::Pth),
+            [b'P', b'K', 3 | 5, 4 | 6, ..] => Some(Self::Npz),
+            // The length of a header, below 4 GiB, and the brace with which it begins.
+            [_, _, _, _, 0, 0, 0, 0, b'{'] => Some(Self::Safetensors),
+            // A pickle without an archive, as PyTorch wrote it before version 1.6.
+            [0x80, 2..=5, ..] => Some(Self::Pth),
+            _ => None,
+        })
+    }
+}
+
+/// Reads weights, the format by the file's first bytes. Nothing in the file is run.
 ///
 /// # Errors
 /// [`WeightsError`].
 pub fn read(path: &Path) -> Result<State, WeightsError> {
     let refuse = |reason| WeightsError::Content { path: path.into(), reason };
-    match ending(path) {
-        Some("npz") => npz::read(path).map_err(refuse),
-        Some("safetensors") => from_safetensors(&bytes(path)?).map_err(refuse),
-        Some("pth" | "pt") => pth::read(path).map_err(refuse),
-        _ => Err(WeightsError::Ending { path: path.into() }),
+    match Format::of(path).map_err(|source| WeightsError::Io { path: path.into(), source })? {
+        Some(Format::Npz) => npz::read(path).map_err(refuse),
+        Some(Format::Safetensors) => from_safetensors(&bytes(path)?).map_err(refuse),
+        Some(Format::Pth) => pth::read(path).map_err(refuse),
+        None => Err(refuse("not weights: expected an .npz, .safetensors or .pth file".into())),
     }
 }
 

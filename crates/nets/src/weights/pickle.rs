@@ -1,5 +1,6 @@
 //! The part of pickle that state dictionaries of PyTorch use. Nothing is called: the few classes
-//! and functions that occur are known by name, everything else is refused.
+//! and functions that occur are known by name, everything else is refused. These are
+//! binary pickles, from protocol 2 on; `corsmal_vision` reads those of protocol 0, which are text.
 
 use super::numbers::Kind;
 

@@ -14,6 +14,16 @@ const MAX_PICKLE: u64 = 64 << 20;
 /// Keys under which training scripts keep the weights beside other things.
 const INNER: [&str; 3] = ["state_dict", "model_state_dict", "model"];
 
+/// Whether a zip archive is one of `torch.save`.
+pub(super) fn is_archive(path: &Path) -> bool {
+    let archive = File::open(path).ok().and_then(|f| ZipArchive::new(BufReader::new(f)).ok());
+    archive.is_some_and(|a| a.file_names().any(|name| name.is_ok_and(|name| is_pickle(&name))))
+}
+
+fn is_pickle(name: &str) -> bool {
+    name == "data.pkl" || name.ends_with("/data.pkl")
+}
+
 pub(super) fn read(path: &Path) -> Result<State, String> {
     let file = File::open(path).map_err(|e| e.to_string())?;
     let length = file.metadata().map_err(|e| e.to_string())?.len();
@@ -27,10 +37,7 @@ pub(super) fn read(path: &Path) -> Result<State, String> {
         .file_names()
         .map(|name| name.map(|n| n.into_owned()).map_err(|e| e.to_string()))
         .collect::<Result<_, _>>()?;
-    let pickle = names
-        .iter()
-        .find(|n| n.as_str() == "data.pkl" || n.ends_with("/data.pkl"))
-        .ok_or("there is no data.pkl in it")?;
+    let pickle = names.iter().find(|name| is_pickle(name)).ok_or("there is no data.pkl in it")?;
     let root = pickle.strip_suffix("data.pkl").unwrap_or("").to_owned();
     if let Ok(order) = member(&mut archive, &format!("{root}byteorder"), 16)
         && order != b"little"

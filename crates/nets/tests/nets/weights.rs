@@ -156,3 +156,21 @@ fn damaged_files_are_refused_by_name() {
     std::fs::write(&other, b"").unwrap();
     assert!(weights::read(&other).unwrap_err().to_string().contains(".safetensors"));
 }
+
+#[test]
+fn content_says_what_weights_are_and_not_their_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    weights::write(&path("a.npz"), &state()).unwrap();
+    weights::write(&path("a.safetensors"), &state()).unwrap();
+    std::fs::rename(path("a.npz"), path("b.pth")).unwrap();
+    std::fs::rename(path("a.safetensors"), path("b.npz")).unwrap();
+    let sorted = |name: &str| {
+        let mut read = weights::read(&path(name)).unwrap();
+        read.sort_by(|a, b| a.0.cmp(&b.0));
+        read
+    };
+    assert_eq!(sorted("b.pth"), sorted("b.npz"));
+    let error = weights::write(&path("b.bin"), &state()).unwrap_err().to_string();
+    assert!(error.contains("must end in .npz or .safetensors"), "{error}");
+}

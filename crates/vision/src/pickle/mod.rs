@@ -1,5 +1,6 @@
 //! A reader of text pickles (protocol 0) that hold lists, dictionaries, strings, numbers and numpy
-//! arrays of floats. Nothing is called: a pickle that names any other function is refused.
+//! arrays of floats. Nothing is called: a pickle that names any other function is refused. `corsmal_nets`
+//! reads the binary pickles of PyTorch.
 
 mod array;
 mod literal;
