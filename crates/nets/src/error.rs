@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::batch::Shape;
+
 const GIB: f64 = (1u64 << 30) as f64;
 
 /// A refusal. Texts name the place, what was found and what would be accepted.
@@ -39,10 +41,12 @@ pub enum NetError {
         actual: usize,
     },
     /// Layers that do not fit one another.
-    #[error("layer {layer}: cannot take {input}")]
+    #[error("layer {layer}: expected {expected}, found {input}")]
     LayerInput {
         /// the layer
         layer: String,
+        /// what it takes
+        expected: String,
         /// what it was offered
         input: String,
     },
@@ -152,9 +156,21 @@ pub enum NetError {
         network: String,
         /// what was asked for
         what: &'static str,
-        /// what there is instead
+        /// what to use instead
         hint: String,
     },
+}
+
+impl NetError {
+    /// The refusal of a layer.
+    pub(crate) fn layer(
+        layer: impl Into<String>,
+        expected: impl Into<String>,
+        found: Shape,
+    ) -> Self {
+        let (layer, expected, input) = (layer.into(), expected.into(), found.to_string());
+        Self::LayerInput { layer, expected, input }
+    }
 }
 
 /// Result of this crate.

@@ -120,8 +120,11 @@ impl Network {
             let fits =
                 matches!(shape, Shape::Vector(_)) && outputs.is_none_or(|o| o == shape.len());
             if !fits {
-                let (layer, input) = ("the network's end".into(), shape.to_string());
-                return Err(NetError::LayerInput { layer, input });
+                let expected = match outputs {
+                    None => "a vector".to_string(),
+                    Some(n) => format!("{n} numbers, as of the other inputs"),
+                };
+                return Err(NetError::layer("the network's end", expected, shape));
             }
             outputs = Some(shape.len());
         }

@@ -47,7 +47,8 @@ impl Layer for BatchNorm {
     }
 
     fn output(&self, input: Shape) -> Result<Shape> {
-        let refusal = || NetError::LayerInput { layer: self.describe(), input: input.to_string() };
+        let refusal =
+            || NetError::layer(self.describe(), format!("{} channels", self.channels), input);
         (input.numbers() == self.channels).then_some(input).ok_or_else(refusal)
     }
 

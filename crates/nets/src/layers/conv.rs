@@ -130,7 +130,13 @@ impl Layer for Conv2d {
     }
 
     fn output(&self, input: Shape) -> Result<Shape> {
-        let refusal = || NetError::LayerInput { layer: self.describe(), input: input.to_string() };
+        let refusal = || {
+            NetError::layer(
+                self.describe(),
+                format!("an image of {} channels that its kernel fits", self.inputs),
+                input,
+            )
+        };
         let g = self.geometry(input).ok_or_else(refusal)?;
         Ok(Shape::Image { height: g.out_height, width: g.out_width, channels: self.outputs })
     }

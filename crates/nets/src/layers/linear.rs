@@ -39,7 +39,8 @@ impl Layer for Linear {
 
     fn output(&self, input: Shape) -> Result<Shape> {
         let fits = input.numbers() == self.inputs && !matches!(input, Shape::Image { .. });
-        let refusal = || NetError::LayerInput { layer: self.describe(), input: input.to_string() };
+        let refusal =
+            || NetError::layer(self.describe(), format!("{} numbers", self.inputs), input);
         fits.then(|| input.with_numbers(self.outputs)).ok_or_else(refusal)
     }
 

@@ -57,7 +57,7 @@ impl Layer for MaxPool {
     }
 
     fn output(&self, input: Shape) -> Result<Shape> {
-        let refusal = || NetError::LayerInput { layer: self.describe(), input: input.to_string() };
+        let refusal = || NetError::layer(self.describe(), "an image of at least its size", input);
         let (height, width) = self.sizes(input).ok_or_else(refusal)?;
         Ok(Shape::Image { height, width, channels: input.numbers() })
     }
@@ -161,7 +161,7 @@ impl Layer for AveragePool {
     fn output(&self, input: Shape) -> Result<Shape> {
         match input {
             Shape::Image { channels, .. } => Ok(Shape::Vector(channels)),
-            _ => Err(NetError::LayerInput { layer: self.describe(), input: input.to_string() }),
+            _ => Err(NetError::layer(self.describe(), "an image", input)),
         }
     }
 

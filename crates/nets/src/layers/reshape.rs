@@ -17,7 +17,7 @@ impl Layer for Flatten {
     fn output(&self, input: Shape) -> Result<Shape> {
         match input {
             Shape::Image { .. } => Ok(Shape::Vector(input.len())),
-            _ => Err(NetError::LayerInput { layer: self.describe(), input: input.to_string() }),
+            _ => Err(NetError::layer(self.describe(), "an image", input)),
         }
     }
 
@@ -73,7 +73,7 @@ impl Layer for LastStep {
     fn output(&self, input: Shape) -> Result<Shape> {
         match input {
             Shape::Sequence { numbers, .. } => Ok(Shape::Vector(numbers)),
-            _ => Err(NetError::LayerInput { layer: self.describe(), input: input.to_string() }),
+            _ => Err(NetError::layer(self.describe(), "a sequence", input)),
         }
     }
 
@@ -127,7 +127,7 @@ impl Layer for Join {
     fn output(&self, input: Shape) -> Result<Shape> {
         match input {
             Shape::Vector(n) => Ok(Shape::Vector(n + self.numbers)),
-            _ => Err(NetError::LayerInput { layer: self.describe(), input: input.to_string() }),
+            _ => Err(NetError::layer(self.describe(), "a vector", input)),
         }
     }
 

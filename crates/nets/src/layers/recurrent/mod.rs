@@ -165,7 +165,11 @@ impl Layer for Recurrent {
             Shape::Sequence { numbers, .. } if numbers == self.inputs => {
                 Ok(input.with_numbers(self.hidden))
             }
-            _ => Err(NetError::LayerInput { layer: self.describe(), input: input.to_string() }),
+            _ => Err(NetError::layer(
+                self.describe(),
+                format!("steps of {} numbers", self.inputs),
+                input,
+            )),
         }
     }
 
