@@ -111,8 +111,8 @@ pub struct DatasetArgs {
     pub members: MemberArgs,
     #[command(flatten)]
     labels: LabelArgs,
-    /// Label column to learn; the only one where there is one. `joint` is type and level together
-    /// where there is no such column.
+    /// Label column to learn; may be left out if there is only one. `joint` is type and level
+    /// together where there is no such column.
     #[arg(long, visible_alias = "y", value_name = "COLUMN")]
     target: Option<String>,
     /// Label column of groups that must not be split between training and test. Without --cv,

@@ -22,8 +22,8 @@ pub struct PipelineArgs {
     /// Principal components to keep: a number of them, or a part of the variance below 1.0.
     #[arg(long, value_name = "N")]
     pca: Option<String>,
-    /// Try these values, such as C=0.1,1,10; repeated, every combination. The choice is made on
-    /// folds inside the training rows.
+    /// Try these values, such as C=0.1,1,10; repeat it to try every combination. The choice is made
+    /// on folds inside the training rows.
     #[arg(long, value_name = "KEY=V1,V2")]
     tune: Vec<String>,
     /// Seed of the classifier or network and of shuffled folds; 0 by default.

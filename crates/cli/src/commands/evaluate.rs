@@ -48,7 +48,7 @@ pub struct Args {
     /// Rules to score by.
     #[arg(long, value_enum, default_value = "toolkit")]
     rules: Rules,
-    /// Submission that stands in, in the filling mass only, for tasks that are not addressed.
+    /// Submission that replaces unaddressed tasks, in the filling mass only.
     /// Default: the official random1.csv or random123.csv, which come with this tool; pseudo-random
     /// estimates for recordings that those files do not have.
     #[arg(long, value_name = "CSV")]

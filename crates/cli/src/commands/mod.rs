@@ -54,7 +54,7 @@ fn run_words(words: &[&str]) -> Result<ExitCode, Failure> {
 /// Registration: a command is its file, a variant here and a line in `run`.
 #[derive(Subcommand)]
 enum Command {
-    /// Recordings in, feature tensors or tables out.
+    /// Extract features of recordings into tensors or tables.
     Extract(extract::Args),
     /// Join the outputs of all shards of a run.
     Merge(merge::Args),

@@ -95,7 +95,7 @@ pub struct Args {
 pub(super) enum Format {
     /// A header, then a line each.
     Csv,
-    /// A JSON object a line.
+    /// One JSON object per line.
     #[value(alias = "json")]
     Jsonl,
 }
@@ -176,8 +176,8 @@ pub(super) fn configuration(args: &Args, model: &Model) -> Result<Arc<Config>, F
     // A configuration of another version of the tool may mean something else.
     if config.hash() != header.feature_config_hash {
         return Err(Failure::new(format!(
-            "{place}: its feature configuration was written by version {} and reads differently in \
-             this version: extract and train again",
+            "{place}: its feature configuration was written by version {}; this version computes other \
+             features from it: extract and train again",
             header.tool_version
         )));
     }

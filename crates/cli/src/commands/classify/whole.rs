@@ -54,8 +54,8 @@ pub fn run(args: &Args, model: &Model) -> Result<(End, Option<Records>), Failure
         let labels = input.labels.iter().map(|(_, value)| value.as_str()).collect();
         let path = path(input);
         // What was refused by its header is in no table.
-        let refused = Prediction { status: Status::Mismatch, class: None, proba: None };
-        let Prediction { status, class, proba } =
+        let refused = Verdict { status: Status::Mismatch, class: None, proba: None };
+        let Verdict { status, class, proba } =
             predictions.remove(input.id.as_str()).unwrap_or(refused);
         let id = input.id.as_str();
         let record =
@@ -101,7 +101,7 @@ pub fn of_features(
         let labels = rows.get(id).map_or(Vec::new(), |&row| {
             table.columns().iter().map(|(_, values)| values[row].as_str()).collect()
         });
-        let Prediction { status, class, proba } = predictions[id].clone();
+        let Verdict { status, class, proba } = predictions[id].clone();
         let record = Record { id, path, span: None, windows: 0, status, labels, class, proba };
         if !delivered(records.write(&record))? {
             return Ok((End::Unread, Some(records)));
@@ -110,9 +110,9 @@ pub fn of_features(
     Ok((End::Done, Some(records)))
 }
 
-/// The line of a recording.
+/// What the line of a recording says.
 #[derive(Clone)]
-struct Prediction {
+struct Verdict {
     status: Status,
     class: Option<usize>,
     proba: Option<Vec<f64>>,
@@ -142,9 +142,9 @@ fn predictions(
     table: &LabelledTable,
     formats: &FormatRule,
     args: &Args,
-) -> Result<HashMap<String, Prediction>, Failure> {
+) -> Result<HashMap<String, Verdict>, Failure> {
     let mut found = HashMap::new();
-    let none = |status| Prediction { status, class: None, proba: None };
+    let none = |status| Verdict { status, class: None, proba: None };
     let by_id: HashMap<&str, &Outcome> =
         table.outcomes.iter().map(|o| (o.id.as_str(), o)).collect();
     let not_finite: HashMap<usize, usize> = table.non_finite().into_iter().collect();
@@ -177,7 +177,7 @@ fn predictions(
             let id = &table.ids[row];
             let status = by_id.get(id.as_str()).map_or(Status::Ok, |o| o.status);
             let proba = proba.as_ref().map(|proba| proba.row(at).to_vec());
-            let prediction = Prediction { status, class: Some(classes[at]), proba };
+            let prediction = Verdict { status, class: Some(classes[at]), proba };
             found.insert(id.clone(), prediction);
         }
     }
@@ -204,7 +204,7 @@ fn check_features(model: &Model, table: &LabelledTable, args: &Args) -> Result<b
     match names.enumerate().find(|(_, (known, given))| known != given) {
         None => Ok(true),
         Some((at, (known, given))) => Err(Failure::new(format!(
-            "{}: feature {at} is {given}, the model was trained on {known} there",
+            "{}: feature {at} must be {known}, as in training, not {given}",
             table.path.display()
         ))),
     }

@@ -170,9 +170,9 @@ impl SubmissionArgs {
             ("--part", self.part.is_some()),
         ];
         match given.iter().find(|(_, given)| *given) {
-            Some((name, _)) => {
-                Err(Failure::new(format!("{name} is for submissions, made of --type and --level")))
-            }
+            Some((name, _)) => Err(Failure::new(format!(
+                "{name} is for submissions: give --type, --level or --joint"
+            ))),
             None => Ok(()),
         }
     }

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use corsmal_ccm::capacity;
 use corsmal_ccm::dataset::{Annotations, Subset};
 use corsmal_ccm::decision::{Rule, decide, decide_joint};
-use corsmal_ccm::submission::{self, Prediction, RowKey, Submission, official_rows};
+use corsmal_ccm::submission::{self, RowKey, Submission, SubmissionRow, official_rows};
 
 use super::args::{Args, Format, Part};
 use crate::failure::{FAILED_FILES, Failure};
@@ -16,7 +16,7 @@ use crate::failure::{FAILED_FILES, Failure};
 pub fn run(args: &Args) -> Result<ExitCode, Failure> {
     let options = &args.submission;
     if args.out.as_os_str() == "-" {
-        return Err(Failure::new("--out -: a submission is checked and written as a file"));
+        return Err(Failure::new("--out - cannot hold a submission: name a file"));
     }
     let fused = |paths: &[PathBuf], weights: &Option<Vec<f64>>| {
         let some = !paths.is_empty();
@@ -88,7 +88,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
 
 /// Names recordings as the format does, by the annotations.
 fn rename(
-    predictions: &mut [Prediction],
+    predictions: &mut [SubmissionRow],
     annotations: &Annotations,
     format: submission::Format,
 ) -> Result<(), Failure> {

@@ -83,7 +83,7 @@ pub fn draw_array(path: &Path, values: ArrayD<f32>, picture: &Picture) -> Result
 }
 
 fn nothing(path: &str) -> Failure {
-    Failure::new(format!("{path}: it has no array of features to draw"))
+    Failure::new(format!("{path}: holds no array of features to draw"))
 }
 
 /// A panel for each channel of an array `[channels, coefficients, frames]`.
