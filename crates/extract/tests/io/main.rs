@@ -5,6 +5,7 @@
 
 mod archives;
 mod faults;
+mod in_order;
 mod inputs;
 mod outputs;
 mod own_feature;
