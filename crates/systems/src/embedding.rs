@@ -49,7 +49,7 @@ impl Embedder {
         let mut network = definition.build(None, 0)?;
         network
             .load_state(&weights::read(path)?)
-            .map_err(|source| SystemError::OtherWeights { path: path.into(), source })?;
+            .map_err(|e| SystemError::OtherWeights { path: path.into(), source: Box::new(e) })?;
         let weights = identity::of_file(path)
             .map_err(|source| SystemError::Io { path: path.into(), source })?;
         Ok(Self { definition, front_end, config, network, weights })

@@ -59,7 +59,7 @@ pub enum SystemError {
         /// the file
         path: PathBuf,
         /// how they differ
-        source: NetError,
+        source: Box<NetError>,
     },
     /// A file that cannot be read.
     #[error("{path}: {source}")]
@@ -77,7 +77,7 @@ pub enum SystemError {
     Rate(#[from] OtherRate),
     /// The extraction cannot start or go on.
     #[error(transparent)]
-    Extraction(RunError),
+    Extraction(Box<RunError>),
     /// The threads cannot be started.
     #[error(transparent)]
     Threads(#[from] rayon::ThreadPoolBuildError),
@@ -99,7 +99,7 @@ impl From<RunError> for SystemError {
     fn from(error: RunError) -> Self {
         match error {
             RunError::Interrupted => Self::Interrupted,
-            error => Self::Extraction(error),
+            error => Self::Extraction(Box::new(error)),
         }
     }
 }

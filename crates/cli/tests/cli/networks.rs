@@ -80,6 +80,16 @@ fn a_network_is_validated_trained_and_applied() {
     let train = [&["train"], &learn[..], &recipe[..], &["-q", "-o", text(&model)]].concat();
     done(&[&train[..], &["--checkpoints", text(&kept)]].concat());
     let first = std::fs::read(&model).unwrap();
+    // Its content says that a file holds inputs, not its name.
+    let renamed = path("inputs.dat");
+    std::fs::copy(&features, &renamed).unwrap();
+    let words = [&["train", text(&renamed)], &train[2..], &["--overwrite"]].concat();
+    done(&words);
+    let parameters = |bytes: &[u8]| {
+        let header = u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+        bytes[8 + header..].to_vec()
+    };
+    assert!(parameters(&std::fs::read(&model).unwrap()) == parameters(&first));
     // From the checkpoint of a training that is over, and from nothing: the same bytes.
     for again in [vec!["--checkpoints", text(&kept)], vec!["--jobs", "1"]] {
         done(&[&train[..], &["--overwrite"], &again[..]].concat());
@@ -119,6 +129,11 @@ fn what_a_network_cannot_learn_from_is_refused() {
     refuse(&[&level[..], &["--seed", "1", "--set", "seed=1"]].concat(), "give one");
     let wild = ["--set", "epochs=1", "--set", "lr=1e39", "-q"];
     refuse(&[&level[..], &wild].concat(), "training step 1");
+    let table = folder.path().join("table.npz");
+    std::fs::write(&table, b"PAR1").unwrap();
+    let words = ["train", text(&table), "-o", text(&model)];
+    let message = refused(&[&words[..], &level[..]].concat());
+    assert!(message.contains("is a Parquet table; a network takes an .npz"), "{message}");
     let recordings = folder.path().join("audio");
     tone(&recordings.join("a/1.wav"), 0, 0.1, 16_000);
     let words = ["train", text(&recordings), "--net", "m4-type", "--labels", "folders", "--x", "Y"];
@@ -212,7 +227,7 @@ fn a_network_learns_from_recordings_and_hears_them() {
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{message}");
     assert!(
-        message.contains("short: too short: ") && message.contains("not trained on"),
+        message.contains("short: too short: ") && message.contains("left out of training"),
         "{message}"
     );
 
@@ -246,7 +261,16 @@ fn a_network_learns_from_recordings_and_hears_them() {
     let output = run(&["classify", "-m", text(&model), text(&other)]);
     assert_eq!(output.status.code(), Some(1));
     let message = String::from_utf8_lossy(&output.stderr);
-    assert!(message.contains("mismatch"), "{message}");
+    assert!(message.contains("22,050 Hz; the model was trained on 44,100 Hz"), "{message}");
+    let message = refused(&[
+        "classify",
+        "-m",
+        text(&model),
+        text(&other),
+        "--set",
+        "signal.sample_rate=8000",
+    ]);
+    assert!(message.contains("must be 44,100 Hz, as in training"), "{message}");
 
     let report = done(
         &[
