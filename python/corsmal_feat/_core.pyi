@@ -51,6 +51,7 @@ __all__ = [
     "delta",
     "detrend",
     "effective_config",
+    "embed_recordings",
     "estimate_tuning",
     "evaluate",
     "extract",
@@ -58,6 +59,7 @@ __all__ = [
     "fit_projection",
     "fuse",
     "get_window",
+    "hear_recordings",
     "hpss_masks",
     "istft",
     "jobs",
@@ -109,6 +111,7 @@ __all__ = [
     "stft",
     "to_mono",
     "tonnetz",
+    "train_network",
     "upright_box",
     "write_weights",
     "zero_crossing_rate",
@@ -403,6 +406,27 @@ def classifier_inputs(name: str) -> list[tuple[str, str]]: ...
 def network_recipe(name: str, changes: str) -> str: ...
 def read_weights(path: str | os.PathLike[str]) -> dict[str, _Singles]: ...
 def write_weights(path: str | os.PathLike[str], state: list[tuple[str, _Singles]]) -> None: ...
+def train_network(
+    name: str,
+    rows: list[tuple[str, str, str | None]],
+    kind: str,
+    recipe: str,
+    checkpoints: str | None,
+    progress: Any,
+    jobs: int | None,
+) -> tuple[TrainedNetwork, list[tuple[str, str]]]: ...
+def hear_recordings(
+    network: TrainedNetwork,
+    paths: list[str],
+    any_rate: bool,
+    jobs: int | None,
+) -> tuple[npt.NDArray[np.float64], list[tuple[str, str]]]: ...
+def embed_recordings(
+    name: str,
+    paths: list[str],
+    weights: str,
+    jobs: int | None,
+) -> tuple[list[tuple[str, _Singles]], list[tuple[str, str]]]: ...
 
 @final
 class TrainedNetwork:

@@ -1,15 +1,17 @@
 """The networks of the paper: built, loaded, run and trained by the Rust side.
 
 `build(name)` gives a network as published, with PyTorch's parameter names and layouts in
-`state_dict` and `load_state_dict`. What each network is and where the published code differs from
-the paper: docs/networks.md.
+`state_dict` and `load_state_dict`. `train` trains one on recordings, `load` reads a trained one,
+and both give a `TrainedNetwork`, which hears recordings; `embed` gives the numbers that a network
+makes of them. What each network is and where the published code differs from the paper:
+docs/networks.md.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypedDict
 
@@ -17,8 +19,11 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
+from ._classifier import class_labels
+from ._extract import MOST_JOBS
 from ._refusals import refuses
-from .errors import ParameterError
+from ._warnings import warn
+from .errors import DecodeError, ParameterError
 
 if TYPE_CHECKING:
     from ._network_classifier import NetworkClassifier
@@ -26,14 +31,19 @@ if TYPE_CHECKING:
 __all__ = [
     "Network",
     "NetworkClassifier",
+    "TrainedNetwork",
     "TrainingSteps",
     "build",
+    "embed",
+    "load",
     "names",
     "read_weights",
+    "train",
     "write_weights",
 ]
 
 _Singles = npt.NDArray[np.float32]
+_Path = str | os.PathLike[str]
 
 
 class TrainingSteps(TypedDict):
@@ -88,6 +98,151 @@ def build(name: str, *, outputs: int | None = None, seed: int = 0) -> Network:
 
 
 @refuses
+def train(
+    name: str,
+    recordings: Iterable[_Path],
+    y: Sequence[object] | npt.NDArray[Any],
+    *,
+    groups: Sequence[object] | npt.NDArray[Any] | None = None,
+    recipe: Mapping[str, Any] | None = None,
+    checkpoints: _Path | None = None,
+    progress: Callable[[int, int, float | None, float | None, float], object] | None = None,
+    jobs: int | None = None,
+) -> TrainedNetwork:
+    """Trains a network on recordings, as `corsmal-feat train --net` does.
+
+    A recording without features, or too short for the network, is left out with a warning.
+
+    Parameters
+    ----------
+    name : str
+        One of `names()` that takes recordings.
+    recordings : paths
+        One for each recording.
+    y : array [shape=(recordings,)]
+        Their labels.
+    groups : array [shape=(recordings,)], optional
+        What must not be split where the recipe holds out a validation group.
+    recipe : mapping, optional
+        Keys of the recipe that are not as published, such as {"epochs": 3, "seed": 1}.
+    checkpoints : path, optional
+        Folder that keeps the training after each epoch; the next training continues from there.
+    progress : function, optional
+        Called with epochs done, epochs in all, last loss, last score and seconds left.
+    jobs : int, optional
+        Recordings that are read at a time; one for each core by default.
+
+    Returns
+    -------
+    TrainedNetwork
+
+    Examples
+    --------
+    >>> paths = [f"audio/{kind}/{i}.wav" for kind in ("rice", "water") for i in range(6)]
+    >>> network = corsmal_feat.nets.train(
+    ...     "m1", paths, ["rice"] * 6 + ["water"] * 6, recipe={"epochs": 2}
+    ... )
+    >>> network.classes_.tolist()
+    ['rice', 'water']
+    """
+    paths = _paths(recordings)
+    labels = np.asarray(y)
+    of_group = None if groups is None else np.asarray(groups)
+    for what, values in (("y", labels), ("groups", of_group)):
+        if values is not None and values.shape != (len(paths),):
+            raise ParameterError(
+                f"{what} must have a value for each of the {len(paths)} recordings,"
+                f" not shape {values.shape}"
+            )
+    names = [str(label) for label in labels.tolist()]
+    parts = [None] * len(paths) if of_group is None else [str(g) for g in of_group.tolist()]
+    changes = json.dumps(dict(recipe or {}), default=_plain)
+    if checkpoints is not None:
+        os.makedirs(checkpoints, exist_ok=True)
+    network, left_out = _core.train_network(
+        name,
+        list(zip(paths, names, parts, strict=True)),
+        labels.dtype.kind,
+        _core.network_recipe(name, changes),
+        None if checkpoints is None else os.fspath(checkpoints),
+        progress,
+        _jobs(jobs),
+    )
+    if left_out:
+        warn(
+            f"{len(left_out)} of {len(paths)} recordings are left out of training, the first:"
+            f" {left_out[0][0]}: {left_out[0][1]}"
+        )
+    return TrainedNetwork(network)
+
+
+@refuses
+def load(path: _Path) -> TrainedNetwork:
+    """Reads a trained network, of `corsmal-feat train --net` or of `save`.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+
+    Returns
+    -------
+    TrainedNetwork
+
+    Examples
+    --------
+    >>> corsmal_feat.nets.load("pouring.safetensors").predict(["rice.wav", "water.wav"]).tolist()
+    ['rice', 'water']
+    """
+    return TrainedNetwork(_core.TrainedNetwork.load(os.fspath(path)))
+
+
+@refuses
+def embed(
+    name: str,
+    recordings: Iterable[_Path],
+    weights: _Path,
+    *,
+    jobs: int | None = None,
+) -> dict[str, _Singles]:
+    """The numbers that a network makes of recordings, as `corsmal-feat embed` does.
+
+    A recording that has none is left out with a warning.
+
+    Parameters
+    ----------
+    name : str
+        A network that embeds: `vggish`.
+    recordings : paths
+        Files, folders, globs and manifests.
+    weights : path
+        Its weights, `.pth`, `.safetensors` or `.npz`.
+    jobs : int, optional
+        Recordings that are read at a time; one for each core by default.
+
+    Returns
+    -------
+    dict
+        By id the rows of a recording [shape=(rows, numbers)]; VGGish has a row of 128 numbers for
+        each .96 s.
+
+    Examples
+    --------
+    >>> corsmal_feat.nets.embed("m2-type", ["rice.wav"], "vggish.pth")
+    Traceback (most recent call last):
+    ...
+    corsmal_feat.errors.ParameterError: m2_type gives classes, not embeddings: use vggish, or \
+`corsmal-feat classify` for classes
+    """
+    rows, failed = _core.embed_recordings(name, _paths(recordings), os.fspath(weights), _jobs(jobs))
+    if failed:
+        warn(
+            f"{len(failed)} recordings have no embedding, the first: {failed[0][0]}: {failed[0][1]}"
+        )
+    return dict(rows)
+
+
+@refuses
 def read_weights(path: str | os.PathLike[str]) -> dict[str, _Singles]:
     """Reads weights; nothing in the file is run.
 
@@ -126,6 +281,102 @@ def write_weights(path: str | os.PathLike[str], state: Mapping[str, Any]) -> Non
     >>> corsmal_feat.nets.write_weights("ones.npz", {"bias": np.ones(3)})
     """
     _core.write_weights(os.fspath(path), [(str(k), _single(v)) for k, v in state.items()])
+
+
+class TrainedNetwork:
+    """A trained network that hears recordings. `train` and `load` give one.
+
+    Attributes
+    ----------
+    header : dict
+        What the file says about the network: name, recipe, history, features.
+    classes_ : array
+        Labels, in the order of `predict_proba`.
+
+    Examples
+    --------
+    >>> network = corsmal_feat.nets.load("pouring.safetensors")
+    >>> network
+    <m1: rice, water>
+    >>> network.predict_proba(["rice.wav", "water.wav"]).argmax(axis=1).tolist()
+    [0, 1]
+    """
+
+    def __init__(self, network: _core.TrainedNetwork) -> None:
+        self._network = network
+        self.header: dict[str, Any] = json.loads(network.header())
+        self.classes_: npt.NDArray[Any] = class_labels(self.header)
+
+    @refuses
+    def predict_proba(
+        self,
+        recordings: Iterable[_Path],
+        *,
+        any_rate: bool = False,
+        jobs: int | None = None,
+    ) -> npt.NDArray[np.float64]:
+        """Probabilities of recordings; the mean of their windows, where the network takes windows.
+
+        Parameters
+        ----------
+        recordings : paths
+            One for each recording.
+        any_rate : bool
+            Take recordings of a sample rate or with channels that the network was not trained on.
+        jobs : int, optional
+            Recordings that are read at a time; one for each core by default.
+
+        Returns
+        -------
+        float64 [shape=(recordings, classes)], columns in the order of `classes_`
+
+        Raises
+        ------
+        DecodeError : a recording that the network cannot hear
+        """
+        paths = _paths(recordings)
+        proba, failed = _core.hear_recordings(self._network, paths, any_rate, _jobs(jobs))
+        if failed:
+            raise DecodeError(f"{failed[0][0]}: {failed[0][1]}")
+        return proba
+
+    @refuses
+    def predict(
+        self,
+        recordings: Iterable[_Path],
+        *,
+        any_rate: bool = False,
+        jobs: int | None = None,
+    ) -> npt.NDArray[Any]:
+        """The label of each recording.
+
+        Parameters
+        ----------
+        recordings, any_rate, jobs
+            See `predict_proba`.
+
+        Returns
+        -------
+        labels [shape=(recordings,)]
+        """
+        proba = self.predict_proba(recordings, any_rate=any_rate, jobs=jobs)
+        labels: npt.NDArray[Any] = self.classes_[proba.argmax(axis=1)]
+        return labels
+
+    @refuses
+    def save(self, path: _Path) -> None:
+        """Writes the model file, whole or not at all; `corsmal-feat classify` takes it."""
+        self._network.save(os.fspath(path))
+
+    def __reduce__(self) -> tuple[Callable[[bytes], TrainedNetwork], tuple[bytes]]:
+        return _of_bytes, (self._network.to_bytes(),)
+
+    def __repr__(self) -> str:
+        return f"<{self.header['network']}: {', '.join(map(str, self.classes_.tolist()))}>"
+
+
+def _of_bytes(file: bytes) -> TrainedNetwork:
+    return TrainedNetwork(_core.TrainedNetwork.from_bytes(file))
 
 
 class Network:
@@ -255,6 +506,18 @@ def _single(value: Any) -> _Singles:
     if not np.isfinite(array).all():
         raise ParameterError("inputs and weights must be finite numbers")
     return array
+
+
+def _paths(recordings: Iterable[_Path]) -> list[str]:
+    if isinstance(recordings, (str, os.PathLike)):
+        return [os.fspath(recordings)]
+    return [os.fspath(path) for path in recordings]
+
+
+def _jobs(jobs: int | None) -> int | None:
+    if jobs is not None and not 1 <= jobs <= MOST_JOBS:
+        raise ParameterError(f"jobs must be 1 to {MOST_JOBS}, not {jobs}")
+    return jobs
 
 
 def _lengths(lengths: Sequence[int] | None) -> list[int] | None:

@@ -73,6 +73,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     labels = [name.split("/")[0] for name in features.ids]
     forest = corsmal_feat.RandomForest(20, random_state=1).fit(features.summary, labels)
     forest.save(folder / "bottles.model", features=features)
+    paths = [folder / "audio" / f"{name}.wav" for name in features.ids]
+    network = corsmal_feat.nets.train("m1", paths, labels, recipe={"epochs": 20})
+    network.save(folder / "pouring.safetensors")
     for name in ("rf", "knn"):
         result = corsmal_feat.cross_validate(
             folder / "features.npz", labels="folders", cv=3, classifier=name

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from corsmal_feat import corsmal, nets
-from corsmal_feat.errors import ParameterError
+from corsmal_feat.errors import DecodeError, ParameterError
 
 SHARED = Path(os.environ.get("CORSMAL_SHARED", Path(__file__).parents[3] / "shared"))
 
@@ -144,3 +144,60 @@ def test_ctrl_c_and_errors_of_progress_end_the_training() -> None:
 
     with pytest.raises(RuntimeError, match="enough"):
         nets.NetworkClassifier("m5-vggish-level", progress=fails).fit(x, y)
+
+
+def recording(path: Path, hz: float, rate: int = 44_100) -> str:
+    """Half a second of a tone."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    samples = 16_000 * np.sin(2 * np.pi * hz * np.arange(rate // 2) / rate)
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(rate)
+        file.writeframes(samples.astype("<i2").tobytes())
+    return str(path)
+
+
+def test_a_network_learns_from_recordings_and_hears_them(tmp_path: Path) -> None:
+    paths = [
+        recording(tmp_path / kind / f"{take}.wav", hz + 10 * take)
+        for kind, hz in (("deep", 300), ("high", 3000))
+        for take in range(3)
+    ]
+    broken = tmp_path / "broken.wav"
+    broken.write_bytes(b"RIFF")
+    y = [1] * 3 + [2] * 3
+    told: list[tuple[object, ...]] = []
+    with pytest.warns(UserWarning, match=r"1 of 7 recordings .* broken"):
+        network = nets.train(
+            "m1",
+            [*paths, broken],
+            [*y, 1],
+            recipe={"epochs": 20},
+            progress=lambda *now: told.append(now),
+        )
+    assert len(told) == 21
+    assert network.classes_.tolist() == [1, 2]
+    assert network.predict(paths).tolist() == y
+    proba = network.predict_proba(paths, jobs=2)
+    assert np.allclose(proba.sum(axis=1), 1)
+
+    network.save(tmp_path / "tone.safetensors")
+    back = nets.load(tmp_path / "tone.safetensors")
+    assert np.array_equal(back.predict_proba(paths), proba)
+    assert np.array_equal(pickle.loads(pickle.dumps(back)).predict_proba(paths), proba)
+    assert back.header["provenance"]["recordings"] == 6
+
+    with pytest.raises(DecodeError, match=r"broken\.wav: "):
+        network.predict([paths[0], broken])
+    with pytest.raises(ParameterError, match="name each recording"):
+        network.predict(tmp_path)
+    with pytest.raises(ParameterError, match="each of the 6 recordings"):
+        nets.train("m1", paths, y[:5])
+    with pytest.raises(ParameterError, match="2 classes"):
+        nets.train("m1", paths, ["a"] * 6, recipe={"epochs": 1})
+    with pytest.raises(ParameterError, match="not recordings"):
+        nets.train("m5-vggish-level", paths, y)
+    with pytest.raises(ParameterError, match=r"features\.0\.weight"):
+        nets.write_weights(tmp_path / "none.npz", {"bias": np.zeros(1)})
+        nets.embed("vggish", paths, tmp_path / "none.npz")

@@ -146,7 +146,9 @@ CALLS = {
     """,
     "nets": """
         build(name="m3_mlp")
+        embed(name="vggish", recordings=[wav], weights=table)
         read_weights(path=table)
+        train(name="m1", recordings=[wav], y=["a"])
         write_weights(path=table, state={"x": S})
     """,
     "onset": """

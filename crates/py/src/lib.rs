@@ -14,6 +14,7 @@ mod evaluate;
 mod extract;
 mod frontends;
 mod harmonic;
+mod listening;
 mod mel;
 mod nets;
 mod onset;
@@ -55,6 +56,8 @@ mod _core {
     use crate::harmonic::{
         af193, chroma_cqt, chroma_of_cqt, cqt, hpss_masks, istft, separate, tonnetz,
     };
+    #[pymodule_export]
+    use crate::listening::{embed_recordings, hear_recordings, train_network};
     #[pymodule_export]
     use crate::mel::{apply_mel, delta, mel, melspectrogram, mfcc, power_to_db};
     #[pymodule_export]

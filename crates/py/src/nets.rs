@@ -188,9 +188,48 @@ impl PyNetwork {
     }
 }
 
+/// Tells Python's function of a training's progress, and ends the training with the first exception.
+pub(crate) struct Teller {
+    progress: Option<Py<PyAny>>,
+    raised: Option<PyErr>,
+}
+
+impl Teller {
+    /// Calls `progress` with epochs done, epochs in all, last loss, last score, seconds left.
+    pub(crate) fn new(progress: Option<Py<PyAny>>) -> Self {
+        Self { progress, raised: None }
+    }
+
+    /// Whether the training goes on.
+    pub(crate) fn tell(&mut self, told: Progress<'_>) -> bool {
+        let result = Python::attach(|py| {
+            py.check_signals()?;
+            let Some(progress) = self.progress.as_ref().filter(|_| told.step.is_none()) else {
+                return Ok(());
+            };
+            let last = told.epochs.last();
+            let arguments = (
+                told.epochs.len(),
+                told.total,
+                last.map(|e| e.loss),
+                last.and_then(|e| e.score),
+                told.left.as_secs_f64(),
+            );
+            progress.call1(py, arguments).map(|_| ())
+        });
+        self.raised = result.err();
+        self.raised.is_none()
+    }
+
+    /// The exception that ended the training.
+    pub(crate) fn end(self) -> PyResult<()> {
+        self.raised.map_or(Ok(()), Err)
+    }
+}
+
 /// A trained network as it is kept in a file.
 #[pyclass(frozen, name = "TrainedNetwork", module = "corsmal_feat._core")]
-pub(crate) struct PyTrainedNetwork(NetModel);
+pub(crate) struct PyTrainedNetwork(pub(crate) NetModel);
 
 /// Numbers of all items of an input, and where each begins.
 type ItemColumns<'py> = Vec<(PyReadonlyArrayDyn<'py, f32>, Vec<usize>)>;
@@ -239,31 +278,12 @@ impl PyTrainedNetwork {
         let score = |truth: &[usize], found: &[usize]| {
             Scores::new(truth, found, labels.len()).map_or(0.0, |s| s.weighted_f1)
         };
-        let mut stopped = None;
-        let tell = |told: Progress<'_>| {
-            let result = Python::attach(|py| {
-                py.check_signals()?;
-                let Some(progress) = progress.as_ref().filter(|_| told.step.is_none()) else {
-                    return Ok(());
-                };
-                let last = told.epochs.last();
-                let arguments = (
-                    told.epochs.len(),
-                    told.total,
-                    last.map(|e| e.loss),
-                    last.and_then(|e| e.score),
-                    told.left.as_secs_f64(),
-                );
-                progress.call1(py, arguments).map(|_| ())
-            });
-            stopped = result.err();
-            stopped.is_none()
-        };
+        let mut teller = Teller::new(progress);
         let path = checkpoint.as_deref();
-        let fitted = compute(py, || fit::fit(&mut network, task, &recipe, path, score, tell))?;
-        if let Some(error) = stopped {
-            return Err(error);
-        }
+        let fitted = compute(py, || {
+            fit::fit(&mut network, task, &recipe, path, score, |told| teller.tell(told))
+        })?;
+        teller.end()?;
         let header = model::Header {
             format: 0,
             network: definition.name.into(),

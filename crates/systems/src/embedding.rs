@@ -46,9 +46,10 @@ impl Embedder {
         }
         let front_end = recordings::front_end(definition)?;
         let config = recordings::configuration(&front_end)?;
+        let state = weights::read(path)?;
         let mut network = definition.build(None, 0)?;
         network
-            .load_state(&weights::read(path)?)
+            .load_state(&state)
             .map_err(|e| SystemError::OtherWeights { path: path.into(), source: Box::new(e) })?;
         let weights = identity::of_file(path)
             .map_err(|source| SystemError::Io { path: path.into(), source })?;

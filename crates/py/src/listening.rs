@@ -1,0 +1,177 @@
+//! Networks that learn from recordings, hear and embed them.
+
+use std::path::{Path, PathBuf};
+
+use corsmal_extract::inputs::{self, Input};
+use corsmal_models::voting::VotingRule;
+use corsmal_nets::networks;
+use corsmal_systems::SystemError;
+use corsmal_systems::embedding::Embedder;
+use corsmal_systems::examples::Examples;
+use corsmal_systems::listening::{Formats, Listener};
+use corsmal_systems::training::Training;
+use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods};
+use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::prelude::*;
+
+use crate::errors::{RunError, value_error};
+use crate::extract::interruptible;
+use crate::nets::{PyTrainedNetwork, Teller};
+use crate::pool::{compute, jobs as usual_jobs};
+
+/// Recordings that gave nothing: name and reason.
+type Failed = Vec<(String, String)>;
+
+/// By id the rows of a recording [rows, numbers].
+type Embedded<'py> = Vec<(String, Bound<'py, PyArrayDyn<f32>>)>;
+
+fn error(error: SystemError) -> PyErr {
+    match error {
+        SystemError::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
+        SystemError::Extraction(error) => RunError::new_err(error.to_string()),
+        error => value_error(error),
+    }
+}
+
+fn threads(jobs: Option<usize>) -> PyResult<usize> {
+    jobs.map_or_else(usual_jobs, Ok)
+}
+
+/// One recording for each path.
+fn recordings(paths: &[String]) -> PyResult<Vec<Input>> {
+    let found = inputs::collect(paths).map_err(|e| RunError::new_err(e.to_string()))?.inputs;
+    if found.len() == paths.len() {
+        return Ok(found);
+    }
+    let (found, named) = (found.len(), paths.len());
+    Err(value_error(format!(
+        "{named} paths stand for {found} recordings: folders, globs and manifests have no labels here; \
+         name each recording"
+    )))
+}
+
+/// A network trained on recordings, given as path, label and group, and the recordings that were left
+/// out; `kind` is what the labels are in numpy.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "one private caller, by name")]
+pub(crate) fn train_network(
+    py: Python<'_>,
+    name: &str,
+    rows: Vec<(String, String, Option<String>)>,
+    kind: &str,
+    recipe: &str,
+    checkpoints: Option<PathBuf>,
+    progress: Option<Py<PyAny>>,
+    jobs: Option<usize>,
+) -> PyResult<(PyTrainedNetwork, Failed)> {
+    let definition = networks::classifier(name).map_err(value_error)?;
+    let recipe = serde_json::from_str(recipe).map_err(value_error)?;
+    let jobs = threads(jobs)?;
+    let mut left_out = Vec::new();
+    let examples = py.detach(|| {
+        interruptible(
+            |stop| {
+                let paths: Vec<String> = rows.iter().map(|(path, ..)| path.clone()).collect();
+                let mut found = recordings(&paths)?;
+                for (input, (_, label, group)) in found.iter_mut().zip(&rows) {
+                    let group = group.as_ref().map(|group| ("groups".into(), group.clone()));
+                    let labels = std::iter::once(("y".into(), label.clone())).chain(group);
+                    input.labels = labels.collect();
+                }
+                let place = (Path::new("the recordings"), &found[..]);
+                Examples::of_recordings(definition, place, jobs, stop, |input, reason| {
+                    left_out.push((input.id.clone(), reason.to_owned()));
+                })
+                .map_err(error)
+            },
+            &mut |_| Ok(()),
+        )
+    })?;
+    let groups = rows.iter().any(|(.., group)| group.is_some()).then_some("groups");
+    let checkpoints = checkpoints.as_deref();
+    let training = Training { target: "y", groups, recipe, checkpoints };
+    let mut teller = Teller::new(progress);
+    let trained = compute(py, || {
+        training.train(&examples, serde_json::Value::Null, |told| teller.tell(told))
+    })?;
+    teller.end()?;
+    let mut model = trained.map_err(error)?.model;
+    model.header.provenance["label_kind"] = kind.into();
+    Ok((PyTrainedNetwork(model), left_out))
+}
+
+/// Probabilities [recordings, classes] that a network gives recordings, the mean of their windows, and
+/// why others have none; these are zero.
+#[pyfunction]
+pub(crate) fn hear_recordings<'py>(
+    py: Python<'py>,
+    network: &PyTrainedNetwork,
+    paths: Vec<String>,
+    any_rate: bool,
+    jobs: Option<usize>,
+) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Failed)> {
+    let jobs = threads(jobs)?;
+    let formats = if any_rate { Formats::Any } else { Formats::AsTrained };
+    let classes = network.0.header.labels.len();
+    let (mut proba, mut failed) = (Vec::new(), Vec::new());
+    py.detach(|| {
+        interruptible(
+            |stop| {
+                let listener = Listener::new(&network.0, &[], formats, jobs).map_err(error)?;
+                let found = recordings(&paths)?;
+                let vote = Some(VotingRule::Mean);
+                let ended = listener.recordings(&found, vote, stop, &mut |input, verdict| {
+                    let found = verdict.decision.and_then(|(_, proba)| proba);
+                    if found.is_none() {
+                        let reason = verdict.reason.unwrap_or_default();
+                        let reason = format!("{}: {reason}", verdict.status);
+                        failed.push((input.source.to_string(), reason));
+                    }
+                    proba.extend(found.unwrap_or_else(|| vec![0.0; classes]));
+                    Ok::<_, SystemError>(true)
+                });
+                match ended.map_err(error)? {
+                    true => Ok(()),
+                    false => Err(error(SystemError::Interrupted)),
+                }
+            },
+            &mut |_| Ok(()),
+        )
+    })?;
+    Ok((proba.into_pyarray(py).reshape(vec![paths.len(), classes])?, failed))
+}
+
+/// What a network makes of recordings: by id rows of numbers, and why others have none.
+#[pyfunction]
+pub(crate) fn embed_recordings<'py>(
+    py: Python<'py>,
+    name: &str,
+    paths: Vec<String>,
+    weights: PathBuf,
+    jobs: Option<usize>,
+) -> PyResult<(Embedded<'py>, Failed)> {
+    let jobs = threads(jobs)?;
+    let mut failed = Vec::new();
+    let (width, dataset) = py.detach(|| {
+        interruptible(
+            |stop| {
+                let embedder = Embedder::new(name, &weights).map_err(error)?;
+                let found =
+                    inputs::collect(&paths).map_err(|e| RunError::new_err(e.to_string()))?;
+                let tell = |input: &Input, status, reason: &str| {
+                    failed.push((input.source.to_string(), format!("{status}: {reason}")));
+                };
+                let dataset = embedder.embed(&found.inputs, jobs, stop, tell).map_err(error)?;
+                Ok((embedder.width(), dataset))
+            },
+            &mut |_| Ok(()),
+        )
+    })?;
+    let column = &dataset.items.columns[0];
+    let rows = dataset.ids.into_iter().zip(column.offsets.windows(2)).map(|(id, ends)| {
+        let values = column.values[ends[0]..ends[1]].to_vec();
+        let shape = vec![values.len() / width, width];
+        Ok((id, values.into_pyarray(py).reshape(shape)?))
+    });
+    Ok((rows.collect::<PyResult<_>>()?, failed))
+}
