@@ -236,9 +236,8 @@ def embed(
     """
     rows, failed = _core.embed_recordings(name, _paths(recordings), os.fspath(weights), _jobs(jobs))
     if failed:
-        warn(
-            f"{len(failed)} recordings have no embedding, the first: {failed[0][0]}: {failed[0][1]}"
-        )
+        more = f" (and {len(failed) - 1} more)" if len(failed) > 1 else ""
+        warn(f"left out: {failed[0][0]}: {failed[0][1]}{more}")
     return dict(rows)
 
 

@@ -264,3 +264,11 @@ def test_refusals(
                 except Exception as error:
                     wrong.append(f"{parameter.name}={value!r}: {type(error).__name__}: {error}")
     assert not wrong, f"{name}\n" + "\n".join(wrong)
+
+
+def test_warnings_point_to_the_line_of_the_caller() -> None:
+    with pytest.warns(UserWarning, match="larger than the signal") as told:
+        corsmal_feat.stft(np.zeros(100), n_fft=2048)
+    with pytest.warns(UserWarning, match="larger than the signal") as inner:
+        corsmal_feat.feature.melspectrogram(y=np.zeros(100), n_fft=2048)
+    assert {warning.filename for warning in [*told, *inner]} == {__file__}

@@ -149,7 +149,10 @@ impl Request<'_> {
 }
 
 /// Whether a path names a file of a network's inputs, and not recordings; a stream is not looked into.
-fn is_inputs(path: &Path) -> Result<bool, Failure> {
+///
+/// # Errors
+/// A table that networks do not take.
+pub fn is_inputs(path: &Path) -> Result<bool, Failure> {
     match path.is_file().then(|| Content::of(path)) {
         Some(Ok(Content::Npz)) => Ok(true),
         Some(Ok(Content::Parquet)) => Err(Failure::new(format!(

@@ -15,7 +15,8 @@ use corsmal_nets::network::Network;
 use corsmal_nets::networks::{self, Definition};
 use corsmal_nets::recipe::{Recipe, Select};
 
-use crate::{Settings, recordings};
+use crate::definition::Settings;
+use crate::recordings;
 
 /// Trains the networks of a system.
 pub struct Learning<'a> {

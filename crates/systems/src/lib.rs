@@ -64,6 +64,7 @@
 //! and are run by [`corsmal_ccm::benchmark`]. Adding one: a file here with a [`Definition`], and one
 //! line in the list below.
 
+mod definition;
 pub mod embedding;
 mod error;
 pub mod examples;
@@ -72,36 +73,10 @@ pub mod listening;
 pub mod recordings;
 pub mod training;
 
-use std::path::PathBuf;
-
-pub use error::SystemError;
-
-use corsmal_ccm::benchmark::System;
 use corsmal_ccm::{CcmError, Result};
 
-/// What is chosen for all networks of all systems.
-#[derive(Clone, Debug, Default)]
-pub struct Settings {
-    /// Epochs instead of the published ones.
-    pub epochs: Option<usize>,
-    /// Embeddings of recordings by other programs, by name (`vggish`, `r21d`), in the format of
-    /// [`corsmal_nets::dataset`]; several files of a name are joined.
-    pub embeddings: Vec<(String, PathBuf)>,
-}
-
-/// A system of the paper.
-pub struct Definition {
-    /// Name on the command line.
-    pub name: &'static str,
-    /// One sentence.
-    pub about: &'static str,
-    /// Networks that it is made of.
-    pub networks: &'static [&'static str],
-    /// What of it is not there, or is a choice of ours, in sentences.
-    pub limits: &'static [&'static str],
-    /// Makes it, unless what it needs is not there.
-    make: Option<fn(Settings) -> Box<dyn System>>,
-}
+pub use definition::{Definition, Settings};
+pub use error::SystemError;
 
 macro_rules! systems {
     ($($module:ident: $definition:ident;)*) => {
@@ -130,19 +105,6 @@ pub fn named(name: &str) -> Result<&'static Definition> {
         let names: Vec<&str> = SYSTEMS.iter().map(|s| s.name).collect();
         CcmError::Request(format!("there is no system {name}: {}", names.join(", ")))
     })
-}
-
-impl Definition {
-    /// The system, ready to be run.
-    ///
-    /// # Errors
-    /// [`CcmError::Request`] for one whose inputs this program does not make.
-    pub fn make(&self, settings: &Settings) -> Result<Box<dyn System>> {
-        let make = self.make.ok_or_else(|| {
-            CcmError::Request(format!("{}: {}", self.name, self.limits.join(" ")))
-        })?;
-        Ok(make(settings.clone()))
-    }
 }
 
 #[cfg(test)]

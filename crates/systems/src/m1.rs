@@ -4,7 +4,7 @@ use corsmal_models::argmax;
 use corsmal_nets::items::Items;
 
 use crate::learning::{self, Learning, array};
-use crate::{Definition, Settings};
+use crate::definition::{Definition, Settings};
 
 /// Challengers' system.
 pub(crate) const M1: Definition = Definition {

@@ -1,4 +1,4 @@
-use crate::Definition;
+use crate::definition::Definition;
 
 /// Concatenation's system.
 pub(crate) const M3: Definition = Definition {

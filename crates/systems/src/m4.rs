@@ -5,7 +5,7 @@ use corsmal_models::fusion::{Background, WindowVotes};
 use corsmal_nets::items::{Column, Items};
 
 use crate::learning::{Learning, array};
-use crate::{Definition, Settings};
+use crate::definition::{Definition, Settings};
 
 /// HVRL's system.
 pub(crate) const M4: Definition = Definition {

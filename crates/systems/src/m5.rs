@@ -10,7 +10,7 @@ use corsmal_nets::items::{Column, Items};
 use ndarray::{Array2, Axis};
 
 use crate::learning::{Learning, array};
-use crate::{Definition, Settings};
+use crate::definition::{Definition, Settings};
 
 /// Because It's Tactile's system.
 pub(crate) const M5: Definition = Definition {

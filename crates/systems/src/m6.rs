@@ -5,7 +5,7 @@ use corsmal_models::argmax;
 use corsmal_nets::items::Items;
 
 use crate::learning::{self, Learning, UNKNOWN};
-use crate::{Definition, Settings};
+use crate::definition::{Definition, Settings};
 
 /// ACC's system.
 pub(crate) const M6: Definition = Definition {

@@ -100,6 +100,10 @@ fn a_network_is_validated_trained_and_applied() {
     let table = done(&classify);
     assert_eq!(table.lines().count(), 13, "{table}");
     assert!(table.lines().nth(1).is_some_and(|line| line.starts_with("r00,")), "{table}");
+    let table = path("table.npz");
+    std::fs::write(&table, b"PAR1").unwrap();
+    let message = refused(&["classify", "-m", text(&model), "--features", text(&table)]);
+    assert!(message.contains("is a Parquet table"), "{message}");
     let message = refused(&["classify", "-m", text(&model), "x.wav"]);
     assert!(message.contains("takes VGGish embeddings, not recordings"), "{message}");
 }

@@ -13,6 +13,7 @@ use corsmal_systems::listening::{Formats, Listener, Verdict};
 use super::args::{Args, check_changes, recordings};
 use super::records::{End, Records, delivered, path_of};
 use crate::failure::Failure;
+use crate::networks::is_inputs;
 
 /// Predicts.
 pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Failure> {
@@ -22,6 +23,7 @@ pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Fail
         if vote.is_some() {
             return Err(Failure::new("--vote works on windows of recordings, not on --features"));
         }
+        is_inputs(path)?;
         let names = args.members.names();
         let ids = names.ids.as_deref();
         let data = Dataset::read_members(path, &model.network, &names.x, ids)?;
