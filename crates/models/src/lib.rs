@@ -57,7 +57,7 @@ mod mt19937;
 pub mod params;
 pub mod pipeline;
 pub mod predictions;
-pub mod recipe;
+pub mod request;
 pub mod scores;
 pub mod splits;
 pub mod spread;

@@ -43,14 +43,14 @@ impl Tensor {
 
 /// Equal stretches of frames that a network takes one by one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Windows {
+pub struct Stretches {
     /// frames of a window
     pub frames: usize,
     /// frames from one window to the next
     pub step: usize,
 }
 
-impl Windows {
+impl Stretches {
     /// The whole windows of so many frames.
     pub fn of(self, frames: usize) -> impl Iterator<Item = Range<usize>> {
         let count = frames.checked_sub(self.frames).map_or(0, |rest| rest / self.step + 1);
@@ -66,7 +66,7 @@ pub struct FrontEnd {
     /// keys of it that are changed
     pub set: &'static [&'static str],
     /// stretches of 10 ms frames that are items of their own; `None`: a recording is one item
-    pub windows: Option<Windows>,
+    pub windows: Option<Stretches>,
     /// the numbers of an item from a recording, or a window of it
     pub item: fn(Tensor) -> Vec<f32>,
 }
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn windows_are_whole() {
-        let windows = Windows { frames: 64, step: 16 };
+        let windows = Stretches { frames: 64, step: 16 };
         let starts = |frames| windows.of(frames).map(|w| w.start).collect::<Vec<_>>();
         assert!(starts(63).is_empty());
         assert_eq!(starts(64), [0]);

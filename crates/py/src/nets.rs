@@ -8,7 +8,7 @@ use corsmal_nets::fit::{self, Progress, Task};
 use corsmal_nets::items::{Column, Items};
 use corsmal_nets::model::{self, NetModel};
 use corsmal_nets::optimiser::OptimiserSpec;
-use corsmal_nets::recipe::Recipe as FitRecipe;
+use corsmal_nets::recipe::Recipe;
 use corsmal_nets::trainer::{StepSettings, Trainer};
 use corsmal_nets::{batch, loss, network, networks, weights};
 use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -32,7 +32,7 @@ pub(crate) fn networks_published() -> Vec<(&'static str, &'static str)> {
 /// What `train_steps` is told, in PyTorch's words.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Recipe {
+struct StepRecipe {
     optimizer: String,
     lr: f64,
     #[serde(default)]
@@ -47,7 +47,7 @@ struct Recipe {
     loss: Option<String>,
 }
 
-impl Recipe {
+impl StepRecipe {
     fn settings(self, dropout: Option<u64>) -> PyResult<StepSettings> {
         let Self { lr, momentum, weight_decay, .. } = self;
         let refuse = |key: &str, value: &str, allowed: &str| {
@@ -161,7 +161,7 @@ impl PyNetwork {
         dropout: Option<u64>,
         lengths: Option<Vec<usize>>,
     ) -> PyResult<(Vec<f64>, HashMap<String, f64>)> {
-        let recipe: Recipe = serde_json::from_str(recipe).map_err(value_error)?;
+        let recipe: StepRecipe = serde_json::from_str(recipe).map_err(value_error)?;
         let settings = recipe.settings(dropout)?;
         let inputs = inputs(&self.0, &arrays, lengths)?;
         let targets = match (classes, numbers) {
@@ -269,7 +269,7 @@ impl PyTrainedNetwork {
         provenance: &str,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
-        let recipe: FitRecipe = serde_json::from_str(recipe).map_err(value_error)?;
+        let recipe: Recipe = serde_json::from_str(recipe).map_err(value_error)?;
         let provenance = serde_json::from_str(provenance).map_err(value_error)?;
         let items = items(&columns)?;
         let definition = networks::classifier(name).map_err(value_error)?;

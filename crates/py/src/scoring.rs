@@ -7,7 +7,7 @@ use corsmal_models::comparison::compare;
 use corsmal_models::dataset::{LabelSource, LabelledTable, MemberNames};
 use corsmal_models::labels::Labels;
 use corsmal_models::predictions::PredictionTable;
-use corsmal_models::recipe::Recipe;
+use corsmal_models::request::PipelineRequest;
 use corsmal_models::scores::Scoring;
 use corsmal_models::validation::validate;
 use corsmal_models::voting::VotingRule;
@@ -67,7 +67,7 @@ pub(crate) fn cross_validate(
 ) -> PyResult<(String, String)> {
     let plan = cv.map(str::parse).transpose().map_err(|e| value_error(format!("cv = {e}")))?;
     let seed = recipe.seed;
-    let recipe = Recipe {
+    let recipe = PipelineRequest {
         classifier: recipe.classifier,
         parameters: recipe.parameters,
         standardize: recipe.standardize,

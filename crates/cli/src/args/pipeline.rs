@@ -2,7 +2,7 @@
 
 use corsmal_models::params::key_values;
 use corsmal_models::pipeline::PipelineSpec;
-use corsmal_models::recipe::Recipe;
+use corsmal_models::request::PipelineRequest;
 use serde_json::{Map, Value};
 
 use crate::failure::Failure;
@@ -56,7 +56,7 @@ impl PipelineArgs {
 
     /// The same with another seed.
     pub fn candidates_with(&self, seed: u32) -> Result<Vec<PipelineSpec>, Failure> {
-        let recipe = Recipe {
+        let recipe = PipelineRequest {
             classifier: self.classifier.clone(),
             parameters: self.parameters.clone(),
             standardize: self.standardize,

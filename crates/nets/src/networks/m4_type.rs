@@ -2,7 +2,7 @@ use super::Definition;
 use crate::batch::Shape;
 use crate::layer::Chain;
 use crate::layers::{BatchNorm, Conv2d, Dropout, Flatten, Linear, MaxPool, Relu, Softmax};
-use crate::front_end::{FrontEnd, Windows};
+use crate::front_end::{FrontEnd, Stretches};
 use crate::network::{Architecture, Body, Input};
 use crate::recipe::Recipe;
 
@@ -24,7 +24,7 @@ pub(super) const M4_TYPE: Definition = Definition {
 const FRONT_END: FrontEnd = FrontEnd {
     preset: "m4-code",
     set: &[],
-    windows: Some(Windows { frames: 64, step: 16 }),
+    windows: Some(Stretches { frames: 64, step: 16 }),
     item: |tensor| {
         let scale = |v: f32| ((f64::from(v) - MIN) / (MAX - MIN)) as f32;
         tensor.values.into_iter().map(scale).collect()

@@ -2,7 +2,7 @@ use super::Definition;
 use crate::batch::Shape;
 use crate::layer::Chain;
 use crate::layers::{Conv2d, FlattenPixels, Linear, MaxPool, Relu};
-use crate::front_end::{FrontEnd, Windows};
+use crate::front_end::{FrontEnd, Stretches};
 use crate::network::{Architecture, Body, Input};
 use crate::recipe::Recipe;
 
@@ -16,7 +16,7 @@ pub(super) const VGGISH: Definition = Definition {
     paper: &[],
     takes: "log-mel patches of 96 x 64",
     front_end: Some(FrontEnd {
-        windows: Some(Windows { frames: 96, step: 96 }),
+        windows: Some(Stretches { frames: 96, step: 96 }),
         ..FrontEnd::of("m5-vggish")
     }),
     // Never trained in the benchmark; for those who go on with its weights.

@@ -12,7 +12,7 @@ use crate::steps::StepSpec;
 
 /// A request for one pipeline, or for several to choose from.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Recipe {
+pub struct PipelineRequest {
     /// name of the classifier
     pub classifier: String,
     /// its parameters as `key=value`
@@ -27,7 +27,7 @@ pub struct Recipe {
     pub seed: u32,
 }
 
-impl Default for Recipe {
+impl Default for PipelineRequest {
     fn default() -> Self {
         Self {
             classifier: "rf".into(),
@@ -40,7 +40,7 @@ impl Default for Recipe {
     }
 }
 
-impl Recipe {
+impl PipelineRequest {
     /// The pipelines to choose from: one, unless something is tuned.
     ///
     /// # Errors
