@@ -19,7 +19,6 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._classifier import class_labels
 from ._extract import MOST_JOBS
 from ._refusals import refuses
 from ._warnings import warn
@@ -242,7 +241,7 @@ def embed(
 
 
 @refuses
-def read_weights(path: str | os.PathLike[str]) -> dict[str, _Singles]:
+def read_weights(path: _Path) -> dict[str, _Singles]:
     """Reads weights; nothing in the file is run.
 
     Parameters
@@ -265,7 +264,7 @@ def read_weights(path: str | os.PathLike[str]) -> dict[str, _Singles]:
 
 
 @refuses
-def write_weights(path: str | os.PathLike[str], state: Mapping[str, Any]) -> None:
+def write_weights(path: _Path, state: Mapping[str, npt.ArrayLike]) -> None:
     """Writes weights, whole or not at all.
 
     Parameters
@@ -304,7 +303,9 @@ class TrainedNetwork:
     def __init__(self, network: _core.TrainedNetwork) -> None:
         self._network = network
         self.header: dict[str, Any] = json.loads(network.header())
-        self.classes_: npt.NDArray[Any] = class_labels(self.header)
+        # With scikit-learn, whose import takes a second.
+        labels = import_module("._classifier", __package__).class_labels
+        self.classes_: npt.NDArray[Any] = labels(self.header)
 
     @refuses
     def predict_proba(
@@ -419,7 +420,7 @@ class Network:
         """All numbers under PyTorch's names, running statistics included."""
         return self._network.state()
 
-    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+    def load_state_dict(self, state: Mapping[str, npt.ArrayLike]) -> None:
         """Replaces all numbers.
 
         `num_batches_tracked` may be there. Every other name and shape must be this network's: a

@@ -25,6 +25,7 @@ mod resample;
 mod scoring;
 mod spectral;
 mod spectrum;
+mod teller;
 mod time_domain;
 mod transform;
 mod vision;

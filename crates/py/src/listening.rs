@@ -16,8 +16,9 @@ use pyo3::prelude::*;
 
 use crate::errors::{RunError, value_error};
 use crate::extract::interruptible;
-use crate::nets::{PyTrainedNetwork, Teller};
+use crate::nets::PyTrainedNetwork;
 use crate::pool::{compute, jobs as usual_jobs};
+use crate::teller::Teller;
 
 /// Recordings that gave nothing: name and reason.
 type Failed = Vec<(String, String)>;

@@ -131,3 +131,65 @@ impl Embedder {
         Ok(rows)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A small network in the place of VGGish, whose weights are 288 MB.
+    fn small() -> Embedder {
+        let definition = networks::named("m1").unwrap();
+        let front_end = definition.front_end.unwrap();
+        let config = recordings::configuration(&front_end).unwrap();
+        let network = definition.build(Some(3), 1).unwrap();
+        Embedder { definition, front_end, config, network, weights: "none".into() }
+    }
+
+    fn recordings(folder: &Path) -> Vec<Input> {
+        let spec = hound::WavSpec {
+            channels: 1,
+            sample_rate: 44_100,
+            bits_per_sample: 16,
+            sample_format: hound::SampleFormat::Int,
+        };
+        let mut table = "path,level\n".to_owned();
+        for take in 0..5_i32 {
+            let path = folder.join(format!("{take}.wav"));
+            if take == 3 {
+                std::fs::write(&path, b"RIFF").unwrap();
+            } else {
+                let mut wav = hound::WavWriter::create(&path, spec).unwrap();
+                (0..9000).for_each(|i| wav.write_sample((i * (300 + take)) as i16 / 2).unwrap());
+                wav.finalize().unwrap();
+            }
+            table.push_str(&format!("{take}.wav,{}\n", take % 2));
+        }
+        let manifest = folder.join("all.csv");
+        std::fs::write(&manifest, table).unwrap();
+        inputs::collect(&[manifest]).unwrap().inputs
+    }
+
+    #[test]
+    fn recordings_keep_their_order_and_labels_whatever_the_threads() {
+        let folder = tempfile::tempdir().unwrap();
+        let (embedder, found) = (small(), recordings(folder.path()));
+        let stop = Arc::default();
+        let embed = |found: &[Input], jobs| {
+            let mut failed = Vec::new();
+            let tell = |input: &Input, status, _: &str| failed.push((input.id.clone(), status));
+            (embedder.embed(found, jobs, &stop, tell).unwrap(), failed)
+        };
+        let (all, failed) = embed(&found, 1);
+        assert_eq!(all.ids, ["0", "1", "2", "4"]);
+        assert_eq!(all.column("level").unwrap(), ["0", "1", "0", "0"]);
+        assert_eq!(failed, [("3".to_owned(), Status::Corrupt)]);
+        let (column, width) = (&all.items.columns[0], embedder.width());
+        assert_eq!(column.offsets, [0, width, 2 * width, 3 * width, 4 * width]);
+        assert_eq!(embed(&found, 3).0.items, all.items);
+        let last = embed(&found[4..], 1).0.items;
+        assert_eq!(last.columns[0].values, column.values[3 * width..]);
+        stop.store(true, std::sync::atomic::Ordering::Relaxed);
+        let stopped = embedder.embed(&found, 1, &stop, |_, _, _| ());
+        assert!(matches!(stopped, Err(SystemError::Interrupted)));
+    }
+}
