@@ -47,6 +47,7 @@ __all__ = [
     "compare_predictions",
     "cqt",
     "cross_validate",
+    "cross_validate_network",
     "cuboid",
     "delta",
     "detrend",
@@ -415,6 +416,16 @@ def train_network(
     progress: Any,
     jobs: int | None,
 ) -> tuple[TrainedNetwork, list[tuple[str, str]]]: ...
+def cross_validate_network(
+    name: str,
+    rows: list[tuple[str, str, str | None]],
+    recipe: str,
+    cv: str | None,
+    seed: int,
+    checkpoints: str | None,
+    progress: Any,
+    jobs: int | None,
+) -> tuple[str, str, list[str], list[tuple[str, str]]]: ...
 def hear_recordings(
     network: TrainedNetwork,
     paths: list[str],

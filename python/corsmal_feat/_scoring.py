@@ -185,6 +185,11 @@ def cross_validate(
     text, held_out = _core.cross_validate(
         os.fspath(features), target, _labels(labels, id_column, target), groups, plan, recipe
     )
+    return validated(text, held_out)
+
+
+def validated(text: str, held_out: str) -> CrossValidation:
+    """From the report as JSON and the predictions of the held-out rows as CSV."""
     report = json.loads(text)
     result = report["result"]
     return CrossValidation(

@@ -21,6 +21,7 @@ import numpy.typing as npt
 from . import _core
 from ._extract import MOST_JOBS
 from ._refusals import refuses
+from ._scoring import CrossValidation, validated
 from ._warnings import warn
 from .errors import DecodeError, ParameterError
 
@@ -33,6 +34,7 @@ __all__ = [
     "TrainedNetwork",
     "TrainingSteps",
     "build",
+    "cross_validate",
     "embed",
     "load",
     "names",
@@ -144,35 +146,71 @@ def train(
     >>> network.classes_.tolist()
     ['rice', 'water']
     """
-    paths = _paths(recordings)
-    labels = np.asarray(y)
-    of_group = None if groups is None else np.asarray(groups)
-    for what, values in (("y", labels), ("groups", of_group)):
-        if values is not None and values.shape != (len(paths),):
-            raise ParameterError(
-                f"{what} must have a value for each of the {len(paths)} recordings,"
-                f" not shape {values.shape}"
-            )
-    names = [str(label) for label in labels.tolist()]
-    parts = [None] * len(paths) if of_group is None else [str(g) for g in of_group.tolist()]
-    changes = json.dumps(dict(recipe or {}), default=_plain)
-    if checkpoints is not None:
-        os.makedirs(checkpoints, exist_ok=True)
+    rows, kind = _rows(recordings, y, groups)
     network, left_out = _core.train_network(
+        name, rows, kind, _recipe(name, recipe), _folder(checkpoints), progress, _jobs(jobs)
+    )
+    _tell_left_out(left_out, len(rows))
+    return TrainedNetwork(network)
+
+
+@refuses
+def cross_validate(
+    name: str,
+    recordings: Iterable[_Path],
+    y: Sequence[object] | npt.NDArray[Any],
+    *,
+    groups: Sequence[object] | npt.NDArray[Any] | None = None,
+    cv: int | str | None = None,
+    recipe: Mapping[str, Any] | None = None,
+    checkpoints: _Path | None = None,
+    progress: Callable[[int, int, float | None, float | None, float], object] | None = None,
+    jobs: int | None = None,
+) -> CrossValidation:
+    """Scores a network on held-out recordings, as `corsmal-feat cross-validate --net` does.
+
+    Parameters
+    ----------
+    name, recordings, y, recipe, progress, jobs
+        See `train`; epochs are those of each fold.
+    groups : array [shape=(recordings,)], optional
+        What must not be split between training and test. Each is held out once, unless `cv` says
+        otherwise.
+    cv : int or str, optional
+        Number of folds, or a plan on the column `groups`, such as "lists=1,4,7/2,5,8".
+    checkpoints : path, optional
+        Folder that keeps the training of each fold; the next validation continues from there.
+
+    Returns
+    -------
+    CrossValidation
+
+    Examples
+    --------
+    >>> paths = [f"audio/{kind}/{i}.wav" for kind in ("rice", "water") for i in range(6)]
+    >>> result = corsmal_feat.nets.cross_validate(
+    ...     "m1", paths, ["rice"] * 6 + ["water"] * 6, cv=2, recipe={"epochs": 20}
+    ... )
+    >>> result.accuracy["mean"], result.predictions.labels
+    (1.0, ['rice', 'water'])
+    """
+    rows, _ = _rows(recordings, y, groups)
+    text = _recipe(name, recipe)
+    plan = None if cv is None else str(cv)
+    report, held_out, odd, left_out = _core.cross_validate_network(
         name,
-        list(zip(paths, names, parts, strict=True)),
-        labels.dtype.kind,
-        _core.network_recipe(name, changes),
-        None if checkpoints is None else os.fspath(checkpoints),
+        rows,
+        text,
+        plan,
+        json.loads(text)["seed"] % 2**32,
+        _folder(checkpoints),
         progress,
         _jobs(jobs),
     )
-    if left_out:
-        warn(
-            f"{len(left_out)} of {len(paths)} recordings are left out of training, the first:"
-            f" {left_out[0][0]}: {left_out[0][1]}"
-        )
-    return TrainedNetwork(network)
+    for warning in odd:
+        warn(warning)
+    _tell_left_out(left_out, len(rows))
+    return validated(report, held_out)
 
 
 @refuses
@@ -512,6 +550,44 @@ def _paths(recordings: Iterable[_Path]) -> list[str]:
     if isinstance(recordings, (str, os.PathLike)):
         return [os.fspath(recordings)]
     return [os.fspath(path) for path in recordings]
+
+
+def _rows(
+    recordings: Iterable[_Path],
+    y: Sequence[object] | npt.NDArray[Any],
+    groups: Sequence[object] | npt.NDArray[Any] | None,
+) -> tuple[list[tuple[str, str, str | None]], str]:
+    """Path, label and group of each recording, and the kind of the labels."""
+    paths, labels = _paths(recordings), np.asarray(y)
+    of_group = None if groups is None else np.asarray(groups)
+    for what, values in (("y", labels), ("groups", of_group)):
+        if values is not None and values.shape != (len(paths),):
+            raise ParameterError(
+                f"{what} must have a value for each of the {len(paths)} recordings,"
+                f" not shape {values.shape}"
+            )
+    names = [str(label) for label in labels.tolist()]
+    parts = [None] * len(paths) if of_group is None else [str(g) for g in of_group.tolist()]
+    return list(zip(paths, names, parts, strict=True)), labels.dtype.kind
+
+
+def _recipe(name: str, recipe: Mapping[str, Any] | None) -> str:
+    return _core.network_recipe(name, json.dumps(dict(recipe or {}), default=_plain))
+
+
+def _folder(checkpoints: _Path | None) -> str | None:
+    if checkpoints is None:
+        return None
+    os.makedirs(checkpoints, exist_ok=True)
+    return os.fspath(checkpoints)
+
+
+def _tell_left_out(left_out: list[tuple[str, str]], count: int) -> None:
+    if left_out:
+        warn(
+            f"{len(left_out)} of {count} recordings are left out, the first:"
+            f" {left_out[0][0]}: {left_out[0][1]}"
+        )
 
 
 def _jobs(jobs: int | None) -> int | None:

@@ -168,7 +168,7 @@ def test_a_network_learns_from_recordings_and_hears_them(tmp_path: Path) -> None
     broken.write_bytes(b"RIFF")
     y = [1] * 3 + [2] * 3
     told: list[tuple[object, ...]] = []
-    with pytest.warns(UserWarning, match=r"1 of 7 recordings .* broken"):
+    with pytest.warns(UserWarning, match=r"1 of 7 recordings are left out, the first: broken"):
         network = nets.train(
             "m1",
             [*paths, broken],
@@ -187,6 +187,15 @@ def test_a_network_learns_from_recordings_and_hears_them(tmp_path: Path) -> None
     assert np.array_equal(back.predict_proba(paths), proba)
     assert np.array_equal(pickle.loads(pickle.dumps(back)).predict_proba(paths), proba)
     assert back.header["provenance"]["recordings"] == 6
+
+    groups = ["a", "b", "c"] * 2
+    recipe = {"epochs": 20}
+    result = nets.cross_validate("m1", paths, y, groups=groups, recipe=recipe)
+    assert [fold["name"] for fold in result.report["result"]["folds"]] == ["a", "b", "c"]
+    assert result.accuracy["mean"] == 1
+    assert result.predictions.labels == ["1", "2"]
+    with pytest.warns(UserWarning, match="the held-out fold also chose the epoch"):
+        nets.cross_validate("m1", paths, y, cv=2, recipe={"epochs": 1, "select": "published"})
 
     with pytest.raises(DecodeError, match=r"broken\.wav: "):
         network.predict([paths[0], broken])

@@ -146,7 +146,9 @@ CALLS = {
     """,
     "nets": """
         build(name="m3_mlp")
+        cross_validate(name="m1", recordings=[wav], y=["a"])
         embed(name="vggish", recordings=[wav], weights=table)
+        load(path=table)
         read_weights(path=table)
         train(name="m1", recordings=[wav], y=["a"])
         write_weights(path=table, state={"x": S})
@@ -203,7 +205,8 @@ def functions() -> set[str]:
             continue
         module = import_module(f"corsmal_feat.{path.stem}")
         for name in module.__all__:
-            if inspect.isroutine(getattr(module, name)) and name not in names:
+            function = getattr(module, name)
+            if inspect.isroutine(function) and function is not getattr(corsmal_feat, name, None):
                 found.add(f"{path.stem}.{name}")
     return found - OTHERS
 

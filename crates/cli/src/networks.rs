@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 
 use corsmal_files::format::Content;
-use corsmal_models::folds::{CvPlan, Folds};
+use corsmal_models::folds::CvPlan;
 use corsmal_nets::NetError;
 use corsmal_nets::fit::Progress;
 use corsmal_nets::networks;
@@ -81,12 +81,12 @@ impl Request<'_> {
         training.train(&examples, files, progress).map_err(|e| self.stopped(e))
     }
 
-    /// Holds out parts of the items in turn; the target comes first.
+    /// Holds out parts of the items in turn.
     pub fn cross_validate(
         &self,
         name: &str,
         plan: Option<&CvPlan>,
-    ) -> Result<(String, Examples, Folds, Validated), Failure> {
+    ) -> Result<(Examples, Validated), Failure> {
         let Loaded { examples, recipe, target } = self.load(name)?;
         let training = self.training(&target, recipe)?;
         let (folds, warnings) = training.folds(&examples, plan, self.pipeline.seed())?;
@@ -94,9 +94,9 @@ impl Request<'_> {
             eprintln!("warning: {warning}");
         }
         let found = training
-            .cross_validate(&examples, &folds, |fold, told| self.tell(fold, told))
+            .cross_validate(&examples, folds, |fold, told| self.tell(fold, told))
             .map_err(|e| self.stopped(e))?;
-        Ok((target, examples, folds, found))
+        Ok((examples, found))
     }
 
     fn training<'t>(&'t self, target: &'t str, recipe: Recipe) -> Result<Training<'t>, Failure> {

@@ -58,7 +58,9 @@ mod _core {
         af193, chroma_cqt, chroma_of_cqt, cqt, hpss_masks, istft, separate, tonnetz,
     };
     #[pymodule_export]
-    use crate::listening::{embed_recordings, hear_recordings, train_network};
+    use crate::listening::{
+        cross_validate_network, embed_recordings, hear_recordings, train_network,
+    };
     #[pymodule_export]
     use crate::mel::{apply_mel, delta, mel, melspectrogram, mfcc, power_to_db};
     #[pymodule_export]

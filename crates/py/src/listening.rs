@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use corsmal_extract::inputs::{self, Input};
+use corsmal_models::validation;
 use corsmal_models::voting::VotingRule;
 use corsmal_nets::networks;
 use corsmal_systems::SystemError;
@@ -18,7 +19,12 @@ use crate::errors::{RunError, value_error};
 use crate::extract::interruptible;
 use crate::nets::PyTrainedNetwork;
 use crate::pool::{compute, jobs as usual_jobs};
+use crate::scoring::csv;
 use crate::teller::Teller;
+
+/// Columns of labels and groups.
+const TARGET: &str = "y";
+const GROUPS: &str = "groups";
 
 /// Recordings that gave nothing: name and reason.
 type Failed = Vec<(String, String)>;
@@ -51,22 +57,17 @@ fn recordings(paths: &[String]) -> PyResult<Vec<Input>> {
     )))
 }
 
-/// A network trained on recordings, given as path, label and group, and the recordings that were left
-/// out; `kind` is what the labels are in numpy.
-#[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "one private caller, by name")]
-pub(crate) fn train_network(
+/// A recording: path, label, group.
+type Row = (String, String, Option<String>);
+
+/// Items of recordings with their labels, and the recordings that were left out.
+fn examples(
     py: Python<'_>,
     name: &str,
-    rows: Vec<(String, String, Option<String>)>,
-    kind: &str,
-    recipe: &str,
-    checkpoints: Option<PathBuf>,
-    progress: Option<Py<PyAny>>,
+    rows: &[Row],
     jobs: Option<usize>,
-) -> PyResult<(PyTrainedNetwork, Failed)> {
+) -> PyResult<(Examples, Failed)> {
     let definition = networks::classifier(name).map_err(value_error)?;
-    let recipe = serde_json::from_str(recipe).map_err(value_error)?;
     let jobs = threads(jobs)?;
     let mut left_out = Vec::new();
     let examples = py.detach(|| {
@@ -74,9 +75,9 @@ pub(crate) fn train_network(
             |stop| {
                 let paths: Vec<String> = rows.iter().map(|(path, ..)| path.clone()).collect();
                 let mut found = recordings(&paths)?;
-                for (input, (_, label, group)) in found.iter_mut().zip(&rows) {
-                    let group = group.as_ref().map(|group| ("groups".into(), group.clone()));
-                    let labels = std::iter::once(("y".into(), label.clone())).chain(group);
+                for (input, (_, label, group)) in found.iter_mut().zip(rows) {
+                    let group = group.as_ref().map(|group| (GROUPS.into(), group.clone()));
+                    let labels = std::iter::once((TARGET.into(), label.clone())).chain(group);
                     input.labels = labels.collect();
                 }
                 let place = (Path::new("the recordings"), &found[..]);
@@ -88,9 +89,36 @@ pub(crate) fn train_network(
             &mut |_| Ok(()),
         )
     })?;
-    let groups = rows.iter().any(|(.., group)| group.is_some()).then_some("groups");
-    let checkpoints = checkpoints.as_deref();
-    let training = Training { target: "y", groups, recipe, checkpoints };
+    Ok((examples, left_out))
+}
+
+/// What is learned of rows by a recipe.
+fn training<'t>(
+    rows: &[Row],
+    recipe: &str,
+    checkpoints: Option<&'t Path>,
+) -> PyResult<Training<'t>> {
+    let recipe = serde_json::from_str(recipe).map_err(value_error)?;
+    let groups = rows.iter().any(|(.., group)| group.is_some()).then_some(GROUPS);
+    Ok(Training { target: TARGET, groups, recipe, checkpoints })
+}
+
+/// A network trained on recordings, and the recordings that were left out; `kind` is what the labels
+/// are in numpy.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "one private caller, by name")]
+pub(crate) fn train_network(
+    py: Python<'_>,
+    name: &str,
+    rows: Vec<Row>,
+    kind: &str,
+    recipe: &str,
+    checkpoints: Option<PathBuf>,
+    progress: Option<Py<PyAny>>,
+    jobs: Option<usize>,
+) -> PyResult<(PyTrainedNetwork, Failed)> {
+    let training = training(&rows, recipe, checkpoints.as_deref())?;
+    let (examples, left_out) = examples(py, name, &rows, jobs)?;
     let mut teller = Teller::new(progress);
     let trained = compute(py, || {
         training.train(&examples, serde_json::Value::Null, |told| teller.tell(told))
@@ -99,6 +127,38 @@ pub(crate) fn train_network(
     let mut model = trained.map_err(error)?.model;
     model.header.provenance["label_kind"] = kind.into();
     Ok((PyTrainedNetwork(model), left_out))
+}
+
+/// Scores of a network on recordings that it was not trained on: the report as JSON, the predictions
+/// of the held-out recordings as CSV, what is odd, and the recordings that were left out.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "one private caller, by name")]
+pub(crate) fn cross_validate_network(
+    py: Python<'_>,
+    name: &str,
+    rows: Vec<Row>,
+    recipe: &str,
+    cv: Option<&str>,
+    seed: u32,
+    checkpoints: Option<PathBuf>,
+    progress: Option<Py<PyAny>>,
+    jobs: Option<usize>,
+) -> PyResult<(String, String, Vec<String>, Failed)> {
+    let plan = cv.map(str::parse).transpose().map_err(|e| value_error(format!("cv = {e}")))?;
+    let training = training(&rows, recipe, checkpoints.as_deref())?;
+    let (examples, left_out) = examples(py, name, &rows, jobs)?;
+    let (folds, mut warnings) = training.folds(&examples, plan.as_ref(), seed).map_err(error)?;
+    let mut teller = Teller::new(progress);
+    let validated =
+        compute(py, || training.cross_validate(&examples, folds, |_, told| teller.tell(told)))?;
+    teller.end()?;
+    let validated = validated.map_err(error)?;
+    warnings.extend(validated.caution.map(String::from));
+    let held_out = Path::new("the held-out predictions");
+    let predictions = validated.predictions(&examples.table.ids, held_out);
+    let scores = compute(py, || validation::held_out(&predictions))?.map_err(value_error)?;
+    let report = validated.to_value(&scores).to_string();
+    Ok((report, csv(predictions.to_csv())?, warnings, left_out))
 }
 
 /// Probabilities [recordings, classes] that a network gives recordings, the mean of their windows, and

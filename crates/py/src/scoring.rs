@@ -187,6 +187,6 @@ pub(crate) fn score(
     serde_json::to_string(&report.map_err(value_error)?).map_err(value_error)
 }
 
-fn csv(bytes: std::io::Result<Vec<u8>>) -> PyResult<String> {
+pub(crate) fn csv(bytes: std::io::Result<Vec<u8>>) -> PyResult<String> {
     String::from_utf8(bytes.map_err(value_error)?).map_err(value_error)
 }

@@ -7,7 +7,8 @@ use corsmal_models::cross_validation::CrossValidation;
 use corsmal_models::folds::{CvPlan, Folds};
 use corsmal_models::fusion::WindowVotes;
 use corsmal_models::labels::Labels;
-use corsmal_models::scores::Scores;
+use corsmal_models::predictions::PredictionTable;
+use corsmal_models::scores::{ClassReport, Scores};
 use corsmal_models::targets::Classes;
 use corsmal_nets::cross_validation::{self, Data, FoldItems};
 use corsmal_nets::fit::{self, Progress, Task};
@@ -46,6 +47,10 @@ pub struct Trained {
 /// A validation, in the terms of the classifiers'.
 #[derive(Debug)]
 pub struct Validated {
+    /// label column that was predicted
+    pub target: String,
+    /// how rows were held out
+    pub folds: Folds,
     /// names of the classes
     pub labels: Labels,
     /// the class of each row
@@ -56,6 +61,27 @@ pub struct Validated {
     pub report: Value,
     /// what must be said beside the scores
     pub caution: Option<&'static str>,
+}
+
+impl Validated {
+    /// The predictions of the held-out rows; `ids` are those of the table, `path` is named in messages
+    /// about them.
+    pub fn predictions(&self, ids: &[String], path: &Path) -> PredictionTable {
+        self.result.predictions(ids, self.folds.dependent(), &self.labels, &self.classes, path)
+    }
+
+    /// Everything; `held_out` are the scores of all held-out rows together.
+    pub fn to_value(&self, held_out: &ClassReport) -> Value {
+        json!({
+            "target": self.target,
+            "labels": self.labels,
+            "folds_by": self.folds.description,
+            "training": self.report,
+            "result": self.result,
+            "held_out": held_out,
+            "caution": self.caution,
+        })
+    }
 }
 
 impl Training<'_> {
@@ -130,7 +156,7 @@ impl Training<'_> {
     pub fn cross_validate(
         &self,
         examples: &Examples,
-        folds: &Folds,
+        folds: Folds,
         mut progress: impl FnMut(&str, Progress<'_>) -> bool,
     ) -> Result<Validated> {
         let Examples { definition, table, items, .. } = examples;
@@ -183,7 +209,8 @@ impl Training<'_> {
         let caution = (recipe.select == Select::Published).then_some(
             "scores are too good: with select=published, the held-out fold also chose the epoch",
         );
-        Ok(Validated { labels, classes, result, report, caution })
+        let target = self.target.into();
+        Ok(Validated { target, folds, labels, classes, result, report, caution })
     }
 }
 

@@ -252,12 +252,10 @@ fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
     let Args { dataset, pipeline, network, quiet, jobs, .. } = args;
     let (jobs, quiet) = (jobs.count(), *quiet);
     let request = crate::networks::Request { dataset, pipeline, network, jobs, quiet };
-    let (target, examples, folds, found) = request.cross_validate(name, args.cv.as_ref())?;
+    let (examples, found) = request.cross_validate(name, args.cv.as_ref())?;
     let held_out = args.predictions.as_deref().unwrap_or(Path::new("the held-out predictions"));
     let ids = &examples.table.ids;
-    let groups = folds.dependent();
-    let predictions =
-        found.result.predictions(ids, groups, &found.labels, &found.classes, held_out);
+    let predictions = found.predictions(ids, held_out);
     let scores = corsmal_models::validation::held_out(&predictions)?;
     if let Some(path) = &args.predictions {
         draft::write(path, &predictions.to_csv()?)?;
@@ -266,34 +264,26 @@ fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
         eprintln!("warning: {caution}");
     }
     if args.json {
-        let report = serde_json::json!({
-            "target": target,
-            "labels": found.labels,
-            "folds_by": folds.description,
-            "training": found.report,
-            "result": found.result,
-            "held_out": scores,
-            "caution": found.caution,
-        });
+        let report = found.to_value(&scores);
         println!("{}", serde_json::to_string_pretty(&report)?);
     } else if !args.quiet {
         println!("features  {}: {} items", examples.table.path.display(), ids.len());
-        println!("target    {}, {} classes", target, found.labels.len());
+        println!("target    {}, {} classes", found.target, found.labels.len());
         println!("network   {name}");
-        println!("held out  {}", folds.description);
+        println!("held out  {}", found.folds.description);
         if let Some(caution) = found.caution {
             println!("caution   {caution}");
         }
         println!();
-        print_folds(&found.result, &[], &folds);
+        print_folds(&found.result, &[], &found.folds);
         print_held_out(&scores);
     }
     if let Some(folder) = &args.report {
         let held_out = HeldOut {
             table: &examples.table,
-            target: &target,
+            target: &found.target,
             classes: &found.classes,
-            folds: &folds,
+            folds: &found.folds,
             result: &found.result,
             predictions: &predictions,
             scores: &scores,
