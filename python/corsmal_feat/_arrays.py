@@ -1,4 +1,4 @@
-"""Checks and shapes shared by all front-end functions."""
+"""Checks and shapes shared by the functions on arrays."""
 
 from __future__ import annotations
 
