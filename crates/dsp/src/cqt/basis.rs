@@ -101,25 +101,38 @@ pub(super) struct Basis {
 }
 
 impl Basis {
-    /// The filters `range` of `wavelets` at the sample rate `sr`, transformed and without their
-    /// smallest values (librosa 0.11 `__vqt_filter_fft`, `util.sparsify_rows`).
+    /// Length of the transform for the filters `range` of `wavelets` at the sample rate `sr`.
     ///
     /// # Errors
     /// Filters of less than one or of too many samples.
-    pub fn new(
+    pub fn transform_length(
         wavelets: &Wavelets,
         range: std::ops::Range<usize>,
         sr: f64,
         p: &CqtParams,
-    ) -> Result<Self> {
-        let longest = range.clone().map(|k| wavelets.length(k, sr)).fold(0.0, f64::max);
+    ) -> Result<usize> {
+        let longest = range.map(|k| wavelets.length(k, sr)).fold(0.0, f64::max);
         if !(0.5..=LONGEST_FILTER).contains(&longest) {
             let allowed = format!(
                 "such that the longest filter has 1 to {LONGEST_FILTER} samples (it has {longest:.3})"
             );
             return Err(DspError::parameter("filter_scale", p.filter_scale, allowed));
         }
-        let n_fft = 2.0_f64.powf(longest.log2().ceil()) as usize;
+        Ok(2.0_f64.powf(longest.log2().ceil()) as usize)
+    }
+
+    /// The filters `range` of `wavelets` at the sample rate `sr`, transformed to `n_fft` values and
+    /// without the smallest of them (librosa 0.11 `__vqt_filter_fft`, `util.sparsify_rows`).
+    ///
+    /// # Errors
+    /// A window that has no such length.
+    pub fn new(
+        wavelets: &Wavelets,
+        range: std::ops::Range<usize>,
+        sr: f64,
+        n_fft: usize,
+        p: &CqtParams,
+    ) -> Result<Self> {
         let fft = FftPlanner::<f64>::new().plan_fft_forward(n_fft);
         let mut scratch = vec![Complex::default(); fft.get_inplace_scratch_len()];
         let rows = range.map(|k| {
@@ -130,6 +143,11 @@ impl Basis {
             Ok(sparse(&filter, p.sparsity))
         });
         Ok(Self { n_fft, rows: rows.collect::<Result<_>>()? })
+    }
+
+    /// Numbers that one frame touches: its transform and the weights of all filters.
+    pub fn work(&self) -> usize {
+        self.n_fft + self.rows.iter().map(|(_, weights)| weights.len()).sum::<usize>()
     }
 }
 

@@ -30,6 +30,12 @@ use crate::window::Window;
 use basis::{Basis, Wavelets};
 use decimate::Decimator;
 
+/// Most work for each sample of the signal, in numbers that a frame touches. The default bins take
+/// 200, and 100,000 with a hop of 1.
+const MOST_WORK: f64 = (1 << 17) as f64;
+/// Most values of all filters before the small ones are left out.
+const MOST_VALUES: usize = 1 << 26;
+
 /// One octave of filters and how its signal comes about.
 struct Octave {
     basis: Arc<Basis>,
@@ -59,7 +65,8 @@ pub struct CqtPlan {
 
 impl CqtPlan {
     /// # Errors
-    /// Impossible parameters, or filters that reach above half the sample rate.
+    /// Impossible parameters, filters that reach above half the sample rate, or more of them or of
+    /// frames than can be computed in sensible time.
     pub fn new(p: &CqtParams) -> Result<Self> {
         p.check()?;
         let wavelets = Wavelets::new(p);
@@ -77,20 +84,38 @@ impl CqtPlan {
         let (mut sr, mut hop) = (base, p.hop_length >> early);
         let mut octaves: Vec<Octave> = Vec::with_capacity(n_octaves);
         let mut end = p.n_bins;
+        let (mut values, mut work) = (0_usize, 0.0);
+        let require_work = |work: f64| match work <= MOST_WORK {
+            true => Ok(()),
+            false => Err(DspError::parameter("hop_length", p.hop_length, less_work(p))),
+        };
         while end > 0 {
             let first = end.saturating_sub(p.bins_per_octave);
+            // Frames of this octave for each sample of the signal.
+            let density = sr / p.sr / hop as f64;
             let (basis, lanes) = match octaves.last() {
                 Some(above) if same_lengths(&wavelets, first..end, sr, above, base) => {
                     (above.basis.clone(), above.lanes.clone())
                 }
                 _ => {
-                    let basis = Basis::new(&wavelets, first..end, sr, p)?;
+                    let n_fft = Basis::transform_length(&wavelets, first..end, sr, p)?;
+                    require_work(work + n_fft as f64 * density)?;
+                    values = values.saturating_add((end - first).saturating_mul(n_fft));
+                    if values > MOST_VALUES {
+                        let allowed = format!(
+                            "so few that their filters have at most {MOST_VALUES} values together"
+                        );
+                        return Err(DspError::parameter("n_bins", p.n_bins, allowed));
+                    }
+                    let basis = Basis::new(&wavelets, first..end, sr, n_fft, p)?;
                     let lanes = LaneFft::supports(basis.n_fft)
                         .then(|| LaneFft::new(basis.n_fft).map(Arc::new))
                         .transpose()?;
                     (Arc::new(basis), lanes)
                 }
             };
+            work += basis.work() as f64 * density;
+            require_work(work)?;
             let gain = |k: usize| {
                 let scale = if p.scale { wavelets.length(k, base).sqrt() } else { 1.0 };
                 // Without the scale, early halving is made up for.
@@ -324,6 +349,15 @@ fn same_lengths(
             let length = wavelets.length(above.first + i, 2.0 * sr);
             (wavelets.length(k, sr) - length).abs() <= 1e-9 * length
         })
+}
+
+/// What makes the frames of a transform cheaper.
+fn less_work(p: &CqtParams) -> String {
+    format!(
+        "larger, or a multiple of a higher power of two, or fewer bins: with n_bins = {} and \
+         bins_per_octave = {} a sample takes more than {MOST_WORK} steps",
+        p.n_bins, p.bins_per_octave
+    )
 }
 
 /// Share of the Nyquist frequency that octaves may fill; librosa up to 0.9 took the pass band of its

@@ -159,3 +159,18 @@ fn a_key_of_a_feature_that_is_not_there_changes_nothing() {
     assert_eq!(names, ["melspectrogram", "mfcc"]);
     assert_eq!(added.to_value()["features"]["mfcc"]["n_mels"], 64);
 }
+
+#[test]
+fn more_work_than_sensible_time_allows_is_refused() {
+    for (text, expected) in [
+        ("cqt]\nhop_length = 1\nn_bins = 4000\nbins_per_octave = 600", "hop_length"),
+        ("cqt]\nhop_length = 1\nsparsity = 0", "hop_length"),
+        ("hpss]\nhop_length = 1\nkernel_size = 1048576", "kernel_size"),
+        ("hpss]\nkernel_size = [31, 1025]", "kernel_size"),
+    ] {
+        let refused = config(&format!("[features.{text}"), &[]).unwrap_err();
+        assert!(refused.contains(expected), "{text}: {refused}");
+    }
+    config("[features.cqt]\nhop_length = 1", &[]).unwrap();
+    config("[features.hpss]\nkernel_size = 1023", &[]).unwrap();
+}

@@ -8,7 +8,10 @@ use serde::{Deserialize, Deserializer, Serialize};
 use super::kernel::{Extent, Feature, WholeKernel};
 use super::kind::FeatureKind;
 use super::labels::hertz;
-use crate::params::{Keys, StftSpec};
+use crate::params::{Keys, StftSpec, at_most};
+
+/// Longest median in frames or bins: the time of each grows with it.
+const MAX_KERNEL: usize = 1024;
 
 /// A part of the sound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -109,6 +112,7 @@ impl FeatureKind for Hpss {
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let stft = self.stft.params()?;
+        self.kernel_size.iter().try_for_each(|&n| at_most("kernel_size", n, MAX_KERNEL))?;
         let params = HpssParams {
             kernel_harmonic: self.kernel_size[0],
             kernel_percussive: self.kernel_size[1],
