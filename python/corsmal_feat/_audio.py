@@ -12,18 +12,17 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import Floats, number, precision, size
 from ._mono import to_mono
-from ._refusals import refuses
+from ._refusals import existing, refuses
 from ._resample import resample
 from ._warnings import warn
-from .errors import DecodeError, MissingFileError, ParameterError
+from .errors import DecodeError, ParameterError
 
 Source = str | os.PathLike[str] | BinaryIO
 
 
 def _open(path: Source) -> _core.Recording:
     if isinstance(path, (str, os.PathLike)):
-        if not os.path.exists(path):
-            raise MissingFileError(f"{os.fspath(path)}: no such file")
+        existing(path)
         try:
             return _core.Recording.open(path)
         except DecodeError as error:
@@ -259,9 +258,11 @@ def get_duration(
         return (recording.count() if frames is None else frames) / recording.sample_rate
     if not sr > 0:
         raise ParameterError(f"sr must be a positive sample rate in Hz, not {sr}")
+    if y is None and S is None:
+        raise ParameterError("At least one of (y, sr), S, or path must be provided")
     given = np.asarray(S if y is None else y)
     if given.ndim == 0:
-        raise ParameterError("At least one of (y, sr), S, or path must be provided, with an axis")
+        raise ParameterError(f"{'S' if y is None else 'y'} has 0 dimensions, expected at least 1")
     if y is not None:
         return float(given.shape[-1] / sr)
     samples = n_fft + hop_length * (given.shape[-1] - 1)

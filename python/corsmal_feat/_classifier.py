@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import size
+from ._refusals import existing, place
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
 from ._validation import Matrix, features, labels_of, names_of, weights_of
 from .errors import ModelError, ParameterError
@@ -156,12 +157,12 @@ class Classifier(ClassifierMixin, BaseEstimator):
         """
         if not hasattr(self, "_model"):
             raise not_fitted(self)
-        self._model.save(os.fspath(path), None if features is None else made_of(features))
+        self._model.save(place(path), None if features is None else made_of(features))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """Reads a model file of this very classifier (see `load_model` for any)."""
-        model = _core.TrainedModel.load(os.fspath(path))
+        model = _core.TrainedModel.load(existing(path))
         header = json.loads(model.header())
         pipeline = header["pipeline"]
         spec = pipeline["classifier"]

@@ -199,7 +199,9 @@ def sk_resize(
         raise ParameterError(f"S has {s.ndim} dimensions and shape {len(shape)}, expected 2 and 2")
     height, width = size("shape", shape[0]), size("shape", shape[1])
     room("an image", 4, height + s.shape[0], width + s.shape[1])
-    return _core.sk_resize(rows(s, 1), height, width, mode, anti_aliasing)
+    return _core.sk_resize(
+        rows(s, 1), height, width, mode, None if anti_aliasing is None else bool(anti_aliasing)
+    )
 
 
 @refuses

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import audio
+from ._arrays import audio, size
 from ._features import Features, load_features
 from ._refusals import refuses
 from ._warnings import warn
@@ -80,7 +80,8 @@ def extract(
     if not names:
         raise ParameterError("paths must name at least one recording")
     inputs = [os.fspath(name) for name in names]
-    if jobs is not None and not 1 <= jobs <= MOST_JOBS:
+    jobs = None if jobs is None else size("jobs", jobs)
+    if jobs is not None and jobs > MOST_JOBS:
         raise ParameterError(f"jobs must be 1 to {MOST_JOBS}, not {jobs}")
     if out is not None:
         return _run(inputs, chosen, overrides, os.fspath(out), jobs, resume, overwrite, progress)
@@ -101,11 +102,13 @@ def _run(
     overwrite: bool,
     progress: bool | Progress,
 ) -> Features:
-    if not isinstance(progress, bool) and not callable(progress):
+    tell: Progress | None = progress if callable(progress) else None
+    if not callable(progress) and progress not in (None, False, True):
         raise ParameterError(f"progress must be True, False or a function, not {progress!r}")
-    tell = _to_stderr if progress is True else progress or None
+    if progress in (True,):
+        tell = _to_stderr
     found = _core.extract(inputs, config, overrides, out, jobs, resume, overwrite, tell)
-    if progress is True:
+    if tell is _to_stderr:
         print(file=sys.stderr)
     for message in found:
         warn(message)

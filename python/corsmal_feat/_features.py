@@ -14,7 +14,9 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from . import _core
 from ._refusals import refuses
+from ._warnings import warn
 from .errors import ParameterError, UnknownIdError
 
 StrPath = str | os.PathLike[str]
@@ -126,7 +128,8 @@ class Features:
         if self.summary is None and recording in self.arrays:
             return self.arrays[recording]
         if recording not in self.ids:
-            close = [i for i in self.ids if str(recording) in i or i in str(recording)][:3]
+            near = isinstance(recording, str)
+            close = [i for i in self.ids if near and (recording in i or i in recording)][:3]
             hint = f"; did you mean {', '.join(map(repr, close))}?" if close else ""
             raise UnknownIdError(f"no recording {recording!r} among {len(self.ids)}{hint}")
         if self.summary is None:
@@ -185,6 +188,12 @@ class Features:
                 "features does not say how it was made, since another program wrote the table anew:"
                 " give what corsmal_feat wrote"
             )
+        if (wanted := self._names_of_recordings()) not in (None, self.names):
+            raise ParameterError(
+                f"features has {len(self.names)} columns, not the {len(wanted or ())} that recordings"
+                " are given by its configuration, in that order, so the model could not predict"
+                " recordings; fit on all columns as corsmal_feat wrote them"
+            )
         return {
             "feature_names": self.names,
             "feature_config": self.config,
@@ -195,6 +204,14 @@ class Features:
                 if row["status"] in GOOD
             ],
         }
+
+    def _names_of_recordings(self) -> list[str] | None:
+        """The names of the values that recordings like these are given, if one is known."""
+        row = next((row for row in self.outcomes if row["status"] in GOOD), None)
+        if row is None or not row.get("sample_rate"):
+            return None
+        signals = _core.Signals(("json", json.dumps(self.config)), [])
+        return signals.start(row["sample_rate"], row["channels"]).summary_names()
 
     def _durations(self) -> npt.NDArray[np.float64]:
         rows = {row["id"]: row for row in self.outcomes}
@@ -334,6 +351,16 @@ def _lines(text: str | bytes) -> list[dict[str, Any]]:
     return [json.loads(line) for line in text.splitlines() if line]
 
 
+def _is_text(types: Any, kind: Any) -> bool:
+    kind = kind.value_type if types.is_dictionary(kind) else kind
+    return bool(types.is_string(kind) or types.is_large_string(kind))
+
+
+def _is_statistic(column: str) -> bool:
+    """Whether a column is called as values of a summary are: `mfcc[0].mean`, `rms.std`."""
+    return "[" in column or "." in column
+
+
 def _ids(name: str, column: list[Any]) -> list[str]:
     ids: dict[str, int] = {}
     for row, value in enumerate(column):
@@ -363,17 +390,22 @@ def _of_parquet(name: str) -> dict[str, Any]:
     metadata = table.schema.metadata or {}
     if "id" not in table.column_names:
         raise ParameterError(f"{name} is not an output of corsmal-feat: it has no column id")
-    nested = [field.name for field in table.schema if field.type.num_fields != 0]
-    if nested:
-        raise ParameterError(f"{name}: the column {nested[0]} holds lists; numbers or text go")
-    columns = {k: table.column(k).to_numpy() for k in table.column_names if k != "id"}
-    # Other tools write the summary in double precision or, where all values are whole, as integers,
-    # and their own metadata only.
-    names = [
-        k
-        for k, v in columns.items()
-        if not k.startswith("__") and (v.dtype.kind == "f" or (v.dtype.kind in "iu" and "[" in k))
-    ]
+    types = import_module("pyarrow").types
+    columns: dict[str, Values] = {}
+    names: list[str] = []
+    for field in table.schema:
+        if field.name == "id" or field.name.startswith("__"):
+            continue
+        whole = types.is_integer(field.type)
+        # pandas makes a column of whole values one of integers; ours have such names.
+        if types.is_floating(field.type) or (whole and _is_statistic(field.name)):
+            names.append(field.name)
+            columns[field.name] = table.column(field.name).to_numpy()
+        elif whole or types.is_boolean(field.type) or _is_text(types, field.type):
+            texts = ["" if v is None else str(v) for v in table.column(field.name).to_pylist()]
+            columns[field.name] = np.asarray(texts, dtype=np.str_)
+        else:
+            warn(f"{name}: the column {field.name} is left out: it holds {field.type}")
     ids = _ids(name, table.column("id").to_pylist())
     empty = np.zeros((len(ids), 0), np.float32)
     meta = json.loads(metadata.get(b"corsmal.meta", b"{}"))
@@ -385,11 +417,7 @@ def _of_parquet(name: str) -> dict[str, Any]:
         if names
         else empty,
         "names": names,
-        "labels": {
-            k: v.astype(np.str_)
-            for k, v in columns.items()
-            if k not in names and not k.startswith("__")
-        },
+        "labels": {k: v for k, v in columns.items() if k not in names},
         "config": json.loads(metadata.get(b"corsmal.config", b"{}")),
         "config_hash": meta.get("config_hash", ""),
         "outcomes": _lines(metadata.get(b"corsmal.outcomes", b"")),

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import number, room, size
+from ._arrays import number, precision, room, size
 from ._params import ChromaParams, MelParams, WindowSpec
 from ._refusals import refuses
 from ._warnings import warn
@@ -173,7 +173,7 @@ def mel(
     bank, empty = _core.mel(mel_params(sr, n_fft, n_mels, fmin, fmax, htk, norm))
     if empty:
         warn_empty()
-    return bank.astype(dtype, copy=False)
+    return bank.astype(precision(dtype), copy=False)
 
 
 def warn_empty() -> None:

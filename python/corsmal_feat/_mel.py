@@ -182,12 +182,15 @@ def delta(
     if kwargs:
         raise ParameterError(f"delta does not take {', '.join(map(repr, kwargs))}")
     array = floats("data", data)
+    kind = array.dtype
+    if not np.isfinite(step) or step == 0:
+        raise ParameterError(f"delta must be a finite number that is not 0, not {step}")
     if mode == "constant" and beyond != 0:
         # The derivative of a constant is 0: the ends are zeros after a shift.
-        array = array - array.dtype.type(number("cval", beyond))
+        array = array.astype(np.float64) - number("cval", beyond)
     moved = np.moveaxis(array, axis, -1)
     result: Any = _core.delta(rows(moved, 1), int(width), int(order), str(mode))
     if step != 1.0:
-        result = result / array.dtype.type(step) ** order
-    slope: Floats = np.moveaxis(result.reshape(moved.shape), -1, axis)
+        result = result / step**order
+    slope: Floats = np.moveaxis(result.reshape(moved.shape), -1, axis).astype(kind, copy=False)
     return slope

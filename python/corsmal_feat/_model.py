@@ -14,7 +14,7 @@ from . import _core
 from ._classifier import class_labels
 from ._extract import extract
 from ._features import GOOD
-from ._refusals import refuses
+from ._refusals import existing, refuses
 from ._validation import Matrix, features
 from .errors import DecodeError, ModelError, ParameterError
 
@@ -41,7 +41,7 @@ class TrainedModel:
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path = os.fspath(path)
+        self.path = existing(path)
         self._model = _core.TrainedModel.load(self.path)
         self.header: dict[str, Any] = json.loads(self._model.header())
         self.classes_ = class_labels(self.header)
@@ -132,6 +132,8 @@ class TrainedModel:
     def _rows(self, X: Any, any_rate: bool) -> Matrix:
         if isinstance(X, (str, os.PathLike)):
             X = [X]
+        if isinstance(X, (list, tuple)) and not X:
+            raise ParameterError("X is empty: at least one row or recording is needed")
         if getattr(X, "ndim", 2) == 1 and not np.issubdtype(np.asarray(X).dtype, np.number):
             X = list(X)  # an array or a pandas Series of paths
         if isinstance(X, (list, tuple)) and X and isinstance(X[0], (str, os.PathLike)):
@@ -170,6 +172,11 @@ class TrainedModel:
             raise ParameterError(
                 f"X gives {len(found.names)} values for each recording where {self.path} was"
                 f" trained on {self.n_features_in_}: another number of channels?"
+            )
+        if self.header["feature_names"] not in ([], found.names):
+            raise ModelError(
+                f"{self.path} was trained on features of other names, or in another order, than"
+                " recordings are given: train it on all columns as corsmal_feat wrote them"
             )
         if found.config_hash != self.header["feature_config_hash"]:
             raise ModelError(

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._classifier import class_labels
+from ._refusals import existing, place
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
 from ._validation import labels_of
 from .errors import ParameterError
@@ -119,12 +120,12 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         """Writes the model file, whole or not at all. It is a safetensors file."""
         if not hasattr(self, "_model"):
             raise not_fitted(self)
-        self._model.save(os.fspath(path))
+        self._model.save(place(path))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """Reads a model file."""
-        model = _core.TrainedNetwork.load(os.fspath(path))
+        model = _core.TrainedNetwork.load(existing(path))
         header = json.loads(model.header())
         estimator = cls(header["network"], recipe=header["recipe"])
         estimator._model = model

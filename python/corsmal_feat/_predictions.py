@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from ._refusals import place, refuses
+
 StrPath = str | os.PathLike[str]
 
 
@@ -48,9 +50,10 @@ class Predictions:
     def __len__(self) -> int:
         return len(self.predicted)
 
+    @refuses
     def save(self, path: StrPath) -> None:
         """Writes the prediction file: CSV that `score`, `fuse` and the command read."""
-        Path(path).write_text(self._text, encoding="utf-8", newline="")
+        Path(place(path)).write_text(self._text, encoding="utf-8", newline="")
 
 
 def parse(text: str) -> Predictions:

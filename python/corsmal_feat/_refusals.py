@@ -8,8 +8,10 @@ import reprlib
 import types
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
+from pathlib import Path
 from typing import (
     Any,
+    BinaryIO,
     Literal,
     ParamSpec,
     TypeVar,
@@ -28,23 +30,26 @@ from .errors import CorsmalFeatError, FileError, MissingFileError, ParameterErro
 P = ParamSpec("P")
 R = TypeVar("R")
 
-_ARRAY_LIKE = frozenset(get_args(npt.ArrayLike))
-_DTYPE_LIKE = frozenset(get_args(npt.DTypeLike))
-_NUMBERS = (bool, int, float, np.number, np.bool_)
+#: What an argument of a wrong type or value raises, here or in numpy.
+_CAUSED = (TypeError, ValueError, OverflowError, AttributeError, IndexError, ZeroDivisionError)
+#: Where errors are raised that an argument causes.
+_PACKAGES = tuple(f"{Path(module).parent}{os.sep}" for module in (__file__, np.__file__))
+_LIBRARY = ("<frozen", f"{Path(os.__file__).parent}{os.sep}")
 
 
 def refuses(function: Callable[P, R]) -> Callable[P, R]:
     """A public function whose refusals are all errors of this package.
 
-    Nothing is checked before the call. After an error that is not this package's, the arguments are
-    compared with the annotations, and the first one that does not fit them is named.
+    Nothing is checked before the call. After an error the arguments are compared with the
+    annotations, and the first one that does not fit them is named. Errors of a function that the
+    caller passes in are left alone.
     """
 
     @wraps(function)
     def refusing(*args: P.args, **kwargs: P.kwargs) -> R:
         try:
             return function(*args, **kwargs)
-        except (CorsmalFeatError, Warning, ImportError):
+        except (Warning, ImportError):
             raise
         except Exception as error:
             try:
@@ -65,24 +70,69 @@ def _told(
     hints = get_type_hints(function)
     # What stands in `**kwargs` is refused by the function that it is passed on to.
     given = [(name, value) for name, value in arguments.items() if name in hints]
-    for name, value in given:
-        if not _fits(hints[name], value):
-            expected = " or ".join(dict.fromkeys(_words(hints[name])))
-            return ParameterError(f"{name} must be {expected}, not {_shown(value)}")
-    for name, value in given:
-        if isinstance(value, (float, np.floating)) and not np.isfinite(value):
-            return ParameterError(f"{name} must be a finite number, not {value}")
-        if isinstance(error, TypeError) and "complex" in str(error) and np.iscomplexobj(value):
-            return ParameterError(f"{name} must be real, not complex")
-        if isinstance(error, ZeroDivisionError) and isinstance(value, _NUMBERS) and value == 0:
-            return ParameterError(f"{name} must not be 0")
+    if any(callable(value) for _, value in given) and _of_the_caller(error):
+        return None
+    if isinstance(error, (ParameterError, *_CAUSED)):
+        for name, value in given:
+            if not _fits(hints[name], value):
+                if isinstance(error, CorsmalFeatError) and name in str(error):
+                    return None
+                return ParameterError(f"{name} must be {_words(hints[name])}, not {_shown(value)}")
+    if isinstance(error, CorsmalFeatError):
+        return None
     if isinstance(error, OSError):
-        kind = MissingFileError if isinstance(error, FileNotFoundError) else FileError
-        place = f"{error.filename}: " if error.filename is not None else ""
-        return kind(f"{place}{error.strerror or error}")
+        return of_file(error)
+    for name, value in given:
+        number = isinstance(value, (float, np.floating))
+        if number and not np.isfinite(value) and isinstance(error, _CAUSED):
+            return ParameterError(f"{name} must be a finite number, not {value}")
+        if isinstance(error, TypeError) and "complex" in str(error) and _is_complex(value):
+            return ParameterError(f"{name} must be real, not complex")
+        if isinstance(error, ZeroDivisionError) and _fits_kind(float, value) and value == 0:
+            return ParameterError(f"{name} must not be 0")
     if isinstance(error, (ValueError, OverflowError, MemoryError)):
         return ParameterError(f"{function.__name__}: {error}")
     return None
+
+
+def of_file(error: OSError) -> FileError:
+    """The same as an error of this package."""
+    kind = MissingFileError if isinstance(error, FileNotFoundError) else FileError
+    place = f"{error.filename}: " if error.filename is not None else ""
+    told = kind(f"{place}{error.strerror or error}")
+    told.errno, told.strerror, told.filename = error.errno, error.strerror, error.filename
+    return told
+
+
+def place(path: Any) -> str:
+    """A path as text."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise ParameterError(f"path must be a path, not {_shown(path)}")
+    return os.fsdecode(path)
+
+
+def existing(path: Any) -> str:
+    """The path of something that is there, as text."""
+    name = place(path)
+    try:
+        os.stat(name)
+    except OSError as error:
+        raise of_file(error) from error
+    except ValueError as error:  # a zero byte
+        raise ParameterError(f"{name!r}: {error}") from error
+    return name
+
+
+def _of_the_caller(error: BaseException) -> bool:
+    """Whether code of neither this package, numpy nor Python's library had a part in it."""
+    step = error.__traceback__
+    while step is not None:
+        file = step.tb_frame.f_code.co_filename
+        library = file.startswith(_LIBRARY) and "site-packages" not in file
+        if not (library or file.startswith(_PACKAGES)):
+            return True
+        step = step.tb_next
+    return False
 
 
 def _shown(value: Any) -> str:
@@ -92,9 +142,22 @@ def _shown(value: Any) -> str:
     return reprlib.repr(value)
 
 
+def _parts(union: Any) -> tuple[Any, ...]:
+    """The alternatives of a union, also of unions in it that have names (numpy's since 2.5)."""
+    union = getattr(union, "__value__", union)
+    if get_origin(union) not in (Union, types.UnionType):
+        return (union,)
+    return tuple(part for inner in get_args(union) for part in _parts(inner))
+
+
+_ARRAY_LIKE = frozenset(_parts(npt.ArrayLike))
+_DTYPE_LIKE = frozenset(_parts(npt.DTypeLike))
+_ARRAYS = (np.ndarray, npt.NDArray)
+
+
 def _split(hint: Any) -> tuple[frozenset[Any], list[Any]]:
     """numpy's union that a hint holds, if any, and its other alternatives."""
-    kinds = get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
+    kinds = _parts(hint)
     for group in (_ARRAY_LIKE, _DTYPE_LIKE):
         if group <= set(kinds):
             return group, [kind for kind in kinds if kind not in group]
@@ -112,8 +175,12 @@ def _fits(hint: Any, value: Any) -> bool:
 def _is_array(value: Any) -> bool:
     try:
         return np.asarray(value).dtype.kind in "biufc"
-    except ValueError:
+    except Exception:
         return False
+
+
+def _is_complex(value: Any) -> bool:
+    return _is_array(value) and np.iscomplexobj(np.asarray(value))
 
 
 def _is_dtype(value: Any) -> bool:
@@ -124,19 +191,28 @@ def _is_dtype(value: Any) -> bool:
     return True
 
 
+def _is_number(value: Any) -> bool:
+    """Numbers, and arrays without dimension of one."""
+    if isinstance(value, np.ndarray):
+        return value.ndim == 0 and value.dtype.kind in "biuf"
+    return isinstance(value, (bool, int, float, np.bool_, np.integer, np.floating))
+
+
 def _fits_kind(kind: Any, value: Any) -> bool:
     origin = get_origin(kind)
     if kind is Any or isinstance(kind, TypeVar):
         return True
     if origin is Literal:
         return isinstance(value, str | int | None) and value in get_args(kind)
-    if kind in (float, np.floating):
-        return isinstance(value, _NUMBERS) and not isinstance(value, np.complexfloating)
-    if kind in (int, np.integer):
-        return _fits_kind(float, value) and float(value).is_integer()
+    if kind in (float, np.floating) or origin is np.floating:
+        return _is_number(value)
+    if kind in (int, np.integer) or origin is np.integer:
+        if isinstance(value, (float, np.floating)):
+            return float(value).is_integer()
+        return _is_number(value) and np.asarray(value).dtype.kind in "biuO"
     if kind is bool:
-        return isinstance(value, (bool, np.bool_))
-    if origin is np.ndarray:
+        return isinstance(value, (bool, np.bool_, int, np.integer))
+    if origin in _ARRAYS:
         return isinstance(value, np.ndarray)
     if is_typeddict(kind):
         return isinstance(value, dict) and kind.__required_keys__ <= value.keys()
@@ -145,6 +221,8 @@ def _fits_kind(kind: Any, value: Any) -> bool:
     if isinstance(origin, type) and issubclass(origin, Iterable) and origin is not Mapping:
         several = value.ndim > 0 if isinstance(value, np.ndarray) else isinstance(value, origin)
         return several and _elements_fit(kind, value)
+    if kind is BinaryIO:
+        return hasattr(value, "read")
     found = origin or kind
     return not isinstance(found, type) or isinstance(value, found)
 
@@ -156,30 +234,13 @@ def _elements_fit(kind: Any, value: Any) -> bool:
     return all(any(_fits(hint, element) for hint in hints) for element in value)
 
 
-def _words(hint: Any) -> Iterable[str]:
-    """What an annotation takes, in words."""
-    group, kinds = _split(hint)
-    if group:
-        yield "an array of numbers" if group is _ARRAY_LIKE else "a numpy type"
-    for kind in kinds:
-        origin = get_origin(kind)
-        found = origin or kind
-        if origin is Literal:
-            yield from (repr(choice) for choice in get_args(kind))
-        elif found in _NAMES:
-            yield _NAMES[found]
-        elif isinstance(found, type) and issubclass(found, Iterable):
-            yield "a sequence"
-        else:
-            yield f"a {found.__name__}"
-
-
 _NAMES: dict[Any, str] = {
     float: "a number",
     int: "a whole number",
     np.integer: "a whole number",
     np.floating: "a number",
     np.ndarray: "an array of numbers",
+    npt.NDArray: "an array of numbers",
     bool: "True or False",
     str: "text",
     types.NoneType: "None",
@@ -187,4 +248,29 @@ _NAMES: dict[Any, str] = {
     Mapping: "a mapping",
     dict: "a mapping",
     Callable: "a function",
+    BinaryIO: "a binary file",
 }
+
+
+def _words(hint: Any) -> str:
+    """What an annotation takes, in words."""
+    group, kinds = _split(hint)
+    words = []
+    if group:
+        words.append("an array of numbers" if group is _ARRAY_LIKE else "a numpy type")
+    path = any(get_origin(kind) is os.PathLike for kind in kinds)
+    for kind in kinds:
+        origin = get_origin(kind)
+        found = origin or kind
+        if origin is Literal:
+            words += [repr(choice) for choice in get_args(kind)]
+        elif found in _NAMES:
+            # A path may be text.
+            words += [] if path and kind is str else [_NAMES[found]]
+        elif isinstance(found, type) and issubclass(found, Iterable):
+            inner = [hint for hint in get_args(kind) if hint not in (Ellipsis, Any)]
+            each = f", each {' or '.join(map(_words, inner))}" if inner else ""
+            words.append(f"a sequence{each}")
+        else:
+            words.append(f"a {getattr(found, '__name__', found)}")
+    return " or ".join(dict.fromkeys(words))

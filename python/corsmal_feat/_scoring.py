@@ -12,7 +12,7 @@ import numpy as np
 
 from . import _core
 from ._predictions import Predictions, StrPath, parse
-from ._refusals import refuses
+from ._refusals import existing, refuses
 from .errors import ParameterError
 
 __all__ = [
@@ -183,7 +183,7 @@ def cross_validate(
         "seed": _whole("seed", seed, 2**32),
     }
     text, held_out = _core.cross_validate(
-        os.fspath(features), target, _labels(labels, id_column, target), groups, plan, recipe
+        existing(features), target, _labels(labels, id_column, target), groups, plan, recipe
     )
     return validated(text, held_out)
 
@@ -240,7 +240,7 @@ def fuse(
     """
     if isinstance(predictions, (str, os.PathLike)):
         predictions = [predictions]
-    paths = [os.fspath(path) for path in predictions]
+    paths = [existing(path) for path in predictions]
     if not paths:
         raise ParameterError("fuse needs at least one prediction file")
     chosen = None if weights is None else [float(weight) for weight in weights]
@@ -285,7 +285,7 @@ def compare_predictions(
     """
     count = _whole("resamples", resamples, 1_000_001)
     text = _core.compare_predictions(
-        os.fspath(first), os.fspath(second), target, count, _whole("seed", seed, 2**64)
+        existing(first), existing(second), target, count, _whole("seed", seed, 2**64)
     )
     report = json.loads(text)
     test, interval = report["mcnemar"], report["bootstrap_rows"]
@@ -354,7 +354,7 @@ def score(
     if labels is not None and os.fspath(labels) == FOLDERS and target is None:
         target = "class"
     text = _core.score(
-        os.fspath(predictions),
+        existing(predictions),
         _labels(labels, id_column, target or "class"),
         target,
         groups,

@@ -241,7 +241,7 @@ def multi_frequency_weighting(
 
 @refuses
 def perceptual_weighting(
-    S: npt.NDArray[Any], frequencies: npt.ArrayLike, *, kind: str | None = "A", **kwargs: Any
+    S: npt.ArrayLike, frequencies: npt.ArrayLike, *, kind: str | None = "A", **kwargs: Any
 ) -> npt.NDArray[Any]:
     """Weighted power spectrogram in dB (librosa.perceptual_weighting).
 

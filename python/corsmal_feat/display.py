@@ -25,7 +25,11 @@ _PLAIN = ("frames", "off", "none", None)
 _HERTZ = ("linear", "fft", "hz", "log", "mel", "cqt_hz", "cqt_note")
 _CLASSES = ("chroma", "tonnetz")
 #: Axes of one kind, which have one scale where they have the same limits.
-_ALIKE = (set(_TIMES), {"linear", "fft", "hz"}, {"frames"}, {"chroma"}, {"tonnetz"})
+_ALIKE = (
+    set(_TIMES),
+    {"linear", "fft", "hz"},
+    *({name} for name in ("frames", "log", "mel", "cqt_hz", "cqt_note", "chroma", "tonnetz")),
+)
 #: What only librosa's ticks of Indian and just intonation, keys and tempograms need.
 _LEFT_OUT = (
     "Sa", "intervals", "key", "mela", "tempo_max", "tempo_min", "thaat", "unicode", "unison",
@@ -115,7 +119,6 @@ def specshow(
     kwargs.setdefault("cmap", _colors(values))
     kwargs.setdefault("rasterized", True)
     kwargs.setdefault("shading", "auto")
-    length = 2 * (values.shape[0] - 1) if n_fft is None else n_fft
 
     def positions(axis: str | None, count: int, given: npt.ArrayLike | None) -> Any:
         if given is not None:
@@ -126,6 +129,7 @@ def specshow(
         if axis in _TIMES:
             return times_like(count, sr=sr, hop_length=hop_length)
         if axis in ("linear", "fft", "hz", "log"):
+            length = 2 * (count - 1) if n_fft is None else n_fft
             bins = fft_frequencies(sr=sr, n_fft=length)
             if len(bins) != count:
                 raise ParameterError(
@@ -229,7 +233,7 @@ def waveshow(
     offset : float
         Seconds at the first sample.
     marker : matplotlib marker
-        Of the samples.
+        Of the samples, where these are drawn.
     where : {"post", "pre", "mid"}
         Where a value begins or ends.
     label : str, optional
@@ -254,6 +258,8 @@ def waveshow(
     signal = np.atleast_2d(np.asarray(y))
     if signal.ndim > 2 or not signal.size:
         raise ParameterError(f"y has shape {np.shape(y)}, expected (n,) or (channels, n)")
+    if not sr > 0:
+        raise ParameterError(f"sr must be a positive sample rate in Hz, not {sr}")
     if max_points < 1:
         raise ParameterError(f"max_points must be at least 1, not {max_points}")
     plot = _pyplot()

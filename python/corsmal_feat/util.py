@@ -16,7 +16,9 @@ __all__ = ["fix_frames", "fix_length", "frame", "normalize", "pad_center", "tiny
 Array = npt.NDArray[Any]
 
 
-def _along(x: Array, axis: int) -> int:
+def _along(x: Array, axis: int, name: str = "data") -> int:
+    if x.ndim == 0:
+        raise ParameterError(f"{name} has 0 dimensions, expected at least 1")
     if not -x.ndim <= axis < x.ndim:
         raise ParameterError(
             f"axis must be an axis of the array, which has {x.ndim} dimensions, not {axis}"
@@ -63,7 +65,7 @@ def frame(
            [3, 5]])
     """
     array = np.asanyarray(x) if subok else np.asarray(x)
-    length = _along(array, axis)
+    length = _along(array, axis, "x")
     if frame_length < 1 or length < frame_length:
         raise ParameterError(
             f"Input is too short (n={length}) for frame_length={frame_length}:"
@@ -297,7 +299,7 @@ def normalize(
     if norm is None:
         return array
     if axis is not None:
-        _along(array, axis)
+        _along(array, axis, "S")
     magnitude = np.abs(array).astype(np.float64)
     constant = 1.0
     length: Any

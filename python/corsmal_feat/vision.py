@@ -293,6 +293,8 @@ def m2_capacity(depth: Depth | Region, weights: StrPath) -> float | None:
     >>> bool(np.isfinite(capacity))
     True
     """
+    if isinstance(depth, dict) and not depth.keys() >= Region.__required_keys__:
+        raise ParameterError("depth must be a path, an array, or what region found")
     found = depth if isinstance(depth, dict) else region(depth)
     if found is None:
         return None

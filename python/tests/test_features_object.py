@@ -159,8 +159,27 @@ def test_edited_tables_that_cannot_be_right_are_refused(tmp_path: Path, folder: 
     with pytest.raises(cf.ParameterError, match="row 1 has no id"):
         cf.load_features(path)
     table.assign(takes=[[1, 2], [3]]).to_parquet(path)
-    with pytest.raises(cf.ParameterError, match="takes holds lists"):
-        cf.load_features(path)
+    with pytest.warns(UserWarning, match="takes is left out: it holds list"):
+        assert cf.load_features(path).names == kept.names
+    gaps = table.assign(level=pandas.array([90, None], dtype="Int64"), text=["a", None])
+    gaps.to_parquet(path)
+    again = cf.load_features(path)
+    assert again.names == kept.names
+    assert list(again.labels["level"]) == ["90", ""] and list(again.labels["text"]) == ["a", ""]
+
+
+def test_a_model_never_mixes_columns(tmp_path: Path, folder: Path) -> None:
+    pq = pytest.importorskip("pyarrow.parquet")
+    path = tmp_path / "table.parquet"
+    kept = cf.extract([folder], preset="mfcc-zcr", out=path)
+    table = pq.read_table(path)
+    # Such a table keeps what this package wrote into it.
+    pq.write_table(table.select(["id", *kept.names[::-1]]), path)
+    turned = cf.load_features(path)
+    assert turned.names == kept.names[::-1]
+    model = cf.DecisionTree().fit(turned.summary, ["a", "b"])
+    with pytest.raises(cf.ParameterError, match="in that order"):
+        model.save(tmp_path / "tree.model", features=turned)
 
 
 def test_the_command_and_python_read_edited_tables_alike(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 //! Paragraphs for a terminal of eighty columns.
 
 /// Columns of a line.
-const WIDTH: usize = 80;
+pub const WIDTH: usize = 80;
 
 /// `text` in lines that begin with `indent` and end before column eighty, broken between words.
 pub fn wrapped(text: &str, indent: &str) -> String {

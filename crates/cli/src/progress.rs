@@ -10,7 +10,7 @@ use corsmal_extract::run::{Progress, RunReport};
 use corsmal_files::outcome::Outcome;
 use corsmal_files::quote::printable;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
-use serde_json::json;
+use serde_json::{Value, json};
 
 /// Form of messages.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -53,7 +53,7 @@ pub struct Meter {
     /// Seconds of audio read.
     seconds: Mutex<f64>,
     /// Recordings without features by what is wrong.
-    failures: Mutex<BTreeMap<String, usize>>,
+    faults: Mutex<BTreeMap<String, usize>>,
 }
 
 /// Recordings that are named of those with the same fault.
@@ -74,12 +74,30 @@ impl Meter {
             bar,
             started: Instant::now(),
             seconds: Mutex::default(),
-            failures: Mutex::default(),
+            faults: Mutex::default(),
         }
     }
 
     fn line(&self, text: &str) {
         self.bar.suspend(|| eprintln!("{}", printable(text)));
+    }
+
+    /// Says why a recording has no result, unless that was said of many others.
+    pub fn refused(&self, path: &str, fault: &str) {
+        let mut faults = self.faults.lock().unwrap_or_else(|e| e.into_inner());
+        let count = faults.entry(fault.into()).or_default();
+        *count += 1;
+        if *count <= NAMED {
+            self.line(&format!("{path}: {fault}"));
+        }
+    }
+
+    /// Says of how many others it was not said.
+    pub fn rest(&self) {
+        let faults = self.faults.lock().unwrap_or_else(|e| e.into_inner());
+        for (fault, count) in faults.iter().filter(|(_, count)| **count > NAMED) {
+            eprintln!("and {} more: {}", count - NAMED, printable(fault));
+        }
     }
 
     /// The one line of a run that was only checked.
@@ -110,31 +128,33 @@ impl Meter {
         }
     }
 
+    /// What a run has done, for programs.
+    pub fn summary(&self, report: &RunReport, out: &Path) -> Value {
+        json!({
+            "out": out.display().to_string(), "statuses": counts(&report.outcomes),
+            "repairs": repairs(&report.outcomes), "resumed": report.resumed,
+            "up_to_date": report.up_to_date, "elapsed_s": self.started.elapsed().as_secs_f64(),
+            "audio_s": *self.seconds.lock().unwrap_or_else(|e| e.into_inner()),
+        })
+    }
+
     /// The last lines of a run.
     pub fn finish(&self, report: &RunReport, out: &Path) {
         self.bar.finish_and_clear();
-        let failures = self.failures.lock().unwrap_or_else(|e| e.into_inner());
-        for (fault, count) in failures.iter().filter(|(_, count)| **count > NAMED) {
-            eprintln!("and {} more: {}", count - NAMED, printable(fault));
-        }
+        self.rest();
         if self.quiet {
+            return;
+        }
+        if self.format == LogFormat::Json {
+            let mut line = self.summary(report, out);
+            line["event"] = "finished".into();
+            eprintln!("{line}");
             return;
         }
         let elapsed = self.started.elapsed();
         let seconds = *self.seconds.lock().unwrap_or_else(|e| e.into_inner());
         let statuses = counts(&report.outcomes);
         let repairs = repairs(&report.outcomes);
-        if self.format == LogFormat::Json {
-            eprintln!(
-                "{}",
-                json!({
-                    "event": "finished", "out": out.display().to_string(), "statuses": statuses,
-                    "repairs": repairs, "resumed": report.resumed, "up_to_date": report.up_to_date,
-                    "elapsed_s": elapsed.as_secs_f64(), "audio_s": seconds,
-                })
-            );
-            return;
-        }
         if report.up_to_date {
             eprintln!("{}: up to date, nothing to do", out.display());
             return;
@@ -192,14 +212,7 @@ impl Progress for Meter {
                 self.line(&json!({"event": "file", "outcome": value}).to_string());
             }
             LogFormat::Text if !outcome.status.has_features() => {
-                let fault = fault(outcome);
-                let line = format!("{}: {fault}", outcome.path);
-                let mut failures = self.failures.lock().unwrap_or_else(|e| e.into_inner());
-                let count = failures.entry(fault).or_default();
-                *count += 1;
-                if *count <= NAMED {
-                    self.line(&line);
-                }
+                self.refused(&outcome.path, &fault(outcome));
             }
             LogFormat::Text => {}
         }
@@ -224,7 +237,7 @@ pub fn failure_line(outcome: &Outcome) -> String {
 }
 
 /// Status and reason of a recording without features.
-fn fault(outcome: &Outcome) -> String {
+pub fn fault(outcome: &Outcome) -> String {
     let place = outcome
         .byte_offset
         .filter(|_| !outcome.reason.contains("byte"))

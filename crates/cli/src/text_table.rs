@@ -3,7 +3,7 @@
 use comfy_table::{CellAlignment, Table, presets};
 
 /// Columns of a plain terminal: wider tables change their form.
-pub const WIDTH: usize = 80;
+pub use crate::paragraphs::WIDTH;
 
 /// A table without lines: first column left, the others right.
 pub struct TextTable(Table);

@@ -18,8 +18,7 @@ pub struct WindowSpan {
 }
 
 /// The windows of every recording, in the order of time: `x@0.5` begins half a second into `x`.
-/// Labels are copied; the column `recording` holds the id of the recording, unless there is such a
-/// label.
+/// Labels are copied; the column `recording` holds the id of the recording.
 ///
 /// Windows begin at multiples of the hop and are whole: what remains at the end is left out, but a
 /// recording shorter than a window is one window. Both are whole numbers of frames, rounded once.
@@ -27,8 +26,15 @@ pub struct WindowSpan {
 ///
 /// # Errors
 /// Standard input, which cannot be read twice; too many windows; a window with the id of another
-/// input.
+/// input; a label called `recording`, by whose values folds would split recordings.
 pub fn into_windows(inputs: Vec<Input>, span: WindowSpan) -> Result<Vec<Input>, InputError> {
+    if let Some(input) = inputs.iter().find(|i| i.labels.iter().any(|(name, _)| name == RECORDING))
+    {
+        let reason = format!(
+            "the manifest has a column {RECORDING}, the name of what windows are cut from: rename it"
+        );
+        return Err(InputError::Window { id: input.id.clone(), reason });
+    }
     let headers = headers(&inputs);
     let lengths = lengths(&inputs, &headers);
     let mut windows = Vec::new();
@@ -97,8 +103,6 @@ fn seconds(frame: u64, rate: f64) -> f64 {
 
 fn labelled(input: &Input, id: String, start: Option<f64>, end: Option<f64>) -> Input {
     let mut labels = input.labels.clone();
-    if !labels.iter().any(|(name, _)| name == RECORDING) {
-        labels.push((RECORDING.into(), input.id.clone()));
-    }
+    labels.push((RECORDING.into(), input.id.clone()));
     Input { id, source: input.source.clone(), start, end, labels }
 }

@@ -16,7 +16,8 @@ use crate::provenance::{LAYOUT_VERSION, Provenance};
 use crate::table::{RESERVED, Table, TableError};
 
 const IDS: &str = "__ids__";
-const SUMMARY: &str = "__summary__";
+/// Member with the statistics, `[rows, features]`.
+pub const SUMMARY: &str = "__summary__";
 const SUMMARY_NAMES: &str = "__summary_names__";
 const LABELS: &str = "__labels__/";
 /// Prefix of the arrays of frame times.

@@ -18,8 +18,8 @@ pub struct Family {
     pub columns: Vec<usize>,
 }
 
-/// The families of features by their names, in the order of their first features: `mfcc[3].mean` is
-/// of `mfcc`, and a part of a compound vector, such as `af193[chroma_2]`, of `chroma`.
+/// The families of features by their names, in the order of their first features: `mfcc[3].mean` and
+/// `mfcc_3_mean` are of `mfcc`, and a part of a compound vector, such as `af193[chroma_2]`, of `chroma`.
 pub fn families(names: &[String]) -> Vec<Family> {
     let mut families: Vec<Family> = Vec::new();
     for (column, name) in names.iter().enumerate() {
@@ -42,8 +42,18 @@ fn stem(name: &str) -> &str {
             });
             number.map_or(part, |(i, _)| &part[..i])
         }
-        _ => outer,
+        Some(_) => outer,
+        // `mfcc_12_mean`, as other programs name them.
+        None => {
+            outer.split(['_', '-']).next().filter(|word| numbered(word, outer)).unwrap_or(outer)
+        }
     }
+}
+
+/// Whether a number follows the first word of a name.
+fn numbered(word: &str, name: &str) -> bool {
+    let rest = name[word.len()..].trim_start_matches(['_', '-']);
+    !word.is_empty() && rest.starts_with(|c: char| c.is_ascii_digit())
 }
 
 /// What permuting a family costs.

@@ -82,6 +82,8 @@ pub struct Folds {
     pub outer: Vec<Fold>,
     /// what is never split, one name per row
     groups: Option<Vec<String>>,
+    /// what is odd about them, in words
+    warning: Option<String>,
     /// whether these groups are no more than the folds of a column
     are_folds: bool,
     /// of the classes
@@ -139,9 +141,17 @@ impl Folds {
             }
             _ => parts,
         };
+        let one = kept.is_none()
+            && table.ids.len() > 1
+            && table.column(RECORDING).is_ok_and(|values| Labels::of(&values).0.len() == 1);
+        let warning = one.then(|| {
+            "all rows are parts of one recording, so training and test hold neighbours: scores are too \
+             good for other recordings"
+                .into()
+        });
         let are_folds = matches!(plan, CvPlan::Fold(_)) && groups.is_none();
         let names = labels.names().to_vec();
-        Ok(Self { description, outer, groups: kept, are_folds, names, seed })
+        Ok(Self { description, outer, groups: kept, warning, are_folds, names, seed })
     }
 
     /// What is never split, one name per row; `None` where any row may be held out.
@@ -182,12 +192,14 @@ impl Folds {
         splits::group_k_fold(&inside, different.clamp(2, FOLDS))
     }
 
-    /// What is odd, in words: classes that some fold tests without having trained on them.
+    /// What is odd, in words: classes that some fold tests without having trained on them, rows that
+    /// are all parts of one recording.
     pub fn warnings(&self, classes: &Classes) -> Vec<String> {
         let one = |(class, fold): (usize, &str)| {
             format!("fold {fold}: class {} has no training rows", self.names[class])
         };
-        self.untrained(classes).into_iter().map(one).collect()
+        let untrained = self.untrained(classes).into_iter().map(one);
+        self.warning.iter().cloned().chain(untrained).collect()
     }
 
     /// Classes that some fold tests without having trained on them, each with the fold.
@@ -232,8 +244,13 @@ fn stratified(labels: &Labels, y: &[usize], k: usize, seed: u32) -> Result<Vec<F
     for (class, name) in labels.names().iter().enumerate() {
         let rows = y.iter().filter(|&&c| c == class).count();
         if rows < k {
+            let advice = match rows {
+                0 | 1 => "leave the class out or add rows".into(),
+                _ => format!("--cv {rows} makes {rows} folds"),
+            };
             let rows = count(rows, "row");
-            let reason = format!("class {name} has {rows}, too few for {k} stratified folds");
+            let reason =
+                format!("class {name} has {rows}, too few for {k} stratified folds: {advice}");
             return Err(ModelError::Folds { reason }.into());
         }
     }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use corsmal_files::draft;
 
+use crate::Source;
 use crate::error::{ReportError, Result};
 use crate::report::Report;
 use crate::{latex, page};
@@ -41,9 +42,11 @@ impl Report {
                 }
             }
         }
+        let mut rows = self.sections.iter().flat_map(|s| &s.tables).flat_map(|t| &t.rows);
+        let mixed = rows.any(|row| row.source != Source::Ours);
         let put = |path: &Path, bytes: &[u8]| draft::write(path, bytes).map_err(ReportError::Write);
         for table in self.sections.iter().flat_map(|s| &s.tables) {
-            put(&tables.join(format!("{}.csv", table.name)), table.csv()?.as_bytes())?;
+            put(&tables.join(format!("{}.csv", table.name)), table.csv(mixed)?.as_bytes())?;
             put(&tables.join(format!("{}.tex", table.name)), latex::table(table).as_bytes())?;
         }
         for section in &self.sections {

@@ -129,13 +129,14 @@ impl Table {
         cells.any(|cell| matches!(cell, Cell::Score(_, Some(_))))
     }
 
-    /// The table as CSV. Its first column says whose figures a row holds; a column of scores with
-    /// intervals is followed by their ends.
-    pub(crate) fn csv(&self) -> Result<String> {
+    /// The table as CSV. With `sources` its first column says whose figures a row holds; a column of
+    /// scores with intervals is followed by their ends.
+    pub(crate) fn csv(&self, sources: bool) -> Result<String> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         let fault = |reason: String| ReportError::Table { name: self.name.clone(), reason };
         let with: Vec<bool> = (0..self.columns.len()).map(|c| self.has_interval(c)).collect();
-        let mut header = vec!["source".to_owned()];
+        let source = |name: &str| if sources { vec![name.to_owned()] } else { Vec::new() };
+        let mut header = source("source");
         for (column, with) in self.columns.iter().zip(&with) {
             header.push(column.clone());
             if *with {
@@ -144,7 +145,7 @@ impl Table {
         }
         writer.write_record(&header).map_err(|e| fault(e.to_string()))?;
         for row in &self.rows {
-            let mut record = vec![row.source.name().to_owned()];
+            let mut record = source(row.source.name());
             for (cell, with) in row.cells.iter().zip(&with) {
                 record.push(match cell {
                     Cell::Text(text) => text.clone(),
@@ -182,10 +183,11 @@ mod tests {
             rows: vec![row(Cell::Score(50.0, Some((40.0, 60.0)))), row(Cell::None)],
         };
         assert_eq!(
-            table.csv().unwrap(),
+            table.csv(true).unwrap(),
             "source,Method,F1,\"F1, low\",\"F1, high\"\nours,\"a, b\",50.0000,40.0000,60.0000\n\
              ours,\"a, b\",,,\n"
         );
+        assert!(table.csv(false).unwrap().starts_with("Method,F1,"));
         assert!(table.is_numeric(1) && !table.is_numeric(0));
     }
 }

@@ -1,12 +1,15 @@
 //! Labelled features.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use corsmal_files::identity;
+use corsmal_files::outcome::Outcome;
 use corsmal_models::dataset::{LabelSource, LabelledTable, MemberNames};
 use serde_json::{Value, json};
 
 use crate::failure::Failure;
+use crate::plural::plural;
 
 /// What --labels says for class folders.
 const FOLDERS: &str = "folders";
@@ -93,6 +96,28 @@ impl LabelArgs {
     }
 }
 
+/// Columns that another program added to statistics of ours, which are taken for features.
+fn strange(table: &LabelledTable) -> Option<String> {
+    let (ours, others): (Vec<&str>, Vec<&str>) =
+        table.feature_names.iter().map(String::as_str).partition(|name| name.contains(['[', '.']));
+    (table.config.is_null() && !ours.is_empty() && !others.is_empty()).then(|| {
+        format!("{} of decimal numbers, taken as features: write labels as text", others.join(", "))
+    })
+}
+
+/// How many recordings of a run have no features, and why.
+fn left_out(outcomes: &[Outcome]) -> Option<String> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for outcome in outcomes.iter().filter(|outcome| !outcome.status.has_features()) {
+        *counts.entry(outcome.status.name()).or_default() += 1;
+    }
+    let total = counts.values().sum::<usize>();
+    let each: Vec<String> = counts.iter().map(|(status, n)| format!("{n} {status}")).collect();
+    let recordings = plural(outcomes.len(), "recording");
+    let have = if total == 1 { "has no features and is" } else { "have no features and are" };
+    (total > 0).then(|| format!("{total} of {recordings} {have} left out ({})", each.join(", ")))
+}
+
 fn is_like_folders(path: &Path) -> bool {
     corsmal_names::closest(&path.to_string_lossy(), [FOLDERS]).is_some()
 }
@@ -133,6 +158,12 @@ impl DatasetArgs {
         let mut table = LabelledTable::read(self.path(), &self.members.names())?;
         let target = self.label(&mut table)?;
         let constant = table.check()?;
+        if let Some(strange) = strange(&table) {
+            eprintln!("warning: {}: {strange}", self.path().display());
+        }
+        if let Some(left_out) = left_out(&table.outcomes) {
+            eprintln!("warning: {}: {left_out}", self.path().display());
+        }
         if let Some(&first) = constant.first() {
             eprintln!(
                 "warning: {}: {} of {} features have one value in all rows, the first is {}",
@@ -148,7 +179,12 @@ impl DatasetArgs {
     /// Adds the labels to a table, and names the column to learn.
     pub fn label(&self, table: &mut LabelledTable) -> Result<String, Failure> {
         if let Some(source) = self.labels.source(self.target.as_deref())? {
-            table.add_labels(&source)?;
+            for column in table.add_labels(&source)? {
+                eprintln!(
+                    "warning: {}: its column {column} is replaced by that of --labels",
+                    self.path().display()
+                );
+            }
         }
         self.target(table)
     }

@@ -4,12 +4,14 @@ mod dataset;
 mod jobs;
 mod network;
 mod pipeline;
+mod told;
 mod vote;
 
 pub use dataset::{DatasetArgs, LabelArgs, MemberArgs};
 pub use jobs::Jobs;
 pub use network::NetworkArgs;
 pub use pipeline::PipelineArgs;
+pub use told::Told;
 pub use vote::VoteArgs;
 
 /// A number from 0 to 1.

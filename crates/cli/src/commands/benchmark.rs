@@ -13,6 +13,7 @@ use corsmal_vision::lode::Variant;
 use crate::args::Jobs;
 use crate::failure::{Failure, INTERRUPTED};
 use crate::made;
+use crate::paragraphs::wrapped;
 
 /// Arguments of `benchmark`.
 #[derive(clap::Args)]
@@ -63,7 +64,7 @@ pub struct Args {
     /// Print the whole report as JSON instead of its main scores.
     #[arg(long)]
     json: bool,
-    /// Suppress progress messages.
+    /// Print only warnings and errors.
     #[arg(short, long)]
     quiet: bool,
 }
@@ -203,7 +204,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     } else if !quiet {
         print!("{}{}", scores(&report), amounts(&report));
         if let Some(warning) = &report.warning {
-            println!("{warning}\n");
+            println!("{}\n", wrapped(warning, ""));
         }
         println!("{}", options.out.join("report.html").display());
     }
@@ -282,7 +283,7 @@ fn scores(report: &Report) -> String {
     // Method, inputs, protocol, then the score on the training part.
     let score = |cell: Option<&Cell>| match cell {
         Some(Cell::Score(value, Some((low, high)))) => {
-            format!("{value:6.2}  ({low:.1} to {high:.1})")
+            format!("{value:6.2}  {low:.1}\u{2013}{high:.1}")
         }
         Some(Cell::Score(value, None)) => format!("{value:6.2}"),
         _ => "     \u{2013}".into(),
@@ -294,8 +295,8 @@ fn scores(report: &Report) -> String {
     let shown: Vec<&Row> = levels.iter().chain(alone).copied().collect();
     let width = shown.iter().map(|r| word(r.cells.first()).chars().count()).max().unwrap_or(6);
     let mut out = format!(
-        "\nweighted F1 on training recordings that were not trained on, percent (95 % interval)\n\n\
-         {:width$}  {:10}  {:24}{}\n",
+        "\nweighted F1 on held-out training recordings, percent, with 95 % intervals\n\n\
+         {:width$}  {:10}  {:21}{}\n",
         "method", "protocol", TASKS[0].1, TASKS[1].1
     );
     for row in shown {
@@ -304,7 +305,7 @@ fn scores(report: &Report) -> String {
             score(rows.iter().find(|other| same(row, other)).and_then(|r| r.cells.get(3)))
         };
         let (level, kind) = (of(&levels), of(&types));
-        out.push_str(&format!("{method:width$}  {protocol:10}  {level:24}{kind}\n"));
+        out.push_str(&format!("{method:width$}  {protocol:10}  {level:21}{kind}\n"));
     }
     out + "\n"
 }

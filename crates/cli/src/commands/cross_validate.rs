@@ -71,7 +71,7 @@ pub struct Args {
     overwrite: bool,
     #[command(flatten)]
     jobs: Jobs,
-    /// Print nothing but warnings.
+    /// Print only warnings and errors.
     #[arg(long, short)]
     quiet: bool,
 }

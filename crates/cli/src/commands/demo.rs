@@ -77,7 +77,7 @@ pub fn run(
         ("What that output holds", vec!["inspect", &table]),
         (
             "A recording: format, health and picture",
-            vec!["inspect", &recording, "--picture", &picture],
+            vec!["inspect", &recording, "--picture", &picture, "--overwrite"],
         ),
         (trained, benchmark),
         (

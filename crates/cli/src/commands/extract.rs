@@ -13,7 +13,7 @@ use corsmal_files::npz::Compression;
 use corsmal_files::shard::Shard;
 use serde_json::json;
 
-use crate::args::Jobs;
+use crate::args::{Jobs, Told};
 use crate::failure::{COULD_NOT_RUN, FAILED_FILES, Failure, INTERRUPTED};
 use crate::progress::{LogFormat, Meter};
 use crate::recordings;
@@ -74,9 +74,8 @@ pub struct Args {
     /// Check everything and list the inputs, but read and write nothing.
     #[arg(long)]
     dry_run: bool,
-    /// Only errors on standard error.
-    #[arg(long, short)]
-    quiet: bool,
+    #[command(flatten)]
+    told: Told,
     /// Form of messages on standard error.
     #[arg(long, value_enum, default_value = "text")]
     log_format: LogFormat,
@@ -140,7 +139,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 fn extract(args: Args) -> Result<ExitCode, Failure> {
     let config = Arc::new(args.config.load()?);
     let names: Vec<OsString> = args.inputs.into_iter().chain(args.named).collect();
-    let meter = Meter::new(args.log_format, args.quiet);
+    let meter = Meter::new(args.log_format, args.told.quiet);
     let mut found = recordings::named(&names, |warning| meter.warning(warning))?;
     if let Some(window) = args.window {
         found = into_windows(found, WindowSpan { window, hop: args.hop.unwrap_or(window / 2.0) })?;
@@ -170,6 +169,10 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
     match run::run(&found, &config, &options, &meter, crate::interrupt::flag()) {
         Ok(report) => {
             meter.finish(&report, &options.out);
+            if args.told.json {
+                let summary = meter.summary(&report, &options.out);
+                println!("{}", serde_json::to_string_pretty(&summary)?);
+            }
             Ok(if report.failed() > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
         }
         Err(error @ RunError::Interrupted) => {

@@ -4,8 +4,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use corsmal_extract::merge::Existing;
+use serde_json::json;
 
+use crate::args::Told;
 use crate::failure::Failure;
+use crate::plural::plural;
 
 /// Arguments of `merge`.
 #[derive(clap::Args)]
@@ -27,9 +30,11 @@ pub struct Args {
     /// Replace an existing output.
     #[arg(long)]
     overwrite: bool,
-    /// Go on with an interrupted merge.
+    /// Continue an interrupted merge.
     #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
+    #[command(flatten)]
+    told: Told,
 }
 
 /// Merges shards.
@@ -40,5 +45,9 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         _ => Existing::Keep,
     };
     corsmal_extract::merge::merge(&args.shards, &args.out, existing)?;
+    args.told.tell(
+        || json!({ "out": args.out, "shards": args.shards }),
+        || format!("{}: {} merged", args.out.display(), plural(args.shards.len(), "shard")),
+    )?;
     Ok(ExitCode::SUCCESS)
 }

@@ -6,7 +6,9 @@ use std::process::ExitCode;
 use corsmal_extract::projection::Projection;
 use corsmal_files::draft;
 use corsmal_files::format::require_npz;
+use serde_json::json;
 
+use crate::args::Told;
 use crate::failure::Failure;
 use crate::publish;
 
@@ -34,12 +36,8 @@ pub struct Args {
     /// Replace an existing file.
     #[arg(long)]
     overwrite: bool,
-    /// Print the result as JSON.
-    #[arg(long)]
-    json: bool,
-    /// Print nothing.
-    #[arg(long, short)]
-    quiet: bool,
+    #[command(flatten)]
+    told: Told,
 }
 
 /// Fits and writes the projection.
@@ -51,16 +49,10 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     }
     let projection = Projection::fit(&args.features, args.n_components)?;
     projection.save(&args.out)?;
-    if args.json {
-        let result = serde_json::json!({
-            "out": args.out.display().to_string(),
-            "n_features": projection.n_inputs(),
-            "n_components": projection.n_components(),
-        });
-        println!("{}", serde_json::to_string_pretty(&result)?);
-    } else if !args.quiet {
-        let (from, to) = (projection.n_inputs(), projection.n_components());
-        println!("{}: {from} features to {to} components", args.out.display());
-    }
+    let (from, to) = (projection.n_inputs(), projection.n_components());
+    args.told.tell(
+        || json!({ "out": args.out, "n_features": from, "n_components": to }),
+        || format!("{}: {from} features to {to} components", args.out.display()),
+    )?;
     Ok(ExitCode::SUCCESS)
 }

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use corsmal_ccm::synth::{self, SAMPLE_RATE, Size};
+use serde_json::json;
 
+use crate::args::Told;
 use crate::failure::Failure;
 
 /// Arguments of `synth`.
@@ -34,9 +36,8 @@ pub struct Args {
     /// (about 2 MB a recording).
     #[arg(long)]
     vision: bool,
-    /// Print nothing.
-    #[arg(long, short)]
-    quiet: bool,
+    #[command(flatten)]
+    told: Told,
 }
 
 /// Writes the data set and says what it is.
@@ -48,15 +49,23 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     };
     let generate = if args.vision { synth::generate_with_views } else { synth::generate };
     let summary = generate(&args.out, size, args.seed)?;
-    if !args.quiet {
-        println!(
-            "{}: {} synthetic recordings, {:.0} s, 8 channels, {SAMPLE_RATE} Hz (seed {})",
-            args.out.display(),
-            summary.recordings,
-            summary.frames as f64 / f64::from(SAMPLE_RATE),
-            args.seed
-        );
-        println!("They are synthetic: scores on them mean nothing about the real data set.");
-    }
+    let (out, recordings, seed) = (&args.out, summary.recordings, args.seed);
+    let seconds = summary.frames as f64 / f64::from(SAMPLE_RATE);
+    args.told.tell(
+        || {
+            json!({
+                "out": out, "recordings": recordings, "seconds": seconds, "channels": 8,
+                "sample_rate": SAMPLE_RATE, "seed": seed, "synthetic": true,
+            })
+        },
+        || {
+            format!(
+                "{}: {recordings} synthetic recordings, {seconds:.0} s, 8 channels, {SAMPLE_RATE} Hz \
+                 (seed {seed})\n\
+                 They are synthetic: scores on them mean nothing about the real data set.",
+                out.display()
+            )
+        },
+    )?;
     Ok(ExitCode::SUCCESS)
 }

@@ -50,7 +50,7 @@ pub struct Args {
     json: bool,
     #[command(flatten)]
     jobs: Jobs,
-    /// Print nothing but warnings.
+    /// Print only warnings and errors.
     #[arg(long, short)]
     quiet: bool,
 }
@@ -79,6 +79,12 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
     let dataset = table.dataset(classes.clone());
     let mut chosen = 0;
     let mut choice = Value::Null;
+    if candidates.len() == 1 && groups.is_some() {
+        eprintln!(
+            "warning: --groups matters to --tune only, whose inner folds keep groups whole; all rows \
+             are trained on"
+        );
+    }
     if candidates.len() > 1 {
         let (seed, named) = (args.pipeline.seed(), args.dataset.groups.as_deref());
         let folds = Folds::new(None, &table, named, (&labels, &classes), seed)?;

@@ -18,6 +18,7 @@ use super::page::{add_made, file_name, write};
 use super::recordings::{self, Source};
 use super::scored::of_predictions;
 use crate::failure::Failure;
+use crate::progress::fault;
 
 /// Repetitions of each permutation.
 const REPEATS: usize = 5;
@@ -154,6 +155,8 @@ impl HeldOut<'_> {
             id: outcome.id.clone(),
             path: PathBuf::from(&outcome.path),
             class: class_of.get(outcome.id.as_str()).copied(),
+            unused: (!outcome.status.has_features())
+                .then(|| format!("not in the scores: {}", fault(outcome))),
         });
         source.collect()
     }

@@ -18,6 +18,8 @@ pub(super) struct Source {
     pub id: String,
     pub path: PathBuf,
     pub class: Option<usize>,
+    /// Why it has no features.
+    pub unused: Option<String>,
 }
 
 /// Reads the recordings, each file once: their health, and a picture of the first of each class. Where
@@ -55,10 +57,11 @@ pub(super) fn add(study: &mut Study, sources: Vec<Source>, quiet: bool) {
                 Recording { id: source.id.clone(), class: source.class, ..Recording::default() };
             // All channels of an array would fill a page for each class.
             let view = wanted.then(|| View { channels: vec![0], ..View::default() });
-            let found = match look(&source.path, view) {
+            let mut found = match look(&source.path, view) {
                 Ok(found) => (described(recording, &found), found.picture),
                 Err(error) => (Recording { failure: Some(error.to_string()), ..recording }, None),
             };
+            found.0.notes.extend(source.unused.clone());
             bar.inc(1);
             found
         })

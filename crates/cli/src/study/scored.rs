@@ -35,6 +35,7 @@ pub fn write_scored(
             id: row.key.0.clone(),
             path: PathBuf::from(path),
             class: Some(prediction.truth),
+            unused: None,
         });
         let sources = sources.collect();
         recordings::add(&mut study, sources, false);

@@ -272,7 +272,7 @@ fn outputs_show_contents_configuration_and_outcomes() {
         assert!(table.contains("recordings: 1, features: 168"), "{table}");
     }
     let members = text(&inspect(&[&folder.path().join("feats.npz")]).stdout);
-    assert!(members.contains("1 row × 168 columns"), "{members}");
+    assert!(members.contains("1 row × 168 features"), "{members}");
 }
 
 #[test]

@@ -206,8 +206,9 @@ pub fn require_finite(
     let at = samples.iter().position(|x| !x.is_finite()).unwrap_or(0);
     let frame = position + (at / channels) as u64;
     let reason = format!(
-        "NaN or infinite from frame {frame} on (channel {}; {bad} such samples in that block)",
-        at % channels
+        "NaN or infinite from frame {frame} on (channel {}; {} of this block)",
+        at % channels,
+        if bad == 1 { "1 sample".into() } else { format!("{bad} samples") }
     );
     Err(Failed { byte_offset: byte_of(frame), ..Failed::new(Status::NonFinite, reason) })
 }

@@ -62,13 +62,15 @@ impl Collected {
         }
         let names = first.labels.iter().map(|(name, _)| name.as_str());
         let times: Vec<&str> = names.filter(|name| TIMES.contains(name)).collect();
-        (!times.is_empty()).then(|| {
-            format!(
-                "the columns {} are labels, and whole recordings are read: columns called `start` and `end`, in \
-                 seconds, cut stretches",
-                times.join(", ")
-            )
-        })
+        let columns = match times.as_slice() {
+            [] => return None,
+            [only] => format!("the column {only} is a label"),
+            several => format!("the columns {} are labels", several.join(", ")),
+        };
+        Some(format!(
+            "{columns}, and whole recordings are read: columns called `start` and `end`, in seconds, cut \
+             stretches"
+        ))
     }
 
     /// A sentence about the files skipped, one about archives without an end and one about columns of

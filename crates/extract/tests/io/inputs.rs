@@ -372,7 +372,7 @@ fn columns_that_look_like_times_are_told() {
     };
     let warning = told("path,start_time,class\na.wav,0.5,x\n").unwrap();
     assert!(
-        warning.starts_with("the columns start_time are labels, and whole recordings are read"),
+        warning.starts_with("the column start_time is a label, and whole recordings are read"),
         "{warning}"
     );
     assert_eq!(told("path,start,onset\na.wav,0.5,1\n"), None);

@@ -21,6 +21,18 @@ use crate::error::{ModelError, Result};
 use crate::params::{Parameter, Parameters, key_of};
 use crate::table::{check_features, check_labels, check_varied, check_weights, class_counts};
 
+/// What other programs call a classifier, by its name here.
+fn usual(name: &str) -> &str {
+    match name.to_lowercase().replace(['-', '_', ' '], "").as_str() {
+        "forest" | "randomforest" | "randomforestclassifier" => "rf",
+        "svc" | "supportvector" | "supportvectormachine" => "svm",
+        "decisiontree" | "decisiontreeclassifier" | "cart" => "tree",
+        "extratreesclassifier" => "extra-trees",
+        "kneighborsclassifier" | "nearestneighbors" | "nn" => "knn",
+        _ => name,
+    }
+}
+
 macro_rules! built_in {
     ($($variant:ident, $name:literal, $params:ident => $fitted:path, $about:literal;)*) => {
         /// A classifier's name with its parameters.
@@ -48,7 +60,7 @@ macro_rules! built_in {
                         None => Err(ModelError::UnknownName {
                             kind: "classifier",
                             name: name.into(),
-                            allowed: corsmal_names::choices(name, classifiers().into_iter().map(|(name, _)| name)),
+                            allowed: corsmal_names::choices(usual(name), classifiers().into_iter().map(|(name, _)| name)),
                         }),
                     },
                 }

@@ -106,7 +106,9 @@ pub(super) fn read_parquet(
     let mut features = Vec::new();
     for (at, (name, kind)) in names.iter().zip(&types).enumerate() {
         if name.starts_with(RESERVED) {
-        } else if kind.starts_with("float") || (kind.starts_with("int") && name.contains('[')) {
+        } else if kind.starts_with("float")
+            || (kind.starts_with("int") && name.contains(['[', '.']))
+        {
             features.push(at);
         } else {
             let whole = |v: &f64| if v.is_nan() { String::new() } else { format!("{v:.0}") };
@@ -145,6 +147,9 @@ pub(super) fn read_parquet(
 }
 
 fn require_unique(path: &Path, ids: &[String]) -> Result<()> {
+    if let Some(row) = ids.iter().position(String::is_empty) {
+        return Err(DatasetError::content(path, format!("row {row} has no id")));
+    }
     let mut seen = HashSet::new();
     match ids.iter().find(|id| !seen.insert(id.as_str())) {
         Some(twice) => Err(DatasetError::content(path, format!("id {twice:?} occurs twice"))),

@@ -103,11 +103,11 @@ impl LabelledTable {
         Ok(columns.filter(|(_, c)| c.iter().all(|v| *v == c[0])).map(|(i, _)| i).collect())
     }
 
-    /// Adds labels from a source; its columns hide columns of the same name.
+    /// Adds labels from a source. Gives the names of columns that were there and are now hidden.
     ///
     /// # Errors
     /// [`DatasetError::Content`] for recordings without labels and labels without recording.
-    pub fn add_labels(&mut self, source: &LabelSource) -> Result<()> {
+    pub fn add_labels(&mut self, source: &LabelSource) -> Result<Vec<String>> {
         let columns = match source {
             LabelSource::Folders { column } => vec![(column.clone(), self.folders()?)],
             LabelSource::File { path, key } => {
@@ -125,8 +125,10 @@ impl LabelledTable {
                 file.for_recordings(&recordings, &pairs(false), &self.path)?
             }
         };
+        let there = |name: &&String| self.columns.iter().any(|(column, _)| column == *name);
+        let hidden = columns.iter().map(|(name, _)| name).filter(there).cloned().collect();
         self.columns.splice(0..0, columns);
-        Ok(())
+        Ok(hidden)
     }
 
     /// The folder in which each recording lies.
@@ -191,7 +193,7 @@ impl LabelledTable {
             let why = if value.is_empty() {
                 "is empty"
             } else if value.parse::<f64>().is_ok() && value.parse::<i128>().is_err() {
-                "is a decimal number; classes are whole numbers or names"
+                "is a decimal number; classes are whole numbers or names (score measures estimates of numbers)"
             } else {
                 continue;
             };

@@ -16,12 +16,14 @@ pub(super) fn section(study: &Study) -> Option<Section> {
     }
     let sure = |p: &Prediction| p.confidence.unwrap_or(0.0);
     wrong.sort_by(|a, b| sure(b).total_cmp(&sure(a)).then_with(|| a.id.cmp(&b.id)));
-    let mut text = format!(
-        "{} of {} rows are wrong. The most confident errors come first: they are either \
-         labelled wrongly or the most instructive to listen to.",
-        wrong.len(),
-        study.predictions.len()
-    );
+    let mut text = format!("{} of {} rows are wrong.", wrong.len(), study.predictions.len());
+    let confident = wrong.iter().any(|p| p.confidence.is_some());
+    if confident {
+        text.push_str(
+            " The most confident errors come first: they are either labelled wrongly or the most \
+             instructive to listen to.",
+        );
+    }
     if wrong.len() > LISTED {
         text.push_str(&format!(" The first {LISTED} are shown."));
     }
@@ -44,7 +46,10 @@ pub(super) fn section(study: &Study) -> Option<Section> {
     };
     let table = Table {
         name: "errors".into(),
-        caption: "Wrong predictions, the most confident first; confidence in percent".into(),
+        caption: match confident {
+            true => "Wrong predictions, the most confident first; confidence in percent".into(),
+            false => "Wrong predictions".into(),
+        },
         columns: ["Recording", "Time", "True", "Predicted", "Confidence"]
             .map(String::from)
             .to_vec(),

@@ -5,7 +5,9 @@ use std::process::ExitCode;
 
 use corsmal_ccm::capacity::combine_files;
 use corsmal_vision::lode::PRIOR_ML;
+use serde_json::json;
 
+use crate::args::Told;
 use crate::failure::Failure;
 use crate::publish;
 
@@ -31,12 +33,17 @@ pub struct Args {
     /// Replace an existing output.
     #[arg(long)]
     overwrite: bool,
+    #[command(flatten)]
+    told: Told,
 }
 
 /// Combines and writes.
 pub fn run(args: &Args) -> Result<ExitCode, Failure> {
     publish::check(&args.out, args.overwrite)?;
     let (rows, without) = combine_files(&args.inputs, args.prior, &args.out)?;
-    println!("{}: {rows} recordings, {without} with the prior", args.out.display());
+    args.told.tell(
+        || json!({ "out": args.out, "recordings": rows, "prior": without }),
+        || format!("{}: {rows} recordings, {without} with the prior", args.out.display()),
+    )?;
     Ok(ExitCode::SUCCESS)
 }

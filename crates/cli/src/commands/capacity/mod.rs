@@ -12,7 +12,9 @@ use clap::{Subcommand, ValueEnum};
 use corsmal_ccm::CcmError;
 use corsmal_ccm::capacity::{self, CapacityModel, Method, Row};
 use corsmal_vision::cuboid::Outliers;
+use serde_json::json;
 
+use crate::args::Told;
 use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
 use crate::publish;
 use source::{Source, VariantName};
@@ -79,9 +81,8 @@ struct Estimate {
     /// Replace an existing output.
     #[arg(long)]
     overwrite: bool,
-    /// Print nothing.
-    #[arg(long, short)]
-    quiet: bool,
+    #[command(flatten)]
+    told: Told,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -154,17 +155,23 @@ fn estimate(args: Estimate) -> Result<ExitCode, Failure> {
     };
     capacity::write(&args.out, &options, &rows)?;
     let count = |status: &str| rows.iter().filter(|r| r.status() == status).count();
-    let failed = count("failed");
-    if !args.quiet {
-        println!(
-            "{}: {} recordings: {} measured, {} with the prior, {} without an estimate, {failed} failed",
-            args.out.display(),
-            rows.len(),
-            count("ok"),
-            count("prior"),
-            count("none"),
-        );
-    }
+    let (measured, prior, none) = (count("ok"), count("prior"), count("none"));
+    let (out, recordings, failed) = (&args.out, rows.len(), count("failed"));
+    args.told.tell(
+        || {
+            json!({
+                "out": out, "recordings": recordings, "measured": measured, "prior": prior,
+                "without_estimate": none, "failed": failed,
+            })
+        },
+        || {
+            format!(
+                "{}: {recordings} recordings: {measured} measured, {prior} with the prior, \
+                 {none} without an estimate, {failed} failed",
+                out.display()
+            )
+        },
+    )?;
     if let Some((name, reason)) = first_failure(&rows) {
         eprintln!("{failed} recordings failed; the first, {name}: {reason}");
         return Ok(ExitCode::from(FAILED_FILES));

@@ -29,7 +29,7 @@ pub struct Args {
     /// Replace an existing output.
     #[arg(long)]
     overwrite: bool,
-    /// Print nothing.
+    /// Print only warnings and errors.
     #[arg(long, short)]
     quiet: bool,
 }

@@ -85,7 +85,7 @@ pub struct Args {
     pub(super) overwrite: bool,
     #[command(flatten)]
     pub(super) jobs: Jobs,
-    /// Only errors on standard error.
+    /// Print only warnings and errors.
     #[arg(long, short)]
     pub(super) quiet: bool,
 }

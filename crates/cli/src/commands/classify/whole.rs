@@ -18,6 +18,7 @@ use super::args::{Args, configuration, recordings};
 use super::records::{End, Records, delivered};
 use crate::configuration::difference;
 use crate::failure::Failure;
+use crate::plural::plural;
 use crate::progress::{LogFormat, Meter};
 
 /// Extracts into memory, then predicts.
@@ -27,14 +28,14 @@ pub fn run(args: &Args, model: &Model) -> Result<(End, Option<Records>), Failure
     let found = recordings(args)?;
     let columns: Vec<String> =
         found.iter().take(1).flat_map(|f| &f.labels).map(|(column, _)| column.clone()).collect();
-    let accepted = by_format(&found, &formats, args);
+    let meter = Meter::new(LogFormat::Text, args.quiet);
+    let accepted = by_format(&found, &formats, &meter);
     let folder = if args.out == Path::new("-") {
         std::env::temp_dir()
     } else {
         draft::folder(&args.out).to_path_buf()
     };
     let stop = crate::interrupt::flag();
-    let meter = Meter::new(LogFormat::Text, args.quiet);
     let mut predictions = HashMap::new();
     if !accepted.is_empty() {
         let extracted = run::table(&accepted, &config, (args.jobs.count(), &folder), &meter, stop);
@@ -46,8 +47,9 @@ pub fn run(args: &Args, model: &Model) -> Result<(End, Option<Records>), Failure
         // What the recordings are called where their table is at fault.
         let place = Path::new("the recordings");
         let table = LabelledTable::of_extraction(place, &table, config.to_value(), config.hash())?;
-        predictions = self::predictions(model, &table, &formats, args)?;
+        predictions = self::predictions(model, &table, &formats, (args, &meter))?;
     }
+    meter.rest();
     let header = model.header();
     let mut records = args.records(&header.labels, &header.target, Unit::Recording, &columns)?;
     for input in &found {
@@ -87,7 +89,9 @@ pub fn of_features(
         true => FormatRule::default(),
         false => args.rule(model, &table.config)?,
     };
-    let predictions = predictions(model, table, &formats, args)?;
+    let meter = Meter::new(LogFormat::Text, args.quiet);
+    let predictions = predictions(model, table, &formats, (args, &meter))?;
+    meter.rest();
     let columns: Vec<String> = table.columns().iter().map(|(name, _)| name.clone()).collect();
     let header = model.header();
     let mut records = args.records(&header.labels, &header.target, Unit::Recording, &columns)?;
@@ -121,7 +125,7 @@ struct Verdict {
 /// The recordings whose headers say that the model may be applied to them, before anything is
 /// computed: one of another format must not decide how wide the table is. What cannot be opened is left
 /// to the extraction.
-fn by_format(found: &[Input], formats: &FormatRule, args: &Args) -> Vec<Input> {
+fn by_format(found: &[Input], formats: &FormatRule, meter: &Meter) -> Vec<Input> {
     let mut accepted = Vec::new();
     for input in found {
         let can_be_read_again = input.source != InputSource::Stdin;
@@ -130,7 +134,7 @@ fn by_format(found: &[Input], formats: &FormatRule, args: &Args) -> Vec<Input> {
         let channels = spec.map(|spec| u32::from(spec.channels));
         match formats.check(spec.map(|spec| spec.sample_rate), channels) {
             Ok(()) => accepted.push(input.clone()),
-            Err(reason) => refuse(args, &path(input), &reason),
+            Err(reason) => refuse(meter, &path(input), &reason),
         }
     }
     accepted
@@ -141,28 +145,26 @@ fn predictions(
     model: &Model,
     table: &LabelledTable,
     formats: &FormatRule,
-    args: &Args,
+    (args, meter): (&Args, &Meter),
 ) -> Result<HashMap<String, Verdict>, Failure> {
     let mut found = HashMap::new();
     let none = |status| Verdict { status, class: None, proba: None };
     let by_id: HashMap<&str, &Outcome> =
         table.outcomes.iter().map(|o| (o.id.as_str(), o)).collect();
     let not_finite: HashMap<usize, usize> = table.non_finite().into_iter().collect();
-    let fits = table.ids.is_empty() || check_features(model, table, args)?;
+    let fits = table.ids.is_empty() || check_features(model, table, meter)?;
     let mut usable = Vec::new();
     for (row, id) in table.ids.iter().enumerate() {
         let outcome = by_id.get(id.as_str());
         let format = outcome.map_or(Ok(()), |o| formats.check(o.sample_rate, o.channels));
         if let Err(reason) = format {
-            refuse(args, outcome.map_or(id, |o| &o.path), &reason);
+            refuse(meter, outcome.map_or(id, |o| &o.path), &reason);
             found.insert(id.clone(), none(Status::Mismatch));
         } else if !fits {
             found.insert(id.clone(), none(Status::Mismatch));
         } else if let Some(&feature) = not_finite.get(&row) {
-            if !args.quiet {
-                let (name, value) = (table.feature_name(feature), table.x[[row, feature]]);
-                eprintln!("{id}: non_finite: feature {name} is {value}");
-            }
+            let (name, value) = (table.feature_name(feature), table.x[[row, feature]]);
+            meter.refused(id, &format!("non_finite: feature {name} is {value}"));
             found.insert(id.clone(), none(Status::NonFinite));
         } else {
             usable.push(row);
@@ -189,15 +191,15 @@ fn predictions(
 
 /// Whether the features are those that the model knows. Rows of another width become outcome rows;
 /// other names are another kind of table altogether.
-fn check_features(model: &Model, table: &LabelledTable, args: &Args) -> Result<bool, Failure> {
+fn check_features(model: &Model, table: &LabelledTable, meter: &Meter) -> Result<bool, Failure> {
     let (known, given) = (model.n_features(), table.x.ncols());
     if known != given {
         let channels = table.outcomes.iter().find_map(|o| o.channels);
-        let channels = channels.map_or(String::new(), |n| format!(", of {n} channels"));
+        let channels = channels.map_or(String::new(), |n| format!(", of {}", plural(n, "channel")));
         let reason = format!(
             "gives {given} features{channels}; the model was trained on {known}, on recordings with another number of channels"
         );
-        table.ids.iter().for_each(|id| refuse(args, id, &reason));
+        table.ids.iter().for_each(|id| refuse(meter, id, &reason));
         return Ok(false);
     }
     let names = model.header().feature_names.iter().zip(&table.feature_names);
@@ -211,10 +213,8 @@ fn check_features(model: &Model, table: &LabelledTable, args: &Args) -> Result<b
 }
 
 /// Says why a recording has no prediction.
-fn refuse(args: &Args, name: &str, reason: &str) {
-    if !args.quiet {
-        eprintln!("{name}: mismatch: {reason}");
-    }
+fn refuse(meter: &Meter, name: &str, reason: &str) {
+    meter.refused(name, &format!("mismatch: {reason}"));
 }
 
 fn path(input: &Input) -> String {

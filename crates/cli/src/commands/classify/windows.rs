@@ -51,7 +51,7 @@ fn predict(
     records: &mut Records,
 ) -> Result<End, Failure> {
     let mut write = |line: Line<'_>| {
-        if let Some(reason) = line.reason.filter(|_| !args.quiet) {
+        if let Some(reason) = line.reason {
             eprintln!("{}: {}: {reason}", line.record.id, line.record.status.name());
         }
         delivered(records.write(&line.record))

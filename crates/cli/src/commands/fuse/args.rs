@@ -6,9 +6,11 @@ use clap::ValueEnum;
 use corsmal_ccm::predictions::{self, RecordingPredictions};
 use corsmal_models::labels::Labels;
 use corsmal_models::predictions::PredictionTable;
+use serde_json::json;
 
-use crate::args::VoteArgs;
+use crate::args::{Told, VoteArgs};
 use crate::failure::Failure;
+use crate::plural::plural;
 
 /// Arguments of `fuse`.
 #[derive(clap::Args)]
@@ -63,9 +65,8 @@ pub struct Args {
     /// Replace an existing output.
     #[arg(long)]
     pub(super) overwrite: bool,
-    /// Print nothing.
-    #[arg(long, short)]
-    pub(super) quiet: bool,
+    #[command(flatten)]
+    pub(super) told: Told,
 }
 
 /// Form of a submission.
@@ -80,6 +81,19 @@ pub(super) enum Format {
 }
 
 impl Args {
+    /// Says what was written; on standard error, since predictions may be on standard output.
+    pub(super) fn tell(&self, recordings: usize, failed: usize, what: &str) -> Result<(), Failure> {
+        let out = &self.out;
+        if self.told.json {
+            let value = json!({ "out": out, "recordings": recordings, "failed": failed });
+            println!("{}", serde_json::to_string_pretty(&value)?);
+        } else if !self.told.quiet {
+            let recordings = plural(recordings, "recording");
+            eprintln!("{}: {recordings}, {failed} without {what}", out.display());
+        }
+        Ok(())
+    }
+
     /// One table from several: windows are voted on, then files averaged.
     pub(super) fn fused(
         &self,

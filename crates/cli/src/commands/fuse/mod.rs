@@ -15,6 +15,9 @@ use crate::publish;
 /// Fuses and writes.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let to_stdout = args.out.as_os_str() == "-";
+    if to_stdout && args.told.json {
+        return Err(Failure::new("--json: --out - has the predictions on standard output"));
+    }
     if !to_stdout {
         publish::check(&args.out, args.overwrite)?;
     }
@@ -30,9 +33,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     } else {
         draft::write(&args.out, &bytes)?;
     }
-    let failed = fused.without_prediction();
-    if !args.quiet {
-        eprintln!("{} recordings, {failed} without a prediction", fused.rows.len());
-    }
+    let (recordings, failed) = (fused.rows.len(), fused.without_prediction());
+    args.tell(recordings, failed, "a prediction")?;
     Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
 }

@@ -78,11 +78,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
     };
     Submission::write(&args.out, format, &predictions, &expected)?;
     let failed = predictions.iter().filter(|p| p.kind.is_none() && p.level.is_none()).count();
-    eprintln!(
-        "{}: {} recordings, {failed} without an estimate",
-        args.out.display(),
-        predictions.len()
-    );
+    args.tell(predictions.len(), failed, "an estimate")?;
     Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
 }
 

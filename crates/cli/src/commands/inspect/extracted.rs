@@ -95,20 +95,18 @@ fn listed<T>(counts: &BTreeMap<T, usize>, name: impl Fn(&T) -> String) -> String
 }
 
 /// What the arrays of an output are, in a line: `3 recordings: mfcc 2 × 20 × 16–44 frames`, or the
-/// size of its table. `members` are all of its arrays with their shapes.
+/// size of its table of `n_features`. `members` are all of its arrays with their shapes.
 pub fn shapes<'m>(
     features: &[&str],
     members: impl Iterator<Item = (&'m str, &'m [u64])>,
-    npz: bool,
+    n_features: usize,
 ) -> Vec<String> {
-    const SUMMARY: &str = "__summary__";
     let members: Vec<(&str, &[u64])> = members.collect();
-    if !npz {
-        let rows = members.first().map_or(0, |(_, shape)| shape.iter().product());
-        return vec![format!("  {} × {} columns", plural(rows, "row"), members.len())];
-    }
-    if let Some((_, [rows, columns])) = members.iter().find(|(name, _)| *name == SUMMARY) {
-        return vec![format!("  {} × {columns} columns", plural(*rows, "row"))];
+    if n_features > 0 {
+        let table = members.iter().find(|(name, _)| *name == layout::SUMMARY);
+        // A Parquet table has a column for each feature, and those have as many rows.
+        let rows = table.or(members.first()).and_then(|(_, shape)| shape.first()).copied();
+        return vec![format!("  {} × {n_features} features", plural(rows.unwrap_or(0), "row"))];
     }
     let mut ranges: BTreeMap<&str, Vec<[u64; 2]>> = BTreeMap::new();
     let mut recordings = 0;

@@ -19,11 +19,14 @@ use super::extracted::{Recordings, shapes};
 use super::refusal::{Refusal, to_json};
 use crate::configuration::nearest;
 use crate::failure::Failure;
+use crate::paragraphs::{WIDTH, wrapped};
 use crate::plural::plural;
 use crate::progress::{counts, failure_line};
 
 /// Members shown as text; JSON has all.
 const SHOWN: usize = 20;
+/// Where values begin behind `  label       `.
+const LABELS: usize = 14;
 
 /// Everything that is printed; its JSON form is the output of `--json`.
 #[derive(Serialize)]
@@ -64,6 +67,8 @@ struct Run {
     meta: Provenance,
     config: Value,
     statuses: BTreeMap<&'static str, usize>,
+    /// Of a summary; 0 where there are frames.
+    n_features: usize,
     #[serde(flatten)]
     recordings: Recordings,
     failed: Vec<Outcome>,
@@ -176,7 +181,8 @@ impl Run {
         let failed = table.outcomes().iter().filter(|o| !o.status.has_features());
         let (statuses, failed) = (counts(table.outcomes()), failed.cloned().collect());
         let recordings = Recordings::of(&table);
-        Ok(Self { meta, config, statuses, recordings, failed })
+        let n_features = table.feature_names().len();
+        Ok(Self { meta, config, statuses, n_features, recordings, failed })
     }
 
     /// Names of its features.
@@ -200,10 +206,29 @@ impl Run {
     }
 }
 
+/// A line that a terminal of eighty columns shows whole: what is beyond goes below, further in.
+fn folded(line: &str) -> String {
+    if line.chars().count() <= WIDTH {
+        return line.to_owned();
+    }
+    let indent = line.len() - line.trim_start_matches([' ', '\n']).len();
+    // `  label       name: values` goes on below the values.
+    let (head, deeper) = match line.get(..LABELS) {
+        Some(head) if head[indent.min(LABELS)..].ends_with("  ") => (LABELS, LABELS),
+        _ => (indent, indent + 2),
+    };
+    let rest = wrapped(&line[head..], &" ".repeat(deeper));
+    format!("{}{}", &line[..head], rest.trim_start())
+}
+
 impl Contents {
     fn text(&self) -> String {
         let mut lines = vec![self.path.clone()];
-        let arrays = format!("{} · {}", self.format, plural(self.members.len(), "member"));
+        let arrays = format!(
+            "{} · {}",
+            self.format,
+            plural(self.members.len(), if self.format == "parquet" { "column" } else { "member" })
+        );
         lines.push(match &self.run {
             None => format!("  {arrays}"),
             Some(run) => {
@@ -221,7 +246,7 @@ impl Contents {
         if let Some(run) = &self.run {
             let names: Vec<&str> = run.features();
             let arrays = self.members.iter().map(|m| (m.name.as_str(), m.shape.as_slice()));
-            lines.extend(shapes(&names, arrays, self.format == "npz"));
+            lines.extend(shapes(&names, arrays, run.n_features));
             run.text(&mut lines);
         } else {
             let width = self.members.iter().map(|m| m.name.chars().count()).max().unwrap_or(0);
@@ -243,6 +268,7 @@ impl Contents {
                 plural(*rows, "row")
             ));
         }
+        let lines: Vec<String> = lines.iter().map(|line| folded(line)).collect();
         lines.join("\n") + "\n"
     }
 }

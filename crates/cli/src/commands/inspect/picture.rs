@@ -8,6 +8,7 @@ use corsmal_plot::{DEFAULT_DPI, Figure, WaveScale, to_pdf, to_png, to_svg};
 use corsmal_report::{FrequencyAxis, View};
 
 use crate::failure::Failure;
+use crate::publish;
 
 /// Arguments of `inspect` that are about the picture.
 #[derive(clap::Args)]
@@ -16,6 +17,9 @@ pub struct PictureArgs {
     /// each channel with what is wrong with it; of a feature file, the features of a recording.
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
+    /// Replace an existing picture.
+    #[arg(long, requires = "picture")]
+    overwrite: bool,
     /// Channels to draw, such as 0,3 or 0-3; default all.
     #[arg(long, value_name = "LIST", requires = "picture", value_parser = channels)]
     channels: Option<Channels>,
@@ -25,7 +29,7 @@ pub struct PictureArgs {
     /// End of the stretch to draw, in seconds.
     #[arg(long, value_name = "SECONDS", requires = "picture", value_parser = seconds)]
     end: Option<f64>,
-    /// Axis of frequency of a spectrogram.
+    /// Frequency axis of a spectrogram.
     #[arg(long, value_enum, default_value = "mel", requires = "picture")]
     frequency_axis: Axis,
     /// Highest frequency of a spectrogram, in Hz; default half the sample rate.
@@ -133,10 +137,7 @@ impl PictureArgs {
                 return Err(Failure::new(message));
             }
         };
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-        if folder.is_some_and(|folder| !folder.is_dir()) {
-            return Err(Failure::new(format!("--picture {name}: its folder does not exist")));
-        }
+        publish::check(&path, self.overwrite)?;
         let start = self.start.unwrap_or(0.0);
         if let Some(end) = self.end.filter(|end| *end <= start) {
             let message = format!("--end {end} is not after --start {start}: nothing to draw");
