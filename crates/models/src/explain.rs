@@ -19,7 +19,7 @@ pub struct Family {
 }
 
 /// The families of features by their names, in the order of their first features: `mfcc[3].mean` and
-/// `mfcc_3_mean` are of `mfcc`, and a part of a compound vector, such as `af193[chroma_2]`, of `chroma`.
+/// `mfcc_3_mean` are of `mfcc`, of every channel, and a part of a compound vector, such as `af193[chroma_2]`, of `chroma`.
 pub fn families(names: &[String]) -> Vec<Family> {
     let mut families: Vec<Family> = Vec::new();
     for (column, name) in names.iter().enumerate() {
@@ -33,6 +33,11 @@ pub fn families(names: &[String]) -> Vec<Family> {
 }
 
 fn stem(name: &str) -> &str {
+    // `ch3/mfcc[0].mean`: the channels of a feature say much the same.
+    let channel = name.split_once('/').filter(|(first, _)| {
+        first.strip_prefix("ch").is_some_and(|n| n.chars().all(|c| c.is_ascii_digit()))
+    });
+    let name = channel.map_or(name, |(_, feature)| feature);
     let outer = name.split(['[', '.']).next().unwrap_or(name);
     let inner = name.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(i, _)| i);
     match inner {

@@ -29,11 +29,21 @@ fn named(names: &[&str]) -> Vec<String> {
 
 #[test]
 fn families_are_named_by_their_feature() {
-    let names = ["mfcc[0].mean", "zcr.mean", "mfcc[1].std", "x", "af193[chroma_2]", "af193[f_a]"];
+    let names = [
+        "mfcc[0].mean",
+        "zcr.mean",
+        "mfcc[1].std",
+        "x",
+        "af193[chroma_2]",
+        "af193[f_a]",
+        "ch3/mfcc[0].mean",
+        "mfcc_12_mean",
+        "energy_entropy_mean",
+    ];
     let found = families(&named(&names));
     let names: Vec<_> = found.iter().map(|f| f.name.as_str()).collect();
-    assert_eq!(names, ["mfcc", "zcr", "x", "chroma", "f_a"]);
-    assert_eq!(found[0].columns, [0, 2]);
+    assert_eq!(names, ["mfcc", "zcr", "x", "chroma", "f_a", "energy_entropy_mean"]);
+    assert_eq!(found[0].columns, [0, 2, 6, 7]);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use crate::args::Jobs;
+use crate::args::{Jobs, Told};
 use crate::failure::Failure;
 
 /// Arguments of `embed`.
@@ -38,15 +38,14 @@ pub struct Args {
     overwrite: bool,
     #[command(flatten)]
     jobs: Jobs,
-    /// Print nothing but errors.
-    #[arg(long, short)]
-    quiet: bool,
+    #[command(flatten)]
+    told: Told,
 }
 
 /// Says how to get networks.
 #[cfg(not(feature = "nets"))]
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
-    let Args { network: _, paths: _, weights: _, out: _, overwrite: _, jobs: _, quiet: _ } = args;
+    let Args { network: _, paths: _, weights: _, out: _, overwrite: _, jobs: _, told: _ } = args;
     Err(super::nets::absent())
 }
 
@@ -56,6 +55,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     use corsmal_files::format::require_npz;
     use corsmal_systems::SystemError;
     use corsmal_systems::embedding::Embedder;
+    use serde_json::json;
 
     use crate::failure::{FAILED_FILES, INTERRUPTED};
     use crate::recordings;
@@ -83,8 +83,10 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let (recordings, width) = (dataset.ids.len(), embedder.width());
     let rows = dataset.items.columns[0].values.len() / width;
     dataset.write_sequences(&args.out, width, &embedder.provenance(&found).to_string())?;
-    if !args.quiet {
-        println!("{}: {recordings} recordings, {rows} x {width}", args.out.display());
-    }
+    let out = &args.out;
+    args.told.tell(
+        || json!({ "out": out, "recordings": recordings, "rows": rows, "width": width, "failed": failed }),
+        || format!("{}: {recordings} recordings, {rows} x {width}", out.display()),
+    )?;
     Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
 }

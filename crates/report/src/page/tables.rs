@@ -20,7 +20,7 @@ pub(super) fn write(out: &mut String, table: &Table) {
          <div class=\"scroll\" tabindex=\"0\"><table{dense} aria-label=\"{caption}\">\n<thead><tr>",
     );
     for (i, column) in table.columns.iter().enumerate() {
-        let class = if i == 0 || !table.is_numeric(i) { words(table, i) } else { "figure" };
+        let class = if table.is_numeric(i) { "figure" } else { words(table, i) };
         let _ = write!(
             out,
             "<th scope=\"col\" class=\"{class}\"><button type=\"button\">{}</button></th>",

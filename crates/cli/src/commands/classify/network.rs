@@ -114,7 +114,7 @@ fn write(
     verdict: Verdict,
 ) -> Result<bool, Failure> {
     let Verdict { span, windows, status, decision, reason } = verdict;
-    if let Some(reason) = reason.filter(|_| !args.quiet) {
+    if let Some(reason) = reason {
         eprintln!("{}: {}: {reason}", input.id, status.name());
     }
     let (class, proba) = decision.map_or((None, None), |(class, proba)| (Some(class), proba));
