@@ -62,7 +62,7 @@ pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Fail
     let stop = crate::interrupt::flag();
     let mut unread = false;
     let mut each = |input: &Input, verdict: Verdict| -> Result<bool, Failure> {
-        unread = !write(args, &mut records, input, verdict)?;
+        unread = !write(&mut records, input, verdict)?;
         Ok(!unread)
     };
     let heard = match windowing {
@@ -107,12 +107,7 @@ fn of_inputs(
 }
 
 /// Writes a line; `false` where nobody reads any more.
-fn write(
-    args: &Args,
-    records: &mut Records,
-    input: &Input,
-    verdict: Verdict,
-) -> Result<bool, Failure> {
+fn write(records: &mut Records, input: &Input, verdict: Verdict) -> Result<bool, Failure> {
     let Verdict { span, windows, status, decision, reason } = verdict;
     if let Some(reason) = reason {
         eprintln!("{}: {}: {reason}", input.id, status.name());
