@@ -1,8 +1,7 @@
-"""Classifiers: scikit-learn estimators, trained and kept by the Rust side.
+"""Classifiers: scikit-learn estimators, trained and kept by the Rust side; they also work without it.
 
-They also work without scikit-learn. `save` writes the model file that the command `corsmal-feat
-classify` reads, `load_model` reads what `corsmal-feat train` wrote. Which algorithm each one is and
-how it differs from scikit-learn's: docs/classifiers.md.
+`save` writes the model file that `corsmal-feat classify` reads, `load_model` reads what
+`corsmal-feat train` wrote. How each differs from scikit-learn's: docs/classifiers.md.
 """
 
 from __future__ import annotations

@@ -1,0 +1,171 @@
+"""A network with its numbers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any, TypedDict
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._arrays import Singles
+from ._refusals import refuses
+from .errors import ParameterError
+
+
+class TrainingSteps(TypedDict):
+    """What `Network.train_steps` returns."""
+
+    losses: list[float]
+    gradient_norms: dict[str, float]
+
+
+class Network:
+    """A network with its numbers. `build` makes one.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    num_parameters : int
+        Numbers that training changes.
+    layers : list
+        Layers in their order, each with the shape of an item after it.
+
+    Examples
+    --------
+    >>> network = corsmal_feat.nets.build("m3-mlp", seed=1)
+    >>> network.name, network.num_parameters
+    ('m3_mlp', 20763827)
+    """
+
+    def __init__(self, network: _core.Network) -> None:
+        self._network = network
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self._network.name()
+
+    @property
+    def num_parameters(self) -> int:
+        """Numbers that training changes."""
+        return self._network.num_parameters()
+
+    @property
+    def layers(self) -> list[tuple[str, str]]:
+        """Layers in their order, each with the shape of an item after it."""
+        return self._network.layers()
+
+    def state_dict(self) -> dict[str, Singles]:
+        """All numbers under PyTorch's names, running statistics included."""
+        return self._network.state()
+
+    @refuses
+    def load_state_dict(self, state: Mapping[str, npt.ArrayLike]) -> None:
+        """Replaces all numbers.
+
+        `num_batches_tracked` may be there. Every other name and shape must be this network's: a
+        `ParameterError` lists all that are not, and changes nothing.
+        """
+        self._network.load_state(
+            [(str(name), single(value)) for name, value in state.items()],
+        )
+
+    @refuses
+    def forward(self, *inputs: npt.ArrayLike, lengths: Sequence[int] | None = None) -> Singles:
+        """Outputs [shape=(items, outputs)] in evaluation mode.
+
+        Parameters
+        ----------
+        inputs : arrays in PyTorch's layouts: [items, channels, height, width], [items, steps,
+            numbers] or [items, numbers]; four views as one array [items, 4, steps, numbers]
+        lengths : steps of each item, where items were padded; without it the network runs through
+            the padding, as PyTorch's does on a padded batch
+        """
+        return self._network.forward([single(x) for x in inputs], _lengths(lengths))
+
+    @refuses
+    def features(self, *inputs: npt.ArrayLike) -> Singles:
+        """What the network's last layers work on [shape=(items, n)]."""
+        return self._network.features([single(x) for x in inputs])
+
+    @refuses
+    def train_steps(
+        self,
+        inputs: npt.ArrayLike | Sequence[npt.ArrayLike],
+        y: npt.ArrayLike,
+        steps: int,
+        recipe: Mapping[str, Any],
+        *,
+        dropout: bool = True,
+        seed: int = 0,
+        lengths: Sequence[int] | None = None,
+    ) -> TrainingSteps:
+        """Trains for a few steps over the whole batch.
+
+        Parameters
+        ----------
+        inputs : as those of `forward`, in a list
+        y : a class for each item (whole numbers), or numbers for a network that estimates
+        steps : how many
+        recipe : "optimizer" ("adam" or "sgd"), "lr", and where needed "momentum", "weight_decay",
+            "clip_grad_norm", "class_weights", "loss" ("cross_entropy" or "mse")
+        dropout : whether dropout works
+        seed : of dropout
+        lengths : steps of each item
+
+        Returns
+        -------
+        losses before each step, and the norm of each parameter's gradient at the first
+        """
+        arrays = [inputs] if isinstance(inputs, np.ndarray) else list(inputs)  # type: ignore[arg-type]
+        targets = np.asarray(y)
+        classes = numbers = None
+        if targets.dtype.kind in "iub":
+            if targets.ndim != 1 or (targets.size and targets.min() < 0):
+                raise ParameterError("y: classes are one whole number from 0 for each item")
+            classes = targets.tolist()
+        else:
+            numbers = targets.astype(np.float32).ravel().tolist()
+        if steps < 0:
+            raise ParameterError(f"steps must be at least 0, not {steps}")
+        losses, norms = self._network.train_steps(
+            [single(x) for x in arrays],
+            classes,
+            numbers,
+            steps,
+            json.dumps(dict(recipe), default=plain),
+            seed_of(seed) if dropout else None,
+            _lengths(lengths),
+        )
+        return {"losses": losses, "gradient_norms": norms}
+
+    def __repr__(self) -> str:
+        return f"<{self.name}: {self.num_parameters:,} parameters>"
+
+
+def single(value: Any) -> Singles:
+    """A contiguous array in single precision, of finite numbers."""
+    array = np.ascontiguousarray(value, dtype=np.float32)
+    if not np.isfinite(array).all():
+        raise ParameterError("inputs and weights must be finite numbers")
+    return array
+
+
+def _lengths(lengths: Sequence[int] | None) -> list[int] | None:
+    return None if lengths is None else [int(n) for n in lengths]
+
+
+def seed_of(seed: int) -> int:
+    if not 0 <= seed < 1 << 64:
+        raise ParameterError(f"seed must be 0 to 2**64 - 1, not {seed}")
+    return int(seed)
+
+
+def plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    raise ParameterError(f"a recipe cannot hold a {type(value).__name__}")

@@ -1,0 +1,128 @@
+"""A trained network that hears recordings."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterable
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._extract import MOST_JOBS
+from ._features import StrPath
+from ._refusals import place, refuses
+from .errors import DecodeError, ParameterError
+
+
+class TrainedNetwork:
+    """A trained network that hears recordings. `train` and `load` give one.
+
+    Attributes
+    ----------
+    header : dict
+        What the file says about the network: name, recipe, history, features.
+    classes_ : array
+        Labels, in the order of `predict_proba`.
+
+    Examples
+    --------
+    >>> network = corsmal_feat.nets.load("pouring.safetensors")
+    >>> network
+    <m1: rice, water>
+    >>> network.predict_proba(["rice.wav", "water.wav"]).argmax(axis=1).tolist()
+    [0, 1]
+    """
+
+    def __init__(self, network: _core.TrainedNetwork) -> None:
+        self._network = network
+        self.header: dict[str, Any] = json.loads(network.header())
+        # With scikit-learn, whose import takes a second.
+        labels = import_module("._classifier", __package__).class_labels
+        self.classes_: npt.NDArray[Any] = labels(self.header)
+
+    @refuses
+    def predict_proba(
+        self,
+        recordings: Iterable[StrPath],
+        *,
+        any_rate: bool = False,
+        jobs: int | None = None,
+    ) -> npt.NDArray[np.float64]:
+        """Probabilities of recordings; the mean of their windows, where the network takes windows.
+
+        Parameters
+        ----------
+        recordings : paths
+            One for each recording.
+        any_rate : bool
+            Take recordings of a sample rate or with channels that the network was not trained on.
+        jobs : int, optional
+            Recordings that are read at a time; one for each core by default.
+
+        Returns
+        -------
+        float64 [shape=(recordings, classes)], columns in the order of `classes_`
+
+        Raises
+        ------
+        DecodeError : a recording that the network cannot hear
+        """
+        paths = paths_of(recordings)
+        proba, failed = _core.hear_recordings(self._network, paths, any_rate, jobs_of(jobs))
+        if failed:
+            raise DecodeError(f"{failed[0][0]}: {failed[0][1]}")
+        return proba
+
+    @refuses
+    def predict(
+        self,
+        recordings: Iterable[StrPath],
+        *,
+        any_rate: bool = False,
+        jobs: int | None = None,
+    ) -> npt.NDArray[Any]:
+        """The label of each recording.
+
+        Parameters
+        ----------
+        recordings, any_rate, jobs
+            See `predict_proba`.
+
+        Returns
+        -------
+        labels [shape=(recordings,)]
+        """
+        proba = self.predict_proba(recordings, any_rate=any_rate, jobs=jobs)
+        labels: npt.NDArray[Any] = self.classes_[proba.argmax(axis=1)]
+        return labels
+
+    @refuses
+    def save(self, path: StrPath) -> None:
+        """Writes the model file, whole or not at all; `corsmal-feat classify` takes it."""
+        self._network.save(place(path))
+
+    def __reduce__(self) -> tuple[Callable[[bytes], TrainedNetwork], tuple[bytes]]:
+        return _of_bytes, (self._network.to_bytes(),)
+
+    def __repr__(self) -> str:
+        return f"<{self.header['network']}: {', '.join(map(str, self.classes_.tolist()))}>"
+
+
+def _of_bytes(file: bytes) -> TrainedNetwork:
+    return TrainedNetwork(_core.TrainedNetwork.from_bytes(file))
+
+
+def paths_of(recordings: Iterable[StrPath]) -> list[str]:
+    if isinstance(recordings, (str, os.PathLike)):
+        return [os.fspath(recordings)]
+    return [os.fspath(path) for path in recordings]
+
+
+def jobs_of(jobs: int | None) -> int | None:
+    if jobs is not None and not 1 <= jobs <= MOST_JOBS:
+        raise ParameterError(f"jobs must be 1 to {MOST_JOBS}, not {jobs}")
+    return jobs
