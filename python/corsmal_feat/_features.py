@@ -190,9 +190,9 @@ class Features:
             )
         if (wanted := self._names_of_recordings()) not in (None, self.names):
             raise ParameterError(
-                f"features has {len(self.names)} columns, not the {len(wanted or ())} that"
-                " recordings are given by its configuration, in that order, so the model could not predict"
-                " recordings; fit on all columns as corsmal_feat wrote them"
+                f"features has {len(self.names)} columns, not the {len(wanted or ())} that its"
+                " configuration gives, in that order: a model of them could not predict recordings;"
+                " fit on all columns as corsmal_feat wrote them"
             )
         return {
             "feature_names": self.names,

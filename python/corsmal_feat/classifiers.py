@@ -1,7 +1,7 @@
-"""Classifiers: scikit-learn estimators, trained and kept by the Rust side; they also work without it.
+"""Classifiers: scikit-learn estimators, trained and kept by the Rust side.
 
 `save` writes the model file that `corsmal-feat classify` reads, `load_model` reads what
-`corsmal-feat train` wrote. How each differs from scikit-learn's: docs/classifiers.md.
+`corsmal-feat train` wrote. They also work without scikit-learn. How each differs from scikit-learn's: docs/classifiers.md.
 """
 
 from __future__ import annotations
