@@ -1,7 +1,8 @@
 """Classifiers: scikit-learn estimators, trained and kept by the Rust side.
 
 `save` writes the model file that `corsmal-feat classify` reads, `load_model` reads what
-`corsmal-feat train` wrote. They also work without scikit-learn. How each differs from scikit-learn's: docs/classifiers.md.
+`corsmal-feat train` wrote. They also work without scikit-learn; docs/classifiers.md tells how each
+differs from its own.
 """
 
 from __future__ import annotations
