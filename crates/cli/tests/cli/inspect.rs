@@ -85,11 +85,17 @@ fn pictures_by_extension() {
     }
 }
 
+/// A text in one line, as it was before it was cut for the terminal.
+fn joined(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 /// The SVG that `inspect --picture` draws.
 fn drawn(file: &Path, args: &[&str]) -> String {
     let picture = file.with_extension("drawn.svg");
-    let out = tool().arg("inspect").arg(file).arg("--picture").arg(&picture).args(args).output();
-    let out = out.unwrap();
+    let mut out = tool();
+    let out = out.arg("inspect").arg(file).arg("--picture").arg(&picture).args(args);
+    let out = out.arg("--overwrite").output().unwrap();
     assert!(out.status.success(), "{}", text(&out.stderr));
     std::fs::read_to_string(picture).unwrap()
 }
@@ -253,7 +259,7 @@ fn outputs_show_contents_configuration_and_outcomes() {
             "  is preset mfcc-zcr\n",
             "audio/bad.wav: corrupt at byte 0",
         ] {
-            assert!(report.contains(words), "{words:?} is not in: {report}");
+            assert!(joined(&report).contains(&joined(words)), "{words:?} is not in: {report}");
         }
         let shown = inspect(&[&out, "--json".as_ref()]);
         let report: serde_json::Value = serde_json::from_slice(&shown.stdout).unwrap();
@@ -307,4 +313,16 @@ fn of_other_archives_only_the_members() {
         let report: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
         assert!(report["reason"].as_str().is_some_and(|r| !r.is_empty()));
     }
+}
+
+#[test]
+fn a_picture_is_replaced_only_when_asked() {
+    let folder = tempfile::tempdir().unwrap();
+    let wav = recording(folder.path());
+    let picture = folder.path().join("x.svg");
+    std::fs::write(&picture, "mine").unwrap();
+    let refused = inspect(&[&wav, "--picture".as_ref(), &picture]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("exists; --overwrite replaces it"));
+    assert_eq!(std::fs::read_to_string(&picture).unwrap(), "mine");
 }

@@ -159,7 +159,7 @@ fn systems_of_the_paper_join_the_benchmark() {
     assert!(!scores.contains("kNN"), "{scores}");
     for (name, tasks) in [("M1", 2), ("M2", 1), ("M5", 2)] {
         let line = scores.lines().find(|line| line.starts_with(name)).unwrap();
-        assert_eq!(line.matches(" to ").count(), tasks, "{line}");
+        assert_eq!(line.matches('\u{2013}').count(), tasks, "{line}");
     }
     let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
     let submission = read("submissions/m1-held-out.csv");
