@@ -120,7 +120,7 @@ fn pictures_show_what_is_asked_for_and_what_is_wrong() {
     assert!(drawn(&wav, &["--frequency-axis", "log"]).contains(">200<"));
     assert_ne!(drawn(&wav, &["--wave-scale", "channel"]), whole);
     let png = |dpi: &str| {
-        let picture = folder.path().join("p.png");
+        let picture = folder.path().join(format!("p{dpi}.png"));
         let options = ["--picture", "--dpi"].map(Path::new);
         let args: [&Path; 5] = [&wav, options[0], &picture, options[1], Path::new(dpi)];
         assert!(inspect(&args).status.success());
