@@ -162,7 +162,7 @@ class Job:
         known = model.header["feature_names"]
         if len(names) == len(known) and names != known:
             at = next(i for i, (a, b) in enumerate(zip(names, known, strict=True)) if a != b)
-            raise ModelError(f"feature {at} is {names[at]}, the model was trained on {known[at]}")
+            raise ModelError(f"feature {at} must be {known[at]}, as in training, not {names[at]}")
         good = [row for row in outcomes if row["status"] in GOOD]
         taken = np.zeros(len(good), dtype=bool)
         for i, row in enumerate(good):

@@ -64,7 +64,7 @@ def evaluate(
     rules : {"paper", "toolkit-2020-10", "toolkit-2021-11", "toolkit"}
         Rule set; docs/ccm.md describes each with its quirks.
     baseline : path, optional
-        Submission that stands in, in the filling mass only, for tasks that are not addressed; by
+        Submission that replaces unaddressed tasks, in the filling mass only; by
         default the official random1.csv or random123.csv, which come with this package.
     seed : int, optional
         Use pseudo-random estimates of this seed instead.

@@ -205,7 +205,7 @@ class SignalExtractor:
             )
         self._signal.push(samples)
 
-    def finish(self) -> Any:
+    def finish(self) -> npt.NDArray[np.float32] | dict[str, npt.NDArray[Any]]:
         """The summary [shape=(len(names),)], or by feature its frames
         [shape=(channels, coefficients, frames)]."""
         summary, features = self._signal.finish()

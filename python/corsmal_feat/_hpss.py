@@ -45,7 +45,7 @@ def hpss(
     power: float = 2.0,
     mask: bool = False,
     margin: float | Sequence[float] = 1.0,
-) -> tuple[Any, Any]:
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """Harmonic and percussive part of a spectrogram by median filtering (librosa.decompose.hpss).
 
     Parameters
@@ -119,7 +119,7 @@ def effects_hpss(
     window: Window = "hann",
     center: bool = True,
     pad_mode: str = "constant",
-) -> tuple[Any, Any]:
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """Harmonic and percussive part of a signal (librosa.effects.hpss).
 
     Parameters

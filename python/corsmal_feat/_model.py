@@ -62,9 +62,10 @@ class TrainedModel:
         )
 
     @property
-    def feature_config(self) -> Any:
+    def feature_config(self) -> dict[str, Any] | None:
         """The full configuration of the features, or None."""
-        return self.header["feature_config"]
+        config: dict[str, Any] | None = self.header["feature_config"]
+        return config
 
     @refuses
     def predict(self, X: Any, *, any_rate: bool = False) -> npt.NDArray[Any]:
@@ -181,7 +182,8 @@ class TrainedModel:
         if found.config_hash != self.header["feature_config_hash"]:
             raise ModelError(
                 f"{self.path}: its feature configuration was written by version"
-                f" {self.header['tool_version']} and reads differently in this one: train it again"
+                f" {self.header['tool_version']}; this version computes other features from it:"
+                " extract and train again"
             )
         row_of = dict(zip(different, found.summary.astype(np.float64), strict=True))
         return np.stack([row_of[path] for path in paths])

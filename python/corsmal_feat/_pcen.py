@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import rows, size, spectrum, unrows
+from ._arrays import Floats, rows, size, spectrum, unrows
 from ._params import PcenParams
 from ._refusals import refuses
 from ._warnings import warn
@@ -33,7 +33,7 @@ def pcen(
     max_axis: int | None = None,
     zi: npt.ArrayLike | None = None,
     return_zf: bool = False,
-) -> Any:
+) -> Floats | tuple[Floats, Floats]:
     """Per-channel energy normalisation of a spectrogram (librosa.pcen): every band divided by its
     smoothed level and compressed.
 
@@ -115,7 +115,7 @@ def pcen(
         array = array[0] if s.ndim == 1 else array
         return np.moveaxis(array, range(-len(places), 0), places)
 
-    result = restored(unrows(out, ordered, 2))
+    result: Floats = restored(unrows(out, ordered, 2))
     if not return_zf:
         return result
     return result, restored(end.reshape((*ordered.shape[:-1], 1)))

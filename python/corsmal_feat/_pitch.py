@@ -75,7 +75,7 @@ def piptrack(
     center: bool = True,
     pad_mode: str = "constant",
     ref: float | Callable[..., Any] | None = None,
-) -> tuple[Any, Any]:
+) -> tuple[Floats, Floats]:
     """Interpolated frequencies in Hz and magnitudes of spectral peaks, 0 elsewhere, each
     [shape=(..., d, t)] (librosa.piptrack).
 

@@ -1,4 +1,4 @@
-"""A trained network that hears recordings."""
+"""A trained network that classifies recordings."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .errors import DecodeError, ParameterError
 
 
 class TrainedNetwork:
-    """A trained network that hears recordings. `train` and `load` give one.
+    """A trained network that classifies recordings. `train` and `load` give one.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class TrainedNetwork:
 
         Raises
         ------
-        DecodeError : a recording that the network cannot hear
+        DecodeError : a recording that the network cannot classify
         """
         paths = paths_of(recordings)
         proba, failed = _core.hear_recordings(self._network, paths, any_rate, jobs_of(jobs))

@@ -2,8 +2,8 @@
 
 `build(name)` gives a network as published, with PyTorch's parameter names and layouts in
 `state_dict` and `load_state_dict`. `train` trains one on recordings, `load` reads a trained one,
-and both give a `TrainedNetwork`, which hears recordings; `embed` gives the numbers that a network
-makes of them. What each network is and where the published code differs from the paper:
+and both give a `TrainedNetwork`, which classifies recordings; `embed` gives the numbers that a
+network makes of them. What each network is and where the published code differs from the paper:
 docs/networks.md.
 """
 

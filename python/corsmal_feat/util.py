@@ -225,7 +225,7 @@ def tiny(x: npt.ArrayLike) -> np.floating[Any]:
 
 
 @refuses
-def valid_audio(y: Any) -> bool:
+def valid_audio(y: object) -> bool:
     """True, or an error that says why `y` is not a signal (librosa.util.valid_audio).
 
     Parameters

@@ -210,3 +210,14 @@ def test_a_network_learns_from_recordings_and_hears_them(tmp_path: Path) -> None
     with pytest.raises(ParameterError, match=r"features\.0\.weight"):
         nets.write_weights(tmp_path / "none.npz", {"bias": np.zeros(1)})
         nets.embed("vggish", paths, tmp_path / "none.npz")
+
+
+def test_paths_that_stand_for_others_are_refused(tmp_path: Path) -> None:
+    """Two recordings of a folder and a file that is passed over are not two recordings named."""
+    for name in ("a", "b"):
+        with wave.open(str(tmp_path / f"{name}.wav"), "wb") as file:
+            file.setparams((1, 2, 16000, 0, "NONE", "not compressed"))
+            file.writeframes(bytes(32000))
+    (tmp_path / "._x.wav").write_bytes(b"metadata of macOS")
+    with pytest.raises(ParameterError, match="name each recording"):
+        nets.train("m1", [tmp_path, tmp_path / "._x.wav"], ["rice", "water"])

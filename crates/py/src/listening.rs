@@ -47,7 +47,9 @@ fn threads(jobs: Option<usize>) -> PyResult<usize> {
 /// One recording for each path.
 fn recordings(paths: &[String]) -> PyResult<Vec<Input>> {
     let found = inputs::collect(paths).map_err(|e| RunError::new_err(e.to_string()))?.inputs;
-    if found.len() == paths.len() {
+    // By number alone a folder of two and a file that is skipped would pass.
+    let same = |(input, path): (&Input, &String)| input.source.to_string() == *path;
+    if found.len() == paths.len() && found.iter().zip(paths).all(same) {
         return Ok(found);
     }
     let (found, named) = (found.len(), paths.len());

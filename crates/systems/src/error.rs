@@ -29,17 +29,15 @@ pub enum SystemError {
     },
     /// A trained network that does not know how its inputs come from recordings.
     #[error(
-        "{network} was trained on inputs that came from a file, and cannot make them from recordings; \
-         give --features, or train it on recordings"
+        "{network} was trained on inputs that came from a file, and cannot make them from recordings: \
+         give such inputs, or train it on recordings"
     )]
     TrainedOnInputs {
         /// the network
         network: String,
     },
     /// A network that gives classes where embeddings are wanted.
-    #[error(
-        "{network} gives classes, not embeddings: use vggish, or `corsmal-feat classify` for classes"
-    )]
+    #[error("{network} gives classes, not embeddings: vggish gives embeddings")]
     NoEmbeddings {
         /// the network
         network: &'static str,

@@ -27,7 +27,7 @@ pub struct Learning<'a> {
 }
 
 /// A network with the recipe that trained it.
-pub struct Trained {
+pub struct Learned {
     /// The network.
     pub network: Network,
     recipe: Recipe,
@@ -144,7 +144,7 @@ impl<'a> Learning<'a> {
         items: &Items,
         classes: &[usize],
         train: &[usize],
-    ) -> Result<Trained> {
+    ) -> Result<Learned> {
         let definition = self.definition(network)?;
         let mut recipe = self.recipe(definition);
         if recipe.drop_last && train.len() < recipe.batch {
@@ -173,7 +173,7 @@ impl<'a> Learning<'a> {
             Scores::new(truth, found, outputs).map_or(0.0, |s| s.weighted_f1)
         };
         fit::fit(&mut net, task, &recipe, None, score, told).map_err(refuse)?;
-        Ok(Trained { network: net, recipe })
+        Ok(Learned { network: net, recipe })
     }
 
     /// Probability of each class for some of the items.
@@ -182,7 +182,7 @@ impl<'a> Learning<'a> {
     /// Items that the network does not take.
     pub fn probabilities(
         &self,
-        trained: &Trained,
+        trained: &Learned,
         items: &Items,
         rows: &[usize],
     ) -> Result<Vec<Vec<f64>>> {
@@ -195,7 +195,7 @@ impl<'a> Learning<'a> {
     ///
     /// # Errors
     /// Items or networks without features.
-    pub fn inner(&self, trained: &Trained, items: &Items, rows: &[usize]) -> Result<Vec<Vec<f32>>> {
+    pub fn inner(&self, trained: &Learned, items: &Items, rows: &[usize]) -> Result<Vec<Vec<f32>>> {
         let mut all = Vec::with_capacity(rows.len());
         for rows in rows.chunks(64) {
             self.work.go_on()?;

@@ -36,7 +36,7 @@ pub enum Formats {
 
 /// What a network says of a recording, or of a window of it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Verdict {
+pub struct Answer {
     /// start and end of the window in seconds; `None` for all of the recording
     pub span: Option<(f64, f64)>,
     /// windows that were decided from
@@ -49,7 +49,7 @@ pub struct Verdict {
     pub reason: Option<String>,
 }
 
-impl Verdict {
+impl Answer {
     fn none(span: Option<(f64, f64)>, trouble: Trouble) -> Self {
         let Trouble { status, reason } = trouble;
         Self { span, windows: 0, status, decision: None, reason: Some(reason) }
@@ -110,7 +110,7 @@ impl<'a> Listener<'a> {
         self.front_end.windows.is_some()
     }
 
-    /// Hears each recording as a whole. A network that takes windows gives a verdict for each of them,
+    /// Hears each recording as a whole. A network that takes windows gives a answer for each of them,
     /// or with `vote` one of all. `each` is told them in the order of the recordings, and ends the work
     /// by returning false. False where `stop` ended it.
     ///
@@ -121,7 +121,7 @@ impl<'a> Listener<'a> {
         inputs: &[Input],
         vote: Option<VotingRule>,
         stop: &Arc<AtomicBool>,
-        each: &mut dyn FnMut(&Input, Verdict) -> std::result::Result<bool, E>,
+        each: &mut dyn FnMut(&Input, Answer) -> std::result::Result<bool, E>,
     ) -> std::result::Result<bool, E> {
         let engine = Recordings::new(self.config.clone());
         let recordings = engine.in_order(inputs, self.jobs, stop).map_err(SystemError::from)?;
@@ -142,27 +142,27 @@ impl<'a> Listener<'a> {
                 (Some(Ok(tensor)), Ok(())) => self.hear(tensor)?,
             };
             let status = outcome.status;
-            let verdict =
-                |span, windows, decision| Verdict { span, windows, status, decision, reason: None };
+            let answer =
+                |span, windows, decision| Answer { span, windows, status, decision, reason: None };
             let verdicts = match (heard, vote) {
-                (Err(trouble), _) => vec![Verdict::none(None, trouble)],
+                (Err(trouble), _) => vec![Answer::none(None, trouble)],
                 (Ok(heard), Some(rule)) => {
                     let votes = self.votes(&heard)?;
                     let decision = rule.decide(&votes).map_err(SystemError::from)?;
-                    vec![verdict(None, votes.windows(), decision)]
+                    vec![answer(None, votes.windows(), decision)]
                 }
                 (Ok(heard), None) => {
                     let start = input.start.unwrap_or(0.0);
                     let second = |frame: usize| start + frame as f64 * FRAME;
                     let one = |(frames, proba): Heard| {
                         let span = frames.map(|f| (second(f.start), second(f.end)));
-                        verdict(span, usize::from(span.is_some()), Some(decided(proba)))
+                        answer(span, usize::from(span.is_some()), Some(decided(proba)))
                     };
                     heard.into_iter().map(one).collect()
                 }
             };
-            for verdict in verdicts {
-                if !each(input, verdict)? {
+            for answer in verdicts {
+                if !each(input, answer)? {
                     return Ok(true);
                 }
             }
@@ -171,7 +171,7 @@ impl<'a> Listener<'a> {
     }
 
     /// Hears windows of recordings or of a stream, each as soon as it is complete. With `vote` there is
-    /// one verdict for each recording, from all of its windows. False where `stop` ended it.
+    /// one answer for each recording, from all of its windows. False where `stop` ended it.
     ///
     /// # Errors
     /// As [`Self::recordings`].
@@ -180,7 +180,7 @@ impl<'a> Listener<'a> {
         inputs: &[Input],
         (windowing, vote): (Windowing, Option<VotingRule>),
         stop: &Arc<AtomicBool>,
-        each: &mut dyn FnMut(&Input, Verdict) -> std::result::Result<bool, E>,
+        each: &mut dyn FnMut(&Input, Answer) -> std::result::Result<bool, E>,
     ) -> std::result::Result<bool, E> {
         let signals = Signals::new(self.config.clone());
         let stopped = || stop.load(Ordering::Relaxed);
@@ -197,7 +197,7 @@ impl<'a> Listener<'a> {
                 });
             let mut windows = match opened {
                 Ok(windows) => windows,
-                Err(trouble) => match each(input, Verdict::none(None, trouble))? {
+                Err(trouble) => match each(input, Answer::none(None, trouble))? {
                     true => continue,
                     false => return Ok(true),
                 },
@@ -217,7 +217,7 @@ impl<'a> Listener<'a> {
                     Ok(Err(reason)) => Err(Trouble { status: Status::Io, reason }),
                     Ok(Ok(tensor)) => self.hear(tensor)?,
                 };
-                let verdict = match (heard, vote) {
+                let answer = match (heard, vote) {
                     (Err(found), Some(_)) => {
                         failures += 1;
                         trouble.get_or_insert(found);
@@ -227,14 +227,14 @@ impl<'a> Listener<'a> {
                         self.add(&mut votes, &heard)?;
                         continue;
                     }
-                    (Err(trouble), None) => Verdict::none(span, trouble),
+                    (Err(trouble), None) => Answer::none(span, trouble),
                     (Ok(heard), None) => {
                         let mean = self.votes(&heard)?.mean();
                         let (windows, status) = (heard.len(), Status::Ok);
-                        Verdict { span, windows, status, decision: mean.map(decided), reason: None }
+                        Answer { span, windows, status, decision: mean.map(decided), reason: None }
                     }
                 };
-                if !each(input, verdict)? {
+                if !each(input, answer)? {
                     return Ok(true);
                 }
             }
@@ -243,8 +243,8 @@ impl<'a> Listener<'a> {
             }
             let Some(rule) = vote else { continue };
             let decision = rule.decide(&votes).map_err(SystemError::from)?;
-            let verdict = match (decision, trouble) {
-                (None, Some(trouble)) => Verdict::none(None, trouble),
+            let answer = match (decision, trouble) {
+                (None, Some(trouble)) => Answer::none(None, trouble),
                 (decision, trouble) => {
                     let status = match &trouble {
                         Some(trouble) => trouble.status,
@@ -255,10 +255,10 @@ impl<'a> Listener<'a> {
                         let windows = if failures == 1 { "window" } else { "windows" };
                         format!("{failures} {windows} failed, the first: {}", trouble.reason)
                     });
-                    Verdict { span: None, windows: votes.windows(), status, decision, reason }
+                    Answer { span: None, windows: votes.windows(), status, decision, reason }
                 }
             };
-            if !each(input, verdict)? {
+            if !each(input, answer)? {
                 return Ok(true);
             }
         }
@@ -303,7 +303,7 @@ impl<'a> Listener<'a> {
     }
 }
 
-/// The verdict on a recording that a network cannot take; `None` where the recording is not at fault.
+/// The answer on a recording that a network cannot take; `None` where the recording is not at fault.
 fn status_of(error: &NetError) -> Option<Status> {
     match error {
         NetError::TooShort { .. } => Some(Status::TooShort),

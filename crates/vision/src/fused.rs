@@ -19,7 +19,7 @@ const MAX_LOG: f64 = 30.0;
 /// Bias and spread of a method in one category, in logarithms.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Reliability {
+pub struct MethodError {
     /// Mean of the logarithm of estimate over truth.
     pub bias: f64,
     /// Their root mean square about the bias, between containers and within.
@@ -33,7 +33,7 @@ pub struct Reliability {
 #[serde(deny_unknown_fields)]
 pub struct Fusion {
     /// By category and method.
-    pub methods: BTreeMap<Category, BTreeMap<String, Reliability>>,
+    pub methods: BTreeMap<Category, BTreeMap<String, MethodError>>,
     /// Mean and standard deviation of the logarithm of the capacity in mL, by category.
     pub priors: BTreeMap<Category, [f64; 2]>,
 }
@@ -144,7 +144,7 @@ impl Fusion {
 }
 
 /// Every container counts once: the bias is the mean of their means.
-fn reliability(errors: &BTreeMap<u8, Vec<f64>>) -> Reliability {
+fn reliability(errors: &BTreeMap<u8, Vec<f64>>) -> MethodError {
     let means: Vec<f64> = errors.values().map(|e| mean(e)).collect();
     let bias = mean(&means);
     let n = means.len() as f64;
@@ -155,7 +155,7 @@ fn reliability(errors: &BTreeMap<u8, Vec<f64>>) -> Reliability {
     let within = within.sum::<f64>() / n;
     // One container tells nothing about the spread between containers.
     let between = variance(&means).map_or(0.25, |v| v * (1.0 + 1.0 / n));
-    Reliability { bias, deviation: (within + between).sqrt().max(FLOOR), containers: means.len() }
+    MethodError { bias, deviation: (within + between).sqrt().max(FLOOR), containers: means.len() }
 }
 
 fn mean(values: &[f64]) -> f64 {
@@ -187,7 +187,7 @@ mod tests {
         for (bias, deviation) in
             [(f64::NAN, 0.1), (1e3, 0.1), (0.0, 0.0), (0.0, -1.0), (0.0, f64::INFINITY)]
         {
-            let changed = Reliability { bias, deviation, ..good };
+            let changed = MethodError { bias, deviation, ..good };
             let of = fusion.methods.get_mut(&Category::Cup).unwrap();
             of.insert("good".into(), changed);
             let error = fusion.check().unwrap_err();

@@ -58,8 +58,8 @@ pub struct Args {
     predictions: Option<PathBuf>,
     /// Write a report into this folder: report.html with scores, confusion matrix, curves, the errors
     /// to listen to, what the recordings are like, which features matter and whether more rows would
-    /// help; tables as CSV and LaTeX, figures as SVG and PDF. Trains about six times as often. With
-    /// --net, without the parts that train again.
+    /// help; tables as CSV and LaTeX, figures as SVG and PDF. Trains about six times as many
+    /// models; with --net, the parts that train again are left out.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
     /// Repeat with N seeds, from --seed on: how much of a difference between two classifiers is

@@ -354,8 +354,8 @@ fn same_lengths(
 /// What makes the frames of a transform cheaper.
 fn less_work(p: &CqtParams) -> String {
     format!(
-        "larger, or a multiple of a higher power of two, or fewer bins: with n_bins = {} and \
-         bins_per_octave = {} a sample takes more than {MOST_WORK} steps",
+        "larger or divisible by a higher power of two (or use fewer bins: n_bins = {} with \
+         bins_per_octave = {} takes more than {MOST_WORK} steps a sample)",
         p.n_bins, p.bins_per_octave
     )
 }

@@ -24,7 +24,9 @@ fn fill(writer: &mut NpzWriter, from: usize) -> Vec<EntryRecord> {
         let header = Header::new(DType::F32, &[10, index * 10]).fortran();
         let record = match index % 2 {
             0 => writer.array(&name, &header, bytemuck::cast_slice(&data)),
-            _ => writer.array_from(&name, &header, bytemuck::cast_slice::<_, u8>(&data)),
+            _ => {
+                writer.array_with(&name, &header, |out| out.write_all(bytemuck::cast_slice(&data)))
+            }
         };
         records.push(record.unwrap());
     }
@@ -174,7 +176,7 @@ fn a_failed_entry_leaves_no_trace() {
         let header = Header::new(DType::F32, &[10]);
         let failures: [NpzError; 3] = [
             writer.array("x", &header, &[0; 39]).unwrap_err(),
-            writer.array_from("x", &header, &[0; 41][..]).unwrap_err(),
+            writer.array_with("x", &header, |out| out.write_all(&[0; 41])).unwrap_err(),
             writer
                 .array_with("x", &header, |out| {
                     out.write_all(&[1; 5000])?;

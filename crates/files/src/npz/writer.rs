@@ -145,30 +145,6 @@ impl NpzWriter {
         Ok(self.push(entry))
     }
 
-    /// Appends an array whose elements come from a stream; none of it is held in memory.
-    ///
-    /// # Errors
-    /// As [`NpzWriter::array`].
-    pub fn array_from(
-        &mut self,
-        name: &str,
-        header: &Header,
-        mut data: impl Read,
-    ) -> Result<EntryRecord, NpzError> {
-        self.array_with(name, header, |out| {
-            let length = header.data_len().unwrap_or(0).clamp(1, CHUNK as u64);
-            let mut chunk = vec![0u8; length as usize];
-            loop {
-                match data.read(&mut chunk) {
-                    Ok(0) => return Ok(()),
-                    Ok(n) => out.write_all(&chunk[..n])?,
-                    Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                    Err(error) => return Err(error),
-                }
-            }
-        })
-    }
-
     /// Appends an array whose elements `produce` writes, in pieces of any size.
     ///
     /// # Errors

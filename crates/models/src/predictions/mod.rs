@@ -29,7 +29,6 @@ use crate::dataset::{DatasetError, LabelFile, LabelSource};
 use crate::error::ModelError;
 use crate::fusion;
 
-pub use read::UNKNOWN;
 pub use record::{Record, RecordWriter, Unit};
 pub use write::{Cell, Form, PredictionWriter};
 
@@ -39,6 +38,8 @@ pub const SUM_TOLERANCE: f64 = 1e-3;
 /// Largest prediction file that is read.
 const MAX_BYTES: u64 = 2 << 30;
 
+/// What a prediction is called that was rejected.
+pub const UNKNOWN: &str = "unknown";
 /// Columns that name a recording, the first of them that a file has.
 const KEYS: [&str; 3] = ["id", "Configuration ID", "path"];
 

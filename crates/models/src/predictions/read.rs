@@ -6,13 +6,10 @@ use corsmal_files::csv_text;
 
 use super::{
     Id, KEYS, MAX_BYTES, PredictionError, PredictionRow, PredictionTable, Result, SUM_TOLERANCE,
-    content,
+    UNKNOWN, content,
 };
 use crate::labels::Labels;
 use crate::table::argmax;
-
-/// What a prediction is called that was rejected.
-pub const UNKNOWN: &str = "unknown";
 
 impl PredictionTable {
     /// Reads a file; a recording may have several lines, one for each of its windows. Columns

@@ -7,7 +7,7 @@ use std::io::{self, Write};
 use serde_json::{Map, Value};
 
 use super::PredictionTable;
-use super::read::UNKNOWN;
+use super::UNKNOWN;
 
 /// How lines are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -57,7 +57,13 @@ impl Layer for MaxPool {
     }
 
     fn output(&self, input: Shape) -> Result<Shape> {
-        let refusal = || NetError::layer(self.describe(), "an image of at least its size", input);
+        let refusal = || {
+            NetError::layer(
+                self.describe(),
+                "an image at least as large as the pooling window",
+                input,
+            )
+        };
         let (height, width) = self.sizes(input).ok_or_else(refusal)?;
         Ok(Shape::Image { height, width, channels: input.numbers() })
     }

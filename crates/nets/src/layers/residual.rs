@@ -37,7 +37,7 @@ impl Layer for Residual {
     fn output(&self, input: Shape) -> Result<Shape> {
         let through = |chain: &Chain| chain.iter().try_fold(input, |s, l| l.output(s));
         let (main, shortcut) = (through(&self.main)?, through(&self.shortcut)?);
-        let refusal = || NetError::layer(self.describe(), "one shape behind both paths", input);
+        let refusal = || NetError::layer(self.describe(), "the same shape from both paths", input);
         (main == shortcut).then_some(main).ok_or_else(refusal)
     }
 

@@ -1,4 +1,4 @@
-use super::Definition;
+use super::definition::Definition;
 use crate::batch::Shape;
 use crate::layers::{Conv2d, Dropout, Flatten, Linear, Relu};
 use crate::front_end::FrontEnd;

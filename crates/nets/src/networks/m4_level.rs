@@ -1,4 +1,4 @@
-use super::Definition;
+use super::definition::Definition;
 use crate::batch::Shape;
 use crate::layers::{Dropout, LastStep, Linear, Recurrent, Sigmoid};
 use crate::network::{Architecture, Body, Input};

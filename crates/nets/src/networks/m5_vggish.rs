@@ -1,4 +1,4 @@
-use super::Definition;
+use super::definition::Definition;
 use crate::batch::Shape;
 use crate::layers::{LastStep, Linear, Recurrent, Relu};
 use crate::network::{Architecture, Body, Input};

@@ -1,4 +1,4 @@
-use super::Definition;
+use super::definition::Definition;
 use crate::batch::Shape;
 use crate::layer::Chain;
 use crate::layers::{Conv2d, Dropout, Flatten, Linear, MaxPool, Relu};

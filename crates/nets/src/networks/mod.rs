@@ -2,37 +2,11 @@
 //!
 //! Adding one: a file here with a [`Definition`], and one line in the list below.
 
-use serde_json::{Map, Value, json};
-
 use crate::error::{NetError, Result};
-use crate::front_end::FrontEnd;
-use crate::network::{Architecture, Input, Network};
-use crate::parameters::Declared;
-use crate::recipe::Recipe;
 
-/// A published network.
-#[derive(Clone, Copy, Debug)]
-pub struct Definition {
-    /// name on the command line; hyphen and underscore are equal
-    pub name: &'static str,
-    /// one sentence
-    pub about: &'static str,
-    /// outputs of the published network
-    pub outputs: usize,
-    /// whether the outputs are classes, and not one number
-    pub classifies: bool,
-    /// layers, for a number of outputs
-    pub architecture: fn(usize) -> Architecture,
-    /// what an item is, in words
-    pub takes: &'static str,
-    /// how its input comes from a recording; `None` where it takes what other networks give, or
-    /// more than sound
-    pub front_end: Option<FrontEnd>,
-    /// training as the published code has it, its defects corrected
-    pub recipe: Recipe,
-    /// what the paper says where it differs from the code
-    pub paper: &'static [(&'static str, f64)],
-}
+mod definition;
+
+pub use definition::{Definition, MAX_OUTPUTS};
 
 macro_rules! networks {
     ($($module:ident: $($definition:ident),+;)*) => {
@@ -77,74 +51,6 @@ pub fn classifier(name: &str) -> Result<&'static Definition> {
     match definition.classifies {
         true => Ok(definition),
         false => Err(NetError::NoClasses { network: definition.name.into() }),
-    }
-}
-
-/// Most outputs a network may be given.
-pub const MAX_OUTPUTS: usize = 1 << 16;
-
-impl Definition {
-    /// The recipe with some keys replaced. Besides those of [`Recipe::with`] there is `recipe`: code,
-    /// the default, or paper, which the other keys go on from.
-    ///
-    /// # Errors
-    /// As [`Recipe::with`].
-    pub fn recipe_with(&self, changes: &Map<String, Value>) -> Result<Recipe> {
-        let mut changes = changes.clone();
-        let from = match changes.remove("recipe") {
-            None => self.recipe,
-            Some(Value::String(name)) if name == "code" => self.recipe,
-            Some(Value::String(name)) if name == "paper" => {
-                let number = |&(key, value): &(&str, f64)| {
-                    let whole = value >= 1.0;
-                    let value = if whole { json!(value as u64) } else { json!(value) };
-                    (key.to_owned(), value)
-                };
-                self.recipe.with(&self.paper.iter().map(number).collect())?
-            }
-            Some(other) => {
-                return Err(NetError::Recipe {
-                    key: "recipe".into(),
-                    value: other.to_string(),
-                    allowed: "code or paper".into(),
-                });
-            }
-        };
-        from.with(&changes)
-    }
-
-    /// With initial numbers of this seed and as many outputs as asked for, or as published.
-    ///
-    /// # Errors
-    /// No outputs, or more than [`MAX_OUTPUTS`].
-    pub fn build(&self, outputs: Option<usize>, seed: u64) -> Result<Network> {
-        Network::new(self.name, self.layers(outputs)?, seed)
-    }
-
-    /// Its parameters without their numbers.
-    ///
-    /// # Errors
-    /// As [`Definition::build`].
-    pub(crate) fn declared(&self, outputs: usize) -> Result<Vec<Declared>> {
-        let layers = self.layers(Some(outputs))?;
-        Ok(layers.body.layers().flat_map(|layer| layer.parameters()).collect())
-    }
-
-    /// What an item is: name and shape of each input.
-    pub fn inputs(&self) -> Vec<Input> {
-        (self.architecture)(self.outputs).inputs
-    }
-
-    fn layers(&self, outputs: Option<usize>) -> Result<Architecture> {
-        let outputs = outputs.unwrap_or(self.outputs);
-        if outputs == 0 || outputs > MAX_OUTPUTS {
-            return Err(NetError::Recipe {
-                key: "outputs".into(),
-                value: outputs.to_string(),
-                allowed: format!("1 to {MAX_OUTPUTS}"),
-            });
-        }
-        Ok((self.architecture)(outputs))
     }
 }
 

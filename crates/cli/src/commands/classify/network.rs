@@ -8,7 +8,7 @@ use corsmal_models::predictions::{Record, Unit};
 use corsmal_nets::dataset::Dataset;
 use corsmal_nets::model::NetModel;
 use corsmal_systems::SystemError;
-use corsmal_systems::listening::{Formats, Listener, Verdict};
+use corsmal_systems::listening::{Answer, Formats, Listener};
 
 use super::args::{Args, check_changes, recordings};
 use super::records::{End, Records, delivered, path_of};
@@ -61,8 +61,8 @@ pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Fail
     let mut records = args.records(&labels, &model.header.target, unit, &columns)?;
     let stop = crate::interrupt::flag();
     let mut unread = false;
-    let mut each = |input: &Input, verdict: Verdict| -> Result<bool, Failure> {
-        unread = !write(&mut records, input, verdict)?;
+    let mut each = |input: &Input, answer: Answer| -> Result<bool, Failure> {
+        unread = !write(&mut records, input, answer)?;
         Ok(!unread)
     };
     let heard = match windowing {
@@ -107,8 +107,8 @@ fn of_inputs(
 }
 
 /// Writes a line; `false` where nobody reads any more.
-fn write(records: &mut Records, input: &Input, verdict: Verdict) -> Result<bool, Failure> {
-    let Verdict { span, windows, status, decision, reason } = verdict;
+fn write(records: &mut Records, input: &Input, answer: Answer) -> Result<bool, Failure> {
+    let Answer { span, windows, status, decision, reason } = answer;
     if let Some(reason) = reason {
         eprintln!("{}: {}: {reason}", input.id, status.name());
     }

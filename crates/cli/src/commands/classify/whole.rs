@@ -56,8 +56,8 @@ pub fn run(args: &Args, model: &Model) -> Result<(End, Option<Records>), Failure
         let labels = input.labels.iter().map(|(_, value)| value.as_str()).collect();
         let path = path(input);
         // What was refused by its header is in no table.
-        let refused = Verdict { status: Status::Mismatch, class: None, proba: None };
-        let Verdict { status, class, proba } =
+        let refused = Answer { status: Status::Mismatch, class: None, proba: None };
+        let Answer { status, class, proba } =
             predictions.remove(input.id.as_str()).unwrap_or(refused);
         let id = input.id.as_str();
         let record =
@@ -105,7 +105,7 @@ pub fn of_features(
         let labels = rows.get(id).map_or(Vec::new(), |&row| {
             table.columns().iter().map(|(_, values)| values[row].as_str()).collect()
         });
-        let Verdict { status, class, proba } = predictions[id].clone();
+        let Answer { status, class, proba } = predictions[id].clone();
         let record = Record { id, path, span: None, windows: 0, status, labels, class, proba };
         if !delivered(records.write(&record))? {
             return Ok((End::Unread, Some(records)));
@@ -116,7 +116,7 @@ pub fn of_features(
 
 /// What the line of a recording says.
 #[derive(Clone)]
-struct Verdict {
+struct Answer {
     status: Status,
     class: Option<usize>,
     proba: Option<Vec<f64>>,
@@ -146,9 +146,9 @@ fn predictions(
     table: &LabelledTable,
     formats: &FormatRule,
     (args, meter): (&Args, &Meter),
-) -> Result<HashMap<String, Verdict>, Failure> {
+) -> Result<HashMap<String, Answer>, Failure> {
     let mut found = HashMap::new();
-    let none = |status| Verdict { status, class: None, proba: None };
+    let none = |status| Answer { status, class: None, proba: None };
     let by_id: HashMap<&str, &Outcome> =
         table.outcomes.iter().map(|o| (o.id.as_str(), o)).collect();
     let not_finite: HashMap<usize, usize> = table.non_finite().into_iter().collect();
@@ -179,7 +179,7 @@ fn predictions(
             let id = &table.ids[row];
             let status = by_id.get(id.as_str()).map_or(Status::Ok, |o| o.status);
             let proba = proba.as_ref().map(|proba| proba.row(at).to_vec());
-            let prediction = Verdict { status, class: Some(classes[at]), proba };
+            let prediction = Answer { status, class: Some(classes[at]), proba };
             found.insert(id.clone(), prediction);
         }
     }
