@@ -473,7 +473,9 @@ fn capacities_complete_what_is_heard() {
     let file = dir.path().join("capacity.csv");
     std::fs::write(&file, table).unwrap();
     let forest = Baseline::all().into_iter().filter(|b| b.slug() == "zcr-mfcc-rf").collect();
-    let capacities = vec![CapacityTable { name: "M 2".into(), path: file, own: None }];
+    let learned_from = vec![2, 11];
+    let capacities =
+        vec![CapacityTable { name: "M 2".into(), path: file, own: None, learned_from }];
     let report = run(&BenchmarkOptions { capacities, ..options(&data, &out, forest) }).unwrap();
 
     let tables: Vec<_> = report.sections.iter().flat_map(|s| &s.tables).collect();

@@ -77,7 +77,7 @@ impl Request<'_> {
             false => self.dataset.provenance()?,
         };
         let training = self.training(&target, recipe)?;
-        let progress = |told: Progress<'_>| self.tell(examples.definition.name, told);
+        let progress = |told: Progress<'_>| tell(examples.definition.name, told, self.quiet, F1);
         training.train(&examples, files, progress).map_err(|e| self.stopped(e))
     }
 
@@ -94,7 +94,7 @@ impl Request<'_> {
             eprintln!("warning: {warning}");
         }
         let found = training
-            .cross_validate(&examples, folds, |fold, told| self.tell(fold, told))
+            .cross_validate(&examples, folds, |fold, told| tell(fold, told, self.quiet, F1))
             .map_err(|e| self.stopped(e))?;
         Ok((examples, found))
     }
@@ -111,30 +111,6 @@ impl Request<'_> {
         Ok(Some(folder))
     }
 
-    /// A line for each epoch; before any step, false once the user asked to stop.
-    fn tell(&self, name: &str, progress: Progress<'_>) -> bool {
-        if !self.quiet && progress.step.is_none() {
-            let (done, total) = (progress.epochs.len(), progress.total);
-            let left = span(progress.left.as_secs());
-            match progress.epochs.last() {
-                None => {
-                    let mib = progress.memory.div_ceil(1 << 20);
-                    let epochs = if total == 1 { "epoch" } else { "epochs" };
-                    eprintln!("{name}: {total} {epochs}, about {left}, {mib} MiB of memory");
-                }
-                Some(epoch) => {
-                    let score = epoch.score.map(|s| format!(", weighted F1 {:.2}", 100.0 * s));
-                    let score = score.unwrap_or_default();
-                    eprintln!(
-                        "{name}: epoch {done} of {total}: loss {:.4}{score}, {left} left",
-                        epoch.loss
-                    );
-                }
-            }
-        }
-        !interrupt::flag().load(Ordering::SeqCst)
-    }
-
     fn stopped(&self, error: SystemError) -> Failure {
         match (&error, &self.network.checkpoints) {
             (SystemError::Network(NetError::Stopped { .. }), Some(_)) => {
@@ -146,6 +122,34 @@ impl Request<'_> {
             _ => error.into(),
         }
     }
+}
+
+/// The score of classifiers.
+const F1: &str = "weighted F1";
+
+/// A line for each epoch with its score of this name, unless `quiet`; before any step, false once the user asked to
+/// stop.
+pub fn tell(name: &str, progress: Progress<'_>, quiet: bool, scored: &str) -> bool {
+    if !quiet && progress.step.is_none() {
+        let (done, total) = (progress.epochs.len(), progress.total);
+        let left = span(progress.left.as_secs());
+        match progress.epochs.last() {
+            None => {
+                let mib = progress.memory.div_ceil(1 << 20);
+                let epochs = if total == 1 { "epoch" } else { "epochs" };
+                eprintln!("{name}: {total} {epochs}, about {left}, {mib} MiB of memory");
+            }
+            Some(epoch) => {
+                let score = epoch.score.map(|s| format!(", {scored} {:.2}", 100.0 * s));
+                let score = score.unwrap_or_default();
+                eprintln!(
+                    "{name}: epoch {done} of {total}: loss {:.4}{score}, {left} left",
+                    epoch.loss
+                );
+            }
+        }
+    }
+    !interrupt::flag().load(Ordering::SeqCst)
 }
 
 /// Whether a path names a file of a network's inputs, and not recordings; a stream is not looked into.

@@ -6,11 +6,12 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::course::Course;
 use crate::history::Epoch;
+use crate::loss::Targets;
 use crate::network::Network;
 use crate::parameters::Parameters;
 use crate::recipe::Recipe;
-use crate::task::Task;
 use crate::trainer::Trainer;
 use crate::weights::{self, State, WeightsError};
 
@@ -29,18 +30,25 @@ struct Text {
     best: Option<(f64, usize)>,
 }
 
-/// Says which training this is: recipe, network, items, classes, rows.
-pub(crate) fn key(network: &Network, task: Task<'_>, recipe: &Recipe) -> String {
+/// Says which training this is: recipe, network, items, targets, rows.
+pub(crate) fn key(network: &Network, course: &Course<'_>, recipe: &Recipe) -> String {
     let mut hash = blake3::Hasher::new();
     let recipe = serde_json::to_string(recipe).unwrap_or_default();
     hash.update(format!("{} {recipe}", network.name()).as_bytes());
-    for numbers in [task.classes, task.train, task.watched] {
+    let (classes, numbers): (&[usize], &[f32]) = match course.targets {
+        Targets::Classes(classes) => (classes, &[]),
+        Targets::Numbers(numbers) => (&[], numbers),
+    };
+    numbers.iter().for_each(|v| {
+        hash.update(&v.to_le_bytes());
+    });
+    for numbers in [classes, course.train, course.watched] {
         hash.update(b"/");
         numbers.iter().for_each(|n| {
             hash.update(&(*n as u64).to_le_bytes());
         });
     }
-    for column in &task.items.columns {
+    for column in &course.items.columns {
         hash.update(b"/");
         column.offsets.iter().for_each(|n| {
             hash.update(&(*n as u64).to_le_bytes());

@@ -20,6 +20,7 @@
 pub mod batch;
 pub mod capacity;
 mod checkpoint;
+mod course;
 pub mod cross_validation;
 pub mod dataset;
 pub mod error;

@@ -1,17 +1,17 @@
 //! How much memory a training takes, told before it begins.
 
 use crate::batch::Shape;
+use crate::course::Course;
 use crate::error::{NetError, Result};
 use crate::network::Network;
 use crate::recipe::{Offset, OptimizerKind, Recipe, Select};
-use crate::task::Task;
 
 const FLOAT: u64 = 4;
 
 /// Bytes that a training takes, roughly: items, numbers with their gradients and moments, and what
 /// the largest step keeps for its way back.
-pub(crate) fn of_training(network: &Network, task: Task<'_>, recipe: &Recipe) -> u64 {
-    let items: usize = task.items.columns.iter().map(|c| c.values.len()).sum();
+pub(crate) fn of_training(network: &Network, course: &Course<'_>, recipe: &Recipe) -> u64 {
+    let items: usize = course.items.columns.iter().map(|c| c.values.len()).sum();
     let copies = match (recipe.optimizer, recipe.select) {
         (OptimizerKind::Adam, Select::Last) => 4,
         (OptimizerKind::Adam, _) => 5,
@@ -19,9 +19,9 @@ pub(crate) fn of_training(network: &Network, task: Task<'_>, recipe: &Recipe) ->
         (OptimizerKind::Sgd, _) => 4,
     };
     let longest = |column: usize, numbers: usize| {
-        let ends = &task.items.columns[column].offsets;
+        let ends = &course.items.columns[column].offsets;
         let of = |&row: &usize| (ends[row + 1] - ends[row]) / numbers;
-        task.train.iter().chain(task.watched).map(of).max().unwrap_or(0)
+        course.train.iter().chain(course.watched).map(of).max().unwrap_or(0)
     };
     let shapes = network.inputs().iter().enumerate().map(|(column, input)| match input.shape {
         Shape::Sequence { numbers, .. } if recipe.offset == Offset::Random => {
@@ -33,7 +33,7 @@ pub(crate) fn of_training(network: &Network, task: Task<'_>, recipe: &Recipe) ->
         shape => shape,
     });
     let step = network.kept(&shapes.collect::<Vec<_>>()) as u64;
-    let batch = recipe.batch.min(task.train.len()) as u64;
+    let batch = recipe.batch.min(course.train.len()) as u64;
     let numbers = items as u64 + copies * network.parameters().count() as u64;
     FLOAT * numbers.saturating_add(batch.saturating_mul(step))
 }
@@ -57,6 +57,7 @@ pub(crate) fn available() -> Option<u64> {
 mod tests {
     use super::*;
     use crate::items::{Column, Items};
+    use crate::loss::{Loss, Targets};
     use crate::networks;
 
     #[test]
@@ -66,9 +67,15 @@ mod tests {
         let of = |steps: usize, batch: usize| {
             let item = vec![0.0; steps * 128];
             let items = Items { columns: vec![Column::of([&item[..], &item, &item, &item])] };
-            let task =
-                Task { items: &items, classes: &[0, 1, 2, 0], train: &[0, 1, 2, 3], watched: &[] };
-            of_training(&network, task, &Recipe { batch, ..definition.recipe })
+            let course = Course {
+                items: &items,
+                targets: &Targets::Classes(vec![0, 1, 2, 0]),
+                train: &[0, 1, 2, 3],
+                watched: &[],
+                loss: Loss::CrossEntropy,
+                class_weights: Vec::new(),
+            };
+            of_training(&network, &course, &Recipe { batch, ..definition.recipe })
         };
         // Numbers, gradients and two moments.
         let least = 4 * 4 * network.parameters().count() as u64;

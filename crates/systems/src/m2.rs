@@ -11,8 +11,8 @@ pub(crate) const M2: Definition = Definition {
     name: "m2",
     about: "M2 (NTNU-ERC): type by a convolutional network over MFCC",
     networks: &["m2_type", "m2_capacity"],
-    limits: &["Its capacity network needs the depth views, which `benchmark` does not read; \
-               `corsmal-feat capacity` estimates capacities from views, and --add joins them."],
+    limits: &["Its capacity network needs the depth views: `corsmal-feat capacity train --method m2`, \
+               then `benchmark --capacity m2=MODEL`."],
     make: Some(|settings| Box::new(Ntnu(settings))),
 };
 

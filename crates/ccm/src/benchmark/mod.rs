@@ -32,7 +32,7 @@ use corsmal_models::pipeline::{Pipeline, PipelineSpec};
 use corsmal_report::Report;
 use rayon::prelude::*;
 
-use crate::dataset::DataSet;
+use crate::dataset::{Container, DataSet, Subset};
 use crate::error::{CcmError, Result};
 use baselines::BaselineResult;
 use matrix::Store;
@@ -48,6 +48,26 @@ pub struct CapacityTable {
     pub path: PathBuf,
     /// What a method that was run on these recordings takes, such as `rgb1+rgb2`; `None` for a table that was given.
     pub own: Option<&'static str>,
+    /// Containers that its model learned from, where that is known.
+    pub learned_from: Vec<u8>,
+}
+
+impl CapacityTable {
+    /// What makes the training scores too good.
+    fn caution(&self) -> Option<String> {
+        let trained = self.learned_from.iter().copied().filter_map(Container::new);
+        let trained: Vec<String> = trained
+            .filter(|container| container.subset() == Subset::Training)
+            .map(|container| format!("C{}", container.number()))
+            .collect();
+        (!trained.is_empty()).then(|| {
+            format!(
+                "The model of {} learned from {}: its scores on them are too good. Those on the test parts are not affected.",
+                self.name,
+                trained.join(", ")
+            )
+        })
+    }
 }
 
 /// What to run.
@@ -121,6 +141,9 @@ pub fn run(
     for nowhere in given.filter(|a| !a.is_any()) {
         progress(&format!("{}: has no recording of this data set", nowhere.name));
     }
+    let cautions: Vec<String> =
+        options.capacities.iter().filter_map(CapacityTable::caution).collect();
+    cautions.iter().for_each(|caution| progress(caution));
     files::prepare(&options.out)?;
     let store = Store { folder: options.out.join("features"), jobs: options.jobs, stop };
     let mut outcomes = Vec::new();
@@ -165,8 +188,13 @@ pub fn run(
     }
     files::write_random(&options.out, &rows, options.seed)?;
     let made = &options.made;
-    let predicted =
-        Predicted { outcomes: &outcomes, runs: &runs, added: &added, capacities: &capacities };
+    let predicted = Predicted {
+        outcomes: &outcomes,
+        runs: &runs,
+        added: &added,
+        capacities: &capacities,
+        cautions: &cautions,
+    };
     files::write_completed(&options.out, &rows, &predicted, options.seed)?;
     let report = report::report(&set, &rows, &predicted, options.seed, made)?;
     let figures = options.out.join("figures");

@@ -185,12 +185,19 @@ pub trait RegionNetwork: std::fmt::Debug + Send + Sync {
     fn identity(&self) -> &str;
 }
 
-/// M2: its network on the region of interest of the last depth image of view 3 that has one.
+/// M2: its network on the region of interest.
 pub(super) fn m2(
     views: &Views,
     network: &dyn RegionNetwork,
     variant: Variant,
 ) -> Result<Estimate, Problem> {
+    let region = m2_region(views, variant)?;
+    let capacity = network.capacity_ml(&region).map_err(Problem::Damaged)?;
+    Ok(Estimate { capacity, frames: 1, ..Estimate::default() })
+}
+
+/// The region of interest of the last depth image of view 3 that has one.
+pub(super) fn m2_region(views: &Views, variant: Variant) -> Result<Region, Problem> {
     let frames = views.frames(Kind::Depth, 3)?;
     // The published program never looks at the first image of a short video.
     let first = match (variant, frames.len()) {
@@ -199,8 +206,7 @@ pub(super) fn m2(
     };
     for frame in frames[first..].iter().rev() {
         if let Some(region) = region::region(&views.depth(3, frame.number)?) {
-            let capacity = network.capacity_ml(&region).map_err(Problem::Damaged)?;
-            return Ok(Estimate { capacity, frames: 1, ..Estimate::default() });
+            return Ok(region);
         }
     }
     let looked = frames.len() - first;

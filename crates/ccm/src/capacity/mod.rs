@@ -5,6 +5,7 @@
 mod combine;
 mod methods;
 mod model;
+mod regions;
 mod table;
 mod views;
 
@@ -17,7 +18,7 @@ use corsmal_vision::cuboid::Outliers;
 use corsmal_vision::lode::Variant;
 use rayon::prelude::*;
 
-use crate::dataset::{DataSet, Recording, Subset};
+use crate::dataset::{Container, DataSet, Recording, Subset};
 use crate::error::{CcmError, Result};
 use crate::submission::RowKey;
 
@@ -25,6 +26,7 @@ pub use combine::combine_files;
 pub use methods::{Estimate, RegionNetwork, Sizes};
 use model::Sample;
 pub use model::{CapacityModel, HeldOut};
+pub use regions::{LabelledRegion, Regions, regions};
 pub use table::{Measured, PRIOR_MASS_G, Row, read, write};
 pub use views::{Frame, Kind, Problem, Views};
 
@@ -115,7 +117,7 @@ pub fn run(
         )));
     }
     if options.method == Method::M2 && options.network.is_none() {
-        return Err(CcmError::Request("method m2 needs the weights of its network".into()));
+        return Err(CcmError::Request("method m2 needs its network: a model of `corsmal-feat capacity train --method m2`, or weights".into()));
     }
     let set = DataSet::open(&options.data)?;
     each(&set.recordings, options.jobs, progress, interrupted, |recording| {
@@ -231,8 +233,7 @@ pub fn train(
 ) -> Result<Learned> {
     let fused = options.method == Method::Fused;
     let set = DataSet::open(&options.data)?;
-    let recordings: Vec<Recording> =
-        set.recordings.iter().filter(|r| r.part == Subset::Training).cloned().collect();
+    let recordings = training(&set);
     let results = each(&recordings, options.jobs, progress, interrupted, |recording| {
         sample(&set, recording, options).transpose().map(|result| (key(recording), result))
     })?;
@@ -268,15 +269,25 @@ pub fn train(
     Ok(Learned { model, held_out, recordings: recordings.len(), failed })
 }
 
+/// The training recordings.
+fn training(set: &DataSet) -> Vec<Recording> {
+    set.recordings.iter().filter(|r| r.part == Subset::Training).cloned().collect()
+}
+
+/// Container and capacity in mL, where both are known.
+fn labelled(set: &DataSet, recording: &Recording) -> Option<(Container, f64)> {
+    let annotated = set.annotation(recording).map(|a| a.capacity_ml).filter(|c| *c > 0.0);
+    let container = recording.container?;
+    Some((container, annotated.or(container.capacity_ml())?))
+}
+
 /// What a training recording teaches; `None` where its container or capacity is not known.
 fn sample(
     set: &DataSet,
     recording: &Recording,
     options: &CapacityOptions,
 ) -> std::result::Result<Option<Sample>, Problem> {
-    let annotated = set.annotation(recording).map(|a| a.capacity_ml).filter(|c| *c > 0.0);
-    let Some(container) = recording.container else { return Ok(None) };
-    let Some(capacity) = annotated.or(container.capacity_ml()) else { return Ok(None) };
+    let Some((container, capacity)) = labelled(set, recording) else { return Ok(None) };
     let views = Views::of(recording, options.detections.as_deref());
     let detections = methods::table(&views)?;
     let estimates = match options.method {

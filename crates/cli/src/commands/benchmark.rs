@@ -1,6 +1,8 @@
 //! `corsmal-feat benchmark`: the paper's audio baselines and systems on a CCM data set.
 
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use corsmal_ccm::CcmError;
@@ -21,7 +23,7 @@ use crate::paragraphs::wrapped;
                         corsmal-feat benchmark --data ~/CCM --out report --baselines zcr-mfcc-rf \
                         --add M6=m6_acc.csv\n  corsmal-feat benchmark --data ~/CCM --out report \
                         --methods m1,m2,m4,m6 --epochs 5\n  corsmal-feat benchmark --data ~/CCM --out report \
-                        --capacity m5 --capacity M2=m2.csv\n\nSystems are trained on whole containers \
+                        --capacity m5 --capacity fused=fused.capacity --capacity M2=m2.csv\n\nSystems are trained on whole containers \
                         held out in three folds, by their published recipes; `corsmal-feat nets` \
                         lists them.\n\nThe report is report/report.html; the same tables \
                         are in report/tables and report/report.json.")]
@@ -52,9 +54,10 @@ pub struct Args {
     #[arg(long, value_parser = named_file, value_name = "NAME=CSV")]
     add: Vec<(String, PathBuf)>,
     /// Capacities that have their rows and complete the submissions of every baseline and system, so
-    /// that the filling mass has all three tasks: a table of `capacity` with its name, or m4 or m5 to
-    /// run it on the views of the data set first (by the detections beside the recordings).
-    #[arg(long, value_parser = capacity_source, value_name = "NAME=CSV|m4|m5")]
+    /// that the filling mass has all three tasks: a table of `capacity` with its name, or a method to run on
+    /// the views of the data set first (by the detections beside the recordings): m4, m5, or m2, m3 or
+    /// fused with the model of `capacity train`, m2 also with published weights.
+    #[arg(long, value_parser = capacity_source, value_name = "m4|m5|METHOD=MODEL|NAME=CSV")]
     capacity: Vec<CapacitySource>,
     /// Seed of the forests and of the pseudo-random estimates.
     #[arg(long, default_value_t = 1)]
@@ -90,40 +93,68 @@ fn named_file(text: &str) -> Result<(String, PathBuf), String> {
 #[derive(Clone)]
 enum CapacitySource {
     Given(String, PathBuf),
-    Run(Method),
+    Run(Method, Option<PathBuf>),
 }
 
 fn capacity_source(text: &str) -> Result<CapacitySource, String> {
+    let learning = |name: &str| {
+        let all = [Method::M2, Method::M3, Method::Fused];
+        all.into_iter().find(|method| method.name() == name)
+    };
     match text {
-        "m4" => Ok(CapacitySource::Run(Method::M4)),
-        "m5" => Ok(CapacitySource::Run(Method::M5)),
+        "m4" => Ok(CapacitySource::Run(Method::M4, None)),
+        "m5" => Ok(CapacitySource::Run(Method::M5, None)),
         _ if text.contains('=') => {
-            named_file(text).map(|(name, path)| CapacitySource::Given(name, path))
+            let (name, path) = named_file(text)?;
+            Ok(match learning(&name).filter(|_| !is_text(&path)) {
+                Some(method) => CapacitySource::Run(method, Some(path)),
+                None => CapacitySource::Given(name, path),
+            })
         }
-        _ => Err(
-            "expected m4, m5, or NAME=FILE such as M2=m2.csv; `corsmal-feat capacity` makes such \
-                  files, also by methods that need weights or a model"
-                .into(),
-        ),
+        _ => Err("expected m4, m5, m2=MODEL, m3=MODEL or fused=MODEL by `corsmal-feat capacity train`, or \
+                  NAME=FILE such as M2=m2.csv by `corsmal-feat capacity`"
+            .into()),
+    }
+}
+
+/// Whether a file is a table, and neither a model nor weights; one that cannot be opened is none.
+fn is_text(path: &Path) -> bool {
+    let mut start = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(64).read_to_end(&mut start));
+    read.is_ok() && !start.starts_with(b"{") && !start.contains(&0) && !start.starts_with(b"PK")
+}
+
+/// What a method takes, as the paper's tables write it.
+fn takes(method: Method) -> &'static str {
+    match method {
+        Method::M2 => "depth3",
+        Method::M3 => "rgb1+rgb2+rgb3+rgb4",
+        Method::M4 => "rgb1+depth1",
+        Method::M5 => "rgb1+rgb2",
+        Method::Fused => "rgb1+rgb2+rgb3+rgb4+depth1+depth2",
     }
 }
 
 /// The tables of capacities; methods are run and their tables kept in `capacity/` below the output.
-fn capacities(args: &Args) -> Result<Vec<CapacityTable>, CcmError> {
+fn capacities(args: &Args) -> Result<Option<Vec<CapacityTable>>, Failure> {
     let mut tables = Vec::with_capacity(args.capacity.len());
     for source in &args.capacity {
-        let method = match source {
+        let (method, model) = match source {
             CapacitySource::Given(name, path) => {
-                tables.push(CapacityTable { name: name.clone(), path: path.clone(), own: None });
+                let (name, path) = (name.clone(), path.clone());
+                tables.push(CapacityTable { name, path, own: None, learned_from: Vec::new() });
                 continue;
             }
-            CapacitySource::Run(method) => *method,
+            CapacitySource::Run(method, model) => (*method, model.as_deref()),
         };
-        let name = method.name().to_uppercase();
+        let name = match method {
+            Method::Fused => "Fused".into(),
+            _ => method.name().to_uppercase(),
+        };
         if !args.quiet {
             eprintln!("{name}: capacities");
         }
-        let options = CapacityOptions {
+        let mut options = CapacityOptions {
             data: args.data.clone(),
             detections: None,
             method,
@@ -134,15 +165,23 @@ fn capacities(args: &Args) -> Result<Vec<CapacityTable>, CcmError> {
             jobs: args.jobs.count(),
             seed: args.seed,
         };
-        let rows = capacity::run(&options, &|_, _| {}, crate::interrupt::flag())?;
+        // M2's weights may be a model or the published ones.
+        let (model, weights) = if method == Method::M2 { (None, model) } else { (model, None) };
+        let learned_from = super::capacity::read_learned(&mut options, model, weights)?;
+        let rows = match capacity::run(&options, &|_, _| {}, crate::interrupt::flag()) {
+            Err(error @ CcmError::Interrupted) => {
+                eprintln!("{error}");
+                return Ok(None);
+            }
+            rows => rows?,
+        };
         let folder = args.out.join("capacity");
         std::fs::create_dir_all(&folder).map_err(|e| CcmError::io(&folder, e))?;
         let path = folder.join(format!("{}.csv", method.name()));
         capacity::write(&path, &options, &rows)?;
-        let own = if method == Method::M4 { "rgb1+depth1" } else { "rgb1+rgb2" };
-        tables.push(CapacityTable { name, path, own: Some(own) });
+        tables.push(CapacityTable { name, path, own: Some(takes(method)), learned_from });
     }
-    Ok(tables)
+    Ok(Some(tables))
 }
 
 #[cfg(feature = "nets")]
@@ -173,10 +212,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         eprintln!("{error}");
         Ok(ExitCode::from(INTERRUPTED))
     };
-    let capacities = match capacities(&args) {
-        Err(error @ CcmError::Interrupted) => return interrupted(error),
-        tables => tables?,
-    };
+    let Some(capacities) = capacities(&args)? else { return Ok(ExitCode::from(INTERRUPTED)) };
     let options = BenchmarkOptions {
         data: args.data.clone(),
         out: args.out.clone(),

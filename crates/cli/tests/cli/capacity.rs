@@ -57,7 +57,10 @@ fn every_method_estimates_from_files() {
         assert!(measured.count() * 3 > found.len() * 2, "{method}: {found:?}");
     }
     #[cfg(feature = "nets")]
-    m2_runs_on_weights(dir.path(), &data);
+    {
+        m2_runs_on_weights(dir.path(), &data);
+        m2_learns(dir.path(), &data);
+    }
     // A table that is damaged: its recording is named, the others teach.
     let broken = std::fs::read_dir(Path::new(&data).join("train/2/audio")).unwrap().next();
     let broken = broken.unwrap().unwrap().file_name().into_string().unwrap();
@@ -90,10 +93,76 @@ fn m2_runs_on_weights(dir: &Path, data: &str) {
     weights::write(&file, &state.collect()).unwrap();
     let out = dir.join("m2.csv");
     let arguments = ["capacity", "--method", "m2", "--data", data, "--out", text(&out)];
-    assert!(refused(&arguments).contains("needs --weights"));
+    assert!(refused(&arguments).contains("capacity train --method m2"));
     done(&[&arguments[..], &["--weights", text(&file)]].concat());
     let found = rows(&out);
     assert_eq!(found, vec![("ok".to_string(), 1000.0); 9]);
+}
+
+/// Few epochs: the same bytes on one thread and on two, and estimates by what was learned.
+#[cfg(feature = "nets")]
+fn m2_learns(dir: &Path, data: &str) {
+    let train = |jobs: &str, out: &Path| {
+        let how = ["--set", "epochs=2", "--set", "batch=4", "--seed", "5", "--jobs", jobs];
+        let what = ["capacity", "train", "--method", "m2", "--data", data, "--out", text(out)];
+        done(&[&what[..], &how].concat())
+    };
+    let models = [dir.join("m2-1.safetensors"), dir.join("m2-2.safetensors")];
+    let said = train("1", &models[0]);
+    assert!(said.contains("9 of 9 recordings") && said.contains("SYNTHETIC"), "{said}");
+    train("2", &models[1]);
+    let [first, second] = models.each_ref().map(|path| std::fs::read(path).unwrap());
+    assert_eq!(first, second);
+    let out = dir.join("m2-learned.csv");
+    let estimate =
+        ["capacity", "--method", "m2", "--data", data, "--overwrite", "--out", text(&out)];
+    done(&[&estimate[..], &["--model", text(&models[0])]].concat());
+    let learned = std::fs::read_to_string(&out).unwrap();
+    assert_eq!(rows(&out).len(), 9);
+    // A model holds weights, too; weights are no model.
+    done(&[&estimate[..], &["--weights", text(&models[0])]].concat());
+    let without_time = |table: &str| -> Vec<String> {
+        let lines = table.lines().map(|line| line.split(',').take(3).collect::<Vec<_>>().join(","));
+        lines.collect()
+    };
+    assert_eq!(without_time(&std::fs::read_to_string(&out).unwrap()), without_time(&learned));
+    let weights = dir.join("m2.npz");
+    let refusal = refused(&[&estimate[..], &["--model", text(&weights)]].concat());
+    assert!(refusal.contains("no model of M2's capacity network"), "{refusal}");
+    let other = ["capacity", "train", "--method", "m3", "--data", data, "--out", "new.capacity"];
+    assert!(refused(&[&other[..], &["--set", "epochs=2"]].concat()).contains("--method m2"));
+    let seeds = ["--set", "seed=1"];
+    let m2 = ["capacity", "train", "--method", "m2", "--data", data, "--out", "new.capacity"];
+    assert!(refused(&[&m2[..], &seeds].concat()).contains("--seed"));
+    benchmark_runs_what_learned(dir, &models[0]);
+}
+
+/// `benchmark` runs methods that learned, by their models, and says where their scores are too good.
+#[cfg(feature = "nets")]
+fn benchmark_runs_what_learned(dir: &Path, m2: &Path) {
+    // All recordings: baselines need every class.
+    let data = dir.join("all");
+    done(&["synth", "--small", "--vision", "--quiet", "--out", text(&data)]);
+    let data = text(&data);
+    let report = dir.join("report");
+    let fused = dir.join("fused.capacity");
+    let of = |name: &str, path: &Path| format!("{name}={}", text(path));
+    let (m2, m3, both) = (of("m2", m2), of("m3", &fused), of("fused", &fused));
+    let common =
+        ["benchmark", "--data", data, "--out", text(&report), "--baselines", "zcr-mfcc-knn"];
+    let said =
+        done(&[&common[..], &["--capacity", &m2, "--capacity", &m3, "--capacity", &both]].concat());
+    for name in ["M2", "M3", "Fused"] {
+        assert!(said.contains(&format!("ZCR + MFCCs + kNN, capacity {name}")), "{name}: {said}");
+        let file = report.join(format!("capacity/{}.csv", name.to_lowercase()));
+        assert_eq!(rows(&file).len(), 57);
+    }
+    let page = std::fs::read_to_string(report.join("report.html")).unwrap();
+    assert!(page.contains("The model of M2 learned from C1, C2"), "no caution");
+    let wrong = of("m2", &fused);
+    let refusal =
+        refused(&["benchmark", "--data", data, "--out", "no-report", "--capacity", &wrong]);
+    assert!(refusal.contains("fused.capacity"), "{refusal}");
 }
 
 #[test]

@@ -10,13 +10,15 @@ fn what_needs_networks_names_the_build_that_has_them() {
     // As a trained network begins.
     std::fs::write(&model, b"\x02\0\0\0\0\0\0\0{}").unwrap();
     let out = path("out.safetensors");
-    let commands: [&[&str]; 6] = [
+    let commands: [&[&str]; 8] = [
         &["nets"],
         &["train", text(&features), "--net", "m2-type", "-o", text(&out)],
         &["cross-validate", text(&features), "--net", "m2-type"],
         &["embed", "vggish", "a.wav", "--weights", "w.pth", "-o", "out.npz"],
         &["benchmark", "--data", "ccm", "--out", "report", "--methods", "m1"],
         &["classify", "-m", text(&model), "x.wav"],
+        &["capacity", "train", "--method", "m2", "--data", "ccm", "-o", text(&out)],
+        &["capacity", "--method", "m2", "--model", text(&model), "--data", "ccm", "-o", "o.csv"],
     ];
     for command in commands {
         let message = refused(command);

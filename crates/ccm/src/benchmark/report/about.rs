@@ -57,8 +57,12 @@ pub(super) fn methods() -> Section {
     }
 }
 
-/// `nowhere`: methods whose files have no recording of the data set.
-pub(super) fn notes<'a>(nowhere: impl Iterator<Item = &'a str>, runs: &[Run]) -> Section {
+/// `nowhere`: methods whose files have no recording of the data set; `cautions`: of models that learned from what they estimate.
+pub(super) fn notes<'a>(
+    nowhere: impl Iterator<Item = &'a str>,
+    cautions: &[String],
+    runs: &[Run],
+) -> Section {
     let of_systems = runs
         .iter()
         .flat_map(|run| run.notes.iter().map(|note| format!("{} of this run: {note}", run.name)));
@@ -81,6 +85,7 @@ pub(super) fn notes<'a>(nowhere: impl Iterator<Item = &'a str>, runs: &[Run]) ->
         ]
         .into_iter()
         .chain(absent)
+        .chain(cautions.iter().cloned())
         .chain(of_systems)
         .collect(),
         ..Section::new("notes", "Reading these figures")

@@ -1,16 +1,17 @@
 //! `corsmal-feat capacity`: capacities of containers from the views of a data set.
 
 mod combine;
+#[cfg(feature = "nets")]
 mod network;
 mod source;
 mod train;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Subcommand, ValueEnum};
 use corsmal_ccm::CcmError;
-use corsmal_ccm::capacity::{self, CapacityModel, Method, Row};
+use corsmal_ccm::capacity::{self, CapacityModel, CapacityOptions, Method, Row};
 use corsmal_vision::cuboid::Outliers;
 use serde_json::json;
 
@@ -28,6 +29,7 @@ use source::{Source, VariantName};
 Examples:
   corsmal-feat capacity --method m5 --data ~/CCM --out capacity.csv
   corsmal-feat capacity --method m2 --weights task3.pth --data ~/CCM --out capacity.csv
+  corsmal-feat capacity train --method m2 --data ~/CCM --out m2.safetensors
   corsmal-feat capacity train --method fused --data ~/CCM --out fused.capacity
   corsmal-feat capacity --method fused --model fused.capacity --data ~/CCM --out capacity.csv
   corsmal-feat fuse --joint joint.csv --capacity capacity.csv --out submission.csv
@@ -69,11 +71,11 @@ struct Estimate {
     /// How m4 drops outliers; by default as --variant says.
     #[arg(long, value_enum)]
     outliers: Option<OutliersName>,
-    /// What `capacity train` learned, for m3 and fused.
+    /// What `capacity train` learned, for m2, m3 and fused.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Published weights of its network, for m2: .pth, .npz or .safetensors under PyTorch's names.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "model")]
     weights: Option<PathBuf>,
     /// Table to write.
     #[arg(long, short, value_name = "CSV")]
@@ -87,7 +89,7 @@ struct Estimate {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum MethodName {
-    /// A network on the nearest large thing in the third view's depth; needs --weights.
+    /// A network on the nearest large thing in the third view's depth; needs --model or --weights.
     M2,
     /// Gaussian processes on the sizes of detected regions in four views.
     M3,
@@ -142,10 +144,7 @@ fn estimate(args: Estimate) -> Result<ExitCode, Failure> {
             OutliersName::Kept => Outliers::Kept,
         };
     }
-    options.model = args.model.as_deref().map(CapacityModel::read).transpose()?;
-    if method == Method::M2 {
-        options.network = Some(network::read(args.weights.as_deref())?);
-    }
+    read_learned(&mut options, args.model.as_deref(), args.weights.as_deref())?;
     let rows = match capacity::run(&options, &|_, _| {}, crate::interrupt::flag()) {
         Err(error @ CcmError::Interrupted) => {
             eprintln!("{error}");
@@ -177,6 +176,45 @@ fn estimate(args: Estimate) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::from(FAILED_FILES));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Reads what a method learned into its options; the containers that a model learned from.
+pub(super) fn read_learned(
+    options: &mut CapacityOptions,
+    model: Option<&Path>,
+    weights: Option<&Path>,
+) -> Result<Vec<u8>, Failure> {
+    if options.method == Method::M2 {
+        return read_network(options, model, weights);
+    }
+    options.model = model.map(CapacityModel::read).transpose()?;
+    Ok(options.model.as_ref().map(|m| learned_containers(&m.provenance)).unwrap_or_default())
+}
+
+#[cfg(feature = "nets")]
+fn read_network(
+    options: &mut CapacityOptions,
+    model: Option<&Path>,
+    weights: Option<&Path>,
+) -> Result<Vec<u8>, Failure> {
+    let (network, containers) = network::read(model, weights)?;
+    options.network = Some(network);
+    Ok(containers)
+}
+
+#[cfg(not(feature = "nets"))]
+fn read_network(
+    _: &mut CapacityOptions,
+    _: Option<&Path>,
+    _: Option<&Path>,
+) -> Result<Vec<u8>, Failure> {
+    Err(super::nets::absent())
+}
+
+/// The containers that a model's provenance names.
+fn learned_containers(provenance: &serde_json::Value) -> Vec<u8> {
+    let containers = provenance["containers"].as_array().into_iter().flatten();
+    containers.filter_map(|n| n.as_u64()?.try_into().ok()).collect()
 }
 
 fn first_failure(rows: &[Row]) -> Option<(String, String)> {

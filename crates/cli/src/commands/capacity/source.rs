@@ -19,11 +19,11 @@ pub(super) struct Source {
     /// `detections/` beside each recording's audio folder.
     #[arg(long, value_name = "DIR")]
     detections: Option<PathBuf>,
-    /// Seed of votes and isolation forests.
+    /// Seed of votes, isolation forests and the training of m2's network.
     #[arg(long, default_value_t = 1)]
-    seed: u64,
+    pub(super) seed: u64,
     #[command(flatten)]
-    jobs: Jobs,
+    pub(super) jobs: Jobs,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
