@@ -175,6 +175,11 @@ fn capacities(args: &Args) -> Result<Option<Vec<CapacityTable>>, Failure> {
             }
             rows => rows?,
         };
+        if !rows.iter().any(|row| row.status() == "ok") {
+            eprintln!(
+                "warning: {name} measures no capacity: its rows in the tables are priors, or missing"
+            );
+        }
         let folder = args.out.join("capacity");
         std::fs::create_dir_all(&folder).map_err(|e| CcmError::io(&folder, e))?;
         let path = folder.join(format!("{}.csv", method.name()));

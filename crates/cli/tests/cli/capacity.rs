@@ -162,7 +162,7 @@ fn benchmark_runs_what_learned(dir: &Path, m2: &Path) {
     assert!(page.contains("The model of Fused learned from C1, C2"), "no caution");
     let wrong = of("m2", &fused);
     let refusal =
-        refused(&["benchmark", "--data", data, "--out", "no-report", "--capacity", &wrong]);
+        refused(&["benchmark", "-q", "--data", data, "--out", "no-report", "--capacity", &wrong]);
     assert!(refusal.contains("fused.capacity"), "{refusal}");
 }
 
