@@ -5,8 +5,8 @@ use std::path::Path;
 
 use corsmal_files::draft;
 
-use super::CapacityOptions;
 use super::methods::Estimate;
+use super::options::CapacityOptions;
 use super::views::Problem;
 use crate::dataset::Dimensions;
 use crate::error::{CcmError, Result};
