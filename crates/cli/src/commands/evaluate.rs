@@ -35,12 +35,15 @@ enum Format {
 
 /// Arguments of `evaluate`.
 #[derive(clap::Args)]
-#[command(after_help = "Example:\n  corsmal-feat evaluate --submission team.csv --annotations \
+#[command(after_help = "Example:\n  corsmal-feat evaluate team.csv --annotations \
                         ccm_train_annotation.csv --rules toolkit\n\n\
                         Quirks of each rule set are described in docs/ccm.md.")]
 pub struct Args {
     /// Submissions in the official 2020 or 2022 format.
-    #[arg(long, required = true, num_args = 1.., value_name = "CSV")]
+    #[arg(value_name = "CSV", required_unless_present = "submission")]
+    submissions: Vec<PathBuf>,
+    /// The same as the positional arguments; these follow the others.
+    #[arg(long, num_args = 1.., value_name = "CSV")]
     submission: Vec<PathBuf>,
     /// Official annotation file.
     #[arg(long, value_name = "CSV")]
@@ -97,7 +100,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let annotations = Annotations::read(&args.annotations)?;
     let read_baseline = args.baseline.as_deref().map(Submission::read).transpose()?;
     let mut results = Vec::new();
-    for path in &args.submission {
+    for path in args.submissions.iter().chain(&args.submission) {
         let submission = Submission::read(path)?;
         let baseline = match &read_baseline {
             Some(baseline) => baseline.clone(),

@@ -17,15 +17,18 @@ use crate::publish;
 #[command(after_help = "\
 Examples:
   corsmal-feat extract --in train/ --out train.npz --preset spec9216-code
-  corsmal-feat pca --features train.npz --n-components 128 --out pca.npz
+  corsmal-feat pca train.npz --n-components 128 --out pca.npz
   corsmal-feat extract --in test/ --out test.npz --preset spec9216-code --project pca.npz
 
 The file records the configuration of its features; features of any other are refused. Fit on
 training recordings only: extract never fits.")]
 pub struct Args {
     /// Training features: an .npz or .parquet of `extract` with summaries.
-    #[arg(long, value_name = "FILE")]
-    features: PathBuf,
+    #[arg(value_name = "FEATURES", required_unless_present = "named")]
+    features: Option<PathBuf>,
+    /// The same as the positional argument.
+    #[arg(long = "features", value_name = "FILE", conflicts_with = "features")]
+    named: Option<PathBuf>,
     /// Components to keep, at most the rows and the features of the file; 128 by default, or as many
     /// as there can be.
     #[arg(long, value_name = "N")]
@@ -44,10 +47,11 @@ pub struct Args {
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     require_npz(&args.out)?;
     publish::check(&args.out, args.overwrite)?;
-    if draft::same(&args.features, &args.out) {
+    let features = args.features.or(args.named).unwrap_or_default();
+    if draft::same(&features, &args.out) {
         return Err(Failure::new(format!("{}: would replace the features", args.out.display())));
     }
-    let projection = Projection::fit(&args.features, args.n_components)?;
+    let projection = Projection::fit(&features, args.n_components)?;
     projection.save(&args.out)?;
     let (from, to) = (projection.n_inputs(), projection.n_components());
     args.told.tell(

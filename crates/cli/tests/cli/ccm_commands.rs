@@ -166,7 +166,7 @@ fn submissions_with_faults_are_refused_and_quirks_are_noted() {
     let other = dir.path().join("with, mass.csv");
     std::fs::write(&other, format!("{header}\n{}\n", weighed.join("\n"))).unwrap();
     std::fs::write(&file, format!("{header}\n{}\n", rows.join("\n"))).unwrap();
-    let both = ["evaluate", "--rules", "paper", "--submission", text(&file), text(&other)];
+    let both = ["evaluate", text(&file), text(&other), "--rules", "paper"];
     let both = [&both[..], &["--annotations", text(&annotations)]].concat();
     let csv = lines(&run(&[&both[..], &["--format", "csv"]].concat()).stdout);
     let mut reader = csv::Reader::from_reader(csv.as_bytes());

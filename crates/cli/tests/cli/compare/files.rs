@@ -290,7 +290,7 @@ fn a_projection_keeps_what_there_is_by_default() {
     let files = Files::new();
     extract(&files, "a.npz", &["--preset", "esc26"]);
     let (features, out) = (files.path("a.npz"), files.path("pca.npz"));
-    let told = run(&["pca", "--features", text_of(&features), "--out", text_of(&out)]);
+    let told = run(&["pca", text_of(&features), "--out", text_of(&out)]);
     let told = text(&told.stdout);
     assert!(told.contains("26 features to 2 components"), "{told}");
 }
