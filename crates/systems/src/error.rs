@@ -37,7 +37,7 @@ pub enum SystemError {
         network: String,
     },
     /// A network that gives classes where embeddings are wanted.
-    #[error("{network} gives classes, not embeddings: vggish gives embeddings")]
+    #[error("{network} gives classes: vggish gives embeddings")]
     NoEmbeddings {
         /// the network
         network: &'static str,
