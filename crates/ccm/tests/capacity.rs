@@ -139,7 +139,7 @@ fn methods_measure_synthetic_views_and_faults_are_rows() {
     let error = capacity::run(&options(root, Method::M3), &|_, _| {}, &stop).unwrap_err();
     assert!(error.to_string().contains("capacity train --method m3"), "{error}");
     let error = capacity::run(&options(root, Method::M2), &|_, _| {}, &stop).unwrap_err();
-    assert!(error.to_string().contains("needs the weights"), "{error}");
+    assert!(error.to_string().contains("needs its network"), "{error}");
     impossible_models_are_refused(&root.join("model.json"));
     let m2 = |scale, variant| {
         let network: Arc<dyn RegionNetwork> = Arc::new(Height(scale));
