@@ -149,6 +149,8 @@ def specshow(
                     " bins_per_octave of the transform"
                 )
             return found
+        if axis == "chroma":
+            return np.arange(count) * 12 / bins_per_octave
         if axis in _PLAIN or axis in _CLASSES:
             return np.arange(count)
         names = ", ".join(str(name) for name in (*_TIMES, *_HERTZ, *_CLASSES, *_PLAIN))
@@ -159,8 +161,8 @@ def specshow(
     mesh = axes.pcolormesh(x, y, values, **kwargs)
     if ax is None:
         plot.sci(mesh)
-    _decorate(axes.xaxis, axes.set_xscale, x_axis, bins_per_octave)
-    _decorate(axes.yaxis, axes.set_yscale, y_axis, bins_per_octave)
+    _decorate(axes.xaxis, axes.set_xscale, x_axis)
+    _decorate(axes.yaxis, axes.set_yscale, y_axis)
     alike = any(x_axis in kind and y_axis in kind for kind in _ALIKE)
     if auto_aspect and alike and axes.get_xlim() == axes.get_ylim():
         axes.set_aspect("equal")
@@ -168,13 +170,15 @@ def specshow(
 
 
 def _colors(values: npt.NDArray[Any]) -> str:
-    """A map of two colours where there are values on both sides of zero."""
+    """A map of two colours where there are values on both sides of zero, but for the outermost."""
     if values.dtype == bool:
         return "gray_r"
-    return "coolwarm" if values.size and values.min() < 0 < values.max() else "magma"
+    finite = values[np.isfinite(values)]
+    low, high = np.percentile(finite, [2, 98]) if finite.size else (0.0, 0.0)
+    return "coolwarm" if low < 0 < high else "magma"
 
 
-def _decorate(axis: Any, scale: Callable[..., Any], kind: str | None, bins: int) -> None:
+def _decorate(axis: Any, scale: Callable[..., Any], kind: str | None) -> None:
     """Scale, ticks and label of an axis."""
     ticker = import_module("matplotlib.ticker")
     if kind in ("log", "cqt_hz", "cqt_note"):
@@ -187,7 +191,7 @@ def _decorate(axis: Any, scale: Callable[..., Any], kind: str | None, bins: int)
         scale("symlog", base=2, linthresh=1000.0)
         axis.set_major_formatter(ticker.ScalarFormatter())
     elif kind == "chroma":
-        steps = np.array([0, 2, 4, 5, 7, 9, 11]) * bins // 12
+        steps = np.array([0, 2, 4, 5, 7, 9, 11])
         axis.set_major_locator(ticker.FixedLocator(steps))
         axis.set_major_formatter(ticker.FixedFormatter(("C", "D", "E", "F", "G", "A", "B")))
     elif kind == "tonnetz":
@@ -282,5 +286,5 @@ def waveshow(
         fill = axes.fill_betweenx if transpose else axes.fill_between
         drawn = fill(times, lower, upper, step=where, label=label, **kwargs)
     along, scale = (axes.yaxis, axes.set_yscale) if transpose else (axes.xaxis, axes.set_xscale)
-    _decorate(along, scale, axis, 12)
+    _decorate(along, scale, axis)
     return drawn

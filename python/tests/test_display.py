@@ -34,6 +34,7 @@ AXES: tuple[dict[str, Any], ...] = (
     {"y_axis": "cqt_hz", "x_axis": "frames", "tuning": 0.3, "bins_per_octave": 24},
     {"y_axis": "cqt_note", "x_axis": "time", "fmin": 55, "bins_per_octave": 36},
     {"y_axis": "chroma", "x_axis": "time"},
+    {"y_axis": "chroma", "x_axis": "chroma", "bins_per_octave": 24},
     {"y_axis": None, "x_axis": None},
 )
 
@@ -50,6 +51,20 @@ def test_places_are_librosas(axes: dict[str, Any]) -> None:
     assert here.get_xlim() == pytest.approx(there.get_xlim())
     assert here.get_ylim() == pytest.approx(there.get_ylim())
     assert ours.get_cmap().name == theirs.get_cmap().name
+
+
+@pytest.mark.parametrize("low", [-np.inf, -1.0, 0.0, 0.5])
+def test_colours_are_librosas(low: float) -> None:
+    data = np.linspace(0.1, 1.0, 600).reshape(20, 30)
+    data[0, :2] = low
+    signed = data - 0.5
+    signed[0, 0] = low
+    for values in (data, signed, data > 0.5):
+        (_, ours), (_, theirs) = (
+            drawn(corsmal_feat.display, values),
+            drawn(display, values),
+        )
+        assert ours.get_cmap().name == theirs.get_cmap().name
 
 
 @pytest.mark.parametrize("auto", [True, False])
