@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::course::Course;
+use crate::epochs;
 use crate::error::{NetError, Result};
 use crate::items::Items;
 use crate::layers::softmax;
@@ -50,7 +51,7 @@ pub fn fit(
         let proba = probabilities(network, task.items, task.watched, recipe)?;
         Ok(score(&truth, &labels(&proba)))
     };
-    course.run(network, recipe, checkpoint, rate, progress)
+    epochs::run(&course, network, recipe, checkpoint, rate, progress)
 }
 
 /// Probability of each class for these items, in batches in their order.

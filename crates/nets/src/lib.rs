@@ -23,6 +23,7 @@ mod checkpoint;
 mod course;
 pub mod cross_validation;
 pub mod dataset;
+mod epochs;
 pub mod error;
 pub mod fit;
 pub mod front_end;

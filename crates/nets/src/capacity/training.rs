@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
-use super::{CapacityNetwork, Header, LARGEST_ML, SIDE};
+use super::estimate::{LARGEST_ML, millilitres_of};
+use super::network::{CapacityNetwork, FORMAT, Header};
 use crate::course::Course;
+use crate::epochs;
 use crate::error::{NetError, Result};
 use crate::fit::Progress;
 use crate::items::{Column, Items};
@@ -101,9 +103,9 @@ pub fn train(
         let scores: Result<Vec<f64>> = watched.iter().map(score).collect();
         Ok(scores?.iter().sum::<f64>() / watched.len() as f64)
     };
-    let history = course.run(&mut network, recipe, checkpoint, rate, progress)?;
+    let history = epochs::run(&course, &mut network, recipe, checkpoint, rate, progress)?;
     let header = Header {
-        format: super::FORMAT,
+        format: FORMAT,
         network: network.name().into(),
         recipe: *recipe,
         history,
@@ -135,18 +137,11 @@ fn refuse(examples: &[Example<'_>], train: usize, watched: usize, recipe: &Recip
     Ok(())
 }
 
-/// Capacity in mL of one region.
-pub(super) fn millilitres_of(network: &Network, depth: &[f32], size: [f32; 2]) -> Result<f64> {
-    let depth = (vec![1, 1, SIDE, SIDE], depth.to_vec());
-    let inputs = network.batches(&[depth, (vec![1, 2], size.to_vec())])?;
-    let outputs = network.forward(&inputs)?;
-    Ok(outputs.values.values().iter().map(|&y| f64::from(y) * LARGEST_ML).sum())
-}
-
 #[cfg(test)]
 mod tests {
     use serde_json::json;
 
+    use super::super::estimate::SIDE;
     use super::*;
 
     /// Images whose depth says the capacity.

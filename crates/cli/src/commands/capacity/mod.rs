@@ -1,6 +1,7 @@
 //! `corsmal-feat capacity`: capacities of containers from the views of a data set.
 
 mod combine;
+mod learning;
 #[cfg(feature = "nets")]
 mod network;
 mod source;
@@ -18,7 +19,7 @@ use serde_json::json;
 use crate::args::Told;
 use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
 use crate::publish;
-use source::{Source, VariantName};
+use source::{Source, VariantName, learned_containers};
 
 /// Arguments of `capacity`.
 #[derive(clap::Args)]
@@ -209,12 +210,6 @@ fn read_network(
     _: Option<&Path>,
 ) -> Result<Vec<u8>, Failure> {
     Err(super::nets::absent())
-}
-
-/// The containers that a model's provenance names.
-fn learned_containers(provenance: &serde_json::Value) -> Vec<u8> {
-    let containers = provenance["containers"].as_array().into_iter().flatten();
-    containers.filter_map(|n| n.as_u64()?.try_into().ok()).collect()
 }
 
 fn first_failure(rows: &[Row]) -> Option<(String, String)> {

@@ -12,8 +12,8 @@ use corsmal_nets::capacity::{self as network, CapacityNetwork, Example};
 use corsmal_nets::fit::Progress;
 use corsmal_vision::region::Region;
 
-use super::source::VariantName;
-use super::{learned_containers, train};
+use super::learning::{Args, SYNTHETIC, ended};
+use super::source::{VariantName, learned_containers};
 use crate::failure::{Failure, INTERRUPTED};
 use crate::interrupt;
 use crate::networks::tell;
@@ -54,7 +54,7 @@ pub(super) fn read(
 }
 
 /// Trains it on the regions of a data set's training recordings.
-pub(super) fn train(args: train::Args) -> Result<ExitCode, Failure> {
+pub(super) fn train(args: Args) -> Result<ExitCode, Failure> {
     let mut changes = key_values(&args.parameters)?;
     if changes.insert("seed".into(), args.source.seed.into()).is_some() {
         return Err(Failure::new("--set seed=…: give --seed instead"));
@@ -103,8 +103,8 @@ pub(super) fn train(args: train::Args) -> Result<ExitCode, Failure> {
         let (out, used) = (args.out.display(), regions.len());
         println!("{out}: learned from the regions of {used} of {recordings} recordings");
         if synthetic {
-            println!("{}", train::SYNTHETIC);
+            println!("{}", SYNTHETIC);
         }
     }
-    Ok(train::ended(&failed, recordings))
+    Ok(ended(&failed, recordings))
 }

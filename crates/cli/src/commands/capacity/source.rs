@@ -50,3 +50,9 @@ impl Source {
         }
     }
 }
+
+/// The containers that a model's provenance names.
+pub(super) fn learned_containers(provenance: &serde_json::Value) -> Vec<u8> {
+    let containers = provenance["containers"].as_array().into_iter().flatten();
+    containers.filter_map(|n| n.as_u64()?.try_into().ok()).collect()
+}
