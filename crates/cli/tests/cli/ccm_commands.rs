@@ -182,8 +182,8 @@ fn submissions_with_faults_are_refused_and_quirks_are_noted() {
     assert_eq!(width(shown[1]), width(shown[2]) + 1, "{table}");
     // The thirteen scores of the toolkit fit a terminal, for one submission and for several.
     let one = ["evaluate", "--submission", text(&file), "--annotations", text(&annotations)];
-    let several = [&["evaluate"], &both[3..]].concat();
-    for arguments in [&one[..], &several] {
+    let several = ["evaluate", text(&file), text(&other), "--annotations", text(&annotations)];
+    for arguments in [&one[..], &several[..]] {
         let table = lines(&run(arguments).stdout);
         assert!(table.contains("filling level, weighted F1"), "{table}");
         assert!(table.lines().all(|line| line.chars().count() <= 80), "{table}");
