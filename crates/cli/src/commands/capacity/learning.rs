@@ -7,6 +7,7 @@ use clap::ValueEnum;
 use corsmal_ccm::submission::RowKey;
 
 use super::source::Source;
+use crate::args::Told;
 use crate::failure::FAILED_FILES;
 
 /// Arguments of `capacity train`.
@@ -39,9 +40,8 @@ pub struct Args {
     /// Replace an existing output.
     #[arg(long)]
     pub(super) overwrite: bool,
-    /// Print only warnings and errors.
-    #[arg(long, short)]
-    pub(super) quiet: bool,
+    #[command(flatten)]
+    pub(super) told: Told,
 }
 
 /// Methods that learn.

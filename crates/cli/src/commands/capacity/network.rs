@@ -11,6 +11,7 @@ use corsmal_nets::NetError;
 use corsmal_nets::capacity::{self as network, CapacityNetwork, Example};
 use corsmal_nets::fit::Progress;
 use corsmal_vision::region::Region;
+use serde_json::json;
 
 use super::learning::{Args, SYNTHETIC, ended};
 use super::source::{VariantName, learned_containers};
@@ -84,7 +85,7 @@ pub(super) fn train(args: Args) -> Result<ExitCode, Failure> {
         examples.push(Example { depth, size, millilitres: *capacity });
     }
     let progress =
-        |told: Progress<'_>| tell("m2_capacity", told, args.quiet, "score of those held out");
+        |told: Progress<'_>| tell("m2_capacity", told, args.told.quiet, "score of those held out");
     let trained = pool.install(|| {
         network::train(&examples, &recipe, provenance, checkpoint.as_deref(), progress)
     });
@@ -99,8 +100,15 @@ pub(super) fn train(args: Args) -> Result<ExitCode, Failure> {
     })?;
     let bytes = trained.to_bytes().map_err(Failure::new)?;
     corsmal_files::draft::write(&args.out, &bytes)?;
-    if !args.quiet {
-        let (out, used) = (args.out.display(), regions.len());
+    let used = regions.len();
+    if args.told.json {
+        let summary = json!({
+            "out": args.out, "recordings": recordings, "used": used, "failed": failed.len(),
+            "synthetic": synthetic,
+        });
+        println!("{}", serde_json::to_string_pretty(&summary)?);
+    } else if !args.told.quiet {
+        let out = args.out.display();
         println!("{out}: learned from the regions of {used} of {recordings} recordings");
         if synthetic {
             println!("{}", SYNTHETIC);

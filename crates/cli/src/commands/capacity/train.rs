@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use corsmal_ccm::CcmError;
 use corsmal_ccm::capacity::{self, HeldOut, Method};
+use serde_json::json;
 
 pub use super::learning::Args;
 use super::learning::{Learning, SYNTHETIC, ended};
@@ -35,8 +36,14 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
             model => model?,
         };
     model.write(&args.out)?;
-    if !args.quiet {
-        let used = &model.provenance["with_container"];
+    let used = &model.provenance["with_container"];
+    if args.told.json {
+        let summary = json!({
+            "out": args.out, "recordings": recordings, "used": used, "failed": failed.len(),
+            "synthetic": model.provenance["synthetic"],
+        });
+        println!("{}", serde_json::to_string_pretty(&summary)?);
+    } else if !args.told.quiet {
         println!("{}: learned from {used} of {recordings} recordings", args.out.display());
         if model.provenance["synthetic"] == true {
             println!("{SYNTHETIC}");
