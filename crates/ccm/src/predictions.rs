@@ -8,7 +8,7 @@ use std::path::Path;
 
 use corsmal_models::predictions::{PredictionRow, PredictionTable};
 
-use crate::dataset::{Container, PathParts, SequenceName};
+use crate::dataset::{Container, PathParts, SequenceName, Subset};
 use crate::error::{CcmError, Result};
 use crate::submission::RowKey;
 use crate::table::Table;
@@ -132,27 +132,72 @@ pub(crate) fn file_key(file: &str) -> Option<RowKey> {
     }
 }
 
+/// How a table names a recording. Ids begin at 0 in every part of the flat release.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Named {
+    /// The part, where the container or a column tells; else an id may be of any.
+    pub part: Option<Subset>,
+    /// The recording in it.
+    pub key: RowKey,
+}
+
+impl Named {
+    /// A recording whose part nothing but its container tells.
+    pub fn alone(key: RowKey) -> Self {
+        let part = match key {
+            RowKey::Sequence(container, _) => Container::new(container).map(Container::subset),
+            RowKey::Id(_) => None,
+        };
+        Self { part, key }
+    }
+}
+
+impl fmt::Display for Named {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.part, self.key) {
+            (Some(part), RowKey::Id(_)) => write!(f, "{} of the {} part", self.key, part.name()),
+            _ => self.key.fmt(f),
+        }
+    }
+}
+
+/// The recording in a row of a table of capacities.
+pub(crate) fn row_name(table: &Table, row: usize, file: usize) -> Result<Named> {
+    let key = file_key(table.text(row, file))
+        .ok_or_else(|| table.fault(row, file, "a name such as id10_0000.png or id000000.png"))?;
+    let named = Named::alone(key);
+    let Some(column) = table.find("part").filter(|_| named.part.is_none()) else {
+        return Ok(named);
+    };
+    let text = table.text(row, column);
+    if text.is_empty() {
+        return Ok(named);
+    }
+    let part = Subset::ALL.into_iter().find(|part| part.name() == text);
+    let expected = "training, public test or private test";
+    let part = part.ok_or_else(|| table.fault(row, column, expected))?;
+    Ok(Named { part: Some(part), key })
+}
+
 /// Capacity estimates by recording: columns `fileName` (`id10_0000.png`: container and sequence
 /// number; `id000000.png`: id of the flat release) and `capacity[mL]`, as M5 published them; -1 is not an estimate.
+/// A column `part` tells the ids of several parts apart.
 ///
 /// # Errors
 /// [`CcmError`] with line and column for other values, and for recordings that occur twice.
-pub fn read_capacities(path: &Path) -> Result<HashMap<RowKey, Option<f64>>> {
+pub fn read_capacities(path: &Path) -> Result<HashMap<Named, Option<f64>>> {
     let table = Table::read(path)?;
     let file = table.column("fileName")?;
     let capacity = table.column("capacity[mL]")?;
     let mut by_key = HashMap::new();
     let mut seen = HashSet::new();
     for row in 0..table.rows() {
-        let key = file_key(table.text(row, file));
-        let key = key.ok_or_else(|| {
-            table.fault(row, file, "a name such as id10_0000.png or id000000.png")
-        })?;
-        if !seen.insert(key) {
+        let named = row_name(&table, row, file)?;
+        if !seen.insert(named) {
             return Err(table.fault(row, file, "a name that occurs once"));
         }
         let value = table.number(row, capacity)?;
-        by_key.insert(key, (value > -1.0).then_some(value));
+        by_key.insert(named, (value > -1.0).then_some(value));
     }
     Ok(by_key)
 }

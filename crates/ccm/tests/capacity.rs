@@ -10,9 +10,9 @@ use corsmal_ccm::capacity::{
     self, CapacityModel, CapacityOptions, Method, Problem, RegionNetwork, Row, Views,
 };
 use corsmal_ccm::dataset::{
-    Annotations, Container, DataSet, Filling, FillingLevel, FillingType, SequenceName,
+    Annotations, Container, DataSet, Filling, FillingLevel, FillingType, SequenceName, Subset,
 };
-use corsmal_ccm::predictions::read_capacities;
+use corsmal_ccm::predictions::{Named, read_capacities};
 use corsmal_ccm::scores::{RuleSet, evaluate};
 use corsmal_ccm::submission::{RowKey, Submission, pseudo_random};
 use corsmal_ccm::synth::write_views;
@@ -362,6 +362,50 @@ fn stored_frames_combine_to_the_published_file() {
         (read_capacities(&out).unwrap(), read_capacities(&file("combination_public_test")));
     for (key, value) in published.unwrap() {
         assert!((own[&key].unwrap() - value.unwrap()).abs() < 1e-9, "{key}");
+    }
+}
+
+/// Ids begin at 0 in every part: a table tells them apart.
+#[test]
+fn ids_of_several_parts_stay_apart() {
+    let dir = tempfile::tempdir().unwrap();
+    for (part, recordings) in [("train", 3), ("test_pub", 2), ("test_priv", 1)] {
+        let audio = dir.path().join(part).join("audio");
+        std::fs::create_dir_all(&audio).unwrap();
+        for id in 0..recordings {
+            std::fs::write(audio.join(format!("{id:06}.wav")), b"").unwrap();
+        }
+    }
+    let made = options(dir.path(), Method::M5);
+    let rows = run(&made);
+    let out = dir.path().join("m5.csv");
+    capacity::write(&out, &made, &rows).unwrap();
+    let read = capacity::read(&out).unwrap();
+    let mut named: Vec<_> = read.keys().copied().collect();
+    named.sort_unstable();
+    let expected = [
+        (Subset::Training, 0),
+        (Subset::Training, 1),
+        (Subset::Training, 2),
+        (Subset::Public, 0),
+        (Subset::Public, 1),
+        (Subset::Private, 0),
+    ];
+    let expected = expected.map(|(part, id)| Named { part: Some(part), key: RowKey::Id(id) });
+    assert_eq!(named, expected);
+    assert_eq!(named[3].to_string(), "id 0 of the public test part");
+    let both = dir.path().join("both.csv");
+    assert_eq!(capacity::combine_files(&[out.clone(), out.clone()], -1.0, &both).unwrap(), (6, 6));
+    assert_eq!(read_capacities(&both).unwrap().len(), 6);
+    // A name twice in one part, and a part that there is not.
+    let text = std::fs::read_to_string(&out).unwrap();
+    for (from, to, said) in [
+        ("public test", "private test", "a name that occurs once"),
+        ("public test", "test", "training, public test or private test"),
+    ] {
+        std::fs::write(&out, text.replace(from, to)).unwrap();
+        let error = capacity::read(&out).unwrap_err().to_string();
+        assert!(error.contains(said), "{error}");
     }
 }
 

@@ -7,6 +7,7 @@ use super::results::{Estimate, Rows, Target};
 use crate::capacity;
 use crate::dataset::{Container, Dimensions, Subset};
 use crate::error::{CcmError, Result};
+use crate::predictions::Named;
 use crate::submission::{RowKey, Submission, listed};
 use crate::table::Table;
 
@@ -14,7 +15,7 @@ use crate::table::Table;
 pub struct Added {
     name: String,
     path: PathBuf,
-    by_key: HashMap<RowKey, Estimate>,
+    by_name: HashMap<Named, Estimate>,
 }
 
 /// Predictions for the parts of a data set that their file covers.
@@ -41,12 +42,12 @@ impl Added {
     /// [`CcmError`] as [`Submission::read`].
     pub fn read(name: &str, path: &Path) -> Result<Self> {
         let table = Table::read(path)?;
-        let by_key = if table.find("fileName").is_some() {
+        let by_name = if table.find("fileName").is_some() {
             return Self::capacities(name, path);
         } else {
             submission(&Submission::from_table(&table)?)
         };
-        Ok(Self { name: name.to_string(), path: path.to_path_buf(), by_key })
+        Ok(Self { name: name.to_string(), path: path.to_path_buf(), by_name })
     }
 
     /// Reads a table of `corsmal-feat capacity`, or another with the columns `fileName` and `capacity[mL]`.
@@ -61,8 +62,8 @@ impl Added {
             ..Estimate::default()
         };
         let rows = capacity::read(path)?.into_iter();
-        let by_key = rows.map(|(key, measured)| (key, estimate(measured))).collect();
-        Ok(Self { name: name.to_string(), path: path.to_path_buf(), by_key })
+        let by_name = rows.map(|(named, measured)| (named, estimate(measured))).collect();
+        Ok(Self { name: name.to_string(), path: path.to_path_buf(), by_name })
     }
 
     /// The estimates for each part of a data set, where there are any.
@@ -73,7 +74,8 @@ impl Added {
     pub(super) fn place(&self, rows: &Rows) -> Result<Placed> {
         let mut parts = vec![Part::new(self, Subset::Training, &rows.training)];
         parts.extend(rows.tests.iter().map(|t| Part::new(self, t.subset, &t.rows)));
-        if self.by_key.keys().any(|key| matches!(key, RowKey::Id(_))) {
+        let nowhere = |named: &Named| matches!(named.key, RowKey::Id(_)) && named.part.is_none();
+        if self.by_name.keys().any(nowhere) {
             self.choose(&mut parts)?;
         }
         for part in &parts {
@@ -93,7 +95,7 @@ impl Added {
         let fits = |part: &Part<'_>| part.is_whole() && part.unknown.is_empty();
         let mut fitting: Vec<Subset> = parts.iter().filter(|p| fits(p)).map(|p| p.subset).collect();
         if fitting.len() > 1 {
-            fitting.retain(|&subset| size(subset) == self.by_key.len());
+            fitting.retain(|&subset| size(subset) == self.by_name.len());
         }
         match fitting.as_slice() {
             [one] => {
@@ -147,7 +149,8 @@ struct Part<'a> {
 
 impl<'a> Part<'a> {
     fn new(added: &Added, subset: Subset, targets: &'a [Target]) -> Self {
-        let mut left: HashMap<&RowKey, &Estimate> = added.by_key.iter().collect();
+        let of_part = added.by_name.iter().filter(|(n, _)| n.part.is_none_or(|p| p == subset));
+        let mut left: HashMap<&RowKey, &Estimate> = of_part.map(|(n, e)| (&n.key, e)).collect();
         let mut take = |target: &Target| {
             let by_id = target.recording.id.map(RowKey::Id);
             left.remove(&target.key).or_else(|| left.remove(&by_id?)).cloned()
@@ -188,7 +191,7 @@ fn size(subset: Subset) -> usize {
     subset.containers().map(Container::recordings).sum()
 }
 
-fn submission(submission: &Submission) -> HashMap<RowKey, Estimate> {
+fn submission(submission: &Submission) -> HashMap<Named, Estimate> {
     let class = |value: f64| (value >= 0.0).then_some(value as usize);
     let rows = submission.keys.iter().enumerate().map(|(row, &key)| {
         let level = match submission.level.values[row] {
@@ -210,7 +213,7 @@ fn submission(submission: &Submission) -> HashMap<RowKey, Estimate> {
             }),
             ..Estimate::default()
         };
-        (key, estimate)
+        (Named::alone(key), estimate)
     });
     rows.collect()
 }

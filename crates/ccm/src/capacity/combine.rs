@@ -9,7 +9,7 @@ use corsmal_vision::lode::PRIOR_ML;
 
 use super::table::file_name;
 use crate::error::{CcmError, Result};
-use crate::predictions::read_capacities;
+use crate::predictions::{Named, read_capacities};
 use crate::submission::RowKey;
 
 /// Writes the mean of the files' estimates of each recording, `prior` where none has one; what equals M5's
@@ -22,7 +22,7 @@ pub fn combine_files(inputs: &[PathBuf], prior: f64, out: &Path) -> Result<(usiz
     if !prior.is_finite() {
         return Err(CcmError::Request(format!("a prior of {prior}; expected a number in mL")));
     }
-    let mut estimates: BTreeMap<RowKey, Vec<f64>> = BTreeMap::new();
+    let mut estimates: BTreeMap<Named, Vec<f64>> = BTreeMap::new();
     let mut tables = Vec::with_capacity(inputs.len());
     for path in inputs {
         let table = read_capacities(path)?;
@@ -43,16 +43,21 @@ pub fn combine_files(inputs: &[PathBuf], prior: f64, out: &Path) -> Result<(usiz
             });
         }
     }
-    let mut text = String::from("fileName,capacity[mL]\n");
+    // M5's columns alone, unless ids would be of several parts.
+    let by_part = |named: &Named| matches!(named.key, RowKey::Id(_)) && named.part.is_some();
+    let several = estimates.keys().any(by_part);
+    let mut text = String::from("fileName,capacity[mL]");
+    text += if several { ",part\n" } else { "\n" };
     let mut without = 0;
-    for (key, values) in &estimates {
+    for (named, values) in &estimates {
         let value = if values.is_empty() {
             without += 1;
             prior
         } else {
             values.iter().sum::<f64>() / values.len() as f64
         };
-        let _ = writeln!(text, "{},{value}", file_name(*key));
+        let part = named.part.filter(|_| several).map(|part| format!(",{}", part.name()));
+        let _ = writeln!(text, "{},{value}{}", file_name(named.key), part.unwrap_or_default());
     }
     draft::write(out, text.as_bytes()).map_err(CcmError::Write)?;
     Ok((estimates.len(), without))

@@ -55,6 +55,7 @@ pub fn run(
         let estimate = estimate(&views, options).and_then(sound);
         Row {
             key: key(recording),
+            part: recording.part,
             estimate,
             execution_ms: started.elapsed().as_secs_f64() * 1000.0,
         }
@@ -62,7 +63,7 @@ pub fn run(
 }
 
 /// Work on all recordings in parallel; results in their order.
-fn each<T: Send>(
+pub(crate) fn each<T: Send>(
     recordings: &[Recording],
     jobs: usize,
     progress: &(dyn Fn(usize, usize) + Sync),
@@ -199,7 +200,7 @@ pub fn train(
 }
 
 /// The training recordings.
-fn training(set: &DataSet) -> Vec<Recording> {
+pub(crate) fn training(set: &DataSet) -> Vec<Recording> {
     set.recordings.iter().filter(|r| r.part == Subset::Training).cloned().collect()
 }
 
@@ -233,7 +234,7 @@ fn sample(
 }
 
 /// How a recording is named in tables: by container and sequence where they are known.
-fn key(recording: &Recording) -> RowKey {
+pub(crate) fn key(recording: &Recording) -> RowKey {
     match (recording.container, recording.sequence, recording.id) {
         (Some(container), Some(sequence), _) => RowKey::Sequence(container.number(), sequence),
         (_, _, id) => RowKey::Id(id.unwrap_or_default()),

@@ -8,14 +8,14 @@ use corsmal_files::draft;
 use super::methods::Estimate;
 use super::options::CapacityOptions;
 use super::views::Problem;
-use crate::dataset::Dimensions;
+use crate::dataset::{Dimensions, Subset};
 use crate::error::{CcmError, Result};
-use crate::predictions::{file_key, read_capacities};
+use crate::predictions::{Named, read_capacities, row_name};
 use crate::submission::{RowKey, SubmissionRow};
 use crate::table::Table;
 
 /// Columns of the table; the first two are those of M5's published files.
-const HEADER: [&str; 15] = [
+const HEADER: [&str; 16] = [
     "fileName",
     "capacity[mL]",
     "low[mL]",
@@ -31,6 +31,7 @@ const HEADER: [&str; 15] = [
     "reason",
     "tool_version",
     "config_hash",
+    "part",
 ];
 
 /// What became of a recording.
@@ -38,6 +39,8 @@ const HEADER: [&str; 15] = [
 pub struct Row {
     /// The recording.
     pub key: RowKey,
+    /// Its part of the data set, in which its id is its own.
+    pub part: Subset,
     /// The estimate, or why there is none.
     pub estimate: std::result::Result<Estimate, Problem>,
     /// Time it took, in ms.
@@ -85,6 +88,7 @@ impl Row {
             reason,
             env!("CARGO_PKG_VERSION").into(),
             config_hash.into(),
+            self.part.name().into(),
         ]
     }
 }
@@ -124,7 +128,7 @@ impl Measured {
 ///
 /// # Errors
 /// As [`read_capacities`], and for cells that are no numbers.
-pub fn read(path: &Path) -> Result<HashMap<RowKey, Measured>> {
+pub fn read(path: &Path) -> Result<HashMap<Named, Measured>> {
     let capacities = read_capacities(path)?;
     let table = Table::read(path)?;
     let has = |name: &str| table.header().iter().any(|h| h == name);
@@ -138,8 +142,8 @@ pub fn read(path: &Path) -> Result<HashMap<RowKey, Measured>> {
     let file = table.column("fileName")?;
     let mut measured = HashMap::with_capacity(capacities.len());
     for row in 0..table.rows() {
-        let Some(key) = file_key(table.text(row, file)) else { continue };
-        let capacity_ml = capacities.get(&key).copied().flatten();
+        let named = row_name(&table, row, file)?;
+        let capacity_ml = capacities.get(&named).copied().flatten();
         let cell = |i: usize| match &columns {
             Some(columns) if !table.text(row, columns[i]).is_empty() => {
                 table.number(row, columns[i]).map(Some)
@@ -153,7 +157,7 @@ pub fn read(path: &Path) -> Result<HashMap<RowKey, Measured>> {
             }
             _ => None,
         };
-        measured.insert(key, Measured { capacity_ml, dimensions, execution_ms: cell(3)? });
+        measured.insert(named, Measured { capacity_ml, dimensions, execution_ms: cell(3)? });
     }
     Ok(measured)
 }

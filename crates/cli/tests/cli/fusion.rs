@@ -88,6 +88,13 @@ fn submissions_are_checked_before_they_are_written() {
         "id,path,predicted,p_empty,p_half,p_full\n\
         000001,a/000001.wav,full,0.1,0.2,0.7\n000000,a/000000.wav,,,,\n",
     );
+    // Ids of two parts: which are meant?
+    put(
+        "parts.csv",
+        "fileName,capacity[mL],part\nid000000.png,100,public test\n\
+        id000001.png,101,public test\nid000000.png,200,private test\n",
+    );
+    let parts = at("parts.csv");
     let (kind, level, out) = (at("type.csv"), at("level.csv"), at("s.csv"));
     let fuse = ["fuse", "--type", text(&kind), "--level", text(&level), "--out", text(&out)];
     let output = run(&[&fuse[..], &["--format", "2022"]].concat());
@@ -102,6 +109,15 @@ fn submissions_are_checked_before_they_are_written() {
         (&["--format", "2020"][..], "id 0 is not how this format names rows"),
         (&["--format", "2022", "--part", "public"], "missing rows: id 2"),
         (&["--format", "2022", "--capacity", text(&kind)], "no column 'fileName'"),
+        (&["--format", "2022", "--capacity", text(&parts)], "id 0 in several parts"),
+        (
+            &["--format", "2022", "--capacity", text(&parts), "--part", "public"],
+            "missing rows: id 2",
+        ),
+        (
+            &["--format", "2022", "--capacity", text(&parts), "--part", "private"],
+            "has no line for id 1",
+        ),
         (&["--format", "2022", "--annotations", text(&kind)], "type.csv"),
         (&["--type-weights", "1,2"], "weights: expected 1, found 2"),
         (&["--type-weights=-1"], "positive"),

@@ -1,12 +1,13 @@
 //! Fused type and level as an official submission.
 
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use corsmal_ccm::capacity;
+use corsmal_ccm::capacity::{self, Measured};
 use corsmal_ccm::dataset::{Annotations, Subset};
 use corsmal_ccm::decision::{Rule, decide, decide_joint};
+use corsmal_ccm::predictions::Named;
 use corsmal_ccm::submission::{self, RowKey, Submission, SubmissionRow, official_rows};
 
 use super::args::{Args, Format, Part};
@@ -46,7 +47,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
         (None, kind, level) => decide(kind.as_ref(), level.as_ref(), rule)?,
     };
     if let Some(path) = &options.capacity {
-        let mut capacities = capacity::read(path)?;
+        let mut capacities = of_part(capacity::read(path)?, options.part, path)?;
         for prediction in &mut predictions {
             let measured = capacities.remove(&prediction.key).ok_or_else(|| {
                 Failure::new(format!("{}: has no line for {}", path.display(), prediction.key))
@@ -72,14 +73,42 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
     }
     let expected: Vec<RowKey> = match options.part {
         None => predictions.iter().map(|p| p.key).collect(),
-        Some(Part::Training) => official_rows(Subset::Training, format),
-        Some(Part::Public) => official_rows(Subset::Public, format),
-        Some(Part::Private) => official_rows(Subset::Private, format),
+        Some(part) => official_rows(subset(part), format),
     };
     Submission::write(&args.out, format, &predictions, &expected)?;
     let failed = predictions.iter().filter(|p| p.kind.is_none() && p.level.is_none()).count();
     args.tell(predictions.len(), failed, "an estimate")?;
     Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
+}
+
+fn subset(part: Part) -> Subset {
+    match part {
+        Part::Training => Subset::Training,
+        Part::Public => Subset::Public,
+        Part::Private => Subset::Private,
+    }
+}
+
+/// The rows of the wanted part, where they say of which part they are.
+fn of_part(
+    all: HashMap<Named, Measured>,
+    part: Option<Part>,
+    path: &Path,
+) -> Result<HashMap<RowKey, Measured>, Failure> {
+    let mut rows = HashMap::with_capacity(all.len());
+    for (named, measured) in all {
+        if part.is_some_and(|wanted| named.part.is_some_and(|part| part != subset(wanted))) {
+            continue;
+        }
+        if rows.insert(named.key, measured).is_some() {
+            return Err(Failure::new(format!(
+                "{}: has {} in several parts of the data set: --part says which is meant",
+                path.display(),
+                named.key
+            )));
+        }
+    }
+    Ok(rows)
 }
 
 /// Names recordings as the format does, by the annotations.
