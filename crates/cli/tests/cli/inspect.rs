@@ -3,6 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use corsmal_ccm::dataset::{Container, SequenceName};
+use corsmal_ccm::synth::write_views;
+
 use crate::command::tool;
 
 fn inspect(args: &[&Path]) -> Output {
@@ -325,4 +328,145 @@ fn a_picture_is_replaced_only_when_asked() {
     assert_eq!(refused.status.code(), Some(2));
     assert!(text(&refused.stderr).contains("exists; --overwrite replaces it"));
     assert_eq!(std::fs::read_to_string(&picture).unwrap(), "mine");
+}
+
+/// Everything else that the tool writes or reads is known by its content.
+#[test]
+fn every_kind_of_file_is_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let shown = |file: &Path| -> (String, serde_json::Value) {
+        let out = inspect(&[file]);
+        assert!(out.status.success(), "{}", text(&out.stderr));
+        let json = inspect(&[file, "--json".as_ref()]);
+        (text(&out.stdout), serde_json::from_slice(&json.stdout).unwrap())
+    };
+    let written = |name: &str, content: &[u8]| {
+        std::fs::write(path(name), content).unwrap();
+        path(name)
+    };
+    let run = |words: &[&str]| {
+        let out = tool().args(words).current_dir(folder.path()).output().unwrap();
+        assert!(out.status.success(), "{words:?}: {}", text(&out.stderr));
+        text(&out.stdout)
+    };
+    let container = Container::new(3).unwrap();
+    let base = path("ccm/train/3");
+    std::fs::create_dir_all(base.join("audio")).unwrap();
+    for stem in ["s0_fi1_fu1_b0_l0", "s0_fi2_fu2_b0_l0"] {
+        std::fs::write(base.join(format!("audio/{stem}_audio.wav")), b"").unwrap();
+        let name = SequenceName::parse(stem).unwrap();
+        write_views(&base, stem, container, name, 1).unwrap();
+    }
+    let name = "s0_fi1_fu1_b0_l0";
+
+    let (calibration, json) = shown(&base.join(format!("calib/{name}_c1_calib.pickle")));
+    assert!(calibration.contains("focal lengths 920.0, 920.0, principal point 645.0, 358.0"));
+    assert!(calibration.contains("at -0.550, -1.100, 0.620"), "{calibration}");
+    assert_eq!(json["cameras"]["rgb"]["intrinsic"][0][0], 920.0);
+    let (detections, json) = shown(&base.join(format!("detections/{name}.json")));
+    assert!(detections.contains("table of detections · json") && detections.contains("person × "));
+    assert_eq!((&json["frames"], json["views"].as_object().unwrap().len()), (&2.into(), 4));
+    let depth = shown(&base.join(format!("depth/{name}/c1/0000.png"))).0;
+    assert!(depth.contains("depth image · 1280 × 720 px · ") && depth.contains("% measured"));
+    let colour = shown(&base.join(format!("rgb/{name}/c1/0000.png"))).0;
+    assert!(colour.contains("colour image · 1280 × 720 px"), "{colour}");
+    let mut mask = corsmal_vision::Mask::empty(6, 5);
+    mask.data[8] = true;
+    let mask = shown(&written("mask.png", &mask.to_png().unwrap())).0;
+    assert!(mask.contains("mask · 6 × 5 px · 1 px inside, columns 2 to 2, rows 1 to 1"), "{mask}");
+
+    run(&["capacity", "--method", "m5", "--data", "ccm", "--out", "m5.csv", "--quiet"]);
+    let capacities = shown(&path("m5.csv")).0;
+    assert!(capacities.contains("capacities · 2 rows") && capacities.contains("m5 2"));
+    run(&["capacity", "train", "--method", "m3", "--data", "ccm", "--out", "m3.capacity", "-q"]);
+    let (model, json) = shown(&path("m3.capacity"));
+    assert!(
+        model.contains("capacity model · json") && model.contains("categories     cup"),
+        "{model}"
+    );
+    assert!(model.contains("capacity --method m3 --model"), "{model}");
+    assert_eq!((&json["fused"], &json["provenance"]["recordings"]), (&false.into(), &2.into()));
+
+    let line = r#"{"id":"a","status":"ok","true":"cup","predicted":"cup"}"#;
+    let other = line.replace("\"predicted\":\"cup\"", "\"predicted\":\"box\"");
+    let (lines, json) = shown(&written("p.jsonl", format!("{line}\n{other}\n").as_bytes()));
+    assert!(lines.contains("predictions · jsonl · 2 rows") && lines.contains("50.00 %"), "{lines}");
+    assert_eq!(json["counts"]["predicted"]["box"], 1);
+    let (submission, _) =
+        shown(&written("s.csv", b"Container ID,Sequence,Filling type,Filling level\n10,0,1,2\n"));
+    assert!(submission.contains("submission in the format of 2020 · 1 row"), "{submission}");
+    let cells = "frame,view,label,score,x_min,y_min,x_max,y_max\n0,1,cup,0.5,0,0,9,9\n";
+    let table = shown(&written("d.csv", cells.as_bytes())).0;
+    assert!(table.contains("table of detections · 1 row") && table.contains("cup 1"), "{table}");
+    let other = shown(&written("x.json", br#"{"title": "T", "sections": [{"title": "S"}]}"#)).0;
+    assert!(other.contains("report · json") && other.contains("sections       S"), "{other}");
+
+    let preset = run(&["presets", "esc26", "--toml"]);
+    let configuration = shown(&written("esc26.toml", preset.as_bytes())).0;
+    assert!(configuration.contains("is preset esc26"), "{configuration}");
+    let out = inspect(&[&written("bad.toml", b"[features.mfcc]\nn_mefl = 3\n")]);
+    assert_eq!(out.status.code(), Some(1));
+    assert!(text(&out.stderr).contains("n_mefl"), "{}", text(&out.stderr));
+    for (name, content) in
+        [("r.html", "<!DOCTYPE html><p>"), ("f.svg", "<svg xmlns=''/>"), ("f.pdf", "%PDF-1.7")]
+    {
+        assert!(shown(&written(name, content.as_bytes())).0.contains("for a browser or viewer"));
+    }
+
+    // What is damaged is said to be so, and never taken for sound.
+    for (name, content, reason) in [
+        ("b.json", &b"{\"kind\": \"corsmal-feat capacity model\", \"format\": 9}"[..], "b.json"),
+        ("b.pickle", b"(dp0\n.", "no colour camera"),
+        ("b.png", b"\x89PNG\r\n\x1a\n", "PNG"),
+        ("b.safetensors", b"\xff\0\0\0\0\0\0\0{", "a header of 255 bytes in a file of 9"),
+        ("b.jsonl", b"{\"a\": 1}\n{\"a\"\n", "line 2"),
+        ("c.json", b"[1, 2", "not readable as JSON"),
+    ] {
+        let out = inspect(&[&written(name, content)]);
+        assert_eq!(out.status.code(), Some(1), "{name}");
+        let said = text(&out.stderr);
+        assert!(said.contains(reason) && !said.contains("audio"), "{said}");
+        let json = inspect(&[&path(name), "--json".as_ref()]);
+        let refusal: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+        assert_eq!(refusal["status"], "corrupt", "{name}");
+    }
+    let drawn = inspect(&[&path("x.json"), "--picture".as_ref(), &path("x.png")]);
+    assert!(text(&drawn.stderr).contains("neither sound nor features"));
+}
+
+#[test]
+fn a_ledger_says_how_far_its_run_came() {
+    let folder = tempfile::tempdir().unwrap();
+    let audio = folder.path().join("audio");
+    std::fs::create_dir(&audio).unwrap();
+    recording(&audio);
+    std::fs::write(audio.join("bad.wav"), b"RIFF").unwrap();
+    let out = folder.path().join("feats.npz");
+    // Ends at the first failure, its ledger intact.
+    let mut command = tool();
+    command.arg("extract").arg("--in").arg(&audio).arg("--out").arg(&out);
+    let run = command.args(["--preset", "mfcc-zcr", "--max-errors", "0"]).output().unwrap();
+    assert!(!run.status.success());
+    let ledger = folder.path().join("feats.npz.ledger");
+    let shown = inspect(&[&ledger]);
+    assert!(shown.status.success(), "{}", text(&shown.stderr));
+    let report = text(&shown.stdout);
+    assert!(
+        report.contains("ledger of an unfinished run") && report.contains("shard 0/1"),
+        "{report}"
+    );
+    assert!(report.contains("bad.wav: "), "{report}");
+    let json = inspect(&[&ledger, "--json".as_ref()]);
+    let json: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    assert_eq!(
+        (&json["kind"], &json["header"]["format"]),
+        (&"ledger".into(), &"npz stored".into())
+    );
+    // A header that was changed is none.
+    let bytes = std::fs::read_to_string(&ledger).unwrap();
+    std::fs::write(&ledger, bytes.replacen("0/1", "0/2", 1)).unwrap();
+    let torn = inspect(&[&ledger]);
+    assert_eq!(torn.status.code(), Some(1));
+    assert!(text(&torn.stderr).contains("the checksum of its first line does not match"));
 }

@@ -14,6 +14,7 @@
 mod error;
 mod header;
 mod lines;
+mod look;
 mod record;
 
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -30,6 +31,7 @@ use lines::{Chain, Lines, Next};
 
 pub use error::LedgerError;
 pub use header::{Header, VERSION};
+pub use look::look;
 pub use record::{Done, Record};
 
 /// What an interrupted run has left.

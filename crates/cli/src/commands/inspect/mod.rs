@@ -1,13 +1,20 @@
 //! `corsmal-feat inspect`: what a file holds and whether it is healthy.
 
+mod calibration;
 mod extracted;
 mod features;
-mod other;
+mod image;
+mod json;
+mod kind;
+mod model;
 mod output;
 mod picture;
 mod recording;
 mod refusal;
+mod run;
 mod several;
+mod table;
+mod tensors;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -17,6 +24,7 @@ use corsmal_files::format::Content;
 use corsmal_files::layout;
 
 use crate::failure::Failure;
+use kind::Kind;
 use picture::{Picture, PictureArgs};
 
 /// Arguments of `inspect`.
@@ -26,10 +34,13 @@ use picture::{Picture, PictureArgs};
     corsmal-feat inspect recordings/\n  \
     corsmal-feat inspect recording.wav --picture part.pdf --channels 0,3 --start 2 --end 4\n  \
     corsmal-feat inspect feats.npz --picture feats.png --recording dog_01\n  \
-    corsmal-feat inspect my.model\n\n\
+    corsmal-feat inspect my.model\n  \
+    corsmal-feat inspect level.safetensors\n\n\
     Of a recording: format and health. Of folders and several recordings: a line for each. Of an output\n\
-    of `extract`: contents, configuration, outcomes; of any other .npz: its members. Of a model: what it\n\
-    was trained on. Of predictions: how many of each class.\n\n\
+    of `extract`: contents, configuration, outcomes; of any other .npz: its members. Of a model, network,\n\
+    checkpoint or capacity model: what it was trained on. Of predictions (CSV, JSON lines): how many of each\n\
+    class. Of submissions, capacities, detections, calibrations, depth images, masks, configurations and\n\
+    ledgers: what they hold.\n\n\
     Clipping: at least three successive samples at the channel's own peak. Silence: share of 20 ms\n\
     blocks below -60 dBFS. Exit code 1: some content cannot be read.")]
 pub struct Args {
@@ -69,15 +80,22 @@ fn single(path: &Path, picture: Option<&Picture>, json: bool) -> Result<ExitCode
         }
         return Ok(code);
     }
-    match other::kind(path)? {
-        Some(_) if picture.is_some() => Err(Failure::new(format!(
-            "--picture: {} holds neither sound nor features",
-            path.display()
-        ))),
-        Some(other::Kind::Model) => other::model(path, json),
-        Some(other::Kind::Table) => other::table(path, json),
-        // The audio readers say what is wrong with anything else.
-        None => recording::inspect(path, picture, json),
+    // The audio readers say what is wrong with anything else.
+    let Some(kind) = kind::of(path)? else { return recording::inspect(path, picture, json) };
+    if picture.is_some() {
+        let path = path.display();
+        return Err(Failure::new(format!("--picture: {path} holds neither sound nor features")));
+    }
+    match kind {
+        Kind::Model => model::inspect(path, json),
+        Kind::Tensors => tensors::inspect(path, json),
+        Kind::Json => json::inspect(path, json),
+        Kind::Ledger => run::ledger(path, json),
+        Kind::Picture => image::inspect(path, json),
+        Kind::Pickle => calibration::inspect(path, json),
+        Kind::Table => table::inspect(path, json),
+        Kind::Configuration => run::configuration(path, json),
+        Kind::Page(format) => run::page(path, format, json),
     }
 }
 

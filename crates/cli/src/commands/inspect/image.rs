@@ -1,0 +1,68 @@
+//! Inspection of pictures: depth images, masks, colour.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use corsmal_vision::{Depth, Mask, Rgb};
+use serde_json::{Value, json};
+
+use super::refusal::{Refusal, to_json};
+use crate::failure::Failure;
+
+/// Prints what a picture shows, as far as `capacity` and `crops` care.
+pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
+    let name = path.display().to_string();
+    let found = match Depth::read(path) {
+        Ok(depth) => Ok(of_depth(&depth)),
+        Err(_) => Rgb::read(path).map(|image| of_colours(&image)),
+    };
+    let (kind, text, mut facts) = match found {
+        Ok(found) => found,
+        Err(error) => {
+            let reason = error.to_string();
+            return Refusal { path: &name, status: "corrupt", byte: None, reason: &reason }
+                .print(json);
+        }
+    };
+    if json {
+        facts["path"] = name.into();
+        facts["kind"] = kind.into();
+        print!("{}", to_json(&facts)?);
+    } else {
+        let size = format!("{} × {} px", facts["width"], facts["height"]);
+        println!("{name}\n  {kind} · {size}{text}");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Kind, what is said of it, and facts.
+type Found = (&'static str, String, Value);
+
+fn of_depth(depth: &Depth) -> Found {
+    let measured = || depth.data.iter().copied().filter(|&mm| mm > 0);
+    let count = measured().count();
+    let (nearest, farthest) = (measured().min(), measured().max());
+    let share = count as f64 / depth.data.len() as f64;
+    let range = nearest.zip(farthest).map(|(near, far)| format!(" · {near} to {far} mm"));
+    let text = format!("{} · {:.1} % measured", range.unwrap_or_default(), 100.0 * share);
+    let facts = json!({
+        "width": depth.width, "height": depth.height, "measured": share, "nearest_mm": nearest,
+        "farthest_mm": farthest,
+    });
+    ("depth image", text, facts)
+}
+
+fn of_colours(image: &Rgb) -> Found {
+    let Rgb { width, height, data } = image;
+    let two = |pixel: &[u8]| matches!(pixel, [0, 0, 0] | [255, 255, 255]);
+    if !data.chunks_exact(3).all(two) {
+        return ("colour image", String::new(), json!({ "width": width, "height": height }));
+    }
+    let inside = data.chunks_exact(3).map(|pixel| pixel[0] > 0).collect();
+    let mask = Mask { width: *width, height: *height, data: inside };
+    let (area, bounds) = (mask.area(), mask.bounds());
+    let place = bounds
+        .map(|[x0, y0, x1, y1]| format!(", columns {x0} to {}, rows {y0} to {}", x1 - 1, y1 - 1));
+    let text = format!(" · {area} px inside{}", place.unwrap_or_default());
+    ("mask", text, json!({ "width": width, "height": height, "area": area, "bounds": bounds }))
+}
