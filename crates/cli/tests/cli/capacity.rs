@@ -2,21 +2,29 @@
 
 use std::path::Path;
 
+use corsmal_ccm::dataset::{Container, SequenceName};
+use corsmal_ccm::synth::write_views;
+
 use crate::command::{done, refused, run, text};
 
-/// Synthetic recordings with views, of which one a container stays.
-fn data(dir: &Path) -> String {
-    let data = dir.join("data");
-    done(&["synth", "--small", "--vision", "--quiet", "--out", text(&data)]);
-    for container in 1..=9 {
-        for entry in std::fs::read_dir(data.join(format!("train/{container}/audio"))).unwrap() {
+/// Synthetic recordings, one a container with views; `alone`: the others are removed. Rendering views takes
+/// longest.
+fn data(dir: &Path, alone: bool) -> String {
+    done(&["synth", "--small", "--quiet", "--out", text(dir)]);
+    for container in Container::all().take(9) {
+        let base = dir.join(format!("train/{}", container.number()));
+        for entry in std::fs::read_dir(base.join("audio")).unwrap() {
             let path = entry.unwrap().path();
-            if !path.file_name().unwrap().to_str().unwrap().starts_with("s0_fi1_fu1_") {
+            let stem = path.file_stem().unwrap().to_str().unwrap();
+            if let (true, Some(name)) = (stem.starts_with("s0_fi1_fu1_"), SequenceName::parse(stem))
+            {
+                write_views(&base, &name.to_string(), container, name, 1).unwrap();
+            } else if alone {
                 std::fs::remove_file(&path).unwrap();
             }
         }
     }
-    text(&data).into()
+    text(dir).into()
 }
 
 /// Statuses and capacities of a table.
@@ -35,7 +43,7 @@ fn rows(path: &Path) -> Vec<(String, f64)> {
 #[test]
 fn every_method_estimates_from_files() {
     let dir = tempfile::tempdir().unwrap();
-    let data = data(dir.path());
+    let data = data(&dir.path().join("data"), true);
     let out = dir.path().join("capacity.csv");
     let model = dir.path().join("fused.capacity");
     let learned =
@@ -142,9 +150,7 @@ fn m2_learns(dir: &Path, data: &str) {
 #[cfg(feature = "nets")]
 fn benchmark_runs_what_learned(dir: &Path, m2: &Path) {
     // All recordings: baselines need every class.
-    let data = dir.join("all");
-    done(&["synth", "--small", "--vision", "--quiet", "--out", text(&data)]);
-    let data = text(&data);
+    let data = &data(&dir.join("all"), false);
     let report = dir.join("report");
     let fused = dir.join("fused.capacity");
     let of = |name: &str, path: &Path| format!("{name}={}", text(path));
