@@ -30,6 +30,7 @@
 pub mod benchmark;
 pub mod capacity;
 pub mod citation;
+pub mod crop;
 pub mod dataset;
 pub mod decision;
 pub mod error;

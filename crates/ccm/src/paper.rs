@@ -60,6 +60,38 @@ pub struct PaperScore {
     pub combined: f64,
 }
 
+impl PaperScore {
+    /// Whether this is the row of a method, which may name its inputs as well.
+    pub(crate) fn is_of(&self, method: &str) -> bool {
+        self.method == method || method == named(self.method, self.inputs)
+    }
+}
+
+/// A method with one of its inputs.
+pub(crate) fn named(method: &str, inputs: &str) -> String {
+    format!("{method}, {}", short_inputs(inputs))
+}
+
+/// `audio+rgb1+rgb2` as "audio, RGB 1 2".
+pub(crate) fn short_inputs(inputs: &str) -> String {
+    let mut text = String::new();
+    let mut last = "";
+    for part in inputs.split('+').filter(|p| !p.is_empty()) {
+        let kind = part.trim_end_matches(|c: char| c.is_ascii_digit());
+        if kind != last {
+            let comma = if text.is_empty() { "" } else { ", " };
+            let name = if kind == "rgb" { "RGB" } else { kind };
+            text.push_str(&format!("{comma}{name}"));
+        }
+        let view = &part[kind.len()..];
+        if !view.is_empty() {
+            text.push_str(&format!(" {view}"));
+        }
+        last = kind;
+    }
+    text
+}
+
 /// Scores of a method by scenario and by test container.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PaperBreakdown {

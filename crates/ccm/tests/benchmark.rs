@@ -413,12 +413,17 @@ impl Prepared for Ready<'_> {
         vec!["it always says rice.".into()]
     }
 
-    fn predict(&self, train: &[usize], wanted: &[usize]) -> corsmal_ccm::Result<Vec<Estimate>> {
+    fn predict(
+        &self,
+        train: &[usize],
+        wanted: &[usize],
+    ) -> corsmal_ccm::Result<Vec<Vec<Estimate>>> {
         let container = |row: &usize| self.0.subjects[*row].container;
         let known: Vec<_> = train.iter().map(container).collect();
         assert!(train.iter().all(|&row| row < self.0.training));
         assert!(wanted.iter().all(|row| !known.contains(&container(row))));
-        Ok(wanted.iter().map(|_| Estimate { kind: Some(2), ..Estimate::default() }).collect())
+        let rice = || Estimate { kind: Some(2), ..Estimate::default() };
+        Ok(vec![wanted.iter().map(|_| rice()).collect()])
     }
 }
 
@@ -448,6 +453,43 @@ fn a_system_is_run_on_containers_that_it_never_heard() {
     let systems: Vec<Box<dyn System>> = vec![Box::new(Constant), Box::new(Constant)];
     let twice = BenchmarkOptions { systems, ..options(&data, &out, Vec::new()) };
     assert_eq!(run(&twice).unwrap_err().to_string(), "M4 is given twice");
+}
+
+/// One table has the capacities of all parts, of which two have the same ids.
+#[test]
+fn capacities_of_the_same_ids_go_to_their_parts() {
+    let dir = tempfile::tempdir().unwrap();
+    let (data, out) = (dir.path().join("data"), dir.path().join("report"));
+    synth::generate(&data, Size::Small, 3).unwrap();
+    let mut table = String::from("fileName,capacity[mL],part\n");
+    for recording in corsmal_ccm::dataset::DataSet::open(&data).unwrap().recordings {
+        let (container, sequence) =
+            (recording.container.unwrap().number(), recording.sequence.unwrap());
+        table += &format!("id{container}_{sequence:04}.png,300,\n");
+    }
+    for (folder, part, capacity) in
+        [("test_pub", "public test", 400), ("test_priv", "private test", 500)]
+    {
+        let audio = data.join(folder).join("audio");
+        std::fs::create_dir_all(&audio).unwrap();
+        for id in 0..2 {
+            std::fs::write(audio.join(format!("{id:06}.wav")), b"").unwrap();
+            table += &format!("id{id:06}.png,{capacity},{part}\n");
+        }
+    }
+    let path = dir.path().join("capacity.csv");
+    std::fs::write(&path, table).unwrap();
+    let given = CapacityTable { name: "X".into(), path, own: None, learned_from: Vec::new() };
+    let systems: Vec<Box<dyn System>> = vec![Box::new(Constant)];
+    let made =
+        BenchmarkOptions { systems, capacities: vec![given], ..options(&data, &out, Vec::new()) };
+    run(&made).unwrap();
+    for (part, capacity) in [("public-test", "400"), ("private-test", "500")] {
+        let path = out.join(format!("submissions/m4-x-{part}-2022.csv"));
+        let rows = std::fs::read_to_string(&path).unwrap();
+        let cells: Vec<&str> = rows.lines().skip(1).map(|r| r.split(',').nth(1).unwrap()).collect();
+        assert_eq!(cells, [capacity; 2], "{rows}");
+    }
 }
 
 /// Capacities have their rows, complete what is heard, and give whole submissions and figures of their errors.

@@ -11,8 +11,8 @@ use corsmal_nets::networks;
 use corsmal_nets::recipe::Recipe;
 use corsmal_systems::SystemError;
 use corsmal_systems::examples::Examples;
-use corsmal_systems::training::{Trained, Training, Validated};
-use serde_json::Value;
+use corsmal_systems::training::{Trained, Training, Validated, Weights};
+use serde_json::{Value, json};
 
 use crate::args::{DatasetArgs, NetworkArgs, PipelineArgs};
 use crate::failure::Failure;
@@ -44,8 +44,20 @@ impl Request<'_> {
         let definition = networks::classifier(name)?;
         let recipe = definition.recipe_with(&self.pipeline.changes()?)?;
         let (path, members) = (self.dataset.path(), &self.dataset.members);
-        let mut examples = if is_inputs(path)? {
+        let takes_pictures = definition.picture().is_some();
+        let mut examples = if self.dataset.crops.is_none() && is_inputs(path)? {
             Examples::of_file(definition, path, &members.names())?
+        } else if takes_pictures || self.dataset.crops.is_some() {
+            members.refuse()?;
+            let seen = Examples::of_pictures(definition, path, interrupt::flag(), |id, reason| {
+                eprintln!("warning: {id}: {reason}: left out of training");
+            });
+            match seen {
+                Err(SystemError::Interrupted) => {
+                    return Err(Failure::interrupted("interrupted; nothing was written"));
+                }
+                seen => seen?,
+            }
         } else {
             members.refuse()?;
             let found = recordings::named(&[path], recordings::warn)?;
@@ -65,18 +77,26 @@ impl Request<'_> {
                 heard => heard?,
             }
         };
-        let target = self.dataset.label(&mut examples.table)?;
+        // Networks are named after what they tell.
+        let usual = ["level", "type"]
+            .into_iter()
+            .find(|column| definition.name.rsplit('_').next() == Some(column));
+        let target = self.dataset.label(&mut examples.table, usual)?;
         Ok(Loaded { examples, recipe, target })
     }
 
     /// Trains on all items.
     pub fn train(&self, name: &str) -> Result<Trained, Failure> {
         let Loaded { examples, recipe, target } = self.load(name)?;
-        let files = match examples.is_of_recordings() {
-            true => Value::Null,
-            false => self.dataset.provenance()?,
+        let files = match (examples.is_of_recordings(), examples.pictures()) {
+            (true, _) => Value::Null,
+            (false, Some(identity)) => {
+                json!({ "pictures": self.dataset.path(), "identity": identity })
+            }
+            (false, None) => self.dataset.provenance()?,
         };
-        let training = self.training(&target, recipe)?;
+        let weights = self.weights()?;
+        let training = self.training(&target, recipe, weights.as_ref())?;
         let progress = |told: Progress<'_>| tell(examples.definition.name, told, self.quiet, F1);
         training.train(&examples, files, progress).map_err(|e| self.stopped(e))
     }
@@ -88,7 +108,8 @@ impl Request<'_> {
         plan: Option<&CvPlan>,
     ) -> Result<(Examples, Validated), Failure> {
         let Loaded { examples, recipe, target } = self.load(name)?;
-        let training = self.training(&target, recipe)?;
+        let weights = self.weights()?;
+        let training = self.training(&target, recipe, weights.as_ref())?;
         let (folds, warnings) = training.folds(&examples, plan, self.pipeline.seed())?;
         for warning in warnings {
             eprintln!("warning: {warning}");
@@ -99,9 +120,18 @@ impl Request<'_> {
         Ok((examples, found))
     }
 
-    fn training<'t>(&'t self, target: &'t str, recipe: Recipe) -> Result<Training<'t>, Failure> {
+    fn training<'t>(
+        &'t self,
+        target: &'t str,
+        recipe: Recipe,
+        weights: Option<&'t Weights>,
+    ) -> Result<Training<'t>, Failure> {
         let groups = self.dataset.groups.as_deref();
-        Ok(Training { target, groups, recipe, checkpoints: self.folder()? })
+        Ok(Training { target, groups, recipe, checkpoints: self.folder()?, weights })
+    }
+
+    fn weights(&self) -> Result<Option<Weights>, Failure> {
+        Ok(self.network.weights.as_deref().map(Weights::read).transpose()?)
     }
 
     fn folder(&self) -> Result<Option<&Path>, Failure> {

@@ -58,6 +58,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         classes: &classes,
         n_classes: definition.outputs,
         groups: Some(containers),
+        weights: None,
     };
     println!("{name}, {} recordings, {recipe:?}", data.ids.len());
     let mut means = Vec::new();

@@ -30,7 +30,7 @@ struct Text {
     best: Option<(f64, usize)>,
 }
 
-/// Says which training this is: recipe, network, items, targets, rows.
+/// Says which training this is: recipe, network, items, targets, rows, what it begins with.
 pub(crate) fn key(network: &Network, course: &Course<'_>, recipe: &Recipe) -> String {
     let mut hash = blake3::Hasher::new();
     let recipe = serde_json::to_string(recipe).unwrap_or_default();
@@ -54,6 +54,11 @@ pub(crate) fn key(network: &Network, course: &Course<'_>, recipe: &Recipe) -> St
             hash.update(&(*n as u64).to_le_bytes());
         });
         let bytes: Vec<u8> = column.values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        hash.update(&bytes);
+    }
+    for (name, _, values) in network.beginning().into_iter().flatten() {
+        hash.update(name.as_bytes());
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
         hash.update(&bytes);
     }
     hash.finalize().to_hex().to_string()

@@ -8,6 +8,7 @@ use crate::items::Items;
 use crate::networks::Definition;
 use crate::random::Stream;
 use crate::recipe::{Recipe, Select};
+use crate::weights::State;
 
 /// Items trained on and items held out.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,6 +47,8 @@ pub struct Data<'a> {
     pub n_classes: usize,
     /// group of each item, for a validation group of whole groups
     pub groups: Option<&'a [String]>,
+    /// what trainings begin with instead of random numbers; see [`crate::network::Network::begin_with`]
+    pub weights: Option<&'a State>,
 }
 
 /// Trains a network for each fold and classifies what the fold holds out, in its order. Checkpoints
@@ -65,6 +68,7 @@ pub fn cross_validate(
     let mut results = Vec::new();
     for (number, fold) in folds.iter().enumerate() {
         let mut network = definition.build(Some(data.n_classes), recipe.seed)?;
+        data.weights.map(|state| network.begin_with(state)).transpose()?;
         let (train, watched, validation) = watched(data, fold, recipe)?;
         let task =
             Task { items: data.items, classes: data.classes, train: &train, watched: &watched };

@@ -18,12 +18,15 @@ pub struct Column {
 impl Column {
     /// Items one after another.
     pub fn of<'a>(items: impl IntoIterator<Item = &'a [f32]>) -> Self {
-        let (mut values, mut offsets) = (Vec::new(), vec![0]);
-        for item in items {
-            values.extend_from_slice(item);
-            offsets.push(values.len());
-        }
-        Self { values, offsets }
+        let mut column = Self { values: Vec::new(), offsets: vec![0] };
+        items.into_iter().for_each(|item| column.push(item));
+        column
+    }
+
+    /// Adds an item behind the others.
+    pub fn push(&mut self, item: &[f32]) {
+        self.values.extend_from_slice(item);
+        self.offsets.push(self.values.len());
     }
 
     fn item(&self, item: usize) -> &[f32] {

@@ -42,6 +42,16 @@ pub trait Layer: Debug + Send + Sync {
 /// Layers one after another.
 pub type Chain = Vec<Box<dyn Layer>>;
 
+/// Numbers that a training step holds for each item on account of these layers; see [`Layer::kept`].
+pub(crate) fn kept_by(layers: &[Box<dyn Layer>], input: Shape) -> usize {
+    let (mut shape, mut sum) = (input, 0);
+    for layer in layers {
+        sum += layer.kept(shape);
+        shape = layer.output(shape).unwrap_or(shape);
+    }
+    sum
+}
+
 /// A way through the network.
 #[derive(Debug)]
 pub struct Pass<'a> {

@@ -4,50 +4,14 @@ use std::collections::HashMap;
 
 use crate::batch::{Batch, Shape};
 use crate::error::{NetError, Result};
-use crate::layer::{Backward, Chain, Layer, Pass, Training};
+use crate::layer::{Backward, Chain, Layer, Pass, Training, kept_by};
 use crate::loss::{Loss, Targets};
 use crate::matrix::Matrix;
-use crate::parameters::{Initial, Parameters};
+use crate::parameters::{Declared, Initial, Parameters};
 use crate::random::Stream;
+use crate::weights::State;
 
-/// One of a network's inputs.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Input {
-    /// its name
-    pub name: String,
-    /// shape of an item; sequences have 0 steps here, as many as there are in a batch
-    pub shape: Shape,
-}
-
-impl Input {
-    /// A named input.
-    pub fn new(name: impl Into<String>, shape: Shape) -> Self {
-        Self { name: name.into(), shape }
-    }
-
-    /// Whether an item of this shape in PyTorch's layout is one.
-    pub fn takes(&self, item: &[usize]) -> bool {
-        match (self.shape, item) {
-            (Shape::Vector(n), &[m]) => n == m,
-            (Shape::Image { height, width, channels }, &[c, h, w]) => {
-                (c, h, w) == (channels, height, width)
-            }
-            (Shape::Sequence { numbers, .. }, &[steps, m]) => numbers == m && steps > 0,
-            _ => false,
-        }
-    }
-
-    /// Items in PyTorch's layout, for people.
-    pub fn layout(&self) -> String {
-        match self.shape {
-            Shape::Vector(n) => format!("[items, {n}]"),
-            Shape::Image { height, width, channels } => {
-                format!("[items, {channels}, {height}, {width}]")
-            }
-            Shape::Sequence { numbers, .. } => format!("[items, steps, {numbers}]"),
-        }
-    }
-}
+pub use crate::input::Input;
 
 /// The layers between inputs and outputs.
 #[derive(Debug)]
@@ -93,6 +57,8 @@ pub struct Network {
     outputs: usize,
     parameters: Parameters,
     through_activation: bool,
+    /// what trainings begin with; `None`: random numbers
+    beginning: Option<State>,
 }
 
 /// Loss and gradients of a batch.
@@ -131,7 +97,14 @@ impl Network {
         let declared = architecture.body.layers().flat_map(|layer| layer.parameters()).collect();
         let parameters = Parameters::new(declared, seed);
         let (name, outputs) = (name.into(), outputs.unwrap_or(0));
-        Ok(Self { name, architecture, outputs, parameters, through_activation: true })
+        Ok(Self {
+            name,
+            architecture,
+            outputs,
+            parameters,
+            through_activation: true,
+            beginning: None,
+        })
     }
 
     /// Its name.
@@ -186,16 +159,7 @@ impl Network {
     /// Numbers that a training step holds for an item of these input shapes, roughly.
     pub(crate) fn kept(&self, shapes: &[Shape]) -> usize {
         let chains = self.architecture.body.chains().iter().zip(shapes);
-        let of = |(chain, &input): (&Chain, &Shape)| {
-            let mut shape = input;
-            let mut sum = input.len();
-            for layer in chain {
-                sum += layer.kept(shape);
-                shape = layer.output(shape).unwrap_or(shape);
-            }
-            sum
-        };
-        chains.map(of).sum()
+        chains.map(|(chain, &input)| input.len() + kept_by(chain, input)).sum()
     }
 
     /// Refuses inputs of other shapes.
@@ -370,9 +334,34 @@ impl Network {
         Ok(Gradients { loss, by_parameter: backward.gradients, running, outputs })
     }
 
+    /// Lets trainings begin with these numbers instead of random ones. The last layer stays random where
+    /// it has another number of outputs; gives the names of its parameters.
+    ///
+    /// # Errors
+    /// [`NetError::Weights`] for other differences; nothing is changed then.
+    pub fn begin_with(&mut self, state: &State) -> Result<Vec<String>> {
+        let random = self.parameters.adopt(&self.name, state)?;
+        self.beginning = Some(state.clone());
+        Ok(random)
+    }
+
+    /// What trainings begin with, where that is not random.
+    pub(crate) fn beginning(&self) -> Option<&State> {
+        self.beginning.as_ref()
+    }
+
+    fn begin(&mut self, declared: Vec<Declared>, seed: u64) {
+        self.parameters = Parameters::new(declared, seed);
+        if let Some(state) = &self.beginning
+            && let Err(error) = self.parameters.adopt(&self.name, state)
+        {
+            unreachable!("it was adopted before: {error}");
+        }
+    }
+
     /// Starts all parameters anew.
     pub fn start(&mut self, seed: u64) {
-        self.parameters = Parameters::new(self.parameters.declared().to_vec(), seed);
+        self.begin(self.parameters.declared().to_vec(), seed);
     }
 
     /// Starts every matrix and kernel anew, uniform by the sum of the numbers it takes and gives
@@ -388,6 +377,6 @@ impl Network {
                 d.initial = Initial::Constant(0.0);
             }
         }
-        self.parameters = Parameters::new(declared, seed);
+        self.begin(declared, seed);
     }
 }

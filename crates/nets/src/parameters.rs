@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use crate::error::{NetError, Result};
 use crate::matrix::Matrix;
 use crate::random::Stream;
+use crate::weights::State;
 
 /// How a parameter starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,6 +112,33 @@ impl Parameters {
         self.iter().find_map(|(d, values)| Some((d.name.as_str(), not_finite(values)?)))
     }
 
+    /// Replaces all values by those of a network that may have learned other classes: the last layer
+    /// stays as it is where it has another number of outputs. Gives the names of what stays.
+    ///
+    /// # Errors
+    /// As [`Parameters::load`], for other differences.
+    pub(crate) fn adopt(&mut self, network: &str, state: &State) -> Result<Vec<String>> {
+        let last = self.declared.last().map(|d| layer(&d.name));
+        let (mut merged, mut stay) = (State::with_capacity(state.len()), Vec::new());
+        for (name, shape, values) in state {
+            let own = self.index.get(name).map(|&i| (&self.declared[i], &self.values[i]));
+            let own = own.filter(|(d, _)| {
+                Some(layer(name)) == last
+                    && d.shape[0] != shape.first().copied().unwrap_or(0)
+                    && d.shape.get(1..) == shape.get(1..)
+            });
+            merged.push(match own {
+                Some((d, values)) => {
+                    stay.push(name.clone());
+                    (name.clone(), d.shape.clone(), values.values().to_vec())
+                }
+                None => (name.clone(), shape.clone(), values.clone()),
+            });
+        }
+        self.load(network, &merged)?;
+        Ok(stay)
+    }
+
     /// Replaces all values by those given under PyTorch's names. `num_batches_tracked` may be there.
     ///
     /// # Errors
@@ -135,6 +163,11 @@ impl Parameters {
         }
         Ok(())
     }
+}
+
+/// The layer of a parameter.
+fn layer(name: &str) -> &str {
+    name.rsplit_once('.').map_or("", |(layer, _)| layer)
 }
 
 /// Names and shapes that are not those declared; `num_batches_tracked` may be there.

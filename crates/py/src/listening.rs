@@ -102,7 +102,7 @@ fn training<'t>(
 ) -> PyResult<Training<'t>> {
     let recipe = serde_json::from_str(recipe).map_err(value_error)?;
     let groups = rows.iter().any(|(.., group)| group.is_some()).then_some(GROUPS);
-    Ok(Training { target: TARGET, groups, recipe, checkpoints })
+    Ok(Training { target: TARGET, groups, recipe, checkpoints, weights: None })
 }
 
 /// A network trained on recordings, and the recordings that were left out; `kind` is what the labels

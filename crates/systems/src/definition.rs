@@ -13,6 +13,8 @@ pub struct Settings {
     /// Embeddings of recordings by other programs, by name (`vggish`, `r21d`), in the format of
     /// [`corsmal_nets::dataset`]; several files of a name are joined.
     pub embeddings: Vec<(String, PathBuf)>,
+    /// Weights that networks begin with instead of random ones, by name.
+    pub weights: Vec<(String, PathBuf)>,
 }
 
 /// A system of the paper.

@@ -27,6 +27,38 @@ pub enum SystemError {
         /// what it takes
         takes: &'static str,
     },
+    /// A network that takes something else.
+    #[error("{network} takes {takes}, not pictures")]
+    TakesNoPictures {
+        /// the network
+        network: &'static str,
+        /// what it takes
+        takes: &'static str,
+    },
+    /// A folder without pictures.
+    #[error("{path}: holds no picture: PNG and JPEG are read")]
+    NoPictures {
+        /// the folder
+        path: PathBuf,
+    },
+    /// A folder with more pictures than can be learned from.
+    #[error("{path}: more than {limit} pictures")]
+    TooManyPictures {
+        /// the folder
+        path: PathBuf,
+        /// how many there may be
+        limit: usize,
+    },
+    /// Two pictures that differ in their ending alone.
+    #[error("{first} and {second} have one id, {id}: rename one")]
+    SameId {
+        /// their id
+        id: String,
+        /// the one
+        first: PathBuf,
+        /// the other
+        second: PathBuf,
+    },
     /// A trained network that does not know how its inputs come from recordings.
     #[error(
         "{network} was trained on inputs that came from a file, and cannot make them from recordings: \
@@ -42,8 +74,8 @@ pub enum SystemError {
         /// the network
         network: &'static str,
     },
-    /// Recordings without features.
-    #[error("{path}: no recording has features: nothing to train on")]
+    /// Recordings without features, or pictures that are all damaged.
+    #[error("{path}: nothing in it can be read: nothing to train on")]
     NoExamples {
         /// where they lie
         path: PathBuf,

@@ -4,11 +4,14 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use corsmal_ccm::crop::LABEL_FILE;
 use corsmal_ccm::dataset::SequenceName;
 use corsmal_extract::config::Config;
 use corsmal_extract::inputs::Input;
 use corsmal_extract::run::Recordings;
-use corsmal_models::dataset::{LabelledTable, MemberNames};
+use corsmal_files::identity;
+use corsmal_files::outcome::{Outcome, Status};
+use corsmal_models::dataset::{LabelSource, LabelledTable, MemberNames};
 use corsmal_models::model_file::TrainedOn;
 use corsmal_models::targets::Classes;
 use corsmal_nets::dataset::Dataset;
@@ -16,6 +19,7 @@ use corsmal_nets::items::{Column, Items};
 use corsmal_nets::networks::Definition;
 
 use crate::error::{Result, SystemError};
+use crate::pictures::{self, Picture};
 use crate::recordings;
 
 /// Items of a network and the table that labels them.
@@ -28,6 +32,8 @@ pub struct Examples {
     /// the row of each item: a recording may be several windows
     row_of: Vec<usize>,
     pub(crate) heard: Option<Heard>,
+    /// identity of the pictures, where items were made of them
+    seen: Option<String>,
 }
 
 /// How recordings became items.
@@ -53,7 +59,7 @@ impl Examples {
         columns.extend(named_labels(&columns));
         let row_of = (0..ids.len()).collect();
         let table = LabelledTable::of_columns(path, ids, columns);
-        Ok(Self { definition, table, items, row_of, heard: None })
+        Ok(Self { definition, table, items, row_of, heard: None, seen: None })
     }
 
     /// Recordings through the network's front end, with `jobs` threads. `path` is named in messages
@@ -103,12 +109,66 @@ impl Examples {
         let column = Column::of(items.iter().map(|item| item.values.as_slice()));
         let items = Items { columns: vec![column] };
         let heard = Some(Heard { config: engine.config().clone(), trained_on });
-        Ok(Self { definition, table, items, row_of, heard })
+        Ok(Self { definition, table, items, row_of, heard, seen: None })
+    }
+
+    /// Pictures in a folder; `left_out` is told each that cannot be read, and why. A file
+    /// [`LABEL_FILE`] among them gives their label columns.
+    ///
+    /// # Errors
+    /// As [`pictures::read`], and labels of other pictures.
+    pub fn of_pictures(
+        definition: &'static Definition,
+        folder: &Path,
+        stop: &AtomicBool,
+        mut left_out: impl FnMut(&str, &str),
+    ) -> Result<Self> {
+        let (mut ids, mut column, mut outcomes) = (Vec::new(), Column::of([]), Vec::new());
+        for Picture { id, path, identity, item } in pictures::read(definition, folder, stop)? {
+            let place = path.display().to_string();
+            let (status, reason) = match &item {
+                Ok(_) => (Status::Ok, String::new()),
+                Err(reason) => (Status::Corrupt, reason.clone()),
+            };
+            let outcome = Outcome::new(&id, place, status, &reason);
+            outcomes.push(Outcome { identity, ..outcome });
+            match item {
+                Ok(item) => {
+                    column.push(&item);
+                    ids.push(id);
+                }
+                Err(_) => left_out(&id, &reason),
+            }
+        }
+        if ids.is_empty() {
+            return Err(SystemError::NoExamples { path: folder.into() });
+        }
+        let row_of = (0..ids.len()).collect();
+        let mut table = LabelledTable::of_columns(folder, ids, Vec::new());
+        table.outcomes = outcomes;
+        let labels = folder.join(LABEL_FILE);
+        if labels.is_file() {
+            table.add_labels(&LabelSource::File { path: labels, key: None })?;
+        }
+        let items = Items { columns: vec![column] };
+        let all: Vec<&str> = table.outcomes.iter().map(|o| o.identity.as_str()).collect();
+        let seen = Some(identity::of_bytes(all.join("\n").as_bytes()));
+        Ok(Self { definition, table, items, row_of, heard: None, seen })
+    }
+
+    /// Its items, one for each row unless recordings are several windows.
+    pub fn items(&self) -> &Items {
+        &self.items
     }
 
     /// Whether the items were made of recordings.
     pub fn is_of_recordings(&self) -> bool {
         self.heard.is_some()
+    }
+
+    /// A fingerprint of the pictures that the items were made of.
+    pub fn pictures(&self) -> Option<&str> {
+        self.seen.as_deref()
     }
 
     /// The class of each item.

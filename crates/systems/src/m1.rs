@@ -42,7 +42,7 @@ impl Prepared for Ready<'_> {
         self.learning.notes()
     }
 
-    fn predict(&self, train: &[usize], wanted: &[usize]) -> Result<Vec<Estimate>> {
+    fn predict(&self, train: &[usize], wanted: &[usize]) -> Result<Vec<Vec<Estimate>>> {
         let proba = |outputs, classes| {
             let trained = self.learning.train("m1", outputs, &self.items, classes, train)?;
             self.learning.probabilities(&trained, &self.items, wanted)
@@ -55,6 +55,6 @@ impl Prepared for Ready<'_> {
             kind_probabilities: array(kind),
             ..Estimate::default()
         };
-        Ok(levels.iter().zip(&types).map(estimate).collect())
+        Ok(vec![levels.iter().zip(&types).map(estimate).collect()])
     }
 }

@@ -43,7 +43,7 @@ impl Prepared for Ready<'_> {
         self.learning.notes()
     }
 
-    fn predict(&self, train: &[usize], wanted: &[usize]) -> Result<Vec<Estimate>> {
+    fn predict(&self, train: &[usize], wanted: &[usize]) -> Result<Vec<Vec<Estimate>>> {
         let trained = self.learning.train("m2_type", 4, &self.items, &self.types, train)?;
         let found = self.learning.probabilities(&trained, &self.items, wanted)?;
         let estimate = |kind: &Vec<f64>| Estimate {
@@ -51,6 +51,6 @@ impl Prepared for Ready<'_> {
             kind_probabilities: array(kind),
             ..Estimate::default()
         };
-        Ok(found.iter().map(estimate).collect())
+        Ok(vec![found.iter().map(estimate).collect()])
     }
 }

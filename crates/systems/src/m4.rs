@@ -91,7 +91,7 @@ impl Prepared for Ready<'_> {
         self.learning.notes()
     }
 
-    fn predict(&self, train: &[usize], wanted: &[usize]) -> Result<Vec<Estimate>> {
+    fn predict(&self, train: &[usize], wanted: &[usize]) -> Result<Vec<Vec<Estimate>>> {
         let learning = &self.learning;
         let train_windows = self.windows_of(train);
         let hears = learning.train("m4_type", 4, &self.windows, &self.types, &train_windows)?;
@@ -132,14 +132,15 @@ impl Prepared for Ready<'_> {
             level_probabilities: array(level),
             ..Estimate::default()
         };
-        Ok(kinds.iter().zip(&levels).map(estimate).collect())
+        Ok(vec![kinds.iter().zip(&levels).map(estimate).collect()])
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use corsmal_ccm::dataset::{Filling, FillingLevel, FillingType};
+    use corsmal_ccm::capacity::Views;
+    use corsmal_ccm::dataset::{Filling, FillingLevel, FillingType, Recording, Subset};
     use corsmal_extract::inputs::{Input, InputSource};
 
     #[test]
@@ -147,9 +148,17 @@ mod tests {
         let source = InputSource::Stdin;
         let input = Input { id: "x".into(), source, start: None, end: None, labels: Vec::new() };
         let filling = Filling::new(FillingType::Rice, FillingLevel::Full);
+        let recording = Recording {
+            path: "x.wav".into(),
+            part: Subset::Training,
+            container: None,
+            id: None,
+            sequence: None,
+            name: None,
+        };
         let of = |action, start| {
-            let input = input.clone();
-            let subject = Subject { input, container: Some(1), name: None, filling, action };
+            let (input, views) = (input.clone(), Views::of(&recording, None));
+            let subject = Subject { input, container: Some(1), name: None, filling, action, views };
             window_type(&subject, start)
         };
         let poured = Some(Some((1.0, 2.0)));

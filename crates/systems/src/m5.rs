@@ -164,9 +164,9 @@ fn mean(members: &[Vec<Vec<f64>>]) -> Vec<Vec<f64>> {
 }
 
 impl Prepared for Ready<'_> {
-    fn inputs(&self) -> String {
+    fn inputs(&self) -> Vec<String> {
         let more = self.branches.iter().map(|b| b.source).filter(|s| *s != "audio");
-        std::iter::once("audio").chain(more).collect::<Vec<_>>().join("+")
+        vec![std::iter::once("audio").chain(more).collect::<Vec<_>>().join("+")]
     }
 
     fn notes(&self) -> Vec<String> {
@@ -174,7 +174,7 @@ impl Prepared for Ready<'_> {
         self.learning.notes().into_iter().chain([trees]).collect()
     }
 
-    fn predict(&self, train: &[usize], wanted: &[usize]) -> Result<Vec<Estimate>> {
+    fn predict(&self, train: &[usize], wanted: &[usize]) -> Result<Vec<Vec<Estimate>>> {
         let mut levels = vec![self.forest(&self.levels, 3, train, wanted)?];
         let mut types = vec![self.forest(&self.types, 4, train, wanted)?];
         for branch in &self.branches {
@@ -195,6 +195,6 @@ impl Prepared for Ready<'_> {
             kind_probabilities: array(kind),
             ..Estimate::default()
         };
-        Ok(levels.iter().zip(&types).map(estimate).collect())
+        Ok(vec![levels.iter().zip(&types).map(estimate).collect()])
     }
 }

@@ -66,7 +66,7 @@ impl Prepared for Ready<'_> {
         self.learning.notes()
     }
 
-    fn predict(&self, train: &[usize], wanted: &[usize]) -> Result<Vec<Estimate>> {
+    fn predict(&self, train: &[usize], wanted: &[usize]) -> Result<Vec<Vec<Estimate>>> {
         let proba = |network, outputs, classes, rows: &[usize]| {
             let trained = self.learning.train(network, outputs, &self.items, classes, rows)?;
             self.learning.probabilities(&trained, &self.items, wanted)
@@ -93,6 +93,6 @@ impl Prepared for Ready<'_> {
             };
             Estimate::joint(decided, Some(&joint))
         };
-        Ok(actions.iter().zip(&poured).zip(&shaken).map(estimate).collect())
+        Ok(vec![actions.iter().zip(&poured).zip(&shaken).map(estimate).collect()])
     }
 }

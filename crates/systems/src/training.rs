@@ -1,6 +1,6 @@
 //! Networks trained on labelled items, and validated on items that they were not trained on.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use corsmal_models::argmax;
 use corsmal_models::cross_validation::CrossValidation;
@@ -10,14 +10,16 @@ use corsmal_models::labels::Labels;
 use corsmal_models::predictions::PredictionTable;
 use corsmal_models::scores::{ClassReport, Scores};
 use corsmal_models::targets::Classes;
+use corsmal_nets::NetError;
 use corsmal_nets::cross_validation::{self, Data, FoldItems};
 use corsmal_nets::fit::{self, Progress, Task};
 use corsmal_nets::model::{Header, NetModel};
 use corsmal_nets::recipe::{Recipe, Select};
+use corsmal_nets::weights::{self, State};
 use ndarray::Array2;
 use serde_json::{Value, json};
 
-use crate::error::Result;
+use crate::error::{Result, SystemError};
 use crate::examples::Examples;
 
 /// What is learned, and how.
@@ -31,6 +33,37 @@ pub struct Training<'a> {
     pub recipe: Recipe,
     /// folder that keeps the training after each epoch; the next one continues from there
     pub checkpoints: Option<&'a Path>,
+    /// what it begins with instead of random numbers
+    pub weights: Option<&'a Weights>,
+}
+
+/// Weights that a training begins with; see [`corsmal_nets::network::Network::begin_with`].
+#[derive(Clone, Debug)]
+pub struct Weights {
+    path: PathBuf,
+    identity: String,
+    state: State,
+}
+
+impl Weights {
+    /// Reads a file (`.pth`, `.npz`, `.safetensors`).
+    ///
+    /// # Errors
+    /// A file that cannot be read or holds no weights.
+    pub fn read(path: &Path) -> Result<Self> {
+        let identity = corsmal_files::identity::of_file(path)
+            .map_err(|source| SystemError::Io { path: path.into(), source })?;
+        Ok(Self { path: path.into(), identity, state: weights::read(path)? })
+    }
+
+    fn provenance(&self) -> Value {
+        json!({ "path": self.path.display().to_string(), "identity": self.identity })
+    }
+
+    /// Says which file does not fit.
+    fn refusal(&self, source: NetError) -> SystemError {
+        SystemError::OtherWeights { path: self.path.clone(), source: Box::new(source) }
+    }
 }
 
 /// A trained network.
@@ -103,11 +136,15 @@ impl Training<'_> {
         let groups = self.groups.map(|groups| table.column(groups)).transpose()?;
         let groups = groups.map(|groups| examples.of_items(&groups));
         let groups = groups.as_deref();
-        let data = Data { items, classes: &y, n_classes: labels.len(), groups };
+        let state = self.weights.map(|weights| &weights.state);
+        let data = Data { items, classes: &y, n_classes: labels.len(), groups, weights: state };
         let all = FoldItems { name: "all".into(), train: (0..y.len()).collect(), test: Vec::new() };
         let (train, watched, validation_group) = cross_validation::watched(data, &all, &recipe)?;
         let task = Task { items, classes: &y, train: &train, watched: &watched };
         let mut network = definition.build(Some(labels.len()), recipe.seed)?;
+        if let Some(weights) = self.weights {
+            network.begin_with(&weights.state).map_err(|e| weights.refusal(e))?;
+        }
         let checkpoint = self.checkpoints.map(|folder| folder.join("training.safetensors"));
         let score = |truth: &[usize], found: &[usize]| weighted_f1(truth, found, labels.len());
         let history =
@@ -124,6 +161,7 @@ impl Training<'_> {
                 "files": files,
                 "recordings": heard.as_ref().map(|_| table.ids.len()),
                 "items": y.len(),
+                "weights": self.weights.map(Weights::provenance),
                 "trained_on": heard.as_ref().and_then(|heard| heard.trained_on.as_ref()),
             }),
             tool_version: env!("CARGO_PKG_VERSION").into(),
@@ -165,7 +203,8 @@ impl Training<'_> {
         let y = examples.classes(&classes);
         let groups = folds.groups().map(|groups| examples.of_items(groups));
         let groups = groups.as_deref();
-        let data = Data { items, classes: &y, n_classes: labels.len(), groups };
+        let state = self.weights.map(|weights| &weights.state);
+        let data = Data { items, classes: &y, n_classes: labels.len(), groups, weights: state };
         let items_of = examples.items_of();
         let of_rows = |rows: &[usize]| -> Vec<usize> {
             rows.iter().flat_map(|&row| items_of[row].iter().copied()).collect()

@@ -38,6 +38,7 @@ mod mask;
 mod matrix;
 mod pickle;
 pub mod region;
+mod resize;
 
 pub use calibration::{BackProjection, Calibration, Camera};
 pub use category::Category;

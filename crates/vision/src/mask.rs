@@ -22,6 +22,21 @@ impl Mask {
         self.data.iter().filter(|&&inside| inside).count()
     }
 
+    /// First column, first row, column and row after the last; `None` without any pixel inside.
+    pub fn bounds(&self) -> Option<[usize; 4]> {
+        let inside = |row: &[bool]| row.contains(&true);
+        let rows = self.data.chunks_exact(self.width);
+        let top = rows.clone().position(inside)?;
+        let bottom = rows.clone().rposition(inside)?;
+        let mut columns = [self.width, 0];
+        for row in rows {
+            let (left, right) = (row.iter().position(|&p| p), row.iter().rposition(|&p| p));
+            columns[0] = columns[0].min(left.unwrap_or(self.width));
+            columns[1] = columns[1].max(right.map_or(0, |last| last + 1));
+        }
+        Some([columns[0], top, columns[1], bottom + 1])
+    }
+
     /// Grows by one pixel in all eight directions.
     pub fn dilated(&self) -> Self {
         self.windowed(1, |a, b| a | b, false)
@@ -95,6 +110,7 @@ pub(crate) mod tests {
         assert_eq!(dot.dilated(), drawn(&[".....", ".###.", ".###.", ".###.", "....."]));
         assert_eq!(dot.dilated().eroded(), dot);
         assert_eq!(dot.eroded().area(), 0);
+        assert_eq!((dot.dilated().bounds(), dot.eroded().bounds()), (Some([1, 1, 4, 4]), None));
         let gap = drawn(&["##.##", "##.##", "##.##"]);
         assert_eq!(gap.closed(1).area(), 15);
         // The edge of the image does not shrink a mask.

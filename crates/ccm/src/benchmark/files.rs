@@ -72,7 +72,7 @@ pub(super) fn write_model(
 
 /// Writes the submissions of a system.
 pub(super) fn write_run(out: &Path, run: &Run, rows: &Rows) -> Result<()> {
-    write_estimates(out, &run.name.to_lowercase(), rows, &run.held_out, &run.tests)
+    write_estimates(out, &run.slug, rows, &run.held_out, &run.tests)
 }
 
 /// Writes the submissions of all methods that a table of capacities completes.

@@ -225,8 +225,8 @@ pub(super) fn methods(rows: &Rows, predicted: &Predicted<'_>, seed: u64) -> Vec<
         })
         .collect();
     list.extend(predicted.runs.iter().map(|run| Method {
-        name: run.name.into(),
-        slug: Some(run.name.to_lowercase()),
+        name: run.name.clone(),
+        slug: Some(run.slug.clone()),
         inputs: run.inputs.clone(),
         protocol: "corrected".into(),
         source: Source::Ours,

@@ -181,9 +181,10 @@ pub fn run(
         let (folder, how) = (options.out.join("features"), (options.jobs, options.seed));
         let work = Work::new(&set, &rows, &folder, how, progress, stop)?;
         for system in &options.systems {
-            let run = system::run(system.as_ref(), &work, &rows)?;
-            files::write_run(&options.out, &run, &rows)?;
-            runs.push(run);
+            for run in system::run(system.as_ref(), &work, &rows)? {
+                files::write_run(&options.out, &run, &rows)?;
+                runs.push(run);
+            }
         }
     }
     files::write_random(&options.out, &rows, options.seed)?;

@@ -6,10 +6,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::matrix::inputs;
+use super::method::file_name;
 use super::protocols::container_folds;
 use super::results::{Estimate, Rows};
+use crate::capacity::Views;
 use crate::dataset::{DataSet, Filling, SequenceName};
 use crate::error::{CcmError, Result};
+use crate::paper;
 use corsmal_extract::inputs::Input;
 
 /// A recording as a system sees it.
@@ -25,6 +28,8 @@ pub struct Subject {
     pub filling: Option<Filling>,
     /// Seconds in which something is poured or shaken; `Some(None)` where nothing is.
     pub action: Option<Option<(f64, f64)>>,
+    /// The files of its views.
+    pub views: Views,
 }
 
 /// What a system works on.
@@ -59,24 +64,31 @@ pub trait System {
 
 /// A system that has its features.
 pub trait Prepared {
-    /// What it hears and sees, joined by `+`.
-    fn inputs(&self) -> String {
-        "audio".into()
+    /// What it hears and sees, joined by `+`. A system that answers by several inputs, each alone, has as
+    /// many rows in the tables.
+    fn inputs(&self) -> Vec<String> {
+        vec!["audio".into()]
     }
 
     /// What differs from the published system, in sentences.
     fn notes(&self) -> Vec<String>;
 
-    /// Estimates of the `wanted` subjects in their order, after training on the subjects `train`.
+    /// Estimates of the `wanted` subjects in their order, after training on the subjects `train`: a list for
+    /// each of [`Prepared::inputs`].
     ///
     /// # Errors
     /// A training that fails or is interrupted.
-    fn predict(&self, train: &[usize], wanted: &[usize]) -> Result<Vec<Estimate>>;
+    fn predict(&self, train: &[usize], wanted: &[usize]) -> Result<Vec<Vec<Estimate>>>;
 }
 
-/// What a system predicted.
+/// What a system predicted by one kind of inputs.
 pub(super) struct Run {
-    pub(super) name: &'static str,
+    /// Name of the system.
+    pub(super) system: &'static str,
+    /// Name in the tables: that of the system, and the inputs where it has several.
+    pub(super) name: String,
+    /// Name of its files.
+    pub(super) slug: String,
     pub(super) inputs: String,
     pub(super) notes: Vec<String>,
     /// Training recordings, each by networks that never heard its container.
@@ -110,6 +122,7 @@ impl<'a> Work<'a> {
                     name: recording.name.filter(|_| training),
                     filling: target.filling.filter(|_| training),
                     action: key.filter(|_| training).and_then(|k| actions.get(&k).copied()),
+                    views: Views::of(recording, None),
                 });
             }
         }
@@ -127,30 +140,50 @@ impl<'a> Work<'a> {
     }
 }
 
-/// Holds out containers in three folds; test parts are predicted after training on everything.
-pub(super) fn run(system: &dyn System, work: &Work<'_>, rows: &Rows) -> Result<Run> {
+/// Holds out containers in three folds; test parts are predicted after training on everything. The runs are
+/// those by each of its inputs.
+pub(super) fn run(system: &dyn System, work: &Work<'_>, rows: &Rows) -> Result<Vec<Run>> {
     let name = system.name();
     let fault = |e: corsmal_models::ModelError| CcmError::Request(format!("{name}: {e}"));
     (work.progress)(&format!("{name}: features"));
     let prepared = system.prepare(work)?;
-    let mut held_out = Vec::with_capacity(work.training);
+    let inputs = prepared.inputs();
+    let several = inputs.len() > 1;
+    let of_inputs = |inputs: String| Run {
+        system: name,
+        name: if several { paper::named(name, &inputs) } else { name.into() },
+        slug: file_name(&if several { format!("{name} {inputs}") } else { name.into() }),
+        inputs,
+        notes: Vec::new(),
+        held_out: Vec::with_capacity(work.training),
+        tests: Vec::with_capacity(rows.tests.len()),
+    };
+    let mut runs: Vec<Run> = inputs.into_iter().map(of_inputs).collect();
     let folds = container_folds(&rows.training).map_err(fault)?;
     for (number, fold) in folds.iter().enumerate() {
         work.go_on()?;
         (work.progress)(&format!("{name}: fold {} of {}", number + 1, folds.len()));
         let found = prepared.predict(&fold.train, &fold.test)?;
-        held_out.extend(fold.test.iter().copied().zip(found));
+        for (run, found) in runs.iter_mut().zip(found) {
+            run.held_out.extend(fold.test.iter().copied().zip(found));
+        }
     }
-    held_out.sort_by_key(|(row, _)| *row);
-    let mut tests = Vec::with_capacity(rows.tests.len());
+    runs.iter_mut().for_each(|run| run.held_out.sort_by_key(|(row, _)| *row));
     if !rows.tests.is_empty() {
         work.go_on()?;
         (work.progress)(&format!("{name}: all training recordings"));
         let all: Vec<usize> = (0..work.training).collect();
         let wanted: Vec<usize> = (work.training..work.subjects.len()).collect();
-        let mut found = prepared.predict(&all, &wanted)?.into_iter();
-        tests.extend(rows.tests.iter().map(|t| found.by_ref().take(t.rows.len()).collect()));
+        let found = prepared.predict(&all, &wanted)?;
+        for (run, found) in runs.iter_mut().zip(found) {
+            let mut found = found.into_iter();
+            let parts = rows.tests.iter();
+            run.tests.extend(parts.map(|t| found.by_ref().take(t.rows.len()).collect()));
+        }
     }
-    let (inputs, notes) = (prepared.inputs(), prepared.notes());
-    Ok(Run { name, inputs, notes, held_out, tests })
+    // What is to be said is said once.
+    if let Some(first) = runs.first_mut() {
+        first.notes = prepared.notes();
+    }
+    Ok(runs)
 }

@@ -223,25 +223,48 @@ impl Views {
             check_size((mask.width, mask.height), || path.display().to_string())?;
             return Ok(mask);
         }
-        let of_frame = detections
-            .iter()
-            .filter(|d| d.view == view && d.frame == frame && d.score >= score)
-            .filter(|d| labels.contains(&d.label.as_str()));
-        // The first of equals, as detectors list them.
-        let mut best: Option<&Detection> = None;
-        for detection in of_frame {
-            if best.is_none_or(|b| detection.score > b.score) {
-                best = Some(detection);
-            }
-        }
-        let missing = || Problem::Missing(format!("no container in view {view}, frame {frame}"));
-        let mask = best.ok_or_else(missing)?.mask(Some(IMAGE_SIZE))?.ok_or_else(|| {
+        let best = best(detections, (view, frame), labels, score)?;
+        let mask = best.mask(Some(IMAGE_SIZE))?.ok_or_else(|| {
             Problem::Missing(format!("view {view}, frame {frame}: the detection has no mask"))
         })?;
         check_size((mask.width, mask.height), || {
             format!("the detection in view {view}, frame {frame}")
         })?;
         Ok(mask)
+    }
+
+    /// Edges of the object in a colour image of `size`, first column and row and those after the last: of
+    /// its mask, where there is one, else of the detector's box. Where it is, is as [`Views::mask`] finds it.
+    ///
+    /// # Errors
+    /// There is neither, it is damaged, or its mask is of another size.
+    pub fn edges(
+        &self,
+        detections: &[Detection],
+        (view, frame): (u8, u32),
+        labels: &[&str],
+        size: (usize, usize),
+    ) -> Result<[usize; 4], Problem> {
+        let (mask, boxed) = match self.image(Kind::Masks, view, frame)? {
+            Some(path) => (Some(Mask::read(path)?), None),
+            None => {
+                let best = best(detections, (view, frame), labels, 0.0)?;
+                (best.mask(Some(size))?, Some(best.bounds))
+            }
+        };
+        let edges = match (mask, boxed) {
+            (Some(mask), _) if (mask.width, mask.height) != size => {
+                return Err(Problem::Damaged(format!(
+                    "the mask in view {view}, frame {frame}: {} by {} px; its image has {} by {}",
+                    mask.width, mask.height, size.0, size.1
+                )));
+            }
+            (Some(mask), _) => mask.bounds(),
+            (None, boxed) => boxed.map(|[left, top, right, bottom]| {
+                [left.floor(), top.floor(), right.ceil(), bottom.ceil()].map(|v| v as usize)
+            }),
+        };
+        edges.ok_or_else(|| absent(view, frame))
     }
 
     /// Numbers of the first frame of the side views' video and of the one `from_end` from its end, the last
@@ -296,6 +319,26 @@ impl Views {
         }
         Ok(common.unwrap_or_default())
     }
+}
+
+/// The most confident detection among `labels` in a frame with at least `score`, of equals the first, as
+/// detectors list them.
+fn best<'d>(
+    detections: &'d [Detection],
+    (view, frame): (u8, u32),
+    labels: &[&str],
+    score: f64,
+) -> Result<&'d Detection, Problem> {
+    let of_frame = detections
+        .iter()
+        .filter(|d| d.view == view && d.frame == frame && d.score >= score)
+        .filter(|d| labels.contains(&d.label.as_str()));
+    let best = of_frame.reduce(|best, d| if d.score > best.score { d } else { best });
+    best.ok_or_else(|| absent(view, frame))
+}
+
+fn absent(view: u8, frame: u32) -> Problem {
+    Problem::Missing(format!("no container in view {view}, frame {frame}"))
 }
 
 /// Masks and depth images must be as large as what the calibration belongs to: measures on others are as wrong

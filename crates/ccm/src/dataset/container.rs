@@ -54,6 +54,12 @@ impl Container {
         }
     }
 
+    /// Whether one cannot see what it holds: boxes, and the coloured cups 1 and 2 (our reading). Of
+    /// the test containers only the boxes are known.
+    pub fn is_opaque(self) -> bool {
+        self.category() == Category::Box || matches!(self.0, 1 | 2)
+    }
+
     /// Part of the data set.
     pub fn subset(self) -> Subset {
         match self.0 {

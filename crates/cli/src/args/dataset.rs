@@ -18,7 +18,7 @@ const FOLDERS: &str = "folders";
 const FOLDER_COLUMN: &str = "class";
 
 /// Label columns that are groups rather than something to predict.
-const NO_TARGETS: [&str; 4] = ["fold", "group", "container", "recording"];
+const NO_TARGETS: [&str; 5] = ["fold", "group", "container", "recording", "view"];
 
 /// How to read a file that `extract` did not write.
 #[derive(clap::Args, Clone)]
@@ -126,12 +126,16 @@ fn is_like_folders(path: &Path) -> bool {
 #[derive(clap::Args)]
 pub struct DatasetArgs {
     /// Features: an .npz or .parquet of `extract` with summaries, or any .npz. With --net also
-    /// recordings: a file, a folder or a manifest.
-    #[arg(value_name = "FEATURES", required_unless_present = "features")]
+    /// recordings: a file, a folder or a manifest; or a folder of pictures.
+    #[arg(value_name = "FEATURES", required_unless_present_any = ["features", "crops"])]
     table: Option<PathBuf>,
     /// The same as the positional argument.
     #[arg(long, value_name = "FILE", conflicts_with = "table")]
     features: Option<PathBuf>,
+    /// The same for a folder of pictures, such as those of `corsmal-feat crops`, for networks that
+    /// take them. Its labels.csv gives the labels unless --labels does.
+    #[arg(long, value_name = "DIR", requires = "net", conflicts_with_all = ["table", "features"])]
+    pub crops: Option<PathBuf>,
     #[command(flatten)]
     pub members: MemberArgs,
     #[command(flatten)]
@@ -149,14 +153,15 @@ pub struct DatasetArgs {
 impl DatasetArgs {
     /// The feature file.
     pub fn path(&self) -> &Path {
-        self.table.as_deref().or(self.features.as_deref()).unwrap_or(Path::new(""))
+        let given = [&self.table, &self.features, &self.crops];
+        given.into_iter().flatten().next().map_or(Path::new(""), PathBuf::as_path)
     }
 
     /// Reads features and labels, refuses what cannot be learned from, warns of what is odd. Gives
     /// the name of the column to learn, too.
     pub fn load(&self) -> Result<(LabelledTable, String), Failure> {
         let mut table = LabelledTable::read(self.path(), &self.members.names())?;
-        let target = self.label(&mut table)?;
+        let target = self.label(&mut table, None)?;
         let constant = table.check()?;
         if let Some(strange) = strange(&table) {
             eprintln!("warning: {}: {strange}", self.path().display());
@@ -176,8 +181,8 @@ impl DatasetArgs {
         Ok((table, target))
     }
 
-    /// Adds the labels to a table, and names the column to learn.
-    pub fn label(&self, table: &mut LabelledTable) -> Result<String, Failure> {
+    /// Adds the labels to a table, and names the column to learn; of several, that of the name `usual`.
+    pub fn label(&self, table: &mut LabelledTable, usual: Option<&str>) -> Result<String, Failure> {
         if let Some(source) = self.labels.source(self.target.as_deref())? {
             for column in table.add_labels(&source)? {
                 eprintln!(
@@ -186,10 +191,10 @@ impl DatasetArgs {
                 );
             }
         }
-        self.target(table)
+        self.target(table, usual)
     }
 
-    fn target(&self, table: &LabelledTable) -> Result<String, Failure> {
+    fn target(&self, table: &LabelledTable, usual: Option<&str>) -> Result<String, Failure> {
         if let Some(target) = &self.target {
             return Ok(target.clone());
         }
@@ -206,6 +211,9 @@ impl DatasetArgs {
                 "{}: has no label column; --labels adds labels from a CSV or from class folders",
                 self.path().display()
             ))),
+            several if several.iter().any(|name| Some(*name) == usual) => {
+                Ok(usual.unwrap_or_default().into())
+            }
             several => Err(Failure::new(format!(
                 "{}: name the column to learn: --target is one of {}",
                 self.path().display(),

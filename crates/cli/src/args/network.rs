@@ -5,14 +5,18 @@ use std::path::PathBuf;
 /// Which network is trained.
 #[derive(clap::Args)]
 pub struct NetworkArgs {
-    /// Train a network of `corsmal-feat nets` instead of a classifier, from recordings or from an
-    /// .npz of its inputs; --set changes its recipe, such as epochs=5.
+    /// Train a network of `corsmal-feat nets` instead of a classifier, from recordings, from an .npz
+    /// of its inputs, or from pictures; --set changes its recipe, such as epochs=5.
     #[arg(long, value_name = "NAME")]
     #[arg(conflicts_with_all = ["classifier", "standardize", "pca", "tune"])]
     pub net: Option<String>,
     /// Where the network runs: cpu, the only device of this build.
     #[arg(long, value_name = "DEVICE", default_value = "cpu", requires = "net", value_parser = device)]
     pub device: String,
+    /// Begin with these weights instead of random numbers: .pth, .npz or .safetensors under the
+    /// network's names, such as torchvision's for ResNet-18. The last layer may have had other classes.
+    #[arg(long, value_name = "FILE", requires = "net")]
+    pub weights: Option<PathBuf>,
     /// Folder that keeps the training after each epoch; the next run continues from it.
     #[arg(long, value_name = "FOLDER", requires = "net")]
     pub checkpoints: Option<PathBuf>,

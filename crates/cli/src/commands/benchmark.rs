@@ -38,7 +38,7 @@ pub struct Args {
     /// --methods.
     #[arg(long, num_args = 1.., value_delimiter = ',', value_parser = baseline, value_name = "NAME")]
     baselines: Vec<Baseline>,
-    /// Systems of the paper to train and run: m1, m2, m4, m5, m6. They need a build with the feature
+    /// Systems of the paper to train and run: m1, m2, m4, m5, m6, mask-rn. They need a build with the feature
     /// `nets`.
     #[arg(long, num_args = 1.., value_delimiter = ',', value_name = "NAME")]
     methods: Vec<String>,
@@ -49,6 +49,10 @@ pub struct Args {
     /// ids; several files of a name are joined.
     #[arg(long, value_parser = named_file, value_name = "NAME=NPZ", requires = "methods")]
     embeddings: Vec<(String, PathBuf)>,
+    /// Weights that a network of the systems begins with instead of random numbers, such as torchvision's
+    /// for resnet18-level and resnet18-type.
+    #[arg(long, value_parser = named_file, value_name = "NETWORK=FILE", requires = "methods")]
+    weights: Vec<(String, PathBuf)>,
     /// Predictions of another method that join the tables: a submission in an official format or
     /// capacity estimates by file name.
     #[arg(long, value_parser = named_file, value_name = "NAME=CSV")]
@@ -191,18 +195,28 @@ fn capacities(args: &Args) -> Result<Option<Vec<CapacityTable>>, Failure> {
 
 #[cfg(feature = "nets")]
 fn systems(args: &Args) -> Result<Vec<Box<dyn System>>, Failure> {
-    let settings = corsmal_systems::Settings {
-        epochs: args.epochs.map(|n| n as usize),
-        embeddings: args.embeddings.clone(),
-    };
-    let made = |name: &String| Ok(corsmal_systems::named(name)?.make(&settings)?);
-    args.methods.iter().map(made).collect()
+    let methods = args.methods.iter().map(|name| corsmal_systems::named(name));
+    let methods = methods.collect::<Result<Vec<_>, _>>()?;
+    let mut weights = Vec::with_capacity(args.weights.len());
+    for (name, path) in &args.weights {
+        let network = corsmal_nets::networks::named(name)?.name;
+        if !methods.iter().any(|method| method.networks.contains(&network)) {
+            return Err(Failure::new(format!(
+                "--weights {name}: no system of this run has that network"
+            )));
+        }
+        weights.push((network.to_owned(), path.clone()));
+    }
+    let epochs = args.epochs.map(|n| n as usize);
+    let embeddings = args.embeddings.clone();
+    let settings = corsmal_systems::Settings { epochs, embeddings, weights };
+    Ok(methods.into_iter().map(|method| method.make(&settings)).collect::<Result<Vec<_>, _>>()?)
 }
 
 #[cfg(not(feature = "nets"))]
 fn systems(args: &Args) -> Result<Vec<Box<dyn System>>, Failure> {
-    // What --epochs and --embeddings say is for the systems.
-    let Args { epochs: _, embeddings: _, .. } = args;
+    // What these say is for the systems.
+    let Args { epochs: _, embeddings: _, weights: _, .. } = args;
     if args.methods.is_empty() { Ok(Vec::new()) } else { Err(super::nets::absent()) }
 }
 

@@ -7,6 +7,7 @@ mod classify;
 mod compare;
 mod compare_predictions;
 mod completions;
+mod crops;
 mod cross_validate;
 mod dataset;
 mod demo;
@@ -92,6 +93,8 @@ enum Command {
     Benchmark(benchmark::Args),
     /// Estimate capacities of containers from the views of a CORSMAL data set.
     Capacity(capacity::Args),
+    /// Cut containers out of the last frames of a CORSMAL data set, as pictures with labels.
+    Crops(crops::Args),
     /// Print shell completions or the man page.
     Completions(completions::Args),
     /// Check a CORSMAL data set on disk.
@@ -124,6 +127,7 @@ impl Command {
             Self::Fuse(args) => fuse::run(args),
             Self::Benchmark(args) => benchmark::run(args),
             Self::Capacity(args) => capacity::run(args),
+            Self::Crops(args) => crops::run(args),
             Self::Completions(args) => completions::run(args, Cli::command()),
             Self::Dataset(args) => dataset::run(args),
             Self::Evaluate(args) => evaluate::run(args),

@@ -18,6 +18,8 @@ mod live;
 mod models;
 #[cfg(feature = "nets")]
 mod networks;
+#[cfg(feature = "nets")]
+mod pictures;
 mod scoring;
 #[cfg(not(feature = "nets"))]
 mod without_networks;

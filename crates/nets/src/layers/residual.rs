@@ -3,7 +3,7 @@
 use crate::batch::{Batch, Shape};
 use crate::error::{NetError, Result};
 use crate::kernels;
-use crate::layer::{Backward, Chain, Layer, Pass};
+use crate::layer::{Backward, Chain, Layer, Pass, kept_by};
 use crate::parameters::Declared;
 
 /// `main(x) + shortcut(x)`; an empty shortcut passes `x` on.
@@ -39,6 +39,10 @@ impl Layer for Residual {
         let (main, shortcut) = (through(&self.main)?, through(&self.shortcut)?);
         let refusal = || NetError::layer(self.describe(), "the same shape from both paths", input);
         (main == shortcut).then_some(main).ok_or_else(refusal)
+    }
+
+    fn kept(&self, input: Shape) -> usize {
+        kept_by(&self.main, input) + kept_by(&self.shortcut, input)
     }
 
     fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch {

@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
+use crate::batch::Shape;
 use crate::error::{NetError, Result};
 use crate::front_end::FrontEnd;
 use crate::network::{Architecture, Input, Network};
@@ -85,6 +86,16 @@ impl Definition {
     /// What an item is: name and shape of each input.
     pub fn inputs(&self) -> Vec<Input> {
         (self.architecture)(self.outputs).inputs
+    }
+
+    /// Width and height of the pictures that it takes, where it takes pictures.
+    pub fn picture(&self) -> Option<(usize, usize)> {
+        match self.inputs().as_slice() {
+            [Input { shape: Shape::Image { height, width, channels: 3 }, .. }] => {
+                Some((*width, *height))
+            }
+            _ => None,
+        }
     }
 
     fn layers(&self, outputs: Option<usize>) -> Result<Architecture> {

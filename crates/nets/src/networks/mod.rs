@@ -28,6 +28,7 @@ networks! {
     m5_r21d: M5_R21D_LEVEL, M5_R21D_TYPE;
     m6: M6_ACTION, M6_POURING, M6_SHAKING;
     vggish: VGGISH;
+    resnet18: RESNET18_LEVEL, RESNET18_TYPE;
 }
 
 /// The definition of this name.

@@ -17,7 +17,7 @@ fn manifest() -> Option<Value> {
 }
 
 /// The manifest's formula for numbers between 0 and 1.
-fn u(seed: u64, name: &str, n: usize) -> Vec<f64> {
+pub fn u(seed: u64, name: &str, n: usize) -> Vec<f64> {
     let crc = u64::from(crc32fast::hash(name.as_bytes()));
     (0..n as u64)
         .map(|i| i.wrapping_mul(2_654_435_761).wrapping_add(crc + seed * 40503) % (1 << 32))

@@ -5,6 +5,7 @@
 mod golden;
 mod layers;
 mod published;
+mod resnet;
 mod training;
 mod weights;
 

@@ -145,7 +145,7 @@ fn folds_are_scored_on_what_they_hold_out() {
     let definition = networks::named("m3_mlp").unwrap();
     let run = |select: &str, groups: Option<&[String]>| {
         let recipe = recipe(json!({"epochs": 2, "batch": 3, "lr": 1e-4, "select": select}));
-        let data = Data { items: &items, classes: &classes, n_classes: 3, groups };
+        let data = Data { items: &items, classes: &classes, n_classes: 3, groups, weights: None };
         cross_validate(definition, data, &folds, &recipe, None, accuracy, |_, _| true)
     };
     let found = run("validation", Some(&groups)).unwrap();

@@ -65,7 +65,7 @@ pub(super) fn notes<'a>(
 ) -> Section {
     let of_systems = runs
         .iter()
-        .flat_map(|run| run.notes.iter().map(|note| format!("{} of this run: {note}", run.name)));
+        .flat_map(|run| run.notes.iter().map(|note| format!("{} of this run: {note}", run.system)));
     let absent = nowhere
         .map(|name| format!("The predictions of {name} are for no recording of this data set."));
     Section {

@@ -3,7 +3,6 @@
 use corsmal_plot::{Mark, ScorePlot, ScoreRow};
 use corsmal_report::{Cell, Figure, Row, Section, Source, Table};
 
-use super::tasks::short_inputs;
 use crate::benchmark::method::{Method, Part, of_task};
 use crate::benchmark::results::{PartScores, Rows};
 use crate::error::Result;
@@ -26,7 +25,7 @@ pub(super) fn section(
         let scored = corrected.iter().filter_map(|(m, s)| Some((m, of_task(task, s)?)));
         let Some((method, _)) = scored.max_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
         let paper = paper::scores(task);
-        let same = paper.iter().find(|p| p.method == method.name);
+        let same = paper.iter().find(|p| p.is_of(&method.name));
         let best = paper.iter().max_by(|a, b| a.combined.total_cmp(&b.combined));
         lines.push(Row {
             source: Source::Ours,
@@ -92,7 +91,7 @@ fn plot(task: Task, rows: &Rows, methods: &[Method], seed: u64) -> ScorePlot {
         let same = published.iter().filter(|other| other.method == row.method);
         let name = match same.count() {
             1 => row.method.to_owned(),
-            _ => format!("{}, {}", row.method, short_inputs(row.inputs)),
+            _ => paper::named(row.method, row.inputs),
         };
         lines.push(ScoreRow { name, marks: vec![mark] });
     }

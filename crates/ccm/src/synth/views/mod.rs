@@ -10,7 +10,7 @@ mod shape;
 
 use std::path::Path;
 
-use corsmal_vision::{Camera, Depth, Mask, Rgb, compress};
+use corsmal_vision::{Camera, Depth, Rgb, compress};
 use rand::Rng;
 use serde_json::json;
 
@@ -169,14 +169,9 @@ fn hand(shape: &Shape, at: [f64; 3]) -> Vec<Ellipsoid> {
     std::iter::once(palm).chain(fingers).collect()
 }
 
-/// Whether one cannot look into a container.
-fn opaque(container: Container) -> bool {
-    container.category() == Category::Box || matches!(container.number(), 1 | 2)
-}
-
 /// Colour by part and facing; filling shows through what is transparent.
 fn colours(seen: &Seen, take: &Take) -> Rgb {
-    let container = match (take.container.category(), opaque(take.container)) {
+    let container = match (take.container.category(), take.container.is_opaque()) {
         (Category::Box, _) => [196.0, 148.0, 88.0],
         (_, true) => [190.0, 60.0, 52.0],
         _ => [176.0, 196.0, 204.0],
@@ -198,7 +193,7 @@ fn colours(seen: &Seen, take: &Take) -> Rgb {
             Part::Table => [112.0, 84.0, 62.0],
             Part::Person => [54.0, 70.0, 96.0],
             Part::Hand => [206.0, 160.0, 134.0],
-            Part::Container if !opaque(take.container) && *height < level => content,
+            Part::Container if !take.container.is_opaque() && *height < level => content,
             Part::Container => container,
         };
         let shade = if *part == Part::Nothing { 1.0 } else { 0.45 + 0.55 * f64::from(*facing) };
@@ -209,7 +204,7 @@ fn colours(seen: &Seen, take: &Take) -> Rgb {
 
 /// Depth in mm: noise that grows with the distance, holes, lost edges; glass is measured poorly.
 fn depth(seen: &Seen, container: Container, rng: &mut impl Rng) -> Depth {
-    let glass = !opaque(container);
+    let glass = !container.is_opaque();
     let mut data = vec![0u16; seen.depth.len()];
     for (i, mm) in data.iter_mut().enumerate() {
         let z = f64::from(seen.depth[i]);
@@ -255,7 +250,7 @@ fn detect(
             d if d < 0.5 => mask.dilated(),
             _ => mask,
         };
-        let Some(bounds) = bounds(&mask) else { return };
+        let Some(bounds) = mask.bounds() else { return };
         let mut entry = json!({
             "frame": frame, "view": view + 1, "label": label, "score": score, "box": bounds,
         });
@@ -278,17 +273,6 @@ fn detect(
     if !missed {
         add(Part::Container, label, (score * 1000.0).round() / 1000.0, &mut random);
     }
-}
-
-/// Edges of the box around a mask in px.
-fn bounds(mask: &Mask) -> Option<[usize; 4]> {
-    let mut bounds: Option<[usize; 4]> = None;
-    for (i, _) in mask.data.iter().enumerate().filter(|(_, inside)| **inside) {
-        let (x, y) = (i % mask.width, i / mask.width);
-        let [a, b, c, d] = bounds.unwrap_or([x, y, x + 1, y + 1]);
-        bounds = Some([a.min(x), b.min(y), c.max(x + 1), d.max(y + 1)]);
-    }
-    bounds
 }
 
 #[cfg(test)]

@@ -41,7 +41,8 @@ pub struct Args {
     /// Model file of `corsmal-feat train`, or one of `corsmal-feat benchmark`.
     #[arg(long, short, value_name = "FILE")]
     pub(super) model: PathBuf,
-    /// Recordings: files, folders, globs, manifests, or - for one WAV stream on standard input.
+    /// Recordings: files, folders, globs, manifests, or - for one WAV stream on standard input. For a
+    /// network that takes pictures, a folder of them.
     #[arg(value_name = "PATH", required_unless_present_any = ["features", "inputs"])]
     pub(super) paths: Vec<String>,
     /// The same as the positional argument.
@@ -105,8 +106,8 @@ impl Args {
         if self.json || self.format == Format::Jsonl { Form::JsonLines } else { Form::Csv }
     }
 
-    /// Recordings, however they were named.
-    fn names(&self) -> &[String] {
+    /// Recordings or pictures, however they were named.
+    pub(super) fn names(&self) -> &[String] {
         if self.paths.is_empty() { &self.inputs } else { &self.paths }
     }
 

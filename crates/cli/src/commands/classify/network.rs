@@ -1,4 +1,6 @@
-//! Predictions of a trained network: from recordings through its front end, or from its inputs.
+//! Predictions of a trained network: from recordings through its front end, from pictures, or from its inputs.
+
+use std::path::Path;
 
 use corsmal_extract::inputs::Input;
 use corsmal_files::outcome::Status;
@@ -6,9 +8,12 @@ use corsmal_models::argmax;
 use corsmal_models::labels::Labels;
 use corsmal_models::predictions::{Record, Unit};
 use corsmal_nets::dataset::Dataset;
+use corsmal_nets::items::{Column, Items};
 use corsmal_nets::model::NetModel;
+use corsmal_nets::networks::{self, Definition};
 use corsmal_systems::SystemError;
 use corsmal_systems::listening::{Answer, Formats, Listener};
+use corsmal_systems::pictures;
 
 use super::args::{Args, check_changes, recordings};
 use super::records::{End, Records, delivered, path_of};
@@ -30,6 +35,11 @@ pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Fail
         return of_inputs(args, model, &labels, &data);
     }
     args.members.refuse()?;
+    if let Ok(definition) = networks::named(&model.header.network)
+        && definition.picture().is_some()
+    {
+        return of_pictures(args, model, &labels, definition);
+    }
     check_changes(args)?;
     let formats = if args.any_rate { Formats::Any } else { Formats::AsTrained };
     let listener = Listener::new(model, &args.overrides, formats, args.jobs.count());
@@ -98,6 +108,58 @@ fn of_inputs(
             labels: data.columns.iter().map(|(_, values)| values[row].as_str()).collect(),
             class: Some(argmax(&proba)),
             proba: Some(proba),
+        };
+        if !delivered(records.write(&record))? {
+            return Ok((End::Unread, Some(records)));
+        }
+    }
+    Ok((End::Done, Some(records)))
+}
+
+/// Predicts pictures.
+fn of_pictures(
+    args: &Args,
+    model: &NetModel,
+    labels: &Labels,
+    definition: &Definition,
+) -> Result<(End, Option<Records>), Failure> {
+    let [folder] = args.names() else {
+        return Err(Failure::new("name one picture, or one folder of pictures"));
+    };
+    if args.window.is_some() || args.vote.rule(labels)?.is_some() || !args.overrides.is_empty() {
+        return Err(Failure::new("--window, --vote and --set are for recordings, not pictures"));
+    }
+    let pool = args.jobs.pool()?;
+    let stop = crate::interrupt::flag();
+    let pictures = match pool.install(|| pictures::read(definition, Path::new(folder), stop)) {
+        Err(SystemError::Interrupted) => return Ok((End::Interrupted, None)),
+        pictures => pictures?,
+    };
+    let items: Vec<&[f32]> = pictures.iter().filter_map(|p| p.item.as_deref().ok()).collect();
+    let items = Items { columns: vec![Column::of(items)] };
+    let mut proba = match items.is_empty() {
+        true => Vec::new(),
+        false => pool.install(|| model.predict_proba(&items))?,
+    }
+    .into_iter();
+    let mut records = args.records(labels, &model.header.target, Unit::Recording, &[])?;
+    for picture in &pictures {
+        let (status, proba) = match &picture.item {
+            Ok(_) => (Status::Ok, proba.next()),
+            Err(reason) => {
+                eprintln!("{}: {}: {reason}", picture.id, Status::Corrupt.name());
+                (Status::Corrupt, None)
+            }
+        };
+        let record = Record {
+            id: &picture.id,
+            path: &picture.path.display().to_string(),
+            span: None,
+            windows: 0,
+            status,
+            labels: Vec::new(),
+            class: proba.as_deref().map(argmax),
+            proba,
         };
         if !delivered(records.write(&record))? {
             return Ok((End::Unread, Some(records)));

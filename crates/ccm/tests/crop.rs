@@ -1,0 +1,149 @@
+//! What the vision baseline sees of recordings.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use corsmal_ccm::capacity::{Problem, Views};
+use corsmal_ccm::crop::{self, Written, crops};
+use corsmal_ccm::dataset::{Container, DataSet, Filling, FillingLevel, FillingType, SequenceName};
+use corsmal_ccm::synth::write_views;
+use corsmal_vision::{Mask, Rgb};
+
+/// A recording without views: the folder of its container and its name.
+fn recording(dir: &Path, number: u8) -> (PathBuf, SequenceName) {
+    let filling = Filling::new(FillingType::Rice, FillingLevel::Full).unwrap();
+    let name = SequenceName { scenario: 0, filling, background: 0, illumination: 0 };
+    let base = dir.join(format!("train/{number}"));
+    std::fs::create_dir_all(base.join("audio")).unwrap();
+    std::fs::write(base.join(format!("audio/{name}_audio.wav")), b"").unwrap();
+    (base, name)
+}
+
+/// An image whose red counts columns and whose green counts rows.
+fn image(width: usize, height: usize) -> Rgb {
+    let pixel = |i: usize| [(i % width) as u8, (i / width) as u8, 9];
+    Rgb { width, height, data: (0..width * height).flat_map(pixel).collect() }
+}
+
+fn write(path: &Path, bytes: &[u8]) {
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    std::fs::write(path, bytes).unwrap();
+}
+
+fn views(dir: &Path) -> Views {
+    Views::of(&DataSet::open(dir).unwrap().recordings[0], None)
+}
+
+/// Size and first pixel.
+fn seen(crop: &Result<Rgb, Problem>) -> (usize, usize, u8, u8) {
+    let crop = crop.as_ref().unwrap();
+    (crop.width, crop.height, crop.data[0], crop.data[1])
+}
+
+#[test]
+fn the_best_cup_or_glass_of_the_last_frame_is_cut_out() {
+    let dir = tempfile::tempdir().unwrap();
+    let (base, name) = recording(dir.path(), 3);
+    let png = image(40, 30).to_png().unwrap();
+    for (view, frame) in [(1, 0), (1, 7), (2, 7), (3, 7)] {
+        write(&base.join(format!("rgb/{name}/c{view}/{frame:04}.png")), &png);
+    }
+    // In view 1 a mask with rows 5 and 6, columns 10 to 12; in view 2 a box, partly outside; in view 3 a
+    // box in another frame.
+    let mut mask = Mask::empty(40, 30);
+    for (x, y) in [(10, 5), (11, 5), (12, 6)] {
+        mask.data[y * 40 + x] = true;
+    }
+    write(&base.join("detections/c1.png"), &mask.to_png().unwrap());
+    let table = "frame,view,label,score,x_min,y_min,x_max,y_max,mask\n\
+                 7,1,bottle,0.99,0,0,5,5,\n\
+                 7,1,wine glass,0.4,9,4,14,8,c1.png\n\
+                 7,1,cup,0.3,0,0,5,5,\n\
+                 7,2,cup,0.2,30.5,20,50,40,\n\
+                 0,3,cup,0.9,0,0,5,5,\n";
+    write(&base.join(format!("detections/{name}.csv")), table.as_bytes());
+    let found = crops(&views(dir.path()));
+    assert_eq!(seen(&found[0]), (3, 2, 10, 5));
+    assert_eq!(seen(&found[1]), (10, 10, 30, 20));
+    let reason = |view: usize| match &found[view] {
+        Err(Problem::Missing(reason)) => reason.clone(),
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(reason(2), "no container in view 3, frame 7");
+    assert_eq!(reason(3), "no colour image of view 4");
+
+    // A mask's file counts before the detections.
+    let mut other = Mask::empty(40, 30);
+    other.data[2 * 40 + 39] = true;
+    write(&base.join(format!("masks/{name}/c2/0007.png")), &other.to_png().unwrap());
+    assert_eq!(seen(&crops(&views(dir.path()))[1]), (1, 1, 39, 2));
+}
+
+#[test]
+fn damaged_files_are_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let (base, name) = recording(dir.path(), 3);
+    write(&base.join(format!("rgb/{name}/c1/0000.png")), &image(40, 30).to_png().unwrap());
+    write(&base.join(format!("rgb/{name}/c2/0000.png")), b"no image");
+    let fault = |view: usize, expected: &str| match &crops(&views(dir.path()))[view - 1] {
+        Err(Problem::Damaged(reason)) => assert!(reason.contains(expected), "{reason}"),
+        other => panic!("{other:?}"),
+    };
+    fault(2, "c2/0000.png");
+    let table = base.join(format!("detections/{name}.csv"));
+    let header = "frame,view,label,score,x_min,y_min,x_max,y_max,mask\n";
+    write(&table, format!("{header}0,1,cup,0.9,40,0,60,9,\n").as_bytes());
+    fault(1, "outside");
+    write(&base.join("detections/m.png"), &Mask::empty(41, 30).to_png().unwrap());
+    write(&table, format!("{header}0,1,cup,0.9,0,0,9,9,m.png\n").as_bytes());
+    fault(1, "41 by 30 px; its image has 40 by 30");
+    write(&table, b"frame\n0\n");
+    fault(1, "detections");
+}
+
+#[test]
+fn labelled_pictures_are_written_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let (data, out) = (dir.path().join("data"), dir.path().join("crops"));
+    // A coloured cup, a clear one, a glass and a box, which no detector takes for a cup in all views.
+    for number in [1, 3, 4, 7] {
+        let (base, name) = recording(&data, number);
+        let container = Container::new(number).unwrap();
+        write_views(&base, &name.to_string(), container, name, 5).unwrap();
+    }
+    let make = || crop::write(&data, None, &out, 2, &AtomicBool::new(false));
+    let Written { crops, recordings, without, failed, synthetic } = make().unwrap();
+    assert_eq!((recordings, crops + without, failed.len(), synthetic), (4, 16, 0, false));
+    let table = std::fs::read_to_string(out.join("labels.csv")).unwrap();
+    assert_eq!(table.lines().count(), crops + 1);
+    assert!(table.lines().any(|line| line == "1_s0_fi2_fu2_b0_l0_c1,1,1,opaque,opaque"), "{table}");
+    for line in table.lines().skip(1) {
+        let cells: Vec<&str> = line.split(',').collect();
+        let labels = if matches!(cells[1], "1" | "7") { ["opaque"; 2] } else { ["full", "rice"] };
+        assert_eq!(cells[3..], labels, "{line}");
+        let picture = Rgb::read(&out.join(format!("{}.png", cells[0]))).unwrap();
+        assert!(picture.width > 20 && picture.height > 20, "{line}");
+    }
+    assert!(make().unwrap_err().to_string().contains("new or empty folder"));
+
+    let damaged = data.join("train/4/rgb/s0_fi2_fu2_b0_l0/c2/0008.png");
+    std::fs::write(&damaged, b"no image").unwrap();
+    let again = dir.path().join("again");
+    let made = crop::write(&data, None, &again, 2, &AtomicBool::new(false)).unwrap();
+    assert_eq!(made.failed.len(), 1);
+    assert!(made.failed[0].1.contains("c2/0008.png"), "{:?}", made.failed);
+    assert!(!again.join("4_s0_fi2_fu2_b0_l0_c1.png").exists());
+}
+
+#[test]
+fn a_data_set_without_containers_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let data = dir.path().join("data");
+    recording(&data, 3);
+    let error = crop::write(&data, None, &dir.path().join("out"), 1, &AtomicBool::new(false));
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("none of 1 labelled training recordings"), "{error}");
+    assert!(error.contains("no colour image of view 1"), "{error}");
+}
