@@ -63,7 +63,7 @@ enum Command {
     Presets(presets::Args),
     /// List the features that a configuration can name.
     Features(features::Args),
-    /// Show format and health of a recording, with a picture on request.
+    /// Show format and health of a recording, with a picture on request, or what another file holds.
     Inspect(inspect::Args),
     /// Show how two feature files differ, and the likely causes.
     Compare(compare::Args),
