@@ -1,0 +1,47 @@
+//! What the targets share: hostile bytes as a file, and every reader of a feature file.
+
+use std::path::{Path, PathBuf};
+
+use corsmal_files::feature_file::FeatureFile;
+use corsmal_models::dataset::{LabelledTable, MemberNames};
+
+/// A folder of this process, in memory where the system has such a place.
+pub fn folder() -> &'static Path {
+    thread_local! {
+        static FOLDER: &'static Path = {
+            let memory = Path::new("/dev/shm");
+            let base = if memory.is_dir() { memory.into() } else { std::env::temp_dir() };
+            let folder = tempfile::Builder::new().prefix("corsmal-fuzz-").tempdir_in(base);
+            Box::leak(folder.expect("a temporary folder").keep().into_boxed_path())
+        };
+    }
+    FOLDER.with(|folder| *folder)
+}
+
+/// A file of these bytes.
+pub fn file(name: &str, bytes: &[u8]) -> PathBuf {
+    let path = folder().join(name);
+    std::fs::write(&path, bytes).expect("room in the temporary folder");
+    path
+}
+
+/// Reads all that a feature file holds, in each way in which a command does.
+pub fn read_features(path: &Path) {
+    let _ = LabelledTable::read(path, &MemberNames::default());
+    let Ok(mut file) = FeatureFile::open(path) else { return };
+    let _ = file.provenance();
+    let _ = file.table();
+    match &mut file {
+        FeatureFile::Npz(npz) => {
+            for name in npz.names().to_vec() {
+                let _ = npz.header(&name);
+                let _ = npz.components(&name);
+                let _ = npz.strings(&name);
+            }
+        }
+        FeatureFile::Npy(npy) => {
+            let _ = npy.components();
+        }
+        FeatureFile::Parquet(_) => {}
+    }
+}
