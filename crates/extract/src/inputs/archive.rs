@@ -1,10 +1,8 @@
 //! Recordings in tar archives, read where they lie: nothing is unpacked.
 //!
-//! A recording's labels are in the members beside it, as WebDataset has them: `x.json` and `x.cls`
-//! belong to `x.wav`.
+//! A recording's labels are in the members beside it (see [`beside`]).
 
 use std::cell::Cell;
-use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Component, Path, PathBuf};
@@ -16,6 +14,7 @@ use corsmal_files::quote::quoted;
 use serde::{Deserialize, Serialize};
 use tar::{Archive, EntryType};
 
+use super::beside;
 use super::error::InputError;
 use super::folder::has_extension;
 use crate::manifest;
@@ -162,11 +161,24 @@ pub(super) fn is_archive(path: &Path) -> bool {
 /// Why a file cannot be taken that is an archive by its name.
 pub(super) fn refusal(path: &Path) -> Option<InputError> {
     let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
-    COMPRESSED.iter().any(|end| name.ends_with(end)).then(|| {
-        let reason = "is compressed as a whole, so that no member can be read where it lies; \
-                      decompress it to .tar (sound files hardly get smaller)";
-        InputError::Archive { path: path.into(), reason: reason.into() }
-    })
+    COMPRESSED.iter().any(|end| name.ends_with(end)).then(|| compressed(path))
+}
+
+fn compressed(path: &Path) -> InputError {
+    let reason = "is compressed as a whole, so that no member can be read where it lies; \
+                  decompress it to .tar (sound files hardly get smaller)";
+    InputError::Archive { path: path.into(), reason: reason.into() }
+}
+
+/// Whether the first bytes are those of a compressed file, whatever its name.
+fn is_compressed(file: &mut File) -> io::Result<bool> {
+    /// gzip, bzip2, xz, zstd, lz4.
+    const BEGINNINGS: [&[u8]; 5] =
+        [b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"\x04\x22\x4d\x18"];
+    let mut start = Vec::new();
+    file.take(5).read_to_end(&mut start)?;
+    file.rewind()?;
+    Ok(BEGINNINGS.iter().any(|begin| start.starts_with(begin)))
 }
 
 /// Finds the recordings of an archive and their labels.
@@ -181,14 +193,17 @@ pub(super) fn contents(path: &Path) -> Result<Contents, InputError> {
             None => InputError::Archive { path: path.into(), reason: e.to_string() },
         }
     };
-    let file = File::open(path).map_err(failed)?;
+    let mut file = File::open(path).map_err(failed)?;
+    if is_compressed(&mut file).map_err(failed)? {
+        return Err(compressed(path));
+    }
     let length = file.metadata().map_err(failed)?.len();
     let left = Rc::new(Cell::new(MOST_HEADERS));
     let mut archive = Archive::new(Headers { file, left: left.clone() });
     // Archives that were put one behind the other.
     archive.set_ignore_zeros(true);
     let mut found = Contents::default();
-    let mut labels: HashMap<PathBuf, Vec<(String, String)>> = HashMap::new();
+    let mut labels: Vec<beside::Labels> = Vec::new();
     let mut end = 0;
     for entry in archive.entries_with_seek().map_err(failed)? {
         left.set(MOST_HEADERS);
@@ -208,14 +223,11 @@ pub(super) fn contents(path: &Path) -> Result<Contents, InputError> {
                 path: path.into(),
                 reason: format!("{}: {reason}", quoted(&name.to_string_lossy())),
             })?;
-            labels.entry(key(&name)).or_default().extend(read);
+            labels.push((name, read));
         }
     }
-    for Entry { name, labels: own, .. } in &mut found.recordings {
-        if let Some(labels) = labels.get(&key(name)) {
-            own.clone_from(labels);
-        }
-    }
+    let refused = |reason| InputError::Archive { path: path.into(), reason };
+    beside::join(&mut found.recordings, labels).map_err(refused)?;
     found.is_ended = is_ended(path, end).map_err(failed)?;
     Ok(found)
 }
@@ -252,12 +264,6 @@ fn inner(name: &Path) -> PathBuf {
 
 fn is_hidden(name: &Path) -> bool {
     name.iter().any(|part| part.as_encoded_bytes().starts_with(b"."))
-}
-
-/// What the members of a recording have in common: their names up to the first dot.
-fn key(name: &Path) -> PathBuf {
-    let file = name.file_name().map(|file| file.to_string_lossy().into_owned()).unwrap_or_default();
-    name.with_file_name(file.split('.').next().unwrap_or_default())
 }
 
 /// The labels that a member holds.

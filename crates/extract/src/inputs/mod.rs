@@ -16,6 +16,7 @@
 //! would begin with `__`, the prefix of an output's own arrays, get `./` in front.
 
 mod archive;
+mod beside;
 mod braces;
 mod error;
 mod folder;

@@ -241,6 +241,8 @@ fn archives_in_which_recordings_may_be_missed_are_refused() {
     refused("empty.tar", b"", "no file with an audio extension");
     refused("x.tar.gz", &good, "decompress");
     refused("x.tgz", &good, "decompress");
+    refused("gzip.tar", b"\x1f\x8b\x08\0\0\0\0\0\0\x03", "decompress");
+    refused("zstd.tar", b"\x28\xb5\x2f\xfd\x24", "decompress");
     // The name of a member that would be a gigabyte long.
     let mut long = Header::new_gnu();
     long.set_entry_type(EntryType::GNULongName);
@@ -280,6 +282,64 @@ fn labels_that_cannot_be_read_are_refused() {
         let message = collect(&path).unwrap_err();
         assert!(message.contains("\"x.json\"") && message.contains(part), "{message}");
     }
+}
+
+/// Where all labels of `take` were taken for those of one sample, each recording had the last.
+#[test]
+fn labels_of_names_with_dots_are_those_of_their_recording() {
+    let folder = TempDir::new().unwrap();
+    let sound = wav(1);
+    let path = archive(
+        &folder,
+        "s.tar",
+        &[
+            ("take.1.wav", &sound),
+            ("take.1.json", br#"{"y": "first"}"#),
+            ("take.2.wav", &sound),
+            ("take.2.json", br#"{"y": "second"}"#),
+            ("take.3.wav", &sound),
+            ("take.4.json", br#"{"y": "of none"}"#),
+            ("take.cls", b"7"),
+            ("x.meta.json", br#"{"y": "beside"}"#),
+            ("x.wav", &sound),
+        ],
+    );
+    let found = collect(&path).unwrap().inputs;
+    let labels: Vec<String> = found
+        .iter()
+        .map(|input| input.labels.iter().map(|(_, value)| value.as_str()).collect::<Vec<_>>())
+        .map(|values| values.join(","))
+        .collect();
+    assert_eq!(labels, ["first,7", "second,7", ",7", "beside,"]);
+}
+
+#[test]
+fn a_label_that_is_given_twice_is_refused() {
+    let folder = TempDir::new().unwrap();
+    let sound = wav(1);
+    let one = ("x.json", &br#"{"y": 1, "cls": 3}"#[..]);
+    for second in [one, ("x.cls", b"4"), ("x.more.json", br#"{"y": 2}"#)] {
+        let path = archive(&folder, "s.tar", &[("x.wav", &sound), one, second]);
+        let message = collect(&path).unwrap_err();
+        assert!(message.contains("of \"x.wav\" is given twice"), "{message}");
+    }
+}
+
+/// A member of 20 KB labels 10,000 recordings: 20 million labels.
+#[test]
+fn labels_that_one_member_gives_to_many_recordings_are_counted() {
+    let folder = TempDir::new().unwrap();
+    let names: Vec<String> = (0..10_000).map(|i| format!("x.{i}.wav")).collect();
+    let mut members: Vec<(&str, &[u8])> =
+        names.iter().map(|n| (n.as_str(), &b"RIFF"[..])).collect();
+    let json = serde_json::to_string(
+        &(0..2000).map(|i| (format!("c{i}"), 0.into())).collect::<serde_json::Map<_, _>>(),
+    )
+    .unwrap();
+    members.push(("x.json", json.as_bytes()));
+    let path = archive(&folder, "s.tar", &members);
+    let message = collect(&path).unwrap_err();
+    assert!(message.contains("more than 16777216 labels"), "{message}");
 }
 
 #[test]
