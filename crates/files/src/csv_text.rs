@@ -1,6 +1,7 @@
 //! CSV as spreadsheets and other programs write it: separated by commas, semicolons or tabs, with or
 //! without a byte order mark.
 
+use std::collections::HashSet;
 use std::io::{self, BufRead};
 
 /// A reader of the table in `text`, whose first line says what separates its fields: commas where
@@ -31,6 +32,13 @@ pub fn reader<R: BufRead>(mut text: R) -> io::Result<csv::Reader<R>> {
     Ok(builder.delimiter(delimiter).trim(csv::Trim::All).from_reader(text))
 }
 
+/// A name that two columns have; columns without a name are not told apart.
+pub fn repeated<S: AsRef<str>>(header: impl IntoIterator<Item = S>) -> Option<String> {
+    let mut seen = HashSet::new();
+    let named = header.into_iter().map(|name| name.as_ref().to_owned());
+    named.filter(|name| !name.is_empty()).find(|name| !seen.insert(name.clone()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -47,6 +55,12 @@ mod tests {
             assert_eq!((row.len(), &row[0]), (header.len(), "1"));
         }
         assert_eq!(reader(&b""[..]).unwrap().headers().unwrap().len(), 0);
+    }
+
+    #[test]
+    fn names_that_two_columns_have_are_found() {
+        assert_eq!(repeated(["a", "", "A", "b", "", "A"]).as_deref(), Some("A"));
+        assert_eq!(repeated(["a", "", "A", ""]), None);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::error::{ModelError, Result};
 use crate::labels::Labels;
 use crate::predictions::{Id, PredictionError, PredictionTable};
-use crate::scores::Scores;
+use crate::scores::{Scores, Tally};
 
 /// McNemar's exact test.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -88,17 +88,18 @@ pub fn bootstrap<S: AsRef<str>>(
         }
     };
     let n_classes = truth.iter().chain(first).chain(second).max().map_or(0, |c| c + 1);
-    let difference = |rows: &[usize]| -> Result<f64> {
-        let of = |p: &[usize]| rows.iter().map(|&row| p[row]).collect::<Vec<_>>();
-        let t = of(truth);
-        let f1 = |p| Scores::new(&t, &of(p), n_classes).map(|s| s.weighted_f1);
-        Ok(f1(second)? - f1(first)?)
+    let difference = |rows: &[usize]| {
+        let f1 = |p: &[usize]| {
+            let pairs = rows.iter().map(|&row| (truth[row], Some(p[row])));
+            Tally::new(n_classes, pairs).weighted_f1()
+        };
+        f1(second) - f1(first)
     };
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut found = Vec::with_capacity(resamples.min(1 << 20));
     for _ in 0..resamples {
         let drawn = (0..units.len()).flat_map(|_| units[rng.gen_range(0..units.len())].iter());
-        found.push(difference(&drawn.copied().collect::<Vec<_>>())?);
+        found.push(difference(&drawn.copied().collect::<Vec<_>>()));
     }
     found.sort_by(f64::total_cmp);
     let at = |part: f64| found[((resamples - 1) as f64 * part).round() as usize];
@@ -108,7 +109,7 @@ pub fn bootstrap<S: AsRef<str>>(
     let tail = part(|d| *d <= 0.0).min(part(|d| *d >= 0.0));
     let all: Vec<usize> = (0..truth.len()).collect();
     Ok(Bootstrap {
-        difference: difference(&all)?,
+        difference: difference(&all),
         low: at(0.025),
         high: at(0.975),
         p_value: (2.0 * tail).min(1.0),

@@ -116,6 +116,16 @@ pub enum ModelError {
         /// classes among them
         classes: usize,
     },
+    /// More different classes than [`crate::labels::MAX_CLASSES`].
+    #[error(
+        "{classes} different classes: at most {} are learned and scored; is the column one of ids or \
+         numbers? `score --numeric` measures estimates of numbers",
+        crate::labels::MAX_CLASSES
+    )]
+    TooManyClasses {
+        /// how many
+        classes: usize,
+    },
     /// A class with fewer rows than asked for.
     #[error("class {class} has {rows} rows; {purpose} needs {needed}")]
     TooFewRows {

@@ -1,10 +1,18 @@
 //! Label names and class indices.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::{ModelError, Result};
+
+/// Most classes that are learned and scored.
+pub const MAX_CLASSES: usize = 4096;
+
+/// Refuses more than [`MAX_CLASSES`].
+pub(crate) fn require_few(classes: usize) -> Result<()> {
+    if classes > MAX_CLASSES { Err(ModelError::TooManyClasses { classes }) } else { Ok(()) }
+}
 
 /// The names of the classes; a class index is a position in it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -31,8 +39,7 @@ impl Labels {
             names.sort_by_key(|n| n.parse::<i64>().unwrap_or(0));
         }
         let table = Self(names.into_iter().map(String::from).collect());
-        let position: std::collections::HashMap<&str, usize> =
-            table.0.iter().enumerate().map(|(i, n)| (n.as_str(), i)).collect();
+        let position = positions(&table.0);
         let classes = rows.iter().map(|r| position[r.as_ref()]).collect();
         (table, classes)
     }
@@ -42,10 +49,11 @@ impl Labels {
     /// # Errors
     /// [`ModelError::UnknownName`] for a name that is not in the table.
     pub fn encode<S: AsRef<str>>(&self, rows: &[S]) -> Result<Vec<usize>> {
+        let position = positions(&self.0);
         rows.iter()
             .map(|row| {
                 let row = row.as_ref();
-                self.0.iter().position(|n| n == row).ok_or_else(|| ModelError::UnknownName {
+                position.get(row).copied().ok_or_else(|| ModelError::UnknownName {
                     kind: "label",
                     name: row.into(),
                     allowed: corsmal_names::choices(row, self.0.iter().map(String::as_str)),
@@ -68,4 +76,9 @@ impl Labels {
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
+}
+
+/// The index of each name.
+pub(crate) fn positions(names: &[String]) -> HashMap<&str, usize> {
+    names.iter().enumerate().map(|(i, name)| (name.as_str(), i)).collect()
 }

@@ -226,6 +226,10 @@ fn from_csv(bytes: &[u8], path: &Path) -> Result<Vec<Detection>> {
             let there = there.join(", ");
             return Err(VisionError::file(path, format!("no column '{name}'; it has {there}")));
         }
+        // The first of two would count, whatever the other says.
+        if header.iter().filter(|h| h.eq_ignore_ascii_case(name)).count() > 1 {
+            return Err(VisionError::file(path, format!("two columns are named '{name}'")));
+        }
     }
     let mut detections = Vec::new();
     for row in reader.records() {

@@ -110,3 +110,37 @@ fn what_is_explained_is_explained_to_programs_too() {
     assert_eq!(esc26["config"]["signal"]["sample_rate"], 22_050.0);
     assert!(json(&["presets"]).as_array().unwrap().contains(&esc26));
 }
+
+/// The first of two columns counted, whatever the other said.
+#[test]
+fn tables_with_two_columns_of_one_name_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("p.csv");
+    for header in ["id,true,true,predicted", "id,true,True,predicted", "id,predicted,x,predicted"] {
+        std::fs::write(&file, format!("{header}\nr,a,a,a\ns,b,b,b\n")).unwrap();
+        assert!(refused(&["score", text(&file)]).contains("two columns are named"), "{header}");
+    }
+    std::fs::write(&file, "fileName,capacity[mL],Capacity[mL]\nid1_0000.png,100,200\n").unwrap();
+    let out = folder.path().join("c.csv");
+    let combine = ["capacity", "combine", "--in", text(&file), "--out", text(&out)];
+    assert!(refused(&combine).contains("two columns are named"));
+}
+
+/// A confusion matrix of ids has billions of places.
+#[test]
+fn ids_are_no_classes() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("p.csv");
+    let write = |classes: usize| {
+        let rows: String = (0..classes).map(|i| format!("r{i},{i},{i}\n")).collect();
+        std::fs::write(&file, format!("id,true,predicted\n{rows}")).unwrap();
+    };
+    write(100_000);
+    let message = refused(&["score", text(&file)]);
+    assert!(message.contains("100000 different classes: at most 4096"), "{message}");
+    // Two thousand draws of so many took minutes.
+    write(2000);
+    assert!(done(&["score", text(&file)]).contains("2000 rows, 2000 classes"));
+    let numbers = done(&["score", text(&file), "--numeric", "--json"]);
+    assert!(numbers.contains("\"numbers\""), "{numbers:.200}");
+}

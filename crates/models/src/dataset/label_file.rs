@@ -84,11 +84,11 @@ impl LabelFile {
                 return Err(DatasetError::content(path, reason));
             }
         };
-        for (i, column) in header.iter().enumerate() {
-            if header.iter().take(i).any(|other| other == column) {
-                let reason = format!("two columns are named {column:?}");
-                return Err(DatasetError::content(path, reason));
-            }
+        let unnamed = header.iter().filter(|name| name.is_empty()).count();
+        let repeated = csv_text::repeated(header.iter());
+        if let Some(column) = repeated.or_else(|| (unnamed > 1).then(String::new)) {
+            let reason = format!("two columns are named {column:?}");
+            return Err(DatasetError::content(path, reason));
         }
         let is_label = |i: usize| i != at && !matches!(&header[i], "id" | "path");
         let label_at: Vec<usize> = (0..header.len()).filter(|&i| is_label(i)).collect();

@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::error::{DatasetError, Result};
 use super::label_file::{LabelFile, LabelSource};
 use crate::formats::TrainedOn;
-use crate::labels::Labels;
+use crate::labels::{Labels, require_few};
 use crate::targets::Classes;
 
 /// A feature file in memory.
@@ -206,6 +206,8 @@ impl LabelledTable {
             let reason = format!("all rows have {name} = {only}; at least 2 classes are needed");
             return Err(DatasetError::content(&self.path, reason));
         }
+        require_few(labels.len())
+            .map_err(|e| DatasetError::content(&self.path, format!("label column {name}: {e}")))?;
         let classes = Classes::new(indices, labels.len())?;
         Ok((labels, classes))
     }

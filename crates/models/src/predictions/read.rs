@@ -1,5 +1,6 @@
 //! Reading prediction files.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use corsmal_files::csv_text;
@@ -8,7 +9,7 @@ use super::{
     Id, KEYS, MAX_BYTES, PredictionError, PredictionRow, PredictionTable, Result, SUM_TOLERANCE,
     UNKNOWN, content,
 };
-use crate::labels::Labels;
+use crate::labels::{Labels, positions};
 use crate::table::argmax;
 
 impl PredictionTable {
@@ -49,6 +50,10 @@ impl PredictionTable {
     }
 }
 
+/// Columns that are known by their names, in any case.
+const MEANT: [&str; 8] =
+    ["id", "path", "true", "predicted", "sequence", "object", "container", "container id"];
+
 type Lines = [(u64, csv::StringRecord)];
 
 /// Columns by what they hold.
@@ -63,6 +68,15 @@ struct PredictionColumns {
 
 impl PredictionColumns {
     fn find(path: &Path, header: &[String], lines: &Lines) -> Result<Self> {
+        if let Some(column) = csv_text::repeated(header) {
+            return Err(content(path, format!("two columns are named {column:?}")));
+        }
+        // `True` beside `true` leaves open which one is meant.
+        for name in MEANT {
+            if header.iter().filter(|h| h.eq_ignore_ascii_case(name)).count() > 1 {
+                return Err(content(path, format!("two columns are named {name:?} in any case")));
+            }
+        }
         let find = |name: &str| header.iter().position(|h| h.eq_ignore_ascii_case(name));
         let container = ["Object", "container", "Container ID"].iter().find_map(|n| find(n));
         let lacking = |column: &str| PredictionError::Column {
@@ -105,8 +119,8 @@ impl PredictionColumns {
                 proba.iter().map(label).collect()
             }
         };
-        if let Some(twice) = (1..labels.len()).find(|&i| labels[..i].contains(&labels[i])) {
-            return Err(content(path, format!("two columns for the class {}", labels[twice])));
+        if let Some(twice) = csv_text::repeated(&labels) {
+            return Err(content(path, format!("two columns for the class {twice}")));
         }
         let taken = |i: &usize| naming.contains(i) || proba.contains(i) || predicted == Some(*i);
         let others = (0..header.len()).filter(|i| !taken(i)).collect();
@@ -115,7 +129,8 @@ impl PredictionColumns {
 
     fn table(self, path: &Path, header: &[String], lines: &Lines) -> Result<PredictionTable> {
         let order: Vec<usize> = self.naming.iter().chain(&self.others).copied().collect();
-        let rows = lines.iter().map(|line| self.row(path, header, line, &order));
+        let classes = positions(&self.labels);
+        let rows = lines.iter().map(|line| self.row(path, header, line, (&order, &classes)));
         Ok(PredictionTable {
             path: path.into(),
             columns: order.iter().map(|&at| header[at].clone()).collect(),
@@ -130,7 +145,7 @@ impl PredictionColumns {
         path: &Path,
         header: &[String],
         (line, record): &(u64, csv::StringRecord),
-        order: &[usize],
+        (order, classes): (&[usize], &HashMap<&str, usize>),
     ) -> Result<PredictionRow> {
         let text = |at: usize| record.get(at).unwrap_or_default();
         let refuse = |at: usize, expected: String| {
@@ -158,10 +173,10 @@ impl PredictionColumns {
         }
         let proba = (!proba.is_empty()).then_some(proba);
         let class = match self.predicted.map(|at| (at, text(at))) {
-            Some((_, UNKNOWN)) if !self.labels.iter().any(|l| l == UNKNOWN) => None,
+            Some((_, UNKNOWN)) if !classes.contains_key(UNKNOWN) => None,
             None | Some((_, "")) => proba.as_deref().map(argmax),
-            Some((at, name)) => match self.labels.iter().position(|label| label == name) {
-                Some(class) => Some(class),
+            Some((at, name)) => match classes.get(name) {
+                Some(class) => Some(*class),
                 None => {
                     let choices =
                         corsmal_names::choices(name, self.labels.iter().map(String::as_str));

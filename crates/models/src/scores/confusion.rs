@@ -42,17 +42,78 @@ impl ConfusionMatrix {
 
     /// Share of rows with the right class; 0 where there are none.
     pub fn accuracy(&self) -> f64 {
-        let right: u64 = (0..self.counts.len()).map(|c| self.counts[c][c]).sum();
-        ratio(right, self.total())
+        self.tally().accuracy()
     }
 
     /// Scores of each class; 0 where a division by zero would be (as scikit-learn's default).
     pub fn classes(&self) -> Vec<ClassScores> {
-        (0..self.counts.len())
+        self.tally().classes()
+    }
+
+    /// Mean of the classes' F1 scores weighted by their support (scikit-learn
+    /// `f1_score(average="weighted")`); rows without a prediction count as of one more class, which
+    /// has no support.
+    pub fn weighted_f1(&self) -> f64 {
+        self.tally().weighted_f1()
+    }
+
+    /// Mean of the F1 scores of the classes that occur or are predicted (scikit-learn
+    /// `f1_score(average="macro")`).
+    pub fn macro_f1(&self) -> f64 {
+        self.tally().macro_f1()
+    }
+
+    /// Rows without a prediction, by true class.
+    pub fn unknown(&self) -> Vec<u64> {
+        self.counts.iter().map(|row| row[self.counts.len()]).collect()
+    }
+
+    fn tally(&self) -> Tally {
+        let classes = self.counts.len();
+        let estimated = |c: usize| self.counts.iter().map(|row| row[c]).sum();
+        Tally {
+            right: (0..classes).map(|c| self.counts[c][c]).collect(),
+            support: self.counts.iter().map(|row| row.iter().sum()).collect(),
+            estimated: (0..classes).map(estimated).collect(),
+        }
+    }
+}
+
+/// The rows, predictions and right predictions of each class, from which all scores follow: many
+/// draws of many classes are scored without a matrix.
+pub(crate) struct Tally {
+    right: Vec<u64>,
+    support: Vec<u64>,
+    estimated: Vec<u64>,
+}
+
+impl Tally {
+    /// As [`ConfusionMatrix::new`].
+    pub(crate) fn new(
+        classes: usize,
+        pairs: impl IntoIterator<Item = (usize, Option<usize>)>,
+    ) -> Self {
+        let none = vec![0; classes];
+        let mut tally = Self { right: none.clone(), support: none.clone(), estimated: none };
+        for (truth, predicted) in pairs.into_iter().filter(|(truth, _)| *truth < classes) {
+            tally.support[truth] += 1;
+            if let Some(predicted) = predicted.filter(|class| *class < classes) {
+                tally.estimated[predicted] += 1;
+                tally.right[predicted] += u64::from(predicted == truth);
+            }
+        }
+        tally
+    }
+
+    pub(crate) fn accuracy(&self) -> f64 {
+        ratio(self.right.iter().sum(), self.support.iter().sum())
+    }
+
+    fn classes(&self) -> Vec<ClassScores> {
+        (0..self.right.len())
             .map(|c| {
-                let right = self.counts[c][c];
-                let support = self.counts[c].iter().sum();
-                let estimated = self.counts.iter().map(|row| row[c]).sum();
+                let (right, support, estimated) =
+                    (self.right[c], self.support[c], self.estimated[c]);
                 ClassScores {
                     precision: ratio(right, estimated),
                     recall: ratio(right, support),
@@ -63,32 +124,19 @@ impl ConfusionMatrix {
             .collect()
     }
 
-    /// Mean of the classes' F1 scores weighted by their support (scikit-learn
-    /// `f1_score(average="weighted")`); rows without a prediction count as of one more class, which
-    /// has no support.
-    pub fn weighted_f1(&self) -> f64 {
+    pub(crate) fn weighted_f1(&self) -> f64 {
         let sum: f64 = self.classes().iter().map(|c| c.f1 * c.support as f64).sum();
-        let total = self.total();
+        let total: u64 = self.support.iter().sum();
         if total == 0 { 0.0 } else { sum / total as f64 }
     }
-}
 
-impl ConfusionMatrix {
-    /// Mean of the F1 scores of the classes that occur or are predicted (scikit-learn
-    /// `f1_score(average="macro")`).
-    pub fn macro_f1(&self) -> f64 {
-        let predicted = |c: usize| self.counts.iter().any(|row| row[c] > 0);
-        let classes = self.classes().into_iter().enumerate();
+    pub(crate) fn macro_f1(&self) -> f64 {
+        let classes = self.classes().into_iter().zip(&self.estimated);
         let seen: Vec<f64> = classes
-            .filter(|(c, scores)| scores.support > 0 || predicted(*c))
-            .map(|(_, scores)| scores.f1)
+            .filter(|(scores, estimated)| scores.support > 0 || **estimated > 0)
+            .map(|(scores, _)| scores.f1)
             .collect();
         seen.iter().sum::<f64>() / seen.len().max(1) as f64
-    }
-
-    /// Rows without a prediction, by true class.
-    pub fn unknown(&self) -> Vec<u64> {
-        self.counts.iter().map(|row| row[self.counts.len()]).collect()
     }
 }
 
@@ -109,6 +157,16 @@ mod tests {
         let f1: Vec<_> = matrix.classes().iter().map(|c| c.f1).collect();
         assert_eq!(f1, [0.5, 0.8, 0.0]);
         assert_eq!(matrix.accuracy(), 0.5);
+    }
+
+    #[test]
+    fn a_tally_scores_as_the_matrix_does() {
+        let pairs = (0..200_usize).map(|i| (i * i % 7, (i % 11 != 0).then_some(i * 5 % 8)));
+        let (tally, matrix) = (Tally::new(7, pairs.clone()), ConfusionMatrix::new(7, pairs));
+        assert_eq!(tally.accuracy(), matrix.accuracy());
+        assert_eq!(tally.weighted_f1(), matrix.weighted_f1());
+        assert_eq!(tally.macro_f1(), matrix.macro_f1());
+        assert_eq!(tally.classes(), matrix.classes());
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod report;
 
 use serde::Serialize;
 
+pub(crate) use confusion::Tally;
 pub use confusion::{ClassScores, ConfusionMatrix};
 pub use curves::ClassCurves;
 pub use interval::Interval;
@@ -17,6 +18,7 @@ pub use reliability::{Reliability, ReliabilityBin};
 pub use report::{ClassReport, ScoreIntervals, ScoreReport, Scoring};
 
 use crate::error::{ModelError, Result};
+use crate::labels::require_few;
 use crate::table::check_labels;
 
 /// Scores of a set of predictions.
@@ -40,7 +42,7 @@ impl Scores {
     /// Scores of `predicted` against `truth`.
     ///
     /// # Errors
-    /// Different lengths, or classes outside the table.
+    /// Different lengths, classes outside the table, or more than [`crate::labels::MAX_CLASSES`].
     pub fn new(truth: &[usize], predicted: &[usize], n_classes: usize) -> Result<Self> {
         check_labels(truth.len(), predicted, n_classes)?;
         Self::with_unknown(truth, predicted.iter().copied().map(Some), n_classes)
@@ -55,6 +57,8 @@ impl Scores {
         predicted: impl IntoIterator<Item = Option<usize>>,
         n_classes: usize,
     ) -> Result<Self> {
+        // The matrix has a place for each pair of them.
+        require_few(n_classes)?;
         check_labels(truth.len(), truth, n_classes)?;
         let predicted: Vec<Option<usize>> = predicted.into_iter().collect();
         if predicted.len() != truth.len() {

@@ -9,9 +9,9 @@ use serde::Serialize;
 use super::curves::ClassCurves;
 use super::interval::{Interval, intervals, units};
 use super::reliability::Reliability;
-use super::{NumericScores, Scores};
+use super::{NumericScores, Scores, Tally};
 use crate::error::ModelError;
-use crate::labels::Labels;
+use crate::labels::{Labels, positions};
 use crate::predictions::{PredictionError, PredictionTable};
 
 /// What is scored against what.
@@ -174,24 +174,22 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         }
         // Classes that the model does not know are wrong whatever it says.
         let mut labels = self.labels.clone();
+        let known = positions(&labels);
         let mut strange: Vec<&str> =
-            truth.iter().copied().filter(|t| !labels.iter().any(|l| l == t)).collect();
+            truth.iter().copied().filter(|t| !known.contains_key(t)).collect();
         strange.sort_unstable();
         strange.dedup();
         labels.extend(strange.into_iter().map(String::from));
         let names = Labels::new(labels.clone()).map_err(|e| self.model(e))?;
         let truth = names.encode(truth).map_err(|e| self.model(e))?;
         let predicted: Vec<Option<usize>> = table.rows.iter().map(|row| row.class).collect();
-        let of = |rows: &[usize]| {
-            let truth: Vec<usize> = rows.iter().map(|&row| truth[row]).collect();
-            let predicted = rows.iter().map(|&row| predicted[row]);
-            Scores::with_unknown(&truth, predicted, labels.len())
-        };
-        let all: Vec<usize> = (0..truth.len()).collect();
-        let scores = of(&all).map_err(|e: ModelError| self.model(e))?;
+        let scores = Scores::with_unknown(&truth, predicted.iter().copied(), labels.len());
+        let scores = scores.map_err(|e: ModelError| self.model(e))?;
         let units = units(truth.len(), groups);
         let [accuracy, weighted_f1, macro_f1] = intervals(&units, how.draws, how.seed, |rows| {
-            of(rows).map_or([f64::NAN; 3], |s| [s.accuracy, s.weighted_f1, s.macro_f1])
+            let pairs = rows.iter().map(|&row| (truth[row], predicted[row]));
+            let tally = Tally::new(labels.len(), pairs);
+            [tally.accuracy(), tally.weighted_f1(), tally.macro_f1()]
         });
         let known = predicted.iter().filter(|class| class.is_some()).count();
         let right = truth.iter().zip(&predicted).filter(|(t, p)| Some(**t) == **p).count();
