@@ -6,6 +6,7 @@
 mod basis;
 mod chroma;
 mod decimate;
+mod octaves;
 mod params;
 mod tuning;
 
@@ -29,12 +30,7 @@ use crate::vector::Lane;
 use crate::window::Window;
 use basis::{Basis, Wavelets};
 use decimate::Decimator;
-
-/// Most work for each sample of the signal, in numbers that a frame touches. The default bins take
-/// 200, and 100,000 with a hop of 1.
-const MOST_WORK: f64 = (1 << 17) as f64;
-/// Most values of all filters before the small ones are left out.
-const MOST_VALUES: usize = 1 << 26;
+use octaves::{Layout, layouts, require_work};
 
 /// One octave of filters and how its signal comes about.
 struct Octave {
@@ -81,61 +77,30 @@ impl CqtPlan {
         let early =
             early_halvings(pass_band(p.res_type) * nyquist, cutoff, p.hop_length, n_octaves);
         let base = p.sr / f64::from(1u32 << early);
-        let (mut sr, mut hop) = (base, p.hop_length >> early);
         let mut octaves: Vec<Octave> = Vec::with_capacity(n_octaves);
-        let mut end = p.n_bins;
-        let (mut values, mut work) = (0_usize, 0.0);
-        let require_work = |work: f64| match work <= MOST_WORK {
-            true => Ok(()),
-            false => Err(DspError::parameter("hop_length", p.hop_length, less_work(p))),
-        };
-        while end > 0 {
-            let first = end.saturating_sub(p.bins_per_octave);
-            // Frames of this octave for each sample of the signal.
-            let density = sr / p.sr / hop as f64;
+        let mut work = 0.0;
+        for layout in layouts(p, &wavelets, (base, p.hop_length >> early))? {
+            let Layout { bins, sr, hop, halve, n_fft, as_above } = layout;
             let (basis, lanes) = match octaves.last() {
-                Some(above) if same_lengths(&wavelets, first..end, sr, above, base) => {
-                    (above.basis.clone(), above.lanes.clone())
-                }
+                Some(above) if as_above => (above.basis.clone(), above.lanes.clone()),
                 _ => {
-                    let n_fft = Basis::transform_length(&wavelets, first..end, sr, p)?;
-                    require_work(work + n_fft as f64 * density)?;
-                    values = values.saturating_add((end - first).saturating_mul(n_fft));
-                    if values > MOST_VALUES {
-                        let allowed = format!(
-                            "so few that their filters have at most {MOST_VALUES} values together"
-                        );
-                        return Err(DspError::parameter("n_bins", p.n_bins, allowed));
-                    }
-                    let basis = Basis::new(&wavelets, first..end, sr, n_fft, p)?;
-                    let lanes = LaneFft::supports(basis.n_fft)
-                        .then(|| LaneFft::new(basis.n_fft).map(Arc::new))
+                    let basis = Basis::new(&wavelets, bins.clone(), sr, n_fft, p)?;
+                    let lanes = LaneFft::supports(n_fft)
+                        .then(|| LaneFft::new(n_fft).map(Arc::new))
                         .transpose()?;
                     (Arc::new(basis), lanes)
                 }
             };
-            work += basis.work() as f64 * density;
-            require_work(work)?;
+            work += basis.work() as f64 * (sr / p.sr / hop as f64);
+            require_work(work, p)?;
             let gain = |k: usize| {
                 let scale = if p.scale { wavelets.length(k, base).sqrt() } else { 1.0 };
                 // Without the scale, early halving is made up for.
                 let early = if p.scale { 1.0 } else { f64::from(1u32 << early).sqrt() };
                 (early * (base / sr).sqrt() / scale) as f32
             };
-            let halve = hop % 2 == 0;
-            octaves.push(Octave {
-                basis,
-                lanes,
-                first,
-                gains: (first..end).map(gain).collect(),
-                hop,
-                halve,
-            });
-            if halve {
-                hop /= 2;
-                sr /= 2.0;
-            }
-            end = first;
+            let gains = bins.clone().map(gain).collect();
+            octaves.push(Octave { basis, lanes, first: bins.start, gains, hop, halve });
         }
         let early_decimators = [Decimator::early(early), Decimator::last(early.max(1))];
         let decimator = match p.res_type {
@@ -330,34 +295,6 @@ fn project(basis: &Basis, gains: &[f32], spectrum: &[Row], response: &mut [[Row;
             }
         },
     );
-}
-
-/// Whether the filters `range` at `sr` have the lengths of the octave above, so that its basis
-/// serves them: frequencies and rate have both halved.
-fn same_lengths(
-    wavelets: &Wavelets,
-    range: std::ops::Range<usize>,
-    sr: f64,
-    above: &Octave,
-    base: f64,
-) -> bool {
-    above.halve
-        && above.gains.len() == range.len()
-        && !range.is_empty()
-        && base > sr
-        && range.enumerate().all(|(i, k)| {
-            let length = wavelets.length(above.first + i, 2.0 * sr);
-            (wavelets.length(k, sr) - length).abs() <= 1e-9 * length
-        })
-}
-
-/// What makes the frames of a transform cheaper.
-fn less_work(p: &CqtParams) -> String {
-    format!(
-        "larger or divisible by a higher power of two (or use fewer bins: n_bins = {} with \
-         bins_per_octave = {} takes more than {MOST_WORK} steps a sample)",
-        p.n_bins, p.bins_per_octave
-    )
 }
 
 /// Share of the Nyquist frequency that octaves may fill; librosa up to 0.9 took the pass band of its
