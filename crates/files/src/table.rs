@@ -6,6 +6,7 @@ use std::collections::HashSet;
 use ndarray::ArrayView2;
 use thiserror::Error;
 
+use crate::growth::make_room;
 use crate::outcome::Outcome;
 
 /// Prefix of an output's own arrays; no id begins with it.
@@ -125,12 +126,16 @@ impl Table {
                     actual: labels.iter().map(|(name, _)| name.clone()).collect(),
                 });
             }
+            make_room(&mut self.ids, 1);
             self.ids.push(outcome.id.clone());
+            make_room(&mut self.values, row.len());
             self.values.extend_from_slice(row);
             for (column, (_, value)) in self.labels.iter_mut().zip(labels) {
+                make_room(column, 1);
                 column.push(value.clone());
             }
         }
+        make_room(&mut self.outcomes, 1);
         self.outcomes.push(outcome);
         Ok(())
     }

@@ -1,5 +1,7 @@
 //! The records of the zip format (PKWARE APPNOTE 6.3.10) that an archive of arrays needs.
 
+use std::io::{self, Write};
+
 use super::entry::{Compression, EntryRecord};
 
 const LOCAL: u32 = 0x0403_4b50;
@@ -83,13 +85,21 @@ pub(super) fn local_header(entry: &EntryRecord, zip64: Zip64) -> Vec<u8> {
     out
 }
 
-/// Everything behind the last entry, which ends at byte `start`.
-pub(super) fn central_directory(entries: &[EntryRecord], start: u64, zip64: Zip64) -> Vec<u8> {
-    let mut out = Vec::new();
+/// Writes everything behind the last entry, which ends at byte `start`.
+pub(super) fn write_directory(
+    to: &mut impl Write,
+    entries: &[EntryRecord],
+    start: u64,
+    zip64: Zip64,
+) -> io::Result<()> {
+    let (mut out, mut size) = (Vec::new(), 0);
     for entry in entries {
         central_header(&mut out, entry, zip64);
+        to.write_all(&out)?;
+        size += out.len() as u64;
+        out.clear();
     }
-    let (size, count) = (out.len() as u64, entries.len() as u64);
+    let count = entries.len() as u64;
     let many = count >= zip64.entries;
     if many || size >= zip64.size || start >= zip64.size {
         put32(&mut out, END_64);
@@ -114,7 +124,7 @@ pub(super) fn central_directory(entries: &[EntryRecord], start: u64, zip64: Zip6
     put32(&mut out, zip64.field(size));
     put32(&mut out, zip64.field(start));
     put16(&mut out, 0);
-    out
+    to.write_all(&out)
 }
 
 fn central_header(out: &mut Vec<u8>, entry: &EntryRecord, zip64: Zip64) {

@@ -15,6 +15,7 @@ use super::entry::{Compression, EntryRecord};
 use super::error::NpzError;
 use super::headers::{self, Zip64};
 use super::packed::Packed;
+use crate::growth::make_room;
 use crate::npy::{DType, Header};
 
 /// Bytes copied at a time from a stream.
@@ -243,8 +244,13 @@ impl NpzWriter {
     /// # Errors
     /// [`NpzError::Io`].
     pub fn finish(mut self) -> Result<(), NpzError> {
-        let directory = headers::central_directory(&self.entries, self.end, self.zip64);
-        self.write_at_end(&[&directory])?;
+        let mut out = io::BufWriter::with_capacity(CHUNK, &self.file);
+        let written = headers::write_directory(&mut out, &self.entries, self.end, self.zip64);
+        if let Err(source) = written.and_then(|()| out.into_inner().map(drop).map_err(Into::into)) {
+            // The first error is the one to report; the next entry overwrites what is there.
+            let _ = self.cut();
+            return Err(NpzError::io(&self.path, source));
+        }
         let settled = self.disk.settle();
         settled.and(self.file.sync_all()).map_err(|e| NpzError::io(&self.path, e))
     }
@@ -314,6 +320,7 @@ impl NpzWriter {
     fn push(&mut self, entry: EntryRecord) -> EntryRecord {
         self.end = entry.end;
         self.disk.written(&self.file, entry.end - entry.offset);
+        make_room(&mut self.entries, 1);
         self.entries.push(entry.clone());
         entry
     }
