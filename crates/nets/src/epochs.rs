@@ -27,7 +27,7 @@ pub(crate) fn run(
     mut progress: impl FnMut(Progress<'_>) -> bool,
 ) -> Result<History> {
     let memory = memory::of_training(network, course, recipe);
-    memory::require(memory, memory::available())?;
+    memory::require(memory, corsmal_files::memory::available())?;
     match recipe.initial {
         InitialKind::Pytorch => network.start(recipe.seed),
         InitialKind::Xavier => network.start_xavier(recipe.seed, false),

@@ -46,13 +46,6 @@ pub(crate) fn require(needed: u64, available: Option<u64>) -> Result<()> {
     }
 }
 
-/// Bytes that can be had without swapping (Linux).
-pub(crate) fn available() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -80,6 +80,11 @@ impl Extractor {
         self.commit(0, 0);
     }
 
+    /// Frames of the signal up to the last that was pushed.
+    pub fn reached(&self) -> u64 {
+        self.first + ((self.buffer.len() - self.head) / self.plan.channels) as u64
+    }
+
     /// Number of values computed and not yet taken.
     pub fn stored(&self) -> usize {
         self.raw.iter().map(Vec::len).sum()
@@ -97,8 +102,7 @@ impl Extractor {
     /// # Errors
     /// A feature of the whole recording does not exist for this one.
     pub fn finish(mut self, at_end: bool) -> Result<Span, Refused> {
-        let total = self.first + ((self.buffer.len() - self.head) / self.plan.channels) as u64;
-        let total = at_end.then_some(total);
+        let total = at_end.then_some(self.reached());
         self.advance(total);
         if total.is_some_and(|n| n > 0) {
             self.whole()?;

@@ -9,6 +9,7 @@
 
 mod extractor;
 mod failed;
+mod held;
 mod live;
 mod plan;
 mod plans;

@@ -9,6 +9,7 @@ use corsmal_files::outcome::{Outcome, Status};
 
 use super::extractor::{Extractor, Span};
 use super::failed::Failed;
+use super::held::Held;
 use super::live::Live;
 use super::plans::Planned;
 use super::signal_chain::SignalChain;
@@ -102,6 +103,9 @@ pub fn compute(
     let own = crop.start.saturating_add(span.start)..crop.start.saturating_add(span.end);
     let checked = source.spec().encoding.may_be_non_finite();
     let mut extractor = Extractor::new(plan.clone(), span.clone(), first);
+    let mut held = Held::of(plan);
+    let mut hold = |frames: u64| held.as_mut().map_or(Ok(()), |held| held.reach(frames));
+    let rate = plan.sample_rate / f64::from(source.spec().sample_rate);
     let identity = front.is_identity();
     let (mut block, mut signal) = (Vec::new(), Vec::new());
     let step = planned.step(BLOCK / channels, source.spec().sample_rate);
@@ -148,6 +152,7 @@ pub fn compute(
             break;
         }
         position += frames as u64;
+        hold(((position - begin) as f64 * rate) as u64)?;
     }
     // The end of the crop is the end of the signal, too.
     let at_end = ended || end == crop.end;
@@ -160,6 +165,9 @@ pub fn compute(
                 each(extractor.take())?;
             }
             extractor.push(rest);
+            if plan.needs_whole() {
+                hold(extractor.reached())?;
+            }
             Ok::<_, Failed>(true)
         })?;
         if !whole {

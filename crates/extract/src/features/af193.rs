@@ -20,6 +20,10 @@ impl WholeKernel for Vector {
     fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>> {
         Ok(Array1::from_vec(self.compute(y)?.to_vec()).insert_axis(Axis(1)))
     }
+
+    fn bytes_per_sample(&self) -> u64 {
+        20
+    }
 }
 
 impl FeatureKind for Af193 {

@@ -86,6 +86,11 @@ impl WholeKernel for Magnitudes {
         };
         Ok((magnitude * mask).index_axis_move(Axis(0), 0))
     }
+
+    fn bytes_per_sample(&self) -> u64 {
+        // Spectrum, two masks and their medians: 40 with the default overlap.
+        10 * (self.stft.n_fft as u64).div_ceil(self.stft.hop_length.max(1) as u64)
+    }
 }
 
 impl FeatureKind for Hpss {

@@ -52,6 +52,11 @@ pub trait WholeKernel: Send + Sync {
     /// # Errors
     /// A signal that the feature does not exist for.
     fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>>;
+
+    /// Bytes that computing takes for each sample of a channel, measured on long recordings.
+    fn bytes_per_sample(&self) -> u64 {
+        12
+    }
 }
 
 /// Finishes stored values once the maxima of the recording are known.
