@@ -2,6 +2,7 @@
 
 mod bad_recordings;
 mod crashes;
+mod full_disk;
 mod long;
 mod outputs;
 mod projection;
