@@ -89,7 +89,10 @@ def extract(
         raise ParameterError("resume and overwrite need out: nothing is kept without it")
     with tempfile.TemporaryDirectory(prefix="corsmal_feat_") as folder:
         temporary = str(Path(folder, "features.npz"))
-        return _run(inputs, chosen, overrides, temporary, jobs, False, False, progress)
+        features = _run(inputs, chosen, overrides, temporary, jobs, False, False, progress)
+        # The file goes with its folder.
+        features.arrays, features.times = dict(features.arrays), dict(features.times)
+        return features
 
 
 def _run(

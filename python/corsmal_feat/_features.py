@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from html import escape
 from importlib import import_module
 from typing import Any, Self
@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
+from ._features_npz import of_npz
 from ._refusals import refuses
 from ._warnings import warn
 from .errors import ParameterError, UnknownIdError
@@ -75,7 +76,8 @@ class Features:
     @classmethod
     @refuses
     def load(cls, path: StrPath) -> Self:
-        """Reads an output of `extract` or of the command `corsmal-feat extract`, whole.
+        """Reads an output of `extract` or of the command `corsmal-feat extract`; the frames of an
+        `.npz` when they are asked for.
 
         Parameters
         ----------
@@ -89,7 +91,7 @@ class Features:
         name = os.fspath(path)
         with open(name, "rb") as file:
             parquet = file.read(4) == b"PAR1"
-        return cls(**(_of_parquet(name) if parquet else _of_npz(name)))
+        return cls(**(_of_parquet(name) if parquet else of_npz(name)))
 
     def __repr__(self) -> str:
         # A table that another program wrote again has no outcomes.
@@ -122,12 +124,17 @@ class Features:
         return iter(self.ids)
 
     def __contains__(self, recording: object) -> bool:
-        return recording in self.ids
+        return recording in self._rows
+
+    @cached_property
+    def _rows(self) -> dict[object, int]:
+        """The place of each id."""
+        return {recording: row for row, recording in enumerate(self.ids)}
 
     def __getitem__(self, recording: str) -> Any:
         if self.summary is None and recording in self.arrays:
             return self.arrays[recording]
-        if recording not in self.ids:
+        if recording not in self._rows:
             near = isinstance(recording, str)
             close = [i for i in self.ids if near and (recording in i or i in recording)][:3]
             hint = f"; did you mean {', '.join(map(repr, close))}?" if close else ""
@@ -135,7 +142,7 @@ class Features:
         if self.summary is None:
             # A recording may be too short for any frame.
             return {} if len(self.config["features"]) > 1 else np.empty((0, 0, 0), np.float32)
-        return self.summary[self.ids.index(recording)]
+        return self.summary[self._rows[recording]]
 
     def to_frame(self) -> Any:
         """The features as a pandas data frame with index (file, start, end), as opensmile's.
@@ -256,7 +263,10 @@ _COLUMNS = ("id", "status", "reason", "sample_rate", "channels", "decoded_frames
 
 @refuses
 def load_features(path: StrPath) -> Features:
-    """Reads an output of `extract` or of the command `corsmal-feat extract`, whole.
+    """Reads an output of `extract` or of the command `corsmal-feat extract`.
+
+    The frames of a recording in an `.npz` are read when they are asked for, and then kept; the file
+    must stay as it is until then.
 
     Parameters
     ----------
@@ -276,75 +286,6 @@ def load_features(path: StrPath) -> Features:
     (26,)
     """
     return Features.load(path)
-
-
-def _of_npz(name: str) -> dict[str, Any]:
-    try:
-        archive = np.load(name, allow_pickle=False)
-    except (ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise ParameterError(
-            f"{name} is not an output of corsmal-feat: no .npz archive; corsmal_feat.load reads"
-            " recordings"
-        ) from error
-    if not isinstance(archive, np.lib.npyio.NpzFile):
-        raise ParameterError(f"{name} is not an output of corsmal-feat: a single array")
-    with archive:
-        if "__meta__" not in archive.files:
-            objects = [member for member in archive.files if _holds_objects(archive, member)]
-            why = f"{objects[0]} holds Python objects, which are never read" if objects else ""
-            raise ParameterError(
-                f"{name} is not an output of corsmal-feat: {why or 'it has no __meta__'}"
-            )
-        members = {member: _member(archive, name, member) for member in archive.files}
-    run = {k: v for k, v in members.items() if not _is_frames(k)}
-    config = json.loads(run["__config__"].tobytes())
-    several = len(config["features"]) > 1
-    arrays: dict[str, Any] = {}
-    times: dict[str, Any] = {}
-    for member, values in members.items():
-        if not _is_frames(member):
-            continue
-        key = member.removeprefix("__times__/")
-        into = arrays if key == member else times
-        if several:
-            recording, _, feature = key.rpartition("/")
-            into.setdefault(recording, {})[feature] = values
-        else:
-            into[key] = values
-    prefix = "__labels__/"
-    return {
-        "ids": [str(i) for i in run["__ids__"]],
-        "arrays": arrays,
-        "times": times,
-        "summary": run.get("__summary__"),
-        "names": [str(n) for n in run.get("__summary_names__", ())],
-        "labels": {k.removeprefix(prefix): v for k, v in run.items() if k.startswith(prefix)},
-        "config": config,
-        "config_hash": json.loads(run["__meta__"].tobytes())["config_hash"],
-        "outcomes": _lines(run["__outcomes__"].tobytes()),
-    }
-
-
-def _member(archive: Any, name: str, member: str) -> Values:
-    try:
-        values: Values = archive[member]
-    except (ValueError, EOFError, zipfile.BadZipFile, MemoryError) as error:
-        what = "holds Python objects" if "pickle" in str(error) else f"cannot be read: {error}"
-        raise ParameterError(f"{name}: {member} {what}") from error
-    return values
-
-
-def _holds_objects(archive: Any, member: str) -> bool:
-    """Whether the head of a member says so; its values are not read."""
-    try:
-        with archive.zip.open(f"{member}.npy") as file:
-            return b"'|O'" in file.read(256)
-    except (KeyError, EOFError, zipfile.BadZipFile):
-        return False
-
-
-def _is_frames(member: str) -> bool:
-    return member.startswith("__times__/") or not member.startswith("__")
 
 
 def _lines(text: str | bytes) -> list[dict[str, Any]]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import pickle
 import subprocess
+import zipfile
 from pathlib import Path
 
 import corsmal_feat as cf
@@ -45,6 +47,51 @@ def test_by_id(summary: cf.Features, frames: cf.Features) -> None:
             features["c"]
         with pytest.raises(cf.CorsmalFeatError):
             features["bad"]
+
+
+def test_frames_are_read_when_they_are_asked_for(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "frames.npz"
+    config = {"features": {"mfcc": {}, "rms": {}}}
+    whole = cf.extract([folder], config=config)
+    cf.extract([folder], config=config, out=out)
+    features = cf.load_features(out)
+    assert "2 recordings, 0 read" in repr(features.arrays)
+    assert list(features.arrays) == ["a", "b"] and "c" not in features.arrays
+    assert features["b"].keys() == whole["b"].keys()
+    assert "2 recordings, 1 read" in repr(features.arrays)
+    assert features["b"] is features["b"], "it is kept"
+    for name, values in whole["b"].items():
+        assert np.array_equal(features["b"][name], values)
+        assert np.array_equal(features.times["b"][name], whole.times["b"][name])
+    with pytest.raises(KeyError):
+        features.arrays["c"]
+    # As with a dict, an array can be replaced, and another process is sent them all.
+    features.arrays["b"] = {"rms": np.zeros(3)}
+    del features.arrays["a"]
+    sent = pickle.loads(pickle.dumps(features))
+    assert type(sent.arrays) is dict and sent["b"]["rms"].sum() == 0 and len(sent.arrays) == 1
+
+
+def test_damaged_frames_are_refused_when_they_are_read(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "frames.npz"
+    cf.extract([folder], preset="logmel", out=out)
+    with zipfile.ZipFile(out) as archive:
+        at = archive.getinfo("b.npy").header_offset + 400
+    content = bytearray(out.read_bytes())
+    content[at] ^= 1
+    out.write_bytes(content)
+    features = cf.load_features(out)
+    assert features["a"].size
+    with pytest.raises(cf.ParameterError, match=r"frames\.npz: b cannot be read"):
+        features["b"]
+
+
+def test_many_rows_are_found_at_once() -> None:
+    """A search through the list for each of 200,000 ids took a quarter of an hour."""
+    ids = [f"r{i}" for i in range(200_000)]
+    summary = np.arange(200_000, dtype=np.float32)[:, None]
+    features = cf.Features(ids, {}, {}, summary, ["x"], {}, {}, "", [])
+    assert sum(float(features[i][0]) for i in ids if i in features) == 199_999 * 100_000
 
 
 def test_data_frames(folder: Path, summary: cf.Features, frames: cf.Features) -> None:

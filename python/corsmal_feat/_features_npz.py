@@ -1,0 +1,84 @@
+"""Outputs in `.npz` archives."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from typing import Any
+
+import numpy as np
+
+from ._members import Members, read_member
+from .errors import ParameterError
+
+_TIMES = "__times__/"
+_LABELS = "__labels__/"
+
+
+def of_npz(name: str) -> dict[str, Any]:
+    """The fields of `Features` of an archive. Arrays of frames are read when they are
+    asked for."""
+    try:
+        archive = np.load(name, allow_pickle=False)
+    except (ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise ParameterError(
+            f"{name} is not an output of corsmal-feat: no .npz archive; corsmal_feat.load reads"
+            " recordings"
+        ) from error
+    if not isinstance(archive, np.lib.npyio.NpzFile):
+        raise ParameterError(f"{name} is not an output of corsmal-feat: a single array")
+    try:
+        return _fields(archive, name)
+    except BaseException:
+        archive.close()
+        raise
+
+
+def _fields(archive: Any, name: str) -> dict[str, Any]:
+    members: list[str] = archive.files
+    if "__meta__" not in members:
+        objects = [member for member in members if _holds_objects(archive, member)]
+        why = f"{objects[0]} holds Python objects, which are never read" if objects else ""
+        raise ParameterError(
+            f"{name} is not an output of corsmal-feat: {why or 'it has no __meta__'}"
+        )
+    frames = [member for member in members if _is_frames(member)]
+    run = {k: read_member(archive, name, k) for k in members if not _is_frames(k)}
+    config = json.loads(run["__config__"].tobytes())
+    arrays: dict[str, Any] = {}
+    times: dict[str, Any] = {}
+    several = len(config["features"]) > 1
+    for member in frames:
+        key = member.removeprefix(_TIMES)
+        into = arrays if key == member else times
+        if several:
+            recording, _, feature = key.rpartition("/")
+            into.setdefault(recording, {})[feature] = member
+        else:
+            into[key] = member
+    if not frames:
+        archive.close()
+    return {
+        "ids": [str(i) for i in run["__ids__"]],
+        "arrays": Members(archive, name, arrays) if arrays else {},
+        "times": Members(archive, name, times) if times else {},
+        "summary": run.get("__summary__"),
+        "names": [str(n) for n in run.get("__summary_names__", ())],
+        "labels": {k.removeprefix(_LABELS): v for k, v in run.items() if k.startswith(_LABELS)},
+        "config": config,
+        "config_hash": json.loads(run["__meta__"].tobytes())["config_hash"],
+        "outcomes": [json.loads(line) for line in run["__outcomes__"].tobytes().splitlines()],
+    }
+
+
+def _holds_objects(archive: Any, member: str) -> bool:
+    """Whether the head of a member says so; its values are not read."""
+    try:
+        with archive.zip.open(f"{member}.npy") as file:
+            return b"'|O'" in file.read(256)
+    except (KeyError, EOFError, zipfile.BadZipFile):
+        return False
+
+
+def _is_frames(member: str) -> bool:
+    return member.startswith(_TIMES) or not member.startswith("__")

@@ -1,0 +1,78 @@
+"""Arrays of an archive, read when they are asked for."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator, MutableMapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import ParameterError
+
+Values = npt.NDArray[Any]
+#: The member of a recording, or of each of its features.
+Names = str | dict[str, str]
+
+
+def read_member(archive: Any, name: str, member: str) -> Values:
+    """A member of the archive `name`.
+
+    Raises
+    ------
+    ParameterError
+        It is damaged, or holds Python objects.
+    """
+    # `archive[member]` looks through the list of all members.
+    try:
+        with archive.zip.open(f"{member}.npy") as file:
+            values: Values = np.lib.format.read_array(file, allow_pickle=False)
+    except (ValueError, EOFError, zipfile.BadZipFile, MemoryError) as error:
+        what = "holds Python objects" if "pickle" in str(error) else f"cannot be read: {error}"
+        raise ParameterError(f"{name}: {member} {what}") from error
+    return values
+
+
+class Members(MutableMapping[str, Any]):
+    """By id the arrays of a recording, as a dict; they are read from the open archive when they are
+    first asked for, and kept."""
+
+    def __init__(self, archive: Any, name: str, members: dict[str, Names]) -> None:
+        self._archive, self._name = archive, name
+        self._members = members
+        self._read: dict[str, Any] = {}
+
+    def __getitem__(self, recording: str) -> Any:
+        if recording not in self._read:
+            names = self._members[recording]
+            self._read[recording] = (
+                read_member(self._archive, self._name, names)
+                if isinstance(names, str)
+                else {k: read_member(self._archive, self._name, v) for k, v in names.items()}
+            )
+        return self._read[recording]
+
+    def __setitem__(self, recording: str, values: Any) -> None:
+        self._members.setdefault(recording, "")
+        self._read[recording] = values
+
+    def __delitem__(self, recording: str) -> None:
+        del self._members[recording]
+        self._read.pop(recording, None)
+
+    def __contains__(self, recording: object) -> bool:
+        return recording in self._members
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._members)
+
+    def __len__(self) -> int:
+        return len(self._members)
+
+    def __repr__(self) -> str:
+        return f"<arrays of {len(self)} recordings, {len(self._read)} read>"
+
+    def __reduce__(self) -> tuple[type[dict[str, Any]], tuple[dict[str, Any]]]:
+        # What another process is sent has the arrays themselves.
+        return dict, (dict(self),)
