@@ -1,23 +1,29 @@
 """Writes seeds for every target with the tool itself: python fuzz/seeds.py CORSMAL_FEAT
 
-They go to fuzz/corpus/TARGET, where cargo fuzz looks for them. The hostile files of CORSMAL_SHARED,
-if it is there, go along.
+They go to fuzz/corpus/TARGET, where cargo fuzz looks for them, or to FUZZ_CORPUS/TARGET. The
+hostile files of CORSMAL_SHARED, if it is there, go along.
 """
 
 from __future__ import annotations
 
+import io
+import json
 import os
+import pickle
 import random
 import shutil
 import struct
 import subprocess
 import sys
 import tempfile
+import types
 import wave
+import zipfile
+import zlib
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-CORPUS = HERE / "corpus"
+CORPUS = Path(os.environ.get("FUZZ_CORPUS", HERE / "corpus"))
 SHARED = Path(os.environ.get("CORSMAL_SHARED", HERE.parent.parent / "shared"))
 HOSTILE = SHARED / "cases" / "hostile"
 
@@ -33,6 +39,93 @@ def seed(target: str, name: str, content: bytes) -> None:
 def pair(first: bytes, second: bytes) -> bytes:
     """Two files as one input."""
     return struct.pack("<I", len(first)) + first + second
+
+
+def torch_archive() -> bytes:
+    """A tensor as torch.save writes it, without PyTorch."""
+    torch, utils = types.ModuleType("torch"), types.ModuleType("torch._utils")
+    sys.modules.update({"torch": torch, "torch._utils": utils})
+
+    class FloatStorage:
+        pass
+
+    def _rebuild_tensor_v2(*_: object) -> None:
+        pass
+
+    for thing, module in ((FloatStorage, torch), (_rebuild_tensor_v2, utils)):
+        thing.__module__, thing.__qualname__ = module.__name__, thing.__name__
+        setattr(module, thing.__name__, thing)
+
+    class Numbers:
+        pass
+
+    class Tensor:
+        def __reduce__(self) -> tuple[object, ...]:
+            return _rebuild_tensor_v2, (Numbers(), 0, (2, 3), (3, 1), False, {})
+
+    class Saver(pickle.Pickler):
+        def persistent_id(self, thing: object) -> object:
+            return ("storage", FloatStorage, "0", "cpu", 6) if isinstance(thing, Numbers) else None
+
+    text = io.BytesIO()
+    Saver(text, protocol=2).dump({"a.weight": Tensor()})
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as file:
+        file.writestr("net/data.pkl", text.getvalue())
+        file.writestr("net/data/0", struct.pack("<6f", *range(6)))
+    return archive.getvalue()
+
+
+def calibration(protocol: int) -> bytes:
+    """A camera as a pickle of lists."""
+    camera = {
+        "rgb": [[920.0, 0.0, 640.0], [0.0, 920.0, 360.0], [0.0, 0.0, 1.0]],
+        "rvec": [0.1, 0.2, 0.3],
+        "extrinsic": {"rgb": {"rvec": [[0.1], [0.2], [0.3]], "tvec": [[0.0], [0.0], [1.0]]}},
+    }
+    return pickle.dumps(camera, protocol=protocol)
+
+
+def png() -> bytes:
+    """A grey image of 8 by 4 pixels of 16 bits."""
+    rows = b"".join(b"\0" + struct.pack(">8H", *range(8)) for _ in range(4))
+
+    def chunk(kind: bytes, content: bytes) -> bytes:
+        check = zlib.crc32(kind + content)
+        return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", check)
+
+    head = struct.pack(">IIBBBBB", 8, 4, 16, 0, 0, 0, 0)
+    chunks = [(b"IHDR", head), (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*one) for one in chunks)
+
+
+TABLES = {
+    "2020": "Container ID,Sequence,Filling type,Filling level,Container Capacity\n1,0,1,2,300\n",
+    "2022": "Configuration ID,Container capacity,Container mass,Filling mass,None,Pasta,Rice,Water,"
+    "Filling type,Empty,Half-full,Full,Filling level,Width at the top,Width at the bottom,Height,"
+    "Object safety,Distance,Angle difference,Execution time\n"
+    "0,300,10,50,-1,-1,-1,-1,1,-1,-1,-1,2,70,60,90,1,5,0,1\n",
+    "annotations": "id,container id,scenario,background,illumination,width at the top,"
+    "width at the bottom,height,depth,container capacity,container mass,filling type,filling level,"
+    "filling density,filling mass,object mass,handover starting frame\n"
+    "0,1,0,0,0,69.8,60,130,0,185,2,1,1,0.41,37,39,200\n",
+    "capacities": "fileName,capacity[mL]\nid10_0000.png,300.5\n",
+    "predictions": "Object,Sequence,p0,p1\n10,0002,1,0\n1,s0_fi1_fu1_b0_l0,0.5,0.5\n",
+    "m3": json.dumps({"kind": "corsmal-feat capacity", "format": 1, "m3": {}}),
+}
+
+
+def networks(work: Path) -> None:
+    """Weights in each format, and items of a network as an archive."""
+    header = {"a.weight": {"dtype": "F32", "shape": [2, 3], "data_offsets": [0, 24]}}
+    about = {**header, "__metadata__": {"corsmal-feat": json.dumps({"format": 1, "network": "m1"})}}
+    for name, value in (("weights", header), ("model", about)):
+        text = json.dumps(value).encode()
+        content = struct.pack("<Q", len(text)) + text + struct.pack("<6f", *range(6))
+        seed("nets", f"{name}.safetensors", content)
+    seed("nets", "weights.pth", torch_archive())
+    for path in sorted(work.glob("*.npz")):
+        seed("nets", path.name, path.read_bytes())
 
 
 def main() -> None:
@@ -87,6 +180,8 @@ def main() -> None:
         run(*classify, "--out", "predictions.csv")
         seed("predictions", "ours", (work / "predictions.csv").read_bytes())
 
+        networks(work)
+
         # A strict run leaves the record of what it has done.
         (work / "audio/r9.wav").write_bytes(b"RIFF")
         strict = ["extract", "audio", "--preset", "logmel", *few, "--max-errors", "0"]
@@ -100,6 +195,11 @@ def main() -> None:
         seed("manifest", "tar", (work / "list.tar").read_bytes())
     for path in (HERE.parent / "presets").glob("*.toml"):
         seed("configuration", path.name, path.read_bytes())
+    for name, text in TABLES.items():
+        seed("submissions", name, text.encode())
+    seed("vision", "image.png", png())
+    for protocol in (0, 2, 4):
+        seed("vision", f"calib{protocol}.pickle", calibration(protocol))
     seed(
         "vision",
         "detections.csv",
@@ -115,6 +215,8 @@ def main() -> None:
             kind = {".npz": "npz", ".parquet": "parquet", ".toml": "configuration"}.get(path.suffix)
             if kind:
                 seed(kind, path.name, path.read_bytes())
+    for path in SHARED.glob("data/lode/calib/*.pickle"):
+        seed("vision", path.name, path.read_bytes())
     for folder in sorted(CORPUS.iterdir()):
         print(folder.name, len(list(folder.iterdir())))
 

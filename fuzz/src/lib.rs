@@ -1,9 +1,24 @@
-//! What the targets share: hostile bytes as a file, and every reader of a feature file.
+//! What the targets share: hostile bytes as a file, every reader of a feature file, and which panics
+//! are findings.
 
+use std::panic;
 use std::path::{Path, PathBuf};
 
+use corsmal_extract::projection::Projection;
 use corsmal_files::feature_file::FeatureFile;
 use corsmal_models::dataset::{LabelledTable, MemberNames};
+
+/// Lets our code catch panics of the decoders that it uses, as it promises. A panic of our own is a
+/// finding even where it would be caught; one of others where it escapes.
+pub fn ours_only() {
+    let fatal = panic::take_hook();
+    panic::set_hook(Box::new(move |info| {
+        let foreign = |file: &str| file.contains("/registry/src/");
+        if !info.location().is_some_and(|place| foreign(place.file())) {
+            fatal(info);
+        }
+    }));
+}
 
 /// A folder of this process, in memory where the system has such a place.
 pub fn folder() -> &'static Path {
@@ -28,6 +43,8 @@ pub fn file(name: &str, bytes: &[u8]) -> PathBuf {
 /// Reads all that a feature file holds, in each way in which a command does.
 pub fn read_features(path: &Path) {
     let _ = LabelledTable::read(path, &MemberNames::default());
+    let _ = Projection::load(path);
+    let _ = corsmal_nets::weights::read(path);
     let Ok(mut file) = FeatureFile::open(path) else { return };
     let _ = file.provenance();
     let _ = file.table();
@@ -42,6 +59,8 @@ pub fn read_features(path: &Path) {
         FeatureFile::Npy(npy) => {
             let _ = npy.components();
         }
-        FeatureFile::Parquet(_) => {}
+        FeatureFile::Parquet(parquet) => {
+            let _ = parquet.numbers();
+        }
     }
 }

@@ -25,7 +25,7 @@ fn drain(source: &mut dyn BlockSource, block: usize) -> (Vec<u32>, bool) {
     (bits, true)
 }
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+libfuzzer_sys::fuzz_target!(init: corsmal_fuzz::ours_only(), |bytes: &[u8]| {
     let file = Cursor::new(bytes.to_vec());
     let Ok(mut source) = from_seekable(file.clone()) else { return };
     let channels = usize::from(source.spec().channels);

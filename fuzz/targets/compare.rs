@@ -3,7 +3,7 @@
 
 use corsmal_compare::{Criteria, compare};
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+libfuzzer_sys::fuzz_target!(init: corsmal_fuzz::ours_only(), |bytes: &[u8]| {
     let Some((length, files)) = bytes.split_first_chunk() else { return };
     let middle = (u32::from_le_bytes(*length) as usize).min(files.len());
     let (first, second) = files.split_at(middle);

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use corsmal_extract::config::Config;
 use corsmal_extract::engine::Signals;
 
-libfuzzer_sys::fuzz_target!(|text: &str| {
+libfuzzer_sys::fuzz_target!(init: corsmal_fuzz::ours_only(), |text: &str| {
     let Ok(config) = Config::with_overrides(text, "fuzz", &[]) else { return };
     let again = Config::from_value(config.to_value()).expect("its own value");
     assert_eq!(again.hash(), config.hash());

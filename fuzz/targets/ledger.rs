@@ -7,7 +7,7 @@ use std::fs;
 use corsmal_extract::ledger::{self, Header, Ledger, Record, ledger_path, part_path};
 use corsmal_files::npz::{Compression, NpzWriter};
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+libfuzzer_sys::fuzz_target!(init: corsmal_fuzz::ours_only(), |bytes: &[u8]| {
     let Some((length, rest)) = bytes.split_first_chunk() else { return };
     let (text, part) = rest.split_at((u32::from_le_bytes(*length) as usize).min(rest.len()));
     let header = Header {

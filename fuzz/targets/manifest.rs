@@ -4,7 +4,7 @@
 use corsmal_extract::inputs;
 use corsmal_models::dataset::LabelFile;
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+libfuzzer_sys::fuzz_target!(init: corsmal_fuzz::ours_only(), |bytes: &[u8]| {
     corsmal_fuzz::file("a.wav", b"RIFF");
     for name in ["list.csv", "list.jsonl", "list.tar"] {
         let path = corsmal_fuzz::file(name, bytes);

@@ -4,7 +4,7 @@
 
 use corsmal_models::model_file::Model;
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+libfuzzer_sys::fuzz_target!(init: corsmal_fuzz::ours_only(), |bytes: &[u8]| {
     let mut file = bytes.to_vec();
     file.extend(blake3::hash(bytes).as_bytes());
     let Ok(model) = Model::from_bytes(&file) else { return };

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use corsmal_vision::{Calibration, Depth, Mask, Rgb, read_detections};
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+libfuzzer_sys::fuzz_target!(init: corsmal_fuzz::ours_only(), |bytes: &[u8]| {
     if let Ok(calibration) = Calibration::parse(bytes, Path::new("calib.pickle")) {
         let _ = calibration;
     }

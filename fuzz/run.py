@@ -1,0 +1,107 @@
+"""Runs the targets one after another and keeps count: python fuzz/run.py --seconds 300
+
+Build them first: RUSTC_BOOTSTRAP=1 cargo fuzz build --fuzz-dir fuzz --sanitizer none. What is new
+goes into the corpus, what crashes, hangs or takes more than 2 GiB into its folder `artifacts`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import datetime
+import os
+import re
+import resource
+import shutil
+import subprocess
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+TARGETS = [path.stem for path in sorted((HERE / "targets").glob("*.rs"))]
+FIELDS = ["date", "target", "executions", "cpu_s", "corpus", "findings"]
+
+
+def one(target: str, options: argparse.Namespace) -> dict[str, object]:
+    """A target for some seconds; it is started again after what it finds."""
+    corpus, artifacts = options.corpus / target, options.corpus / "artifacts" / target
+    corpus.mkdir(parents=True, exist_ok=True)
+    artifacts.mkdir(parents=True, exist_ok=True)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    end = datetime.datetime.now() + datetime.timedelta(seconds=options.seconds)
+    executions = findings = 0
+    while (left := (end - datetime.datetime.now()).total_seconds()) > 1 and findings < 5:
+        command = [
+            str(options.binaries / target),
+            str(corpus),
+            f"-artifact_prefix={artifacts}/",
+            f"-max_total_time={int(left)}",
+            "-rss_limit_mb=2048",
+            "-timeout=20",
+            "-max_len=65536",
+            "-print_final_stats=1",
+        ]
+        environment = {**os.environ, "RUST_BACKTRACE": "0"}
+        with (options.corpus / f"{target}.out").open("w+") as out:
+            done = subprocess.run(command, stdout=out, stderr=out, check=False, env=environment)
+            out.seek(0)
+            text = out.read()
+        counts = re.findall(r"number_of_executed_units: (\d+)", text)
+        # A target that was stopped says no final figure.
+        counts = counts or re.findall(r"^#(\d+)\s", text, re.MULTILINE)
+        executions += int(counts[-1]) if counts else 0
+        if done.returncode != 0:
+            findings += 1
+            print(f"{target}: exit {done.returncode}, see {artifacts}", file=sys.stderr)
+    for folder in Path("/dev/shm").glob("corsmal-fuzz-*"):
+        shutil.rmtree(folder, ignore_errors=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    count = sum(1 for _ in corpus.iterdir())
+    date = datetime.date.today().isoformat()
+    return dict(zip(FIELDS, [date, target, executions, round(cpu), count, findings], strict=True))
+
+
+def summary(log: Path) -> None:
+    """The table of LOG.md."""
+    totals: dict[str, list[float]] = defaultdict(lambda: [0, 0, 0, 0])
+    with log.open() as file:
+        for row in csv.DictReader(file):
+            total = totals[row["target"]]
+            total[0] += int(row["executions"])
+            total[1] += float(row["cpu_s"])
+            total[2] = int(row["corpus"])
+            total[3] += int(row["findings"])
+    print("| target | executions | CPU minutes | corpus | stops |\n|---|---|---|---|---|")
+    for target, (executions, cpu, corpus, stops) in sorted(totals.items()):
+        print(f"| {target} | {executions:,} | {cpu / 60:.1f} | {corpus} | {stops} |")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("targets", nargs="*", default=TARGETS)
+    parser.add_argument("--seconds", type=int, default=300, help="for each target in each round")
+    parser.add_argument("--rounds", type=int, default=1)
+    parser.add_argument("--corpus", type=Path, default=HERE / "corpus")
+    built = HERE / "target/x86_64-unknown-linux-gnu/release"
+    parser.add_argument("--binaries", type=Path, default=built)
+    parser.add_argument("--summary", action="store_true", help="only print what was done so far")
+    options = parser.parse_args()
+    log = options.corpus / "log.csv"
+    if options.summary:
+        return summary(log)
+    for _ in range(options.rounds):
+        for target in options.targets:
+            row = one(target, options)
+            new = not log.exists()
+            with log.open("a", newline="") as file:
+                writer = csv.DictWriter(file, FIELDS)
+                if new:
+                    writer.writeheader()
+                writer.writerow(row)
+            print(row, flush=True)
+
+
+if __name__ == "__main__":
+    main()
