@@ -22,7 +22,7 @@ const GROUPS: [(&str, &[&str]); 4] = [
         ],
     ),
     ("Files", &["compare", "merge", "completions"]),
-    ("CORSMAL", &["benchmark", "capacity", "crops", "evaluate", "dataset", "synth"]),
+    ("CORSMAL", &["benchmark", "capacity", "crops", "detect", "evaluate", "dataset", "synth"]),
 ];
 
 const EXIT_CODES: &str = "\

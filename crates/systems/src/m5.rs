@@ -18,8 +18,8 @@ pub(crate) const M5: Definition = Definition {
     about: "M5 (Because It's Tactile): a forest over statistics of the sound, GRUs over VGGish and \
             R(2+1)D embeddings, averaged",
     networks: &["m5_vggish_level", "m5_vggish_type", "m5_r21d_level"],
-    limits: &["The embeddings are made elsewhere and given with --embeddings; its capacity needs \
-               views: `corsmal-feat capacity --method lode`."],
+    limits: &["The embeddings come from `corsmal-feat embed` and are given with --embeddings; its \
+               capacity needs views: `corsmal-feat capacity --method m5`."],
     make: Some(|settings| Box::new(Tactile(settings))),
 };
 

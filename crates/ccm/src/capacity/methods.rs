@@ -16,7 +16,7 @@ const M5_LABELS: [&str; 5] = ["bottle", "wine glass", "cup", "book", "vase"];
 /// Smallest score of a detection that M5 uses.
 const M5_SCORE: f64 = 0.5;
 /// M5's second frame, counted from the end.
-const M5_FROM_END: usize = 20;
+pub const M5_FROM_END: usize = 20;
 /// Labels of containers in any method of ours.
 const LABELS: [&str; 10] = [
     "bottle",

@@ -20,7 +20,7 @@ use crate::error::{CcmError, Result};
 use crate::submission::RowKey;
 
 pub use combine::combine_files;
-pub use methods::{Estimate, RegionNetwork, Sizes};
+pub use methods::{Estimate, M5_FROM_END, RegionNetwork, Sizes};
 use model::Sample;
 pub use model::{CapacityModel, HeldOut};
 pub use options::{CapacityOptions, Method};

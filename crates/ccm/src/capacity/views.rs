@@ -103,6 +103,11 @@ impl Views {
         }
     }
 
+    /// What the recording's files are called, such as `s0_fi1_fu2_b0_l0`.
+    pub fn stem(&self) -> &str {
+        &self.stem
+    }
+
     /// The colour camera of a view, 1 to 4.
     ///
     /// # Errors

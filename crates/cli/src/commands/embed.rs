@@ -13,40 +13,68 @@ Examples:
   corsmal-feat embed vggish audio/ --weights vggish.pth -o vggish.npz
   corsmal-feat train vggish.npz --net m5-vggish-level --target level -o level.safetensors
   corsmal-feat benchmark --data CCM --out report --methods m5 --embeddings vggish=vggish.npz
+  corsmal-feat embed r21d --data CCM --model r21d.onnx --library libonnxruntime.so.1.32.0 -o r21d.npz
 
 Bring your own weights, under the names of the usual PyTorch port (features.0.weight to
 embeddings.4.bias); a .pth is read without running it. The .npz has X, rows of 128 numbers for each
 .96 s of one recording after another, offsets, where each recording begins, and ids; label columns of
-a manifest are kept.
+a manifest are kept. r21d embeds windows of 16 colour frames of the four views of a data set, 512 numbers
+each, by an ONNX model (docs/vision.md); the member view says which view a sequence is.
 
 Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 interrupted.")]
 pub struct Args {
-    /// The network that embeds: vggish.
+    /// The network that embeds: vggish, or r21d.
     #[arg(value_name = "NETWORK")]
     network: String,
     /// Recordings: files, folders, globs, manifests.
-    #[arg(value_name = "PATH", required = true, num_args = 1..)]
+    #[arg(value_name = "PATH", num_args = 1.., required_unless_present = "data")]
     paths: Vec<String>,
-    /// Its weights: .pth, .safetensors or .npz.
-    #[arg(long, value_name = "FILE")]
-    weights: PathBuf,
+    /// Weights of vggish: .pth, .safetensors or .npz.
+    #[arg(long, value_name = "FILE", required_unless_present = "data")]
+    weights: Option<PathBuf>,
+    /// Folder of the data set whose views r21d embeds.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["paths", "weights"])]
+    #[arg(requires_all = ["model", "library"])]
+    data: Option<PathBuf>,
+    /// r21d as an ONNX model; docs/vision.md says how to export it.
+    #[arg(long, value_name = "FILE", requires = "data")]
+    model: Option<PathBuf>,
+    /// Shared library of ONNX Runtime, such as libonnxruntime.so.1.32.0 of the PyPI package onnxruntime.
+    #[arg(long, value_name = "FILE", env = "CORSMAL_ONNXRUNTIME")]
+    library: Option<PathBuf>,
     /// Embeddings to write (.npz).
     #[arg(long, short, value_name = "FILE")]
-    out: PathBuf,
+    pub(super) out: PathBuf,
     /// Replace an existing file.
     #[arg(long)]
-    overwrite: bool,
+    pub(super) overwrite: bool,
     #[command(flatten)]
-    jobs: Jobs,
+    pub(super) jobs: Jobs,
     #[command(flatten)]
-    told: Told,
+    pub(super) told: Told,
 }
 
 /// Says how to get networks.
 #[cfg(not(feature = "nets"))]
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
-    let Args { network: _, paths: _, weights: _, out: _, overwrite: _, jobs: _, told: _ } = args;
+    let Args { network: _, paths: _, weights: _, data: _, model: _, library: _, .. } = args;
+    let Args { out: _, overwrite: _, jobs: _, told: _, .. } = args;
     Err(super::nets::absent())
+}
+
+/// Embeds views.
+#[cfg(feature = "nets")]
+fn views(args: &Args) -> Result<ExitCode, Failure> {
+    let (Some(data), Some(model), Some(library)) = (&args.data, &args.model, &args.library) else {
+        return Err(Failure::new("r21d embeds views: give --data, --model and --library"));
+    };
+    #[cfg(feature = "onnx")]
+    return super::clips::run(args, data, model, library);
+    #[cfg(not(feature = "onnx"))]
+    {
+        let _ = (data, model, library);
+        Err(super::detect::absent())
+    }
 }
 
 /// Embeds and writes.
@@ -60,9 +88,17 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     use crate::failure::{FAILED_FILES, INTERRUPTED};
     use crate::recordings;
 
+    let Some(weights) = args.weights.as_deref().filter(|_| args.network != "r21d") else {
+        if args.network == "r21d" {
+            return views(&args);
+        }
+        return Err(Failure::new(
+            "--data is for r21d, which embeds views; name recordings and --weights",
+        ));
+    };
     require_npz(&args.out)?;
     crate::publish::check(&args.out, args.overwrite)?;
-    let embedder = Embedder::new(&args.network, &args.weights)?;
+    let embedder = Embedder::new(&args.network, weights)?;
     let found = recordings::named(&args.paths, recordings::warn)?;
     let stop = crate::interrupt::flag();
     let mut failed = 0;

@@ -4,6 +4,8 @@ mod benchmark;
 mod capacity;
 mod classifiers;
 mod classify;
+#[cfg(all(feature = "nets", feature = "onnx"))]
+mod clips;
 mod compare;
 mod compare_predictions;
 mod completions;
@@ -11,6 +13,7 @@ mod crops;
 mod cross_validate;
 mod dataset;
 mod demo;
+mod detect;
 mod embed;
 mod evaluate;
 mod extract;
@@ -95,6 +98,8 @@ enum Command {
     Capacity(capacity::Args),
     /// Cut containers out of the last frames of a CORSMAL data set, as pictures with labels.
     Crops(crops::Args),
+    /// Find objects in the frames of a CORSMAL data set by an ONNX model, as tables and masks.
+    Detect(detect::Args),
     /// Print shell completions or the man page.
     Completions(completions::Args),
     /// Check a CORSMAL data set on disk.
@@ -128,6 +133,7 @@ impl Command {
             Self::Benchmark(args) => benchmark::run(args),
             Self::Capacity(args) => capacity::run(args),
             Self::Crops(args) => crops::run(args),
+            Self::Detect(args) => detect::run(args),
             Self::Completions(args) => completions::run(args, Cli::command()),
             Self::Dataset(args) => dataset::run(args),
             Self::Evaluate(args) => evaluate::run(args),

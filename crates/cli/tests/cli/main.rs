@@ -18,6 +18,7 @@ mod live;
 mod models;
 #[cfg(feature = "nets")]
 mod networks;
+mod onnx;
 #[cfg(feature = "nets")]
 mod pictures;
 mod scoring;

@@ -1,0 +1,230 @@
+//! `corsmal-feat detect`: frames in, tables of detections out.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use crate::args::{Jobs, Told};
+use crate::failure::Failure;
+
+/// Arguments of `detect`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  corsmal-feat detect --data ~/CCM --model mask_rcnn.onnx --library libonnxruntime.so.1.32.0 --out detections
+  corsmal-feat capacity --method m5 --data ~/CCM --detections detections --out capacity.csv
+
+A table CONTAINER/SEQUENCE.json for each recording with colour frames, as `capacity` and `crops` read
+them: what the model sees with its confidence, and masks of containers. Tables that are there are kept,
+so that an interrupted run goes on; model.json says which model made them.
+
+Exit codes: 0 all fine, 1 some recordings have damaged files, 2 could not run, 130 interrupted.")]
+pub struct Args {
+    /// Folder of the data set.
+    #[arg(long, value_name = "DIR")]
+    data: PathBuf,
+    /// torchvision's Mask R-CNN as an ONNX model; docs/vision.md says how to export it.
+    #[arg(long, value_name = "FILE")]
+    model: PathBuf,
+    /// Shared library of ONNX Runtime, such as libonnxruntime.so.1.32.0 of the PyPI package onnxruntime.
+    #[arg(long, value_name = "FILE", env = "CORSMAL_ONNXRUNTIME")]
+    library: PathBuf,
+    /// Folder of the tables.
+    #[arg(long, short, value_name = "DIR")]
+    out: PathBuf,
+    /// Frames that are looked at: ends (the first, the 20th from the end and the last, which m5 and the
+    /// vision baseline need), all (m3), or every=8 (m4), with the last.
+    #[arg(long, value_name = "WHICH", default_value = "ends", value_parser = frames)]
+    frames: Frames,
+    /// Views that are looked at.
+    #[arg(long, value_delimiter = ',', default_value = "1,2,3,4", value_name = "VIEW")]
+    #[arg(value_parser = clap::value_parser!(u8).range(1..=4))]
+    views: Vec<u8>,
+    /// Least confidence of what is written.
+    #[arg(long, value_name = "P", default_value_t = 0.05, value_parser = crate::args::share)]
+    score: f64,
+    /// Make tables anew that are there.
+    #[arg(long)]
+    overwrite: bool,
+    #[command(flatten)]
+    jobs: Jobs,
+    #[command(flatten)]
+    told: Told,
+}
+
+/// Which frames of a view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Frames {
+    /// The first, the 20th from the end, and the last.
+    Ends,
+    /// Every so many, and the last.
+    Every(usize),
+}
+
+fn frames(text: &str) -> Result<Frames, String> {
+    match (text, text.strip_prefix("every=").map(str::parse)) {
+        ("ends", _) => Ok(Frames::Ends),
+        ("all", _) => Ok(Frames::Every(1)),
+        (_, Some(Ok(step))) if step > 0 => Ok(Frames::Every(step)),
+        _ => Err("expected ends, all or every=N such as every=8".into()),
+    }
+}
+
+/// How to get what runs models.
+#[cfg(not(feature = "onnx"))]
+pub fn absent() -> Failure {
+    Failure::new(
+        "this build runs no ONNX models; `cargo install --path crates/cli --features nets,onnx` makes one that does",
+    )
+}
+
+/// Says how to get it.
+#[cfg(not(feature = "onnx"))]
+pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    // What these say is for models.
+    let Args { data: _, model: _, library: _, out: _, frames: _, views: _, .. } = args;
+    let Args { score: _, overwrite: _, jobs: _, told: _, .. } = args;
+    Err(absent())
+}
+
+/// Looks at frames and writes what is there.
+#[cfg(feature = "onnx")]
+pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    use std::sync::atomic::Ordering;
+
+    use corsmal_ccm::dataset::DataSet;
+    use corsmal_onnx::runtime::{Detector, Runtime};
+    use serde_json::json;
+
+    use crate::failure::{FAILED_FILES, INTERRUPTED};
+    use crate::plural::plural;
+
+    let set = DataSet::open(&args.data)?;
+    let runtime = Runtime::load(&args.library, args.jobs.count())?;
+    let mut detector = Detector::open(&runtime, &args.model)?;
+    made_by(&args)?;
+    let stop = crate::interrupt::flag();
+    let (mut written, mut kept, mut without, mut failed) = (0usize, 0usize, 0usize, 0usize);
+    for recording in &set.recordings {
+        if stop.load(Ordering::SeqCst) {
+            eprintln!("interrupted; run the same command again to continue");
+            return Ok(ExitCode::from(INTERRUPTED));
+        }
+        let views = corsmal_ccm::capacity::Views::of(recording, None);
+        let folder = match recording.container {
+            Some(container) => args.out.join(container.number().to_string()),
+            None => args.out.join(recording.part.name().replace(' ', "-")),
+        };
+        let place = folder.join(format!("{}.json", views.stem()));
+        if place.exists() && !args.overwrite {
+            kept += 1;
+            continue;
+        }
+        match seen(&mut detector, &views, &args) {
+            Err(Fault::Recording(reason)) => {
+                eprintln!("{}: {reason}", recording.path.display());
+                failed += 1;
+            }
+            Err(Fault::Model(failure)) => return Err(failure),
+            Ok(None) => without += 1,
+            Ok(Some(rows)) => {
+                std::fs::create_dir_all(&folder)?;
+                let text = serde_json::Value::from(rows).to_string();
+                corsmal_files::draft::write(&place, text.as_bytes())?;
+                written += 1;
+            }
+        }
+    }
+    let (out, recordings) = (&args.out, set.recordings.len());
+    args.told.tell(
+        || {
+            json!({
+                "out": out, "recordings": recordings, "written": written, "kept": kept,
+                "without_frames": without, "failed": failed,
+            })
+        },
+        || {
+            let tables = plural(written, "table");
+            format!(
+                "{}: {tables} of {recordings} recordings, {kept} kept, {without} without frames",
+                out.display()
+            )
+        },
+    )?;
+    Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
+}
+
+/// Says in the folder which model makes its tables; refuses to mix those of several.
+#[cfg(feature = "onnx")]
+fn made_by(args: &Args) -> Result<(), Failure> {
+    use corsmal_files::{draft, identity};
+
+    let identity = identity::of_file(&args.model)
+        .map_err(|e| Failure::new(format!("{}: {e}", args.model.display())))?;
+    let place = args.out.join("model.json");
+    let frames = match args.frames {
+        Frames::Ends => "ends".to_owned(),
+        Frames::Every(step) => format!("every={step}"),
+    };
+    let about = serde_json::json!({
+        "model": identity, "frames": frames, "views": args.views, "score": args.score,
+        "tool_version": env!("CARGO_PKG_VERSION"),
+    });
+    let about = serde_json::to_string_pretty(&about)?;
+    if let (Ok(found), false) = (std::fs::read_to_string(&place), args.overwrite)
+        && found != about
+    {
+        return Err(Failure::new(format!(
+            "{}: the tables there are by another model, version or choice of frames; give another --out, or \
+             --overwrite",
+            place.display()
+        )));
+    }
+    std::fs::create_dir_all(&args.out)
+        .map_err(|e| Failure::new(format!("{}: {e}", args.out.display())))?;
+    Ok(draft::write(&place, about.as_bytes())?)
+}
+
+/// What ends the work on a recording, or on all.
+#[cfg(feature = "onnx")]
+enum Fault {
+    Recording(String),
+    Model(Failure),
+}
+
+/// The rows of a recording; `None` where it has no frames.
+#[cfg(feature = "onnx")]
+fn seen(
+    detector: &mut corsmal_onnx::runtime::Detector,
+    views: &corsmal_ccm::capacity::Views,
+    args: &Args,
+) -> Result<Option<Vec<serde_json::Value>>, Fault> {
+    use corsmal_ccm::capacity::{Kind, Problem};
+
+    let fault = |problem: Problem| match problem {
+        Problem::Missing(reason) | Problem::Damaged(reason) => Fault::Recording(reason),
+    };
+    let ends = views.ends(&[], corsmal_ccm::capacity::M5_FROM_END).map_err(fault)?;
+    let (mut rows, mut any) = (Vec::new(), false);
+    for &view in &args.views {
+        let all = views.frames(Kind::Rgb, view).map_err(fault)?;
+        let last = all.len().saturating_sub(1);
+        for (i, frame) in all.iter().enumerate() {
+            let wanted = match args.frames {
+                Frames::Every(step) => i % step == 0,
+                Frames::Ends => ends.is_some_and(|(a, b)| [a, b].contains(&frame.number)),
+            };
+            if !wanted && i != last {
+                continue;
+            }
+            any = true;
+            let image = corsmal_vision::Rgb::read(&frame.path)
+                .map_err(|e| Fault::Recording(e.to_string()))?;
+            let found = detector.detect(&image).map_err(|e| Fault::Model(e.into()))?;
+            let size = (image.width, image.height);
+            let found = found.rows((view, frame.number), size, args.score as f32);
+            let path = args.model.display();
+            rows.extend(found.map_err(|e| Fault::Model(Failure::new(format!("{path}: {e}"))))?);
+        }
+    }
+    Ok(any.then_some(rows))
+}
