@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from . import _core
 from ._features_npz import of_npz
+from ._features_parquet import of_parquet
 from ._refusals import refuses
-from ._warnings import warn
 from .errors import ParameterError, UnknownIdError
 
 StrPath = str | os.PathLike[str]
@@ -91,7 +91,7 @@ class Features:
         name = os.fspath(path)
         with open(name, "rb") as file:
             parquet = file.read(4) == b"PAR1"
-        return cls(**(_of_parquet(name) if parquet else of_npz(name)))
+        return cls(**(of_parquet(name) if parquet else of_npz(name)))
 
     def __repr__(self) -> str:
         # A table that another program wrote again has no outcomes.
@@ -286,80 +286,3 @@ def load_features(path: StrPath) -> Features:
     (26,)
     """
     return Features.load(path)
-
-
-def _lines(text: str | bytes) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in text.splitlines() if line]
-
-
-def _is_text(types: Any, kind: Any) -> bool:
-    kind = kind.value_type if types.is_dictionary(kind) else kind
-    return bool(types.is_string(kind) or types.is_large_string(kind))
-
-
-def _is_statistic(column: str) -> bool:
-    """Whether a column is called as values of a summary are: `mfcc[0].mean`, `rms.std`."""
-    return "[" in column or "." in column
-
-
-def _ids(name: str, column: list[Any]) -> list[str]:
-    ids: dict[str, int] = {}
-    for row, value in enumerate(column):
-        if value is None:
-            raise ParameterError(f"{name}: row {row} has no id")
-        if str(value) in ids:
-            raise ParameterError(
-                f"{name}: rows {ids[str(value)]} and {row} have the same id, {str(value)!r}"
-            )
-        ids[str(value)] = row
-    return list(ids)
-
-
-def _of_parquet(name: str) -> dict[str, Any]:
-    try:
-        parquet = import_module("pyarrow.parquet")
-        failed = import_module("pyarrow").ArrowInvalid
-    except ImportError as error:
-        raise ImportError(
-            f"{name}: reading Parquet needs pyarrow (pip install pyarrow); "
-            "pandas.read_parquet and polars.read_parquet give the table, too"
-        ) from error
-    try:
-        table = parquet.read_table(name)
-    except failed as error:
-        raise ParameterError(f"{name} is not a readable Parquet file: {error}") from error
-    metadata = table.schema.metadata or {}
-    if "id" not in table.column_names:
-        raise ParameterError(f"{name} is not an output of corsmal-feat: it has no column id")
-    types = import_module("pyarrow").types
-    columns: dict[str, Values] = {}
-    names: list[str] = []
-    for field in table.schema:
-        if field.name == "id" or field.name.startswith("__"):
-            continue
-        whole = types.is_integer(field.type)
-        # pandas makes a column of whole values one of integers; ours have such names.
-        if types.is_floating(field.type) or (whole and _is_statistic(field.name)):
-            names.append(field.name)
-            columns[field.name] = table.column(field.name).to_numpy()
-        elif whole or types.is_boolean(field.type) or _is_text(types, field.type):
-            texts = ["" if v is None else str(v) for v in table.column(field.name).to_pylist()]
-            columns[field.name] = np.asarray(texts, dtype=np.str_)
-        else:
-            warn(f"{name}: the column {field.name} is left out: it holds {field.type}")
-    ids = _ids(name, table.column("id").to_pylist())
-    empty = np.zeros((len(ids), 0), np.float32)
-    meta = json.loads(metadata.get(b"corsmal.meta", b"{}"))
-    return {
-        "ids": ids,
-        "arrays": {},
-        "times": {},
-        "summary": np.stack([columns[k] for k in names], axis=1).astype(np.float32)
-        if names
-        else empty,
-        "names": names,
-        "labels": {k: v for k, v in columns.items() if k not in names},
-        "config": json.loads(metadata.get(b"corsmal.config", b"{}")),
-        "config_hash": meta.get("config_hash", ""),
-        "outcomes": _lines(metadata.get(b"corsmal.outcomes", b"")),
-    }

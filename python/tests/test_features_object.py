@@ -94,6 +94,22 @@ def test_many_rows_are_found_at_once() -> None:
     assert sum(float(features[i][0]) for i in ids if i in features) == 199_999 * 100_000
 
 
+def test_frames_from_parquet(tmp_path: Path, folder: Path) -> None:
+    pytest.importorskip("pyarrow", reason="reading Parquet needs pyarrow")
+    soundfile.write(tmp_path / "short.wav", np.zeros((10, 1)), 16000)
+    paths = [folder, tmp_path / "short.wav"]
+    for features in ({"mfcc": {}}, {"mfcc": {"n_mfcc": 4}, "rms": {}}):
+        outs = [tmp_path / f"{len(features)}.{kind}" for kind in ("npz", "parquet")]
+        for out in outs:
+            cf.extract(paths, config={"features": features}, out=out)
+        npz, parquet = (cf.load_features(out) for out in outs)
+        assert parquet.summary is None and parquet.ids == npz.ids and len(npz) >= 2
+        assert (parquet.config, parquet.outcomes) == (npz.config, npz.outcomes)
+        np.testing.assert_equal(parquet.arrays, npz.arrays)
+        np.testing.assert_equal(parquet.times, npz.times)
+        assert parquet.labels == npz.labels == {}
+
+
 def test_data_frames(folder: Path, summary: cf.Features, frames: cf.Features) -> None:
     pandas = pytest.importorskip("pandas")
     table = summary.to_frame()

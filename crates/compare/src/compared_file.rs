@@ -9,9 +9,8 @@ use corsmal_files::npz::{NpzError, NpzFile};
 use corsmal_files::parquet::{NumericTable, ParquetFile};
 use corsmal_files::provenance::Provenance;
 use corsmal_files::table::{RESERVED, Table};
-use ndarray::ArrayD;
+use ndarray::{Array1, ArrayD};
 use serde::Serialize;
-use serde_json::Value;
 
 /// Name under which frame times are compared.
 const TIMES: &str = "frame times";
@@ -36,11 +35,21 @@ pub(super) struct ArrayEntry {
     pub dtype: String,
 }
 
+/// Frames in a Parquet file, or the times of these frames.
+#[derive(Debug)]
+struct Place {
+    row: usize,
+    feature: String,
+    times: bool,
+}
+
 /// An open file.
 #[derive(Debug)]
 pub(super) struct ComparedFile {
     source: FeatureFile,
     arrays: Vec<ArrayEntry>,
+    /// Where each of them lies in a Parquet file.
+    places: Vec<Place>,
     table: Option<NumericTable>,
     provenance: Option<Provenance>,
     refused: Vec<Refused>,
@@ -60,7 +69,7 @@ impl ComparedFile {
         let (mut table, mut provenance, mut features) = (None, None, Vec::new());
         if layout::is_ours(&npz) {
             let (found, made) = layout::read_table(&mut npz)?;
-            features = feature_names(&made);
+            features = made.features();
             table = (!found.feature_names().is_empty()).then(|| columns(&found));
             provenance = Some(made);
         }
@@ -82,7 +91,14 @@ impl ComparedFile {
             let ours = provenance.as_ref().and_then(|_| owner(&name, &features));
             arrays.push(ArrayEntry { name, ours, dtype: header.dtype.to_string() });
         }
-        Ok(Self { source: FeatureFile::Npz(npz), arrays, table, provenance, refused })
+        Ok(Self {
+            source: FeatureFile::Npz(npz),
+            arrays,
+            places: vec![],
+            table,
+            provenance,
+            refused,
+        })
     }
 
     fn npy(npy: NpyFile) -> Self {
@@ -90,10 +106,14 @@ impl ComparedFile {
         let dtype = npy.header().dtype.to_string();
         let arrays = vec![ArrayEntry { name, ours: None, dtype }];
         let source = FeatureFile::Npy(npy);
-        Self { source, arrays, table: None, provenance: None, refused: vec![] }
+        Self { source, arrays, places: vec![], table: None, provenance: None, refused: vec![] }
     }
 
     fn parquet(parquet: ParquetFile) -> Result<Self, FeatureFileError> {
+        let features = if parquet.is_ours() { parquet.frame_features() } else { Vec::new() };
+        if !features.is_empty() {
+            return Self::parquet_frames(parquet, &features);
+        }
         let table = parquet.numbers()?;
         let reason = "a nested column, or not of numbers";
         let refused =
@@ -102,7 +122,32 @@ impl ComparedFile {
         // Tables of other tools have no provenance.
         let provenance = parquet.provenance().ok();
         let source = FeatureFile::Parquet(parquet);
-        Ok(Self { source, arrays: vec![], table: Some(table), provenance, refused })
+        let (arrays, places) = (vec![], vec![]);
+        Ok(Self { source, arrays, places, table: Some(table), provenance, refused })
+    }
+
+    /// The frames of an output of ours, named as in an `.npz`.
+    fn parquet_frames(parquet: ParquetFile, features: &[String]) -> Result<Self, FeatureFileError> {
+        let (found, made) = parquet.table()?;
+        let several = features.len() > 1;
+        let (mut arrays, mut places) = (Vec::new(), Vec::new());
+        for (row, id) in found.ids().iter().enumerate() {
+            for feature in features {
+                let named = several.then_some(feature.as_str());
+                let frames = layout::frames_name(id, named);
+                let times = layout::times_name(id, named);
+                let owner = frames.clone();
+                for (name, ours, dtype, times) in [
+                    (frames, (id.clone(), feature.clone()), "<f4", false),
+                    (times, (owner, TIMES.into()), "<f8", true),
+                ] {
+                    arrays.push(ArrayEntry { name, ours: Some(ours), dtype: dtype.into() });
+                    places.push(Place { row, feature: feature.clone(), times });
+                }
+            }
+        }
+        let source = FeatureFile::Parquet(parquet);
+        Ok(Self { source, arrays, places, table: None, provenance: Some(made), refused: vec![] })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -143,7 +188,14 @@ impl ComparedFile {
             FeatureFile::Npy(npy) => npy
                 .components()
                 .map_err(|source| FeatureFileError::Npy { path: npy.path().into(), source }),
-            FeatureFile::Parquet(_) => unreachable!("a Parquet file lists no arrays"),
+            FeatureFile::Parquet(parquet) => {
+                let Place { row, feature, times } = &self.places[index];
+                let frames = parquet.frames(*row, feature)?;
+                Ok(match times {
+                    true => Array1::from(frames.times).into_dyn(),
+                    false => frames.values.mapv(f64::from),
+                })
+            }
         }
     }
 
@@ -176,12 +228,6 @@ fn shown(names: &[&String]) -> String {
         (_, 0) => first.join(", "),
         _ => format!("{} and {more} more", first.join(", ")),
     }
-}
-
-/// Features of a configuration that were written frame by frame.
-fn feature_names(made: &Provenance) -> Vec<String> {
-    let config: Value = serde_json::from_str(&made.config).unwrap_or_default();
-    config["features"].as_object().map(|f| f.keys().cloned().collect()).unwrap_or_default()
 }
 
 /// Recording and feature of a frame-level member of an output of ours.

@@ -1,6 +1,7 @@
 //! Puts the outputs of all shards of a run together into the file that one run would have written,
 //! byte for byte.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use corsmal_files::draft;
@@ -9,7 +10,7 @@ use corsmal_files::format::{FormatError, OutputFormat};
 use corsmal_files::identity;
 use corsmal_files::layout;
 use corsmal_files::npz::{Compression, EntryRecord, NpzError, NpzWriter};
-use corsmal_files::parquet::{self, ParquetTableError};
+use corsmal_files::parquet::{self, FramesWriter, ParquetFile, ParquetTableError};
 use corsmal_files::provenance::Provenance;
 use corsmal_files::shard::Shard;
 use corsmal_files::table::{Table, TableError};
@@ -159,6 +160,7 @@ impl Merge<'_> {
             OutputFormat::Parquet => None,
         };
         let mut joined: Option<Table> = None;
+        let mut frames = false;
         for (index, shard) in self.shards.iter().enumerate() {
             let identity = identity::of_file(shard).map_err(|e| NpzError::io(shard, e))?;
             let mut file = FeatureFile::open(shard)?;
@@ -171,6 +173,9 @@ impl Merge<'_> {
                 Some(joined) => joined
                     .extend(&read.table)
                     .map_err(|source| MergeError::Table { path: shard.clone(), source })?,
+            }
+            if let FeatureFile::Parquet(parquet) = &file {
+                frames |= !parquet.frame_features().is_empty();
             }
             if index < ready {
                 continue;
@@ -191,8 +196,23 @@ impl Merge<'_> {
                 layout::write_table(&mut writer, &table, self.provenance)?;
                 Ok(writer.finish()?)
             }
+            None if frames => self.write_frames(part, &path, &table),
             None => Ok(parquet::write_over(part, &path, &table, self.provenance)?),
         }
+    }
+
+    /// Writes the frames of all shards, grouped as those of one run.
+    fn write_frames(&self, part: File, path: &Path, table: &Table) -> Result<(), MergeError> {
+        let mut writer = FramesWriter::over(part, path, table, self.provenance)?;
+        let features = self.provenance.features();
+        for shard in self.shards {
+            let mut file = ParquetFile::open(shard)?;
+            for row in 0..file.table()?.0.ids().len() {
+                let frames = features.iter().map(|feature| file.frames(row, feature));
+                writer.push(frames.collect::<Result<_, _>>()?)?;
+            }
+        }
+        Ok(writer.finish()?)
     }
 }
 

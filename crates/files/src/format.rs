@@ -35,7 +35,7 @@ pub fn require_npz(path: &Path) -> Result<(), FormatError> {
 pub enum OutputFormat {
     /// A numpy archive.
     Npz(Compression),
-    /// A Parquet table of summaries.
+    /// A Parquet table of summaries or of frames.
     Parquet,
 }
 

@@ -1,6 +1,7 @@
 //! What an output says about how it was made.
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::shard::Shard;
 
@@ -36,5 +37,11 @@ impl Provenance {
             shard: shard.to_string(),
             config,
         }
+    }
+
+    /// Names of the features in the configuration, in its order.
+    pub fn features(&self) -> Vec<String> {
+        let config: Value = serde_json::from_str(&self.config).unwrap_or_default();
+        config["features"].as_object().map(|f| f.keys().cloned().collect()).unwrap_or_default()
     }
 }

@@ -39,7 +39,7 @@ pub struct Args {
     /// The same as the positional argument; these follow the others.
     #[arg(long = "in", short = 'i', value_name = "PATH", num_args = 1..)]
     named: Vec<OsString>,
-    /// Output: .npz, or .parquet for summary tables.
+    /// Output: .npz or .parquet.
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
     #[command(flatten)]

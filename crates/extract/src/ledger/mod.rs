@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 
-use corsmal_files::draft;
+use corsmal_files::draft::{self, Draft};
 use corsmal_files::npz::{EntryRecord, intact_entries};
 use serde::Serialize;
 
@@ -162,6 +162,11 @@ impl Ledger {
         }
     }
 
+    /// The output that this run writes.
+    pub fn out(&self) -> &Path {
+        &self.out
+    }
+
     /// Records that one more thing is done. Its entries must have been written.
     ///
     /// # Errors
@@ -184,6 +189,19 @@ impl Ledger {
         fs::rename(part_path(&self.out), &self.out).map_err(io(&self.out))?;
         sync_folder(&self.out).map_err(io(&self.out))?;
         remove(&self.path)
+    }
+
+    /// As [`Ledger::publish`], where the output was made of the partial one: gives `made` its name,
+    /// then removes the partial output.
+    ///
+    /// # Errors
+    /// As [`Ledger::publish`].
+    pub fn publish_made(self, made: Draft) -> Result<(), LedgerError> {
+        self.require_ours()?;
+        let io = |source| LedgerError::Io { path: self.out.clone(), source };
+        made.publish().map_err(io)?;
+        sync_folder(&self.out).map_err(io)?;
+        self.discard()
     }
 
     /// Forgets the run: removes ledger and partial output, if they are still its own.

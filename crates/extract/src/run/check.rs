@@ -42,8 +42,7 @@ fn advice(inputs: usize, config: &Config, format: OutputFormat) -> Option<String
     (frames && members > MANY_MEMBERS).then(|| {
         format!(
             "the output will have {members} members, and archives of more than {MANY_MEMBERS} open \
-             slowly: --shard i/n makes several; a configuration with a [summary] and --out x.parquet \
-             makes one table; corsmal_feat.ray and corsmal_feat.arrow (Python) write frames to Parquet"
+             slowly: --out x.parquet makes one table; --shard i/n makes several archives"
         )
     })
 }
@@ -95,9 +94,13 @@ fn check_output(options: &RunOptions, config: &Config) -> Result<OutputFormat, R
     let out = options.out.as_path();
     let refuse = |why: String| Err(RunError::Format { path: out.into(), why });
     let format = OutputFormat::of_name(out, options.compression)?;
-    if format == OutputFormat::Parquet && config.summary.is_none() {
-        let why = "Parquet holds summary tables: the configuration needs a [summary], \
-                   or write .npz";
+    let complex = |config: &Config| {
+        let value = config.to_value();
+        let features = value["features"].as_object().into_iter().flatten();
+        features.into_iter().any(|(_, feature)| feature["output"] == "complex")
+    };
+    if format == OutputFormat::Parquet && config.summary.is_none() && complex(config) {
+        let why = "Parquet holds no complex numbers: choose another output of stft, or write .npz";
         return refuse(why.into());
     }
     if out.is_dir() {

@@ -3,6 +3,7 @@
 mod check;
 mod collector;
 mod error;
+mod frames;
 mod options;
 mod output;
 mod queue;
@@ -15,6 +16,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use corsmal_files::draft;
+use corsmal_files::format::OutputFormat;
 use corsmal_files::npz::Compression;
 use corsmal_files::table::Table;
 
@@ -69,11 +71,17 @@ pub fn run(
         }
     }
     let resumed = records.len();
-    let output = Output::new(ledger, records, inputs, format)?;
+    let frames = config.summary.is_none();
+    let output = Output::new(ledger, records, inputs, (format, frames))?;
     let survey = Survey::of(all, config);
     survey.warnings().iter().for_each(|warning| progress.warning(warning));
     progress.start(inputs.len(), resumed);
-    let RunOptions { jobs, max_errors, compression, .. } = *options;
+    let RunOptions { jobs, max_errors, .. } = *options;
+    // Frames on their way to Parquet wait as they are.
+    let compression = match format {
+        OutputFormat::Npz(compression) => compression,
+        OutputFormat::Parquet => Compression::Stored,
+    };
     let limits = Limits { jobs, max_errors, compression };
     let folder = draft::folder(&out).to_path_buf();
     let collector =

@@ -1,6 +1,7 @@
 //! The output of a run: recordings go in in the order of the inputs.
 
 use super::error::RunError;
+use super::frames;
 use crate::engine::{FeatureArray, Plan};
 use crate::inputs::Input;
 use crate::ledger::{Ledger, Record};
@@ -74,6 +75,19 @@ impl Member {
         Ok(members)
     }
 
+    /// Why it does not fit into a row of Parquet.
+    fn too_long(&self) -> Option<String> {
+        let shape: Vec<usize> = self.header.shape.iter().map(|n| *n as usize).collect();
+        let values = parquet::entries(&shape);
+        (values > parquet::MAX_FRAMES).then(|| {
+            format!(
+                "frames of {values} values, of which a row of Parquet takes {}: cut the recording \
+                 in a manifest, or write .npz",
+                parquet::MAX_FRAMES
+            )
+        })
+    }
+
     fn write(self, writer: &mut NpzWriter) -> Result<EntryRecord, RunError> {
         Ok(match self.data {
             Data::Packed(packed) => writer.packed(&self.name, &packed)?,
@@ -106,17 +120,18 @@ pub struct Output {
 /// A partial output and its ledger.
 struct Partial {
     ledger: Ledger,
-    /// Of an `.npz`; a Parquet table is written at the end.
+    /// Of frames and of an `.npz`; a Parquet table is written at the end.
     writer: Option<NpzWriter>,
+    format: OutputFormat,
 }
 
 impl Output {
-    /// Opens the output behind the records of an interrupted run.
+    /// Opens the output behind the records of an interrupted run; it is to hold frames or a summary.
     pub fn new(
         ledger: Ledger,
         records: Vec<Record>,
         inputs: &[Input],
-        format: OutputFormat,
+        (format, frames): (OutputFormat, bool),
     ) -> Result<Self, RunError> {
         let mut table = empty_table(inputs)?;
         let mut entries = Vec::new();
@@ -133,9 +148,14 @@ impl Output {
                 let (part, path) = ledger.part()?;
                 Some(NpzWriter::resume(part, &path, compression, entries)?)
             }
+            // The frames wait in an archive, which can go on after a kill where Parquet cannot.
+            OutputFormat::Parquet if frames => {
+                let (part, path) = ledger.part()?;
+                Some(NpzWriter::resume(part, &path, Compression::Stored, entries)?)
+            }
             OutputFormat::Parquet => None,
         };
-        Ok(Self { partial: Some(Partial { ledger, writer }), table, next })
+        Ok(Self { partial: Some(Partial { ledger, writer, format }), table, next })
     }
 
     /// Only a table.
@@ -166,9 +186,17 @@ impl Output {
                 Err(other) => return Err(other.into()),
             }
         }
+        if let Some(partial) = &self.partial
+            && partial.format == OutputFormat::Parquet
+            && let Some(reason) = finished.arrays.iter().find_map(Member::too_long)
+        {
+            finished.outcome.status = Status::Unsupported;
+            finished.outcome.reason = reason;
+            finished.arrays.clear();
+        }
         let outcome = finished.outcome;
         self.table.push(outcome.clone(), &input.labels, row.as_deref().unwrap_or(&[]))?;
-        if let Some(Partial { ledger, writer }) = &mut self.partial {
+        if let Some(Partial { ledger, writer, .. }) = &mut self.partial {
             let mut entries = Vec::new();
             if let Some(writer) = writer {
                 for member in finished.arrays {
@@ -189,8 +217,14 @@ impl Output {
     /// Completes the output and gives it its name; returns the table.
     pub fn publish(self, provenance: &Provenance) -> Result<Table, RunError> {
         let Self { partial, table, .. } = self;
-        if let Some(Partial { ledger, writer }) = partial {
+        if let Some(Partial { ledger, writer, format }) = partial {
             match writer {
+                Some(writer) if format == OutputFormat::Parquet => {
+                    writer.finish()?;
+                    let made = frames::of_archive(&ledger, &table, provenance)?;
+                    ledger.publish_made(made)?;
+                    return Ok(table);
+                }
                 Some(mut writer) => {
                     layout::write_table(&mut writer, &table, provenance)?;
                     writer.finish()?;

@@ -10,6 +10,7 @@ use std::panic::{self, AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Once;
 
+use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 
@@ -26,6 +27,8 @@ pub const MAX_TEXT: u64 = 64 << 20;
 pub const MAX_PAGE: u64 = 256 << 20;
 /// Bytes that Snappy makes of one at most, generously.
 const EXPANSION: u64 = 32;
+/// Bytes that Zstandard makes of one: a block of 128 KiB may take 4.
+const ZSTD_EXPANSION: u64 = 1 << 15;
 
 /// Bytes read at once to find the end of a page's header.
 const HEADER: u64 = 1 << 12;
@@ -82,7 +85,13 @@ pub(super) fn check_pages(
                 return Err(layout(path, "columns inside of the file", "a negative place"));
             };
             match start.checked_add(size) {
-                Some(end) if end <= length => walk_pages(path, file, start, end)?,
+                Some(end) if end <= length => {
+                    let expansion = match chunk.compression() {
+                        Compression::ZSTD(_) => ZSTD_EXPANSION,
+                        _ => EXPANSION,
+                    };
+                    walk_pages(path, file, (start, end), expansion)?;
+                }
                 _ => return Err(layout(path, "columns inside of the file", "one beyond its end")),
             }
         }
@@ -95,7 +104,12 @@ pub(super) fn check_pages(
 }
 
 /// Goes from page header to page header of one column.
-fn walk_pages(path: &Path, file: &File, start: u64, end: u64) -> Result<(), ParquetTableError> {
+fn walk_pages(
+    path: &Path,
+    file: &File,
+    (start, end): (u64, u64),
+    expansion: u64,
+) -> Result<(), ParquetTableError> {
     let damaged = || layout(path, "sound Parquet pages", "a header that contradicts itself");
     let mut at = start;
     let mut buffer = Vec::new();
@@ -116,7 +130,7 @@ fn walk_pages(path: &Path, file: &File, start: u64, end: u64) -> Result<(), Parq
         else {
             return Err(damaged());
         };
-        let most = MAX_PAGE.min(stored.saturating_mul(EXPANSION) + HEADER);
+        let most = MAX_PAGE.min(stored.saturating_mul(expansion) + HEADER);
         if full > most {
             let found = format!("{full} from {stored}");
             return Err(layout(path, format!("a page of at most {most} bytes"), found));

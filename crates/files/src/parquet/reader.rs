@@ -10,6 +10,7 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
 use super::error::{ParquetTableError, io, layer, layout};
+use super::frames::Cursors;
 use super::keys::{CONFIG, META, OUTCOMES, ROWS, WRITER};
 use super::limits::{self, require_rows, shielded, spend};
 use super::numeric::{self, NumericTable};
@@ -22,7 +23,9 @@ pub struct ParquetFile {
     path: PathBuf,
     file: File,
     length: u64,
-    reader: SerializedFileReader<File>,
+    pub(super) reader: SerializedFileReader<File>,
+    /// Where reading of frames has come to.
+    pub(super) cursors: Cursors,
 }
 
 impl std::fmt::Debug for ParquetFile {
@@ -44,7 +47,7 @@ impl ParquetFile {
             limits::check_footer(path, &file)?;
             let other = file.try_clone().map_err(|e| io(path, e))?;
             let reader = SerializedFileReader::new(other).map_err(|e| layer(path, e))?;
-            Ok(Self { path: path.into(), file, length, reader })
+            Ok(Self { path: path.into(), file, length, reader, cursors: Cursors::default() })
         })
     }
 
@@ -109,7 +112,9 @@ impl ParquetFile {
             let parts = (0..reader.num_row_groups())
                 .map(|group| reader.get_row_group(group)?.get_column_reader(index));
             match column.physical_type() {
-                _ if column.max_def_level() > 0 || column.max_rep_level() > 0 => {
+                // Frames, which are read one recording at a time.
+                _ if column.max_rep_level() > 0 => {}
+                _ if column.max_def_level() > 0 => {
                     return Err(layout(path, "required columns", format!("{name:?} is optional")));
                 }
                 Physical::BYTE_ARRAY => {
@@ -138,6 +143,11 @@ impl ParquetFile {
         let table = Table::from_parts(ids, names, values, labels, outcomes)
             .map_err(|source| ParquetTableError::Table { path: path.into(), source })?;
         Ok((table, provenance))
+    }
+
+    /// Checks what the pages say about themselves, before frames are read.
+    pub(super) fn check_pages(&self) -> Result<usize, ParquetTableError> {
+        limits::check_pages(&self.path, &self.file, self.reader.metadata())
     }
 
     fn find(&self, key: &str) -> Option<&str> {

@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Seek};
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -9,15 +10,19 @@ use parquet::basic::{Compression, ConvertedType, LogicalType, Repetition, Type a
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, FloatType};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
-use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterPropertiesBuilder};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{ColumnPath, Type, TypePtr};
 
 use super::error::{ParquetTableError, io, layer};
 use super::keys::{CONFIG, META, OUTCOMES, ROWS, WRITER};
+use super::levels::Levels;
 use crate::layout::json_lines;
 use crate::provenance::Provenance;
 use crate::table::{ID, Table};
+
+/// A row group that is being written.
+pub(super) type Group<'a> = SerializedRowGroupWriter<'a, BufWriter<File>>;
 
 /// Writes a table and waits until it is on the disk. Equal tables give equal bytes.
 ///
@@ -44,6 +49,35 @@ pub fn write_over(
 }
 
 fn write_to(file: File, table: &Table, provenance: &Provenance) -> Result<(), ParquetError> {
+    let properties = properties(table, provenance, Compression::SNAPPY);
+    let out = BufWriter::with_capacity(1 << 20, file);
+    let fields = table.feature_names().iter().map(|name| {
+        Type::primitive_type_builder(name, Physical::FLOAT)
+            .with_repetition(Repetition::REQUIRED)
+            .build()
+    });
+    let schema = schema(table, fields)?;
+    let mut writer = SerializedFileWriter::new(out, schema, Arc::new(properties.build()))?;
+    let rows = table.ids().len();
+    for start in (0..rows).step_by(ROWS) {
+        let range = start..rows.min(start + ROWS);
+        let mut group = writer.next_row_group()?;
+        write_texts(&mut group, table, range.clone())?;
+        for column in table.values().columns() {
+            let values: Vec<f32> = range.clone().map(|row| column[row]).collect();
+            write_column::<FloatType>(&mut group, &values, None)?;
+        }
+        group.close()?;
+    }
+    writer.close().map(drop)
+}
+
+/// What every output of ours says of itself, and how its texts are stored.
+pub(super) fn properties(
+    table: &Table,
+    provenance: &Provenance,
+    compression: Compression,
+) -> WriterPropertiesBuilder {
     let metadata = [
         (META, json_lines(std::slice::from_ref(provenance))),
         (CONFIG, provenance.config.clone()),
@@ -52,7 +86,7 @@ fn write_to(file: File, table: &Table, provenance: &Provenance) -> Result<(), Pa
     let metadata = metadata.into_iter().map(|(key, value)| KeyValue::new(key.into(), value));
     let mut properties = WriterProperties::builder()
         .set_created_by(format!("{WRITER} {}", env!("CARGO_PKG_VERSION")))
-        .set_compression(Compression::SNAPPY)
+        .set_compression(compression)
         // Floats hardly ever repeat; ids and labels do.
         .set_dictionary_enabled(false)
         .set_statistics_enabled(EnabledStatistics::Chunk)
@@ -61,33 +95,34 @@ fn write_to(file: File, table: &Table, provenance: &Provenance) -> Result<(), Pa
         let column = ColumnPath::new(vec![name.to_string()]);
         properties = properties.set_column_dictionary_enabled(column, true);
     }
-    let out = BufWriter::with_capacity(1 << 20, file);
-    let mut writer = SerializedFileWriter::new(out, schema(table)?, Arc::new(properties.build()))?;
-    let rows = table.ids().len();
-    for start in (0..rows).step_by(ROWS) {
-        let range = start..rows.min(start + ROWS);
-        let mut group = writer.next_row_group()?;
-        for (_, texts) in text_columns(table) {
-            let values: Vec<ByteArray> =
-                texts[range.clone()].iter().map(|text| text.as_str().into()).collect();
-            write_column::<ByteArrayType>(&mut group, &values)?;
-        }
-        for column in table.values().columns() {
-            let values: Vec<f32> = range.clone().map(|row| column[row]).collect();
-            write_column::<FloatType>(&mut group, &values)?;
-        }
-        group.close()?;
-    }
-    writer.close().map(drop)
+    properties
 }
 
-fn write_column<T: DataType>(
-    group: &mut SerializedRowGroupWriter<'_, BufWriter<File>>,
+/// Ids and labels of some rows.
+pub(super) fn write_texts(
+    group: &mut Group<'_>,
+    table: &Table,
+    rows: Range<usize>,
+) -> Result<(), ParquetError> {
+    for (_, texts) in text_columns(table) {
+        let values: Vec<ByteArray> =
+            texts[rows.clone()].iter().map(|text| text.as_str().into()).collect();
+        write_column::<ByteArrayType>(group, &values, None)?;
+    }
+    Ok(())
+}
+
+/// The next column of a row group; of nested lists with definition and repetition levels.
+pub(super) fn write_column<T: DataType>(
+    group: &mut Group<'_>,
     values: &[T::T],
+    levels: Option<&Levels>,
 ) -> Result<(), ParquetError> {
     let mut column =
         group.next_column()?.ok_or_else(|| ParquetError::General("too many columns".into()))?;
-    column.typed::<T>().write_batch(values, None, None)?;
+    let (definition, repetition) =
+        levels.map(|l| (l.definition.as_slice(), l.repetition.as_slice())).unzip();
+    column.typed::<T>().write_batch(values, definition, repetition)?;
     column.close()
 }
 
@@ -95,7 +130,11 @@ fn text_columns(table: &Table) -> impl Iterator<Item = (&str, &[String])> {
     std::iter::once((ID, table.ids())).chain(table.labels())
 }
 
-fn schema(table: &Table) -> Result<TypePtr, ParquetError> {
+/// Id, labels, then what holds the features.
+pub(super) fn schema(
+    table: &Table,
+    features: impl Iterator<Item = Result<Type, ParquetError>>,
+) -> Result<TypePtr, ParquetError> {
     let mut fields = Vec::new();
     for (name, _) in text_columns(table) {
         let field = Type::primitive_type_builder(name, Physical::BYTE_ARRAY)
@@ -104,10 +143,8 @@ fn schema(table: &Table) -> Result<TypePtr, ParquetError> {
             .with_converted_type(ConvertedType::UTF8);
         fields.push(Arc::new(field.build()?));
     }
-    for name in table.feature_names() {
-        let field = Type::primitive_type_builder(name, Physical::FLOAT)
-            .with_repetition(Repetition::REQUIRED);
-        fields.push(Arc::new(field.build()?));
+    for field in features {
+        fields.push(Arc::new(field?));
     }
     Ok(Arc::new(Type::group_type_builder("features").with_fields(fields).build()?))
 }

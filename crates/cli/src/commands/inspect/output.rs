@@ -122,7 +122,7 @@ fn npz(mut file: NpzFile) -> Result<Contents, Failed> {
     })
 }
 
-/// A summary table.
+/// An output of ours.
 fn parquet(file: &ParquetFile) -> Result<Contents, Failed> {
     if !file.is_ours() {
         return foreign_parquet(file);
@@ -136,7 +136,10 @@ fn parquet(file: &ParquetFile) -> Result<Contents, Failed> {
     };
     let labels = table.labels().map(|(name, _)| column(name, "text"));
     let features = table.feature_names().iter().map(|name| column(name, "float32"));
-    let members = std::iter::once(column("id", "text")).chain(labels).chain(features).collect();
+    let frames = file.frame_features();
+    let frames = frames.iter().map(|name| column(name, "lists"));
+    let columns = std::iter::once(column("id", "text")).chain(labels);
+    let members = columns.chain(features).chain(frames).collect();
     let path = file.path().display().to_string();
     let run = Some(Run::new(found)?);
     Ok(Contents { path, format: "parquet", members, run, projection: None })

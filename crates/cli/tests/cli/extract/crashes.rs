@@ -40,6 +40,7 @@ fn killed_at_random_moments_and_resumed_gives_the_same_bytes() {
         ("packed.npz", &["--compress"]),
         ("table.npz", &["--preset", "mfcc-zcr"]),
         ("table.parquet", &["--preset", "mfcc-zcr"]),
+        ("frames.parquet", &[]),
     ] {
         let whole = folder.path().join(format!("whole-{name}"));
         extract(&audio, &whole, more).with(1);

@@ -2,6 +2,7 @@
 
 mod bad_recordings;
 mod crashes;
+mod frames;
 mod full_disk;
 mod long;
 mod outputs;
@@ -10,3 +11,4 @@ mod refusals;
 mod streams;
 mod support;
 mod tables;
+mod tars;
