@@ -449,15 +449,13 @@ mod tests {
         let (table, rows) = recordings(4);
         write(&path, &table, &rows).unwrap();
         let bytes = std::fs::read(&path).unwrap();
-        for at in 0..bytes.len() {
-            for value in [0, 1, 0x7f, 0xff] {
-                let mut damaged = bytes.clone();
-                damaged[at] = value;
-                std::fs::write(&path, &damaged).unwrap();
-                let Ok(mut file) = ParquetFile::open(&path) else { continue };
-                for (row, feature) in [(0, "mfcc"), (2, "rms"), (3, "mfcc")] {
-                    let _ = file.frames(row, feature);
-                }
+        for at in (0..bytes.len()).step_by(11) {
+            let mut damaged = bytes.clone();
+            damaged[at] = [0, 1, 0x7f, 0xff][at % 4];
+            std::fs::write(&path, &damaged).unwrap();
+            let Ok(mut file) = ParquetFile::open(&path) else { continue };
+            for (row, feature) in [(0, "mfcc"), (2, "rms"), (3, "mfcc")] {
+                let _ = file.frames(row, feature);
             }
         }
     }

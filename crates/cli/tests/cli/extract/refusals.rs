@@ -112,7 +112,7 @@ fn wrong_names_are_refused() {
     refused(&input, &at("folder.npz"), &["--overwrite"], &["folder.npz", "is a folder"]);
     refused(&input, &at("feats.csv"), &[], &["feats.csv", ".npz", ".parquet"]);
     refused(&input, &at("feats"), &[], &["feats", ".npz", ".parquet"]);
-    let complex = &["--features", "stft", "--set", "stft.output=complex"];
+    let complex = &["--add", "stft", "--set", "stft.output=complex"];
     refused(&input, &at("feats.parquet"), complex, &["feats.parquet", "complex", ".npz"]);
     if cfg!(target_os = "linux") {
         // Not even root can write there.
