@@ -101,13 +101,21 @@ def test_frames_from_parquet(tmp_path: Path, folder: Path) -> None:
     for features in ({"mfcc": {}}, {"mfcc": {"n_mfcc": 4}, "rms": {}}):
         outs = [tmp_path / f"{len(features)}.{kind}" for kind in ("npz", "parquet")]
         for out in outs:
-            cf.extract(paths, config={"features": features}, out=out)
+            with pytest.warns(UserWarning, match="10 samples are fewer than n_fft"):
+                cf.extract(paths, config={"features": features}, out=out)
         npz, parquet = (cf.load_features(out) for out in outs)
         assert parquet.summary is None and parquet.ids == npz.ids and len(npz) >= 2
         assert (parquet.config, parquet.outcomes) == (npz.config, npz.outcomes)
         np.testing.assert_equal(parquet.arrays, npz.arrays)
         np.testing.assert_equal(parquet.times, npz.times)
         assert parquet.labels == npz.labels == {}
+    pyarrow, tables = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    table = tables.read_table(outs[1])
+    at = table.column_names.index("rms")
+    ragged = pyarrow.array([[[[1.0, 2.0], [3.0]]]] * len(table), table.schema.field("rms").type)
+    tables.write_table(table.set_column(at, table.schema.field("rms"), ragged), outs[1])
+    with pytest.raises(cf.ParameterError, match=r"the lists of rms are not of one length"):
+        cf.load_features(outs[1])
 
 
 def test_data_frames(folder: Path, summary: cf.Features, frames: cf.Features) -> None:

@@ -108,6 +108,14 @@ pub fn shapes<'m>(
         let rows = table.or(members.first()).and_then(|(_, shape)| shape.first()).copied();
         return vec![format!("  {} × {n_features} features", plural(rows.unwrap_or(0), "row"))];
     }
+    // Parquet files have a column for each feature, whose lists are not read.
+    let columns =
+        members.iter().filter(|(name, shape)| features.contains(name) && shape.len() == 1);
+    let (names, rows): (Vec<&str>, Vec<u64>) =
+        columns.map(|(name, shape)| (*name, shape[0])).unzip();
+    if let Some(rows) = rows.first() {
+        return vec![format!("  {}: frames of {}", plural(*rows, "recording"), names.join(", "))];
+    }
     let mut ranges: BTreeMap<&str, Vec<[u64; 2]>> = BTreeMap::new();
     let mut recordings = 0;
     for (name, shape) in members.iter().filter(|(name, _)| layout::is_frame_level(name)) {
