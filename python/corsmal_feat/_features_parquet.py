@@ -40,7 +40,7 @@ def _ids(name: str, column: list[Any]) -> list[str]:
 
 
 def of_parquet(name: str) -> dict[str, Any]:
-    """The fields of `Features` of a Parquet file; the outcomes as lines of JSON."""
+    """The fields of `Features` of a Parquet file."""
     try:
         parquet = import_module("pyarrow.parquet")
         failed = import_module("pyarrow").ArrowInvalid
@@ -88,7 +88,7 @@ def of_parquet(name: str) -> dict[str, Any]:
         "labels": {k: v for k, v in columns.items() if k not in names},
         "config": config,
         "config_hash": meta.get("config_hash", ""),
-        "outcomes": metadata.get(b"corsmal.outcomes", b""),
+        "outcomes": [json.loads(x) for x in metadata.get(b"corsmal.outcomes", b"").splitlines()],
     }
 
 

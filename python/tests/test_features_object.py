@@ -106,8 +106,8 @@ def test_frames_from_parquet(tmp_path: Path, folder: Path) -> None:
         npz, parquet = (cf.load_features(out) for out in outs)
         assert parquet.summary is None and parquet.ids == npz.ids and len(npz) >= 2
         assert (parquet.config, parquet.outcomes) == (npz.config, npz.outcomes)
-        np.testing.assert_equal(parquet.arrays, npz.arrays)
-        np.testing.assert_equal(parquet.times, npz.times)
+        np.testing.assert_equal(parquet.arrays, dict(npz.arrays))
+        np.testing.assert_equal(parquet.times, dict(npz.times))
         assert parquet.labels == npz.labels == {}
     pyarrow, tables = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
     table = tables.read_table(outs[1])
