@@ -37,13 +37,16 @@ pub(crate) struct StreamSource<S> {
     start: usize,
     /// Frames of silence that come before anything else.
     silence: u64,
+    /// What was met behind the samples that were handed out last.
+    failed: Option<AudioError>,
     report: ReadReport,
 }
 
 impl<S: Stream> StreamSource<S> {
     /// `report` holds what opening found.
     pub(crate) fn new(stream: S, spec: AudioSpec, report: ReadReport) -> Self {
-        Self { stream: Some(stream), spec, block: Vec::new(), start: 0, silence: 0, report }
+        let (block, start, silence, failed) = (Vec::new(), 0, 0, None);
+        Self { stream: Some(stream), spec, block, start, silence, failed, report }
     }
 
     /// Gets something to hand out; false at the end.
@@ -73,8 +76,12 @@ impl<S: Stream> StreamSource<S> {
         }
     }
 
-    /// Fills `out` and returns how many of its samples were filled.
+    /// Fills `out` and returns how many of its samples were filled. Samples before an error are handed
+    /// out, whatever the length of `out`.
     fn fill(&mut self, out: &mut [f32]) -> Result<usize, AudioError> {
+        if let Some(error) = self.failed.take() {
+            return Err(error);
+        }
         let channels = usize::from(self.spec.channels);
         let mut done = 0;
         while done < out.len() {
@@ -90,8 +97,16 @@ impl<S: Stream> StreamSource<S> {
                 room[..n].copy_from_slice(&self.block[self.start..self.start + n]);
                 self.start += n;
                 done += n;
-            } else if !self.refill()? {
-                break;
+            } else {
+                match self.refill() {
+                    Ok(true) => {}
+                    Ok(false) => break,
+                    Err(error) if done == 0 => return Err(error),
+                    Err(error) => {
+                        self.failed = Some(error);
+                        break;
+                    }
+                }
             }
         }
         Ok(done)
@@ -121,5 +136,52 @@ impl<S: Stream> BlockSource for StreamSource<S> {
 
     fn health(&self) -> &ReadReport {
         &self.report
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::SampleEncoding;
+
+    /// Three samples, a gap of two, three samples, then a fault.
+    struct Faulty(usize);
+
+    impl Stream for Faulty {
+        fn next(&mut self, samples: &mut Vec<f32>, _: &mut ReadReport) -> Result<Next, AudioError> {
+            self.0 += 1;
+            match self.0 {
+                1 | 3 => samples.extend([0.1, 0.2, 0.3]),
+                2 => return Ok(Next::Silence(2)),
+                _ => return Err(AudioError::corrupt(7, "a fault", "none")),
+            }
+            Ok(Next::Samples)
+        }
+    }
+
+    /// Found by fuzzing: those that shared a block with the fault were lost.
+    #[test]
+    fn samples_before_an_error_do_not_depend_on_the_block() {
+        for block in [1, 3, 7, 8, 9, 100] {
+            let spec = AudioSpec {
+                sample_rate: 8000,
+                channels: 1,
+                format: "test".into(),
+                encoding: SampleEncoding::Lossy,
+                declared_frames: None,
+            };
+            let mut source = StreamSource::new(Faulty(0), spec, ReadReport::default());
+            let (mut buffer, mut samples) = (vec![0.0; block], Vec::new());
+            let error = loop {
+                match source.read(&mut buffer) {
+                    Ok(frames) => samples.extend_from_slice(&buffer[..frames]),
+                    Err(error) => break error,
+                }
+                assert!(samples.len() <= 8, "blocks of {block}: no error");
+            };
+            assert_eq!(samples, [0.1, 0.2, 0.3, 0.0, 0.0, 0.1, 0.2, 0.3], "blocks of {block}");
+            assert_eq!((error.offset(), source.health().decoded_frames), (Some(7), 8));
+            assert_eq!(source.read(&mut buffer).unwrap(), 0, "the end follows");
+        }
     }
 }
