@@ -103,6 +103,30 @@ fn damaged_files_are_named() {
     fault(1, "detections");
 }
 
+/// In a folder of their own, tables lie by container, or by part where that is not known.
+#[test]
+fn tables_are_found_in_a_folder_of_their_own() {
+    let dir = tempfile::tempdir().unwrap();
+    let (data, tables) = (dir.path().join("data"), dir.path().join("tables"));
+    recording(&data, 3);
+    for part in ["test_pub", "test_priv"] {
+        write(&data.join(format!("{part}/audio/000007.wav")), b"");
+    }
+    let header = "frame,view,label,score,x_min,y_min,x_max,y_max\n";
+    for recording in DataSet::open(&data).unwrap().recordings {
+        let views = Views::of(&recording, Some(&tables));
+        assert!(views.detections().unwrap().is_none());
+        let rows = "0,1,cup,0.9,0,0,5,5\n".repeat(1 + recording.part as usize);
+        write(&views.table_in(&tables), format!("{header}{rows}").as_bytes());
+    }
+    let places = ["3/s0_fi2_fu2_b0_l0", "public-test/000007", "private-test/000007"];
+    for (place, recording) in places.iter().zip(DataSet::open(&data).unwrap().recordings) {
+        assert!(tables.join(format!("{place}.json")).exists(), "{place}");
+        let found = Views::of(&recording, Some(&tables)).detections().unwrap().unwrap();
+        assert_eq!(found.len(), 1 + recording.part as usize, "{place}");
+    }
+}
+
 #[test]
 fn labelled_pictures_are_written_once() {
     let dir = tempfile::tempdir().unwrap();

@@ -179,6 +179,7 @@ fn annotation_files_must_not_contradict_each_other() {
             systems: Vec::new(),
             added: Vec::new(),
             capacities: Vec::new(),
+            detections: None,
             jobs: 1,
             seed: 1,
             made: Default::default(),

@@ -84,6 +84,8 @@ pub struct BenchmarkOptions {
     pub added: Vec<(String, PathBuf)>,
     /// Tables of capacities: each has its rows, and completes the baselines and systems.
     pub capacities: Vec<CapacityTable>,
+    /// Folder of tables of detections, for systems that see; `None` for those beside the recordings.
+    pub detections: Option<PathBuf>,
     /// Recordings that are extracted at a time, at least 1.
     pub jobs: usize,
     /// Seed of the forests and of the pseudo-random estimates.
@@ -179,7 +181,8 @@ pub fn run(
     let mut runs = Vec::new();
     if !options.systems.is_empty() {
         let (folder, how) = (options.out.join("features"), (options.jobs, options.seed));
-        let work = Work::new(&set, &rows, &folder, how, progress, stop)?;
+        let tables = options.detections.as_deref();
+        let work = Work::new(&set, &rows, &folder, tables, how, progress, stop)?;
         for system in &options.systems {
             for run in system::run(system.as_ref(), &work, &rows)? {
                 files::write_run(&options.out, &run, &rows)?;

@@ -102,6 +102,7 @@ impl<'a> Work<'a> {
         set: &DataSet,
         rows: &Rows,
         features: &Path,
+        detections: Option<&Path>,
         (jobs, seed): (usize, u64),
         progress: &'a dyn Fn(&str),
         stop: &'a Arc<AtomicBool>,
@@ -122,7 +123,7 @@ impl<'a> Work<'a> {
                     name: recording.name.filter(|_| training),
                     filling: target.filling.filter(|_| training),
                     action: key.filter(|_| training).and_then(|k| actions.get(&k).copied()),
-                    views: Views::of(recording, None),
+                    views: Views::of(recording, detections),
                 });
             }
         }

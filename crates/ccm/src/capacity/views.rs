@@ -27,7 +27,8 @@ pub struct Views {
     stem: String,
     /// Folder of tables of detections, where it is another one.
     detections: Option<PathBuf>,
-    container: Option<u8>,
+    /// Its folder among tables of several: the container's number or, where it is not known, the part.
+    group: String,
     /// Frames by kind and view, once they have been asked for.
     frames: [[Listing; 4]; 3],
 }
@@ -86,8 +87,8 @@ impl From<VisionError> for Problem {
 }
 
 impl Views {
-    /// The views of a recording; `detections` is a folder of tables, with sub-folders by container or
-    /// without.
+    /// The views of a recording; `detections` is a folder of tables, with sub-folders by container (by part,
+    /// such as `public-test`, where that is not known) or without.
     pub fn of(recording: &Recording, detections: Option<&Path>) -> Self {
         let stem = recording.path.file_stem().unwrap_or_default().to_string_lossy();
         let stem = stem.strip_suffix("_audio").unwrap_or(&stem).to_string();
@@ -98,14 +99,17 @@ impl Views {
             base: base.into(),
             stem,
             detections: detections.map(Into::into),
-            container: recording.container.map(|c| c.number()),
+            group: match recording.container {
+                Some(container) => container.number().to_string(),
+                None => recording.part.name().replace(' ', "-"),
+            },
             frames: Default::default(),
         }
     }
 
-    /// What the recording's files are called, such as `s0_fi1_fu2_b0_l0`.
-    pub fn stem(&self) -> &str {
-        &self.stem
+    /// Where its table of detections is among those in a folder.
+    pub fn table_in(&self, folder: &Path) -> PathBuf {
+        folder.join(&self.group).join(format!("{}.json", self.stem))
     }
 
     /// The colour camera of a view, 1 to 4.
@@ -186,8 +190,8 @@ impl Views {
         let own = self.base.join("detections");
         let folder = self.detections.as_ref().unwrap_or(&own);
         let mut folders = vec![folder.clone()];
-        if let (Some(container), true) = (self.container, self.detections.is_some()) {
-            folders.insert(0, folder.join(container.to_string()));
+        if self.detections.is_some() {
+            folders.insert(0, folder.join(&self.group));
         }
         let tables = folders.iter().flat_map(|folder| {
             ["csv", "json"].map(|extension| folder.join(format!("{}.{extension}", self.stem)))

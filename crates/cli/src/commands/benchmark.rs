@@ -59,10 +59,14 @@ pub struct Args {
     add: Vec<(String, PathBuf)>,
     /// Capacities that have their rows and complete the submissions of every baseline and system, so
     /// that the filling mass has all three tasks: a table of `capacity` with its name, or a method to run on
-    /// the views of the data set first (by the detections beside the recordings): m4, m5, or m2, m3 or
+    /// the views of the data set first: m4, m5, or m2, m3 or
     /// fused with the model of `capacity train`, m2 also with published weights.
     #[arg(long, value_parser = capacity_source, value_name = "m4|m5|METHOD=MODEL|NAME=CSV")]
     capacity: Vec<CapacitySource>,
+    /// Folder of tables of detections (SEQUENCE.csv or .json, by container or not), for mask-rn and
+    /// --capacity; by default `detections/` beside each recording's audio folder.
+    #[arg(long, value_name = "DIR")]
+    detections: Option<PathBuf>,
     /// Seed of the forests and of the pseudo-random estimates.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -160,7 +164,7 @@ fn capacities(args: &Args) -> Result<Option<Vec<CapacityTable>>, Failure> {
         }
         let mut options = CapacityOptions {
             data: args.data.clone(),
-            detections: None,
+            detections: args.detections.clone(),
             method,
             variant: Variant::Corrected,
             outliers: Outliers::Corrected,
@@ -239,6 +243,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         systems,
         added: args.add.clone(),
         capacities,
+        detections: args.detections.clone(),
         jobs: args.jobs.count(),
         seed: args.seed,
         made: Made { on: Some(made::today()), command: Some(made::command()) },

@@ -30,14 +30,9 @@ pub fn run(args: &Args, data: &Path, model: &Path, library: &Path) -> Result<Exi
     let set = DataSet::open(data)?;
     let runtime = Runtime::load(library, args.jobs.count())?;
     let mut embedder = ClipEmbedder::open(&runtime, model)?;
-    let stop = crate::interrupt::flag();
     let (mut ids, mut view_of, mut names) = (Vec::new(), Vec::new(), Vec::new());
     let (mut column, mut recordings, mut failed) = (Column::of([]), 0usize, 0usize);
     for recording in &set.recordings {
-        if stop.load(Ordering::SeqCst) {
-            eprintln!("interrupted; nothing was written");
-            return Ok(ExitCode::from(INTERRUPTED));
-        }
         let relative = recording.path.strip_prefix(&set.root).unwrap_or(&recording.path);
         let id = relative.with_extension("").to_string_lossy().replace('\\', "/");
         match sequences(&mut embedder, &Views::of(recording, None)) {
@@ -46,8 +41,16 @@ pub fn run(args: &Args, data: &Path, model: &Path, library: &Path) -> Result<Exi
                 failed += 1;
             }
             Err(Fault::Model(error)) => return Err(error.into()),
+            Err(Fault::Interrupted) => {
+                eprintln!("interrupted; nothing was written");
+                return Ok(ExitCode::from(INTERRUPTED));
+            }
             Ok(sequences) => {
                 recordings += 1;
+                if !(args.told.quiet || args.told.json) {
+                    let windows = sequences.iter().map(Vec::len).sum::<usize>() / FEATURES;
+                    eprintln!("{id}: {windows} windows");
+                }
                 let name = recording.container.zip(recording.name);
                 for (view, sequence) in (1..).zip(sequences) {
                     ids.push(id.clone());
@@ -86,6 +89,7 @@ pub fn run(args: &Args, data: &Path, model: &Path, library: &Path) -> Result<Exi
 enum Fault {
     Recording(String),
     Model(OnnxError),
+    Interrupted,
 }
 
 /// The numbers of the windows of each view.
@@ -103,6 +107,9 @@ fn sequences(embedder: &mut ClipEmbedder, views: &Views) -> Result<Vec<Vec<f32>>
         }
         let mut sequence = Vec::with_capacity(frames.len() / FRAMES * FEATURES);
         for window in frames.chunks_exact(FRAMES) {
+            if crate::interrupt::flag().load(Ordering::SeqCst) {
+                return Err(Fault::Interrupted);
+            }
             let read = |frame: &corsmal_ccm::capacity::Frame| {
                 let image = Rgb::read(&frame.path).map_err(|e| Fault::Recording(e.to_string()))?;
                 Ok(clip::frame(&image))

@@ -89,8 +89,6 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 /// Looks at frames and writes what is there.
 #[cfg(feature = "onnx")]
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
-    use std::sync::atomic::Ordering;
-
     use corsmal_ccm::dataset::DataSet;
     use corsmal_onnx::runtime::{Detector, Runtime};
     use serde_json::json;
@@ -102,19 +100,14 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let runtime = Runtime::load(&args.library, args.jobs.count())?;
     let mut detector = Detector::open(&runtime, &args.model)?;
     made_by(&args)?;
-    let stop = crate::interrupt::flag();
+    let interrupted = || {
+        eprintln!("interrupted; run the same command again to continue");
+        ExitCode::from(INTERRUPTED)
+    };
     let (mut written, mut kept, mut without, mut failed) = (0usize, 0usize, 0usize, 0usize);
     for recording in &set.recordings {
-        if stop.load(Ordering::SeqCst) {
-            eprintln!("interrupted; run the same command again to continue");
-            return Ok(ExitCode::from(INTERRUPTED));
-        }
         let views = corsmal_ccm::capacity::Views::of(recording, None);
-        let folder = match recording.container {
-            Some(container) => args.out.join(container.number().to_string()),
-            None => args.out.join(recording.part.name().replace(' ', "-")),
-        };
-        let place = folder.join(format!("{}.json", views.stem()));
+        let place = views.table_in(&args.out);
         if place.exists() && !args.overwrite {
             kept += 1;
             continue;
@@ -125,9 +118,15 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
                 failed += 1;
             }
             Err(Fault::Model(failure)) => return Err(failure),
+            Err(Fault::Interrupted) => return Ok(interrupted()),
             Ok(None) => without += 1,
             Ok(Some(rows)) => {
-                std::fs::create_dir_all(&folder)?;
+                if let Some(folder) = place.parent() {
+                    std::fs::create_dir_all(folder)?;
+                }
+                if !(args.told.quiet || args.told.json) {
+                    eprintln!("{}: {}", place.display(), plural(rows.len(), "detection"));
+                }
                 let text = serde_json::Value::from(rows).to_string();
                 corsmal_files::draft::write(&place, text.as_bytes())?;
                 written += 1;
@@ -189,6 +188,7 @@ fn made_by(args: &Args) -> Result<(), Failure> {
 enum Fault {
     Recording(String),
     Model(Failure),
+    Interrupted,
 }
 
 /// The rows of a recording; `None` where it has no frames.
@@ -217,6 +217,9 @@ fn seen(
                 continue;
             }
             any = true;
+            if crate::interrupt::flag().load(std::sync::atomic::Ordering::SeqCst) {
+                return Err(Fault::Interrupted);
+            }
             let image = corsmal_vision::Rgb::read(&frame.path)
                 .map_err(|e| Fault::Recording(e.to_string()))?;
             let found = detector.detect(&image).map_err(|e| Fault::Model(e.into()))?;

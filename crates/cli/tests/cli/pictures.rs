@@ -123,7 +123,15 @@ fn each_view_answers_alone_in_the_benchmark() {
     let folder = tempfile::tempdir().unwrap();
     let (ccm, out) = (folder.path().join("ccm"), folder.path().join("report"));
     data(&ccm);
+    // Tables in a folder of their own.
+    let tables = folder.path().join("tables");
+    std::fs::create_dir(&tables).unwrap();
+    for container in 1..=6 {
+        let beside = ccm.join(format!("train/{container}/detections"));
+        std::fs::rename(beside, tables.join(container.to_string())).unwrap();
+    }
     let words = ["benchmark", "--data", text(&ccm), "--out", text(&out), "--methods", "mask-rn"];
+    let words = [&words[..], &["--detections", text(&tables)]].concat();
     let said = done(&[&words[..], &["--epochs", "1"]].concat());
     let scored = |view: u8| {
         let name = format!("Mask + RN, RGB {view} ");
