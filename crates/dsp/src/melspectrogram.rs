@@ -33,7 +33,7 @@ pub fn melspectrogram<T: Real>(
     let mut out = Array3::zeros((channels, bands, frames));
     let y = planar(y);
     if T::SINGLE {
-        let plan = LanePlan::new(stft)?;
+        let plan = LanePlan::<Row>::new(stft)?;
         let rows = |n| vec![Row::ZERO; n];
         let state = || (plan.frames(), rows(stft.n_bins()), rows(bands));
         for_each_tile(out.view_mut(), state, |(frames, spectrum, mel), mut tile| {

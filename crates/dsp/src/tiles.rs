@@ -6,7 +6,7 @@ use ndarray::{
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::lanes::{LANES, Row, Slots, Spectrum, gather};
+use crate::lanes::{LANES, Lanes, Row, Spectrum};
 use crate::real::Real;
 use crate::stft::StftParams;
 use crate::window::padded_window;
@@ -83,65 +83,73 @@ pub(crate) fn planar<T: Real>(y: ArrayView2<T>) -> CowArray<T, Ix2> {
     out.into()
 }
 
-/// Spectra in single precision, sixteen frames of a channel at a time: what threads share.
-pub(crate) struct LanePlan {
+/// Spectra of a row of frames of a channel at a time: what threads share.
+pub(crate) struct LanePlan<R: Lanes> {
     params: StftParams,
-    window: Vec<f32>,
-    spectrum: Spectrum,
+    window: Vec<R::Value>,
+    spectrum: Spectrum<R>,
 }
 
-impl LanePlan {
+impl<R: Lanes> LanePlan<R> {
     /// # Errors
     /// Impossible parameters.
     pub fn new(params: &StftParams) -> Result<Self> {
         params.check()?;
         let window = padded_window(&params.window, params.win_length, params.n_fft)?;
-        let window = window.into_iter().map(|w| w as f32).collect();
+        let window = window.into_iter().map(R::Value::of).collect();
         Ok(Self { params: params.clone(), window, spectrum: Spectrum::new(params.n_fft)? })
     }
 
     /// What one thread works with.
-    pub fn frames(&self) -> LaneFrames<'_> {
+    pub fn frames(&self) -> LaneFrames<'_, R> {
         // Frames that do not overlap are laid side by side.
         let hop = self.params.hop_length.min(self.params.n_fft);
         LaneFrames {
             plan: self,
             hop,
-            samples: vec![0.0; (LANES - 1) * hop + self.params.n_fft],
-            rows: vec![Row::ZERO; self.params.n_fft],
+            samples: vec![R::Value::of(0.0); (R::SLOTS - 1) * hop + self.params.n_fft],
+            rows: vec![R::EMPTY; self.params.n_fft],
         }
     }
 }
 
-/// Sixteen frames of a channel at a time.
-pub(crate) struct LaneFrames<'p> {
-    plan: &'p LanePlan,
+/// A row of frames of a channel at a time.
+pub(crate) struct LaneFrames<'p, R: Lanes> {
+    plan: &'p LanePlan<R>,
     hop: usize,
-    samples: Vec<f32>,
-    rows: Vec<Row>,
+    samples: Vec<R::Value>,
+    rows: Vec<R>,
 }
 
-impl LaneFrames<'_> {
-    fn load(&mut self, y: &[f32], first: usize) {
+impl<R: Lanes> LaneFrames<'_, R> {
+    fn load<T: Real>(&mut self, y: &[T], first: usize) {
         let LanePlan { params: p, window, .. } = self.plan;
-        let slots = Slots { first: 0, len: LANES, channels: 1 };
         let start = |t: usize| (t * p.hop_length) as isize - p.pad() as isize;
         if p.hop_length > p.n_fft {
             let frames = first..p.n_frames(y.len());
             for (t, samples) in frames.zip(self.samples.chunks_exact_mut(p.n_fft)) {
                 p.pad_mode.read(y, start(t), samples);
             }
-            return gather(&self.samples, self.hop, window, slots, &mut self.rows);
+            return R::gather(&self.samples, self.hop, window, &mut self.rows);
         }
         let start = start(first);
         let inside = usize::try_from(start).ok().and_then(|s| y.get(s..s + self.samples.len()));
-        let samples = inside.unwrap_or_else(|| {
-            p.pad_mode.read(y, start, &mut self.samples);
-            &self.samples
-        });
-        gather(samples, self.hop, window, slots, &mut self.rows);
+        if let Some(samples) = inside {
+            return R::gather(samples, self.hop, window, &mut self.rows);
+        }
+        p.pad_mode.read(y, start, &mut self.samples);
+        R::gather(&self.samples, self.hop, window, &mut self.rows);
     }
 
+    /// Real and imaginary parts of the frames from `first` on into the even and the odd rows of
+    /// `out` (`2 n_bins` rows).
+    pub fn complex<T: Real>(&mut self, y: &[T], first: usize, out: &mut [R]) {
+        self.load(y, first);
+        self.plan.spectrum.complex(&mut self.rows, out);
+    }
+}
+
+impl LaneFrames<'_, Row> {
     /// `|X|^power` of the frames from `first` on into `out` (`n_bins` rows).
     pub fn power(&mut self, y: &[f32], first: usize, power: f64, out: &mut [Row]) {
         self.load(y, first);
@@ -153,13 +161,6 @@ impl LaneFrames<'_> {
             let exponent = (power / 2.0) as f32;
             out.iter_mut().flat_map(|row| &mut row.0).for_each(|x| *x = x.powf(exponent));
         }
-    }
-
-    /// Real and imaginary parts of the frames from `first` on into the even and the odd rows of
-    /// `out` (`2 n_bins` rows).
-    pub fn complex(&mut self, y: &[f32], first: usize, out: &mut [Row]) {
-        self.load(y, first);
-        self.plan.spectrum.complex(&mut self.rows, out);
     }
 }
 

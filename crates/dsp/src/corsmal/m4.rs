@@ -1,12 +1,11 @@
 //! M4 (HVRL, Keio): a log-mel spectrogram of every channel.
 
 use ndarray::{Array3, Array4, ArrayView2, ArrayView3, s};
-use realfft::RealFftPlanner;
 
 use super::Variant;
 use crate::error::{DspError, Result};
 use crate::frequency::require_rate;
-use crate::lanes::decibel_double;
+use crate::lanes::{DoubleRow, Lanes, Spectrum, decibel_double, weighted_sums};
 use crate::mel::{hz_to_mel, mel_to_hz};
 use crate::real::require_finite;
 use crate::simd::vectorized;
@@ -50,65 +49,70 @@ impl M4LogMel {
             Variant::Paper => (length.next_power_of_two(), 10.0),
         };
         let frames = n.abs_diff(length).div_ceil(step);
-        let used = length.min(n_fft);
-        let window = get_window(&Window::Hamming, length, false)?;
+        let mut window = get_window(&Window::Hamming, length, false)?;
+        window.resize(n_fft, 0.0);
         let bank = triangles(sr, n_fft);
-        let fft = RealFftPlanner::<f64>::new().plan_fft_forward(n_fft);
-        let (mut frame, mut spectrum) = (fft.make_input_vec(), fft.make_output_vec());
-        let mut scratch = fft.make_scratch_vec();
+        let spectrum = Spectrum::<DoubleRow>::new(n_fft)?;
+        let rows = |count| vec![DoubleRow::EMPTY; count];
+        let (mut work, mut power, mut energies) =
+            (rows(n_fft), rows(spectrum.n_bins()), rows(BANDS));
         let mut out = Array3::zeros((frames, BANDS, channels));
-        let mut energies = [0.0; BANDS];
-        let mut power = vec![0.0; spectrum.len()];
+        let mut emphasised = Vec::new();
         for (c, signal) in y.outer_iter().enumerate() {
+            pre_emphasised(&signal.to_vec(), &mut emphasised);
             // The zeros after the last sample are not pre-emphasised.
-            let mut emphasised = Vec::with_capacity(n + step + length);
-            let mut before = 0.0;
-            emphasised.extend(signal.iter().map(|x| {
-                let count = f64::from(*x) * 32768.0;
-                count - PRE_EMPHASIS * std::mem::replace(&mut before, count)
-            }));
-            emphasised.resize(n.max(frames * step + used), 0.0);
-            for t in 0..frames {
-                let samples = &emphasised[t * step..];
-                vectorized(
-                    #[inline(always)]
-                    || {
-                        for (slot, (x, w)) in
-                            frame.iter_mut().zip(samples.iter().zip(&window[..used]))
-                        {
-                            *slot = x * w;
-                        }
-                    },
-                );
-                frame[used..].fill(0.0);
-                fft.process_with_scratch(&mut frame, &mut spectrum, &mut scratch)
-                    .expect("buffers made by the plan itself");
-                vectorized(
-                    #[inline(always)]
-                    || {
-                        for (slot, z) in power.iter_mut().zip(&spectrum) {
-                            *slot = (z.re * z.re + z.im * z.im) / n_fft as f64;
-                        }
-                    },
-                );
-                for ((first, weights), slot) in bank.iter().zip(&mut energies) {
-                    let bins = weights.iter().zip(power.iter().skip(*first));
-                    let energy: f64 = bins.map(|(w, p)| w * p).sum();
-                    *slot = if energy == 0.0 { f64::EPSILON } else { energy };
-                }
-                let part = out.slice_mut(s![t, .., c]);
-                for (slot, energy) in part.into_iter().zip(energies) {
-                    let tens = if energy.is_normal() {
-                        decibel_double(energy)
-                    } else {
-                        10.0 * energy.log10()
-                    };
-                    *slot = (decibels / 10.0 * tens) as f32;
+            let needed = frames.next_multiple_of(DoubleRow::SLOTS) * step + n_fft;
+            emphasised.resize(n.max(needed), 0.0);
+            for first in (0..frames).step_by(DoubleRow::SLOTS) {
+                DoubleRow::gather(&emphasised[first * step..], step, &window, &mut work);
+                spectrum.power(&mut work, &mut power);
+                weighted_sums(&bank, &power, &mut energies);
+                to_decibels(&mut energies, n_fft as f64, decibels / 10.0);
+                let last = frames.min(first + DoubleRow::SLOTS);
+                let mut part = out.slice_mut(s![first..last, .., c]);
+                for (s, mut frame) in part.outer_iter_mut().enumerate() {
+                    let values = energies.iter().map(|row| row.0[s] as f32);
+                    frame.iter_mut().zip(values).for_each(|(slot, x)| *slot = x);
                 }
             }
         }
         Ok(out)
     }
+}
+
+/// 16-bit counts of `signal`, each less a share of the one before.
+fn pre_emphasised(signal: &[f32], out: &mut Vec<f64>) {
+    let count = |x: f32| f64::from(x) * 32768.0;
+    out.clear();
+    out.resize(signal.len(), 0.0);
+    if let (Some(slot), Some(x)) = (out.first_mut(), signal.first()) {
+        *slot = count(*x);
+    }
+    vectorized(
+        #[inline(always)]
+        || {
+            for (slot, pair) in out.iter_mut().skip(1).zip(signal.windows(2)) {
+                *slot = count(pair[1]) - PRE_EMPHASIS * count(pair[0]);
+            }
+        },
+    );
+}
+
+/// Decibels times `factor` of energies of transforms that are not yet divided by their length; of
+/// silence those of the smallest step above 1.
+fn to_decibels(energies: &mut [DoubleRow], n_fft: f64, factor: f64) {
+    vectorized(
+        #[inline(always)]
+        || {
+            for row in energies {
+                for energy in &mut row.0 {
+                    let scaled = *energy / n_fft;
+                    let normal = if scaled == 0.0 { f64::EPSILON } else { scaled };
+                    *energy = factor * decibel_double(normal.max(f64::MIN_POSITIVE));
+                }
+            }
+        },
+    );
 }
 
 /// First bin and weights of each filter, its corners rounded down to bins.

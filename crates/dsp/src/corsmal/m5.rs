@@ -1,11 +1,11 @@
 //! M5 (Because It's Tactile): pyAudioAnalysis statistics and the input of VGGish.
 
 use ndarray::{Array1, Array2, Array3, ArrayView1, ArrayView2, s};
-use realfft::RealFftPlanner;
 
 use super::mono_at;
 use super::paa::{MidTerm, PaaPlan, Peak, file_vector};
 use crate::error::{DspError, Result};
+use crate::lanes::{DoubleRow, Lanes, Spectrum, square_roots, weighted_sums};
 use crate::mono::to_mono;
 use crate::resample::ResType;
 use crate::window::{Window, get_window};
@@ -127,36 +127,47 @@ impl M5VggishPatches {
 /// `[frames, 64]`, no padding.
 fn vggish_log_mel(y: ArrayView1<f32>) -> Result<Array2<f32>> {
     let frames = if y.len() < FRAME { 0 } else { 1 + (y.len() - FRAME) / HOP };
-    let window = get_window(&Window::Hann, FRAME, true)?;
+    let mut window = get_window(&Window::Hann, FRAME, true)?;
+    window.resize(N_FFT, 0.0);
     let bank = vggish_bank();
-    let fft = RealFftPlanner::<f64>::new().plan_fft_forward(N_FFT);
-    let (mut frame, mut spectrum) = (fft.make_input_vec(), fft.make_output_vec());
-    let mut scratch = fft.make_scratch_vec();
+    let spectrum = Spectrum::<DoubleRow>::new(N_FFT)?;
+    let rows = |count| vec![DoubleRow::EMPTY; count];
+    let (mut work, mut bins, mut mel) = (rows(N_FFT), rows(spectrum.n_bins()), rows(BANDS));
+    // Frames are taken several at a time, whole transforms of them.
+    let mut samples = y.to_vec();
+    samples.resize(frames.next_multiple_of(DoubleRow::SLOTS) * HOP + N_FFT, 0.0);
     let mut out = Array2::zeros((frames, BANDS));
-    for t in 0..frames {
-        frame.fill(0.0);
-        for (k, (slot, w)) in frame.iter_mut().zip(&window).enumerate() {
-            *slot = f64::from(y[t * HOP + k]) * w;
+    for first in (0..frames).step_by(DoubleRow::SLOTS) {
+        DoubleRow::gather(&samples[first * HOP..], HOP, &window, &mut work);
+        spectrum.power(&mut work, &mut bins);
+        square_roots(&mut bins);
+        weighted_sums(&bank, &bins, &mut mel);
+        let mut part = out.slice_mut(s![first..frames.min(first + DoubleRow::SLOTS), ..]);
+        for (s, mut frame) in part.outer_iter_mut().enumerate() {
+            for (slot, row) in frame.iter_mut().zip(&mel) {
+                *slot = (row.0[s] + 0.01).ln() as f32;
+            }
         }
-        fft.process_with_scratch(&mut frame, &mut spectrum, &mut scratch)
-            .expect("buffers made by the plan itself");
-        let magnitude = Array1::from_iter(spectrum.iter().map(|z| z.norm_sqr().sqrt()));
-        let mel = bank.dot(&magnitude);
-        out.row_mut(t).assign(&mel.mapv(|m| (m + 0.01).ln() as f32));
     }
     Ok(out)
 }
 
-/// `[64, 257]`: triangles on the mel axis (not in hertz) of peak 1, without the DC bin.
-fn vggish_bank() -> Array2<f64> {
+/// 64 triangles on the mel axis (not in hertz) of peak 1, without the DC bin: the first bin and the
+/// weights of each.
+fn vggish_bank() -> Vec<(usize, Vec<f64>)> {
     let mel = |hz: f64| 1127.0 * (1.0 + hz / 700.0).ln();
     let (low, high) = (mel(125.0), mel(7500.0));
     let edge = |i: usize| low + (high - low) * i as f64 / (BANDS + 1) as f64;
-    Array2::from_shape_fn((BANDS, N_FFT / 2 + 1), |(b, k)| {
+    let weight = |b: usize, k: usize| {
         let at = mel(k as f64 * VGGISH_SR / N_FFT as f64);
         let (left, centre, right) = (edge(b), edge(b + 1), edge(b + 2));
-        let rising = (at - left) / (centre - left);
-        let falling = (right - at) / (right - centre);
-        if k == 0 { 0.0 } else { rising.min(falling).max(0.0) }
-    })
+        ((at - left) / (centre - left)).min((right - at) / (right - centre))
+    };
+    (0..BANDS)
+        .map(|b| {
+            let inside = (1..=N_FFT / 2).filter(|k| weight(b, *k) > 0.0);
+            let first = inside.clone().next().unwrap_or(0);
+            (first, inside.map(|k| weight(b, k)).collect())
+        })
+        .collect()
 }

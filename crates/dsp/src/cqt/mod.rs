@@ -85,7 +85,7 @@ impl CqtPlan {
                 Some(above) if as_above => (above.basis.clone(), above.lanes.clone()),
                 _ => {
                     let basis = Basis::new(&wavelets, bins.clone(), sr, n_fft, p)?;
-                    let lanes = LaneFft::supports(n_fft)
+                    let lanes = LaneFft::<Row>::supports(n_fft)
                         .then(|| LaneFft::new(n_fft).map(Arc::new))
                         .transpose()?;
                     (Arc::new(basis), lanes)

@@ -2,7 +2,8 @@
 
 use pulp::Simd;
 
-use super::Row;
+use super::Lanes;
+use crate::real::Real;
 
 /// A complex value of one register.
 #[derive(Clone, Copy)]
@@ -12,36 +13,48 @@ pub(super) struct C<V> {
 }
 
 /// Real and imaginary rows of a complex value.
-pub(super) type Pair = [Row; 2];
+pub(super) type Pair<R> = [R; 2];
 
 #[inline(always)]
-pub(super) fn load<S: Simd>(pair: &Pair, v: usize) -> C<S::f32s> {
+pub(super) fn load<R: Lanes, S: Simd>(pair: &Pair<R>, v: usize) -> C<R::Register<S>> {
     C { re: pair[0].load::<S>(v), im: pair[1].load::<S>(v) }
 }
 
 #[inline(always)]
-pub(super) fn store<S: Simd>(pair: &mut Pair, v: usize, x: C<S::f32s>) {
+pub(super) fn store<R: Lanes, S: Simd>(pair: &mut Pair<R>, v: usize, x: C<R::Register<S>>) {
     pair[0].store::<S>(v, x.re);
     pair[1].store::<S>(v, x.im);
 }
 
 #[inline(always)]
-pub(super) fn add<S: Simd>(simd: S, a: C<S::f32s>, b: C<S::f32s>) -> C<S::f32s> {
-    C { re: simd.add_f32s(a.re, b.re), im: simd.add_f32s(a.im, b.im) }
+pub(super) fn add<R: Lanes, S: Simd>(
+    simd: S,
+    a: C<R::Register<S>>,
+    b: C<R::Register<S>>,
+) -> C<R::Register<S>> {
+    C { re: R::add(simd, a.re, b.re), im: R::add(simd, a.im, b.im) }
 }
 
 #[inline(always)]
-pub(super) fn sub<S: Simd>(simd: S, a: C<S::f32s>, b: C<S::f32s>) -> C<S::f32s> {
-    C { re: simd.sub_f32s(a.re, b.re), im: simd.sub_f32s(a.im, b.im) }
+pub(super) fn sub<R: Lanes, S: Simd>(
+    simd: S,
+    a: C<R::Register<S>>,
+    b: C<R::Register<S>>,
+) -> C<R::Register<S>> {
+    C { re: R::sub(simd, a.re, b.re), im: R::sub(simd, a.im, b.im) }
 }
 
 /// `a * (re + i im)`.
 #[inline(always)]
-pub(super) fn mul<S: Simd>(simd: S, a: C<S::f32s>, [re, im]: [f32; 2]) -> C<S::f32s> {
-    let (wr, wi) = (simd.splat_f32s(re), simd.splat_f32s(im));
+pub(super) fn mul<R: Lanes, S: Simd>(
+    simd: S,
+    a: C<R::Register<S>>,
+    [re, im]: [R::Value; 2],
+) -> C<R::Register<S>> {
+    let (wr, wi) = (R::splat(simd, re), R::splat(simd, im));
     C {
-        re: simd.negate_mul_add_e_f32s(a.im, wi, simd.mul_f32s(a.re, wr)),
-        im: simd.mul_add_e_f32s(a.re, wi, simd.mul_f32s(a.im, wr)),
+        re: R::negate_mul_add_e(simd, a.im, wi, R::mul(simd, a.re, wr)),
+        im: R::mul_add_e(simd, a.re, wi, R::mul(simd, a.im, wr)),
     }
 }
 
@@ -51,7 +64,7 @@ pub(super) trait Dft<const N: usize> {
     fn list<T>(f: impl FnMut(usize) -> T) -> [T; N];
 
     /// `X[k] = sum of x[n] exp(-2 pi i k n / N)`.
-    fn of<S: Simd>(simd: S, x: [C<S::f32s>; N]) -> [C<S::f32s>; N];
+    fn of<R: Lanes, S: Simd>(simd: S, x: [C<R::Register<S>>; N]) -> [C<R::Register<S>>; N];
 }
 
 /// Holder of the transforms.
@@ -64,15 +77,15 @@ impl Dft<4> for Points {
     }
 
     #[inline(always)]
-    fn of<S: Simd>(simd: S, x: [C<S::f32s>; 4]) -> [C<S::f32s>; 4] {
-        let (even, odd) = (add(simd, x[0], x[2]), sub(simd, x[0], x[2]));
-        let (cross, turned) = (add(simd, x[1], x[3]), sub(simd, x[1], x[3]));
+    fn of<R: Lanes, S: Simd>(simd: S, x: [C<R::Register<S>>; 4]) -> [C<R::Register<S>>; 4] {
+        let (even, odd) = (add::<R, S>(simd, x[0], x[2]), sub::<R, S>(simd, x[0], x[2]));
+        let (cross, turned) = (add::<R, S>(simd, x[1], x[3]), sub::<R, S>(simd, x[1], x[3]));
         // `turned` counts times -i.
         [
-            add(simd, even, cross),
-            C { re: simd.add_f32s(odd.re, turned.im), im: simd.sub_f32s(odd.im, turned.re) },
-            sub(simd, even, cross),
-            C { re: simd.sub_f32s(odd.re, turned.im), im: simd.add_f32s(odd.im, turned.re) },
+            add::<R, S>(simd, even, cross),
+            C { re: R::add(simd, odd.re, turned.im), im: R::sub(simd, odd.im, turned.re) },
+            sub::<R, S>(simd, even, cross),
+            C { re: R::sub(simd, odd.re, turned.im), im: R::add(simd, odd.im, turned.re) },
         ]
     }
 }
@@ -86,32 +99,32 @@ impl Dft<8> for Points {
     /// Two four-point transforms. Odd values are turned by eighths, `sqrt(1/2) (1 - i)` and
     /// `-sqrt(1/2) (1 + i)`: sums and differences, their factor joined to the last addition.
     #[inline(always)]
-    fn of<S: Simd>(simd: S, x: [C<S::f32s>; 8]) -> [C<S::f32s>; 8] {
-        let h = simd.splat_f32s(std::f32::consts::FRAC_1_SQRT_2);
-        let e = Self::of(simd, [x[0], x[2], x[4], x[6]]);
-        let o = Self::of(simd, [x[1], x[3], x[5], x[7]]);
-        let (sum1, diff1) = (simd.add_f32s(o[1].re, o[1].im), simd.sub_f32s(o[1].im, o[1].re));
-        let (sum3, diff3) = (simd.add_f32s(o[3].re, o[3].im), simd.sub_f32s(o[3].im, o[3].re));
+    fn of<R: Lanes, S: Simd>(simd: S, x: [C<R::Register<S>>; 8]) -> [C<R::Register<S>>; 8] {
+        let h = R::splat(simd, R::Value::of(std::f64::consts::FRAC_1_SQRT_2));
+        let e = Self::of::<R, S>(simd, [x[0], x[2], x[4], x[6]]);
+        let o = Self::of::<R, S>(simd, [x[1], x[3], x[5], x[7]]);
+        let (sum1, diff1) = (R::add(simd, o[1].re, o[1].im), R::sub(simd, o[1].im, o[1].re));
+        let (sum3, diff3) = (R::add(simd, o[3].re, o[3].im), R::sub(simd, o[3].im, o[3].re));
         [
-            add(simd, e[0], o[0]),
+            add::<R, S>(simd, e[0], o[0]),
             C {
-                re: simd.mul_add_e_f32s(sum1, h, e[1].re),
-                im: simd.mul_add_e_f32s(diff1, h, e[1].im),
+                re: R::mul_add_e(simd, sum1, h, e[1].re),
+                im: R::mul_add_e(simd, diff1, h, e[1].im),
             },
-            C { re: simd.add_f32s(e[2].re, o[2].im), im: simd.sub_f32s(e[2].im, o[2].re) },
+            C { re: R::add(simd, e[2].re, o[2].im), im: R::sub(simd, e[2].im, o[2].re) },
             C {
-                re: simd.mul_add_e_f32s(diff3, h, e[3].re),
-                im: simd.negate_mul_add_e_f32s(sum3, h, e[3].im),
+                re: R::mul_add_e(simd, diff3, h, e[3].re),
+                im: R::negate_mul_add_e(simd, sum3, h, e[3].im),
             },
-            sub(simd, e[0], o[0]),
+            sub::<R, S>(simd, e[0], o[0]),
             C {
-                re: simd.negate_mul_add_e_f32s(sum1, h, e[1].re),
-                im: simd.negate_mul_add_e_f32s(diff1, h, e[1].im),
+                re: R::negate_mul_add_e(simd, sum1, h, e[1].re),
+                im: R::negate_mul_add_e(simd, diff1, h, e[1].im),
             },
-            C { re: simd.sub_f32s(e[2].re, o[2].im), im: simd.add_f32s(e[2].im, o[2].re) },
+            C { re: R::sub(simd, e[2].re, o[2].im), im: R::add(simd, e[2].im, o[2].re) },
             C {
-                re: simd.negate_mul_add_e_f32s(diff3, h, e[3].re),
-                im: simd.mul_add_e_f32s(sum3, h, e[3].im),
+                re: R::negate_mul_add_e(simd, diff3, h, e[3].re),
+                im: R::mul_add_e(simd, sum3, h, e[3].im),
             },
         ]
     }

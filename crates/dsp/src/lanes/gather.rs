@@ -2,7 +2,8 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::{LANES, Row, registers};
+use super::{DoubleRow, LANES, Lanes, Row};
+use crate::real::Real;
 use crate::simd::vectorized;
 
 /// Which (frame, channel) each lane of a block stands for: slot `s` is the `first + s`-th pair in
@@ -61,6 +62,43 @@ pub fn gather(signal: &[f32], hop: usize, window: &[f32], slots: Slots, rows: &m
     );
 }
 
+/// [`Lanes::gather`] into single-precision rows.
+pub(super) fn channel<T: Real>(signal: &[T], hop: usize, window: &[f32], rows: &mut [Row]) {
+    let slots = Slots { first: 0, len: LANES, channels: 1 };
+    match T::as_f32(signal) {
+        Some(signal) => Arch::new().dispatch(Mono { signal, hop, window, slots, rows }),
+        None => {
+            let signal: Vec<f32> = signal.iter().map(|x| x.wide() as f32).collect();
+            Arch::new().dispatch(Mono { signal: &signal, hop, window, slots, rows });
+        }
+    }
+}
+
+/// [`Lanes::gather`], squares of samples and slots at a time, each turned about in registers.
+pub(super) fn turned<T: Real>(signal: &[T], hop: usize, window: &[f64], rows: &mut [DoubleRow]) {
+    const SIDE: usize = DoubleRow::SLOTS;
+    debug_assert_eq!(window.len(), rows.len());
+    let frames: [&[T]; SIDE] = std::array::from_fn(|s| &signal[s * hop..][..window.len()]);
+    let squares = frames.map(|frame| frame.as_chunks::<SIDE>().0);
+    vectorized(
+        #[inline(always)]
+        || {
+            let parts = rows.as_chunks_mut::<SIDE>().0.iter_mut();
+            for (n, (rows, window)) in parts.zip(window.as_chunks::<SIDE>().0).enumerate() {
+                let square: [[f64; SIDE]; SIDE] =
+                    std::array::from_fn(|s| squares[s][n].map(Real::wide));
+                for (k, (row, w)) in rows.iter_mut().zip(window).enumerate() {
+                    row.0 = std::array::from_fn(|s| w * square[s][k]);
+                }
+            }
+        },
+    );
+    let whole = window.len() / SIDE * SIDE;
+    for n in whole..window.len() {
+        rows[n].0 = frames.map(|frame| window[n] * frame[n].wide());
+    }
+}
+
 /// `FRAMES` whole frames of `CHANNELS` channels fill the lanes.
 #[inline(always)]
 fn groups<const CHANNELS: usize, const FRAMES: usize>(
@@ -115,7 +153,7 @@ impl WithSimd for Mono<'_> {
                 }
                 row
             });
-            for v in 0..registers::<S>() {
+            for v in 0..Row::registers::<S>() {
                 // Transposes the square that each group of the four registers makes.
                 let x: [S::f32s; QUAD] = std::array::from_fn(|j| x[j].load::<S>(v));
                 let x = simd.deinterleave_shfl_f32s(x);
@@ -132,14 +170,14 @@ impl WithSimd for Mono<'_> {
 }
 
 /// Rows of samples, read where they lie.
-pub trait Frames {
+pub trait Frames<R> {
     /// Sample `n` of every slot's frame, without a window.
-    fn row(&self, n: usize) -> Row;
+    fn row(&self, n: usize) -> R;
 }
 
-impl Frames for &[Row] {
+impl<R: Copy> Frames<R> for &[R] {
     #[inline(always)]
-    fn row(&self, n: usize) -> Row {
+    fn row(&self, n: usize) -> R {
         self[n]
     }
 }
@@ -158,7 +196,7 @@ impl<'a, const CHANNELS: usize, const FRAMES: usize> Aligned<'a, CHANNELS, FRAME
     }
 }
 
-impl<const CHANNELS: usize, const FRAMES: usize> Frames for Aligned<'_, CHANNELS, FRAMES> {
+impl<const CHANNELS: usize, const FRAMES: usize> Frames<Row> for Aligned<'_, CHANNELS, FRAMES> {
     #[inline(always)]
     fn row(&self, n: usize) -> Row {
         let mut row = Row::ZERO;

@@ -3,24 +3,24 @@
 use std::sync::Arc;
 
 use num_complex::Complex;
+use num_traits::Float;
 use realfft::{RealFftPlanner, RealToComplex};
 
-use super::{Aligned, LANES, LaneFft, Row, Slots, gather};
+use super::{Aligned, LaneFft, Lanes, Row, Slots, gather};
 use crate::error::{DspError, Result};
 
-/// A real transform of rows: the lane kernel for powers of two, one slot after another (realfft in
-/// single precision) for every other length.
-pub struct Spectrum {
+/// A real transform of rows: the lane kernel for powers of two, one slot after another (realfft) for every other length.
+pub struct Spectrum<R: Lanes = Row> {
     n_fft: usize,
-    kind: Kind,
+    kind: Kind<R>,
 }
 
-enum Kind {
-    Lanes(LaneFft),
-    Slots(Arc<dyn RealToComplex<f32>>),
+enum Kind<R: Lanes> {
+    Lanes(LaneFft<R>),
+    Slots(Arc<dyn RealToComplex<R::Value>>),
 }
 
-impl Spectrum {
+impl<R: Lanes> Spectrum<R> {
     /// Plans a transform of `n_fft` points.
     ///
     /// # Errors
@@ -29,7 +29,7 @@ impl Spectrum {
         if n_fft == 0 {
             return Err(DspError::parameter("n_fft", 0, "at least 1"));
         }
-        let kind = if LaneFft::supports(n_fft) {
+        let kind = if LaneFft::<R>::supports(n_fft) {
             Kind::Lanes(LaneFft::new(n_fft)?)
         } else {
             Kind::Slots(RealFftPlanner::new().plan_fft_forward(n_fft))
@@ -44,26 +44,30 @@ impl Spectrum {
 
     /// Complex spectrum: real parts into the even, imaginary parts into the odd rows of `out`
     /// (`2 n_bins` rows). `frames` (`n_fft` rows) is overwritten.
-    pub fn complex(&self, frames: &mut [Row], out: &mut [Row]) {
+    pub fn complex(&self, frames: &mut [R], out: &mut [R]) {
         match &self.kind {
             Kind::Lanes(plan) => plan.complex(frames, out),
             Kind::Slots(plan) => slots(plan.as_ref(), frames, |k, s, z| {
-                out[2 * k].0[s] = z.re;
-                out[2 * k + 1].0[s] = z.im;
+                out[2 * k].values_mut()[s] = z.re;
+                out[2 * k + 1].values_mut()[s] = z.im;
             }),
         }
     }
 
     /// Power spectrum (`n_bins` rows). `frames` is overwritten.
-    pub fn power(&self, frames: &mut [Row], out: &mut [Row]) {
+    pub fn power(&self, frames: &mut [R], out: &mut [R]) {
         match &self.kind {
             Kind::Lanes(plan) => plan.power(frames, out),
             Kind::Slots(plan) => {
-                slots(plan.as_ref(), frames, |k, s, z| out[k].0[s] = z.re * z.re + z.im * z.im);
+                slots(plan.as_ref(), frames, |k, s, z| {
+                    out[k].values_mut()[s] = z.re * z.re + z.im * z.im;
+                });
             }
         }
     }
+}
 
+impl Spectrum {
     /// Power spectrum of the frames `slots` of an interleaved signal that starts with the first
     /// sample of frame 0, times `window` (`n_fft` values). `work` (`n_fft` rows) is overwritten.
     pub fn power_of(
@@ -108,12 +112,12 @@ impl Spectrum {
 }
 
 /// Magnitudes from powers.
-pub fn square_roots(rows: &mut [Row]) {
+pub fn square_roots<R: Lanes>(rows: &mut [R]) {
     crate::simd::vectorized(
         #[inline(always)]
         || {
             for row in rows.iter_mut() {
-                for x in &mut row.0 {
+                for x in row.values_mut() {
                     *x = x.sqrt();
                 }
             }
@@ -122,16 +126,16 @@ pub fn square_roots(rows: &mut [Row]) {
 }
 
 /// `each(bin, slot, value)` of every slot.
-fn slots(
-    plan: &dyn RealToComplex<f32>,
-    frames: &[Row],
-    mut each: impl FnMut(usize, usize, Complex<f32>),
+fn slots<R: Lanes>(
+    plan: &dyn RealToComplex<R::Value>,
+    frames: &[R],
+    mut each: impl FnMut(usize, usize, Complex<R::Value>),
 ) {
     let (mut x, mut spectrum, mut scratch) =
         (plan.make_input_vec(), plan.make_output_vec(), plan.make_scratch_vec());
-    for s in 0..LANES {
+    for s in 0..R::SLOTS {
         for (x, row) in x.iter_mut().zip(frames) {
-            *x = row.0[s];
+            *x = row.values()[s];
         }
         plan.process_with_scratch(&mut x, &mut spectrum, &mut scratch)
             .expect("buffers made by the plan itself");
@@ -142,10 +146,11 @@ fn slots(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lanes::LANES;
 
     #[test]
     fn odd_lengths_take_the_same_interface() {
-        let spectrum = Spectrum::new(15).unwrap();
+        let spectrum = Spectrum::<Row>::new(15).unwrap();
         let mut frames = vec![Row([1.0; LANES]); 15];
         let mut out = vec![Row::ZERO; spectrum.n_bins()];
         spectrum.magnitude(&mut frames, &mut out);

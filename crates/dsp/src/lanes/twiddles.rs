@@ -2,14 +2,16 @@
 
 use std::f64::consts::PI;
 
+use crate::real::Real;
+
 /// `exp(-2 pi i k / n)`.
 pub(super) fn turn(k: usize, n: usize) -> [f64; 2] {
     let angle = -2.0 * PI * (k % n) as f64 / n as f64;
     [angle.cos(), angle.sin()]
 }
 
-pub(super) fn twiddles<const R: usize>(size: usize, scale: f64) -> Vec<[[f32; 2]; R]> {
-    let column = |j| std::array::from_fn(|q| turn(j * q, size).map(|x| (scale * x) as f32));
+pub(super) fn twiddles<T: Real, const R: usize>(size: usize, scale: f64) -> Vec<[[T; 2]; R]> {
+    let column = |j| std::array::from_fn(|q| turn(j * q, size).map(|x| T::of(scale * x)));
     (0..size / R).map(column).collect()
 }
 

@@ -2,15 +2,13 @@
 
 use ndarray::{Array3, ArrayView2, ArrayViewMut3, Axis};
 use num_complex::Complex;
-use num_traits::Zero;
 
 use super::params::StftParams;
 use crate::error::{DspError, Result};
-use crate::lanes::{LANES, Row};
+use crate::lanes::{DoubleRow, Lanes, Row};
 use crate::real::Real;
 use crate::simd::vectorized;
-use crate::tiles::{LanePlan, for_each_tile, neighbours, planar, write_columns};
-use crate::transform::Forward;
+use crate::tiles::{LanePlan, for_each_tile, neighbours, planar};
 
 /// Complex spectrogram `[channels, n_fft / 2 + 1, frames]` of `y [channels, samples]` (librosa 0.11
 /// `stft`). `f32` signals are transformed in single precision (within 1e-6 of the largest value of
@@ -46,28 +44,8 @@ pub fn stft_into<T: Real>(
     check_out(&out, p.shape_of(y)?)?;
     let y = planar(y);
     if T::SINGLE {
-        let plan = LanePlan::new(p)?;
-        let state = || (plan.frames(), vec![Row::ZERO; 2 * p.n_bins()]);
-        for_each_tile(out.view_mut(), state, |(frames, spectrum), mut tile| {
-            let y = single(y.view(), tile.channel);
-            for (b, mut block) in tile.out.axis_chunks_iter_mut(Axis(1), LANES).enumerate() {
-                frames.complex(y, tile.first + b * LANES, spectrum);
-                let rows = block.outer_iter_mut().zip(spectrum.as_chunks().0);
-                for (row, [re, im]) in rows {
-                    let row = neighbours(row);
-                    vectorized(
-                        #[inline(always)]
-                        || {
-                            for (slot, (re, im)) in row.iter_mut().zip(re.0.iter().zip(&im.0)) {
-                                let (re, im) = (f64::from(*re), f64::from(*im));
-                                *slot = Complex::new(T::of(re), T::of(im));
-                            }
-                        },
-                    );
-                }
-            }
-        });
-        Ok(())
+        let value = |re: f32, im: f32| Complex::new(T::of(re.into()), T::of(im.into()));
+        each_bin::<T, Row, _>(y.view(), p, out, value)
     } else {
         each_spectrum(y.view(), p, out, |z| z)
     }
@@ -130,32 +108,43 @@ pub(crate) fn magnitude<T: Real>(z: Complex<T>) -> T {
 }
 
 /// Fills `out` with `value` of every bin, transformed in double precision and rounded to `T`.
-fn each_spectrum<T: Real, R: Copy + Send + Zero>(
+fn each_spectrum<T: Real, V: Copy + Send>(
     y: ArrayView2<T>,
     p: &StftParams,
-    out: ArrayViewMut3<R>,
-    value: impl Fn(Complex<T>) -> R + Sync,
+    out: ArrayViewMut3<V>,
+    value: impl Fn(Complex<T>) -> V + Sync,
 ) -> Result<()> {
-    let forward = Forward::<f64>::new(p)?;
-    let bins = p.n_bins();
-    let state = || (forward.scratch(), vec![R::zero(); LANES * bins]);
-    for_each_tile(out, state, |(scratch, columns), mut tile| {
+    each_bin::<T, DoubleRow, V>(y, p, out, |re, im| value(Complex::new(T::of(re), T::of(im))))
+}
+
+/// Fills `out` with `value` of the real and imaginary part of every bin, transformed in the
+/// precision of the rows `R`.
+fn each_bin<T: Real, R: Lanes, V: Copy + Send>(
+    y: ArrayView2<T>,
+    p: &StftParams,
+    out: ArrayViewMut3<V>,
+    value: impl Fn(R::Value, R::Value) -> V + Sync,
+) -> Result<()> {
+    let plan = LanePlan::<R>::new(p)?;
+    let state = || (plan.frames(), vec![R::EMPTY; 2 * p.n_bins()]);
+    for_each_tile(out, state, |(frames, spectrum), mut tile| {
         let y = y.row(tile.channel);
         let y = y.to_slice().expect("contiguous");
-        for (b, block) in tile.out.axis_chunks_iter_mut(Axis(1), LANES).enumerate() {
-            let first = tile.first + b * LANES;
-            for (t, column) in columns.chunks_exact_mut(bins).take(block.ncols()).enumerate() {
-                let spectrum = forward.spectrum(y, first + t, scratch);
+        for (b, mut block) in tile.out.axis_chunks_iter_mut(Axis(1), R::SLOTS).enumerate() {
+            frames.complex(y, tile.first + b * R::SLOTS, spectrum);
+            let rows = block.outer_iter_mut().zip(spectrum.as_chunks().0);
+            for (row, [re, im]) in rows {
+                let row = neighbours(row);
                 vectorized(
                     #[inline(always)]
                     || {
-                        for (slot, z) in column.iter_mut().zip(spectrum) {
-                            *slot = value(Complex::new(T::of(z.re), T::of(z.im)));
+                        let parts = re.values().iter().zip(im.values());
+                        for (slot, (re, im)) in row.iter_mut().zip(parts) {
+                            *slot = value(*re, *im);
                         }
                     },
                 );
             }
-            write_columns(columns, block);
         }
     });
     Ok(())
