@@ -39,7 +39,7 @@ pub fn stft<T: Real>(y: ArrayView2<T>, p: &StftParams) -> Result<Array3<Complex<
 pub fn stft_into<T: Real>(
     y: ArrayView2<T>,
     p: &StftParams,
-    mut out: ArrayViewMut3<Complex<T>>,
+    out: ArrayViewMut3<Complex<T>>,
 ) -> Result<()> {
     check_out(&out, p.shape_of(y)?)?;
     let y = planar(y);
