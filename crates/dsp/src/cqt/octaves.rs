@@ -106,18 +106,14 @@ fn same_lengths(
 mod tests {
     use super::*;
 
-    /// Its filters took 40 seconds to make; what its transforms take is known before.
+    /// Filters of the first took 40 seconds to make; what they and the transforms take is known before.
     #[test]
     fn too_much_work_is_refused_before_any_filter_is_made() {
-        let p = CqtParams {
-            hop_length: 1,
-            n_bins: 4000,
-            bins_per_octave: 600,
-            ..CqtParams::new(22050.0)
-        };
-        let wavelets = Wavelets::new(&p);
-        let refused = layouts(&p, &wavelets, (p.sr, 1)).err().map(|e| e.to_string());
-        assert!(refused.is_some_and(|text| text.contains("hop_length")));
+        for (n_bins, bins_per_octave, named) in [(4000, 600, "n_bins"), (96, 12, "hop_length")] {
+            let p = CqtParams { hop_length: 1, n_bins, bins_per_octave, ..CqtParams::new(22050.0) };
+            let refused = layouts(&p, &Wavelets::new(&p), (p.sr, 1)).err().map(|e| e.to_string());
+            assert!(refused.as_ref().is_some_and(|e| e.contains(named)), "{refused:?}");
+        }
         let usual = CqtParams::new(22050.0);
         let octaves = layouts(&usual, &Wavelets::new(&usual), (usual.sr, usual.hop_length));
         assert_eq!(octaves.map(|octaves| octaves.len()).ok(), Some(7));
