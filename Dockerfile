@@ -4,7 +4,7 @@ RUN apt-get update && apt-get install -y --no-install-recommends build-essential
     && rm -rf /var/lib/apt/lists/*
 WORKDIR /source
 COPY . .
-RUN cargo install --locked --path crates/cli --features nets --root /installed
+RUN cargo install --locked --path crates/cli --features nets,cloud --root /installed
 RUN python3 -m venv /build && /build/bin/pip install "maturin>=1.9,<2" \
     && /build/bin/maturin build --release --locked --out /wheels
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
 import numpy as np
 
+from . import _core
 from ._batch_columns import arrow
 from .errors import ParameterError
 
@@ -62,13 +64,18 @@ def rows_of(batch: Any) -> list[Any]:
 
 
 def _local(path: str) -> str:
-    """The path that a URI names."""
-    if "://" not in path:
+    """The path that a `file://` URI names; objects of stores stay URIs."""
+    if "://" not in path or _core.is_stored(path):
         return path
     parts = urlsplit(path)
     if parts.scheme != "file" or parts.netloc not in ("", "localhost"):
         raise ParameterError(
-            f"{path}: only paths and file:// URIs are read; mount the store, or let the engine"
-            " put the content into a column bytes"
+            f"{path}: only paths and URIs of files and objects (s3://, gs://, az://, https://) are"
+            " read; let the engine put the content into a column bytes"
         )
     return unquote(parts.path)
+
+
+def absolute(path: str) -> str:
+    """A path that workers with another current folder find, too; URIs of objects stay."""
+    return path if _core.is_stored(path) else os.path.abspath(path)

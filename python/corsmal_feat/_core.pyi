@@ -62,6 +62,7 @@ __all__ = [
     "get_window",
     "hear_recordings",
     "hpss_masks",
+    "is_stored",
     "istft",
     "jobs",
     "load_calibration",
@@ -263,6 +264,7 @@ def collect(
     list[tuple[str, str, _Place | None, float | None, float | None, list[tuple[str, str]]]],
     str | None,
 ]: ...
+def is_stored(name: str) -> bool: ...
 
 @final
 class Recording:

@@ -20,7 +20,7 @@ from typing import Any
 from . import _core
 from ._accounting import Accounting, account
 from ._batch_columns import arrow as pyarrow
-from ._batch_rows import rows_of
+from ._batch_rows import absolute, rows_of
 from ._batches import Job
 from ._extract import Config, StrPath
 from ._parts import ATTEMPTS, DEATHS, PARTS, compute_part, write_whole
@@ -67,11 +67,11 @@ def manifest(paths: StrPath | Iterable[StrPath]) -> Any:
     text, seconds, bytes_ = pa.string(), pa.float64(), pa.uint64()
     columns = {
         "id": pa.array([row[0] for row in found], text),
-        "path": pa.array([os.path.abspath(row[1]) for row in found], text),
+        "path": pa.array([absolute(row[1]) for row in found], text),
     }
     if any(row[2] is not None for row in found):
         places = [row[2] or (None,) * 4 for row in found]
-        archives = [None if p[0] is None else os.path.abspath(p[0]) for p in places]
+        archives = [None if p[0] is None else absolute(p[0]) for p in places]
         columns["archive"] = pa.array(archives, text)
         for i, (name, kind) in enumerate((("offset", bytes_), ("size", bytes_), ("fault", text))):
             columns[name] = pa.array([place[i + 1] for place in places], kind)

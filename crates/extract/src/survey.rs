@@ -11,6 +11,8 @@ use crate::inputs::{Input, InputSource};
 
 /// Samples read at a time where frames have to be counted.
 const BLOCK: usize = 1 << 16;
+/// Headers of objects that are asked for at the same time.
+const LOOKS: usize = 32;
 /// Different values that a message names.
 const NAMED: usize = 4;
 
@@ -33,10 +35,20 @@ pub fn headers(inputs: &[Input]) -> Vec<Option<Header>> {
     let mut sources: Vec<&InputSource> = inputs.iter().filter_map(again).collect();
     sources.sort_unstable();
     sources.dedup();
-    let read = |source: &&InputSource| source.open().ok().map(|source| of(source.as_ref()));
-    let found: Vec<Option<Header>> = sources.par_iter().map(read).collect();
+    let read = |source: &&InputSource| source.open_header().ok().map(|s| of(s.as_ref()));
+    let look = || sources.par_iter().map(read).collect();
+    let found: Vec<Option<Header>> = match pool_for(&sources) {
+        Some(pool) => pool.install(look),
+        None => look(),
+    };
     let known: HashMap<&InputSource, Option<Header>> = sources.into_iter().zip(found).collect();
     inputs.iter().map(|input| again(input).and_then(|s| known.get(s).copied()?)).collect()
+}
+
+/// More threads than cores where answers of stores are waited for.
+fn pool_for(sources: &[&InputSource]) -> Option<rayon::ThreadPool> {
+    let is_stored = sources.iter().any(|source| source.is_stored());
+    is_stored.then(|| rayon::ThreadPoolBuilder::new().num_threads(LOOKS).build().ok()).flatten()
 }
 
 /// What can be read again afterwards.

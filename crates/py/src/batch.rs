@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use corsmal_extract::engine::{FeatureArray, Plan};
-use corsmal_extract::inputs::{self, Input, InputSource, Member};
+use corsmal_extract::inputs::{self, Input, InputSource, Member, Place};
 use corsmal_extract::run::{Recordings, RunError as Stopped};
 use corsmal_extract::survey::Survey;
 use ndarray::{Array2, Array3};
@@ -25,7 +25,7 @@ pub(crate) enum Source {
     Bytes(PyBackedBytes),
     /// A member of an archive: path, archive, offset, size, fault.
     Member(PathBuf, PathBuf, u64, u64, Option<String>),
-    /// A file.
+    /// A file, or the URI of an object.
     Path(PathBuf),
 }
 
@@ -36,10 +36,22 @@ impl Source {
             Self::Member(path, archive, offset, size, fault) => {
                 let read = |text: String| serde_json::from_str(&text).map_err(value_error);
                 let fault = fault.map(read).transpose()?;
+                let archive = place_of(archive)?;
                 InputSource::Member(Box::new(Member { archive, path, offset, size, fault }))
             }
-            Self::Path(path) => InputSource::File(path),
+            Self::Path(path) => match place_of(path)? {
+                Place::File(path) => InputSource::File(path),
+                Place::Object(object) => InputSource::Object(object),
+            },
         })
+    }
+}
+
+/// A file, or an object of a store by its URI.
+fn place_of(path: PathBuf) -> PyResult<Place> {
+    match path.to_str().filter(|name| inputs::is_stored(name)) {
+        Some(name) => Ok(Place::Object(Arc::new(inputs::object(name).map_err(value_error)?))),
+        None => Ok(Place::File(path)),
     }
 }
 
@@ -152,11 +164,21 @@ pub(crate) fn collect(
             InputSource::Member(member) => {
                 let fault = member.fault.as_ref().map(serde_json::to_string);
                 let fault = fault.transpose().map_err(value_error)?;
-                Some((member.archive, member.offset, member.size, fault))
+                let archive = match member.archive {
+                    Place::File(path) => path,
+                    Place::Object(object) => object.to_string().into(),
+                };
+                Some((archive, member.offset, member.size, fault))
             }
             _ => None,
         };
         Ok((input.id, path, place, input.start, input.end, input.labels))
     });
     Ok((rows.collect::<PyResult<_>>()?, warning))
+}
+
+/// Whether a name is one of a store, and not of a file.
+#[pyfunction]
+pub(crate) fn is_stored(name: &str) -> bool {
+    inputs::is_stored(name)
 }

@@ -37,7 +37,7 @@ mod _core {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use crate::batch::{PyRecordings, collect};
+    use crate::batch::{PyRecordings, collect, is_stored};
     #[pymodule_export]
     use crate::chroma::{chroma, chroma_filter, estimate_tuning, piptrack, pitch_tuning};
     #[pymodule_export]

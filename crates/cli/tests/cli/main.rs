@@ -22,5 +22,6 @@ mod onnx;
 #[cfg(feature = "nets")]
 mod pictures;
 mod scoring;
+mod stores;
 #[cfg(not(feature = "nets"))]
 mod without_networks;

@@ -13,7 +13,9 @@ use super::held::Held;
 use super::live::Live;
 use super::plans::Planned;
 use super::signal_chain::SignalChain;
+use super::watch::Watch;
 use crate::config::SignalConfig;
+use crate::inputs::stored::Purpose;
 use crate::inputs::{Input, InputSource};
 
 /// Samples read at a time, all channels together.
@@ -25,14 +27,33 @@ const END_BEYOND: &str = "end_beyond_recording";
 /// Frames of a span; recordings of more than two are cut.
 const SPAN: u64 = 1 << 20;
 
-/// Opens an input. A stream on standard input fails once `stop` is set, also while nothing comes.
-pub fn open(input: &Input, stop: &Arc<AtomicBool>) -> Result<Box<dyn BlockSource>, Failed> {
+/// Opens an input, all of it or a part. A stream on standard input and what comes from a store fail once
+/// `stop` is set, also while nothing comes.
+pub fn open(
+    input: &Input,
+    watch: &Watch,
+    part: Part,
+    stop: &Arc<AtomicBool>,
+) -> Result<Box<dyn BlockSource>, Failed> {
+    let purpose = match part {
+        Part::Whole if input.start.is_none() => Purpose::Content,
+        Part::Whole | Part::Span => Purpose::Part,
+    };
     Ok(match &input.source {
         InputSource::Stdin => {
             corsmal_audio::from_reader(Live::new(std::io::stdin(), stop.clone()))?
         }
-        source => source.open()?,
+        source => source.open_for(purpose, (watch.pin(), stop))?,
     })
+}
+
+/// How much of a recording is read after it was opened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// As much as the input takes.
+    Whole,
+    /// One span of several.
+    Span,
 }
 
 /// The frame at a time: the last one that does not begin later. Times written with nine decimals

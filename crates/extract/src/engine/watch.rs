@@ -6,6 +6,7 @@ use corsmal_files::identity::Stamp;
 use corsmal_files::outcome::Status;
 
 use super::failed::Failed;
+use crate::inputs::stored::{Pin, identity_of_read};
 use crate::inputs::{Input, InputSource};
 
 /// A look at a file before it is read, to be compared with one after the last read.
@@ -15,6 +16,9 @@ pub struct Watch {
     seen: Option<(InputSource, Stamp)>,
     /// Whether a change could keep the stamp, so that only the content tells.
     fresh: bool,
+    /// Objects of stores are not looked at: every answer says of which version it is.
+    pin: Pin,
+    stored: Option<InputSource>,
 }
 
 impl Watch {
@@ -24,7 +28,23 @@ impl Watch {
         let stamp = input.source.file().and_then(|path| Stamp::of_path(path).ok().flatten());
         let seen = stamp.map(|stamp| (input.source.clone(), stamp));
         let fresh = seen.as_ref().is_some_and(|(_, stamp)| stamp.is_fresh());
-        Self { seen, fresh }
+        let pin = input.source.pin();
+        let stored = pin.is_some().then(|| input.source.clone());
+        Self { seen, fresh, pin: pin.unwrap_or_default(), stored }
+    }
+
+    /// Keeps reads of an object to one version.
+    pub(crate) fn pin(&self) -> &Pin {
+        &self.pin
+    }
+
+    /// What the bytes are known by that came from a store; `None` for files, and before any came.
+    pub(crate) fn identity(&self) -> Option<String> {
+        let whole = identity_of_read(&self.pin)?;
+        Some(match self.stored.as_ref()? {
+            InputSource::Member(member) => member.identity_in(&whole),
+            _ => whole,
+        })
     }
 
     /// Looks again.
@@ -32,6 +52,9 @@ impl Watch {
     /// # Errors
     /// [`Status::Changed`] and what happened to the file.
     pub fn check(&self) -> Result<(), Failed> {
+        if let Some(what) = self.pin.changed() {
+            return Err(Failed::new(Status::Changed, format!("{what} while it was read")));
+        }
         let Some((source, before)) = &self.seen else { return Ok(()) };
         let Some(path) = source.file() else { return Ok(()) };
         let changed =

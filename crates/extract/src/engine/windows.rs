@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use corsmal_audio::BlockSource;
 
 use super::failed::Failed;
-use super::reading;
+use super::reading::{self, Part};
 use super::recording::Features;
 use super::signal::{SignalError, Signals};
 use super::watch::Watch;
@@ -79,7 +79,7 @@ impl<'a> Windows<'a> {
         stop: &Arc<AtomicBool>,
     ) -> Result<Self, SignalError> {
         let watch = Watch::begin(input);
-        let source = watch.settle(reading::open(input, stop))?;
+        let source = watch.settle(reading::open(input, &watch, Part::Whole, stop))?;
         let rate = source.spec().sample_rate;
         let frames = |seconds: f64| ((seconds * f64::from(rate)).round() as u64).max(1);
         Ok(Self {

@@ -7,6 +7,8 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Component, Path, PathBuf};
 use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use corsmal_audio::{AudioError, BlockSource};
 use corsmal_files::identity;
@@ -17,6 +19,7 @@ use tar::{Archive, EntryType};
 use super::beside;
 use super::error::InputError;
 use super::folder::has_extension;
+use super::stored::{self, Blocks, Object, Pin, Purpose};
 use crate::manifest;
 
 /// File name extension, lower case.
@@ -36,7 +39,7 @@ const CLASS: &str = "cls";
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Member {
     /// The archive.
-    pub archive: PathBuf,
+    pub archive: Place,
     /// Archive and name as one path.
     pub path: PathBuf,
     /// Its first byte in the archive.
@@ -45,6 +48,31 @@ pub struct Member {
     pub size: u64,
     /// Why it cannot be read where it lies.
     pub fault: Option<Fault>,
+}
+
+/// Where an archive lies.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Place {
+    /// A file.
+    File(PathBuf),
+    /// An object of a store.
+    Object(Arc<Object>),
+}
+
+impl Place {
+    fn path(&self) -> PathBuf {
+        match self {
+            Self::File(path) => path.clone(),
+            Self::Object(object) => object.to_string().into(),
+        }
+    }
+
+    fn open(&self, pin: &Pin, purpose: Purpose) -> io::Result<Box<dyn Blocks>> {
+        match self {
+            Self::File(path) => Ok(Box::new(File::open(path)?)),
+            Self::Object(object) => stored::open(object, None, purpose, (pin, &Arc::default())),
+        }
+    }
 }
 
 /// Why a member cannot be read where it lies.
@@ -64,7 +92,11 @@ impl Member {
     ///
     /// # Errors
     /// As [`corsmal_audio::open`], and what cannot be read where it lies.
-    pub fn open(&self) -> Result<Box<dyn BlockSource>, AudioError> {
+    pub(super) fn open(
+        &self,
+        purpose: Purpose,
+        with: (&Pin, &Arc<AtomicBool>),
+    ) -> Result<Box<dyn BlockSource>, AudioError> {
         let offset = self.offset;
         let unsupported = |actual: &str| AudioError::Unsupported {
             offset,
@@ -80,20 +112,39 @@ impl Member {
                 return Err(AudioError::Corrupt { offset, actual, expected: "a whole member" });
             }
         }
-        let failed = |source| AudioError::Open { path: self.archive.clone(), source };
-        corsmal_audio::from_seekable(self.slice().map_err(failed)?)
+        let failed = |source| AudioError::Open { path: self.archive.path(), source };
+        match &self.archive {
+            Place::File(path) => corsmal_audio::from_seekable(self.slice(path).map_err(failed)?),
+            Place::Object(object) => {
+                let stretch = Some((offset, self.size));
+                let blocks = stored::open(object, stretch, purpose, with).map_err(failed)?;
+                corsmal_audio::from_seekable(blocks)
+            }
+        }
     }
 
-    /// The identity of its bytes, as [`identity::of_file`] has it for a file.
+    /// The identity of its bytes, as [`identity::of_file`] has it for a file; in a store, that of its
+    /// place and of the archive.
     ///
     /// # Errors
     /// Whatever opening, seeking or reading reports.
     pub fn identity(&self) -> io::Result<String> {
-        identity::of_reader(&mut self.slice()?, self.size)
+        match &self.archive {
+            Place::File(path) => identity::of_reader(&mut self.slice(path)?, self.size),
+            Place::Object(object) => Ok(match stored::identity_now(object) {
+                unknown if unknown.is_empty() || unknown == identity::STREAM => unknown,
+                archive => self.identity_in(&archive),
+            }),
+        }
     }
 
-    fn slice(&self) -> io::Result<Slice> {
-        let mut file = File::open(&self.archive)?;
+    /// Its identity in an archive of some identity.
+    pub(crate) fn identity_in(&self, archive: &str) -> String {
+        format!("{}@{} of {archive}", self.size, self.offset)
+    }
+
+    fn slice(&self, path: &Path) -> io::Result<Slice> {
+        let mut file = File::open(path)?;
         file.seek(SeekFrom::Start(self.offset))?;
         Ok(Slice { file, start: self.offset, size: self.size, position: 0 })
     }
@@ -171,7 +222,7 @@ fn compressed(path: &Path) -> InputError {
 }
 
 /// Whether the first bytes are those of a compressed file, whatever its name.
-fn is_compressed(file: &mut File) -> io::Result<bool> {
+fn is_compressed(file: &mut Box<dyn Blocks>) -> io::Result<bool> {
     /// gzip, bzip2, xz, zstd, lz4.
     const BEGINNINGS: [&[u8]; 5] =
         [b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"\x04\x22\x4d\x18"];
@@ -185,7 +236,8 @@ fn is_compressed(file: &mut File) -> io::Result<bool> {
 ///
 /// # Errors
 /// What is no archive, or damaged so that members may be missed; labels that cannot be read.
-pub(super) fn contents(path: &Path) -> Result<Contents, InputError> {
+pub(super) fn contents(place: &Place) -> Result<Contents, InputError> {
+    let path = &place.path();
     let failed = |e: io::Error| {
         // The operating system's errors have a number, those of the format do not.
         match e.raw_os_error() {
@@ -193,13 +245,19 @@ pub(super) fn contents(path: &Path) -> Result<Contents, InputError> {
             None => InputError::Archive { path: path.into(), reason: e.to_string() },
         }
     };
-    let mut file = File::open(path).map_err(failed)?;
-    if is_compressed(&mut file).map_err(failed)? {
+    let pin = Pin::default();
+    let mut blocks = place.open(&pin, Purpose::Content).map_err(failed)?;
+    if is_compressed(&mut blocks).map_err(failed)? {
         return Err(compressed(path));
     }
-    let length = file.metadata().map_err(failed)?.len();
+    let length = blocks.seek(SeekFrom::End(0)).map_err(failed)?;
+    blocks.rewind().map_err(failed)?;
+    let place = &match place {
+        Place::File(path) => Place::File(path.clone()),
+        Place::Object(object) => Place::Object(Arc::new(stored::as_read(object, &pin))),
+    };
     let left = Rc::new(Cell::new(MOST_HEADERS));
-    let mut archive = Archive::new(Headers { file, left: left.clone() });
+    let mut archive = Archive::new(Headers { blocks, left: left.clone() });
     // Archives that were put one behind the other.
     archive.set_ignore_zeros(true);
     let mut found = Contents::default();
@@ -208,7 +266,7 @@ pub(super) fn contents(path: &Path) -> Result<Contents, InputError> {
     for entry in archive.entries_with_seek().map_err(failed)? {
         left.set(MOST_HEADERS);
         let mut entry = entry.map_err(failed)?;
-        let (name, member) = member(path, length, &mut entry).map_err(failed)?;
+        let (name, member) = member(place, length, &mut entry).map_err(failed)?;
         end = member.offset.saturating_add(member.size.div_ceil(BLOCK).saturating_mul(BLOCK));
         let kind = entry.header().entry_type();
         if is_hidden(&name) || !(kind.is_file() || member.fault.is_some()) {
@@ -219,7 +277,7 @@ pub(super) fn contents(path: &Path) -> Result<Contents, InputError> {
         } else if has_extension(&name, &corsmal_audio::OTHER_EXTENSIONS) {
             found.skipped.push(member.path);
         } else if has_extension(&name, &["json", CLASS]) {
-            let read = labels_of(&member).map_err(|reason| InputError::Archive {
+            let read = labels_of(&member, &mut entry).map_err(|reason| InputError::Archive {
                 path: path.into(),
                 reason: format!("{}: {reason}", quoted(&name.to_string_lossy())),
             })?;
@@ -228,12 +286,12 @@ pub(super) fn contents(path: &Path) -> Result<Contents, InputError> {
     }
     let refused = |reason| InputError::Archive { path: path.into(), reason };
     beside::join(&mut found.recordings, labels).map_err(refused)?;
-    found.is_ended = is_ended(path, end).map_err(failed)?;
+    found.is_ended = is_ended(place, &pin, end).map_err(failed)?;
     Ok(found)
 }
 
 fn member(
-    archive: &Path,
+    archive: &Place,
     length: u64,
     entry: &mut tar::Entry<'_, Headers>,
 ) -> io::Result<(PathBuf, Member)> {
@@ -253,8 +311,8 @@ fn member(
         _ => None,
     };
     let name = inner(&entry.path()?);
-    let path = archive.join(&name);
-    Ok((name, Member { archive: archive.into(), path, offset, size, fault }))
+    let path = archive.path().join(&name);
+    Ok((name, Member { archive: archive.clone(), path, offset, size, fault }))
 }
 
 /// A name without what leads out of the archive.
@@ -267,13 +325,12 @@ fn is_hidden(name: &Path) -> bool {
 }
 
 /// The labels that a member holds.
-fn labels_of(member: &Member) -> Result<Vec<(String, String)>, String> {
+fn labels_of(member: &Member, content: &mut impl Read) -> Result<Vec<(String, String)>, String> {
     if member.fault.is_some() || member.size > MOST_LABELS {
         return Err(format!("labels must be a file of at most {MOST_LABELS} bytes"));
     }
     let mut text = String::new();
-    let slice = member.slice().map_err(|e| e.to_string())?;
-    slice.take(MOST_LABELS).read_to_string(&mut text).map_err(|e| e.to_string())?;
+    content.take(MOST_LABELS).read_to_string(&mut text).map_err(|e| e.to_string())?;
     if has_extension(&member.path, &[CLASS]) {
         return Ok(vec![(CLASS.into(), text.trim().into())]);
     }
@@ -283,23 +340,23 @@ fn labels_of(member: &Member) -> Result<Vec<(String, String)>, String> {
 }
 
 /// Whether a block of zeros follows the last member.
-fn is_ended(path: &Path, end: u64) -> io::Result<bool> {
-    let mut file = File::open(path)?;
+fn is_ended(place: &Place, pin: &Pin, end: u64) -> io::Result<bool> {
+    let mut blocks = place.open(pin, Purpose::Header)?;
     let mut block = Vec::new();
-    file.seek(SeekFrom::Start(end.min(i64::MAX as u64)))?;
-    file.take(BLOCK).read_to_end(&mut block)?;
+    blocks.seek(SeekFrom::Start(end.min(i64::MAX as u64)))?;
+    blocks.take(BLOCK).read_to_end(&mut block)?;
     Ok(block.len() as u64 == BLOCK && block.iter().all(|byte| *byte == 0))
 }
 
 /// Reads headers, up to some number of bytes; contents are passed over by seeking.
 struct Headers {
-    file: File,
+    blocks: Box<dyn Blocks>,
     left: Rc<Cell<u64>>,
 }
 
 impl Read for Headers {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        let read = self.file.read(out)?;
+        let read = self.blocks.read(out)?;
         match self.left.get().checked_sub(read as u64) {
             Some(left) => self.left.set(left),
             None => {
@@ -313,6 +370,6 @@ impl Read for Headers {
 
 impl Seek for Headers {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.file.seek(to)
+        self.blocks.seek(to)
     }
 }

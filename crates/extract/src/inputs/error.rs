@@ -24,15 +24,12 @@ pub enum InputError {
         source: io::Error,
     },
     /// An object of a store.
-    #[error(
-        "{name}: {store}:// cannot be read; mount the bucket (s3fs, gcsfuse, rclone mount) or copy \
-         the files that you need"
-    )]
+    #[error("{name}: {reason}")]
     Store {
         /// The URI given.
         name: String,
-        /// Its scheme.
-        store: &'static str,
+        /// What is wrong with it, or with the store.
+        reason: String,
     },
     /// A folder or glob without recordings.
     #[error("{path}: no file with an audio extension ({extensions}){skipped}")]

@@ -7,6 +7,7 @@ use std::path::{Component, Path};
 use super::error::InputError;
 use super::found::{Found, Naming};
 use super::input::InputSource;
+use super::stored;
 use corsmal_files::quote::quoted;
 use corsmal_files::table::RESERVED;
 
@@ -37,7 +38,7 @@ pub(super) fn refusal(id: &str) -> Option<String> {
 /// The id of each input: given ones as they are, others from the shortest form of their path that
 /// collides with none.
 pub(super) fn assign(found: &[Found]) -> Result<Vec<String>, InputError> {
-    let mut named: HashMap<Option<&Path>, usize> = HashMap::new();
+    let mut named: HashMap<Option<&InputSource>, usize> = HashMap::new();
     // Only a stretch asks whether there are others of its file.
     if found.iter().any(|found| times(found).is_some()) {
         for found in found.iter().filter(|found| matches!(found.naming, Naming::Derived(_))) {
@@ -89,6 +90,7 @@ fn forms(found: &Found) -> Vec<String> {
         (Naming::Derived(relative), source) => {
             let path = match source {
                 InputSource::File(path) => path.clone(),
+                InputSource::Object(object) => stored::path_in_store(object).into(),
                 InputSource::Member(member) => member.path.clone(),
                 InputSource::Memory(_) | InputSource::Stdin => return vec![id_of(relative)],
             };
@@ -106,10 +108,10 @@ fn forms(found: &Found) -> Vec<String> {
     }
 }
 
-/// The file, where it is one.
-fn place(found: &Found) -> Option<&Path> {
+/// The file or object, where it is one.
+fn place(found: &Found) -> Option<&InputSource> {
     match &found.source {
-        InputSource::File(path) => Some(path),
+        InputSource::File(_) | InputSource::Object(_) => Some(&found.source),
         InputSource::Member(_) | InputSource::Memory(_) | InputSource::Stdin => None,
     }
 }

@@ -4,17 +4,21 @@ use std::fmt;
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use corsmal_audio::{AudioError, BlockSource};
 use corsmal_files::identity;
 
-use super::archive::Member;
+use super::archive::{Member, Place};
+use super::stored::{self, Object, Pin, Purpose};
 
 /// Where the bytes of a recording come from.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum InputSource {
     /// A file.
     File(PathBuf),
+    /// An object of a store, or a file on a web server.
+    Object(Arc<Object>),
     /// A member of a tar archive.
     Member(Box<Member>),
     /// Bytes in memory.
@@ -27,6 +31,7 @@ impl fmt::Display for InputSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::File(path) => path.display().fmt(f),
+            Self::Object(object) => object.fmt(f),
             Self::Member(member) => member.path.display().fmt(f),
             // What tells them apart.
             Self::Memory(bytes) => f.write_str(&identity::of_bytes(bytes)),
@@ -40,8 +45,33 @@ impl InputSource {
     pub fn file(&self) -> Option<&Path> {
         match self {
             Self::File(path) => Some(path),
-            Self::Member(member) => Some(&member.archive),
-            Self::Memory(_) | Self::Stdin => None,
+            Self::Member(member) => match &member.archive {
+                Place::File(path) => Some(path),
+                Place::Object(_) => None,
+            },
+            Self::Object(_) | Self::Memory(_) | Self::Stdin => None,
+        }
+    }
+
+    /// Whether the bytes come from a store, which takes time and can be called off.
+    pub(crate) fn is_stored(&self) -> bool {
+        match self {
+            Self::Object(_) => true,
+            Self::Member(member) => matches!(member.archive, Place::Object(_)),
+            Self::File(_) | Self::Memory(_) | Self::Stdin => false,
+        }
+    }
+
+    /// Keeps all that is read from now on to one version, where the bytes come from a store.
+    pub(crate) fn pin(&self) -> Option<Pin> {
+        match self {
+            Self::Object(_) => Some(Pin::default()),
+            Self::Member(member) => match &member.archive {
+                // Members lie there in the version whose headers were read.
+                Place::Object(object) => Some(stored::pin_to_listed(object)),
+                Place::File(_) => None,
+            },
+            Self::File(_) | Self::Memory(_) | Self::Stdin => None,
         }
     }
 
@@ -50,9 +80,37 @@ impl InputSource {
     /// # Errors
     /// As [`corsmal_audio::open`].
     pub fn open(&self) -> Result<Box<dyn BlockSource>, AudioError> {
+        let pin = self.pin().unwrap_or_default();
+        self.open_for(Purpose::Content, (&pin, &Arc::default()))
+    }
+
+    /// Opens the recording for a look at its header.
+    ///
+    /// # Errors
+    /// As [`corsmal_audio::open`].
+    pub fn open_header(&self) -> Result<Box<dyn BlockSource>, AudioError> {
+        let pin = self.pin().unwrap_or_default();
+        self.open_for(Purpose::Header, (&pin, &Arc::default()))
+    }
+
+    /// Opens the recording. From a store, all bytes are of the version that the pin keeps, and waiting
+    /// ends when the flag is set.
+    ///
+    /// # Errors
+    /// As [`corsmal_audio::open`].
+    pub(crate) fn open_for(
+        &self,
+        purpose: Purpose,
+        with: (&Pin, &Arc<AtomicBool>),
+    ) -> Result<Box<dyn BlockSource>, AudioError> {
         match self {
             Self::File(path) => corsmal_audio::open(path),
-            Self::Member(member) => member.open(),
+            Self::Object(object) => {
+                let failed = |source| AudioError::Open { path: object.to_string().into(), source };
+                let blocks = stored::open(object, None, purpose, with).map_err(failed)?;
+                corsmal_audio::from_seekable(blocks)
+            }
+            Self::Member(member) => member.open(purpose, with),
             Self::Memory(bytes) => corsmal_audio::from_seekable(Cursor::new(bytes.clone())),
             Self::Stdin => corsmal_audio::from_reader(io::stdin()),
         }
@@ -62,6 +120,7 @@ impl InputSource {
     pub fn identity(&self) -> String {
         match self {
             Self::File(path) => identity::of_file(path).unwrap_or_default(),
+            Self::Object(object) => stored::identity_now(object),
             Self::Member(member) => member.identity().unwrap_or_default(),
             Self::Memory(bytes) => identity::of_bytes(bytes),
             Self::Stdin => identity::STREAM.to_string(),

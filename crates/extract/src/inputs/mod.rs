@@ -3,7 +3,8 @@
 //! A name is, in this order of interpretation: `-` (a WAV stream on standard input), an existing
 //! file (a manifest if its extension is one of [`manifest::EXTENSIONS`], an archive if it is `.tar`,
 //! else a recording), an existing folder, a list in braces as `{000..012}.tar` or `{a,b}.wav`, or a
-//! glob. Folders and globs give files with an audio extension only, follow
+//! glob. A name such as `s3://bucket/x` is an object of a store, a folder of them where it ends with a
+//! slash or no object has it, a list in braces or a glob. Folders and globs give files with an audio extension only, follow
 //! symbolic links, skip names that begin with a dot, and are sorted by the bytes of the path
 //! relative to their root; names keep the order in which they are given.
 //!
@@ -23,6 +24,8 @@ mod folder;
 mod found;
 mod ids;
 mod input;
+mod objects;
+pub(crate) mod stored;
 mod wildcard;
 
 use std::collections::{BTreeMap, HashSet};
@@ -34,9 +37,10 @@ use crate::manifest;
 use folder::{has_extension, is_apple_double, walk};
 use found::{Found, Naming};
 
-pub use archive::{Fault, Member};
+pub use archive::{Fault, Member, Place};
 pub use error::InputError;
 pub use input::{Input, InputSource, list_hash};
+pub use stored::{Object, is_stored, object};
 
 /// What names stand for.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -181,7 +185,9 @@ fn find(
             Ok(())
         }
         Ok(_) if has_extension(path, &manifest::EXTENSIONS) => find_manifest(path, found, skipped),
-        Ok(_) if archive::is_archive(path) => find_archive(path, found, skipped, unended),
+        Ok(_) if archive::is_archive(path) => {
+            find_archive(path, &Place::File(path.into()), found, skipped, unended)
+        }
         Ok(_) => {
             if let Some(refusal) = archive::refusal(path) {
                 return Err(refusal);
@@ -193,8 +199,8 @@ fn find(
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             let missing = || InputError::Missing { path: path.into() };
             let pattern = name.to_str().ok_or_else(missing)?;
-            if let Some(store) = store(pattern) {
-                return Err(InputError::Store { name: pattern.into(), store });
+            if is_stored(pattern) {
+                return objects::find(pattern, found, skipped, unended);
             }
             match braces::expand(pattern)? {
                 Some(names) => {
@@ -208,21 +214,15 @@ fn find(
     }
 }
 
-/// The store that a URI names.
-fn store(name: &str) -> Option<&'static str> {
-    let stores = ["s3", "gs", "gcs", "az", "abfs", "abfss", "http", "https", "hdfs"];
-    let (scheme, _) = name.split_once("://")?;
-    stores.into_iter().find(|store| scheme.eq_ignore_ascii_case(store))
-}
-
 /// The recordings of an archive; their ids begin with its name.
 fn find_archive(
     path: &Path,
+    place: &Place,
     found: &mut Vec<Found>,
     skipped: &mut Vec<PathBuf>,
     unended: &mut Vec<PathBuf>,
 ) -> Result<(), InputError> {
-    let contents = archive::contents(path)?;
+    let contents = archive::contents(place)?;
     if contents.recordings.is_empty() {
         return Err(no_audio(path, &contents.skipped));
     }
@@ -246,9 +246,15 @@ fn find_manifest(
 ) -> Result<(), InputError> {
     // A manifest beside the wrong folder, or one with files that are gone, is mended before the run.
     let mut unreadable: Option<(u64, String, usize)> = None;
+    let mut stores = HashSet::new();
     for entry in manifest::read(path)? {
         let wrong = |reason| InputError::Manifest { path: path.into(), line: entry.line, reason };
+        let mut stored = None;
         match std::fs::metadata(&entry.path) {
+            _ if is_stored(&entry.written) => {
+                let object = objects::listed(&entry.written, &mut stores);
+                stored = Some(object.map_err(|error| wrong(error.to_string()))?);
+            }
             Ok(meta) if meta.is_dir() => {
                 return Err(wrong(format!("{} is a folder", entry.path.display())));
             }
@@ -272,11 +278,15 @@ fn find_manifest(
         if let Some(reason) = entry.id.as_deref().and_then(ids::refusal) {
             return Err(wrong(reason));
         }
-        let naming = match entry.id {
-            Some(id) => Naming::Given(id),
-            None => Naming::Derived(entry.written.into()),
+        let naming = match (entry.id, &stored) {
+            (Some(id), _) => Naming::Given(id),
+            (None, Some(object)) => Naming::Derived(stored::key(object).into()),
+            (None, None) => Naming::Derived(entry.written.into()),
         };
-        let source = InputSource::File(entry.path);
+        let source = match stored {
+            Some(object) => InputSource::Object(object.into()),
+            None => InputSource::File(entry.path),
+        };
         let (start, end, labels, line) = (entry.start, entry.end, entry.labels, Some(entry.line));
         found.push(Found { source, naming, start, end, labels, line });
     }
@@ -299,7 +309,7 @@ fn find_glob(
         .partition(|path| archive::is_archive(path) && path.is_file());
     archives.sort_unstable();
     for path in &archives {
-        find_archive(path, found, skipped, unended)?;
+        find_archive(path, &Place::File(path.clone()), found, skipped, unended)?;
     }
     for path in paths {
         walk(&path, &mut files, skipped)?;

@@ -56,6 +56,19 @@ pub(super) fn expand(pattern: &str) -> Result<Vec<PathBuf>, InputError> {
     Ok(found)
 }
 
+/// Whether a glob matches the key of an object, or a folder that the object lies in.
+///
+/// # Errors
+/// [`InputError::Glob`] names the pattern.
+pub(super) fn keys(pattern: &str) -> Result<impl Fn(&str) -> bool, InputError> {
+    let compiled = Pattern::new(pattern)
+        .map_err(|e| InputError::Glob { pattern: pattern.into(), reason: e.to_string() })?;
+    Ok(move |key: &str| {
+        let ends = key.match_indices('/').map(|(end, _)| end).chain([key.len()]);
+        ends.into_iter().any(|end| compiled.matches_with(&key[..end], OPTIONS))
+    })
+}
+
 /// The entries of a folder that match.
 fn entries(folder: &Path, part: &Pattern, found: &mut Vec<PathBuf>) -> Result<(), InputError> {
     let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };

@@ -10,7 +10,7 @@ use corsmal_files::{draft, identity};
 use super::error::RunError;
 use super::options::{MAX_JOBS, RunOptions, RunReport};
 use crate::config::Config;
-use crate::inputs::{Input, list_hash};
+use crate::inputs::{Input, is_stored, list_hash};
 use crate::ledger::{self, Ledger};
 
 /// What is known of a run before it starts.
@@ -93,6 +93,11 @@ pub(super) fn require_jobs(jobs: usize) -> Result<(), RunError> {
 fn check_output(options: &RunOptions, config: &Config) -> Result<OutputFormat, RunError> {
     let out = options.out.as_path();
     let refuse = |why: String| Err(RunError::Format { path: out.into(), why });
+    if out.to_str().is_some_and(is_stored) {
+        let why =
+            "is in a store, and outputs are files on a disk: write it here, then copy it there";
+        return refuse(why.into());
+    }
     let format = OutputFormat::of_name(out, options.compression)?;
     let complex = |config: &Config| {
         let value = config.to_value();

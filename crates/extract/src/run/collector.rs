@@ -279,8 +279,10 @@ impl<'a> Collector<'a> {
             self.lock().error.get_or_insert(RunError::Temporary { path, source });
             return;
         }
-        if self.inputs[index].source == InputSource::Stdin && self.stop.load(Ordering::Relaxed) {
-            // The stream did not fail: it was no longer listened to.
+        let source = &self.inputs[index].source;
+        let waits = source == &InputSource::Stdin || source.is_stored();
+        if waits && self.stop.load(Ordering::Relaxed) {
+            // The stream or store did not fail: it was no longer listened to.
             return;
         }
         work::note(&mut outcome, failed);

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use corsmal_audio::{AudioSpec, SampleEncoding};
 use corsmal_files::outcome::{Outcome, Status};
@@ -113,6 +113,9 @@ impl Recordings {
             catch_unwind(AssertUnwindSafe(|| self.features(input, survey, stop, &mut outcome)));
         match computed.unwrap_or_else(|_| Err(broken())) {
             Ok(None) => Err(RunError::Interrupted),
+            Err(_) if input.source.is_stored() && stop.load(Ordering::Relaxed) => {
+                Err(RunError::Interrupted)
+            }
             Ok(features) => Ok((outcome, features)),
             Err(Failed { temporary: Some(source), .. }) => {
                 Err(RunError::Temporary { path: self.folder.clone(), source })

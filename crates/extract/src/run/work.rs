@@ -10,6 +10,7 @@ use corsmal_files::npz::Compression;
 use corsmal_files::outcome::{Outcome, Status};
 
 use super::output::Member;
+use crate::engine::reading::Part;
 use crate::engine::{Failed, Features, Planned, Plans, Recording, Span, Watch, reading};
 use crate::inputs::Input;
 use crate::survey::Survey;
@@ -17,7 +18,10 @@ use crate::survey::Survey;
 /// The outcome of an input before anything is known of it but what its bytes are.
 pub(super) fn outcome_of(input: &Input) -> Outcome {
     let mut outcome = Outcome::new(&input.id, input.source.to_string(), Status::Ok, "");
-    outcome.identity = input.source.identity();
+    // Objects of stores tell theirs when they are read.
+    if !input.source.is_stored() {
+        outcome.identity = input.source.identity();
+    }
     outcome
 }
 
@@ -38,7 +42,11 @@ pub(super) fn open(
     stop: &Arc<AtomicBool>,
     outcome: &mut Outcome,
 ) -> Result<Opened, Failed> {
-    let source = watch.settle(reading::open(input, stop))?;
+    let opened = watch.settle(reading::open(input, watch, Part::Whole, stop));
+    if let Some(identity) = watch.identity() {
+        outcome.identity = identity;
+    }
+    let source = opened?;
     reading::describe(outcome, source.as_ref());
     if let Some(reason) = survey.refusal(source.spec().channels) {
         return Err(Failed::new(Status::Mismatch, reason));
@@ -93,7 +101,7 @@ impl SpanJob {
         let mut parts = Vec::new();
         let mut last = None;
         let mut decoded = 0;
-        let computed = reading::open(input, stop).and_then(|source| {
+        let computed = reading::open(input, &self.watch, Part::Span, stop).and_then(|source| {
             // The spans before this one were read from the file as it was then.
             self.watch.check()?;
             let signal = &self.planned.plan.config.signal;

@@ -24,6 +24,7 @@ pub(super) fn path_of(input: &Input) -> &str {
     match &input.source {
         InputSource::File(path) => path.to_str().unwrap_or(&input.id),
         InputSource::Member(member) => member.path.to_str().unwrap_or(&input.id),
+        InputSource::Object(object) => object.name(),
         InputSource::Memory(_) => &input.id,
         InputSource::Stdin => "-",
     }

@@ -52,6 +52,11 @@ pub fn inspect(paths: &[PathBuf], json: bool) -> Result<ExitCode, Failure> {
                     member.path.display()
                 )));
             }
+            InputSource::Object(object) => {
+                return Err(Failure::new(format!(
+                    "{object}: inspect looks at files; extract and classify read objects of stores"
+                )));
+            }
             InputSource::Memory(_) | InputSource::Stdin => {}
         }
     }

@@ -9,6 +9,6 @@ mod outputs;
 mod projection;
 mod refusals;
 mod streams;
-mod support;
+pub(crate) mod support;
 mod tables;
 mod tars;

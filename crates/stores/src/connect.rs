@@ -1,0 +1,166 @@
+//! Clients of stores, one for each bucket.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, Once, PoisonError};
+use std::time::Duration;
+
+use object_store::aws::{AmazonS3Builder, AmazonS3ConfigKey};
+use object_store::azure::{AzureConfigKey, MicrosoftAzureBuilder};
+use object_store::client::{HttpClient, HttpConnector, ReqwestConnector};
+use object_store::gcp::{GoogleCloudStorageBuilder, GoogleConfigKey};
+use object_store::http::HttpBuilder;
+use object_store::{BackoffConfig, ClientConfigKey, ClientOptions, ObjectStore, RetryConfig};
+
+use crate::error::StoreError;
+use crate::profile;
+use crate::uri::{Scheme, Uri};
+
+/// Time for one range, so that slow lines of 40 KB/s get through, and time without a byte.
+const TIMES: [(ClientConfigKey, &str); 2] =
+    [(ClientConfigKey::Timeout, "120 seconds"), (ClientConfigKey::ReadTimeout, "20 seconds")];
+
+/// The process, and its clients by the root of their objects.
+type Clients = HashMap<String, Arc<dyn ObjectStore>>;
+static CLIENTS: Mutex<Option<(u32, Clients)>> = Mutex::new(None);
+
+/// The client of an object's store.
+pub(crate) fn store(uri: &Uri) -> Result<Arc<dyn ObjectStore>, StoreError> {
+    if let Some(query) = &uri.query {
+        // Signed addresses are as many as objects: their clients share connections and are not kept.
+        return web(uri, Some(&query.0));
+    }
+    if let Some(store) = with_clients(|clients| clients.get(uri.root()).cloned()) {
+        return Ok(store);
+    }
+    let store = connect(uri)?;
+    Ok(with_clients(|clients| clients.entry(uri.root().to_owned()).or_insert(store).clone()))
+}
+
+fn with_clients<T>(work: impl FnOnce(&mut Clients) -> T) -> T {
+    let process = std::process::id();
+    let mut kept = CLIENTS.lock().unwrap_or_else(PoisonError::into_inner);
+    let (mut owner, mut clients) = kept.take().unwrap_or_else(|| (process, Clients::new()));
+    if owner != process {
+        // Those of the parent of a fork: their connections are the parent's.
+        std::mem::forget(std::mem::take(&mut clients));
+        owner = process;
+    }
+    let found = work(&mut clients);
+    *kept = Some((owner, clients));
+    found
+}
+
+fn connect(uri: &Uri) -> Result<Arc<dyn ObjectStore>, StoreError> {
+    cryptography();
+    let store: Arc<dyn ObjectStore> = match uri.scheme {
+        Scheme::S3 => Arc::new(amazon(uri)?.build().map_err(setup)?),
+        Scheme::Google => {
+            let mut builder = GoogleCloudStorageBuilder::from_env().with_bucket_name(uri.bucket());
+            for (key, value) in TIMES {
+                builder = builder.with_config(GoogleConfigKey::Client(key), value);
+            }
+            Arc::new(builder.with_retry(retry()).build().map_err(setup)?)
+        }
+        Scheme::Azure => {
+            let mut builder = MicrosoftAzureBuilder::from_env().with_url(uri.root());
+            for (key, value) in TIMES {
+                builder = builder.with_config(AzureConfigKey::Client(key), value);
+            }
+            Arc::new(builder.with_retry(retry()).build().map_err(setup)?)
+        }
+        Scheme::Web => return web(uri, None),
+    };
+    Ok(store)
+}
+
+fn amazon(uri: &Uri) -> Result<AmazonS3Builder, StoreError> {
+    use AmazonS3ConfigKey as Key;
+    let mut builder =
+        AmazonS3Builder::from_env().with_bucket_name(uri.bucket()).with_retry(retry());
+    let set = |builder: &AmazonS3Builder, key| builder.get_config_value(&key).is_some();
+    let has_role = set(&builder, Key::WebIdentityTokenFile) && set(&builder, Key::RoleArn);
+    let unsigned = builder.get_config_value(&Key::SkipSignature).is_some_and(|v| v == "true");
+    let needs_keys = !set(&builder, Key::AccessKeyId) && !has_role && !unsigned;
+    let profile = profile::chosen(needs_keys)?;
+    for (name, key, is_wanted) in [
+        ("aws_access_key_id", Key::AccessKeyId, needs_keys),
+        ("aws_secret_access_key", Key::SecretAccessKey, needs_keys),
+        ("aws_session_token", Key::Token, needs_keys),
+        ("region", Key::Region, true),
+        ("endpoint_url", Key::Endpoint, true),
+    ] {
+        if let (Some(value), true) = (profile.get(name), is_wanted && !set(&builder, key)) {
+            builder = builder.with_config(key, value);
+        }
+    }
+    let endpoint = [Key::S3Endpoint, Key::Endpoint].map(|key| builder.get_config_value(&key));
+    // Whoever names an endpoint without encryption wants it.
+    if endpoint.iter().flatten().next().is_some_and(|endpoint| endpoint.starts_with("http://")) {
+        builder = builder.with_config(Key::Client(ClientConfigKey::AllowHttp), "true");
+    }
+    for (key, value) in TIMES {
+        builder = builder.with_config(Key::Client(key), value);
+    }
+    Ok(builder)
+}
+
+fn web(uri: &Uri, query: Option<&str>) -> Result<Arc<dyn ObjectStore>, StoreError> {
+    cryptography();
+    let root = match query {
+        Some(query) => format!("{}/?{query}", uri.root()),
+        None => uri.root().to_owned(),
+    };
+    let builder = HttpBuilder::new().with_url(root).with_http_connector(Shared);
+    Ok(Arc::new(builder.with_retry(retry()).build().map_err(setup)?))
+}
+
+/// Web servers share one pool of connections.
+#[derive(Debug)]
+struct Shared;
+
+static WEB: Mutex<Option<(u32, HttpClient)>> = Mutex::new(None);
+
+impl HttpConnector for Shared {
+    fn connect(&self, _: &ClientOptions) -> object_store::Result<HttpClient> {
+        let process = std::process::id();
+        let mut kept = WEB.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, client)) = kept.as_ref().filter(|(owner, _)| *owner == process) {
+            return Ok(client.clone());
+        }
+        let client = ReqwestConnector::default().connect(&options().with_allow_http(true))?;
+        std::mem::forget(kept.replace((process, client.clone())));
+        Ok(client)
+    }
+}
+
+fn options() -> ClientOptions {
+    TIMES
+        .into_iter()
+        .fold(ClientOptions::new(), |options, (key, value)| options.with_config(key, value))
+}
+
+/// What the client repeats by itself: requests that got no answer, or one to come again. Ranges whose
+/// bytes break off are repeated by the reader.
+fn retry() -> RetryConfig {
+    RetryConfig {
+        backoff: BackoffConfig { max_backoff: Duration::from_secs(5), ..BackoffConfig::default() },
+        max_retries: 3,
+        retry_timeout: Duration::from_secs(60),
+    }
+}
+
+/// Chooses who encrypts, once in a process.
+fn cryptography() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        // Where the program that uses this crate has chosen already, that counts.
+        let _ = rustls::crypto::ring::default_provider().install_default();
+    });
+}
+
+fn setup(error: object_store::Error) -> StoreError {
+    match StoreError::from(error) {
+        StoreError::Failed(reason) => StoreError::Setup(reason),
+        other => other,
+    }
+}

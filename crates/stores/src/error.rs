@@ -1,0 +1,161 @@
+//! What can go wrong with an object or its store.
+
+use std::error::Error;
+use std::io;
+
+/// What can go wrong with an object or its store. No message holds credentials or signatures.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StoreError {
+    /// A name that no object can have.
+    #[error("{name} {reason}")]
+    Name {
+        /// The name.
+        name: String,
+        /// Why.
+        reason: String,
+    },
+    /// Nothing has this name.
+    #[error("the store has no such object")]
+    Missing,
+    /// The store does not let us.
+    #[error("the store refuses: {0}")]
+    Refused(String),
+    /// The client cannot be set up.
+    #[error("{0}")]
+    Setup(String),
+    /// The object is not the one that was read before.
+    #[error("{0} while it was read")]
+    Changed(String),
+    /// The bytes did not come, however often they were asked for.
+    #[error("the store failed: {0}")]
+    Failed(String),
+    /// The object has no bytes there.
+    #[error("the object ends before the bytes asked for")]
+    Beyond,
+    /// The server cannot do what is needed.
+    #[error("{0}")]
+    Unsupported(String),
+    /// The caller asked to stop.
+    #[error("interrupted")]
+    Stopped,
+}
+
+/// Where credentials are looked for.
+const NO_CREDENTIALS: &str = "no credentials were found: set those of the store in the environment \
+     (AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, GOOGLE_APPLICATION_CREDENTIALS, AZURE_STORAGE_*), or \
+     for a public bucket AWS_SKIP_SIGNATURE=true, GOOGLE_SKIP_SIGNATURE=true or AZURE_SKIP_SIGNATURE=true";
+/// Addresses that machines of a cloud get credentials from.
+const METADATA: [&str; 3] = ["169.254.169.254", "169.254.170.2", "metadata.google.internal"];
+
+/// Answers of a server that is asked too early or too often.
+const LATER: [&str; 2] = ["408 ", "429 "];
+
+impl StoreError {
+    /// Whether the next try may bring what this one did not.
+    pub(crate) fn is_worth_another_try(&self) -> bool {
+        matches!(self, Self::Failed(_))
+    }
+
+    /// Whether the fault is the job's: every object of the bucket will have it.
+    pub fn is_of_the_store(&self) -> bool {
+        matches!(self, Self::Refused(_) | Self::Setup(_) | Self::Unsupported(_) | Self::Failed(_))
+    }
+}
+
+impl From<object_store::Error> for StoreError {
+    fn from(error: object_store::Error) -> Self {
+        use object_store::Error as E;
+        match &error {
+            E::NotFound { .. } => Self::Missing,
+            E::Precondition { .. } | E::NotModified { .. } => {
+                Self::Changed("was replaced by another object".into())
+            }
+            E::PermissionDenied { .. } | E::Unauthenticated { .. } => Self::Refused(words(&error)),
+            E::NotSupported { .. } => Self::Unsupported(
+                "the server does not send parts of a file (HTTP ranges): download it".into(),
+            ),
+            _ if METADATA.iter().any(|host| error.to_string().contains(host)) => {
+                Self::Setup(NO_CREDENTIALS.into())
+            }
+            _ => match words(&error) {
+                // The second is what the client finds itself.
+                answer if answer.starts_with("416 ") || answer.starts_with("Wanted range") => {
+                    Self::Beyond
+                }
+                // Asking again changes nothing, but for answers that say so.
+                answer
+                    if answer.starts_with('4') && !LATER.iter().any(|l| answer.starts_with(l)) =>
+                {
+                    Self::Refused(answer)
+                }
+                answer => Self::Failed(answer),
+            },
+        }
+    }
+}
+
+impl From<StoreError> for io::Error {
+    fn from(error: StoreError) -> Self {
+        let kind = match error {
+            StoreError::Missing => io::ErrorKind::NotFound,
+            StoreError::Refused(_) => io::ErrorKind::PermissionDenied,
+            StoreError::Unsupported(_) => io::ErrorKind::Unsupported,
+            _ => io::ErrorKind::Other,
+        };
+        Self::new(kind, error)
+    }
+}
+
+/// The last cause of an error. What servers answer may repeat the request with its signature and token:
+/// of that only the status and the code count.
+fn words(error: &object_store::Error) -> String {
+    let mut cause: &dyn Error = error;
+    while let Some(next) = cause.source() {
+        cause = next;
+    }
+    let text = cause.to_string();
+    let code = between(&text, "<Code>", "</Code>").filter(|code| code.len() < 80);
+    let (_, answer) = text.split_once("status code: ").unwrap_or(("", &text));
+    let status = answer.split([':', '<', '\n', '?']).next().unwrap_or_default().trim();
+    match code {
+        Some(code) if text.contains("status code: ") => format!("{status} ({code})"),
+        Some(code) => code.to_owned(),
+        None => status.to_owned(),
+    }
+}
+
+fn between<'t>(text: &'t str, before: &str, after: &str) -> Option<&'t str> {
+    text.split_once(before)?.1.split_once(after).map(|(found, _)| found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(text: &str) -> String {
+        words(&object_store::Error::Generic { store: "S3", source: text.into() })
+    }
+
+    #[test]
+    fn answers_of_servers_are_told_without_what_was_sent() {
+        let body = "<?xml version=\"1.0\"?><Error><Code>SignatureDoesNotMatch</Code><StringToSign>secret\
+                    </StringToSign></Error>";
+        let text = format!("Server returned non-2xx status code: 403 Forbidden: {body}");
+        assert_eq!(of(&text), "403 Forbidden (SignatureDoesNotMatch)");
+        assert_eq!(of(&format!("Server returned error response: {body}")), "SignatureDoesNotMatch");
+        assert_eq!(
+            of("Server returned non-2xx status code: 404 Not Found: secret"),
+            "404 Not Found"
+        );
+        assert_eq!(of("http get /x.wav?signature=secret"), "http get /x.wav");
+        assert_eq!(of("Connection refused (os error 111)"), "Connection refused (os error 111)");
+        let is_refused = |answer: &str| {
+            let source = format!("Server returned non-2xx status code: {answer}: x").into();
+            let error = object_store::Error::Generic { store: "S3", source };
+            matches!(StoreError::from(error), StoreError::Refused(_))
+        };
+        assert!(is_refused("404 Not Found") && is_refused("400 Bad Request"));
+        assert!(!is_refused("429 Too Many Requests") && !is_refused("503 Slow Down"));
+    }
+}

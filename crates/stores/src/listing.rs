@@ -1,0 +1,34 @@
+//! Which objects there are.
+
+use futures_util::TryStreamExt;
+
+use crate::connect;
+use crate::error::StoreError;
+use crate::object::{Object, Version};
+use crate::runtime;
+use crate::uri::{Scheme, Uri};
+
+/// All objects below a folder, at any depth, sorted by the bytes of their keys.
+///
+/// # Errors
+/// [`StoreError`]; web servers have no folders that can be listed.
+pub fn list(folder: &Uri) -> Result<Vec<Object>, StoreError> {
+    if folder.scheme == Scheme::Web {
+        return Err(StoreError::Unsupported(
+            "a web server does not list its files: name them, or list them in a manifest".into(),
+        ));
+    }
+    let (store, path) = (connect::store(folder)?, folder.path()?);
+    let listing = runtime::spawn(async move {
+        let prefix = (!path.is_root()).then_some(path);
+        store.list(prefix.as_ref()).try_collect::<Vec<_>>().await
+    });
+    let found = runtime::wait(&listing, None)??;
+    let object = |meta: object_store::ObjectMeta| Object {
+        uri: folder.with_key(meta.location.as_ref()),
+        listed: Some(Version::of(&meta)),
+    };
+    let mut objects: Vec<Object> = found.into_iter().map(object).collect();
+    objects.sort_unstable_by(|a, b| a.uri.key().cmp(b.uri.key()));
+    Ok(objects)
+}

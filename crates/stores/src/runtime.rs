@@ -1,0 +1,96 @@
+//! The threads that wait for the network.
+//!
+//! A fork copies memory but no threads: each process has a runtime of its own.
+
+use std::future::Future;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use tokio::runtime::{Builder, Handle, Runtime};
+use tokio::task::AbortHandle;
+
+use crate::error::StoreError;
+
+/// Threads: they wait, decrypt and copy.
+const THREADS: usize = 2;
+/// How often one that waits looks whether it should stop.
+const LOOK: Duration = Duration::from_millis(50);
+
+static HERE: Mutex<Option<(u32, Runtime)>> = Mutex::new(None);
+
+/// The runtime of this process.
+fn handle() -> Result<Handle, StoreError> {
+    let process = std::process::id();
+    let mut here = HERE.lock().unwrap_or_else(PoisonError::into_inner);
+    match here.take() {
+        Some((owner, runtime)) if owner == process => {
+            let handle = runtime.handle().clone();
+            *here = Some((owner, runtime));
+            return Ok(handle);
+        }
+        // The parent's: its threads are not here, so nothing must wait for them.
+        Some((_, runtime)) => std::mem::forget(runtime),
+        None => {}
+    }
+    let runtime = Builder::new_multi_thread()
+        .worker_threads(THREADS)
+        .thread_name("stores")
+        .enable_all()
+        .build()
+        .map_err(|e| StoreError::Setup(format!("no threads for the network: {e}")))?;
+    let handle = runtime.handle().clone();
+    *here = Some((process, runtime));
+    Ok(handle)
+}
+
+/// Work that goes on while its result is not asked for; given up when dropped.
+pub(crate) struct Coming<T> {
+    result: Receiver<T>,
+    task: Option<AbortHandle>,
+    failed: Option<StoreError>,
+}
+
+impl<T> Drop for Coming<T> {
+    fn drop(&mut self) {
+        self.task.iter().for_each(AbortHandle::abort);
+    }
+}
+
+/// Starts work.
+pub(crate) fn spawn<T: Send + 'static>(
+    work: impl Future<Output = T> + Send + 'static,
+) -> Coming<T> {
+    let (send, result) = sync_channel(1);
+    let spawned = handle().map(|handle| {
+        handle.spawn(async move {
+            // Nobody waits any more: nothing to do.
+            let _ = send.send(work.await);
+        })
+    });
+    match spawned {
+        Ok(task) => Coming { result, task: Some(task.abort_handle()), failed: None },
+        Err(error) => Coming { result, task: None, failed: Some(error) },
+    }
+}
+
+/// The result of work; an error where `stop` is set before it comes.
+pub(crate) fn wait<T>(coming: &Coming<T>, stop: Option<&AtomicBool>) -> Result<T, StoreError> {
+    if let Some(error) = &coming.failed {
+        return Err(error.clone());
+    }
+    loop {
+        match coming.result.recv_timeout(LOOK) {
+            Ok(result) => return Ok(result),
+            Err(RecvTimeoutError::Timeout) => {
+                if stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+                    return Err(StoreError::Stopped);
+                }
+            }
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(StoreError::Failed("the request ended without an answer".into()));
+            }
+        }
+    }
+}
