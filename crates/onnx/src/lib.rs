@@ -2,7 +2,7 @@
 //! of them.
 //!
 //! [`clip`] and [`instances`] turn images into what the models take and what they give into tables;
-//! with the feature `runtime`, [`runtime`] runs them by ONNX Runtime, whose library the user names.
+//! with the feature `runtime`, its module of that name runs them by ONNX Runtime, whose library the user names.
 
 pub mod clip;
 mod error;
