@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use corsmal_vision::{Calibration, Camera};
 use serde_json::json;
 
-use super::refusal::{Refusal, to_json};
+use super::refusal::{corrupt, to_json};
 use crate::failure::Failure;
 
 /// Prints the cameras of a view.
@@ -14,11 +14,7 @@ pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
     let name = path.display().to_string();
     let calibration = match Calibration::load(path) {
         Ok(calibration) => calibration,
-        Err(error) => {
-            let reason = error.to_string();
-            return Refusal { path: &name, status: "corrupt", byte: None, reason: &reason }
-                .print(json);
-        }
+        Err(error) => return corrupt(path, &error, json),
     };
     if json {
         let contents = json!({ "path": name, "kind": "calibration", "cameras": calibration });

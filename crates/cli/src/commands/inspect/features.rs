@@ -4,6 +4,7 @@ use std::path::Path;
 
 use corsmal_files::layout::{TIMES, is_frame_level};
 use corsmal_files::npz::NpzFile;
+use corsmal_files::parquet::ParquetFile;
 use corsmal_plot::{FeaturePanel, FeaturePicture};
 use ndarray::{Array2, ArrayD, ArrayView2, Axis, Ix3, s};
 
@@ -23,18 +24,7 @@ pub fn draw_npz(file: &mut NpzFile, picture: &Picture) -> Result<(), Failure> {
         true => arrays.iter().map(|n| (*n).clone()).collect(),
         false => ids,
     };
-    let id = match &picture.recording {
-        Some(wanted) if known.contains(wanted) => wanted.clone(),
-        Some(wanted) => {
-            let some = known.iter().take(5).cloned().collect::<Vec<_>>().join(", ");
-            return Err(Failure::new(format!(
-                "{path}: no recording '{wanted}'; it has {} ({some}{})",
-                known.len(),
-                if known.len() > 5 { ", …" } else { "" }
-            )));
-        }
-        None => known.first().cloned().ok_or_else(|| nothing(&path))?,
-    };
+    let id = chosen(&path, &known, picture)?;
     let of = |name: &str| name == id || name.strip_prefix(&id).is_some_and(|r| r.starts_with('/'));
     let arrays: Vec<String> = arrays.into_iter().filter(|n| of(n)).cloned().collect();
     let mut panels = Vec::new();
@@ -49,6 +39,54 @@ pub fn draw_npz(file: &mut NpzFile, picture: &Picture) -> Result<(), Failure> {
         let feature = name.strip_prefix(&id).unwrap_or_default().trim_start_matches('/');
         panels.extend(panels_of(feature, values, picture)?);
     }
+    draw_frames(path, id, panels, time, picture)
+}
+
+/// Draws the frames of one recording of a Parquet file.
+pub fn draw_parquet(file: &mut ParquetFile, picture: &Picture) -> Result<(), Failure> {
+    let path = file.path().display().to_string();
+    let ids = file.table()?.0.ids().to_vec();
+    let id = chosen(&path, &ids, picture)?;
+    let row = ids.iter().position(|known| *known == id).unwrap_or_default();
+    let features = file.frame_features();
+    let mut panels = Vec::new();
+    let mut time = None;
+    for feature in &features {
+        let frames = file.frames(row, feature)?;
+        if frames.values.is_empty() {
+            continue;
+        }
+        time = time.or(frames.times.first().copied().zip(frames.times.last().copied()));
+        let named = if features.len() > 1 { feature } else { "" };
+        panels.extend(panels_of(named, frames.values, picture)?);
+    }
+    draw_frames(path, id, panels, time, picture)
+}
+
+/// The recording to draw, of those that there are.
+fn chosen(path: &str, known: &[String], picture: &Picture) -> Result<String, Failure> {
+    match &picture.recording {
+        Some(wanted) if known.contains(wanted) => Ok(wanted.clone()),
+        Some(wanted) => {
+            let some = known.iter().take(5).cloned().collect::<Vec<_>>().join(", ");
+            Err(Failure::new(format!(
+                "{path}: no recording '{wanted}'; it has {} ({some}{})",
+                known.len(),
+                if known.len() > 5 { ", …" } else { "" }
+            )))
+        }
+        None => known.first().cloned().ok_or_else(|| nothing(path)),
+    }
+}
+
+/// Draws the panels of one recording, from the first to the last `time` in seconds.
+fn draw_frames(
+    path: String,
+    id: String,
+    panels: Vec<FeaturePanel>,
+    time: Option<(f64, f64)>,
+    picture: &Picture,
+) -> Result<(), Failure> {
     if panels.is_empty() {
         return Err(nothing(&path));
     }

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use corsmal_vision::{Depth, Mask, Rgb};
 use serde_json::{Value, json};
 
-use super::refusal::{Refusal, to_json};
+use super::refusal::{corrupt, to_json};
 use crate::failure::Failure;
 
 /// Prints what a picture shows, as far as `capacity` and `crops` care.
@@ -18,11 +18,7 @@ pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
     };
     let (kind, text, mut facts) = match found {
         Ok(found) => found,
-        Err(error) => {
-            let reason = error.to_string();
-            return Refusal { path: &name, status: "corrupt", byte: None, reason: &reason }
-                .print(json);
-        }
+        Err(error) => return corrupt(path, &error, json),
     };
     if json {
         facts["path"] = name.into();

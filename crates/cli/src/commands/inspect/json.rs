@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use super::calibration;
 use super::model::flatten;
-use super::refusal::{Refusal, to_json};
+use super::refusal::{corrupt, to_json};
 use super::table::Counter;
 use crate::failure::Failure;
 
@@ -34,10 +34,7 @@ struct Contents {
 
 /// Prints what a file of JSON holds.
 pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
-    let refused = |reason: String| {
-        let path = path.display().to_string();
-        Refusal { path: &path, status: "corrupt", byte: None, reason: &reason }.print(json)
-    };
+    let refused = |reason: String| corrupt(path, &reason, json);
     let value = match read(path) {
         Ok(value) => value,
         Err(reason) => return refused(reason),

@@ -119,7 +119,10 @@ fn draw(path: &Path, picture: &Picture) -> Result<(), Failure> {
             let ids = table.ids.unwrap_or_else(|| rows.map(|row| row.to_string()).collect());
             features::draw_table(path, &ids, table.values.mapv(|v| v as f32).view(), picture)
         }
-        FeatureFile::Parquet(file) => {
+        FeatureFile::Parquet(mut file) => {
+            if !file.frame_features().is_empty() {
+                return features::draw_parquet(&mut file, picture);
+            }
             let (table, _) = file.table()?;
             features::draw_table(path, table.ids(), table.values(), picture)
         }

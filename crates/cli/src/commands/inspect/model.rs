@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use corsmal_models::model_file::{Model, ModelHeader};
 use serde_json::Value;
 
-use super::refusal::{Refusal, to_json};
+use super::refusal::{corrupt, to_json};
 use crate::failure::Failure;
 use crate::plural::plural;
 
@@ -19,10 +19,7 @@ pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
             print!("{}", if json { to_json(header)? } else { model_text(&name, header)? });
             Ok(ExitCode::SUCCESS)
         }
-        Err(error) => {
-            let reason = error.to_string();
-            Refusal { path: &name, status: "corrupt", byte: None, reason: &reason }.print(json)
-        }
+        Err(error) => corrupt(path, &error, json),
     }
 }
 

@@ -16,7 +16,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::extracted::{Recordings, shapes};
-use super::refusal::{Refusal, to_json};
+use super::refusal::{corrupt, to_json};
 use crate::configuration::nearest;
 use crate::failure::Failure;
 use crate::paragraphs::{WIDTH, wrapped};
@@ -170,11 +170,7 @@ pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
             print!("{}", if json { to_json(&report)? } else { report.text() });
             Ok(ExitCode::SUCCESS)
         }
-        Err(error) => {
-            let path = path.display().to_string();
-            let reason = error.to_string();
-            Refusal { path: &path, status: "corrupt", byte: None, reason: &reason }.print(json)
-        }
+        Err(error) => corrupt(path, &error, json),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Why a file cannot be shown, as text or JSON.
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use serde::Serialize;
@@ -26,6 +27,16 @@ impl Refusal<'_> {
         }
         Ok(ExitCode::from(FAILED_FILES))
     }
+}
+
+/// Says that the content of a file is not what its kind asks for.
+pub(super) fn corrupt(
+    path: &Path,
+    reason: &impl ToString,
+    json: bool,
+) -> Result<ExitCode, Failure> {
+    let (path, reason) = (path.display().to_string(), reason.to_string());
+    Refusal { path: &path, status: "corrupt", byte: None, reason: &reason }.print(json)
 }
 
 /// Indented JSON with a line's end.

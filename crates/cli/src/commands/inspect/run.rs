@@ -7,7 +7,7 @@ use corsmal_extract::config::Config;
 use corsmal_extract::ledger;
 use serde_json::json;
 
-use super::refusal::{Refusal, to_json};
+use super::refusal::{Refusal, corrupt, to_json};
 use crate::configuration::nearest;
 use crate::failure::Failure;
 use crate::plural::plural;
@@ -51,11 +51,7 @@ pub fn ledger(path: &Path, json: bool) -> Result<ExitCode, Failure> {
     let name = path.display().to_string();
     let (header, outcomes) = match ledger::look(path) {
         Ok(found) => found,
-        Err(error) => {
-            let reason = error.to_string();
-            return Refusal { path: &name, status: "corrupt", byte: None, reason: &reason }
-                .print(json);
-        }
+        Err(error) => return corrupt(path, &error, json),
     };
     let statuses = counts(&outcomes);
     let failed: Vec<_> = outcomes.iter().filter(|o| !o.status.has_features()).collect();

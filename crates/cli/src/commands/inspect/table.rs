@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use corsmal_files::csv_text;
 use serde::Serialize;
 
-use super::refusal::{Refusal, to_json};
+use super::refusal::{corrupt, to_json};
 use crate::failure::Failure;
 use crate::plural::plural;
 
@@ -93,10 +93,7 @@ impl Counter {
 pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
     match read(path) {
         Ok(contents) => contents.print(json),
-        Err(error) => {
-            let (path, reason) = (path.display().to_string(), error.to_string());
-            Refusal { path: &path, status: "corrupt", byte: None, reason: &reason }.print(json)
-        }
+        Err(error) => corrupt(path, &error, json),
     }
 }
 

@@ -9,7 +9,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::model::flatten;
-use super::refusal::{Refusal, to_json};
+use super::refusal::{corrupt, to_json};
 use crate::failure::Failure;
 use crate::plural::plural;
 
@@ -49,10 +49,7 @@ pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
             print!("{}", if json { to_json(&contents)? } else { contents.text() });
             Ok(ExitCode::SUCCESS)
         }
-        Err(reason) => {
-            let path = path.display().to_string();
-            Refusal { path: &path, status: "corrupt", byte: None, reason: &reason }.print(json)
-        }
+        Err(reason) => corrupt(path, &reason, json),
     }
 }
 

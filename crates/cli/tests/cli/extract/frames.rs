@@ -60,6 +60,14 @@ fn parquet_holds_the_frames_of_the_npz() {
     let inspected = ended(tool().arg("inspect").arg(at("1.parquet"))).with(0);
     let line = "9 recordings: frames of melspectrogram, rms";
     assert!(inspected.stdout.contains(line), "{}", inspected.stdout);
+    // The same panels as those of the npz, under the other file's name.
+    let drawn = ["npz", "parquet"].map(|kind| {
+        let (file, svg) = (at(&format!("1.{kind}")), at(&format!("{kind}.svg")));
+        let picture = ended(tool().arg("inspect").arg(&file).arg("--picture").arg(&svg));
+        picture.with(0);
+        std::fs::read_to_string(svg).unwrap().replace(&format!("1.{kind}"), "")
+    });
+    assert!(drawn[0] == drawn[1]);
     let refused = ended(tool().arg("train").arg(at("1.parquet"))).code;
     assert_eq!(refused, Some(2), "frames are no rows of statistics");
     assert!(names(folder.path()).iter().all(|n| !n.contains(".part") && !n.contains("unfinished")));
