@@ -14,8 +14,8 @@ Examples:
   corsmal-feat capacity --method m5 --data ~/CCM --detections detections --out capacity.csv
 
 A table CONTAINER/SEQUENCE.json for each recording with colour frames, as `capacity` and `crops` read
-them: what the model sees with its confidence, and masks of containers. Tables that are there are kept,
-so that an interrupted run goes on; model.json says which model made them.
+them: what the model sees with its confidence, and masks of containers. Existing tables are kept, so an
+interrupted run can be resumed; model.json says which model made them.
 
 Exit codes: 0 all fine, 1 some recordings have damaged files, 2 could not run, 130 interrupted.")]
 pub struct Args {
@@ -31,18 +31,19 @@ pub struct Args {
     /// Folder of the tables.
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
-    /// Frames that are looked at: ends (the first, the 20th from the end and the last, which m5 and the
-    /// vision baseline need), all (m3), or every=8 (m4), with the last.
+    /// Frames to run the model on: ends (the first, the 20th from the end and the last, which m5 and the
+    /// vision baseline need), all (m3), or every=8 (m4: numbers that 8
+    /// divides), with the last.
     #[arg(long, value_name = "WHICH", default_value = "ends", value_parser = frames)]
     frames: Frames,
-    /// Views that are looked at.
+    /// Views to run the model on.
     #[arg(long, value_delimiter = ',', default_value = "1,2,3,4", value_name = "VIEW")]
     #[arg(value_parser = clap::value_parser!(u8).range(1..=4))]
     views: Vec<u8>,
-    /// Least confidence of what is written.
+    /// Minimum confidence of detections to write.
     #[arg(long, value_name = "P", default_value_t = 0.05, value_parser = crate::args::share)]
     score: f64,
-    /// Make tables anew that are there.
+    /// Remake existing tables.
     #[arg(long)]
     overwrite: bool,
     #[command(flatten)]
@@ -99,15 +100,19 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let set = DataSet::open(&args.data)?;
     let runtime = Runtime::load(&args.library, args.jobs.count())?;
     let mut detector = Detector::open(&runtime, &args.model)?;
-    made_by(&args)?;
+    let tables: Vec<PathBuf> = set
+        .recordings
+        .iter()
+        .map(|recording| corsmal_ccm::capacity::Views::of(recording, None).table_in(&args.out))
+        .collect();
+    made_by(&args, &tables)?;
     let interrupted = || {
         eprintln!("interrupted; run the same command again to continue");
         ExitCode::from(INTERRUPTED)
     };
     let (mut written, mut kept, mut without, mut failed) = (0usize, 0usize, 0usize, 0usize);
-    for recording in &set.recordings {
+    for (recording, place) in set.recordings.iter().zip(tables) {
         let views = corsmal_ccm::capacity::Views::of(recording, None);
-        let place = views.table_in(&args.out);
         if place.exists() && !args.overwrite {
             kept += 1;
             continue;
@@ -152,9 +157,15 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
 }
 
-/// Says in the folder which model makes its tables; refuses to mix those of several.
+/// The views, each once.
 #[cfg(feature = "onnx")]
-fn made_by(args: &Args) -> Result<(), Failure> {
+fn chosen_views(args: &Args) -> std::collections::BTreeSet<u8> {
+    args.views.iter().copied().collect()
+}
+
+/// Says in the folder what its `tables` are made by and of; refuses to mix them with others.
+#[cfg(feature = "onnx")]
+fn made_by(args: &Args, tables: &[PathBuf]) -> Result<(), Failure> {
     use corsmal_files::{draft, identity};
 
     let identity = identity::of_file(&args.model)
@@ -165,18 +176,24 @@ fn made_by(args: &Args) -> Result<(), Failure> {
         Frames::Every(step) => format!("every={step}"),
     };
     let about = serde_json::json!({
-        "model": identity, "frames": frames, "views": args.views, "score": args.score,
+        "model": identity, "data": args.data.canonicalize()?, "frames": frames,
+        "views": chosen_views(args), "score": args.score,
         "tool_version": env!("CARGO_PKG_VERSION"),
     });
     let about = serde_json::to_string_pretty(&about)?;
-    if let (Ok(found), false) = (std::fs::read_to_string(&place), args.overwrite)
-        && found != about
-    {
-        return Err(Failure::new(format!(
-            "{}: the tables there are by another model, version or choice of frames; give another --out, or \
-             --overwrite",
-            place.display()
-        )));
+    let others = std::fs::read_to_string(&place).ok().is_none_or(|found| found != about);
+    if others {
+        for table in tables.iter().filter(|table| table.exists()) {
+            if !args.overwrite {
+                return Err(Failure::new(format!(
+                    "{}: made by another model or version, or of other data or frames; name another --out, \
+                     or give --overwrite",
+                    table.display()
+                )));
+            }
+            // An interrupted run must not leave those of two models.
+            std::fs::remove_file(table)?;
+        }
     }
     std::fs::create_dir_all(&args.out)
         .map_err(|e| Failure::new(format!("{}: {e}", args.out.display())))?;
@@ -205,12 +222,13 @@ fn seen(
     };
     let ends = views.ends(&[], corsmal_ccm::capacity::M5_FROM_END).map_err(fault)?;
     let (mut rows, mut any) = (Vec::new(), false);
-    for &view in &args.views {
+    for view in chosen_views(args) {
         let all = views.frames(Kind::Rgb, view).map_err(fault)?;
         let last = all.len().saturating_sub(1);
         for (i, frame) in all.iter().enumerate() {
             let wanted = match args.frames {
-                Frames::Every(step) => i % step == 0,
+                // By number, as `capacity` takes them.
+                Frames::Every(step) => (frame.number as usize).is_multiple_of(step),
                 Frames::Ends => ends.is_some_and(|(a, b)| [a, b].contains(&frame.number)),
             };
             if !wanted && i != last {

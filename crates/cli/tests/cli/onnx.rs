@@ -91,7 +91,10 @@ mod with_runtime {
         let said = done(&detect);
         assert_eq!([of(&said, "written"), of(&said, "kept")], [1, 1]);
         let other = [&detect[..], &["--frames", "every=8", "--views", "1"]].concat();
-        assert!(refused(&other).contains("by another model, version or choice of frames"));
+        assert!(
+            refused(&other)
+                .contains("made by another model or version, or of other data or frames")
+        );
         let said = done(&[&other[..], &["--overwrite"]].concat());
         assert_eq!(of(&said, "written"), 2);
         let table = std::fs::read_to_string(out.join("3/s0_fi1_fu1_b0_l0.json")).unwrap();
