@@ -209,6 +209,16 @@ fn systems(args: &Args) -> Result<Vec<Box<dyn System>>, Failure> {
                 "--weights {name}: no system of this run has that network"
             )));
         }
+        if weights.iter().any(|(known, _)| known == network) {
+            return Err(Failure::new(format!("--weights {name}: given twice")));
+        }
+        if corsmal_nets::model::NetModel::load(path).is_ok() {
+            return Err(Failure::new(format!(
+                "--weights {name}: {} is a network that this tool trained, perhaps on recordings that are \
+                 held out here; name weights that others trained",
+                path.display()
+            )));
+        }
         weights.push((network.to_owned(), path.clone()));
     }
     let epochs = args.epochs.map(|n| n as usize);
