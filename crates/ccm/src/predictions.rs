@@ -199,6 +199,19 @@ pub fn read_capacities(path: &Path) -> Result<HashMap<Named, Option<f64>>> {
         let value = table.number(row, capacity)?;
         by_key.insert(named, (value > -1.0).then_some(value));
     }
+    // An id without a part could be of any: beside others its estimate would be theirs, too.
+    let ids = |part: bool| {
+        let of_ids = |named: &&Named| matches!(named.key, RowKey::Id(_));
+        seen.iter().filter(of_ids).find(|named| named.part.is_some() == part)
+    };
+    if let (Some(_), Some(named)) = (ids(true), ids(false)) {
+        return Err(CcmError::Rows {
+            path: path.to_path_buf(),
+            problem: "ids without a part",
+            rows: named.to_string(),
+            expected: "a part for every id, or for none".into(),
+        });
+    }
     Ok(by_key)
 }
 
@@ -289,6 +302,20 @@ mod tests {
         let mean = RecordingPredictions::average(&[a.clone(), a], None).unwrap();
         let written = String::from_utf8(mean.to_csv().unwrap()).unwrap();
         assert_eq!(written, "id,fold,true,site,predicted,p_x,p_y\nr,1,y,A,x,1,0\n");
+    }
+
+    #[test]
+    fn capacities_name_the_part_of_every_id_or_of_none() {
+        let read = |rows: &str| {
+            let file = tempfile::NamedTempFile::new().unwrap();
+            std::fs::write(file.path(), format!("fileName,capacity[mL],part\n{rows}")).unwrap();
+            read_capacities(file.path()).map(|found| found.len()).map_err(|e| e.to_string())
+        };
+        let (named, unnamed) = ("id000000.png,400,public test\n", "id000000.png,300,\n");
+        assert_eq!((read(named), read(unnamed)), (Ok(1), Ok(1)));
+        let mixed = read(&[named, unnamed].concat()).unwrap_err();
+        assert!(mixed.contains("ids without a part: id 0"), "{mixed}");
+        assert_eq!(read(&format!("{named}id10_0001.png,200,\n")), Ok(2), "its container tells");
     }
 
     #[test]

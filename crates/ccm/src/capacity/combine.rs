@@ -8,6 +8,7 @@ use corsmal_files::draft;
 use corsmal_vision::lode::PRIOR_ML;
 
 use super::table::file_name;
+use crate::dataset::Subset;
 use crate::error::{CcmError, Result};
 use crate::predictions::{Named, read_capacities};
 use crate::submission::RowKey;
@@ -56,8 +57,11 @@ pub fn combine_files(inputs: &[PathBuf], prior: f64, out: &Path) -> Result<(usiz
         } else {
             values.iter().sum::<f64>() / values.len() as f64
         };
-        let part = named.part.filter(|_| several).map(|part| format!(",{}", part.name()));
-        let _ = writeln!(text, "{},{value}{}", file_name(named.key), part.unwrap_or_default());
+        let _ = write!(text, "{},{value}", file_name(named.key));
+        if several {
+            let _ = write!(text, ",{}", named.part.map_or("", Subset::name));
+        }
+        text.push('\n');
     }
     draft::write(out, text.as_bytes()).map_err(CcmError::Write)?;
     Ok((estimates.len(), without))
