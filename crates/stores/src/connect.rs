@@ -79,7 +79,7 @@ fn amazon(uri: &Uri) -> Result<AmazonS3Builder, StoreError> {
         AmazonS3Builder::from_env().with_bucket_name(uri.bucket()).with_retry(retry());
     let set = |builder: &AmazonS3Builder, key| builder.get_config_value(&key).is_some();
     let has_role = set(&builder, Key::WebIdentityTokenFile) && set(&builder, Key::RoleArn);
-    let unsigned = builder.get_config_value(&Key::SkipSignature).is_some_and(|v| v == "true");
+    let unsigned = builder.get_config_value(&Key::SkipSignature).is_some_and(|v| is_yes(&v));
     let needs_keys = !set(&builder, Key::AccessKeyId) && !has_role && !unsigned;
     let profile = profile::chosen(needs_keys)?;
     for (name, key, is_wanted) in [
@@ -102,6 +102,11 @@ fn amazon(uri: &Uri) -> Result<AmazonS3Builder, StoreError> {
         builder = builder.with_config(Key::Client(key), value);
     }
     Ok(builder)
+}
+
+/// Whether a setting is on, in the words that the client knows.
+fn is_yes(value: &str) -> bool {
+    ["1", "true", "on", "yes", "y"].contains(&value.to_ascii_lowercase().as_str())
 }
 
 fn web(uri: &Uri, query: Option<&str>) -> Result<Arc<dyn ObjectStore>, StoreError> {

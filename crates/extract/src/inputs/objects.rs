@@ -23,6 +23,15 @@ pub(super) fn find(
     skipped: &mut Vec<PathBuf>,
     unended: &mut Vec<PathBuf>,
 ) -> Result<(), InputError> {
+    let is_pattern = |named: &Object| {
+        let key = stored::key(named);
+        wildcard::is_glob(key) || key.contains('{')
+    };
+    // As on a disk, an object of this very name comes before what the name may stand for.
+    let whole = object(name).ok().filter(|named| !stored::is_web(named) && is_pattern(named));
+    if let Some(Ok(Some(object))) = whole.as_ref().map(stored::look) {
+        return take(object, found, skipped, unended);
+    }
     if let Some(names) = braces::expand(name)? {
         return names.iter().try_for_each(|name| find(name, found, skipped, unended));
     }
@@ -58,11 +67,9 @@ pub(super) fn listed(name: &str, stores: &mut HashSet<String>) -> Result<Object,
         return Err(failed(&object, reason.into()));
     }
     if !stored::is_web(&object) && stores.insert(stored::root(&object).to_owned()) {
-        return match stored::look(&object).map_err(|reason| failed(&object, reason))? {
-            Some(found) => Ok(found),
-            // Its row will say so.
-            None => Ok(object),
-        };
+        // What it says of this object would set its first row apart from the others; one that is not
+        // there has a row that says so.
+        stored::look(&object).map_err(|reason| failed(&object, reason))?;
     }
     Ok(object)
 }
@@ -159,14 +166,16 @@ fn find_glob(
         root if root.as_os_str().is_empty() => String::new(),
         root => format!("{}/", root.display()),
     };
-    let matches = wildcard::keys(pattern)?;
+    let keys = wildcard::Keys::new(pattern)?;
     let (before, passed) = (found.len(), skipped.len());
     for object in listing(&stored::with_key(named, &root))? {
         let key = stored::key(&object).to_owned();
-        if !matches(&key) {
+        let named_itself = keys.matches(&key);
+        if !named_itself && !keys.matches_above(&key) {
             continue;
         }
-        if archive::is_archive(Path::new(&key)) {
+        // As on a disk, archives in folders are passed over.
+        if named_itself && archive::is_archive(Path::new(&key)) {
             let path = PathBuf::from(object.to_string());
             find_archive(&path, &Place::Object(object.into()), found, skipped, unended)?;
         } else {

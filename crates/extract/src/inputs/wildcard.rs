@@ -56,17 +56,27 @@ pub(super) fn expand(pattern: &str) -> Result<Vec<PathBuf>, InputError> {
     Ok(found)
 }
 
-/// Whether a glob matches the key of an object, or a folder that the object lies in.
-///
-/// # Errors
-/// [`InputError::Glob`] names the pattern.
-pub(super) fn keys(pattern: &str) -> Result<impl Fn(&str) -> bool, InputError> {
-    let compiled = Pattern::new(pattern)
-        .map_err(|e| InputError::Glob { pattern: pattern.into(), reason: e.to_string() })?;
-    Ok(move |key: &str| {
-        let ends = key.match_indices('/').map(|(end, _)| end).chain([key.len()]);
-        ends.into_iter().any(|end| compiled.matches_with(&key[..end], OPTIONS))
-    })
+/// A glob of keys of objects.
+pub(super) struct Keys(Pattern);
+
+impl Keys {
+    /// # Errors
+    /// [`InputError::Glob`] names the pattern.
+    pub(super) fn new(pattern: &str) -> Result<Self, InputError> {
+        let compiled = Pattern::new(pattern)
+            .map_err(|e| InputError::Glob { pattern: pattern.into(), reason: e.to_string() })?;
+        Ok(Self(compiled))
+    }
+
+    /// Whether it matches the key.
+    pub(super) fn matches(&self, key: &str) -> bool {
+        self.0.matches_with(key, OPTIONS)
+    }
+
+    /// Whether it matches a folder that the object lies in.
+    pub(super) fn matches_above(&self, key: &str) -> bool {
+        key.match_indices('/').any(|(end, _)| self.matches(&key[..end]))
+    }
 }
 
 /// The entries of a folder that match.

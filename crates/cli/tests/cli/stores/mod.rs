@@ -143,6 +143,15 @@ fn names_globs_and_lists_find_what_a_disk_has() {
     assert_eq!(ids("s3://lab/audio/*.wav"), ["a", "f"]);
     assert_eq!(ids("s3://lab/audi?/b"), ["audio/b/c d%", "audio/b/e&ü"]);
     assert_eq!(ids("s3://lab/audio/{f,a}.wav"), ["f", "a"]);
+    // An object of that very name comes first, and archives in matched folders are passed over.
+    let bytes = fs::read(twins.at("audio/a.wav")).unwrap();
+    for name in ["lab/odd/x[1].wav", "lab/odd/x1.wav", "lab/odd/{a,b}.wav", "lab/data/a.wav"] {
+        twins.store.put(name, &bytes);
+    }
+    twins.store.put("lab/data/old.tar", b"no archive");
+    assert_eq!(ids("s3://lab/odd/x[1].wav"), ["x[1]"]);
+    assert_eq!(ids("s3://lab/odd/{a,b}.wav"), ["{a,b}"]);
+    assert_eq!(ids("s3://lab/dat*"), ["data/a"]);
     for (input, reason) in [
         ("s3://lab/none/", "no file with an audio extension"),
         ("s3://lab/none.wav", "no such file"),
@@ -289,6 +298,11 @@ fn manifests_name_objects_files_and_web_addresses() {
     // What signs an address stands nowhere.
     let told = format!("{}{}{:?}", run.stdout, run.stderr, found.outcomes());
     assert!(!told.contains("the-web-secret") && told.contains("/web/f%201.wav"), "{told}");
+
+    let first = "path,start,end\ns3://lab/audio/a.wav,0,0.1\ns3://lab/audio/a.wav,0.1,0.2\n";
+    fs::write(twins.at("first.csv"), first).unwrap();
+    twins.stored(twins.at("first.csv"), "first.npz", &["--preset", "mfcc-zcr"]).with(0);
+    assert_eq!(table(&twins.at("first.npz")).ids(), ["audio/a@0.0-0.1", "audio/a@0.1-0.2"]);
 
     fs::write(twins.at("tar.csv"), "path\ns3://lab/s.tar\n").unwrap();
     let run = twins.stored(twins.at("tar.csv"), "x.npz", &[]).with(2);
