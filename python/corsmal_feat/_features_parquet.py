@@ -78,6 +78,7 @@ def of_parquet(name: str) -> dict[str, Any]:
     rows = np.zeros((len(ids), 0), np.float32)
     if names:
         rows = np.stack([columns[k] for k in names], axis=1).astype(np.float32)
+    outcomes = metadata.get(b"corsmal.outcomes", b"").splitlines()
     meta = json.loads(metadata.get(b"corsmal.meta", b"{}"))
     return {
         "ids": ids,
@@ -88,7 +89,7 @@ def of_parquet(name: str) -> dict[str, Any]:
         "labels": {k: v for k, v in columns.items() if k not in names},
         "config": config,
         "config_hash": meta.get("config_hash", ""),
-        "outcomes": [json.loads(x) for x in metadata.get(b"corsmal.outcomes", b"").splitlines()],
+        "outcomes": [json.loads(line) for line in outcomes if line],
     }
 
 
@@ -106,13 +107,15 @@ def _lists(file: str, table: Any, ids: list[str], columns: dict[str, str]) -> di
             if not row.is_valid or not len(row.values):
                 continue  # too short for any frame: as in an .npz, not there
             lists, shape = row.values, []
+            even = True
             while lists.type.num_fields:
                 shape.append(len(lists))
+                even = even and len(lists.value_lengths().unique()) <= 1
                 lists = lists.flatten()
             counts = [*shape, len(lists)]
             # Each axis has the lengths of the lists in it; an empty one ends them.
             lengths = [n // max(outer, 1) for outer, n in zip([1, *shape], counts, strict=True)]
-            if math.prod(lengths) != len(lists) or lists.null_count:
+            if not even or math.prod(lengths) != len(lists) or lists.null_count:
                 raise ParameterError(
                     f"{file}: the lists of {name} are not of one length in the row of {recording!r}"
                 )

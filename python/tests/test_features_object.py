@@ -112,10 +112,12 @@ def test_frames_from_parquet(tmp_path: Path, folder: Path) -> None:
     pyarrow, tables = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
     table = tables.read_table(outs[1])
     at = table.column_names.index("rms")
-    ragged = pyarrow.array([[[[1.0, 2.0], [3.0]]]] * len(table), table.schema.field("rms").type)
-    tables.write_table(table.set_column(at, table.schema.field("rms"), ragged), outs[1])
-    with pytest.raises(cf.ParameterError, match=r"the lists of rms are not of one length"):
-        cf.load_features(outs[1])
+    field = table.schema.field("rms")
+    for lists in ([[1.0, 2.0], [3.0]], [[1.0, 2.0, 3.0], [4.0]]):
+        ragged = pyarrow.array([[lists]] * len(table), field.type)
+        tables.write_table(table.set_column(at, field, ragged), outs[1])
+        with pytest.raises(cf.ParameterError, match=r"the lists of rms are not of one length"):
+            cf.load_features(outs[1])
 
 
 def test_data_frames(folder: Path, summary: cf.Features, frames: cf.Features) -> None:

@@ -27,7 +27,7 @@ impl Levels {
         let mut outer = 1;
         for (axis, length) in shape.iter_mut().enumerate().take(depth) {
             let begun = self.repetition.iter().filter(|r| **r <= axis as i16 + 1).count();
-            *length = begun / outer;
+            *length = begun.checked_div(outer)?;
             outer = begun;
         }
         let mut again = Self::default();

@@ -125,7 +125,9 @@ impl Contents {
         let history = if header["history"].is_object() { &header["history"] } else { header };
         if let Some(epochs) = history["epochs"].as_array() {
             let mut text = plural(epochs.len(), "epoch");
-            let kept = history["kept"].as_u64().map_or(epochs.len(), |kept| kept as usize + 1);
+            let kept = history["kept"]
+                .as_u64()
+                .map_or(epochs.len(), |kept| (kept as usize).saturating_add(1));
             if let Some(epoch) = kept.checked_sub(1).and_then(|kept| epochs.get(kept)) {
                 let loss = epoch["loss"].as_f64().unwrap_or(f64::NAN);
                 let score = epoch["score"].as_f64().map(|s| format!(", score {s:.4}"));
