@@ -115,7 +115,7 @@ impl ComparedFile {
             return Self::parquet_frames(parquet, &features);
         }
         let table = parquet.numbers()?;
-        let reason = "a nested column, or not of numbers";
+        let reason = "a nested column, or neither numbers nor text";
         let refused =
             table.skipped.iter().map(|name| Refused { array: name.clone(), reason: reason.into() });
         let refused = refused.collect();
@@ -190,10 +190,9 @@ impl ComparedFile {
                 .map_err(|source| FeatureFileError::Npy { path: npy.path().into(), source }),
             FeatureFile::Parquet(parquet) => {
                 let Place { row, feature, times } = &self.places[index];
-                let frames = parquet.frames(*row, feature)?;
                 Ok(match times {
-                    true => Array1::from(frames.times).into_dyn(),
-                    false => frames.values.mapv(f64::from),
+                    true => Array1::from(parquet.frame_times(*row, feature)?).into_dyn(),
+                    false => parquet.frame_values(*row, feature)?.mapv(f64::from),
                 })
             }
         }

@@ -4,11 +4,12 @@ use std::fs::File;
 use std::path::Path;
 
 use ndarray::Array2;
-use parquet::basic::Type as Physical;
+use parquet::basic::{ConvertedType, LogicalType, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, DataType};
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::schema::types::ColumnDescriptor;
 
 use super::error::{ParquetTableError, layer, layout};
 use super::keys::ROWS;
@@ -18,18 +19,26 @@ use crate::table::ID;
 /// The numbers of a table, and its texts.
 #[derive(Debug)]
 pub struct NumericTable {
-    /// The text column `id`, where there is one.
+    /// The column `id` of texts or whole numbers, where there is one.
     pub ids: Option<Vec<String>>,
     /// Names of the numeric columns.
     pub names: Vec<String>,
-    /// Their types: `float32`, `float64`, `int32`, `int64` or `bool`.
+    /// Their types: `float32`, `float64`, `int32`, `int64`, `uint32`, `uint64` or `bool`.
     pub types: Vec<&'static str>,
     /// `[rows, columns]`; nulls are NaN.
     pub values: Array2<f64>,
-    /// The other text columns; nulls are empty.
+    /// The other text columns, and whole numbers that `float64` would round; nulls are empty.
     pub texts: Vec<(String, Vec<String>)>,
     /// Columns that are neither numbers nor text.
     pub skipped: Vec<String>,
+}
+
+/// What a column holds.
+enum Column {
+    Numbers(&'static str, Vec<f64>),
+    Texts(Vec<String>),
+    /// Neither, or bytes that are no UTF-8.
+    Other,
 }
 
 /// Reads the numeric columns of a table.
@@ -45,26 +54,18 @@ pub(super) fn read(
     let mut series: Vec<Vec<f64>> = Vec::new();
     for (index, column) in schema.columns().iter().enumerate() {
         let name = column.path().string();
-        let levels = column.max_def_level();
-        let mut parts = (0..reader.num_row_groups())
+        let parts = (0..reader.num_row_groups())
             .map(|group| reader.get_row_group(group)?.get_column_reader(index));
-        let numeric = type_of(column.physical_type()).filter(|_| column.max_rep_level() == 0);
-        if let Some(kind) = numeric {
-            let values = parts
-                .try_fold(Vec::new(), |values, part| numbers(part?, levels, rows, values))
-                .map_err(|e| layer(path, e))?;
-            names.push(name);
-            types.push(kind);
-            series.push(values);
-        } else if column.physical_type() == Physical::BYTE_ARRAY && column.max_rep_level() == 0 {
-            let values = parts
-                .try_fold(Vec::new(), |values, part| {
-                    texts(part?, levels, (rows, &mut text), values)
-                })
-                .map_err(|e| layer(path, e))?;
-            if name == ID { ids = Some(values) } else { labels.push((name, values)) }
-        } else {
-            skipped.push(name);
+        let found = of_column(column, parts, rows, &mut text).map_err(|e| layer(path, e))?;
+        match found {
+            Column::Texts(values) if name == ID => ids = Some(values),
+            Column::Texts(values) => labels.push((name, values)),
+            Column::Numbers(kind, values) => {
+                names.push(name);
+                types.push(kind);
+                series.push(values);
+            }
+            Column::Other => skipped.push(name),
         }
     }
     let found = ids.iter().map(Vec::len).chain(series.iter().map(Vec::len));
@@ -77,60 +78,113 @@ pub(super) fn read(
     Ok(NumericTable { ids, names, types, values, texts: labels, skipped })
 }
 
-/// The type of a column of numbers, in numpy's words.
-fn type_of(column: Physical) -> Option<&'static str> {
-    Some(match column {
-        Physical::FLOAT => "float32",
-        Physical::DOUBLE => "float64",
-        Physical::INT32 => "int32",
-        Physical::INT64 => "int64",
-        Physical::BOOLEAN => "bool",
-        _ => return None,
+/// Reads one column.
+fn of_column(
+    column: &ColumnDescriptor,
+    parts: impl Iterator<Item = Result<ColumnReader, ParquetError>>,
+    rows: usize,
+    left: &mut u64,
+) -> Result<Column, ParquetError> {
+    let Some(kind) = kind_of(column) else { return Ok(Column::Other) };
+    let levels = (column.max_def_level(), rows);
+    let (mut numbers, mut integers, mut bytes) = (Vec::new(), Vec::new(), Vec::new());
+    for part in parts {
+        match part? {
+            ColumnReader::FloatColumnReader(reader) => {
+                append(reader, levels, &mut numbers, |v| Ok(f64::from(v)), f64::NAN)?;
+            }
+            ColumnReader::DoubleColumnReader(reader) => {
+                append(reader, levels, &mut numbers, Ok, f64::NAN)?;
+            }
+            ColumnReader::BoolColumnReader(reader) => {
+                let number = |v| Ok(f64::from(u8::from(v)));
+                append(reader, levels, &mut numbers, number, f64::NAN)?;
+            }
+            ColumnReader::Int32ColumnReader(reader) => {
+                let whole = |v: i32| match kind {
+                    UNSIGNED32 => i128::from(v as u32),
+                    _ => i128::from(v),
+                };
+                append(reader, levels, &mut integers, |v| Ok(Some(whole(v))), None)?;
+            }
+            ColumnReader::Int64ColumnReader(reader) => {
+                let whole = |v: i64| match kind {
+                    UNSIGNED64 => i128::from(v as u64),
+                    _ => i128::from(v),
+                };
+                append(reader, levels, &mut integers, |v| Ok(Some(whole(v))), None)?;
+            }
+            ColumnReader::ByteArrayColumnReader(reader) => {
+                let text = |v: ByteArray| match String::from_utf8(v.data().to_vec()) {
+                    Ok(text) => spend(left, &text).map(drop).map(|()| Some(text)),
+                    Err(_) => Ok(None),
+                };
+                append(reader, levels, &mut bytes, text, Some(String::new()))?;
+            }
+            _ => return Err(ParquetError::General("a column holds another type".into())),
+        }
+    }
+    Ok(match kind {
+        TEXT => bytes.into_iter().collect::<Option<_>>().map_or(Column::Other, Column::Texts),
+        "float32" | "float64" | "bool" => Column::Numbers(kind, numbers),
+        _ => whole(column, kind, integers, left)?,
     })
 }
 
-fn numbers(
-    reader: ColumnReader,
-    levels: i16,
-    rows: usize,
-    mut into: Vec<f64>,
-) -> Result<Vec<f64>, ParquetError> {
-    let missing = f64::NAN;
-    match reader {
-        ColumnReader::FloatColumnReader(r) => {
-            append(r, (levels, rows), &mut into, |v| Ok(f64::from(v)), missing)
-        }
-        ColumnReader::DoubleColumnReader(r) => append(r, (levels, rows), &mut into, Ok, missing),
-        ColumnReader::Int32ColumnReader(r) => {
-            append(r, (levels, rows), &mut into, |v| Ok(f64::from(v)), missing)
-        }
-        ColumnReader::Int64ColumnReader(r) => {
-            append(r, (levels, rows), &mut into, |v| Ok(v as f64), missing)
-        }
-        ColumnReader::BoolColumnReader(r) => {
-            append(r, (levels, rows), &mut into, |v| Ok(f64::from(u8::from(v))), missing)
-        }
-        _ => Err(ParquetError::General("a numeric column holds another type".into())),
-    }?;
-    Ok(into)
+/// Whole numbers; as text where they are ids, or where a decimal number would not be the same.
+fn whole(
+    column: &ColumnDescriptor,
+    kind: &'static str,
+    values: Vec<Option<i128>>,
+    left: &mut u64,
+) -> Result<Column, ParquetError> {
+    const EXACT: u128 = 1 << 53;
+    let exact = values.iter().flatten().all(|value| value.unsigned_abs() <= EXACT);
+    if exact && column.path().string() != ID {
+        let number = |value: Option<i128>| value.map_or(f64::NAN, |value| value as f64);
+        return Ok(Column::Numbers(kind, values.into_iter().map(number).collect()));
+    }
+    let mut texts = Vec::with_capacity(values.len());
+    for value in values {
+        let text = value.map_or(String::new(), |value| value.to_string());
+        spend(left, &text)?;
+        texts.push(text);
+    }
+    Ok(Column::Texts(texts))
 }
 
-fn texts(
-    reader: ColumnReader,
-    levels: i16,
-    (rows, left): (usize, &mut u64),
-    mut into: Vec<String>,
-) -> Result<Vec<String>, ParquetError> {
-    let ColumnReader::ByteArrayColumnReader(reader) = reader else {
-        return Err(ParquetError::General("a text column holds another type".into()));
+const TEXT: &str = "text";
+const UNSIGNED32: &str = "uint32";
+const UNSIGNED64: &str = "uint64";
+
+/// What the values of a column are, numbers in numpy's words; `None` for what is neither number nor
+/// text, such as dates and decimal fractions of integers, and for lists.
+fn kind_of(column: &ColumnDescriptor) -> Option<&'static str> {
+    if column.max_rep_level() > 0 {
+        return None;
+    }
+    let whole = |signed, unsigned| match (column.logical_type_ref(), column.converted_type()) {
+        (Some(LogicalType::Integer(integer)), _) => {
+            Some(if integer.is_signed { signed } else { unsigned })
+        }
+        (Some(_), _) => None,
+        (None, ConvertedType::NONE) => Some(signed),
+        (None, ConvertedType::INT_8 | ConvertedType::INT_16) => Some(signed),
+        (None, ConvertedType::INT_32 | ConvertedType::INT_64) => Some(signed),
+        (None, ConvertedType::UINT_8 | ConvertedType::UINT_16) => Some(unsigned),
+        (None, ConvertedType::UINT_32 | ConvertedType::UINT_64) => Some(unsigned),
+        (None, _) => None,
     };
-    let text = |v: ByteArray| {
-        let text = String::from_utf8_lossy(v.data()).into_owned();
-        spend(left, &text)?;
-        Ok(text)
-    };
-    append(reader, (levels, rows), &mut into, text, String::new())?;
-    Ok(into)
+    match column.physical_type() {
+        Physical::FLOAT => Some("float32"),
+        Physical::DOUBLE => Some("float64"),
+        Physical::BOOLEAN => Some("bool"),
+        Physical::INT32 => whole("int32", UNSIGNED32),
+        Physical::INT64 => whole("int64", UNSIGNED64),
+        Physical::BYTE_ARRAY if column.converted_type() == ConvertedType::DECIMAL => None,
+        Physical::BYTE_ARRAY => Some(TEXT),
+        _ => None,
+    }
 }
 
 /// Appends the rows of a column, `missing` where the definition level says that there is no value.
@@ -166,7 +220,7 @@ fn append<T: DataType, V: Clone>(
 mod tests {
     use std::sync::Arc;
 
-    use parquet::data_type::{ByteArrayType, DoubleType, Int64Type};
+    use parquet::data_type::{ByteArrayType, DoubleType, Int32Type, Int64Type};
     use parquet::file::properties::WriterProperties;
     use parquet::file::writer::SerializedFileWriter;
     use parquet::schema::parser::parse_message_type;
@@ -220,5 +274,56 @@ mod tests {
         let x = found.values.column(0);
         assert_eq!([x[0], x[2]], [0.5, -2.0]);
         assert!(x[1].is_nan() && found.skipped.is_empty());
+    }
+
+    #[test]
+    fn whole_numbers_are_read_as_what_they_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("whole.parquet");
+        let schema = parse_message_type(
+            "message m { required int64 id; required int64 large; required int64 at (TIMESTAMP_MICROS);
+             required int64 price (DECIMAL(9,2)); required int64 unsigned (UINT_64);
+             required int32 small (UINT_32); required int64 whole; required binary bytes; }",
+        );
+        let file = std::fs::File::create(&path).unwrap();
+        let properties = Arc::new(WriterProperties::builder().build());
+        let mut writer =
+            SerializedFileWriter::new(file, Arc::new(schema.unwrap()), properties).unwrap();
+        let mut group = writer.next_row_group().unwrap();
+        let odd = (1_i64 << 53) + 1;
+        for values in [[7, 8], [odd, odd - 1], [5, 6], [150, 250], [-1, 1]] {
+            let mut column = group.next_column().unwrap().unwrap();
+            column.typed::<Int64Type>().write_batch(&values, None, None).unwrap();
+            column.close().unwrap();
+        }
+        let mut column = group.next_column().unwrap().unwrap();
+        column.typed::<Int32Type>().write_batch(&[-1, 1], None, None).unwrap();
+        column.close().unwrap();
+        let mut column = group.next_column().unwrap().unwrap();
+        column.typed::<Int64Type>().write_batch(&[odd - 1, -3], None, None).unwrap();
+        column.close().unwrap();
+        let mut column = group.next_column().unwrap().unwrap();
+        let bytes = [vec![0xff_u8], vec![0xfe]].map(ByteArray::from);
+        column.typed::<ByteArrayType>().write_batch(&bytes, None, None).unwrap();
+        column.close().unwrap();
+        group.close().unwrap();
+        writer.close().unwrap();
+
+        let found = crate::parquet::ParquetFile::open(&path).unwrap().numbers().unwrap();
+        assert_eq!(found.ids.unwrap(), ["7", "8"]);
+        assert_eq!(found.skipped, ["at", "price", "bytes"]);
+        assert_eq!(
+            (found.names, found.types),
+            (vec!["small".into(), "whole".into()], vec!["uint32", "int64"])
+        );
+        assert_eq!(found.values.column(0).to_vec(), [4_294_967_295.0, 1.0]);
+        assert_eq!(found.values.column(1).to_vec(), [9_007_199_254_740_992.0, -3.0]);
+        let texts = [
+            ("large", ["9007199254740993", "9007199254740992"]),
+            ("unsigned", ["18446744073709551615", "1"]),
+        ];
+        let texts =
+            texts.map(|(name, values)| (name.to_string(), values.map(String::from).to_vec()));
+        assert_eq!(found.texts, texts);
     }
 }

@@ -90,6 +90,10 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
     })
 }
 
+/// Why a column of a Parquet table is neither feature nor label.
+const UNREAD: &str =
+    "holds neither numbers nor text: dates, lists, decimals and bytes are not read";
+
 /// Columns of decimal numbers are features, all others label columns: so pandas and polars leave a
 /// table of ours. Where all values of a column are whole, they may make it one of integers: names
 /// such as `mfcc[0].mean` stay features.
@@ -99,16 +103,14 @@ pub(super) fn read_parquet(
     members: &MemberNames,
 ) -> Result<LabelledTable> {
     let fault = |reason: String| DatasetError::content(path, reason);
-    let NumericTable { ids, names, types, values, mut texts, .. } =
+    let NumericTable { ids, names, types, values, mut texts, skipped } =
         parquet.numbers().map_err(FeatureFileError::from)?;
     // pandas keeps its index in such a column.
     texts.retain(|(name, _)| !name.starts_with(RESERVED));
     let mut features = Vec::new();
     for (at, (name, kind)) in names.iter().zip(&types).enumerate() {
         if name.starts_with(RESERVED) {
-        } else if kind.starts_with("float")
-            || (kind.starts_with("int") && name.contains(['[', '.']))
-        {
+        } else if kind.starts_with("float") || (kind.contains("int") && name.contains(['[', '.'])) {
             features.push(at);
         } else {
             let whole = |v: &f64| if v.is_nan() { String::new() } else { format!("{v:.0}") };
@@ -142,7 +144,7 @@ pub(super) fn read_parquet(
         config: Value::Null,
         config_hash: String::new(),
         columns: texts,
-        unread: Vec::new(),
+        unread: skipped.into_iter().map(|name| (name, UNREAD.into())).collect(),
     })
 }
 
