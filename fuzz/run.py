@@ -15,10 +15,13 @@ import resource
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections import defaultdict
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
+#: In memory where the system has such a place.
+MEMORY = Path("/dev/shm")
 TARGETS = [path.stem for path in sorted((HERE / "targets").glob("*.rs"))]
 #: An input that takes longer is a finding.
 SECONDS = 20
@@ -51,6 +54,7 @@ def one(target: str, options: argparse.Namespace) -> dict[str, object]:
     before = cpu_of_children()
     end = datetime.datetime.now() + datetime.timedelta(seconds=options.seconds)
     executions = findings = 0
+    work = tempfile.mkdtemp(prefix="corsmal-fuzz-", dir=MEMORY if MEMORY.is_dir() else None)
     while (left := (end - datetime.datetime.now()).total_seconds()) > 1 and findings < 5:
         command = [
             str(options.binaries / target),
@@ -62,7 +66,7 @@ def one(target: str, options: argparse.Namespace) -> dict[str, object]:
             "-max_len=65536",
             "-print_final_stats=1",
         ]
-        environment = {**os.environ, "RUST_BACKTRACE": "0"}
+        environment = {**os.environ, "RUST_BACKTRACE": "0", "CORSMAL_FUZZ_FOLDER": work}
         with (options.corpus / f"{target}.out").open("w+") as out:
             done = subprocess.run(command, stdout=out, stderr=out, check=False, env=environment)
             out.seek(0)
@@ -74,8 +78,7 @@ def one(target: str, options: argparse.Namespace) -> dict[str, object]:
         if done.returncode != 0 and not was_starved(options.binaries / target, artifacts):
             findings += 1
             print(f"{target}: exit {done.returncode}, see {artifacts}", file=sys.stderr)
-    for folder in Path("/dev/shm").glob("corsmal-fuzz-*"):
-        shutil.rmtree(folder, ignore_errors=True)
+    shutil.rmtree(work, ignore_errors=True)
     cpu = cpu_of_children() - before
     count = sum(1 for _ in corpus.iterdir())
     date = datetime.date.today().isoformat()

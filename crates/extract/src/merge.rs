@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use corsmal_files::draft;
 use corsmal_files::feature_file::{FeatureFile, FeatureFileError};
 use corsmal_files::format::{FormatError, OutputFormat};
-use corsmal_files::identity;
+use corsmal_files::identity::{self, Stamp};
 use corsmal_files::layout;
 use corsmal_files::npz::{Compression, EntryRecord, NpzError, NpzWriter};
 use corsmal_files::parquet::{self, FramesWriter, ParquetFile, ParquetTableError};
@@ -54,6 +54,12 @@ pub enum MergeError {
         /// What it is.
         actual: String,
     },
+    /// A shard is no longer the file that was found first.
+    #[error("{path} was changed while it was merged; merge again once nothing writes it")]
+    Changed {
+        /// The shard.
+        path: PathBuf,
+    },
     /// The tables of two shards do not fit together.
     #[error("{path}: {source}")]
     Table {
@@ -74,6 +80,31 @@ pub enum Existing {
     Resume,
     /// Replace it.
     Overwrite,
+}
+
+/// A shard as it was found.
+struct Piece {
+    path: PathBuf,
+    identity: String,
+    stamp: Option<Stamp>,
+}
+
+impl Piece {
+    /// Takes the identity of a file before anything is read from it.
+    fn find(path: &Path) -> Result<Self, MergeError> {
+        let io = |e| NpzError::io(path, e);
+        let stamp = Stamp::of_path(path).map_err(io)?;
+        let identity = identity::of_file(path).map_err(io)?;
+        Ok(Self { path: path.into(), identity, stamp })
+    }
+
+    /// Refuses what was read where the file is another one by now.
+    fn require_same(&self) -> Result<(), MergeError> {
+        match Stamp::of_path(&self.path) {
+            Ok(now) if now == self.stamp => Ok(()),
+            _ => Err(MergeError::Changed { path: self.path.clone() }),
+        }
+    }
 }
 
 /// A shard whose arrays are in the result.
@@ -107,16 +138,14 @@ pub fn merge(shards: &[PathBuf], out: &Path, existing: Existing) -> Result<(), M
     }
     let (shards, provenance) = in_order(shards, out)?;
     if let (OutputFormat::Npz(compression), Some(first)) = (&mut format, shards.first())
-        && let FeatureFile::Npz(npz) = &mut FeatureFile::open(first)?
+        && let FeatureFile::Npz(npz) = &mut FeatureFile::open(&first.path)?
     {
         *compression = layout::compression(npz)?;
     }
     let header = Header::new(&provenance, format_args!("merge of {}, {format}", shards.len()));
     let (ledger, done) = if existing == Existing::Resume {
         let same = |i: usize, done: &Merged| {
-            let now =
-                shards.get(i).filter(|path| **path == done.shard).map(|p| identity::of_file(p));
-            now.is_some_and(|now| now.is_ok_and(|now| now == done.identity))
+            shards.get(i).is_some_and(|s| s.path == done.shard && s.identity == done.identity)
         };
         let (ledger, resumed) = Ledger::resume(out, &header, same)?;
         (ledger, resumed.records)
@@ -137,7 +166,7 @@ pub fn merge(shards: &[PathBuf], out: &Path, existing: Existing) -> Result<(), M
 /// A merge at work.
 struct Merge<'a> {
     ledger: Ledger,
-    shards: &'a [PathBuf],
+    shards: &'a [Piece],
     provenance: &'a Provenance,
     format: OutputFormat,
 }
@@ -161,8 +190,8 @@ impl Merge<'_> {
         };
         let mut joined: Option<Table> = None;
         let mut frames = false;
-        for (index, shard) in self.shards.iter().enumerate() {
-            let identity = identity::of_file(shard).map_err(|e| NpzError::io(shard, e))?;
+        for (index, piece) in self.shards.iter().enumerate() {
+            let shard = &piece.path;
             let mut file = FeatureFile::open(shard)?;
             let read = file.table()?;
             if read.format != self.format {
@@ -178,6 +207,7 @@ impl Merge<'_> {
                 frames |= !parquet.frame_features().is_empty();
             }
             if index < ready {
+                piece.require_same()?;
                 continue;
             }
             let mut entries = Vec::new();
@@ -188,6 +218,8 @@ impl Merge<'_> {
                     entries.push(writer.copy(&entry, raw)?);
                 }
             }
+            piece.require_same()?;
+            let identity = piece.identity.clone();
             self.ledger.append(&Merged { shard: shard.clone(), identity, entries })?;
         }
         let table = joined.unwrap_or_default();
@@ -205,37 +237,40 @@ impl Merge<'_> {
     fn write_frames(&self, part: File, path: &Path, table: &Table) -> Result<(), MergeError> {
         let mut writer = FramesWriter::over(part, path, table, self.provenance)?;
         let features = self.provenance.features();
-        for shard in self.shards {
-            let mut file = ParquetFile::open(shard)?;
+        for piece in self.shards {
+            let mut file = ParquetFile::open(&piece.path)?;
             for row in 0..file.table()?.0.ids().len() {
                 let frames = features.iter().map(|feature| file.frames(row, feature));
                 writer.push(frames.collect::<Result<_, _>>()?)?;
             }
+            piece.require_same()?;
         }
         Ok(writer.finish()?)
     }
 }
 
 /// Brings the shards into order, checks that they are all of one run, and says how that was made.
-fn in_order(shards: &[PathBuf], out: &Path) -> Result<(Vec<PathBuf>, Provenance), MergeError> {
+fn in_order(shards: &[PathBuf], out: &Path) -> Result<(Vec<Piece>, Provenance), MergeError> {
     let mut pieces = Vec::with_capacity(shards.len());
     for path in shards {
-        pieces.push((path.clone(), FeatureFile::open(path)?.provenance()?));
+        let piece = Piece::find(path)?;
+        pieces.push((piece, FeatureFile::open(path)?.provenance()?));
     }
     pieces.sort_by_key(|(_, made)| made.shard.parse::<Shard>().map_or(0, |s| s.index));
     let count = pieces.len();
-    let Some((_, first)) = pieces.first().cloned() else {
+    let Some(first) = pieces.first().map(|(_, made)| made.clone()) else {
         return Err(not_one_run(out, "at least one shard".into(), "none".into()));
     };
-    let mut paths = Vec::with_capacity(count);
-    for (index, (path, made)) in pieces.into_iter().enumerate() {
+    let mut ordered = Vec::with_capacity(count);
+    for (index, (piece, made)) in pieces.into_iter().enumerate() {
+        let path = &piece.path;
         let shard = Shard { index, count }.to_string();
         let of = made.shard.parse::<Shard>().map_or(count, |s| s.count);
         if of != count {
-            return Err(not_one_run(&path, format!("all {of} shards"), format!("{count}")));
+            return Err(not_one_run(path, format!("all {of} shards"), format!("{count}")));
         }
         if made.shard != shard {
-            return Err(not_one_run(&path, format!("shard {shard}"), made.shard));
+            return Err(not_one_run(path, format!("shard {shard}"), made.shard));
         }
         let fields = |p: &Provenance| {
             [
@@ -248,11 +283,11 @@ fn in_order(shards: &[PathBuf], out: &Path) -> Result<(Vec<PathBuf>, Provenance)
         };
         let both = fields(&first).into_iter().zip(fields(&made));
         if let Some(((field, expected), (_, found))) = both.into_iter().find(|(a, b)| a != b) {
-            return Err(not_one_run(&path, format!("{field} {expected}"), found));
+            return Err(not_one_run(path, format!("{field} {expected}"), found));
         }
-        paths.push(path);
+        ordered.push(piece);
     }
-    Ok((paths, Provenance { shard: Shard::default().to_string(), ..first }))
+    Ok((ordered, Provenance { shard: Shard::default().to_string(), ..first }))
 }
 
 fn not_one_run(path: &Path, expected: String, actual: String) -> MergeError {
@@ -302,8 +337,9 @@ mod tests {
                 let format = OutputFormat::Npz(compression);
                 let header = Header::new(&provenance, format_args!("merge of 3, {format}"));
                 let ledger = Ledger::create(&out, &header).unwrap();
-                let mut two =
-                    Merge { ledger, shards: &shards[..2], provenance: &provenance, format };
+                let two: Vec<Piece> =
+                    shards[..2].iter().map(|path| Piece::find(path).unwrap()).collect();
+                let mut two = Merge { ledger, shards: &two, provenance: &provenance, format };
                 two.write(Vec::new()).unwrap();
                 // As a kill would leave it.
                 drop(two);
@@ -322,5 +358,24 @@ mod tests {
                 std::fs::remove_file(&out).unwrap();
             }
         }
+    }
+
+    #[test]
+    fn a_shard_that_changes_after_it_was_found_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("0.npz");
+        let provenance = shard(&path, Compression::Stored, Shard::default());
+        let out = folder.path().join("out.npz");
+        let format = OutputFormat::Npz(Compression::Stored);
+        let header = Header::new(&provenance, format_args!("merge of 1, {format}"));
+        let pieces = [Piece::find(&path).unwrap()];
+        // As another run would replace it: a file of the same size under the same name.
+        let other = folder.path().join("other.npz");
+        std::fs::copy(&path, &other).unwrap();
+        std::fs::rename(&other, &path).unwrap();
+        let ledger = Ledger::create(&out, &header).unwrap();
+        let mut merge = Merge { ledger, shards: &pieces, provenance: &provenance, format };
+        let refused = merge.write(Vec::new()).unwrap_err();
+        assert!(refused.to_string().contains("0.npz was changed"), "{refused}");
     }
 }

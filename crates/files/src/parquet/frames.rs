@@ -244,34 +244,51 @@ impl ParquetFile {
         frames.map(str::to_owned).collect()
     }
 
-    /// The frames of a row. Rows in order are read fastest.
+    /// The frames of a row and their times. Rows in order are read fastest.
     ///
     /// # Errors
     /// [`ParquetTableError`]; there is no such row or feature, or it has more than [`MAX_FRAMES`]
     /// values.
     pub fn frames(&mut self, row: usize, feature: &str) -> Result<Frames, ParquetTableError> {
-        let path = self.path().to_path_buf();
-        shielded(&path, || {
-            if !self.cursors.checked {
-                self.check_pages()?;
-                self.cursors.checked = true;
-            }
-            let (values, levels) =
-                self.row(row, &path_of(feature, AXES), |reader, skip| match reader {
-                    ColumnReader::FloatColumnReader(reader) => record(reader, skip),
-                    _ => Err(ParquetError::General("frames that are not float32".into())),
-                })?;
-            let ragged =
-                || layout(&path, "frames that are an array", format!("lists in row {row}"));
-            let shape = levels.shape(AXES).ok_or_else(ragged)?;
-            let values = ArrayD::from_shape_vec(shape, values).map_err(|_| ragged())?;
-            let times = path_of(&format!("{TIMES}{feature}"), 1);
-            let (times, _) = self.row(row, &times, |reader, skip| match reader {
-                ColumnReader::DoubleColumnReader(reader) => record(reader, skip),
-                _ => Err(ParquetError::General("times that are not float64".into())),
-            })?;
-            Ok(Frames { values, times })
-        })
+        let values = self.frame_values(row, feature)?;
+        Ok(Frames { values, times: self.frame_times(row, feature)? })
+    }
+
+    /// The frames of a row, without their times.
+    ///
+    /// # Errors
+    /// As [`ParquetFile::frames`].
+    pub fn frame_values(
+        &mut self,
+        row: usize,
+        feature: &str,
+    ) -> Result<ArrayD<f32>, ParquetTableError> {
+        let place = path_of(feature, AXES);
+        let (values, levels) = self.row(row, &place, |reader, skip| match reader {
+            ColumnReader::FloatColumnReader(reader) => record(reader, skip),
+            _ => Err(ParquetError::General("frames that are not float32".into())),
+        })?;
+        let path = self.path();
+        let ragged = || layout(path, "frames that are an array", format!("lists in row {row}"));
+        let shape = levels.shape(AXES).ok_or_else(ragged)?;
+        ArrayD::from_shape_vec(shape, values).map_err(|_| ragged())
+    }
+
+    /// The times of the frames of a row, in seconds.
+    ///
+    /// # Errors
+    /// As [`ParquetFile::frames`].
+    pub fn frame_times(
+        &mut self,
+        row: usize,
+        feature: &str,
+    ) -> Result<Vec<f64>, ParquetTableError> {
+        let place = path_of(&format!("{TIMES}{feature}"), 1);
+        let (times, _) = self.row(row, &place, |reader, skip| match reader {
+            ColumnReader::DoubleColumnReader(reader) => record(reader, skip),
+            _ => Err(ParquetError::General("times that are not float64".into())),
+        })?;
+        Ok(times)
     }
 
     /// Values and levels of one row of the column at `place`.
@@ -281,6 +298,20 @@ impl ParquetFile {
         place: &ColumnPath,
         take: impl Fn(&mut ColumnReader, usize) -> Result<(Vec<V>, Levels), ParquetError>,
     ) -> Result<(Vec<V>, Levels), ParquetTableError> {
+        let path = self.path().to_path_buf();
+        shielded(&path, || self.row_of(row, place, take))
+    }
+
+    fn row_of<V>(
+        &mut self,
+        row: usize,
+        place: &ColumnPath,
+        take: impl Fn(&mut ColumnReader, usize) -> Result<(Vec<V>, Levels), ParquetError>,
+    ) -> Result<(Vec<V>, Levels), ParquetTableError> {
+        if !self.cursors.checked {
+            self.check_pages()?;
+            self.cursors.checked = true;
+        }
         let path = self.path().to_path_buf();
         let metadata = self.reader.metadata();
         let columns = metadata.file_metadata().schema_descr().columns();
