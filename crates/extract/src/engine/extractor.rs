@@ -37,13 +37,23 @@ pub struct Extractor {
     plan: Arc<Plan>,
     cursors: Vec<Cursor>,
     raw: Vec<Vec<f32>>,
-    /// Interleaved samples; those before `head` are done with.
-    buffer: Vec<f32>,
+    room: Room,
     head: usize,
     /// Absolute index of the sample at `head`.
     first: u64,
+}
+
+/// The memory that an extractor works in, handed on to the next one of its plan: made anew for each
+/// recording, it would leave a hole in the heap for each.
+#[derive(Default)]
+pub struct Room {
+    /// Interleaved samples; those before the extractor's `head` are done with.
+    buffer: Vec<f32>,
     scratch: Scratch,
 }
+
+/// Largest buffer of samples that is handed on (8 MiB).
+const MAX_BUFFER: usize = 1 << 21;
 
 impl Extractor {
     /// An extractor of frames anchored (`t * hop_length`) in `span`, whose first pushed sample is
@@ -51,7 +61,8 @@ impl Extractor {
     pub fn new(plan: Arc<Plan>, span: Range<u64>, first: u64) -> Self {
         let cursors = plan.streams.iter().map(|s| Cursor::new(&s.framing(), &span)).collect();
         let raw = vec![Vec::new(); plan.features.len()];
-        Self { plan, cursors, raw, buffer: Vec::new(), head: 0, first, scratch: Scratch::default() }
+        let room = plan.take_room();
+        Self { plan, cursors, raw, room, head: 0, first }
     }
 
     /// Channels that are pushed.
@@ -61,28 +72,28 @@ impl Extractor {
 
     /// Room for `frames` more frames, to be filled and then reported by [`Extractor::commit`].
     pub fn room(&mut self, frames: usize) -> &mut [f32] {
-        let length = self.buffer.len();
-        self.buffer.resize(length + frames * self.plan.channels, 0.0);
-        &mut self.buffer[length..]
+        let length = self.room.buffer.len();
+        self.room.buffer.resize(length + frames * self.plan.channels, 0.0);
+        &mut self.room.buffer[length..]
     }
 
     /// Keeps `filled` of the `room` frames last asked for, and computes what they complete.
     pub fn commit(&mut self, room: usize, filled: usize) {
         let unused = (room - filled) * self.plan.channels;
-        self.buffer.truncate(self.buffer.len() - unused);
+        self.room.buffer.truncate(self.room.buffer.len() - unused);
         self.advance(None);
         self.compact();
     }
 
     /// Takes interleaved samples (whole frames).
     pub fn push(&mut self, samples: &[f32]) {
-        self.buffer.extend_from_slice(samples);
+        self.room.buffer.extend_from_slice(samples);
         self.commit(0, 0);
     }
 
     /// Frames of the signal up to the last that was pushed.
     pub fn reached(&self) -> u64 {
-        self.first + ((self.buffer.len() - self.head) / self.plan.channels) as u64
+        self.first + ((self.room.buffer.len() - self.head) / self.plan.channels) as u64
     }
 
     /// Number of values computed and not yet taken.
@@ -107,7 +118,7 @@ impl Extractor {
         if total.is_some_and(|n| n > 0) {
             self.whole()?;
         }
-        Ok(Span { raw: self.raw, total })
+        Ok(Span { raw: std::mem::take(&mut self.raw), total })
     }
 
     /// Computes the features of the whole recording, which the buffer holds.
@@ -118,7 +129,8 @@ impl Extractor {
             let each: Vec<Array2<f32>> = (0..channels)
                 .into_par_iter()
                 .map(|c| {
-                    let y: Vec<f32> = self.buffer[c..].iter().step_by(channels).copied().collect();
+                    let y: Vec<f32> =
+                        self.room.buffer[c..].iter().step_by(channels).copied().collect();
                     kernel.channel(&y)
                 })
                 .collect::<Result<_, _>>()
@@ -135,9 +147,9 @@ impl Extractor {
     }
 
     fn advance(&mut self, total: Option<u64>) {
-        let window = Window { samples: &self.buffer[self.head..], first: self.first, total };
+        let window = Window { samples: &self.room.buffer[self.head..], first: self.first, total };
         for (stream, cursor) in self.plan.streams.iter().zip(&mut self.cursors) {
-            let (raw, scratch) = (&mut self.raw, &mut self.scratch);
+            let (raw, scratch) = (&mut self.raw, &mut self.room.scratch);
             cursor.advance(stream.as_ref(), self.plan.channels, &window, raw, scratch);
         }
     }
@@ -154,14 +166,24 @@ impl Extractor {
             .map(|(cursor, stream)| cursor.keep_from(&stream.framing()))
             .min()
             .unwrap_or(u64::MAX);
-        let held = ((self.buffer.len() - self.head) / self.plan.channels) as u64;
+        let held = ((self.room.buffer.len() - self.head) / self.plan.channels) as u64;
         let done = keep.saturating_sub(self.first).min(held);
         self.first += done;
         self.head += done as usize * self.plan.channels;
-        if self.head > self.buffer.len() / 2 {
-            self.buffer.copy_within(self.head.., 0);
-            self.buffer.truncate(self.buffer.len() - self.head);
+        if self.head > self.room.buffer.len() / 2 {
+            self.room.buffer.copy_within(self.head.., 0);
+            self.room.buffer.truncate(self.room.buffer.len() - self.head);
             self.head = 0;
+        }
+    }
+}
+
+impl Drop for Extractor {
+    fn drop(&mut self) {
+        let mut room = std::mem::take(&mut self.room);
+        if room.buffer.capacity() <= MAX_BUFFER {
+            room.buffer.clear();
+            self.plan.give_room(room);
         }
     }
 }

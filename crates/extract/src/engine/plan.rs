@@ -1,10 +1,11 @@
 //! A configuration planned for one sample rate and number of channels: transforms, windows, filter
 //! banks, all made once and shared by every worker.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use corsmal_dsp::DspError;
 
+use super::extractor::Room;
 use super::stream::{ExactMember, Framing, SharedStreams, SpectrumMember, Stream};
 use crate::config::Config;
 use crate::features::{Derived, Extent, Feature, Finish, Kernel, WholeKernel};
@@ -65,6 +66,8 @@ pub struct Plan {
     /// The configuration.
     pub config: Arc<Config>,
     warnings: Vec<String>,
+    /// What extractors of this plan have worked in.
+    rooms: Mutex<Vec<Room>>,
 }
 
 impl Plan {
@@ -141,7 +144,8 @@ impl Plan {
             });
         }
         let (streams, config) = (streams.into_streams(), config.clone());
-        Ok(Self { sample_rate, channels, features, streams, whole, config, warnings })
+        let rooms = Mutex::default();
+        Ok(Self { sample_rate, channels, features, streams, whole, config, warnings, rooms })
     }
 
     /// Whether a feature needs the whole recording, which can then not be cut into spans.
@@ -155,6 +159,16 @@ impl Plan {
             Some(Extent::Frames(hop)) => hop,
             Some(Extent::Vector) | None => 0.0,
         }
+    }
+
+    /// Memory for an extractor to work in.
+    pub(super) fn take_room(&self) -> Room {
+        self.rooms.lock().unwrap_or_else(|e| e.into_inner()).pop().unwrap_or_default()
+    }
+
+    /// Keeps the memory of an extractor for the next one.
+    pub(super) fn give_room(&self, room: Room) {
+        self.rooms.lock().unwrap_or_else(|e| e.into_inner()).push(room);
     }
 
     /// What the user should know of parameters that are possible but odd.
