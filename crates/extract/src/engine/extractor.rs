@@ -187,3 +187,32 @@ impl Drop for Extractor {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+
+    #[test]
+    fn extractors_of_a_plan_work_in_the_same_memory() {
+        let config = Arc::new(Config::preset("logmel").unwrap());
+        let plan = Arc::new(Plan::new(&config, 16_000.0, 2).unwrap());
+        let compute = |samples: usize| {
+            let mut extractor = Extractor::new(plan.clone(), 0..u64::MAX, 0);
+            extractor.push(&vec![0.1; 2 * samples]);
+            extractor.finish(true).unwrap().raw
+        };
+        let first = compute(8000);
+        let place = |room: &Room| (room.buffer.as_ptr(), room.buffer.capacity());
+        let room = plan.take_room();
+        let before = place(&room);
+        assert!(before.1 >= 16_000 && !room.scratch.frames.is_empty());
+        plan.give_room(room);
+        assert_eq!(compute(8000), first);
+        assert_eq!(place(&plan.take_room()), before);
+        assert!(plan.take_room().buffer.capacity() == 0, "one was at work at a time");
+
+        compute(MAX_BUFFER);
+        assert!(plan.take_room().buffer.capacity() == 0, "long ones are given back");
+    }
+}
