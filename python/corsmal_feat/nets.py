@@ -261,7 +261,7 @@ def embed(
     >>> corsmal_feat.nets.embed("m2-type", ["rice.wav"], "vggish.pth")
     Traceback (most recent call last):
     ...
-    corsmal_feat.errors.ParameterError: m2_type gives classes: vggish gives embeddings
+    corsmal_feat.errors.ParameterError: m2_type gives classes, not embeddings; vggish gives embeddings
     """
     rows, failed = _core.embed_recordings(
         name, paths_of(recordings), os.fspath(weights), jobs_of(jobs)

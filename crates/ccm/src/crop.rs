@@ -1,5 +1,6 @@
 //! What the vision baseline sees: the container in the last frame of a view, cut out.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -29,12 +30,24 @@ fn crop(views: &Views, detections: &[Detection], view: u8) -> std::result::Resul
     let frames = views.frames(Kind::Rgb, view)?;
     let last =
         frames.last().ok_or_else(|| Problem::Missing(format!("no colour image of view {view}")))?;
-    let image = Rgb::read(&last.path)?;
+    let mut shown = None;
+    views.colours(
+        view,
+        |number| number == last.number,
+        |_, image| {
+            shown = Some(image);
+            ControlFlow::Break(())
+        },
+    )?;
+    let image = shown.ok_or_else(|| Problem::Damaged(format!("view {view} has no last frame")))?;
     let size = (image.width, image.height);
     let edges = views.edges(detections, (view, last.number), &LABELS, size)?;
+    // Detectors also give boxes without area, and beyond the picture: nothing that could be seen.
     image.part(edges).ok_or_else(|| {
         let path = last.path.display();
-        Problem::Damaged(format!("{path}: the container would lie at {edges:?}, outside of it"))
+        Problem::Missing(format!(
+            "{path}: the container would lie at {edges:?}, where nothing is to be seen"
+        ))
     })
 }
 
@@ -54,7 +67,8 @@ pub struct Written {
 }
 
 /// Writes the crops of all labelled training recordings as PNG into a new or empty folder, and
-/// [`LABEL_FILE`] with the columns `id`, `container`, `view`, `level` and `type`.
+/// [`LABEL_FILE`] with the columns `id`, `container`, `view`, `level` and `type`. The folder appears when all
+/// is written.
 ///
 /// # Errors
 /// [`CcmError`] when the data set cannot be opened or shows no container, the folder holds files, something
@@ -74,11 +88,16 @@ pub fn write(
             out.display()
         )));
     }
-    std::fs::create_dir_all(out).map_err(io)?;
+    let parent = out.parent().filter(|parent| *parent != Path::new("")).unwrap_or(Path::new("."));
+    std::fs::create_dir_all(parent).map_err(io)?;
+    // Pictures without their labels would look like a finished folder.
+    let hidden = tempfile::Builder::new().prefix(".crops-").tempdir_in(parent).map_err(io)?;
+    let made = hidden.path().join("crops");
+    std::fs::create_dir(&made).map_err(io)?;
     let labelled = |r: &Recording| r.container.is_some() && r.name.is_some();
     let recordings: Vec<Recording> = training(&set).into_iter().filter(labelled).collect();
     let found = each(&recordings, jobs, &|_, _| {}, interrupted, |recording| {
-        write_recording(recording, detections, out)
+        write_recording(recording, detections, &made)
     })?;
     let mut written = Written {
         crops: 0,
@@ -109,7 +128,11 @@ pub fn write(
             recordings.len()
         )));
     }
-    draft::write(&out.join(LABEL_FILE), table.as_bytes()).map_err(CcmError::Write)?;
+    draft::write(&made.join(LABEL_FILE), table.as_bytes()).map_err(CcmError::Write)?;
+    if out.exists() {
+        std::fs::remove_dir(out).map_err(io)?;
+    }
+    std::fs::rename(&made, out).map_err(io)?;
     Ok(written)
 }
 

@@ -43,9 +43,11 @@ impl Table {
         if header.iter().all(String::is_empty) {
             return Err(fault("it is empty; a header line is needed".into()));
         }
-        // Columns are found in any case: the first of two would count, whatever the other says.
+        // Columns are found in upper and lower case: the first of two would count, whatever the other says.
         if let Some(name) = csv_text::repeated(header.iter().map(|h| h.to_ascii_lowercase())) {
-            return Err(fault(format!("two columns are named {name:?} (in any case)")));
+            return Err(fault(format!(
+                "two columns have the name {name:?}, but for upper and lower case; rename one of them"
+            )));
         }
         let mut rows = Vec::new();
         for record in reader.records() {

@@ -5,11 +5,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use corsmal_ccm::capacity::{Problem, Views};
+use corsmal_ccm::CcmError;
+use corsmal_ccm::capacity::{Kind, Problem, Views};
 use corsmal_ccm::crop::{self, Written, crops};
 use corsmal_ccm::dataset::{Container, DataSet, Filling, FillingLevel, FillingType, SequenceName};
 use corsmal_ccm::synth::write_views;
-use corsmal_vision::{Mask, Rgb};
+use corsmal_vision::{Mask, Rgb, read_detections};
 
 /// A recording without views: the folder of its container and its name.
 fn recording(dir: &Path, number: u8) -> (PathBuf, SequenceName) {
@@ -94,13 +95,72 @@ fn damaged_files_are_named() {
     fault(2, "c2/0000.png");
     let table = base.join(format!("detections/{name}.csv"));
     let header = "frame,view,label,score,x_min,y_min,x_max,y_max,mask\n";
-    write(&table, format!("{header}0,1,cup,0.9,40,0,60,9,\n").as_bytes());
-    fault(1, "outside");
     write(&base.join("detections/m.png"), &Mask::empty(41, 30).to_png().unwrap());
     write(&table, format!("{header}0,1,cup,0.9,0,0,9,9,m.png\n").as_bytes());
     fault(1, "41 by 30 px; its image has 40 by 30");
     write(&table, b"frame\n0\n");
     fault(1, "detections");
+}
+
+/// Detectors give them, too: of one view, which then shows no container.
+#[test]
+fn boxes_of_nothing_are_no_damage() {
+    let dir = tempfile::tempdir().unwrap();
+    let (base, name) = recording(dir.path(), 3);
+    write(&base.join(format!("rgb/{name}/c1/0000.png")), &image(40, 30).to_png().unwrap());
+    let table = base.join(format!("detections/{name}.csv"));
+    for bounds in ["40,0,60,9", "5,5,5,9", "5,30,9,40", "-9,-9,-1,-1", "7,7,7,7"] {
+        let header = "frame,view,label,score,x_min,y_min,x_max,y_max,mask\n";
+        write(&table, format!("{header}0,1,cup,0.9,{bounds},\n").as_bytes());
+        match &crops(&views(dir.path()))[0] {
+            Err(Problem::Missing(reason)) => assert!(reason.contains("nothing is to be seen")),
+            other => panic!("{bounds}: {other:?}"),
+        }
+    }
+    // As wide as a pixel once its edges are whole.
+    let header = "frame,view,label,score,x_min,y_min,x_max,y_max\n";
+    write(&table, format!("{header}0,1,cup,0.9,5.2,5,5.4,9\n").as_bytes());
+    assert_eq!(seen(&crops(&views(dir.path()))[0]), (1, 4, 5, 5));
+}
+
+/// A video counts where there are no images of its frames.
+#[test]
+fn frames_may_be_in_a_video() {
+    let dir = tempfile::tempdir().unwrap();
+    let (base, name) = recording(dir.path(), 3);
+    let shades = Path::new(env!("CARGO_MANIFEST_DIR")).join("../vision/tests/shades.mp4");
+    let shades = std::fs::read(shades).unwrap();
+    for view in [1, 2] {
+        write(&base.join(format!("rgb/{name}_c{view}.mp4")), &shades);
+    }
+    let table = "frame,view,label,score,x_min,y_min,x_max,y_max\n19,1,cup,0.9,2,3,10,20\n";
+    write(&base.join(format!("detections/{name}.csv")), table.as_bytes());
+    let seen_by = views(dir.path());
+    assert_eq!(seen_by.frames(Kind::Rgb, 2).unwrap().len(), 20);
+    // The first and, from the end, the 20th frame, whatever the table ends with.
+    assert_eq!(seen_by.ends(&[], 20).unwrap(), Some((0, 0)));
+    assert_eq!(seen_by.ends(&[], 19).unwrap(), Some((0, 1)));
+    match &crops(&seen_by)[0] {
+        Ok(crop) => assert_eq!((crop.width, crop.height, crop.data[1] < 20), (8, 17, true)),
+        Err(Problem::Damaged(reason)) => {
+            assert!(reason.contains("_c1.mp4: this program was built without video"), "{reason}");
+        }
+        Err(other) => panic!("{other:?}"),
+    }
+    // Masks have numbers of their own.
+    for view in [1, 2] {
+        let mask = Mask::empty(40, 30).to_png().unwrap();
+        write(&base.join(format!("masks/{name}/c{view}/0007.png")), &mask);
+    }
+    assert_eq!(views(dir.path()).ends(&[], 20).unwrap(), Some((7, 7)));
+    write(&base.join(format!("rgb/{name}_c3.mp4")), &shades[..200]);
+    let damaged = views(dir.path()).frames(Kind::Rgb, 3).unwrap_err();
+    assert!(
+        matches!(&damaged, Problem::Damaged(reason) if reason.contains("_c3.mp4")),
+        "{damaged:?}"
+    );
+    write(&base.join(format!("rgb/{name}/c1/0004.png")), &image(40, 30).to_png().unwrap());
+    assert_eq!(views(dir.path()).frames(Kind::Rgb, 1).unwrap()[0].number, 4);
 }
 
 /// In a folder of their own, tables lie by container, or by part where that is not known.
@@ -132,14 +192,25 @@ fn labelled_pictures_are_written_once() {
     let dir = tempfile::tempdir().unwrap();
     let (data, out) = (dir.path().join("data"), dir.path().join("crops"));
     // A coloured cup, a clear one, a glass and a box, which no detector takes for a cup in all views.
+    let mut seen = 0;
     for number in [1, 3, 4, 7] {
         let (base, name) = recording(&data, number);
         let container = Container::new(number).unwrap();
         write_views(&base, &name.to_string(), container, name, 5).unwrap();
+        let table = read_detections(&base.join(format!("detections/{name}.json"))).unwrap();
+        let last = table.iter().map(|d| d.frame).max().unwrap();
+        let shows = |view: &u8| {
+            table.iter().any(|d| {
+                (d.view, d.frame) == (*view, last) && crop::LABELS.contains(&d.label.as_str())
+            })
+        };
+        seen += [1, 2, 3, 4].iter().filter(|view| shows(view)).count();
     }
+    assert!((4..16).contains(&seen));
     let make = || crop::write(&data, None, &out, 2, &AtomicBool::new(false));
     let Written { crops, recordings, without, failed, synthetic } = make().unwrap();
-    assert_eq!((recordings, crops + without, failed.len(), synthetic), (4, 16, 0, false));
+    assert_eq!((recordings, failed.len(), synthetic), (4, 0, false));
+    assert_eq!((crops, without), (seen, 16 - seen));
     let table = std::fs::read_to_string(out.join("labels.csv")).unwrap();
     assert_eq!(table.lines().count(), crops + 1);
     assert!(table.lines().any(|line| line == "1_s0_fi2_fu2_b0_l0_c1,1,1,opaque,opaque"), "{table}");
@@ -159,6 +230,13 @@ fn labelled_pictures_are_written_once() {
     assert_eq!(made.failed.len(), 1);
     assert!(made.failed[0].1.contains("c2/0008.png"), "{:?}", made.failed);
     assert!(!again.join("4_s0_fi2_fu2_b0_l0_c1.png").exists());
+
+    // What is broken off leaves nothing that looks like a folder of pictures.
+    let before = std::fs::read_dir(dir.path()).unwrap().count();
+    let broken_off = dir.path().join("broken-off");
+    let error = crop::write(&data, None, &broken_off, 2, &AtomicBool::new(true)).unwrap_err();
+    assert!(matches!(error, CcmError::Interrupted), "{error}");
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), before);
 }
 
 #[test]

@@ -16,6 +16,7 @@ use serde_json::{Value, json};
 
 use crate::args::{DatasetArgs, NetworkArgs, PipelineArgs};
 use crate::failure::Failure;
+use crate::plural::plural;
 use crate::{interrupt, recordings};
 
 /// What both commands are given.
@@ -49,9 +50,12 @@ impl Request<'_> {
             Examples::of_file(definition, path, &members.names())?
         } else if takes_pictures || self.dataset.crops.is_some() {
             members.refuse()?;
-            let seen = Examples::of_pictures(definition, path, interrupt::flag(), |id, reason| {
-                eprintln!("warning: {id}: {reason}: left out of training");
-            });
+            // Labels that were named count alone.
+            let own = !self.dataset.has_labels();
+            let seen =
+                Examples::of_pictures(definition, (path, own), interrupt::flag(), |id, reason| {
+                    eprintln!("warning: {id}: {reason}: left out of training");
+                });
             match seen {
                 Err(SystemError::Interrupted) => {
                     return Err(Failure::interrupted("interrupted; nothing was written"));
@@ -82,6 +86,11 @@ impl Request<'_> {
             .into_iter()
             .find(|column| definition.name.rsplit('_').next() == Some(column));
         let target = self.dataset.label(&mut examples.table, usual)?;
+        let unlabelled = examples.keep_labelled(&target)?;
+        if unlabelled > 0 {
+            let items = plural(unlabelled, "item");
+            eprintln!("warning: {}: {items} without {target}: left out", path.display());
+        }
         Ok(Loaded { examples, recipe, target })
     }
 
@@ -107,6 +116,9 @@ impl Request<'_> {
         name: &str,
         plan: Option<&CvPlan>,
     ) -> Result<(Examples, Validated), Failure> {
+        if let Some(path) = &self.network.weights {
+            refuse_own("--weights", path)?;
+        }
         let Loaded { examples, recipe, target } = self.load(name)?;
         let weights = self.weights()?;
         let training = self.training(&target, recipe, weights.as_ref())?;
@@ -152,6 +164,19 @@ impl Request<'_> {
             _ => error.into(),
         }
     }
+}
+
+/// Refuses weights that a training of this tool made, where scores of recordings are wanted that it may have
+/// seen.
+pub fn refuse_own(option: &str, path: &Path) -> Result<(), Failure> {
+    if !corsmal_nets::weights::trained_here(path) {
+        return Ok(());
+    }
+    Err(Failure::new(format!(
+        "{option}: {} is a network that this tool trained, perhaps on recordings that are held out here; name \
+         weights that others trained",
+        path.display()
+    )))
 }
 
 /// The score of classifiers.

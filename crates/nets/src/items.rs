@@ -52,6 +52,12 @@ impl Items {
         self.len() == 0
     }
 
+    /// Some of them, in this order.
+    pub fn pick(&self, items: &[usize]) -> Self {
+        let of = |column: &Column| Column::of(items.iter().map(|&item| column.item(item)));
+        Self { columns: self.columns.iter().map(of).collect() }
+    }
+
     /// Refuses items that the network does not take, and numbers that are not finite.
     ///
     /// # Errors

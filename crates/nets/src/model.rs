@@ -98,15 +98,8 @@ impl NetModel {
     /// # Errors
     /// A text when it is not a trained network of ours, or its parts do not fit.
     pub fn from_bytes(bytes: &[u8]) -> std::result::Result<Self, String> {
-        let text = weights::safetensors_text(bytes, ENTRY)?
+        let header: Header = weights::entry(bytes, ENTRY, FORMAT)?
             .ok_or("weights alone: no network of corsmal-feat was trained into this file")?;
-        let value: Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
-        let format = value.get("format").and_then(Value::as_u64);
-        if format != Some(FORMAT.into()) {
-            let found = format.map_or("none".into(), |f| f.to_string());
-            return Err(format!("format version {found}: this program reads version {FORMAT}"));
-        }
-        let header: Header = serde_json::from_value(value).map_err(|e| e.to_string())?;
         header.recipe.check().map_err(|e| e.to_string())?;
         let definition = networks::classifier(&header.network).map_err(|e| e.to_string())?;
         // Before a network is made: a few labels too many would ask for any amount of numbers.

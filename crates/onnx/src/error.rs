@@ -11,8 +11,8 @@ pub type Result<T> = std::result::Result<T, OnnxError>;
 pub enum OnnxError {
     /// No ONNX Runtime could be loaded.
     #[error(
-        "{path}: cannot be loaded as ONNX Runtime: {reason}; its shared library is in the PyPI package onnxruntime \
-         (onnxruntime/capi/libonnxruntime.so.VERSION)"
+        "{path}: cannot be loaded as ONNX Runtime: {reason}. The PyPI package onnxruntime has the library: \
+         onnxruntime/capi/libonnxruntime.so.VERSION"
     )]
     Library {
         /// The library.
@@ -30,7 +30,7 @@ pub enum OnnxError {
     },
     /// A model that takes or gives something else.
     #[error(
-        "{path}: {what} is {actual}; expected {expected} (docs/vision.md says how to export it)"
+        "{path}: {what}: found {actual}, expected {expected}; docs/vision.md says how to export the model"
     )]
     Interface {
         /// The model.
@@ -43,7 +43,7 @@ pub enum OnnxError {
         expected: String,
     },
     /// A model that fails on an input.
-    #[error("{path}: fails: {reason}")]
+    #[error("{path}: the model fails on an input: {reason}")]
     Run {
         /// The model.
         path: PathBuf,

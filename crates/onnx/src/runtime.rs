@@ -46,15 +46,14 @@ struct Model {
 
 impl Model {
     fn interface(&self, what: &str, actual: String, expected: &str) -> OnnxError {
-        let (path, what) = (self.path.clone(), what.into());
-        OnnxError::Interface { path, what, actual, expected: expected.into() }
+        interface(&self.path, what, actual, expected)
     }
 
     /// Refuses a model whose only input is none of these shapes of single precision; -1 is any size.
     fn check_input(&self, shapes: &[&[i64]], expected: &str) -> Result<()> {
         let [input] = self.session.inputs() else {
             let count = self.session.inputs().len();
-            return Err(self.interface("the number of its inputs", count.to_string(), "1"));
+            return Err(self.interface("number of inputs", count.to_string(), "1"));
         };
         let fits = |wanted: &[i64], found: &[i64]| {
             let same = |(&w, &f): (&i64, &i64)| w == f || w == -1 || f == -1;
@@ -77,16 +76,17 @@ impl Model {
             _ => 0,
         }
     }
-
-    fn fault(&self, reason: impl std::fmt::Display) -> OnnxError {
-        OnnxError::Run { path: self.path.clone(), reason: reason.to_string() }
-    }
 }
 
-/// Shape and numbers of an output.
-fn floats(value: &DynValue) -> std::result::Result<(Vec<i64>, Vec<f32>), String> {
+fn interface(path: &Path, what: &str, actual: String, expected: &str) -> OnnxError {
+    let (path, what, expected) = (path.into(), what.into(), expected.into());
+    OnnxError::Interface { path, what, actual, expected }
+}
+
+/// Shape and numbers of an output, where the runtime keeps them.
+fn floats(value: &DynValue) -> std::result::Result<(&[i64], &[f32]), String> {
     let (shape, values) = value.try_extract_tensor::<f32>().map_err(|e| e.to_string())?;
-    Ok((shape.to_vec(), values.to_vec()))
+    Ok((&shape[..], values))
 }
 
 /// torchvision's Mask R-CNN.
@@ -107,57 +107,46 @@ impl Detector {
         model.check_input(&shapes, "an image [3, height, width] of single precision")?;
         let names: Vec<&str> = model.session.outputs().iter().map(|output| output.name()).collect();
         if let Some(missing) = OUTPUTS.iter().find(|name| !names.contains(name)) {
-            let what = "the list of its outputs";
-            let expected = format!("a list with {missing}");
-            return Err(model.interface(what, names.join(", "), &expected));
+            let expected = format!("{missing} among them");
+            return Err(model.interface("outputs", names.join(", "), &expected));
         }
         Ok(Self(model))
     }
 
-    /// What is seen in a frame.
+    /// What `with` makes of what is seen in a frame.
     ///
     /// # Errors
     /// [`OnnxError::Run`], such as for another size of image than the model was exported for;
     /// [`OnnxError::Interface`] for outputs of other shapes.
-    pub fn detect(&mut self, image: &Rgb) -> Result<Instances> {
+    pub fn detect<T>(&mut self, image: &Rgb, with: impl FnOnce(Instances<'_>) -> T) -> Result<T> {
         let values = instances::input(image);
         let mut shape = vec![3, image.height as i64, image.width as i64];
         if self.0.rank() == 4 {
             shape.insert(0, 1);
         }
-        let found = self.found(shape, &values);
-        let (boxes, labels, scores, masks) = found.map_err(|e| self.0.fault(e))?;
+        let Model { path, session } = &mut self.0;
+        let fault = |reason: String| OnnxError::Run { path: path.clone(), reason };
+        let text = |e: ort::Error| fault(e.to_string());
+        let input = TensorRef::from_array_view((shape, &values[..])).map_err(text)?;
+        let outputs = session.run(ort::inputs![input]).map_err(text)?;
+        let of = |name: &str| outputs.get(name).ok_or_else(|| fault(format!("no output {name}")));
+        let numbers = |name: &str| of(name).and_then(|value| floats(value).map_err(fault));
+        let (_, labels) = of("labels")?.try_extract_tensor::<i64>().map_err(text)?;
+        let (boxes, scores, masks) = (numbers("boxes")?, numbers("scores")?, numbers("masks")?);
         let (height, width) = (image.height as i64, image.width as i64);
         let n = labels.len() as i64;
         for (name, shape, wanted) in [
-            ("boxes", &boxes.0, vec![n, 4]),
-            ("scores", &scores.0, vec![n]),
-            ("masks", &masks.0, vec![n, 1, height, width]),
+            ("boxes", boxes.0, vec![n, 4]),
+            ("scores", scores.0, vec![n]),
+            ("masks", masks.0, vec![n, 1, height, width]),
         ] {
             if *shape != wanted {
-                let (what, expected) = (format!("output {name}"), format!("{wanted:?}"));
-                return Err(self.0.interface(&what, format!("{shape:?}"), &expected));
+                let (what, actual) = (format!("output {name}"), format!("{shape:?}"));
+                return Err(interface(path, &what, actual, &format!("{wanted:?}")));
             }
         }
-        let boxes = boxes.1.as_chunks::<4>().0.to_vec();
-        Ok(Instances { boxes, labels, scores: scores.1, masks: masks.1 })
-    }
-
-    #[expect(clippy::type_complexity, reason = "taken apart at once")]
-    fn found(
-        &mut self,
-        shape: Vec<i64>,
-        values: &[f32],
-    ) -> std::result::Result<
-        ((Vec<i64>, Vec<f32>), Vec<i64>, (Vec<i64>, Vec<f32>), (Vec<i64>, Vec<f32>)),
-        String,
-    > {
-        let text = |e: ort::Error| e.to_string();
-        let input = TensorRef::from_array_view((shape, values)).map_err(text)?;
-        let outputs = self.0.session.run(ort::inputs![input]).map_err(text)?;
-        let of = |name: &str| outputs.get(name).ok_or_else(|| format!("no output {name}"));
-        let (_, labels) = of("labels")?.try_extract_tensor::<i64>().map_err(text)?;
-        Ok((floats(of("boxes")?)?, labels.to_vec(), floats(of("scores")?)?, floats(of("masks")?)?))
+        let boxes = boxes.1.as_chunks::<4>().0;
+        Ok(with(Instances { boxes, labels, scores: scores.1, masks: masks.1 }))
     }
 }
 
@@ -182,22 +171,20 @@ impl ClipEmbedder {
     /// # Errors
     /// [`OnnxError::Run`]; [`OnnxError::Interface`] for outputs of another shape.
     pub fn embed(&mut self, window: &[f32]) -> Result<Vec<f32>> {
-        let (shape, values) = self.numbers(window).map_err(|e| self.0.fault(e))?;
+        let shape = vec![1, 3, FRAMES as i64, SIDE as i64, SIDE as i64];
+        let Model { path, session } = &mut self.0;
+        let fault = |reason: String| OnnxError::Run { path: path.clone(), reason };
+        let text = |e: ort::Error| fault(e.to_string());
+        let input = TensorRef::from_array_view((shape, window)).map_err(text)?;
+        let outputs = session.run(ort::inputs![input]).map_err(text)?;
+        let (shape, values) = floats(&outputs[0]).map_err(fault)?;
         if values.len() != FEATURES {
-            let (actual, expected) = (format!("{shape:?}"), format!("[1, {FEATURES}]"));
-            return Err(self.0.interface("its first output", actual, &expected));
+            let expected = format!("[1, {FEATURES}]");
+            return Err(interface(path, "first output", format!("{shape:?}"), &expected));
         }
         match values.iter().find(|value| !value.is_finite()) {
-            Some(value) => Err(self.0.fault(format!("an output is {value}"))),
-            None => Ok(values),
+            Some(value) => Err(fault(format!("an output is {value}"))),
+            None => Ok(values.to_vec()),
         }
-    }
-
-    fn numbers(&mut self, window: &[f32]) -> std::result::Result<(Vec<i64>, Vec<f32>), String> {
-        let shape = vec![1, 3, FRAMES as i64, SIDE as i64, SIDE as i64];
-        let text = |e: ort::Error| e.to_string();
-        let input = TensorRef::from_array_view((shape, window)).map_err(text)?;
-        let outputs = self.0.session.run(ort::inputs![input]).map_err(text)?;
-        floats(&outputs[0])
     }
 }

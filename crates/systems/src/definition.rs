@@ -1,9 +1,11 @@
 //! What a system is.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use corsmal_ccm::benchmark::System;
-use corsmal_ccm::{CcmError, Result};
+
+use crate::training::Weights;
 
 /// What is chosen for all networks of all systems.
 #[derive(Clone, Debug, Default)]
@@ -14,7 +16,7 @@ pub struct Settings {
     /// [`corsmal_nets::dataset`]; several files of a name are joined.
     pub embeddings: Vec<(String, PathBuf)>,
     /// Weights that networks begin with instead of random ones, by name.
-    pub weights: Vec<(String, PathBuf)>,
+    pub weights: Vec<(String, Arc<Weights>)>,
 }
 
 /// A system of the paper.
@@ -27,19 +29,13 @@ pub struct Definition {
     pub networks: &'static [&'static str],
     /// What of it is not there, or is a choice of ours, in sentences.
     pub limits: &'static [&'static str],
-    /// Makes it, unless what it needs is not there.
-    pub(crate) make: Option<fn(Settings) -> Box<dyn System>>,
+    /// Makes it.
+    pub(crate) make: fn(Settings) -> Box<dyn System>,
 }
 
 impl Definition {
     /// The system, ready to be run.
-    ///
-    /// # Errors
-    /// [`CcmError::Request`] for one whose inputs this program does not make.
-    pub fn make(&self, settings: &Settings) -> Result<Box<dyn System>> {
-        let make = self.make.ok_or_else(|| {
-            CcmError::Request(format!("{}: {}", self.name, self.limits.join(" ")))
-        })?;
-        Ok(make(settings.clone()))
+    pub fn make(&self, settings: &Settings) -> Box<dyn System> {
+        (self.make)(settings.clone())
     }
 }

@@ -20,7 +20,7 @@ pub enum SystemError {
     #[error("interrupted")]
     Interrupted,
     /// A network that takes something else.
-    #[error("{network} takes {takes}, not recordings: give an .npz of these")]
+    #[error("{network} takes {takes}, not recordings; give it an .npz of those")]
     TakesNoRecordings {
         /// the network
         network: &'static str,
@@ -36,21 +36,36 @@ pub enum SystemError {
         takes: &'static str,
     },
     /// A folder without pictures.
-    #[error("{path}: holds no picture: PNG and JPEG are read")]
+    #[error("{path}: holds no PNG or JPEG picture")]
     NoPictures {
         /// the folder
         path: PathBuf,
     },
     /// A folder with more pictures than can be learned from.
-    #[error("{path}: more than {limit} pictures")]
+    #[error("{path}: holds more than {limit} pictures, the limit")]
     TooManyPictures {
         /// the folder
         path: PathBuf,
         /// how many there may be
         limit: usize,
     },
+    /// More pictures than memory holds.
+    #[error(
+        "{path}: {pictures} pictures take {:.1} GiB of memory as the network sees them; {:.1} GiB are free",
+        gib(*needed), gib(*available)
+    )]
+    TooMuchMemory {
+        /// the folder
+        path: PathBuf,
+        /// how many there are
+        pictures: usize,
+        /// bytes that they take
+        needed: u64,
+        /// bytes that are free
+        available: u64,
+    },
     /// Two pictures that differ in their ending alone.
-    #[error("{first} and {second} have one id, {id}: rename one")]
+    #[error("{first} and {second} have the same id, {id}; rename one of them")]
     SameId {
         /// their id
         id: String,
@@ -61,21 +76,21 @@ pub enum SystemError {
     },
     /// A trained network that does not know how its inputs come from recordings.
     #[error(
-        "{network} was trained on inputs that came from a file, and cannot make them from recordings: \
-         give such inputs, or train it on recordings"
+        "{network} was trained on inputs from a file and cannot make them from recordings; give it such inputs, \
+         or train it on recordings"
     )]
     TrainedOnInputs {
         /// the network
         network: String,
     },
     /// A network that gives classes where embeddings are wanted.
-    #[error("{network} gives classes: vggish gives embeddings")]
+    #[error("{network} gives classes, not embeddings; vggish gives embeddings")]
     NoEmbeddings {
         /// the network
         network: &'static str,
     },
     /// Recordings without features, or pictures that are all damaged.
-    #[error("{path}: nothing in it can be read: nothing to train on")]
+    #[error("{path}: nothing in it can be used for training")]
     NoExamples {
         /// where they lie
         path: PathBuf,
@@ -123,6 +138,10 @@ pub enum SystemError {
     /// The network.
     #[error(transparent)]
     Network(#[from] NetError),
+}
+
+fn gib(bytes: u64) -> f64 {
+    bytes as f64 / f64::from(1 << 30)
 }
 
 impl From<RunError> for SystemError {

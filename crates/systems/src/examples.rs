@@ -19,7 +19,7 @@ use corsmal_nets::items::{Column, Items};
 use corsmal_nets::networks::Definition;
 
 use crate::error::{Result, SystemError};
-use crate::pictures::{self, Picture};
+use crate::pictures::{Picture, Pictures};
 use crate::recordings;
 
 /// Items of a network and the table that labels them.
@@ -112,32 +112,37 @@ impl Examples {
         Ok(Self { definition, table, items, row_of, heard, seen: None })
     }
 
-    /// Pictures in a folder; `left_out` is told each that cannot be read, and why. A file
+    /// Pictures in a folder; `left_out` is told each that cannot be read, and why. With `own_labels` a file
     /// [`LABEL_FILE`] among them gives their label columns.
     ///
     /// # Errors
-    /// As [`pictures::read`], and labels of other pictures.
+    /// As [`Pictures::find`]; more pictures than memory holds; labels of other pictures;
+    /// [`SystemError::Interrupted`] once `stop` is set.
     pub fn of_pictures(
         definition: &'static Definition,
-        folder: &Path,
+        (folder, own_labels): (&Path, bool),
         stop: &AtomicBool,
         mut left_out: impl FnMut(&str, &str),
     ) -> Result<Self> {
+        let pictures = Pictures::find(definition, folder)?;
+        pictures.require_memory(corsmal_files::memory::available())?;
         let (mut ids, mut column, mut outcomes) = (Vec::new(), Column::of([]), Vec::new());
-        for Picture { id, path, identity, item } in pictures::read(definition, folder, stop)? {
-            let place = path.display().to_string();
-            let (status, reason) = match &item {
-                Ok(_) => (Status::Ok, String::new()),
-                Err(reason) => (Status::Corrupt, reason.clone()),
-            };
-            let outcome = Outcome::new(&id, place, status, &reason);
-            outcomes.push(Outcome { identity, ..outcome });
-            match item {
-                Ok(item) => {
-                    column.push(&item);
-                    ids.push(id);
+        for part in pictures.parts() {
+            for Picture { id, path, identity, item } in pictures.read(part, stop)? {
+                let place = path.display().to_string();
+                let (status, reason) = match &item {
+                    Ok(_) => (Status::Ok, String::new()),
+                    Err(reason) => (Status::Corrupt, reason.clone()),
+                };
+                let outcome = Outcome::new(&id, place, status, &reason);
+                outcomes.push(Outcome { identity, ..outcome });
+                match item {
+                    Ok(item) => {
+                        column.push(&item);
+                        ids.push(id);
+                    }
+                    Err(_) => left_out(&id, &reason),
                 }
-                Err(_) => left_out(&id, &reason),
             }
         }
         if ids.is_empty() {
@@ -147,13 +152,38 @@ impl Examples {
         let mut table = LabelledTable::of_columns(folder, ids, Vec::new());
         table.outcomes = outcomes;
         let labels = folder.join(LABEL_FILE);
-        if labels.is_file() {
+        if own_labels && labels.is_file() {
             table.add_labels(&LabelSource::File { path: labels, key: None })?;
         }
         let items = Items { columns: vec![column] };
         let all: Vec<&str> = table.outcomes.iter().map(|o| o.identity.as_str()).collect();
         let seen = Some(identity::of_bytes(all.join("\n").as_bytes()));
         Ok(Self { definition, table, items, row_of, heard: None, seen })
+    }
+
+    /// Drops the items of a file that have no value of a label column, such as recordings of test parts; how
+    /// many they were.
+    ///
+    /// # Errors
+    /// A column that is not there; [`SystemError::NoExamples`] where no item has one.
+    pub fn keep_labelled(&mut self, target: &str) -> Result<usize> {
+        let values = self.table.column(target)?;
+        let kept: Vec<usize> = (0..values.len()).filter(|&row| !values[row].is_empty()).collect();
+        let dropped = values.len() - kept.len();
+        if dropped == 0 || !self.table.outcomes.is_empty() {
+            return Ok(0);
+        }
+        if kept.is_empty() {
+            return Err(SystemError::NoExamples { path: self.table.path.clone() });
+        }
+        let pick = |values: &[String]| kept.iter().map(|&row| values[row].clone()).collect();
+        let columns =
+            self.table.columns().iter().map(|(name, values)| (name.clone(), pick(values)));
+        let columns = columns.collect();
+        self.table = LabelledTable::of_columns(&self.table.path, pick(&self.table.ids), columns);
+        self.items = self.items.pick(&kept);
+        self.row_of = (0..kept.len()).collect();
+        Ok(dropped)
     }
 
     /// Its items, one for each row unless recordings are several windows.
@@ -189,21 +219,27 @@ impl Examples {
     }
 }
 
-/// Type and level as numbers, where a column has names of CCM sequences.
+/// Type and level as numbers, where a column has names of CCM sequences; empty where it is empty.
 fn named_labels(columns: &[(String, Vec<String>)]) -> Vec<(String, Vec<String>)> {
     let has = |name: &str| columns.iter().any(|(column, _)| column == name);
-    let names = columns.iter().find(|(column, _)| column == "sequence").and_then(|(_, values)| {
-        values.iter().map(|v| SequenceName::parse(v)).collect::<Option<Vec<_>>>()
-    });
-    let Some(names) = names else { return Vec::new() };
+    let named = |value: &String| match value.is_empty() {
+        true => Some(None),
+        false => SequenceName::parse(value).map(Some),
+    };
+    let names = columns.iter().find(|(column, _)| column == "sequence");
+    let names = names.and_then(|(_, values)| values.iter().map(named).collect::<Option<Vec<_>>>());
+    let Some(names) = names.filter(|names| names.iter().any(Option::is_some)) else {
+        return Vec::new();
+    };
+    let numbers = |of: fn(&SequenceName) -> u8| -> Vec<String> {
+        names.iter().map(|n| n.as_ref().map_or(String::new(), |n| of(n).to_string())).collect()
+    };
     let mut labels = Vec::new();
     if !has("type") {
-        let number = |n: &SequenceName| (n.filling.kind() as u8).to_string();
-        labels.push(("type".to_owned(), names.iter().map(number).collect()));
+        labels.push(("type".to_owned(), numbers(|name| name.filling.kind() as u8)));
     }
     if !has("level") {
-        let number = |n: &SequenceName| (n.filling.level() as u8).to_string();
-        labels.push(("level".to_owned(), names.iter().map(number).collect()));
+        labels.push(("level".to_owned(), numbers(|name| name.filling.level() as u8)));
     }
     labels
 }

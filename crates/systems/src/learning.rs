@@ -14,7 +14,6 @@ use corsmal_nets::items::{Column, Items};
 use corsmal_nets::network::Network;
 use corsmal_nets::networks::{self, Definition};
 use corsmal_nets::recipe::{Recipe, Select};
-use corsmal_nets::weights;
 
 use crate::definition::Settings;
 use crate::recordings;
@@ -158,11 +157,9 @@ impl<'a> Learning<'a> {
             e => self.fault(&format!("{}: {e}", definition.name)),
         };
         let mut net = definition.build(Some(outputs), recipe.seed).map_err(refuse)?;
-        if let Some((_, path)) = self.settings.weights.iter().find(|(name, _)| name == network) {
-            let state = weights::read(path).map_err(|e| self.fault(&e))?;
-            let begun = net.begin_with(&state);
-            begun.map_err(|e| self.fault(&format!("{}: {e}", path.display())))?;
-            self.note(format!("{network} began with {}.", path.display()));
+        if let Some((_, weights)) = self.settings.weights.iter().find(|(name, _)| name == network) {
+            weights.begin(&mut net).map_err(|e| self.fault(&e))?;
+            self.note(format!("{network} began with {}.", weights.path().display()));
         }
         let task = Task { items, classes, train, watched: &[] };
         let told = |progress: fit::Progress<'_>| {

@@ -12,7 +12,7 @@ pub(crate) const M1: Definition = Definition {
     about: "M1 (Challengers): level and type by a perceptron each, from the sound",
     networks: &["m1"],
     limits: &["The paper names neither widths nor how frames become a vector: those are our choice."],
-    make: Some(|settings| Box::new(Challengers(settings))),
+    make: |settings| Box::new(Challengers(settings)),
 };
 
 struct Challengers(Settings);

@@ -13,7 +13,7 @@ pub(crate) const M2: Definition = Definition {
     networks: &["m2_type", "m2_capacity"],
     limits: &["Its capacity network needs the depth views: `corsmal-feat capacity train --method m2`, \
                then `benchmark --capacity m2=MODEL`."],
-    make: Some(|settings| Box::new(Ntnu(settings))),
+    make: |settings| Box::new(Ntnu(settings)),
 };
 
 struct Ntnu(Settings);

@@ -13,7 +13,7 @@ pub(crate) const M4: Definition = Definition {
     about: "M4 (HVRL): type by a vote over windows of eight channels, level by LSTMs over them",
     networks: &["m4_type", "m4_level"],
     limits: &["Its capacity needs views: `corsmal-feat capacity --method m4`."],
-    make: Some(|settings| Box::new(Hvrl(settings))),
+    make: |settings| Box::new(Hvrl(settings)),
 };
 
 /// The type network's features are scaled by these published extremes.

@@ -20,7 +20,7 @@ pub(crate) const M5: Definition = Definition {
     networks: &["m5_vggish_level", "m5_vggish_type", "m5_r21d_level"],
     limits: &["The embeddings come from `corsmal-feat embed` and are given with --embeddings; its \
                capacity needs views: `corsmal-feat capacity --method m5`."],
-    make: Some(|settings| Box::new(Tactile(settings))),
+    make: |settings| Box::new(Tactile(settings)),
 };
 
 /// Embeddings by name, the networks that take them, and what they are made of.

@@ -14,7 +14,7 @@ pub(crate) const M6: Definition = Definition {
             tells type and level together",
     networks: &["m6_action", "m6_pouring", "m6_shaking"],
     limits: &[],
-    make: Some(|settings| Box::new(Acc(settings))),
+    make: |settings| Box::new(Acc(settings)),
 };
 
 /// Actions by their numbers: nothing, pouring, shaking.

@@ -24,7 +24,7 @@ pub(crate) const MASK_RN: Definition = Definition {
     limits: &["Detections (Mask R-CNN's in the paper) are read from tables beside the recordings. The \
                paper names neither the size of the crops nor the training, nor what counts where nothing \
                is detected: those are our choice."],
-    make: Some(|settings| Box::new(Baseline(settings))),
+    make: |settings| Box::new(Baseline(settings)),
 };
 
 /// Views, each of which answers alone.

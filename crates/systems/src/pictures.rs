@@ -1,5 +1,8 @@
 //! Pictures in folders, as networks take them.
 
+use std::fs::File;
+use std::io::Read;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -15,6 +18,8 @@ use crate::error::{Result, SystemError};
 const MAX_DEPTH: usize = 8;
 /// Pictures of a folder at most.
 const MAX_PICTURES: usize = 1 << 20;
+/// Pictures that are read at a time.
+const PART: usize = 256;
 
 /// A picture of a folder.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,52 +34,106 @@ pub struct Picture {
     pub item: std::result::Result<Vec<f32>, String>,
 }
 
-/// The pictures (PNG, JPEG) in a folder and the folders in it, or a single one, in the order of their
-/// ids, in the size that the network takes.
-///
-/// # Errors
-/// [`SystemError::TakesNoPictures`]; a folder that cannot be read or has none; [`SystemError::Interrupted`]
-/// once `stop` is set.
-pub fn read(definition: &Definition, folder: &Path, stop: &AtomicBool) -> Result<Vec<Picture>> {
-    let Some((width, height)) = definition.picture() else {
-        let (network, takes) = (definition.name, definition.takes);
-        return Err(SystemError::TakesNoPictures { network, takes });
-    };
-    let mut paths = Vec::new();
-    let root = match folder.is_dir() {
-        true => {
-            list(folder, 0, &mut paths)?;
-            folder
+/// The pictures (PNG, JPEG) in a folder and the folders in it, or a single one, in the order of their ids.
+#[derive(Clone, Debug)]
+pub struct Pictures {
+    folder: PathBuf,
+    named: Vec<(String, PathBuf)>,
+    /// Width and height that the network takes.
+    size: (usize, usize),
+}
+
+impl Pictures {
+    /// Looks for them and reads none.
+    ///
+    /// # Errors
+    /// [`SystemError::TakesNoPictures`]; a folder that cannot be read or has none.
+    pub fn find(definition: &Definition, folder: &Path) -> Result<Self> {
+        let Some(size) = definition.picture() else {
+            let (network, takes) = (definition.name, definition.takes);
+            return Err(SystemError::TakesNoPictures { network, takes });
+        };
+        let mut paths = Vec::new();
+        let root = match folder.is_dir() {
+            true => {
+                list(folder, 0, &mut paths)?;
+                folder
+            }
+            false => {
+                paths.push(folder.into());
+                folder.parent().unwrap_or(Path::new(""))
+            }
+        };
+        let id = |path: &Path| {
+            let inner = path.strip_prefix(root).unwrap_or(path).with_extension("");
+            let parts = inner.components().map(|part| part.as_os_str().to_string_lossy());
+            parts.collect::<Vec<_>>().join("/")
+        };
+        let mut named: Vec<(String, PathBuf)> = paths.into_iter().map(|p| (id(&p), p)).collect();
+        named.sort();
+        if let Some(twice) = named.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            let (first, second) = (twice[0].1.clone(), twice[1].1.clone());
+            return Err(SystemError::SameId { id: twice[0].0.clone(), first, second });
         }
-        false => {
-            paths.push(folder.into());
-            folder.parent().unwrap_or(Path::new(""))
+        if named.is_empty() {
+            return Err(SystemError::NoPictures { path: folder.into() });
         }
-    };
-    let id = |path: &Path| {
-        let inner = path.strip_prefix(root).unwrap_or(path).with_extension("");
-        let parts = inner.components().map(|part| part.as_os_str().to_string_lossy());
-        parts.collect::<Vec<_>>().join("/")
-    };
-    let mut named: Vec<(String, PathBuf)> = paths.into_iter().map(|p| (id(&p), p)).collect();
-    named.sort();
-    if let Some(twice) = named.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-        let (first, second) = (twice[0].1.clone(), twice[1].1.clone());
-        return Err(SystemError::SameId { id: twice[0].0.clone(), first, second });
+        Ok(Self { folder: folder.into(), named, size })
     }
-    if named.is_empty() {
-        return Err(SystemError::NoPictures { path: folder.into() });
-    }
-    let read = |(id, path): (String, PathBuf)| {
-        if stop.load(Ordering::SeqCst) {
-            return Err(SystemError::Interrupted);
+
+    /// Refuses more of them than memory holds at a time, as a training does; of what is free in bytes, where
+    /// that is known.
+    ///
+    /// # Errors
+    /// [`SystemError::TooMuchMemory`].
+    pub fn require_memory(&self, available: Option<u64>) -> Result<()> {
+        let (width, height) = self.size;
+        let needed = self.named.len() as u64 * (width * height * 3 * size_of::<f32>()) as u64;
+        match available.filter(|available| needed > *available) {
+            None => Ok(()),
+            Some(available) => {
+                let (path, pictures) = (self.folder.clone(), self.named.len());
+                Err(SystemError::TooMuchMemory { path, pictures, needed, available })
+            }
         }
-        let image = Rgb::read(&path).map_err(|e| e.to_string());
-        let item = image.map(|image| picture::item(&image.resized(width, height).data));
-        let identity = identity::of_file(&path).unwrap_or_default();
-        Ok(Picture { id, path, identity, item })
-    };
-    named.into_par_iter().map(read).collect()
+    }
+
+    /// Stretches of them that are read at a time.
+    pub fn parts(&self) -> impl Iterator<Item = Range<usize>> {
+        let count = self.named.len();
+        (0..count).step_by(PART).map(move |first| first..count.min(first + PART))
+    }
+
+    /// Reads a stretch, in the size that the network takes.
+    ///
+    /// # Errors
+    /// [`SystemError::Interrupted`] once `stop` is set.
+    pub fn read(&self, part: Range<usize>, stop: &AtomicBool) -> Result<Vec<Picture>> {
+        let (width, height) = self.size;
+        let read = |(id, path): &(String, PathBuf)| {
+            if stop.load(Ordering::SeqCst) {
+                return Err(SystemError::Interrupted);
+            }
+            let (item, identity) = match bytes(path) {
+                Err(reason) => (Err(reason), String::new()),
+                Ok(bytes) => {
+                    let image = Rgb::from_bytes(&bytes, path).map_err(|e| e.to_string());
+                    let item = image.map(|image| picture::item(&image.resized(width, height).data));
+                    (item, identity::of_bytes(&bytes))
+                }
+            };
+            Ok(Picture { id: id.clone(), path: path.clone(), identity, item })
+        };
+        self.named[part].par_iter().map(read).collect()
+    }
+}
+
+/// The content of a file, up to what is refused.
+fn bytes(path: &Path) -> std::result::Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    let read = File::open(path).and_then(|f| f.take(Rgb::MAX_BYTES + 1).read_to_end(&mut bytes));
+    read.map_err(|e| format!("{}: {e}", path.display()))?;
+    Ok(bytes)
 }
 
 fn list(folder: &Path, depth: usize, paths: &mut Vec<PathBuf>) -> Result<()> {
@@ -101,4 +160,37 @@ fn list(folder: &Path, depth: usize, paths: &mut Vec<PathBuf>) -> Result<()> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use corsmal_nets::networks;
+
+    #[test]
+    fn memory_is_asked_for_before_a_picture_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.png", "b.jpg", "in/c.PNG", ".hidden.png", "text.txt"] {
+            let path = folder.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, b"no picture").unwrap();
+        }
+        let network = networks::named("resnet18_level").unwrap();
+        let pictures = Pictures::find(network, folder.path()).unwrap();
+        let mut parts = pictures.parts();
+        assert_eq!((parts.next(), parts.next()), (Some(0..3), None));
+        let each = 112 * 112 * 3 * 4;
+        assert!(pictures.require_memory(None).is_ok());
+        assert!(pictures.require_memory(Some(3 * each)).is_ok());
+        let refused = pictures.require_memory(Some(3 * each - 1)).unwrap_err().to_string();
+        assert!(refused.contains("3 pictures take 0.0 GiB"), "{refused}");
+        let read = pictures.read(0..3, &AtomicBool::new(false)).unwrap();
+        let ids: Vec<&str> = read.iter().map(|picture| picture.id.as_str()).collect();
+        assert_eq!(ids, ["a", "b", "in/c"]);
+        assert!(read.iter().all(|picture| picture.item.is_err()));
+        let file = identity::of_file(&folder.path().join("a.png")).unwrap();
+        assert_eq!(read[0].identity, file);
+        let stopped = pictures.read(0..3, &AtomicBool::new(true));
+        assert!(matches!(stopped, Err(SystemError::Interrupted)));
+    }
 }

@@ -14,6 +14,7 @@ use corsmal_nets::NetError;
 use corsmal_nets::cross_validation::{self, Data, FoldItems};
 use corsmal_nets::fit::{self, Progress, Task};
 use corsmal_nets::model::{Header, NetModel};
+use corsmal_nets::network::Network;
 use corsmal_nets::recipe::{Recipe, Select};
 use corsmal_nets::weights::{self, State};
 use ndarray::Array2;
@@ -54,6 +55,20 @@ impl Weights {
         let identity = corsmal_files::identity::of_file(path)
             .map_err(|source| SystemError::Io { path: path.into(), source })?;
         Ok(Self { path: path.into(), identity, state: weights::read(path)? })
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Lets the trainings of a network begin with them.
+    ///
+    /// # Errors
+    /// [`SystemError::OtherWeights`] for those of another network.
+    pub(crate) fn begin(&self, network: &mut Network) -> Result<()> {
+        network.begin_with(&self.state).map_err(|e| self.refusal(e))?;
+        Ok(())
     }
 
     fn provenance(&self) -> Value {
@@ -143,7 +158,7 @@ impl Training<'_> {
         let task = Task { items, classes: &y, train: &train, watched: &watched };
         let mut network = definition.build(Some(labels.len()), recipe.seed)?;
         if let Some(weights) = self.weights {
-            network.begin_with(&weights.state).map_err(|e| weights.refusal(e))?;
+            weights.begin(&mut network)?;
         }
         let checkpoint = self.checkpoints.map(|folder| folder.join("training.safetensors"));
         let score = |truth: &[usize], found: &[usize]| weighted_f1(truth, found, labels.len());
@@ -222,7 +237,11 @@ impl Training<'_> {
             self.checkpoints,
             |truth, found| weighted_f1(truth, found, labels.len()),
             |fold, told| progress(&fold.name, told),
-        )?;
+        );
+        let found = found.map_err(|error| match (error, self.weights) {
+            (error @ NetError::Weights { .. }, Some(weights)) => weights.refusal(error),
+            (error, _) => error.into(),
+        })?;
         let histories = found.iter().map(
             |f| json!({"fold": f.name, "validation_group": f.validation, "history": f.history}),
         );

@@ -142,6 +142,7 @@ impl Calibration {
     /// # Errors
     /// As [`Calibration::load`].
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
+        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         // A text pickle begins with "(" or an opcode letter, JSON with a bracket.
         let json = matches!(bytes.iter().find(|b| !b.is_ascii_whitespace()), Some(b'{' | b'['));
         let calibration = if json {
@@ -268,6 +269,7 @@ mod tests {
     #[test]
     fn json_gives_a_camera_that_projects_and_back() {
         let camera = parse(CAMERA).unwrap().rgb;
+        assert_eq!(camera, parse(&format!("\u{feff}{CAMERA}")).unwrap().rgb);
         assert_eq!(camera.project([0.0, 0.0, 0.0]), [640.0, 360.0]);
         assert_eq!(camera.project([0.2, -0.1, 0.0]), [730.0, 315.0]);
         assert_eq!(camera.projection[0], [900.0, 0.0, 640.0, 1280.0]);

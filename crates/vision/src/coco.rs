@@ -251,7 +251,8 @@ fn runs(counts: &[u32], width: usize, height: usize) -> Mask {
 /// one.
 fn decompress(text: &str) -> Result<Vec<u32>, String> {
     const FAULT: &str = "compressed run lengths that are damaged";
-    let mut counts: Vec<i64> = Vec::new();
+    let mut counts: Vec<u32> = Vec::new();
+    let mut sum = 0u64;
     let mut bytes = text.bytes();
     while let Some(mut byte) = bytes.next() {
         let (mut value, mut shift) = (0i64, 0);
@@ -271,11 +272,18 @@ fn decompress(text: &str) -> Result<Vec<u32>, String> {
             byte = bytes.next().ok_or(FAULT)?;
         }
         if counts.len() > 2 {
-            value = value.checked_add(counts[counts.len() - 2]).ok_or(FAULT)?;
+            let before = i64::from(counts[counts.len() - 2]);
+            value = value.checked_add(before).ok_or(FAULT)?;
         }
-        counts.push(value);
+        let count = u32::try_from(value).map_err(|_| FAULT)?;
+        sum += u64::from(count);
+        // Before memory is filled with runs that no mask has.
+        if sum > MAX_PIXELS as u64 || count == 0 && !counts.is_empty() {
+            return Err(FAULT.into());
+        }
+        counts.push(count);
     }
-    counts.into_iter().map(|c| u32::try_from(c).map_err(|_| FAULT.to_string())).collect()
+    Ok(counts)
 }
 
 /// COCO's text of a mask.

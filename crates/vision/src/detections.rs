@@ -76,10 +76,11 @@ impl Detection {
 /// [`VisionError`] with the line or entry at fault.
 pub fn read_detections(path: &Path) -> Result<Vec<Detection>> {
     let bytes = read(path, MAX_BYTES)?;
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
     // The header of a CSV begins with a letter, whatever the name of the file.
     match bytes.trim_ascii_start().first() {
-        Some(b'[' | b'{') => from_json(&bytes, path),
-        _ => from_csv(&bytes, path),
+        Some(b'[' | b'{') => from_json(bytes, path),
+        _ => from_csv(bytes, path),
     }
 }
 
@@ -381,6 +382,17 @@ mod tests {
             let error = table("d.json", text).unwrap_err().to_string();
             assert!(error.contains(part), "{text}: {error}");
         }
+    }
+
+    #[test]
+    fn a_mark_before_the_text_is_passed_over() {
+        let json =
+            r#"[{"frame":0,"view":1,"label":"cup","score":0.9,"box":[1,2,3.5,4],"mask":"m.png"}]"#;
+        let csv = format!("{HEADER}0,1,cup,0.9,1,2,3.5,4,m.png\n");
+        for text in [json, &csv] {
+            assert_eq!(table("d", &format!("\u{feff}{text}")).unwrap().len(), 1, "{text}");
+        }
+        assert!(table("d.json", "\u{feff}[]").unwrap().is_empty());
     }
 
     #[test]

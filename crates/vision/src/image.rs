@@ -46,19 +46,22 @@ impl Depth {
     /// # Errors
     /// [`VisionError`] when the file is damaged, too large, or another kind of image.
     pub fn read(path: &Path) -> Result<Self> {
-        let png = decode_png(&read(path, MAX_BYTES)?, path, false)?;
-        if (png.channels, png.bits) != (1, 16) {
-            return Err(VisionError::file(
-                path,
-                format!(
-                    "{} channels of {} bits; a depth image has one of 16 bits, in mm",
-                    png.channels, png.bits
-                ),
-            ));
-        }
-        let pairs = png.data.chunks_exact(2);
-        let data = pairs.map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect();
-        Ok(Self { width: png.width, height: png.height, data })
+        let (bytes, kept) = (read(path, MAX_BYTES)?, png::Transformations::IDENTITY);
+        let mut data = Vec::new();
+        let (width, height) = decode_png(&bytes, path, kept, |row, format| {
+            let Format { channels, bits } = format;
+            if (channels, bits) != (1, 16) {
+                return Err(VisionError::file(
+                    path,
+                    format!(
+                        "{channels} channels of {bits} bits; a depth image has one of 16 bits, in mm"
+                    ),
+                ));
+            }
+            data.extend(row.as_chunks().0.iter().map(|pair| u16::from_be_bytes(*pair)));
+            Ok(())
+        })?;
+        Ok(Self { width, height, data })
     }
 
     /// PNG with one channel of 16 bits.
@@ -78,23 +81,41 @@ impl Depth {
 }
 
 impl Rgb {
+    /// Largest file that is read, in bytes.
+    pub const MAX_BYTES: u64 = MAX_BYTES;
+
     /// Reads a PNG or JPEG; grey becomes colour, transparency is dropped.
     ///
     /// # Errors
     /// [`VisionError`] when the file is damaged, too large, or no PNG or JPEG.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = read(path, MAX_BYTES)?;
-        if bytes.starts_with(&[0xff, 0xd8]) {
-            return decode_jpeg(&bytes, path);
+        Self::from_bytes(&read(path, MAX_BYTES)?, path)
+    }
+
+    /// The same from the bytes of a file; `path` is named in errors.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Self> {
+        if bytes.len() as u64 > MAX_BYTES {
+            let (what, actual) = ("size in bytes", bytes.len() as u64);
+            return Err(VisionError::Limit { path: path.into(), what, actual, limit: MAX_BYTES });
         }
-        let png = decode_png(&bytes, path, true)?;
-        let data = match png.channels {
-            1 => png.data.iter().flat_map(|&v| [v; 3]).collect(),
-            2 => png.data.chunks_exact(2).flat_map(|p| [p[0]; 3]).collect(),
-            3 => png.data,
-            _ => png.data.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect(),
-        };
-        Ok(Self { width: png.width, height: png.height, data })
+        if bytes.starts_with(&[0xff, 0xd8]) {
+            return decode_jpeg(bytes, path);
+        }
+        let to_bytes = png::Transformations::normalize_to_color8();
+        let mut data = Vec::new();
+        let (width, height) = decode_png(bytes, path, to_bytes, |row, format| {
+            match format.channels {
+                1 => data.extend(row.iter().flat_map(|&v| [v; 3])),
+                2 => data.extend(row.chunks_exact(2).flat_map(|p| [p[0]; 3])),
+                3 => data.extend_from_slice(row),
+                _ => data.extend(row.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]])),
+            }
+            Ok(())
+        })?;
+        Ok(Self { width, height, data })
     }
 
     /// PNG with three channels of 8 bits.
@@ -112,9 +133,16 @@ impl Mask {
     /// # Errors
     /// [`VisionError`] when the file is damaged, too large, or no PNG.
     pub fn read(path: &Path) -> Result<Self> {
-        let png = decode_png(&read(path, MAX_BYTES)?, path, true)?;
-        let data = png.data.chunks_exact(png.channels).map(|p| p[0] != 0).collect();
-        Ok(Self { width: png.width, height: png.height, data })
+        // Cut to 8 bits, a 1 of 16 bits would be 0.
+        let (bytes, kept) = (read(path, MAX_BYTES)?, png::Transformations::EXPAND);
+        let mut data = Vec::new();
+        let (width, height) = decode_png(&bytes, path, kept, |row, format| {
+            let bytes = format.bits.div_ceil(8);
+            let pixels = row.chunks_exact(format.channels * bytes);
+            data.extend(pixels.map(|pixel| pixel[..bytes].iter().any(|&byte| byte != 0)));
+            Ok(())
+        })?;
+        Ok(Self { width, height, data })
     }
 
     /// PNG with one channel of 8 bits, 255 inside.
@@ -127,52 +155,50 @@ impl Mask {
     }
 }
 
-struct Png {
-    width: usize,
-    height: usize,
+/// What the values of a row are.
+#[derive(Clone, Copy)]
+struct Format {
     channels: usize,
     bits: usize,
-    data: Vec<u8>,
 }
 
-fn decode_png(bytes: &[u8], path: &Path, to_bytes: bool) -> Result<Png> {
+/// Width and height of a PNG whose rows `keep` takes: it holds what is needed of them, and no more.
+fn decode_png(
+    bytes: &[u8],
+    path: &Path,
+    changes: png::Transformations,
+    mut keep: impl FnMut(&[u8], Format) -> Result<()>,
+) -> Result<(usize, usize)> {
     let damaged =
         |e: png::DecodingError| VisionError::file(path, format!("not a readable PNG: {e}"));
     let limits = png::Limits { bytes: MAX_PIXELS * 8 };
     let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), limits);
-    decoder.set_transformations(if to_bytes {
-        png::Transformations::normalize_to_color8()
-    } else {
-        png::Transformations::IDENTITY
-    });
+    decoder.set_transformations(changes);
     let mut reader = decoder.read_info().map_err(damaged)?;
     let (width, height) = (reader.info().width as usize, reader.info().height as usize);
     check_size(width, height, path)?;
     if reader.info().interlaced {
         return Err(VisionError::file(path, "an interlaced PNG; save it without interlacing"));
     }
-    let size =
-        reader.output_buffer_size().filter(|&size| size <= MAX_PIXELS * 8).ok_or_else(|| {
-            VisionError::file(path, "its pixels need more memory than any image that is read")
-        })?;
-    // A header may promise what the file does not hold: memory grows with the rows that are there.
-    let mut data = Vec::new();
-    while let Some(row) = reader.next_row().map_err(damaged)? {
-        if data.len() + row.data().len() > size {
-            return Err(VisionError::file(path, "it has more rows than its header says"));
-        }
-        data.extend_from_slice(row.data());
-    }
     let (color, depth) = reader.output_color_type();
-    let channels = color.samples();
-    let bits = depth as usize;
-    if data.len() != width * height * channels * bits.div_ceil(8) {
+    let format = Format { channels: color.samples(), bits: depth as usize };
+    // A header may promise what the file does not hold: memory grows with the rows that are there.
+    let length = (width * format.channels * format.bits).div_ceil(8);
+    let mut rows = 0;
+    while let Some(row) = reader.next_row().map_err(damaged)? {
+        if rows == height || row.data().len() != length {
+            return Err(VisionError::file(path, "it has more pixels than its header says"));
+        }
+        keep(row.data(), format)?;
+        rows += 1;
+    }
+    if rows != height {
         return Err(VisionError::file(path, "it ends before its last row"));
     }
-    Ok(Png { width, height, channels, bits, data })
+    Ok((width, height))
 }
 
-fn check_size(width: usize, height: usize, path: &Path) -> Result<()> {
+pub(crate) fn check_size(width: usize, height: usize, path: &Path) -> Result<()> {
     let side = width.max(height);
     let (what, actual, limit) = if side > MAX_SIDE {
         ("the longer side in px", side, MAX_SIDE)
@@ -230,4 +256,65 @@ fn encode_png(
     writer.write_image_data(bytes).map_err(fault)?;
     writer.finish().map_err(fault)?;
     Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A few KB that claim the most pixels, and pixels beyond.
+    #[test]
+    fn headers_that_promise_too_much_take_no_memory() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("m.png");
+        let small = Depth { width: 2, height: 2, data: vec![1; 4] }.to_png().unwrap();
+        let claimed = |width: u32, height: u32| {
+            let mut bytes = small.clone();
+            bytes[16..20].copy_from_slice(&width.to_be_bytes());
+            bytes[20..24].copy_from_slice(&height.to_be_bytes());
+            let sum = crc(&bytes[12..29]).to_be_bytes();
+            bytes[29..33].copy_from_slice(&sum);
+            std::fs::write(&path, bytes).unwrap();
+            [
+                Depth::read(&path).unwrap_err(),
+                Mask::read(&path).unwrap_err(),
+                Rgb::read(&path).unwrap_err(),
+            ]
+            .map(|error| error.to_string())
+        };
+        for said in claimed(8192, 8192) {
+            assert!(said.contains("the number of pixels is 67108864; the limit is"), "{said}");
+        }
+        for said in claimed(u32::MAX >> 1, 1) {
+            assert!(said.contains("m.png"), "{said}");
+        }
+        for said in claimed(8192, 4096) {
+            assert!(said.contains("not a readable PNG") || said.contains("ends before"), "{said}");
+        }
+        assert!(claimed(0, 2).iter().all(|said| said.contains("m.png")));
+    }
+
+    fn crc(bytes: &[u8]) -> u32 {
+        !bytes.iter().fold(u32::MAX, |sum, &byte| {
+            (0..8).fold(sum ^ u32::from(byte), |s, _| (s >> 1) ^ (0xedb8_8320 * (s & 1)))
+        })
+    }
+
+    /// Cut to 8 bits, a 1 of 16 bits would be outside.
+    #[test]
+    fn a_mask_of_any_depth_is_what_is_not_0() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("m.png");
+        for value in [1, 255, 256, u16::MAX] {
+            let deep = Depth { width: 3, height: 1, data: vec![0, value, 0] };
+            std::fs::write(&path, deep.to_png().unwrap()).unwrap();
+            assert_eq!(Mask::read(&path).unwrap().data, [false, true, false], "{value}");
+        }
+        for depth in [png::BitDepth::One, png::BitDepth::Two, png::BitDepth::Four] {
+            let bytes = [0b1000_0000];
+            let grey = png::ColorType::Grayscale;
+            std::fs::write(&path, encode_png(2, 1, grey, depth, &bytes).unwrap()).unwrap();
+            assert_eq!(Mask::read(&path).unwrap().data, [true, false], "{depth:?}");
+        }
+    }
 }

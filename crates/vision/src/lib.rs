@@ -39,6 +39,7 @@ mod matrix;
 mod pickle;
 pub mod region;
 mod resize;
+mod video;
 
 pub use calibration::{BackProjection, Calibration, Camera};
 pub use category::Category;
@@ -50,3 +51,4 @@ pub use gaussian_process::{GaussianProcess, Normal};
 pub use image::{Depth, Rgb};
 pub use mask::Mask;
 pub use matrix::{Matrix3, Matrix34};
+pub use video::Video;

@@ -1,15 +1,19 @@
 //! The files of a recording's views.
 //!
 //! Tree of 2020: beside `audio/`, the folders `calib/<sequence>_c1_calib.pickle`,
-//! `depth/<sequence>/c1/0000.png`, `rgb/<sequence>/c1/0000.png` (extracted frames; PNG or JPEG),
-//! `masks/<sequence>/c1/0000.png` and `detections/<sequence>.csv` or `.json`. Flat release:
+//! `depth/<sequence>/c1/0000.png`, `rgb/<sequence>/c1/0000.png` (extracted frames; PNG or JPEG) or else
+//! the video `rgb/<sequence>_c1.mp4`, `masks/<sequence>/c1/0000.png` and `detections/<sequence>.csv` or `.json`. Flat release:
 //! `view1/calib/<id>.pickle`, `view1/depth/<id>/0000.png`, `view1/rgb/<id>/0000.png`,
-//! `view1/masks/<id>/0000.png`, and `detections/<id>.csv` or `.json`. Calibrations may be `.json`.
+//! `view1/rgb/<id>.mp4`, `view1/masks/<id>/0000.png`, and `detections/<id>.csv` or `.json`. Calibrations may be `.json`.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use corsmal_vision::{Calibration, Camera, Depth, Detection, Mask, VisionError, read_detections};
+use corsmal_vision::category::Vote;
+use corsmal_vision::{
+    Calibration, Camera, Depth, Detection, Mask, Rgb, Video, VisionError, read_detections,
+};
 
 use crate::dataset::Recording;
 
@@ -17,6 +21,9 @@ use crate::dataset::Recording;
 pub(super) const IMAGE_SIZE: (usize, usize) = (1280, 720);
 /// Frames that are listed of one view at most.
 const MAX_FRAMES: usize = 100_000;
+
+/// What the names of videos end in.
+const VIDEO: &str = "mp4";
 
 /// Where the files of a recording's views are.
 #[derive(Clone, Debug)]
@@ -63,8 +70,15 @@ impl Kind {
 pub struct Frame {
     /// Its number in the video, from 0.
     pub number: u32,
-    /// The image.
+    /// The image, or the video that it is in.
     pub path: PathBuf,
+}
+
+impl Frame {
+    /// Whether it is in a video, and no image of its own.
+    fn is_in_video(&self) -> bool {
+        self.path.extension().is_some_and(|extension| extension == VIDEO)
+    }
 }
 
 /// Why something could not be used.
@@ -132,10 +146,11 @@ impl Views {
         Ok(Calibration::load(&path)?.rgb)
     }
 
-    /// The frames of a view of one kind, in their order; none where there is no folder.
+    /// The frames of a view of one kind, in their order; none where there is no folder. Where there is a video
+    /// instead of colour images, those of the video.
     ///
     /// # Errors
-    /// The folder cannot be read, or `view` is not 1 to 4.
+    /// The folder or the video cannot be read, or `view` is not 1 to 4.
     pub fn frames(&self, kind: Kind, view: u8) -> Result<&[Frame], Problem> {
         let of_kind = &self.frames[kind as usize];
         let list = of_kind
@@ -161,7 +176,7 @@ impl Views {
             base.join(format!("view{view}/{kind}/{stem}")),
         ];
         let Some(folder) = folders.iter().find(|folder| folder.is_dir()) else {
-            return Ok(Vec::new());
+            return if kind == Kind::Rgb.folder() { self.video(view) } else { Ok(Vec::new()) };
         };
         let unreadable = |e| Problem::Damaged(format!("{}: {e}", folder.display()));
         let mut frames = Vec::new();
@@ -182,6 +197,43 @@ impl Views {
         Ok(frames)
     }
 
+    /// The frames of the video of a view; none where there is none.
+    fn video(&self, view: u8) -> Result<Vec<Frame>, Problem> {
+        let Self { base, stem, .. } = self;
+        let videos = [
+            base.join(format!("rgb/{stem}_c{view}.{VIDEO}")),
+            base.join(format!("view{view}/rgb/{stem}.{VIDEO}")),
+        ];
+        let Some(path) = videos.into_iter().find(|path| path.is_file()) else {
+            return Ok(Vec::new());
+        };
+        let frames = Video::open(&path)?.len() as u32;
+        Ok((0..frames).map(|number| Frame { number, path: path.clone() }).collect())
+    }
+
+    /// Reads those colour images of a view that are `wanted`, in their order, until `each` breaks off. A video
+    /// is decoded once.
+    ///
+    /// # Errors
+    /// An image is damaged; the video is, or this program was built without video.
+    pub fn colours(
+        &self,
+        view: u8,
+        wanted: impl Fn(u32) -> bool,
+        mut each: impl FnMut(u32, Rgb) -> ControlFlow<()>,
+    ) -> Result<(), Problem> {
+        let frames = self.frames(Kind::Rgb, view)?;
+        if let Some(first) = frames.first().filter(|frame| frame.is_in_video()) {
+            return Ok(Video::open(&first.path)?.pictures(wanted, each)?);
+        }
+        for frame in frames.iter().filter(|frame| wanted(frame.number)) {
+            if each(frame.number, Rgb::read(&frame.path)?).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
     /// What a detector saw in all views; `None` where there is no table.
     ///
     /// # Errors
@@ -200,6 +252,14 @@ impl Views {
             Some(path) => Ok(Some(read_detections(&path)?)),
             None => Ok(None),
         }
+    }
+
+    /// Kind of container that a random share of the frames of all views votes for, as M3 tells it.
+    ///
+    /// # Errors
+    /// No frame shows a container; the table of detections is damaged.
+    pub fn vote(&self, seed: u64) -> Result<Vote, Problem> {
+        super::methods::vote(&super::methods::table(self)?, seed)
     }
 
     /// A depth image of a view.
@@ -279,8 +339,9 @@ impl Views {
     /// Numbers of the first frame of the side views' video and of the one `from_end` from its end, the last
     /// where there are fewer; `None` where nothing says how long it is.
     ///
-    /// The video's frames are the images that both views have: colour, depth, or else masks. A table of
-    /// detections has no row for a frame in which nothing was found: it counts from 0 to its last frame.
+    /// The video's frames are the images that both views have: colour, depth, or else masks; then those of the
+    /// videos. A table of detections has no row for a frame in which nothing was found: it counts from 0 to its
+    /// last frame.
     ///
     /// # Errors
     /// A folder cannot be read.
@@ -289,9 +350,15 @@ impl Views {
         detections: &[Detection],
         from_end: usize,
     ) -> Result<Option<(u32, u32)>, Problem> {
-        for kind in [Kind::Rgb, Kind::Depth, Kind::Masks] {
+        // Images may be numbered otherwise than the frames of a video that lies beside them.
+        let sources =
+            [(Kind::Rgb, false), (Kind::Depth, false), (Kind::Masks, false), (Kind::Rgb, true)];
+        for (kind, video) in sources {
             let other = self.frames(kind, 2)?;
-            let shared = |f: &&Frame| other.binary_search_by_key(&f.number, |o| o.number).is_ok();
+            let shared = |f: &&Frame| {
+                f.is_in_video() == video
+                    && other.binary_search_by_key(&f.number, |o| o.number).is_ok()
+            };
             let numbers: Vec<u32> =
                 self.frames(kind, 1)?.iter().filter(shared).map(|f| f.number).collect();
             if let (Some(first), Some(last)) = (numbers.first(), numbers.last()) {

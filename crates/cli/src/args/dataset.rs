@@ -222,6 +222,12 @@ impl DatasetArgs {
         }
     }
 
+    /// Whether labels were named.
+    #[cfg_attr(not(feature = "nets"), expect(dead_code, reason = "for networks"))]
+    pub fn has_labels(&self) -> bool {
+        self.labels.labels.is_some()
+    }
+
     /// Where the table came from, for a model's provenance.
     pub fn provenance(&self) -> Result<Value, Failure> {
         let file = |path: &Path| -> Result<Value, Failure> {

@@ -38,7 +38,7 @@ pub struct Args {
     /// --methods.
     #[arg(long, num_args = 1.., value_delimiter = ',', value_parser = baseline, value_name = "NAME")]
     baselines: Vec<Baseline>,
-    /// Systems of the paper to train and run: m1, m2, m4, m5, m6, mask-rn. They need a build with the feature
+    /// Systems of the paper to train and run: m1 to m6, mask-rn. They need a build with the feature
     /// `nets`.
     #[arg(long, num_args = 1.., value_delimiter = ',', value_name = "NAME")]
     methods: Vec<String>,
@@ -63,8 +63,8 @@ pub struct Args {
     /// fused with the model of `capacity train`, m2 also with published weights.
     #[arg(long, value_parser = capacity_source, value_name = "m4|m5|METHOD=MODEL|NAME=CSV")]
     capacity: Vec<CapacitySource>,
-    /// Folder of tables of detections (SEQUENCE.csv or .json, by container or not), for mask-rn and
-    /// --capacity; by default `detections/` beside each recording's audio folder.
+    /// Folder of tables of detections (SEQUENCE.csv or .json, by container or not), for m3, mask-rn
+    /// and --capacity; by default `detections/` beside each recording's audio folder.
     #[arg(long, value_name = "DIR")]
     detections: Option<PathBuf>,
     /// Seed of the forests and of the pseudo-random estimates.
@@ -199,6 +199,10 @@ fn capacities(args: &Args) -> Result<Option<Vec<CapacityTable>>, Failure> {
 
 #[cfg(feature = "nets")]
 fn systems(args: &Args) -> Result<Vec<Box<dyn System>>, Failure> {
+    use std::sync::Arc;
+
+    use corsmal_systems::training::Weights;
+
     let methods = args.methods.iter().map(|name| corsmal_systems::named(name));
     let methods = methods.collect::<Result<Vec<_>, _>>()?;
     let mut weights = Vec::with_capacity(args.weights.len());
@@ -212,19 +216,13 @@ fn systems(args: &Args) -> Result<Vec<Box<dyn System>>, Failure> {
         if weights.iter().any(|(known, _)| known == network) {
             return Err(Failure::new(format!("--weights {name}: given twice")));
         }
-        if corsmal_nets::model::NetModel::load(path).is_ok() {
-            return Err(Failure::new(format!(
-                "--weights {name}: {} is a network that this tool trained, perhaps on recordings that are \
-                 held out here; name weights that others trained",
-                path.display()
-            )));
-        }
-        weights.push((network.to_owned(), path.clone()));
+        crate::networks::refuse_own(&format!("--weights {name}"), path)?;
+        weights.push((network.to_owned(), Arc::new(Weights::read(path)?)));
     }
     let epochs = args.epochs.map(|n| n as usize);
     let embeddings = args.embeddings.clone();
     let settings = corsmal_systems::Settings { epochs, embeddings, weights };
-    Ok(methods.into_iter().map(|method| method.make(&settings)).collect::<Result<Vec<_>, _>>()?)
+    Ok(methods.into_iter().map(|method| method.make(&settings)).collect())
 }
 
 #[cfg(not(feature = "nets"))]

@@ -5,14 +5,13 @@ use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
 use corsmal_ccm::capacity::{Kind, Problem, Views};
-use corsmal_ccm::dataset::DataSet;
+use corsmal_ccm::dataset::{Container, DataSet, SequenceName};
 use corsmal_files::format::require_npz;
 use corsmal_nets::dataset::Dataset;
 use corsmal_nets::items::{Column, Items};
 use corsmal_onnx::OnnxError;
 use corsmal_onnx::clip::{self, FEATURES, FRAMES};
 use corsmal_onnx::runtime::{ClipEmbedder, Runtime};
-use corsmal_vision::Rgb;
 use serde_json::json;
 
 use super::embed::Args;
@@ -65,11 +64,13 @@ pub fn run(args: &Args, data: &Path, model: &Path, library: &Path) -> Result<Exi
         return Err(Failure::new("no recording has an embedding: nothing was written"));
     }
     let mut columns = vec![("view".to_owned(), view_of)];
-    // Type and level follow from the names, where all are known.
-    if let Some(names) = names.into_iter().collect::<Option<Vec<_>>>() {
-        let containers = names.iter().map(|(c, _)| c.number().to_string()).collect();
-        columns.push(("container".into(), containers));
-        columns.push(("sequence".into(), names.iter().map(|(_, name)| name.to_string()).collect()));
+    // Type and level follow from the names; recordings of the test parts have none.
+    if names.iter().any(Option::is_some) {
+        let named = |text: fn(&(Container, SequenceName)) -> String| {
+            names.iter().map(|name| name.as_ref().map(text).unwrap_or_default()).collect()
+        };
+        columns.push(("container".into(), named(|(container, _)| container.number().to_string())));
+        columns.push(("sequence".into(), named(|(_, name)| name.to_string())));
     }
     let rows = column.values.len() / FEATURES;
     let dataset = Dataset { ids, columns, items: Items { columns: vec![column] } };
@@ -92,32 +93,78 @@ enum Fault {
     Interrupted,
 }
 
+impl From<Problem> for Fault {
+    fn from(problem: Problem) -> Self {
+        Self::Recording(super::frames::reason(problem))
+    }
+}
+
 /// The numbers of the windows of each view.
 fn sequences(embedder: &mut ClipEmbedder, views: &Views) -> Result<Vec<Vec<f32>>, Fault> {
     let mut sequences = Vec::new();
     for view in 1..=VIEWS {
-        let frames = views.frames(Kind::Rgb, view).map_err(|problem| match problem {
-            Problem::Missing(reason) | Problem::Damaged(reason) => Fault::Recording(reason),
-        })?;
-        if frames.len() < FRAMES {
-            let found = frames.len();
-            return Err(Fault::Recording(format!(
-                "view {view} has {found} colour frames; a window has {FRAMES}"
-            )));
-        }
-        let mut sequence = Vec::with_capacity(frames.len() / FRAMES * FEATURES);
-        for window in frames.chunks_exact(FRAMES) {
-            if crate::interrupt::flag().load(Ordering::SeqCst) {
-                return Err(Fault::Interrupted);
-            }
-            let read = |frame: &corsmal_ccm::capacity::Frame| {
-                let image = Rgb::read(&frame.path).map_err(|e| Fault::Recording(e.to_string()))?;
-                Ok(clip::frame(&image))
-            };
-            let window = window.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-            sequence.extend(embedder.embed(&clip::window(&window)).map_err(Fault::Model)?);
-        }
+        let frames = views.frames(Kind::Rgb, view)?;
+        let numbers: Vec<u32> = frames.iter().map(|frame| frame.number).collect();
+        check(view, &numbers).map_err(Fault::Recording)?;
+        let used = numbers.len() / FRAMES * FRAMES;
+        let end = numbers[used - 1];
+        let mut sequence = Vec::with_capacity(used / FRAMES * FEATURES);
+        let mut window = Vec::with_capacity(FRAMES);
+        super::frames::each(
+            views,
+            view,
+            |number| number <= end,
+            |_, image| {
+                if crate::interrupt::flag().load(Ordering::SeqCst) {
+                    return Err(Fault::Interrupted);
+                }
+                window.push(clip::frame(&image));
+                if window.len() == FRAMES {
+                    sequence.extend(embedder.embed(&clip::window(&window)).map_err(Fault::Model)?);
+                    window.clear();
+                }
+                Ok(())
+            },
+        )?;
         sequences.push(sequence);
     }
     Ok(sequences)
+}
+
+/// Refuses frames that windows cannot be made of.
+fn check(view: u8, numbers: &[u32]) -> Result<(), String> {
+    let found = numbers.len();
+    if found < FRAMES {
+        return Err(format!("view {view} has {found} colour frames; a window has {FRAMES}"));
+    }
+    match numbers.windows(2).find(|pair| pair[1] != pair[0] + 1) {
+        None => Ok(()),
+        Some(pair) if pair[0] == pair[1] => {
+            Err(format!("view {view} has two images of frame {}", pair[0]))
+        }
+        Some(pair) => Err(format!(
+            "view {view}: after frame {} comes frame {}; a window has {FRAMES} frames in a row, so every frame \
+             of the video is needed",
+            pair[0], pair[1]
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_have_no_gaps() {
+        let refused = |numbers: &[u32]| check(2, numbers).unwrap_err();
+        let all: Vec<u32> = (1..=20).collect();
+        assert_eq!(check(2, &all), Ok(()));
+        assert!(refused(&all[..15]).contains("view 2 has 15 colour frames; a window has 16"));
+        let gap = [&all[..17], &all[18..]].concat();
+        assert!(refused(&gap).contains("after frame 17 comes frame 19"));
+        let sampled: Vec<u32> = all.iter().map(|number| 8 * number).collect();
+        assert!(refused(&sampled).contains("after frame 8 comes frame 16"));
+        let twice = [&all[..4], &all[3..]].concat();
+        assert!(refused(&twice).contains("two images of frame 4"));
+    }
 }

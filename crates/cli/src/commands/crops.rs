@@ -19,9 +19,10 @@ Examples:
   corsmal-feat train --net resnet18-level --crops crops -o level.safetensors
   corsmal-feat cross-validate --net resnet18-type --crops crops --weights resnet18.pth
 
-A picture for each view of the labelled training recordings whose last colour frame shows a cup or wine
-glass, and labels.csv with id, container, view, level and type; both are \"opaque\" where one cannot see
-what a container holds. docs/vision.md lists the files that it looks for.
+Writes a picture for each view of a labelled training recording whose last colour frame shows a cup or
+wine glass, and labels.csv with the columns id, container, view, level and type. Level and type are
+\"opaque\" where the container hides what it holds. docs/vision.md lists the files that the command reads.
+The folder appears when all is written: nothing is left of an interrupted run.
 
 Exit codes: 0 all fine, 1 some recordings have damaged files, 2 could not run, 130 interrupted.")]
 pub struct Args {

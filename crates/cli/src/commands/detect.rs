@@ -13,9 +13,10 @@ Examples:
   corsmal-feat detect --data ~/CCM --model mask_rcnn.onnx --library libonnxruntime.so.1.32.0 --out detections
   corsmal-feat capacity --method m5 --data ~/CCM --detections detections --out capacity.csv
 
-A table CONTAINER/SEQUENCE.json for each recording with colour frames, as `capacity` and `crops` read
-them: what the model sees with its confidence, and masks of containers. Existing tables are kept, so an
-interrupted run can be resumed; model.json says which model made them.
+A table CONTAINER/SEQUENCE.json for each recording with colour frames (images, or H.264 in MP4 in a build
+with the feature `video`), as `capacity` and `crops` read them: what the model sees with its confidence, and
+masks of containers. Existing tables are kept, so an interrupted run can be resumed; model.json says which
+model made them.
 
 Exit codes: 0 all fine, 1 some recordings have damaged files, 2 could not run, 130 interrupted.")]
 pub struct Args {
@@ -139,6 +140,13 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         }
     }
     let (out, recordings) = (&args.out, set.recordings.len());
+    if without == recordings {
+        return Err(Failure::new(format!(
+            "{}: none of {} has colour frames (rgb/SEQUENCE/c1/0000.png or rgb/SEQUENCE_c1.mp4; see docs/vision.md)",
+            args.data.display(),
+            plural(recordings, "recording")
+        )));
+    }
     args.told.tell(
         || {
             json!({
@@ -208,6 +216,13 @@ enum Fault {
     Interrupted,
 }
 
+#[cfg(feature = "onnx")]
+impl From<corsmal_ccm::capacity::Problem> for Fault {
+    fn from(problem: corsmal_ccm::capacity::Problem) -> Self {
+        Self::Recording(super::frames::reason(problem))
+    }
+}
+
 /// The rows of a recording; `None` where it has no frames.
 #[cfg(feature = "onnx")]
 fn seen(
@@ -215,37 +230,34 @@ fn seen(
     views: &corsmal_ccm::capacity::Views,
     args: &Args,
 ) -> Result<Option<Vec<serde_json::Value>>, Fault> {
-    use corsmal_ccm::capacity::{Kind, Problem};
+    use corsmal_ccm::capacity::Kind;
 
-    let fault = |problem: Problem| match problem {
-        Problem::Missing(reason) | Problem::Damaged(reason) => Fault::Recording(reason),
-    };
-    let ends = views.ends(&[], corsmal_ccm::capacity::M5_FROM_END).map_err(fault)?;
+    let ends = views.ends(&[], corsmal_ccm::capacity::M5_FROM_END)?;
     let (mut rows, mut any) = (Vec::new(), false);
     for view in chosen_views(args) {
-        let all = views.frames(Kind::Rgb, view).map_err(fault)?;
-        let last = all.len().saturating_sub(1);
-        for (i, frame) in all.iter().enumerate() {
-            let wanted = match args.frames {
+        let last = views.frames(Kind::Rgb, view)?.last().map(|frame| frame.number);
+        any |= last.is_some();
+        let wanted = |number: u32| {
+            let chosen = match args.frames {
                 // By number, as `capacity` takes them.
-                Frames::Every(step) => (frame.number as usize).is_multiple_of(step),
-                Frames::Ends => ends.is_some_and(|(a, b)| [a, b].contains(&frame.number)),
+                Frames::Every(step) => (number as usize).is_multiple_of(step),
+                Frames::Ends => ends.is_some_and(|(a, b)| [a, b].contains(&number)),
             };
-            if !wanted && i != last {
-                continue;
-            }
-            any = true;
+            chosen || Some(number) == last
+        };
+        let mut look = |number: u32, image: corsmal_vision::Rgb| -> Result<(), Fault> {
             if crate::interrupt::flag().load(std::sync::atomic::Ordering::SeqCst) {
                 return Err(Fault::Interrupted);
             }
-            let image = corsmal_vision::Rgb::read(&frame.path)
-                .map_err(|e| Fault::Recording(e.to_string()))?;
-            let found = detector.detect(&image).map_err(|e| Fault::Model(e.into()))?;
             let size = (image.width, image.height);
-            let found = found.rows((view, frame.number), size, args.score as f32);
+            let found = detector
+                .detect(&image, |found| found.rows((view, number), size, args.score as f32));
             let path = args.model.display();
+            let found = found.map_err(|e| Fault::Model(e.into()))?;
             rows.extend(found.map_err(|e| Fault::Model(Failure::new(format!("{path}: {e}"))))?);
-        }
+            Ok(())
+        };
+        super::frames::each(views, view, wanted, &mut look)?;
     }
     Ok(any.then_some(rows))
 }

@@ -49,6 +49,11 @@ fn every_method_estimates_from_files() {
     let learned =
         done(&["capacity", "train", "--method", "fused", "--data", &data, "--out", text(&model)]);
     assert!(learned.contains("SYNTHETIC"), "{learned}");
+    let train = ["capacity", "train", "--method", "m3", "--data", &data, "--json", "--out"];
+    let told = done(&[&train[..], &[text(&dir.path().join("told.capacity"))]].concat());
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    assert_eq!([&told["recordings"], &told["used"], &told["failed"]], [9, 9, 0]);
+    assert_eq!(told["synthetic"], true);
     for (method, model) in
         [("m3", Some(text(&model))), ("m4", None), ("m5", None), ("fused", Some(text(&model)))]
     {
@@ -110,15 +115,18 @@ fn m2_runs_on_weights(dir: &Path, data: &str) {
 /// Few epochs: the same bytes on one thread and on two, and estimates by what was learned.
 #[cfg(feature = "nets")]
 fn m2_learns(dir: &Path, data: &str) {
-    let train = |jobs: &str, out: &Path| {
+    let train = |jobs: &str, form: &[&str], out: &Path| {
         let how = ["--set", "epochs=2", "--set", "batch=4", "--seed", "5", "--jobs", jobs];
         let what = ["capacity", "train", "--method", "m2", "--data", data, "--out", text(out)];
-        done(&[&what[..], &how].concat())
+        done(&[&what[..], &how, form].concat())
     };
     let models = [dir.join("m2-1.safetensors"), dir.join("m2-2.safetensors")];
-    let said = train("1", &models[0]);
+    let said = train("1", &[], &models[0]);
     assert!(said.contains("9 of 9 recordings") && said.contains("SYNTHETIC"), "{said}");
-    train("2", &models[1]);
+    let told: serde_json::Value =
+        serde_json::from_str(&train("2", &["--json"], &models[1])).unwrap();
+    assert_eq!([&told["recordings"], &told["used"], &told["failed"]], [9, 9, 0]);
+    assert_eq!((&told["synthetic"], &told["out"]), (&true.into(), &text(&models[1]).into()));
     let [first, second] = models.each_ref().map(|path| std::fs::read(path).unwrap());
     assert_eq!(first, second);
     let out = dir.join("m2-learned.csv");

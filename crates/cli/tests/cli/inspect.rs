@@ -175,9 +175,9 @@ fn folders_and_several_files_are_listed() {
 fn models_and_predictions_are_explained() {
     let folder = tempfile::tempdir().unwrap();
     let predictions = folder.path().join("p.csv");
-    std::fs::write(&predictions, "id,true,predicted,p_dog\na,dog,dog,1\nb,cat,dog,0.6\n").unwrap();
+    std::fs::write(&predictions, "id,true,predicted\na,dog,dog\nb,cat,dog\n").unwrap();
     let shown = text(&inspect(&[&predictions]).stdout);
-    assert!(shown.contains("2 rows · 4 columns") && shown.contains("predicted  dog 2"), "{shown}");
+    assert!(shown.contains("2 rows · 3 columns") && shown.contains("predicted  dog 2"), "{shown}");
     assert!(shown.contains("accuracy   50.00 %"), "{shown}");
     let json = inspect(&[&predictions, "--json".as_ref()]);
     let found: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
@@ -373,8 +373,21 @@ fn every_kind_of_file_is_known() {
     assert!(colour.contains("colour image · 1280 × 720 px"), "{colour}");
     let mut mask = corsmal_vision::Mask::empty(6, 5);
     mask.data[8] = true;
-    let mask = shown(&written("mask.png", &mask.to_png().unwrap())).0;
-    assert!(mask.contains("mask · 6 × 5 px · 1 px inside, columns 2 to 2, rows 1 to 1"), "{mask}");
+    // As other programs write them, too: 1 inside, of 8 and of 16 bits, grey as colour.
+    let inside = |value: u16| mask.data.iter().map(move |&inside| u16::from(inside) * value);
+    let (width, height) = (mask.width, mask.height);
+    let deep = |value| corsmal_vision::Depth { width, height, data: inside(value).collect() };
+    let bytes = inside(1).flat_map(|v| [v as u8; 3]).collect();
+    let colour = corsmal_vision::Rgb { width, height, data: bytes };
+    for png in [mask.to_png(), colour.to_png(), deep(1).to_png(), deep(u16::MAX).to_png()] {
+        let mask = shown(&written("mask.png", &png.unwrap())).0;
+        let want = "mask · 6 × 5 px · 1 px inside, columns 2 to 2, rows 1 to 1";
+        assert!(mask.contains(want), "{mask}");
+    }
+    for other in [deep(700), deep(0)] {
+        let depth = shown(&written("depth.png", &other.to_png().unwrap())).0;
+        assert!(depth.contains("depth image · 6 × 5 px"), "{depth}");
+    }
 
     run(&["capacity", "--method", "m5", "--data", "ccm", "--out", "m5.csv", "--quiet"]);
     let capacities = shown(&path("m5.csv")).0;
@@ -389,10 +402,23 @@ fn every_kind_of_file_is_known() {
     assert_eq!((&json["fused"], &json["provenance"]["recordings"]), (&false.into(), &2.into()));
 
     let line = r#"{"id":"a","status":"ok","true":"cup","predicted":"cup"}"#;
-    let other = line.replace("\"predicted\":\"cup\"", "\"predicted\":\"box\"");
+    let other =
+        line.replace("\"predicted\":\"cup\"", "\"predicted\":\"box\"").replace("\"a\"", "\"b\"");
     let (lines, json) = shown(&written("p.jsonl", format!("{line}\n{other}\n").as_bytes()));
     assert!(lines.contains("predictions · jsonl · 2 rows") && lines.contains("50.00 %"), "{lines}");
     assert_eq!(json["counts"]["predicted"]["box"], 1);
+    // One record is a line as well; marks and empty lists are known.
+    for (name, text) in [
+        ("one.jsonl", "{\"id\":\"a\",\"score\":1}\n".to_owned()),
+        ("one.json", format!("{line}\n")),
+        ("marked.jsonl", format!("\u{feff}{line}\n{line}\n")),
+    ] {
+        let (found, json) = shown(&written(name, text.as_bytes()));
+        assert!(found.contains(" · jsonl · "), "{name}: {found}");
+        assert_eq!(json["rows"], text.lines().count(), "{name}");
+    }
+    let found = shown(&written("none.json", b"\xef\xbb\xbf[]\n")).0;
+    assert!(found.contains("table of detections · json"), "{found}");
     let (submission, _) =
         shown(&written("s.csv", b"Container ID,Sequence,Filling type,Filling level\n10,0,1,2\n"));
     assert!(submission.contains("submission in the format of 2020 · 1 row"), "{submission}");
@@ -411,7 +437,25 @@ fn every_kind_of_file_is_known() {
     for (name, content) in
         [("r.html", "<!DOCTYPE html><p>"), ("f.svg", "<svg xmlns=''/>"), ("f.pdf", "%PDF-1.7")]
     {
-        assert!(shown(&written(name, content.as_bytes())).0.contains("for a browser or viewer"));
+        assert!(
+            shown(&written(name, content.as_bytes())).0.contains("open it in a browser or viewer")
+        );
+    }
+
+    let tensors = |text: &str| {
+        let bytes = [&(text.len() as u64).to_le_bytes(), text.as_bytes(), &[0; 16]].concat();
+        String::from_utf8(inspect(&[&written("t.safetensors", &bytes)]).stderr).unwrap()
+    };
+    for (shape, offsets, reason) in [
+        ("[3]", "[0,16]", "tensor w: 3 numbers of type F32 are 12 bytes, not 16"),
+        ("[4,4294967296,4294967296]", "[0,16]", "tensor w: shape"),
+        ("[4]", "[16,0]", "tensor w: bytes 16 to 0"),
+        ("[3]", "[4,16]", "its tensors do not lie side by side"),
+    ] {
+        let said = tensors(&format!(
+            "{{\"w\":{{\"dtype\":\"F32\",\"shape\":{shape},\"data_offsets\":{offsets}}}}}"
+        ));
+        assert!(said.contains(reason), "{said}");
     }
 
     // What is damaged is said to be so, and never taken for sound.
@@ -433,6 +477,59 @@ fn every_kind_of_file_is_known() {
     }
     let drawn = inspect(&[&path("x.json"), "--picture".as_ref(), &path("x.png")]);
     assert!(text(&drawn.stderr).contains("neither sound nor features"));
+}
+
+/// The accuracy is that of `score`: by the classes that it reads, not by the text of cells.
+#[test]
+fn predictions_are_as_right_as_their_score() {
+    let folder = tempfile::tempdir().unwrap();
+    let shown = |name: &str, text: &str| -> (String, serde_json::Value) {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let json = inspect(&[&path, "--json".as_ref()]);
+        (self::text(&inspect(&[&path]).stdout), serde_json::from_slice(&json.stdout).unwrap())
+    };
+    // Without a class, the most probable one; "unknown" is none.
+    let rows = [
+        "id,true,predicted,p_cup,p_box",
+        "a,cup,,0.9,0.1",
+        "b,box,box,0.2,0.8",
+        "c,box,unknown,0.4,0.6",
+        "d,jug,cup,0.7,0.3",
+    ];
+    let (text, json) = shown("p.csv", &rows.join("\n"));
+    assert!(text.contains("accuracy   50.00 %"), "{text}");
+    let scored =
+        tool().args(["score", "--json"]).arg(folder.path().join("p.csv")).output().unwrap();
+    let scored: serde_json::Value = serde_json::from_slice(&scored.stdout).unwrap();
+    assert_eq!(json["accuracy"], scored["scores"]["accuracy"]);
+    let lines = rows[1..].iter().map(|row| {
+        let cells: Vec<&str> = row.split(',').collect();
+        serde_json::json!({"id": cells[0], "true": cells[1], "predicted": cells[2],
+            "p_cup": cells[3].parse::<f64>().unwrap(), "p_box": cells[4].parse::<f64>().unwrap()})
+    });
+    let lines: Vec<String> = lines.map(|line| line.to_string()).collect();
+    assert_eq!(shown("p.jsonl", &lines.join("\n")).1["accuracy"], 0.5);
+    // What `score` refuses, and numbers, have none.
+    assert_eq!(
+        shown("e.csv", "id,true,predicted\na,cup,cup\nb,,cup\n").1["accuracy"],
+        serde_json::Value::Null
+    );
+    assert_eq!(
+        shown("n.csv", "id,true,predicted\na,1.5,1.5\nb,2.5,1.5\n").1["accuracy"],
+        serde_json::Value::Null
+    );
+    // Values are counted up to a limit, and the most frequent shown.
+    let many = |n: usize| (0..n).map(|i| format!("{i},{i},x\n")).collect::<String>();
+    let (text, json) = shown("m.csv", &format!("id,predicted,status\n{}", many(1001)));
+    assert!(text.contains("predicted  more than 1000 different values"), "{text}");
+    assert_eq!(
+        (&json["counts"]["predicted"], &json["counts"]["status"]["x"]),
+        (&serde_json::Value::Null, &1001.into())
+    );
+    let (text, json) = shown("f.csv", &format!("id,predicted,status\n{}", many(25)));
+    assert!(text.contains("and 5 more"), "{text}");
+    assert_eq!(json["counts"]["predicted"].as_object().unwrap().len(), 25);
 }
 
 #[test]

@@ -32,7 +32,7 @@ mod with_runtime {
     fn library() -> Option<String> {
         let library = std::env::var("CORSMAL_ONNXRUNTIME").ok();
         if library.is_none() {
-            eprintln!("skipped: CORSMAL_ONNXRUNTIME names no library of ONNX Runtime");
+            crate::command::skipped("CORSMAL_ONNXRUNTIME names no library of ONNX Runtime");
         }
         library
     }
@@ -134,6 +134,32 @@ mod with_runtime {
         assert_eq!((read.ids.len(), read.items.columns.len()), (2, 4));
         assert_eq!(read.items.columns[3].offsets, [0, 1024, 2048]);
         assert_eq!(read.column("container").unwrap(), ["3", "4"]);
+
+        // A recording of a test part has no name: the others keep theirs, and teach.
+        let base = ccm.join("test/10");
+        let views = ccm.join("train/3/rgb/s0_fi1_fu1_b0_l0");
+        std::fs::create_dir_all(base.join("audio")).unwrap();
+        std::fs::write(base.join("audio/0000_audio.wav"), b"").unwrap();
+        for view in 1..=4 {
+            let to = base.join(format!("rgb/0000/c{view}"));
+            std::fs::create_dir_all(&to).unwrap();
+            for frame in 0..16 {
+                let name = format!("{frame:04}.png");
+                std::fs::copy(views.join(format!("c{view}/{name}")), to.join(name)).unwrap();
+            }
+        }
+        assert!(done(&[&embed[..], &["--overwrite"]].concat()).contains("3 recordings, 20 x 512"));
+        let read = corsmal_nets::dataset::Dataset::read(&out, &network).unwrap();
+        assert_eq!(read.column("container").unwrap(), ["3", "4", ""]);
+        assert_eq!(read.column("sequence").unwrap()[1..], ["s0_fi2_fu2_b0_l0", ""]);
+        let learned = path("type.safetensors");
+        let train = ["train", text(&out), "--net", "m5-r21d-type", "--target", "type"];
+        let output = run(&[&train[..], &["--set", "epochs=1", "-o", text(&learned)]].concat());
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(
+            output.status.success() && said.contains("1 item without type: left out"),
+            "{said}"
+        );
 
         let third = ccm.join("train/3/rgb/s0_fi1_fu1_b0_l0/c3");
         for frame in 15..35 {

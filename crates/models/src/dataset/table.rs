@@ -170,7 +170,11 @@ impl LabelledTable {
         if name == "joint"
             && let (Some((_, kind)), Some((_, level))) = (find("type"), find("level"))
         {
-            return Ok(kind.iter().zip(level).map(|(t, l)| format!("{t}-{l}")).collect());
+            let joint = |(t, l): (&String, &String)| match t.is_empty() || l.is_empty() {
+                true => String::new(),
+                false => format!("{t}-{l}"),
+            };
+            return Ok(kind.iter().zip(level).map(joint).collect());
         }
         if let Some((_, why)) = self.unread.iter().find(|(member, _)| member == name) {
             return Err(DatasetError::content(&self.path, format!("member {name:?}: {why}")));

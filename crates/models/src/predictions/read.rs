@@ -50,7 +50,7 @@ impl PredictionTable {
     }
 }
 
-/// Columns that are known by their names, in any case.
+/// Columns that are known by their names, in upper and lower case.
 const MEANT: [&str; 8] =
     ["id", "path", "true", "predicted", "sequence", "object", "container", "container id"];
 
@@ -74,7 +74,12 @@ impl PredictionColumns {
         // `True` beside `true` leaves open which one is meant.
         for name in MEANT {
             if header.iter().filter(|h| h.eq_ignore_ascii_case(name)).count() > 1 {
-                return Err(content(path, format!("two columns are named {name:?} in any case")));
+                return Err(content(
+                    path,
+                    format!(
+                        "two columns have the name {name:?}, but for upper and lower case; rename one of them"
+                    ),
+                ));
             }
         }
         let find = |name: &str| header.iter().position(|h| h.eq_ignore_ascii_case(name));

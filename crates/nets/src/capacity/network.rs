@@ -79,16 +79,9 @@ impl CapacityNetwork {
                 "no model of M2's capacity network ({why}); `capacity train --method m2` makes one"
             )
         };
-        let text = weights::safetensors_text(bytes, ENTRY)
+        let header: Header = weights::entry(bytes, ENTRY, FORMAT)
             .map_err(|e| no_model(&e))?
             .ok_or_else(|| no_model("its recipe is missing; weights alone are for --weights"))?;
-        let value: Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
-        let format = value.get("format").and_then(Value::as_u64);
-        if format != Some(FORMAT.into()) {
-            let found = format.map_or("none".into(), |f| f.to_string());
-            return Err(format!("format version {found}: this program reads version {FORMAT}"));
-        }
-        let header: Header = serde_json::from_value(value).map_err(|e| e.to_string())?;
         header.recipe.check().map_err(|e| e.to_string())?;
         let network =
             loaded(&weights::from_safetensors(bytes)?).map_err(|e| no_model(&e.to_string()))?;

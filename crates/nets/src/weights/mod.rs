@@ -1,5 +1,6 @@
 //! Weights on disk: `.npz`, `.safetensors`, `.pth`, under PyTorch's names and in its layouts.
 
+mod entry;
 mod error;
 mod npz;
 mod numbers;
@@ -11,6 +12,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+pub(crate) use entry::entry;
+pub use entry::trained_here;
 pub use error::WeightsError;
 pub use numbers::{MAX_FILE, State};
 pub use safetensors::{from_safetensors, safetensors_shapes, safetensors_text, to_safetensors};

@@ -13,7 +13,7 @@ use corsmal_nets::model::NetModel;
 use corsmal_nets::networks::{self, Definition};
 use corsmal_systems::SystemError;
 use corsmal_systems::listening::{Answer, Formats, Listener};
-use corsmal_systems::pictures;
+use corsmal_systems::pictures::Pictures;
 
 use super::args::{Args, check_changes, recordings};
 use super::records::{End, Records, delivered, path_of};
@@ -131,38 +131,44 @@ fn of_pictures(
     }
     let pool = args.jobs.pool()?;
     let stop = crate::interrupt::flag();
-    let pictures = match pool.install(|| pictures::read(definition, Path::new(folder), stop)) {
-        Err(SystemError::Interrupted) => return Ok((End::Interrupted, None)),
-        pictures => pictures?,
-    };
-    let items: Vec<&[f32]> = pictures.iter().filter_map(|p| p.item.as_deref().ok()).collect();
-    let items = Items { columns: vec![Column::of(items)] };
-    let mut proba = match items.is_empty() {
-        true => Vec::new(),
-        false => pool.install(|| model.predict_proba(&items))?,
-    }
-    .into_iter();
+    let pictures = Pictures::find(definition, Path::new(folder))?;
     let mut records = args.records(labels, &model.header.target, Unit::Recording, &[])?;
-    for picture in &pictures {
-        let (status, proba) = match &picture.item {
-            Ok(_) => (Status::Ok, proba.next()),
-            Err(reason) => {
-                eprintln!("{}: {}: {reason}", picture.id, Status::Corrupt.name());
-                (Status::Corrupt, None)
+    for part in pictures.parts() {
+        let read = match pool.install(|| pictures.read(part, stop)) {
+            Err(SystemError::Interrupted) => {
+                let nothing = records.written == 0;
+                return Ok((End::Interrupted, (!nothing).then_some(records)));
             }
+            read => read?,
         };
-        let record = Record {
-            id: &picture.id,
-            path: &picture.path.display().to_string(),
-            span: None,
-            windows: 0,
-            status,
-            labels: Vec::new(),
-            class: proba.as_deref().map(argmax),
-            proba,
-        };
-        if !delivered(records.write(&record))? {
-            return Ok((End::Unread, Some(records)));
+        let items: Vec<&[f32]> = read.iter().filter_map(|p| p.item.as_deref().ok()).collect();
+        let items = Items { columns: vec![Column::of(items)] };
+        let mut proba = match items.is_empty() {
+            true => Vec::new(),
+            false => pool.install(|| model.predict_proba(&items))?,
+        }
+        .into_iter();
+        for picture in &read {
+            let (status, proba) = match &picture.item {
+                Ok(_) => (Status::Ok, proba.next()),
+                Err(reason) => {
+                    eprintln!("{}: {}: {reason}", picture.id, Status::Corrupt.name());
+                    (Status::Corrupt, None)
+                }
+            };
+            let record = Record {
+                id: &picture.id,
+                path: &picture.path.display().to_string(),
+                span: None,
+                windows: 0,
+                status,
+                labels: Vec::new(),
+                class: proba.as_deref().map(argmax),
+                proba,
+            };
+            if !delivered(records.write(&record))? {
+                return Ok((End::Unread, Some(records)));
+            }
         }
     }
     Ok((End::Done, Some(records)))

@@ -13,8 +13,21 @@ use crate::failure::Failure;
 pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
     let name = path.display().to_string();
     let found = match Depth::read(path) {
-        Ok(depth) => Ok(of_depth(&depth)),
-        Err(_) => Rgb::read(path).map(|image| of_colours(&image)),
+        Ok(depth) => {
+            // Nothing is 1 mm or 65,535 mm away.
+            let values = || depth.data.iter().copied();
+            match values().any(|mm| mm > 0) && two_values(values(), u16::MAX) {
+                true => Mask::read(path).map(|mask| of_mask(&mask)),
+                false => Ok(of_depth(&depth)),
+            }
+        }
+        Err(_) => Rgb::read(path).and_then(|image| {
+            let grey = image.data.as_chunks::<3>().0.iter().all(|p| p[0] == p[1] && p[0] == p[2]);
+            match grey && two_values(image.data.iter().copied(), u8::MAX) {
+                true => Mask::read(path).map(|mask| of_mask(&mask)),
+                false => Ok(of_colours(&image)),
+            }
+        }),
     };
     let (kind, text, mut facts) = match found {
         Ok(found) => found,
@@ -48,17 +61,23 @@ fn of_depth(depth: &Depth) -> Found {
     ("depth image", text, facts)
 }
 
-fn of_colours(image: &Rgb) -> Found {
-    let Rgb { width, height, data } = image;
-    let two = |pixel: &[u8]| matches!(pixel, [0, 0, 0] | [255, 255, 255]);
-    if !data.chunks_exact(3).all(two) {
-        return ("colour image", String::new(), json!({ "width": width, "height": height }));
-    }
-    let inside = data.chunks_exact(3).map(|pixel| pixel[0] > 0).collect();
-    let mask = Mask { width: *width, height: *height, data: inside };
+/// Whether nothing occurs but 0 and, as masks are written, one of 1 and the largest value.
+fn two_values<T: Copy + PartialEq + From<u8>>(values: impl Iterator<Item = T>, most: T) -> bool {
+    let mut inside = None;
+    values.filter(|value| *value != T::from(0)).all(|value| {
+        (value == T::from(1) || value == most) && *inside.get_or_insert(value) == value
+    })
+}
+
+fn of_colours(Rgb { width, height, .. }: &Rgb) -> Found {
+    ("colour image", String::new(), json!({ "width": width, "height": height }))
+}
+
+fn of_mask(mask: &Mask) -> Found {
     let (area, bounds) = (mask.area(), mask.bounds());
     let place = bounds
         .map(|[x0, y0, x1, y1]| format!(", columns {x0} to {}, rows {y0} to {}", x1 - 1, y1 - 1));
     let text = format!(" · {area} px inside{}", place.unwrap_or_default());
+    let Mask { width, height, .. } = mask;
     ("mask", text, json!({ "width": width, "height": height, "area": area, "bounds": bounds }))
 }

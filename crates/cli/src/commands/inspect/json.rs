@@ -7,6 +7,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use corsmal_ccm::capacity::CapacityModel;
+use corsmal_models::predictions::PredictionTable;
 use corsmal_vision::read_detections;
 use serde::Serialize;
 use serde_json::Value;
@@ -19,6 +20,8 @@ use crate::failure::Failure;
 
 /// Largest value, and longest line, that is read.
 const MAX_BYTES: u64 = 64 << 20;
+/// Mark of UTF-8 that some programs put before a text.
+const MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// What is shown of a file.
 #[derive(Serialize)]
@@ -39,9 +42,10 @@ pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
         Ok(value) => value,
         Err(reason) => return refused(reason),
     };
+    let value = value.filter(|value| !is_record(path, value));
     let Some(value) = value else {
         return match records(path) {
-            Ok(counter) => counter.finish(path, "jsonl").print(json),
+            Ok((counter, table)) => counter.finish(path, "jsonl", table.as_ref()).print(json),
             Err(reason) => refused(reason),
         };
     };
@@ -55,7 +59,10 @@ pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
     let found = if value["kind"].as_str().is_some_and(|kind| kind == "corsmal-feat capacity model")
     {
         model(path, &value)
-    } else if value.is_array() && has(&["frame", "view", "label", "score"]) {
+    } else if value.as_array().is_some_and(Vec::is_empty)
+        || value.is_array() && has(&["frame", "view", "label", "score"])
+    {
+        // The only lists that the tool writes; an empty one where nothing was seen.
         detections(path)
     } else {
         Ok(other(&value))
@@ -71,19 +78,24 @@ pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
     }
 }
 
+/// Whether the only value of a file is the only line of one that has a record a line.
+fn is_record(path: &Path, value: &Value) -> bool {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let lines = matches!(ending.as_deref(), Some("jsonl" | "ndjson"));
+    let prediction = ["id", "status", "predicted"].iter().all(|key| value.get(key).is_some());
+    value.is_object() && (lines || prediction)
+}
+
 /// The only value of a file; `None` where there is one a line.
 fn read(path: &Path) -> Result<Option<Value>, String> {
     let mut reader = BufReader::new(File::open(path).map_err(|e| e.to_string())?);
     let mut first = Vec::new();
     Read::take(&mut reader, MAX_BYTES).read_until(b'\n', &mut first).map_err(|e| e.to_string())?;
-    let whole: Option<Value> = serde_json::from_slice(&first).ok();
+    let whole: Option<Value> = serde_json::from_slice(unmarked(&first)).ok();
     let more =
         reader.fill_buf().map_err(|e| e.to_string())?.iter().any(|b| !b.is_ascii_whitespace());
-    if whole.is_some() && more {
-        return Ok(None);
-    }
     if whole.is_some() {
-        return Ok(whole);
+        return Ok(whole.filter(|_| !more));
     }
     Read::take(&mut reader, MAX_BYTES + 1 - (first.len() as u64).min(MAX_BYTES))
         .read_to_end(&mut first)
@@ -91,14 +103,19 @@ fn read(path: &Path) -> Result<Option<Value>, String> {
     if first.len() as u64 > MAX_BYTES {
         return Err(format!("a JSON value of more than {} MiB", MAX_BYTES >> 20));
     }
-    let text = first.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&first);
-    serde_json::from_slice(text).map(Some).map_err(|e| format!("not readable as JSON: {e}"))
+    let found = serde_json::from_slice(unmarked(&first));
+    found.map(Some).map_err(|e| format!("not readable as JSON: {e}"))
 }
 
-/// Objects line by line.
-fn records(path: &Path) -> Result<Counter, String> {
+fn unmarked(text: &[u8]) -> &[u8] {
+    text.strip_prefix(MARK).unwrap_or(text)
+}
+
+/// Objects line by line, counted, and as the table that `score` would read of them.
+fn records(path: &Path) -> Result<(Counter, Option<PredictionTable>), String> {
     let mut reader = BufReader::new(File::open(path).map_err(|e| e.to_string())?);
-    let mut counter: Option<Counter> = None;
+    let mut table: Option<(Vec<String>, Counter)> = None;
+    let mut csv = csv::Writer::from_writer(Vec::new());
     let mut line = Vec::new();
     for number in 1.. {
         line.clear();
@@ -106,22 +123,40 @@ fn records(path: &Path) -> Result<Counter, String> {
         if read.map_err(|e| e.to_string())? == 0 {
             break;
         }
-        if line.trim_ascii().is_empty() {
+        let text = if number == 1 { unmarked(&line) } else { &line };
+        if text.trim_ascii().is_empty() {
             continue;
         }
         let value: Value =
-            serde_json::from_slice(&line).map_err(|e| format!("line {number}: {e}"))?;
+            serde_json::from_slice(text).map_err(|e| format!("line {number}: {e}"))?;
         let Value::Object(record) = value else {
             return Err(format!("line {number} is no object"));
         };
-        let counter = counter.get_or_insert_with(|| Counter::new(record.keys().cloned().collect()));
-        counter.add(|column| match record.get(column) {
+        let cell = |column: &str| match record.get(column) {
             None | Some(Value::Null) => String::new(),
             Some(Value::String(text)) => text.clone(),
             Some(other) => other.to_string(),
-        });
+        };
+        if table.is_none() {
+            let columns: Vec<String> = record.keys().cloned().collect();
+            let counter = Counter::new(columns.clone());
+            if counter.has_truth() {
+                csv.write_record(&columns).map_err(|e| e.to_string())?;
+            }
+            table = Some((columns, counter));
+        }
+        if let Some((columns, counter)) = &mut table {
+            counter.add(cell);
+            if counter.has_truth() {
+                csv.write_record(columns.iter().map(|column| cell(column)))
+                    .map_err(|e| e.to_string())?;
+            }
+        }
     }
-    counter.ok_or_else(|| "no line".into())
+    let (_, counter) = table.ok_or("no line")?;
+    let text = csv.into_inner().map_err(|e| e.to_string())?;
+    let table = counter.has_truth().then(|| PredictionTable::parse(&text, path).ok()).flatten();
+    Ok((counter, table))
 }
 
 /// Kind, facts and lines of text.

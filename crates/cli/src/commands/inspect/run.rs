@@ -39,7 +39,7 @@ pub fn configuration(path: &Path, json: bool) -> Result<ExitCode, Failure> {
     let (base, changes) = nearest(&value);
     match changes.is_empty() {
         true => println!("  is {base}"),
-        false => println!("  {base}, but"),
+        false => println!("  differs from {base} in"),
     }
     changes.iter().for_each(|change| println!("    {change}"));
     println!("\n  corsmal-feat extract --config {name} RECORDINGS");
@@ -72,7 +72,7 @@ pub fn ledger(path: &Path, json: bool) -> Result<ExitCode, Failure> {
     println!("  configuration  {}", header.config_hash);
     println!("  inputs         {}", header.inputs_hash);
     failed.iter().for_each(|outcome| println!("    {}", failure_line(outcome)));
-    println!("\n  the command that began it continues it with --resume");
+    println!("\n  to continue it, run the same command again with --resume");
     Ok(ExitCode::SUCCESS)
 }
 
@@ -85,7 +85,7 @@ pub fn page(path: &Path, format: &str, json: bool) -> Result<ExitCode, Failure> 
         print!("{}", to_json(&contents)?);
     } else {
         println!(
-            "{name}\n  {format} · {}: a page or figure, for a browser or viewer",
+            "{name}\n  {format} · {} · a page or figure; open it in a browser or viewer",
             plural(bytes, "byte")
         );
     }

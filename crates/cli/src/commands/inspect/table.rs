@@ -7,6 +7,8 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use corsmal_files::csv_text;
+use corsmal_models::predictions::PredictionTable;
+use corsmal_models::scores::{ScoreReport, Scoring};
 use serde::Serialize;
 
 use super::refusal::{corrupt, to_json};
@@ -32,6 +34,14 @@ const KINDS: [(&str, &[&str]); 6] = [
     ("table", &[]),
 ];
 
+/// Different values of a column that are counted at most.
+const MAX_VALUES: usize = 1000;
+/// Values shown as text; JSON has all that were counted.
+const SHOWN: usize = 20;
+
+/// Rows of each value of a column; `None` where there are more than [`MAX_VALUES`].
+type Counts = Option<BTreeMap<String, usize>>;
+
 /// What is shown of a table.
 #[derive(Serialize)]
 pub(super) struct Contents {
@@ -40,19 +50,16 @@ pub(super) struct Contents {
     kind: &'static str,
     rows: usize,
     columns: Vec<String>,
-    /// Rows of each value of the columns that have few.
-    counts: BTreeMap<String, BTreeMap<String, usize>>,
-    /// Share of right predictions, where the table has true classes.
+    counts: BTreeMap<String, Counts>,
+    /// Share of right predictions as `score` counts it, where each row has its true class.
     accuracy: Option<f64>,
 }
 
 /// Counts the rows of a table as they come.
 pub(super) struct Counter {
     columns: Vec<String>,
-    counts: BTreeMap<String, BTreeMap<String, usize>>,
+    counts: BTreeMap<String, Counts>,
     rows: usize,
-    scored: usize,
-    right: usize,
 }
 
 impl Counter {
@@ -61,31 +68,50 @@ impl Counter {
         let has = |names: &[&str]| names.iter().all(|name| columns.iter().any(|c| c == name));
         let counted = COUNTED.iter().filter(|(of, _)| has(of)).flat_map(|(_, counted)| *counted);
         let counts = counted.filter(|name| has(&[name]));
-        let counts = counts.map(|name| ((*name).to_owned(), BTreeMap::new())).collect();
-        Self { columns, counts, rows: 0, scored: 0, right: 0 }
+        let counts = counts.map(|name| ((*name).to_owned(), Some(BTreeMap::new()))).collect();
+        Self { columns, counts, rows: 0 }
+    }
+
+    /// Whether there are predictions with true classes.
+    pub(super) fn has_truth(&self) -> bool {
+        self.counts.contains_key("true") && self.counts.contains_key("predicted")
     }
 
     /// Takes in a row, given its value in a column; empty where it has none.
     pub(super) fn add(&mut self, value: impl Fn(&str) -> String) {
         self.rows += 1;
-        for (column, values) in &mut self.counts {
-            *values.entry(value(column)).or_default() += 1;
-        }
-        if self.counts.contains_key("true") && self.counts.contains_key("predicted") {
-            let truth = value("true");
-            self.scored += usize::from(!truth.is_empty());
-            self.right += usize::from(!truth.is_empty() && truth == value("predicted"));
+        for (column, counts) in &mut self.counts {
+            if let Some(values) = counts {
+                *values.entry(value(column)).or_default() += 1;
+                if values.len() > MAX_VALUES {
+                    *counts = None;
+                }
+            }
         }
     }
 
-    /// What was counted.
-    pub(super) fn finish(self, path: &Path, format: &'static str) -> Contents {
-        let Self { columns, counts, rows, scored, right } = self;
-        let accuracy = (scored > 0).then(|| right as f64 / scored as f64);
+    /// What was counted, and how good the predictions are.
+    pub(super) fn finish(
+        self,
+        path: &Path,
+        format: &'static str,
+        predictions: Option<&PredictionTable>,
+    ) -> Contents {
+        let Self { columns, counts, rows } = self;
         let has = |names: &[&str]| names.iter().all(|name| columns.iter().any(|c| c == name));
         let kind = KINDS.iter().find(|(_, of)| has(of)).map_or("table", |(kind, _)| *kind);
         let path = path.display().to_string();
+        let accuracy = predictions.and_then(accuracy);
         Contents { path, format, kind, rows, columns, counts, accuracy }
+    }
+}
+
+/// The accuracy that `score` prints; `None` for numbers, and where it refuses the table.
+fn accuracy(table: &PredictionTable) -> Option<f64> {
+    // The interval is not shown.
+    match table.score(&Scoring { draws: 0, ..Scoring::default() }) {
+        Ok(ScoreReport::Classes(report)) => Some(report.scores.accuracy),
+        Ok(ScoreReport::Numbers(_)) | Err(_) => None,
     }
 }
 
@@ -108,7 +134,8 @@ fn read(path: &Path) -> Result<Contents, csv::Error> {
             place(column).and_then(|at| record.get(at)).unwrap_or_default().to_owned()
         });
     }
-    Ok(counter.finish(path, "csv"))
+    let predictions = counter.has_truth().then(|| PredictionTable::read(path).ok()).flatten();
+    Ok(counter.finish(path, "csv", predictions.as_ref()))
 }
 
 impl Contents {
@@ -130,13 +157,21 @@ impl Contents {
             self.columns.join(", ")
         );
         for (column, values) in &self.counts {
+            let Some(values) = values else {
+                out.push_str(&format!("  {column:9}  more than {MAX_VALUES} different values\n"));
+                continue;
+            };
             let mut values: Vec<(&String, &usize)> = values.iter().collect();
             values.sort_by(|a, b| b.1.cmp(a.1).then(a.0.cmp(b.0)));
-            let told = values.iter().map(|(value, n)| {
+            let told = values.iter().take(SHOWN).map(|(value, n)| {
                 let value = if value.is_empty() { "(none)" } else { value };
                 format!("{value} {n}")
             });
-            out.push_str(&format!("  {column:9}  {}\n", told.collect::<Vec<_>>().join(", ")));
+            let mut told: Vec<String> = told.collect();
+            if values.len() > SHOWN {
+                told.push(format!("and {} more", values.len() - SHOWN));
+            }
+            out.push_str(&format!("  {column:9}  {}\n", told.join(", ")));
         }
         if let Some(accuracy) = self.accuracy {
             out.push_str(&format!("\n  accuracy   {:.2} %\n", 100.0 * accuracy));

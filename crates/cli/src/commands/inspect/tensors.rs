@@ -68,7 +68,8 @@ fn read(path: &Path) -> Result<Contents, String> {
     let mut header: Map<String, Value> =
         serde_json::from_slice(&header).map_err(|e| format!("its header: {e}"))?;
     let texts = header.remove("__metadata__").unwrap_or_default();
-    let (mut members, mut numbers, mut end) = (Vec::with_capacity(header.len()), 0u64, 0u64);
+    let (mut members, mut numbers) = (Vec::with_capacity(header.len()), 0u64);
+    let mut places = Vec::with_capacity(header.len());
     for (name, tensor) in header {
         let whole =
             |value: &Value| value.as_u64().ok_or(format!("tensor {name}: {value} is no size"));
@@ -77,9 +78,31 @@ fn read(path: &Path) -> Result<Contents, String> {
         let count = shape.iter().try_fold(1u64, |n, &size| n.checked_mul(size));
         let count = count.ok_or_else(|| format!("tensor {name}: shape {shape:?}"))?;
         numbers = numbers.saturating_add(count);
-        end = end.max(whole(&tensor["data_offsets"][1])?);
+        let offsets = &tensor["data_offsets"];
+        let (from, to) = (whole(&offsets[0])?, whole(&offsets[1])?);
+        let bytes = to.checked_sub(from).ok_or(format!("tensor {name}: bytes {from} to {to}"))?;
         let kind = tensor["dtype"].as_str().unwrap_or_default().to_owned();
+        let bits =
+            bits(&kind).ok_or(format!("tensor {name}: numbers of an unknown type {kind}"))?;
+        let wanted = count.checked_mul(bits).map(|bits| bits.div_ceil(8));
+        if wanted != Some(bytes) {
+            let wanted = wanted.map_or("too many".into(), |wanted| wanted.to_string());
+            return Err(format!(
+                "tensor {name}: {count} numbers of type {kind} are {wanted} bytes, not {bytes}"
+            ));
+        }
+        places.push((from, to));
         members.push(Member { name, kind, shape });
+    }
+    places.sort_unstable();
+    let mut end = 0;
+    for (from, to) in places {
+        if from != end {
+            return Err(format!(
+                "its tensors do not lie side by side: one ends at byte {end}, the next begins at {from}"
+            ));
+        }
+        end = to;
     }
     if end != size - 8 - length {
         return Err(format!(
@@ -102,6 +125,20 @@ fn read(path: &Path) -> Result<Contents, String> {
     };
     let path = path.display().to_string();
     Ok(Contents { path, format: "safetensors", kind, numbers, header, members })
+}
+
+/// Bits of a number of a type that safetensors knows.
+fn bits(kind: &str) -> Option<u64> {
+    Some(match kind {
+        "F4" => 4,
+        "F6_E2M3" | "F6_E3M2" => 6,
+        "BOOL" | "U8" | "I8" | "F8_E5M2" | "F8_E4M3" | "F8_E8M0" | "F8_E5M2FNUZ"
+        | "F8_E4M3FNUZ" => 8,
+        "I16" | "U16" | "F16" | "BF16" => 16,
+        "I32" | "U32" | "F32" => 32,
+        "I64" | "U64" | "F64" | "C64" => 64,
+        _ => return None,
+    })
 }
 
 impl Contents {

@@ -1,0 +1,187 @@
+//! Where the frames of a video lie in an MP4 file.
+//!
+//! Of ISO 14496-12 only what that takes is read. The crate `re_mp4` makes as many frames as a header claims, and
+//! does not end on a box of size 0 in another.
+
+use std::io::{Read, Seek, SeekFrom};
+
+/// Largest index that is read.
+const MAX_INDEX: u64 = 64 << 20;
+/// Boxes beside it, of which a file has a handful.
+const MAX_BOXES: usize = 10_000;
+/// Most frames of a video: 55 minutes at 30 a second.
+pub(crate) const MAX_FRAMES: usize = 100_000;
+/// Largest frame before it is decoded.
+const MAX_FRAME: u32 = 32 << 20;
+/// Said of a file whose frames are not all in its index.
+const FRAGMENTED: &str = "it is fragmented; `ffmpeg -i IN -c copy OUT.mp4` makes one that is not";
+/// What comes before the boxes of a `VisualSampleEntry`.
+const VISUAL_ENTRY: usize = 78;
+
+/// The video track.
+#[derive(Clone, Debug)]
+#[cfg_attr(not(feature = "video"), expect(dead_code, reason = "what decoding needs"))]
+pub(super) struct Track {
+    /// Codec, such as `avc1`.
+    pub(super) codec: [u8; 4],
+    /// Content of its `avcC` box; empty for other codecs.
+    pub(super) setup: Vec<u8>,
+    /// First byte and number of bytes of each frame, in decoding order.
+    pub(super) frames: Vec<(u64, u32)>,
+}
+
+/// A box: what it is, and its content.
+type Boxed<'a> = ([u8; 4], &'a [u8]);
+
+/// The first video track of a file of `size` bytes.
+pub(super) fn read(file: &mut (impl Read + Seek), size: u64) -> Result<Track, String> {
+    let index = index(file, size)?;
+    if child(&index, b"mvex").is_ok() {
+        return Err(FRAGMENTED.into());
+    }
+    for (kind, track) in children(&index)? {
+        if kind != *b"trak" {
+            continue;
+        }
+        let media = child(track, b"mdia")?;
+        // Version, flags, a reserved number; then what handles the media.
+        if child(media, b"hdlr")?.get(8..12) == Some(b"vide") {
+            return self::track(child(child(media, b"minf")?, b"stbl")?, size);
+        }
+    }
+    Err("it has no video track".into())
+}
+
+/// The content of `moov`.
+fn index(file: &mut (impl Read + Seek), size: u64) -> Result<Vec<u8>, String> {
+    let mut at = 0;
+    for _ in 0..MAX_BOXES {
+        let mut head = [0; 16];
+        let length = (size.saturating_sub(at)).min(16) as usize;
+        if length < 8 {
+            break;
+        }
+        file.seek(SeekFrom::Start(at)).map_err(|e| e.to_string())?;
+        file.read_exact(&mut head[..length]).map_err(|e| e.to_string())?;
+        let kind = [head[4], head[5], head[6], head[7]];
+        if at == 0 && !kind.iter().all(|c| c.is_ascii_graphic() || *c == b' ') {
+            return Err("it does not begin with a box".into());
+        }
+        let (header, bytes) = match u32_at(&head, 0)? {
+            // To the end of the file.
+            0 => (8, size - at),
+            1 if length == 16 => (16, u64_at(&head, 8)?),
+            bytes => (8, u64::from(bytes)),
+        };
+        let end = at.checked_add(bytes).filter(|end| bytes >= header && *end <= size);
+        let name = || kind.escape_ascii();
+        let end = end.ok_or_else(|| format!("box {} at byte {at} leaves the file", name()))?;
+        match &kind {
+            b"moof" => return Err(FRAGMENTED.into()),
+            b"moov" if bytes > MAX_INDEX => {
+                return Err(format!("an index of {bytes} bytes; the limit is {MAX_INDEX}"));
+            }
+            b"moov" => {
+                file.seek(SeekFrom::Start(at + header)).map_err(|e| e.to_string())?;
+                let mut content = Vec::new();
+                file.take(bytes - header).read_to_end(&mut content).map_err(|e| e.to_string())?;
+                return Ok(content);
+            }
+            _ => at = end,
+        }
+    }
+    Err("it has no index (moov): perhaps its recording was broken off".into())
+}
+
+/// The frames of a table of samples, in a file of `size` bytes.
+fn track(table: &[u8], size: u64) -> Result<Track, String> {
+    let descriptions = child(table, b"stsd")?.get(8..).unwrap_or_default();
+    let (codec, entry) = *children(descriptions)?.first().ok_or("no description of its video")?;
+    let setup = match codec == *b"avc1" || codec == *b"avc3" {
+        true => child(entry.get(VISUAL_ENTRY..).unwrap_or_default(), b"avcC")?.to_vec(),
+        false => Vec::new(),
+    };
+    let sizes = child(table, b"stsz")?;
+    let (every, count) = (u32_at(sizes, 4)?, u32_at(sizes, 8)? as usize);
+    if count > MAX_FRAMES {
+        return Err(format!("{count} frames; the limit is {MAX_FRAMES}"));
+    }
+    let chunks = match child(table, b"stco") {
+        Ok(offsets) => entries(offsets, 4)?.map(|e| u32_at(e, 0).map(u64::from)).collect(),
+        Err(_) => entries(child(table, b"co64")?, 8)?.map(|e| u64_at(e, 0)).collect(),
+    };
+    let chunks: Vec<u64> = Result::from_iter::<Vec<Result<u64, String>>>(chunks)?;
+    let mut runs = entries(child(table, b"stsc")?, 12)?.peekable();
+    let (mut frames, mut in_chunk) = (Vec::with_capacity(count), 0);
+    for (number, &chunk) in (1u32..).zip(&chunks) {
+        while let Some(run) = runs.next_if(|run| u32_at(run, 0).is_ok_and(|first| first <= number))
+        {
+            in_chunk = u32_at(run, 4)?;
+        }
+        let mut at = chunk;
+        for _ in 0..in_chunk {
+            let frame = frames.len();
+            if frame == count {
+                break;
+            }
+            let bytes = match every {
+                0 => u32_at(sizes, 12 + 4 * frame)?,
+                every => every,
+            };
+            let end = at.checked_add(bytes.into()).filter(|end| *end <= size);
+            let end = end.ok_or_else(|| format!("it ends before frame {frame}"))?;
+            if bytes > MAX_FRAME {
+                return Err(format!("frame {frame} has {bytes} bytes; the limit is {MAX_FRAME}"));
+            }
+            frames.push((at, bytes));
+            at = end;
+        }
+    }
+    match frames.len() == count {
+        true => Ok(Track { codec, setup, frames }),
+        false => Err(format!("its index tells where {} of {count} frames are", frames.len())),
+    }
+}
+
+/// The entries of a table of `width` bytes each, behind version, flags and their number.
+fn entries(table: &[u8], width: usize) -> Result<std::slice::ChunksExact<'_, u8>, String> {
+    let count = u32_at(table, 4)? as usize;
+    let bytes = count.checked_mul(width).and_then(|bytes| table.get(8..)?.get(..bytes));
+    let bytes = bytes.ok_or_else(|| format!("a table of {count} entries ends too early"))?;
+    Ok(bytes.chunks_exact(width))
+}
+
+/// The boxes in a box.
+fn children(mut bytes: &[u8]) -> Result<Vec<Boxed<'_>>, String> {
+    let mut found = Vec::new();
+    while bytes.len() >= 8 && found.len() < MAX_BOXES {
+        let size = u32_at(bytes, 0)? as usize;
+        let kind = [bytes[4], bytes[5], bytes[6], bytes[7]];
+        let content = bytes.get(8..size).ok_or_else(|| {
+            format!(
+                "box {} has {size} bytes in a box with {} left",
+                kind.escape_ascii(),
+                bytes.len()
+            )
+        })?;
+        found.push((kind, content));
+        bytes = &bytes[size..];
+    }
+    Ok(found)
+}
+
+/// The first box of a kind in a box.
+fn child<'a>(bytes: &'a [u8], kind: &[u8; 4]) -> Result<&'a [u8], String> {
+    let found = children(bytes)?.into_iter().find(|(k, _)| k == kind);
+    found.map(|(_, content)| content).ok_or_else(|| format!("no box {}", kind.escape_ascii()))
+}
+
+fn u32_at(bytes: &[u8], at: usize) -> Result<u32, String> {
+    let number = bytes.get(at..).and_then(<[u8]>::first_chunk);
+    number.map(|n| u32::from_be_bytes(*n)).ok_or_else(|| "a table ends too early".into())
+}
+
+fn u64_at(bytes: &[u8], at: usize) -> Result<u64, String> {
+    let number = bytes.get(at..).and_then(<[u8]>::first_chunk);
+    number.map(|n| u64::from_be_bytes(*n)).ok_or_else(|| "a table ends too early".into())
+}

@@ -1,0 +1,246 @@
+//! Videos: the frames that an MP4 tells of, and pictures of them.
+
+#![allow(clippy::unwrap_used)]
+
+mod muxed;
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use corsmal_vision::{Rgb, Video};
+
+/// Twenty frames of 32 by 24 px that become brighter; red on the left, so that it is told from the right.
+/// Made by `encoded` below.
+fn shades() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/shades.mp4")
+}
+
+fn written(folder: &Path, bytes: &[u8]) -> PathBuf {
+    let path = folder.join("v.mp4");
+    std::fs::write(&path, bytes).unwrap();
+    path
+}
+
+fn refused(bytes: &[u8]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    match Video::open(&written(folder.path(), bytes)) {
+        Err(error) => error.to_string(),
+        Ok(video) => panic!("{} frames", video.len()),
+    }
+}
+
+/// All pictures with their numbers.
+fn pictures(path: &Path) -> Result<Vec<(u32, Rgb)>, String> {
+    let mut all = Vec::new();
+    let video = Video::open(path).map_err(|e| e.to_string())?;
+    let read = video.pictures(
+        |_| true,
+        |number, picture| {
+            all.push((number, picture));
+            ControlFlow::Continue(())
+        },
+    );
+    read.map(|()| all).map_err(|e| e.to_string())
+}
+
+#[test]
+fn frames_are_counted_without_decoding() {
+    assert_eq!(Video::open(&shades()).unwrap().len(), 20);
+    let folder = tempfile::tempdir().unwrap();
+    for count in [0, 1, 2, 3, 4, 7] {
+        let frames: Vec<Vec<u8>> = (0..count).map(|k| vec![k as u8; k + 1]).collect();
+        // Any codec: another program may have extracted the frames.
+        let path = written(folder.path(), &muxed::mp4(b"mp4v", &[], &frames));
+        assert_eq!(Video::open(&path).unwrap().len(), count);
+    }
+}
+
+#[test]
+fn damaged_files_are_refused() {
+    let whole = muxed::mp4(b"avc1", &[], &[vec![1; 5], vec![2; 9], vec![3; 4], vec![4; 4]]);
+    let place = |kind: &[u8; 4]| whole.windows(4).position(|w| w == kind).unwrap();
+    let changed = |at: usize, bytes: &[u8]| {
+        let mut file = whole.clone();
+        file[at..at + bytes.len()].copy_from_slice(bytes);
+        refused(&file)
+    };
+    let most = u32::MAX.to_be_bytes();
+    // Counts that a file claims, sizes of nothing, and boxes that leave theirs.
+    assert!(changed(place(b"stsz") + 12, &most).contains("4294967295 frames; the limit is 100000"));
+    assert!(changed(place(b"stsz") + 12, &[0, 0, 0, 5]).contains("tells where 4 of 5 frames are"));
+    assert!(changed(place(b"stco") + 8, &most).contains("a table of 4294967295 entries ends"));
+    assert!(changed(place(b"stco") + 12, &most).contains("it ends before frame 0"));
+    assert!(changed(place(b"avcC") - 4, &[0; 4]).contains("box avcC has 0 bytes"));
+    assert!(changed(place(b"trak") - 4, &most).contains("box trak has 4294967295 bytes"));
+    assert!(changed(place(b"mdat") - 4, &most).contains("box mdat at byte 28 leaves the file"));
+    assert!(changed(place(b"mdat") - 4, &[0, 0, 0, 3]).contains("box mdat"));
+    assert!(changed(place(b"vide"), b"soun").contains("no video track"));
+    assert!(changed(place(b"moov"), b"moof").contains("fragmented"));
+    assert!(changed(place(b"mvhd"), b"mvex").contains("fragmented"));
+    assert!(changed(place(b"moov"), b"free").contains("no index"));
+    assert!(changed(place(b"stsc"), b"free").contains("no box stsc"));
+    // One frame size for a number of frames that no chunk has.
+    let mut all_equal = whole.clone();
+    all_equal[place(b"stsz") + 8..place(b"stsz") + 16]
+        .copy_from_slice(&[0, 0, 0, 1, 0, 0, 255, 255]);
+    assert!(refused(&all_equal).contains("of 65535 frames"));
+    assert!(refused(b"").contains("no index"));
+    assert!(refused(b"RIFF\0\0\0\0").contains("not a readable MP4"));
+    // Cut anywhere, or with any byte changed, it ends in words or in the frames that are there.
+    let folder = tempfile::tempdir().unwrap();
+    for at in 0..whole.len() {
+        assert!(Video::open(&written(folder.path(), &whole[..at])).is_err(), "{at}");
+        for flip in [0x01, 0x80, 0xff] {
+            let mut file = whole.clone();
+            file[at] ^= flip;
+            if let Ok(video) = Video::open(&written(folder.path(), &file)) {
+                assert!(video.len() <= 4, "{at}");
+            }
+        }
+    }
+}
+
+#[cfg(not(feature = "video"))]
+#[test]
+fn the_way_to_pictures_is_said() {
+    let said = pictures(&shades()).unwrap_err();
+    assert!(said.contains("shades.mp4: this program was built without video"), "{said}");
+    assert!(said.contains("extract the frames") && said.contains("--features video"), "{said}");
+}
+
+#[cfg(feature = "video")]
+mod decoded {
+    use openh264::encoder::Encoder;
+    use openh264::formats::{RgbSliceU8, YUVBuffer};
+    use openh264::nal_units;
+
+    use super::*;
+
+    /// Grey of frame `k`.
+    fn shade(k: usize) -> u8 {
+        20 + 10 * k as u8
+    }
+
+    /// Content of `avcC`, and frames with lengths of four bytes.
+    fn encoded(count: usize) -> (Vec<u8>, Vec<Vec<u8>>) {
+        let mut encoder = Encoder::new().unwrap();
+        let (mut setup, mut frames) = (Vec::new(), Vec::new());
+        for k in 0..count {
+            let grey = shade(k);
+            let pixel = |i: usize| if i % 32 < 16 { [grey, 0, 0] } else { [grey; 3] };
+            let pixels: Vec<u8> = (0..32 * 24).flat_map(pixel).collect();
+            let picture = YUVBuffer::from_rgb8_source(RgbSliceU8::new(&pixels, (32, 24)));
+            let stream = encoder.encode(&picture).unwrap().to_vec();
+            let (mut frame, mut sets) = (Vec::new(), [Vec::new(), Vec::new()]);
+            for unit in nal_units(&stream) {
+                let unit = &unit[unit.iter().position(|&byte| byte == 1).unwrap() + 1..];
+                match unit[0] & 31 {
+                    7 => sets[0] = unit.to_vec(),
+                    8 => sets[1] = unit.to_vec(),
+                    _ => frame.extend([&(unit.len() as u32).to_be_bytes(), unit].concat()),
+                }
+            }
+            if setup.is_empty() {
+                setup.extend([1, sets[0][1], sets[0][2], sets[0][3], 0xff]);
+                for (count, set) in [(0xe1, &sets[0]), (1, &sets[1])] {
+                    setup.push(count);
+                    setup.extend((set.len() as u16).to_be_bytes());
+                    setup.extend(set);
+                }
+            }
+            frames.push(frame);
+        }
+        (setup, frames)
+    }
+
+    fn check(pictures: &[(u32, Rgb)]) {
+        for (k, (number, picture)) in pictures.iter().enumerate() {
+            assert_eq!((*number as usize, picture.width, picture.height), (k, 32, 24));
+            let near = |x: usize, want: [u8; 3]| {
+                let got = &picture.data[3 * (12 * 32 + x)..][..3];
+                let same = got.iter().zip(want).all(|(got, want)| got.abs_diff(want) <= 12);
+                assert!(same, "frame {k}, column {x}: {got:?}, not {want:?}");
+            };
+            near(5, [shade(k), 0, 0]);
+            near(26, [shade(k); 3]);
+        }
+    }
+
+    #[test]
+    fn what_was_encoded_is_seen() {
+        let (setup, frames) = encoded(20);
+        let folder = tempfile::tempdir().unwrap();
+        let file = muxed::mp4(b"avc1", &setup, &frames);
+        if std::env::var_os("CORSMAL_WRITE_SHADES").is_some() {
+            std::fs::write(shades(), &file).unwrap();
+        }
+        for path in [written(folder.path(), &file), shades()] {
+            let all = pictures(&path).unwrap();
+            assert_eq!(all.len(), 20);
+            check(&all);
+        }
+        // Only those that are wanted, and none after the reader has enough.
+        let video = Video::open(&shades()).unwrap();
+        let mut seen = Vec::new();
+        let read = video.pictures(
+            |number| number % 4 == 3,
+            |number, _| {
+                seen.push(number);
+                if number >= 11 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            },
+        );
+        read.unwrap();
+        assert_eq!(seen, [3, 7, 11]);
+    }
+
+    /// Twelve frames, each brighter, in another order than they are shown, made by
+    /// `ffmpeg -f lavfi -i "nullsrc=s=32x24:r=10:d=1.2,geq=lum='30+15*N':cb=128:cr=128" -c:v libx264 -bf 2
+    /// -x264-params b-adapt=0:scenecut=0:keyint=12 -pix_fmt yuv420p`; ffmpeg's own red values beside.
+    #[test]
+    fn frames_come_as_they_are_shown() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reordered.mp4");
+        let found = pictures(&path).unwrap();
+        assert_eq!(found.len(), 12);
+        for (k, (number, picture)) in found.iter().enumerate() {
+            let red = (255.0 / 219.0 * (14.0 + 15.0 * k as f64)).round() as u8;
+            assert_eq!(*number as usize, k);
+            assert!(picture.data[100].abs_diff(red) <= 3, "{k}: {} not {red}", picture.data[100]);
+        }
+    }
+
+    #[test]
+    fn damaged_frames_are_named() {
+        let (setup, frames) = encoded(6);
+        let folder = tempfile::tempdir().unwrap();
+        let refuse = |setup: &[u8], frames: &[Vec<u8>]| {
+            pictures(&written(folder.path(), &muxed::mp4(b"avc1", setup, frames))).unwrap_err()
+        };
+        let mut long = frames.clone();
+        long[2][..4].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff]);
+        assert!(refuse(&setup, &long).contains("frame 2 is damaged"));
+        let mut empty = frames.clone();
+        empty[3].clear();
+        let said = refuse(&setup, &empty);
+        assert!(said.contains("frame") && said.contains("v.mp4"), "{said}");
+        assert!(refuse(&setup[..3], &frames).contains("avcC"));
+        assert!(refuse(&[], &frames).contains("its codec is avc1"));
+        let other = muxed::mp4(b"mp4v", &setup, &frames);
+        let said = pictures(&written(folder.path(), &other)).unwrap_err();
+        assert!(said.contains("its codec is mp4v; of videos H.264 (avc1) is read"), "{said}");
+        // Noise in the frames: words or pictures, whichever, and no panic.
+        let mut state = 1u32;
+        for round in 0..200 {
+            let mut noisy = frames.clone();
+            for _ in 0..1 + round % 7 {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                let frame = &mut noisy[state as usize % 6];
+                let at = 4 + (state >> 8) as usize % (frame.len() - 4);
+                frame[at] ^= (state >> 24) as u8;
+            }
+            let file = muxed::mp4(b"avc1", &setup, &noisy);
+            if let Err(said) = pictures(&written(folder.path(), &file)) {
+                assert!(said.contains("v.mp4"), "{said}");
+            }
+        }
+    }
+}
