@@ -76,14 +76,21 @@ def torch_archive() -> bytes:
     return archive.getvalue()
 
 
-def calibration(protocol: int) -> bytes:
-    """A camera as a pickle of lists."""
-    camera = {
-        "rgb": [[920.0, 0.0, 640.0], [0.0, 920.0, 360.0], [0.0, 0.0, 1.0]],
-        "rvec": [0.1, 0.2, 0.3],
-        "extrinsic": {"rgb": {"rvec": [[0.1], [0.2], [0.3]], "tvec": [[0.0], [0.0], [1.0]]}},
-    }
-    return pickle.dumps(camera, protocol=protocol)
+def calibration() -> bytes:
+    """A camera as Python 2 pickles it: a list of its intrinsic and its extrinsic part."""
+
+    def array(*values: float) -> str:
+        text = "".join(f"\\x{byte:02x}" for byte in struct.pack(f"<{len(values)}d", *values))
+        return (
+            f"cnumpy.core.multiarray\n_reconstruct\n(cnumpy\nndarray\n(I0\ntS'b'\ntR(I1\n(I3\n"
+            f"I{len(values) // 3}\ntcnumpy\ndtype\n(S'f8'\nI0\nI1\ntR(I3\nS'<'\nNNNI-1\nI-1\nI0\nt"
+            f"bI00\nS'{text}'\ntb"
+        )
+
+    matrix = array(920, 0, 640, 0, 920, 360, 0, 0, 1)
+    turn, shift = array(0.1, 0.2, 0.3), array(0, 0, 1)
+    outer = f"(dS'rgb'\n(dS'rvec'\n{turn}sS'tvec'\n{shift}ss"
+    return f"(l(dS'rgb'\n{matrix}sa{outer}a.".encode()
 
 
 def png() -> bytes:
@@ -198,8 +205,7 @@ def main() -> None:
     for name, text in TABLES.items():
         seed("submissions", name, text.encode())
     seed("vision", "image.png", png())
-    for protocol in (0, 2, 4):
-        seed("vision", f"calib{protocol}.pickle", calibration(protocol))
+    seed("vision", "calib.pickle", calibration())
     seed(
         "vision",
         "detections.csv",

@@ -16,6 +16,7 @@ mod inspect;
 mod journey;
 mod live;
 mod models;
+mod mutations;
 #[cfg(feature = "nets")]
 mod networks;
 mod onnx;
