@@ -159,7 +159,10 @@ pub fn mel_filter(p: &MelParams) -> Result<Array2<f32>> {
     let mut bank = Array2::<f32>::zeros((p.n_mels, p.n_fft / 2 + 1));
     for (i, mut row) in bank.axis_iter_mut(Axis(0)).enumerate() {
         let (left, center, right) = (points[i], points[i + 1], points[i + 2]);
-        for (k, weight) in row.iter_mut().enumerate() {
+        // The others are zero.
+        let inside = |(k, _): &(usize, &mut f32)| bin(*k) <= right;
+        let first = ((left / bin(1)) as usize).min(row.len());
+        for (k, weight) in row.iter_mut().enumerate().skip(first).take_while(inside) {
             let f = bin(k);
             let rise = (f - left) / (center - left);
             let fall = (right - f) / (right - center);
@@ -200,9 +203,10 @@ impl SparseBank {
     /// The non-zero span of each row of `bank [bands, bins]`.
     pub fn new(bank: &Array2<f32>) -> Self {
         let span = |row: ndarray::ArrayView1<f32>| {
+            let row = row.to_vec();
             let first = row.iter().position(|w| *w != 0.0).unwrap_or(0);
             let last = row.iter().rposition(|w| *w != 0.0).map_or(first, |i| i + 1);
-            (first, row.slice(s![first..last]).to_vec())
+            (first, row[first..last].to_vec())
         };
         Self { bins: bank.ncols(), bands: bank.axis_iter(Axis(0)).map(span).collect() }
     }

@@ -1,22 +1,25 @@
 //! Mixing channels to one (librosa 0.11 `to_mono`).
 
-use ndarray::{Array1, ArrayView2};
+use ndarray::{Array1, ArrayView2, Axis};
 
 use crate::error::{DspError, Result};
-use crate::real::{Real, require_finite};
+use crate::real::{Real, require_all_finite};
 
 /// Mean over the channels of `y [channels, samples]`, summed in channel order in `T`.
 ///
 /// # Errors
 /// No channel, or a non-finite sample.
 pub fn to_mono<T: Real>(y: ArrayView2<T>) -> Result<Array1<T>> {
-    require_finite("y", y)?;
+    require_all_finite("y", y)?;
     let (channels, n) = y.dim();
     let count = T::of(channels as f64);
     let mut mono = Array1::zeros(n);
     if channels == 0 {
         let expected = "at least one channel".into();
         return Err(DspError::Shape { name: "y", expected, actual: vec![channels, n] });
+    }
+    if channels == 1 {
+        return Ok(y.index_axis_move(Axis(0), 0).to_owned());
     }
     for channel in y.outer_iter() {
         mono += &channel;

@@ -1,5 +1,6 @@
 //! The two sample types, `f32` and `f64`.
 
+use ndarray::{ArrayView, Dimension};
 use num_traits::{Float, FromPrimitive, NumAssign};
 use rayon::prelude::*;
 use rustfft::FftNum;
@@ -71,6 +72,17 @@ pub(crate) fn part_finite<T: Real>(values: &[T]) -> bool {
         #[inline(always)]
         || values.iter().fold(true, |finite, x| finite & x.is_finite()),
     )
+}
+
+/// [`require_finite`] of an array, at the speed of memory where it is contiguous.
+pub(crate) fn require_all_finite<T: Real, D: Dimension>(
+    name: &'static str,
+    values: ArrayView<T, D>,
+) -> Result<()> {
+    match values.as_slice() {
+        Some(values) if part_finite(values) => Ok(()),
+        _ => require_finite(name, &values),
+    }
 }
 
 /// Refuses NaN and infinities, as librosa's `util.valid_audio` does.

@@ -1,6 +1,6 @@
 //! Image resizing as scikit-image 0.26 `transform.resize` does it with linear interpolation.
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView2, s};
 
 use crate::error::{DspError, Result};
 use crate::real::{Real, part_finite, require_finite};
@@ -32,6 +32,18 @@ impl ResizeParams {
 /// # Errors
 /// An empty image or shape, or non-finite values.
 pub fn resize<T: Real>(image: ArrayView2<T>, params: &ResizeParams) -> Result<Array2<T>> {
+    resize_extended(image, image.ncols(), params)
+}
+
+/// [`resize`] of an image of `n_columns` columns, of which `image` has the first: the others repeat its last.
+///
+/// # Errors
+/// As [`resize`].
+pub(crate) fn resize_extended<T: Real>(
+    image: ArrayView2<T>,
+    n_columns: usize,
+    params: &ResizeParams,
+) -> Result<Array2<T>> {
     let (rows, columns) = params.shape;
     if rows == 0 || columns == 0 {
         let value = format!("{rows} x {columns}");
@@ -46,20 +58,23 @@ pub fn resize<T: Real>(image: ArrayView2<T>, params: &ResizeParams) -> Result<Ar
     if !part_finite(values) {
         require_finite("image", image.view())?;
     }
-    let (n_rows, n_columns) = image.dim();
+    let (n_rows, known) = image.dim();
     let shrinks = rows < n_rows || columns < n_columns;
     let smooths = params.anti_aliasing.unwrap_or(shrinks);
     let kernel = |from, to| if smooths { gaussian(from, to) } else { vec![1.0] };
     // Only what the interpolation reads is smoothed: rows first, of them columns.
     let down = Taps::new(n_rows, rows, params.mode);
     let across = Taps::new(n_columns, columns, params.mode);
-    let part = smoothed(values, n_columns, &down.read, &kernel(n_rows, rows), params.mode);
+    let row = |i| params.mode.index(i, n_rows);
+    let column = |i| params.mode.index(i, n_columns).map(|i| i.min(known - 1));
     let kept = down.read.len();
-    let mut turned = vec![T::zero(); part.len()];
-    let part = ArrayView2::from_shape((kept, n_columns), &part).expect("lines of equal length");
-    read_columns(part, &mut turned);
+    let mut turned = vec![T::zero(); kept * known];
+    let lines = Lines { values, width: known };
+    smoothed(lines, &down.read, &kernel(n_rows, rows), row, &mut turned, Turn::About);
+    let lines = Lines { values: &turned, width: kept };
+    let mut smooth = vec![T::zero(); across.read.len() * kept];
     let kernel = kernel(n_columns, columns);
-    let smooth = smoothed(&turned, kept, &across.read, &kernel, params.mode);
+    smoothed(lines, &across.read, &kernel, column, &mut smooth, Turn::Not);
     let value = |row: Option<usize>, column: Option<usize>| match (row, column) {
         (Some(row), Some(column)) => smooth[column * kept + row].wide(),
         _ => 0.0,
@@ -143,39 +158,97 @@ fn gaussian(from: usize, to: usize) -> Vec<f64> {
     half.iter().map(|w| w / total).collect()
 }
 
-/// The lines `chosen` of an image, one after another, each a sum of its neighbours with the weights
-/// of a symmetric `kernel`. Lines have `width` values.
-fn smoothed<T: Real>(
-    image: &[T],
+/// Lines of an image, one after another.
+#[derive(Clone, Copy)]
+struct Lines<'a, T> {
+    values: &'a [T],
+    /// Values of a line.
     width: usize,
+}
+
+/// Whether values are written line by line, or place by place.
+#[derive(Clone, Copy, PartialEq)]
+enum Turn {
+    Not,
+    About,
+}
+
+/// Places of a line that are summed together.
+const CHUNK: usize = 32;
+
+/// The lines `chosen` of an image, each a sum of its neighbours with the weights of a symmetric
+/// `kernel`, into `out`; `line` says where one lies, or that it is zero.
+fn smoothed<T: Real>(
+    image: Lines<T>,
     chosen: &[usize],
     kernel: &[f64],
-    mode: PadMode,
-) -> Vec<T> {
-    let count = image.len() / width;
-    let zeros = vec![T::zero(); width];
-    let line =
-        |i: isize| mode.index(i, count).map_or(&zeros[..], |i| &image[i * width..(i + 1) * width]);
-    let mut out = vec![T::zero(); chosen.len() * width];
-    let mut sums = vec![0.0; width];
-    for (slots, &i) in out.chunks_exact_mut(width).zip(chosen) {
-        let i = i as isize;
+    line: impl Fn(isize) -> Option<usize>,
+    out: &mut [T],
+    turn: Turn,
+) {
+    let (width, zeros) = (image.width, [T::zero(); CHUNK]);
+    let around = |i: usize| {
+        let (i, reach) = (i as isize, kernel.len() as isize - 1);
+        (i - reach..=i + reach).map(&line).collect()
+    };
+    let around: Vec<Vec<Option<usize>>> = chosen.iter().map(|i| around(*i)).collect();
+    let mut part = vec![T::zero(); chosen.len() * CHUNK];
+    for first in (0..width).step_by(CHUNK) {
+        let count = CHUNK.min(width - first);
         vectorized(
             #[inline(always)]
             || {
-                let centre = kernel[0];
-                sums.iter_mut().zip(line(i)).for_each(|(sum, x)| *sum = centre * x.wide());
-                for (j, w) in kernel.iter().enumerate().skip(1) {
-                    let sides = line(i - j as isize).iter().zip(line(i + j as isize));
-                    for (sum, (a, b)) in sums.iter_mut().zip(sides) {
-                        *sum += (a.wide() + b.wide()) * w;
+                for (slots, around) in part.as_chunks_mut::<CHUNK>().0.iter_mut().zip(&around) {
+                    let piece = |line: Option<usize>| match line {
+                        Some(line) => &image.values[line * width + first..][..count],
+                        None => &zeros[..count],
+                    };
+                    match count {
+                        CHUNK => sum_around(slots, around, kernel, CHUNK, piece),
+                        _ => sum_around(slots, around, kernel, count, piece),
                     }
                 }
-                slots.iter_mut().zip(&sums).for_each(|(slot, sum)| *slot = T::of(*sum));
             },
         );
+        match turn {
+            Turn::Not => {
+                for (line, part) in out.chunks_exact_mut(width).zip(part.chunks_exact(CHUNK)) {
+                    line[first..first + count].copy_from_slice(&part[..count]);
+                }
+            }
+            Turn::About => {
+                let part = ArrayView2::from_shape((chosen.len(), CHUNK), &part);
+                let part = part.expect("whole chunks").slice_move(s![.., ..count]);
+                read_columns(part, &mut out[first * chosen.len()..]);
+            }
+        }
     }
-    out
+}
+
+/// `count` places of the sum of the lines `around` one.
+#[inline(always)]
+fn sum_around<'a, T: Real>(
+    slots: &mut [T; CHUNK],
+    around: &[Option<usize>],
+    kernel: &[f64],
+    count: usize,
+    piece: impl Fn(Option<usize>) -> &'a [T],
+) {
+    let middle = kernel.len() - 1;
+    let mut sums = [0.0; CHUNK];
+    let centre = piece(around[middle]);
+    for i in 0..count {
+        sums[i] = kernel[0] * centre[i].wide();
+    }
+    for (j, w) in kernel.iter().enumerate().skip(1) {
+        let (a, b) = (piece(around[middle - j]), piece(around[middle + j]));
+        for i in 0..count {
+            sums[i] += (a[i].wide() + b[i].wide()) * w;
+        }
+    }
+    for i in 0..count {
+        slots[i] = T::of(sums[i]);
+    }
 }
 
 #[cfg(test)]

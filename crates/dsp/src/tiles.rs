@@ -1,5 +1,7 @@
 //! `[channels, rows, frames]` arrays written in parallel, a few frames of a channel at a time.
 
+use std::sync::{Mutex, PoisonError};
+
 use ndarray::{
     Array2, ArrayView2, ArrayViewMut1, ArrayViewMut2, ArrayViewMut3, Axis, CowArray, Ix2,
 };
@@ -28,7 +30,7 @@ pub(crate) struct Tile<'a, T> {
 
 /// Calls `each` with every tile of `out`, on all threads of the pool. `state` is what one thread
 /// works with; results must not depend on what it holds.
-pub(crate) fn for_each_tile<T: Send, S>(
+pub(crate) fn for_each_tile<T: Send, S: Send>(
     mut out: ArrayViewMut3<T>,
     state: impl Fn() -> S + Sync,
     each: impl Fn(&mut S, Tile<T>) + Sync,
@@ -45,9 +47,14 @@ pub(crate) fn for_each_tile<T: Send, S>(
         let rest = tiles.split_off(share.min(tiles.len()));
         shares.push(std::mem::replace(&mut tiles, rest));
     }
+    // Fresh memory is dear: as many states as there are threads at work.
+    let idle = Mutex::new(Vec::new());
+    let idle = || idle.lock().unwrap_or_else(PoisonError::into_inner);
     shares.into_par_iter().for_each(|share| {
-        let mut state = state();
+        let known = idle().pop();
+        let mut state = known.unwrap_or_else(&state);
         share.into_iter().for_each(|tile| each(&mut state, tile));
+        idle().push(state);
     });
 }
 

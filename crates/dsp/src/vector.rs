@@ -21,6 +21,8 @@ pub trait Lane: Real + Pod {
     fn splat<S: Simd>(simd: S, value: Self) -> Self::V<S>;
     /// `a * b + c`, with one rounding where that is faster.
     fn multiply_add<S: Simd>(simd: S, a: Self::V<S>, b: Self::V<S>, c: Self::V<S>) -> Self::V<S>;
+    /// `a * b + c` with one rounding, on every machine.
+    fn fused<S: Simd>(simd: S, a: Self::V<S>, b: Self::V<S>, c: Self::V<S>) -> Self::V<S>;
     /// Smaller value per lane.
     fn lower<S: Simd>(simd: S, a: Self::V<S>, b: Self::V<S>) -> Self::V<S>;
     /// Larger value per lane.
@@ -36,7 +38,7 @@ pub trait Lane: Real + Pod {
 }
 
 macro_rules! lane {
-    ($t:ident, $v:ident, $view:ident, $view_mut:ident, $load:ident, $store:ident, $splat:ident, $mul_add:ident, $min:ident, $max:ident, $less:ident, $select:ident) => {
+    ($t:ident, $v:ident, $view:ident, $view_mut:ident, $load:ident, $store:ident, $splat:ident, $mul_add:ident, $fused:ident, $min:ident, $max:ident, $less:ident, $select:ident) => {
         impl Lane for $t {
             type V<S: Simd> = S::$v;
             #[inline(always)]
@@ -60,6 +62,10 @@ macro_rules! lane {
             #[inline(always)]
             fn multiply_add<S: Simd>(simd: S, a: S::$v, b: S::$v, c: S::$v) -> S::$v {
                 simd.$mul_add(a, b, c)
+            }
+            #[inline(always)]
+            fn fused<S: Simd>(simd: S, a: S::$v, b: S::$v, c: S::$v) -> S::$v {
+                simd.$fused(a, b, c)
             }
             #[inline(always)]
             fn lower<S: Simd>(simd: S, a: S::$v, b: S::$v) -> S::$v {
@@ -86,6 +92,7 @@ lane!(
     partial_store_f32s,
     splat_f32s,
     mul_add_e_f32s,
+    mul_add_f32s,
     min_f32s,
     max_f32s,
     less_than_f32s,
@@ -100,6 +107,7 @@ lane!(
     partial_store_f64s,
     splat_f64s,
     mul_add_e_f64s,
+    mul_add_f64s,
     min_f64s,
     max_f64s,
     less_than_f64s,

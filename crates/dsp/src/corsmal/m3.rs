@@ -1,10 +1,10 @@
 //! M3 (Concatenation, "VA2Mass"): a spectrogram of the end of the recording.
 
-use ndarray::{Array1, Array2, ArrayView2, Axis, s};
+use ndarray::{Array2, ArrayView2, Axis};
 
-use super::mono_at;
+use super::{check_expansion, mono};
 use crate::error::Result;
-use crate::resample::ResType;
+use crate::resample::resample_last;
 use crate::stft::{StftParams, spectrogram};
 
 const SR: f64 = 16_600.0;
@@ -35,12 +35,15 @@ impl M3Spectrogram {
     /// # Errors
     /// Impossible rates or parameters, non-finite samples.
     pub fn run(&self, y: ArrayView2<f32>, sr: f64) -> Result<Array2<f32>> {
-        let mono = mono_at(y, sr, SR, ResType::SoxrHq)?;
-        let mut last = Array1::zeros(SAMPLES);
-        let kept = mono.len().min(SAMPLES);
-        last.slice_mut(s![SAMPLES - kept..]).assign(&mono.slice(s![mono.len() - kept..]));
+        check_expansion(sr, SR)?;
+        let mono = mono(y)?;
+        let mono = mono.as_standard_layout();
+        let samples = mono.as_slice().expect("contiguous");
+        let mut last = resample_last(samples, sr, SR, SAMPLES)?;
+        last.splice(0..0, std::iter::repeat_n(0.0, SAMPLES - last.len()));
+        let last = Array2::from_shape_vec((1, SAMPLES), last).expect("one row");
         let params = StftParams { center: false, ..StftParams::new(self.n_fft, self.hop_length) };
-        let spectrum = spectrogram(last.insert_axis(Axis(0)).view(), &params, 1.0)?;
+        let spectrum = spectrogram(last.view(), &params, 1.0)?;
         Ok(spectrum.index_axis_move(Axis(0), 0))
     }
 }

@@ -7,7 +7,7 @@ use crate::error::{DspError, Result};
 use crate::frequency::require_rate;
 use crate::lanes::{DoubleRow, Lanes, Spectrum, decibel_double, weighted_sums};
 use crate::mel::{hz_to_mel, mel_to_hz};
-use crate::real::require_finite;
+use crate::real::require_all_finite;
 use crate::simd::vectorized;
 use crate::window::{Window, get_window};
 
@@ -15,6 +15,8 @@ const BANDS: usize = 64;
 const PRE_EMPHASIS: f64 = 0.97;
 const WINDOW_FRAMES: usize = 64;
 const WINDOW_STEP: usize = 16;
+/// Longest frame; bounds the memory that the rate of a file can take.
+const MAX_LENGTH: usize = 1 << 16;
 
 /// 64 mel bands in dB of 25 ms frames every 10 ms, all channels, on 16-bit counts.
 ///
@@ -31,14 +33,18 @@ impl M4LogMel {
     /// `[frames, 64, channels]` of `y [channels, samples]`, the layout of the published features.
     ///
     /// # Errors
-    /// No or non-finite samples, a rate below 100 Hz.
+    /// No or non-finite samples, a rate below 100 Hz or above 2.6 MHz.
     pub fn run(&self, y: ArrayView2<f32>, sr: f64) -> Result<Array3<f32>> {
         require_rate(sr)?;
-        require_finite("y", y)?;
+        require_all_finite("y", y)?;
         let length = (0.025 * sr).round_ties_even() as usize;
         let step = (0.01 * sr).round_ties_even() as usize;
         if step == 0 {
             return Err(DspError::parameter("sr", sr, "at least 100 Hz"));
+        }
+        if length > MAX_LENGTH {
+            let most = MAX_LENGTH as f64 / 0.025;
+            return Err(DspError::parameter("sr", sr, format!("at most {most} Hz")));
         }
         let (channels, n) = y.dim();
         if n == 0 {

@@ -1,15 +1,17 @@
 //! M6 (ACC): a 96 x 96 spectrogram from the second onset on.
 
-use ndarray::{Array2, ArrayView1, ArrayView2, Axis, s};
+use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
 
-use super::{mono_at, padded_amplitude_db};
+use super::image::decibel_image;
+use super::mono_at;
 use crate::decibel::Decibel;
 use crate::error::Result;
 use crate::librosa::LibrosaVersion;
 use crate::mel::{MelParams, SparseBank, mel_filter};
 use crate::onset::{OnsetParams, PeakPick, onset_detect, onset_strength};
-use crate::resize::{ResizeParams, resize};
+use crate::simd::vectorized;
 use crate::stft::{StftParams, spectrogram};
+use crate::sums::extremes;
 
 const SR: f64 = 22_050.0;
 const SAMPLES: usize = 220_500;
@@ -48,19 +50,21 @@ impl M6Spectrogram {
     /// # Errors
     /// No or non-finite samples, impossible rates.
     pub fn run(&self, y: ArrayView2<f32>, sr: f64) -> Result<Array2<f32>> {
-        let mut y = mono_at(y, sr, SR, self.librosa.fast_res_type())?;
-        let peak = y.iter().fold(0.0f32, |m, v| m.max(v.abs()));
-        if peak >= f32::MIN_POSITIVE {
-            y.mapv_inplace(|v| v / peak);
+        let mut y = mono_at(y, sr, SR, self.librosa.fast_res_type())?.to_vec();
+        let (_, peak) = vectorized(
+            #[inline(always)]
+            || extremes(&y, |v: f32| v.abs().into()),
+        );
+        if peak >= f64::from(f32::MIN_POSITIVE) {
+            y.iter_mut().for_each(|v| *v /= peak as f32);
         }
         let start = match self.crop {
-            M6Crop::Onset => self.onsets(y.view())?.get(1).copied().unwrap_or(0),
+            M6Crop::Onset => self.onsets(ArrayView1::from(&y))?.get(1).copied().unwrap_or(0),
             M6Crop::At(seconds) => (seconds.max(0.0) * SR) as usize,
         };
-        let start = start.min(y.len());
-        let y = y.slice(s![start..y.len().min(start + SAMPLES)]);
-        let image = padded_amplitude_db(y, SAMPLES, &self.transform())?;
-        resize(image.view(), &ResizeParams::new(96, 96))
+        y.drain(..start.min(y.len()));
+        y.truncate(SAMPLES);
+        decibel_image::<f32, f32>(y, SAMPLES, &self.transform())
     }
 
     fn transform(&self) -> StftParams {

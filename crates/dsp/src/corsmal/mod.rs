@@ -6,6 +6,7 @@
 //! of ours that the plan's documentation names as such.
 
 pub mod af193;
+mod image;
 mod m1;
 mod m2;
 mod m3;
@@ -23,15 +24,12 @@ pub use m5::{M5A34f136, M5VggishPatches, downmix_71, downmix_71_weights};
 pub use m6::{M6Crop, M6Spectrogram};
 pub use spec9216::Spec9216;
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, s};
+use ndarray::{Array1, ArrayView2, Axis, CowArray, Ix2};
 use serde::{Deserialize, Serialize};
 
-use crate::decibel::Decibel;
 use crate::error::{DspError, Result, from_name};
 use crate::mono::to_mono;
-use crate::real::Real;
 use crate::resample::{MAX_EXPANSION, ResType, resample};
-use crate::stft::{StftParams, spectrogram};
 
 /// What a system's paper says or what its published code does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -46,41 +44,25 @@ pub enum Variant {
 
 from_name!(Variant, "variant", "code" => Self::Code, "paper" => Self::Paper);
 
-/// Mean over the channels at `target_sr` (librosa `load` with `mono=True`).
-fn mono_at(y: ArrayView2<f32>, sr: f64, target_sr: f64, res_type: ResType) -> Result<Array1<f32>> {
+/// Refuses a rate that would make a recording grow beyond all bounds.
+fn check_expansion(sr: f64, target_sr: f64) -> Result<()> {
     if target_sr > sr * MAX_EXPANSION {
         let allowed = format!("at least {} Hz", target_sr / MAX_EXPANSION);
         return Err(DspError::parameter("sr", sr, allowed));
     }
-    let mono = to_mono(y)?.insert_axis(Axis(0));
+    Ok(())
+}
+
+/// Mean over the channels as one row; one channel as it is.
+fn mono(y: ArrayView2<f32>) -> Result<CowArray<f32, Ix2>> {
+    Ok(if y.nrows() == 1 { y.into() } else { to_mono(y)?.insert_axis(Axis(0)).into() })
+}
+
+/// Mean over the channels at `target_sr` (librosa `load` with `mono=True`).
+fn mono_at(y: ArrayView2<f32>, sr: f64, target_sr: f64, res_type: ResType) -> Result<Array1<f32>> {
+    check_expansion(sr, target_sr)?;
+    let mono = mono(y)?;
     Ok(resample(mono.view(), sr, target_sr, res_type, true, false)?.remove_axis(Axis(0)))
-}
-
-/// `amplitude_to_db(|stft|)` `[bins, frames]` of one channel, 80 dB deep.
-fn amplitude_db<T: Real>(y: ArrayView2<T>, params: &StftParams) -> Result<Array2<T>> {
-    let mut power = spectrogram(y, params, 2.0)?;
-    Decibel::default().power(power.as_slice_mut().expect("made in C order"))?;
-    Ok(power.index_axis_move(Axis(0), 0))
-}
-
-/// [`amplitude_db`] of `y` and zeros up to `len` samples.
-///
-/// Frames of nothing but zeros are all alike: one is transformed, and stands for those that follow.
-fn padded_amplitude_db<T: Real>(
-    y: ArrayView1<T>,
-    len: usize,
-    params: &StftParams,
-) -> Result<Array2<T>> {
-    // So many zeros make the last frame such a one, whatever lies beyond them.
-    let mut samples = y.to_vec();
-    samples.resize(len.min(y.len() + 2 * params.n_fft), T::zero());
-    let known = amplitude_db(ArrayView1::from(&samples).insert_axis(Axis(0)), params)?;
-    let mut image = Array2::zeros((known.nrows(), params.n_frames(len)));
-    for (mut row, known) in image.outer_iter_mut().zip(known.outer_iter()) {
-        row.fill(known[known.len() - 1]);
-        row.slice_mut(s![..known.len()]).assign(&known);
-    }
-    Ok(image)
 }
 
 #[cfg(test)]

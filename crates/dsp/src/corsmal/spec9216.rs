@@ -1,12 +1,13 @@
 //! The spectrogram input of the classical baselines.
 
-use ndarray::{Array1, Array2, ArrayView1, s};
+use ndarray::{Array2, ArrayView1};
 
-use super::padded_amplitude_db;
+use super::image::decibel_image;
 use crate::error::{DspError, Result};
-use crate::real::{Real, require_finite};
-use crate::resize::{ResizeParams, resize};
+use crate::real::{Real, require_all_finite};
+use crate::simd::vectorized;
 use crate::stft::{PadMode, StftParams};
+use crate::sums::sum;
 
 /// 96 x 96 decibels (9216 values) of one channel divided by its RMS: 512-point transform, hop 128,
 /// 80 dB deep.
@@ -25,9 +26,13 @@ impl Spec9216 {
     /// # Errors
     /// Silence (it has no RMS to divide by), no or non-finite samples.
     pub fn run<T: Real>(&self, y: ArrayView1<T>) -> Result<Array2<f64>> {
-        require_finite("y", y)?;
-        let power = y.iter().map(|v| v.wide() * v.wide()).sum::<f64>() / y.len() as f64;
-        let rms = T::of(power.sqrt());
+        require_all_finite("y", y)?;
+        let y = y.to_vec();
+        let squares = vectorized(
+            #[inline(always)]
+            || sum(&y, |v| v.wide() * v.wide()),
+        );
+        let rms = T::of((squares / y.len() as f64).sqrt());
         if rms.is_nan() || rms <= T::zero() {
             let actual = y.len();
             return Err(if actual == 0 {
@@ -36,18 +41,15 @@ impl Spec9216 {
                 DspError::parameter("y", "silence", "a signal with an RMS above 0")
             });
         }
-        let scaled = y.mapv(|v| v / rms);
-        match self.fixed_len {
-            Some(len) if len > y.len() => self.image(scaled.mapv(Real::wide), len),
-            Some(len) => self.image(scaled.slice_move(s![..len]), len),
-            None => self.image(scaled, y.len()),
-        }
-    }
-
-    /// The image of `y` and zeros up to `len` samples.
-    fn image<T: Real>(&self, y: Array1<T>, len: usize) -> Result<Array2<f64>> {
+        let mut scaled = y;
+        let len = self.fixed_len.unwrap_or(scaled.len());
+        let padded = len > scaled.len();
+        scaled.truncate(len);
+        scaled.iter_mut().for_each(|v| *v /= rms);
         let params = StftParams { pad_mode: self.pad_mode, ..StftParams::new(512, 128) };
-        let decibels = padded_amplitude_db(y.view(), len, &params)?;
-        Ok(resize(decibels.view(), &ResizeParams::new(96, 96))?.mapv(Real::wide))
+        if padded {
+            return decibel_image::<T, f64>(scaled, len, &params);
+        }
+        Ok(decibel_image::<T, T>(scaled, len, &params)?.mapv(Real::wide))
     }
 }

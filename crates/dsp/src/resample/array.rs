@@ -7,12 +7,12 @@ use rayon::prelude::*;
 
 use super::check::check_rates;
 use super::converter::Converter;
-use super::kernel::SPAN;
 use super::sinc::{SincPlan, resample_sinc};
 use super::{ResType, ResamplePlan};
 use crate::error::Result;
-use crate::real::{Real, all_finite, require_finite};
+use crate::real::{Real, all_finite, part_finite, require_finite};
 use crate::tiles::planar;
+use crate::vector::Lane;
 
 /// `y [channels, samples]` at another rate (librosa 0.11 `resample`). Equal rates copy `y`.
 ///
@@ -22,7 +22,7 @@ use crate::tiles::planar;
 ///
 /// # Errors
 /// Impossible rates, or non-finite samples.
-pub fn resample<T: Real>(
+pub fn resample<T: Lane>(
     y: ArrayView2<T>,
     orig_sr: f64,
     target_sr: f64,
@@ -70,14 +70,45 @@ pub fn resample<T: Real>(
     Ok(out)
 }
 
+/// The last `count` samples of [`resample`] of one channel by libsoxr's filters, or all of them
+/// where there are fewer: no others are computed.
+///
+/// # Errors
+/// Impossible rates, or non-finite samples.
+pub(crate) fn resample_last(
+    y: &[f32],
+    orig_sr: f64,
+    target_sr: f64,
+    count: usize,
+) -> Result<Vec<f32>> {
+    if !part_finite(y) {
+        require_finite("y", y)?;
+    }
+    let plan = match Converter::shared(orig_sr, target_sr, ResType::SoxrHq)? {
+        Converter::Soxr(plan) => plan,
+        Converter::Sinc(_) => unreachable!("another converter was asked for"),
+    };
+    let n = y.len() as u64;
+    let (filtered, total) = (plan.filtered_len(n), plan.output_len(n));
+    let first = total.saturating_sub(count as u64);
+    let range = first.min(filtered)..filtered.min(total);
+    let needed = plan.input_range(range.clone());
+    let start = needed.start.clamp(0, n as i64) as usize;
+    let end = (needed.end.max(0) as usize).clamp(start, y.len());
+    let mut out = plan.segment(1, range, &y[start..end], start as u64)?;
+    // The length that librosa gives may have one zero more.
+    out.resize((total - first) as usize, 0.0);
+    Ok(out)
+}
+
 /// `y` has contiguous channels.
 fn resample_hq<T: Real>(y: ArrayView2<T>, plan: &ResamplePlan) -> Array2<T> {
-    let (channels, n) = y.dim();
+    let ((channels, n), span) = (y.dim(), plan.span());
     let mut out = Array2::zeros((channels, plan.filtered_len(n as u64) as usize));
     let rows = out.outer_iter_mut().zip(y.outer_iter()).flat_map(|(row, signal)| {
         let signal = signal.to_slice().expect("contiguous");
-        let spans = row.into_slice().expect("made in C order").chunks_mut(SPAN).enumerate();
-        spans.map(move |(i, out)| (i * SPAN, out, signal))
+        let spans = row.into_slice().expect("made in C order").chunks_mut(span).enumerate();
+        spans.map(move |(i, out)| (i * span, out, signal))
     });
     let spans: Vec<_> = rows.collect();
     spans.into_par_iter().for_each(|(first, out, signal)| {

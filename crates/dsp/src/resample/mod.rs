@@ -9,12 +9,15 @@ mod array;
 mod check;
 mod converter;
 mod design;
+mod dot;
+mod halve;
 mod kaiser;
 mod kernel;
 mod low_pass;
 mod sinc;
 mod stage;
 mod stream;
+mod strided;
 
 use std::ops::Range;
 
@@ -25,6 +28,7 @@ use check::{check_interleaved, check_rates};
 use stage::{Frames, Stage};
 
 pub use array::resample;
+pub(crate) use array::resample_last;
 pub use converter::{Converter, ConverterStream};
 pub(crate) use kaiser::halving;
 pub use sinc::{SincPlan, SincStream};
@@ -86,6 +90,11 @@ impl ResamplePlan {
     /// Output rate in hertz.
     pub fn target_sr(&self) -> f64 {
         self.target_sr
+    }
+
+    /// Outputs of a channel that one thread should make at a time.
+    fn span(&self) -> usize {
+        self.stages.last().map_or(kernel::SPAN, Stage::span)
     }
 
     /// Frames out of `n` frames in: `ceil(n * target_sr / orig_sr)`, librosa's rule (`fix=True`).

@@ -2,14 +2,20 @@
 
 use std::sync::Arc;
 
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::check::{check_interleaved, check_rates};
+use super::dot::{BLOCK, dot};
 use super::kaiser::{KaiserSinc, PRECISION, Table};
 use super::kernel::SPAN;
+use super::strided::strided;
 use crate::error::{DspError, Result};
 use crate::real::Real;
 use crate::simd::vectorized;
+use crate::stft::PadMode;
+use crate::sums::extremes;
+use crate::vector::Lane;
 
 /// Most weights of a [`Bank`].
 const MAX_BANK: usize = 1 << 20;
@@ -54,10 +60,7 @@ enum Weights<T> {
     Any,
 }
 
-/// Weights that are summed side by side; rows are whole multiples of the smaller.
-const BLOCKS: [usize; 2] = [64, 16];
-
-impl<T: Real> SincPlan<T> {
+impl<T: Lane> SincPlan<T> {
     /// Makes the filters; `fast` for `kaiser_fast`.
     ///
     /// # Errors
@@ -74,7 +77,7 @@ impl<T: Real> SincPlan<T> {
         }
         let table = Table { half: KaiserSinc::shared(fast), scale, stride };
         let after = table.reach();
-        let before = (2 * after).next_multiple_of(BLOCKS[1]) - after;
+        let before = (2 * after).next_multiple_of(BLOCK) - after;
         let taps = before + after;
         let phases = phases(orig_sr, target_sr)
             .filter(|phases| phases.saturating_add(1).saturating_mul(taps) <= MAX_BANK);
@@ -120,31 +123,43 @@ impl<T: Real> SincPlan<T> {
             decimate(samples, taps, self.before, *down, out);
             return time + (out.len() * down) as f64;
         }
-        let taps = self.before + self.after;
-        let step = self.step();
+        Arch::new().dispatch(Weigh { plan: self, samples, start, time, out })
+    }
+}
+
+/// [`SincPlan::run`] for outputs between samples.
+struct Weigh<'a, T> {
+    plan: &'a SincPlan<T>,
+    samples: &'a [T],
+    start: usize,
+    time: f64,
+    out: &'a mut [T],
+}
+
+impl<T: Lane> WithSimd for Weigh<'_, T> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> f64 {
+        let Self { plan, samples, start, mut time, out } = self;
+        let (step, taps) = (plan.step(), plan.before + plan.after);
         let mut own = vec![T::zero(); taps];
-        vectorized(
-            #[inline(always)]
-            || {
-                let mut time = time;
-                for slot in out {
-                    let (frame, fraction) = (time as usize, time.fract());
-                    let row = match &self.weights {
-                        Weights::Bank(bank) => {
-                            let phase = (fraction * bank.phases as f64 + 0.5) as usize;
-                            &bank.rows[phase * taps..(phase + 1) * taps]
-                        }
-                        _ => {
-                            self.table.row(fraction, self.before, &mut own);
-                            &own[..]
-                        }
-                    };
-                    *slot = dot(row, &samples[frame - start..frame - start + taps]);
-                    time += step;
+        for slot in out {
+            let (frame, fraction) = (time as usize, time.fract());
+            let row = match &plan.weights {
+                Weights::Bank(bank) => {
+                    let phase = (fraction * bank.phases as f64 + 0.5) as usize;
+                    &bank.rows[phase * taps..(phase + 1) * taps]
                 }
-                time
-            },
-        )
+                _ => {
+                    plan.table.row(fraction, plan.before, &mut own);
+                    &own[..]
+                }
+            };
+            *slot = dot(simd, row, &samples[frame - start..frame - start + taps]);
+            time += step;
+        }
+        time
     }
 }
 
@@ -160,74 +175,90 @@ fn phases(orig_sr: f64, target_sr: f64) -> Option<usize> {
     usize::try_from(target / a).ok()
 }
 
-/// Sum of products, in an order that does not depend on the vector unit. The lengths are equal and a
-/// multiple of the smaller of [`BLOCKS`].
-#[inline(always)]
-fn dot<T: Real>(weights: &[T], samples: &[T]) -> T {
-    const WIDE: usize = BLOCKS[0];
-    const NARROW: usize = BLOCKS[1];
-    let mut sums = [T::zero(); WIDE];
-    let (wide, rest) = weights.as_chunks::<WIDE>();
-    let (wide_samples, rest_samples) = samples.as_chunks::<WIDE>();
-    for (w, x) in wide.iter().zip(wide_samples) {
-        for (sum, (w, x)) in sums.iter_mut().zip(w.iter().zip(x)) {
-            *sum = w.mul_add(*x, *sum);
-        }
-    }
-    for (w, x) in rest.as_chunks::<NARROW>().0.iter().zip(rest_samples.as_chunks::<NARROW>().0) {
-        for (sum, (w, x)) in sums.iter_mut().zip(w.iter().zip(x)) {
-            *sum = w.mul_add(*x, *sum);
-        }
-    }
-    let mut half = WIDE / 2;
-    while half > 0 {
-        for i in 0..half {
-            let other = sums[i + half];
-            sums[i] += other;
-        }
-        half /= 2;
-    }
-    sums[0]
-}
-
 /// Outputs that are summed side by side.
 const SIDE: usize = 64;
+/// Outputs whose samples are laid out at a time: they stay in the nearest cache.
+const PART: usize = 16 * SIDE;
 
 /// Every output `o` is the sum of the samples from `o * down` on by `taps`, as resampy sums: from tap
 /// `before - 1` down to the first, then from tap `before` up, rounded at every step.
 fn decimate<T: Real>(samples: &[T], taps: &[f64], before: usize, down: usize, out: &mut [T]) {
     // Samples that meet the same tap lie side by side, with room for the last outputs.
-    let room = samples.len().div_ceil(down) + SIDE;
-    let mut planes = vec![0.0; down * room];
-    for (m, plane) in planes.chunks_exact_mut(room).enumerate() {
-        let part = samples.iter().skip(m).step_by(down);
-        plane.iter_mut().zip(part).for_each(|(slot, x)| *slot = x.wide());
-    }
+    let room = PART + taps.len().div_ceil(down) + SIDE;
     let outwards = (0..before).rev().chain(before..taps.len());
     let weighed: Vec<(f64, usize)> = outwards
         .map(|k| (taps[k], k % down * room + k / down))
         .filter(|(weight, _)| *weight != 0.0)
         .collect();
+    let mut planes = vec![0.0; down * room];
+    for (i, out) in out.chunks_mut(PART).enumerate() {
+        let samples = &samples[i * PART * down..];
+        for (m, plane) in planes.chunks_exact_mut(room).enumerate() {
+            strided(samples, m, down, plane, T::wide);
+        }
+        if !T::SINGLE {
+            sum_rounded(&planes, &weighed, out, |sum| sum);
+        } else if is_moderate(&planes, &weighed) {
+            sum_rounded(&planes, &weighed, out, round_moderate);
+        } else {
+            sum_rounded(&planes, &weighed, out, |sum| T::of(sum).wide());
+        }
+    }
+}
+
+/// For every output the sum of `weight * planes[at + output]`, `round`ed at every step.
+#[inline(always)]
+fn sum_rounded<T: Real>(
+    planes: &[f64],
+    weighed: &[(f64, usize)],
+    out: &mut [T],
+    round: impl Fn(f64) -> f64,
+) {
     vectorized(
         #[inline(always)]
         || {
             for (i, out) in out.chunks_mut(SIDE).enumerate() {
-                let mut sums = [T::zero(); SIDE];
-                for &(weight, at) in &weighed {
+                let mut sums = [0.0; SIDE];
+                for &(weight, at) in weighed {
                     let samples = &planes[i * SIDE + at..][..SIDE];
                     for (sum, x) in sums.iter_mut().zip(samples) {
-                        *sum = T::of(sum.wide() + weight * x);
+                        *sum = round(*sum + weight * x);
                     }
                 }
-                out.copy_from_slice(&sums[..out.len()]);
+                out.iter_mut().zip(&sums).for_each(|(slot, sum)| *slot = T::of(*sum));
             }
         },
     );
 }
 
+/// `x` rounded to single precision and back, where that is zero or normal: adding 1.5 times the
+/// 2^29-fold of its power of two leaves no room for the digits that single precision lacks. Half
+/// the cost of two conversions.
+#[inline(always)]
+fn round_moderate(x: f64) -> f64 {
+    const EXPONENT: u64 = 0x7ff << 52;
+    const ABOVE: f64 = 1.5 * (1_u64 << 29) as f64;
+    let above = f64::from_bits(x.to_bits() & EXPONENT) * ABOVE;
+    (x + above) - above
+}
+
+/// Whether no sum can leave the normal numbers of single precision, but for zero. A product of at
+/// least `least` is a multiple of `least / 2^53`, and so is every sum of such, rounded or not.
+fn is_moderate(planes: &[f64], weighed: &[(f64, usize)]) -> bool {
+    let size = |x: f64| if x == 0.0 { f64::INFINITY } else { x.abs() };
+    let ((least, _), (_, largest)) = vectorized(
+        #[inline(always)]
+        || (extremes(planes, size), extremes(planes, f64::abs)),
+    );
+    let weights = || weighed.iter().map(|(weight, _)| weight.abs());
+    let (least_weight, total) = (weights().fold(f64::INFINITY, f64::min), weights().sum::<f64>());
+    least * least_weight >= f64::from(f32::MIN_POSITIVE) * 2f64.powi(53)
+        && largest * total < f64::from(f32::MAX)
+}
+
 /// `y`, channels of `n` samples one after another, at another rate: channels of
 /// [`SincPlan::filtered_len`] samples, into `out`.
-pub(super) fn resample_sinc<T: Real>(y: &[T], n: usize, plan: &SincPlan<T>, out: &mut [T]) {
+pub(super) fn resample_sinc<T: Lane>(y: &[T], n: usize, plan: &SincPlan<T>, out: &mut [T]) {
     let length = plan.filtered_len(n as u64) as usize;
     if length == 0 {
         return;
@@ -241,25 +272,29 @@ pub(super) fn resample_sinc<T: Real>(y: &[T], n: usize, plan: &SincPlan<T>, out:
             start
         })
         .collect();
-    let padded: Vec<Vec<T>> = y
-        .chunks_exact(n)
-        .map(|signal| {
-            // A sum of steps may end a little after the last sample.
-            let mut samples = vec![T::zero(); plan.before + n + plan.after];
-            samples[plan.before - 1..][..n].copy_from_slice(signal);
-            samples
-        })
-        .collect();
     let spans: Vec<_> = out
         .chunks_exact_mut(length)
-        .zip(&padded)
-        .flat_map(|(row, samples)| {
+        .zip(y.chunks_exact(n))
+        .flat_map(|(row, signal)| {
             let spans = row.chunks_mut(SPAN).zip(&starts);
-            spans.map(move |(out, start)| (out, samples, *start))
+            spans.map(move |(out, start)| (out, signal, *start))
         })
         .collect();
-    spans.into_par_iter().for_each(|(out, samples, start)| {
-        plan.run(samples, 0, start, out);
+    spans.into_par_iter().for_each(|(out, signal, time)| {
+        let start = time as usize;
+        // The sum of steps may end a little after their product.
+        let last = (time + out.len() as f64 * plan.step()) as usize + 1;
+        let from = start as isize - (plan.before as isize - 1);
+        let needed = last + plan.after - start + plan.before - 1;
+        let inside = usize::try_from(from).ok().and_then(|from| signal.get(from..from + needed));
+        match inside {
+            Some(samples) => plan.run(samples, start, time, out),
+            None => {
+                let mut samples = vec![T::zero(); needed];
+                PadMode::Constant.read(signal, from, &mut samples);
+                plan.run(&samples, start, time, out)
+            }
+        };
     });
 }
 
@@ -296,7 +331,9 @@ impl SincStream {
         let channels = self.held.len();
         check_interleaved(channels, input)?;
         for (c, held) in self.held.iter_mut().enumerate() {
-            held.extend(input.iter().skip(c).step_by(channels));
+            let from = held.len();
+            held.resize(from + input.len() / channels, 0.0);
+            strided(input, c, channels, &mut held[from..], |x| x);
         }
         let complete = self.known().saturating_sub(self.plan.after);
         let (mut time, mut count) = (self.time, 0);

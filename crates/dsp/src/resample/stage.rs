@@ -6,13 +6,18 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 
 use super::design::{Design, PolyDesign};
-use super::kernel::{Correlate, Plane, dispatch};
+use super::dot::{BLOCK, dot};
+use super::halve::Halve;
+use super::kernel::{Correlate, Plane, SPAN, dispatch};
+use super::strided::strided;
 
 /// A filter with single-precision coefficients. Outputs are numbered from 0 at input sample 0.
 #[derive(Debug, Clone)]
 pub(super) enum Stage {
     /// Rational rate change.
     Fir(Fir),
+    /// Half the rate, by a long filter.
+    Halve(Halve),
     /// Tabulated interpolator.
     Poly(Poly),
 }
@@ -27,7 +32,10 @@ pub(super) struct Frames<'a> {
 impl Stage {
     pub fn new(design: &Design) -> Self {
         match design {
-            Design::Fir { up, down, taps } => Self::Fir(Fir::new(*up, *down, taps)),
+            Design::Fir { up, down, taps } => {
+                let halve = (*up == 1 && *down == 2).then(|| Halve::new(taps)).flatten();
+                halve.map_or_else(|| Self::Fir(Fir::new(*up, *down, taps)), Self::Halve)
+            }
             Design::Poly(design) => Self::Poly(Poly::new(design)),
         }
     }
@@ -37,23 +45,23 @@ impl Stage {
         if out.is_empty() {
             return 0..0;
         }
-        let (first, last) = (self.end(out.start), self.end(out.end - 1));
-        first - self.reach() as i64..last
-    }
-
-    /// One past the last input frame of output `o`; never falls as `o` rises.
-    fn end(&self, o: u64) -> i64 {
+        // Ends never fall as outputs rise; before them lies the longest reach of any.
+        let last = out.end - 1;
         match self {
-            Self::Fir(f) => f.end(o),
-            Self::Poly(p) => p.end(o),
+            Self::Halve(halve) => halve.input_range(out),
+            Self::Fir(f) => {
+                let reach = f.residues.iter().map(|r| r.len).max().unwrap_or(0);
+                f.end(out.start) - reach as i64..f.end(last)
+            }
+            Self::Poly(p) => p.end(out.start) - p.taps as i64..p.end(last),
         }
     }
 
-    /// Input frames of any one output, at most.
-    fn reach(&self) -> usize {
+    /// Outputs of a channel that one thread should make at a time.
+    pub fn span(&self) -> usize {
         match self {
-            Self::Fir(f) => f.residues.iter().map(|r| r.len).max().unwrap_or(0),
-            Self::Poly(p) => p.taps,
+            Self::Halve(halve) => halve.span(),
+            Self::Fir(_) | Self::Poly(_) => SPAN,
         }
     }
 
@@ -62,6 +70,7 @@ impl Stage {
         // Outputs at `first + o * step` before `limit`, all in fractions of a frame.
         let end = i128::from(end);
         let (limit, first, step) = match self {
+            Self::Halve(halve) => return halve.available(end as i64),
             Self::Fir(f) => (end * f.up as i128, f.centre as i128, f.down as i128),
             Self::Poly(p) => {
                 let limit = (end - (p.taps / 2) as i128) * i128::from(p.unit);
@@ -76,6 +85,7 @@ impl Stage {
     pub fn run(&self, channels: usize, out: Range<u64>, input: Frames, to: &mut Vec<f32>) {
         match self {
             Self::Fir(f) => f.run(channels, out, input, to),
+            Self::Halve(halve) => halve.run(channels, out, input, to),
             Self::Poly(p) => {
                 let base = to.len();
                 to.resize(base + (out.end - out.start) as usize * channels, 0.0);
@@ -187,8 +197,10 @@ impl Fir {
         }
         let stride = self.down * channels;
         let plane = |m: usize| {
-            let data = data.get(m * channels + c..).unwrap_or_default();
-            Cow::Owned((0..data.len().div_ceil(stride)).map(|i| data[i * stride]).collect())
+            let first = m * channels + c;
+            let mut plane = vec![0.0; data.len().saturating_sub(first).div_ceil(stride)];
+            strided(data, first, stride, &mut plane, |x| x);
+            Cow::Owned(plane)
         };
         (0..self.down).map(plane).collect()
     }
@@ -205,7 +217,9 @@ pub(super) struct Poly {
     unit: u64,
     /// Positions per tabulated phase.
     grain: u64,
-    /// `[phase][order + 1][tap]`: coefficients of the polynomial in the rest of the position.
+    /// Taps with the zeros behind them that fill blocks.
+    width: usize,
+    /// `[phase][order + 1][width]`: coefficients of the polynomial in the rest of the position.
     table: Vec<f32>,
 }
 
@@ -214,7 +228,8 @@ impl Poly {
         let PolyDesign { taps, phases, order, .. } = *design;
         let unit = if order == 0 { phases as u64 } else { 1 << 32 };
         let value = |i: usize| design.prototype.get(i).copied().unwrap_or(0.0);
-        let mut table = Vec::with_capacity(taps * phases * (order + 1));
+        let width = taps.next_multiple_of(BLOCK);
+        let mut table = Vec::with_capacity(width * phases * (order + 1));
         for phase in 0..phases {
             for k in 0..=order {
                 for tap in (0..taps).rev() {
@@ -228,10 +243,11 @@ impl Poly {
                         _ => second,
                     } as f32);
                 }
+                table.resize(table.len().next_multiple_of(width), 0.0);
             }
         }
         let (first, step) = (design.first, design.step);
-        Self { taps, order, first, step, unit, grain: unit / phases as u64, table }
+        Self { taps, order, first, step, unit, grain: unit / phases as u64, width, table }
     }
 
     /// Frame and rest of the position of output `o`.
@@ -257,38 +273,39 @@ impl WithSimd for Interpolate<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _simd: S) {
+    fn with_simd<S: Simd>(self, simd: S) {
         let Self { poly, channels, first, input, out } = self;
-        let Poly { taps, order, step, unit, grain, .. } = *poly;
+        let Poly { taps, order, step, unit, grain, width, .. } = *poly;
         let (mut frame, mut rest) = poly.position(first);
         let reach = (taps / 2) as i64 + 1 - taps as i64;
-        let mut coefficients = vec![0.0f32; taps];
+        // Channel by channel, with zeros behind that meet those of the last taps.
+        let room = input.data.len() / channels + width - taps;
+        let mut planar = vec![0.0; room * channels];
+        for (c, samples) in planar.chunks_exact_mut(room).enumerate() {
+            strided(input.data, c, channels, samples, |x| x);
+        }
+        let mut coefficients = vec![0.0f32; width];
         for slots in out.chunks_exact_mut(channels) {
-            let from = (frame + reach - input.start) as usize * channels;
-            let samples = &input.data[from..from + taps * channels];
+            let from = (frame + reach - input.start) as usize;
             let phase = (rest / grain) as usize;
-            let table = &poly.table[phase * taps * (order + 1)..(phase + 1) * taps * (order + 1)];
+            let table = &poly.table[phase * width * (order + 1)..(phase + 1) * width * (order + 1)];
             let taps = if order == 0 {
                 table
             } else {
                 let x = (rest % grain) as f32 / grain as f32;
-                let (constant, higher) = table.split_at(taps);
+                let (constant, higher) = table.split_at(width);
                 for (i, c) in coefficients.iter_mut().enumerate() {
-                    let slope =
-                        if order == 1 { higher[i] } else { higher[taps + i].mul_add(x, higher[i]) };
+                    let slope = if order == 1 {
+                        higher[i]
+                    } else {
+                        higher[width + i].mul_add(x, higher[i])
+                    };
                     *c = slope.mul_add(x, constant[i]);
                 }
                 &coefficients[..]
             };
-            if let [slot] = slots {
-                *slot = taps.iter().zip(samples).fold(0.0, |sum, (c, x)| c.mul_add(*x, sum));
-            } else {
-                slots.fill(0.0);
-                for (c, frame) in taps.iter().zip(samples.chunks_exact(channels)) {
-                    for (slot, x) in slots.iter_mut().zip(frame) {
-                        *slot = c.mul_add(*x, *slot);
-                    }
-                }
+            for (slot, samples) in slots.iter_mut().zip(planar.chunks_exact(room)) {
+                *slot = dot(simd, taps, &samples[from..from + width]);
             }
             rest += step;
             frame += (rest / unit) as i64;

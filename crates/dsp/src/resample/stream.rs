@@ -9,7 +9,8 @@ use super::stage::Frames;
 use crate::error::Result;
 
 /// Converts interleaved frames as they come; the outputs do not depend on how the input is cut into
-/// blocks. Output lags by the filters' reach (194 input frames at 2:1).
+/// blocks. Output lags by the filters' reach, where the rate is halved by a block of transforms (2048
+/// input frames at 2:1).
 ///
 /// ```
 /// use std::sync::Arc;

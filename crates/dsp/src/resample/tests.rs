@@ -65,6 +65,36 @@ fn spans_of_an_array_join_without_a_seam() {
 }
 
 #[test]
+fn the_last_samples_are_those_of_the_whole() {
+    for (from, to) in RATES {
+        for n in [1, 100, 5000] {
+            let y = Array2::from_shape_vec((1, n), noise(n, 4)).unwrap();
+            let whole = resample(y.view(), from, to, ResType::SoxrHq, true, false).unwrap();
+            let whole = whole.row(0).to_vec();
+            for count in [0, 1, 700, whole.len(), whole.len() + 9] {
+                let last = resample_last(y.as_slice().unwrap(), from, to, count).unwrap();
+                let want = &whole[whole.len().saturating_sub(count)..];
+                assert_eq!(last, want, "{from} -> {to}, {count} of {}", whole.len());
+            }
+        }
+    }
+}
+
+#[test]
+fn faint_and_loud_signals_have_resampys_bits() {
+    // Sums that are too small or too large for the quicker rounding.
+    for scale in [1e-30, 1e-42, 1e35] {
+        let y: Vec<f32> = noise(3000, 7).iter().map(|x| (f64::from(*x) * scale) as f32).collect();
+        let wide: Vec<f64> = y.iter().map(|x| f64::from(*x)).collect();
+        let kernel = (64, 0.9475937167399596, 14.769656459379492);
+        let want = by_description(&wide, 0.5, kernel, |sum| (sum as f32).into());
+        let y = Array2::from_shape_vec((1, y.len()), y).unwrap();
+        let got = resample(y.view(), 2.0, 1.0, ResType::KaiserBest, false, false).unwrap();
+        assert!(got.iter().map(|x| f64::from(*x)).eq(want), "{scale}");
+    }
+}
+
+#[test]
 fn tones_pass() {
     for (from, to) in RATES {
         let n = 20_000;

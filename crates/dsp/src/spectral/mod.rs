@@ -123,7 +123,7 @@ impl<'a, T: Real> Spectra<'a, T> {
 
     /// `[channels, rows, frames]` made by `each(state, channel, frame, magnitudes, out)`, where
     /// `out` holds the `rows` values of that frame; on all threads of the pool, each with a `state`.
-    pub(crate) fn map<R: Real, S>(
+    pub(crate) fn map<R: Real, S: Send>(
         &self,
         rows: usize,
         state: impl Fn() -> S + Sync,

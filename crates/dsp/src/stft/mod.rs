@@ -4,5 +4,6 @@ mod params;
 mod spectrogram;
 
 pub use params::{MAX_N_FFT, PadMode, StftParams};
+pub(crate) use spectrogram::spectrogram_as;
 pub(crate) use spectrogram::{magnitude, single};
 pub use spectrogram::{spectrogram, spectrogram_into, stft, stft_into};
