@@ -30,9 +30,12 @@ impl Levels {
             *length = begun.checked_div(outer)?;
             outer = begun;
         }
-        let mut again = Self::default();
-        again.push(&shape);
-        (again == *self).then_some(shape)
+        let lists = &shape[..depth];
+        let entries: usize = lists.iter().product();
+        let whole = [self.definition.len(), self.repetition.len()] == [entries; 2]
+            && self.definition.iter().all(|d| *d as usize == depth)
+            && self.repetition.iter().enumerate().all(|(i, r)| *r == repetition(lists, i));
+        whole.then_some(shape)
     }
 }
 
