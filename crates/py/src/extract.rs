@@ -214,7 +214,7 @@ impl PySignal {
 
     /// Names of the summary's values; empty without a summary.
     fn summary_names(&mut self) -> PyResult<Vec<String>> {
-        Ok(self.open()?.plan().summary_names())
+        Ok(self.open()?.plan().summary_names().to_vec())
     }
 
     /// The summary [values] if there is one, and frame-level features: name, whether values are

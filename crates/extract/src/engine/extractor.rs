@@ -123,24 +123,40 @@ impl Extractor {
 
     /// Computes the features of the whole recording, which the buffer holds.
     fn whole(&mut self) -> Result<(), Refused> {
-        let channels = self.plan.channels;
+        if !self.plan.needs_whole() {
+            return Ok(());
+        }
+        let owned = if self.plan.channels == 1 {
+            Vec::new()
+        } else {
+            apart(&self.room.buffer, self.plan.channels)
+        };
+        let planes: Vec<&[f32]> = if owned.is_empty() {
+            vec![&self.room.buffer]
+        } else {
+            // Long recordings are not held twice.
+            if self.room.buffer.capacity() > MAX_BUFFER {
+                self.room.buffer = Vec::new();
+            }
+            owned.iter().map(Vec::as_slice).collect()
+        };
         for WholeFeature { feature, kernel } in &self.plan.whole {
             let (planned, raw) = (&self.plan.features[*feature], &mut self.raw[*feature]);
-            let each: Vec<Array2<f32>> = (0..channels)
-                .into_par_iter()
-                .map(|c| {
-                    let y: Vec<f32> =
-                        self.room.buffer[c..].iter().step_by(channels).copied().collect();
-                    kernel.channel(&y)
-                })
+            let each: Vec<Array2<f32>> = planes
+                .par_iter()
+                .map(|y| kernel.channel(y).map(|values| values.reversed_axes()))
                 .collect::<Result<_, _>>()
                 .map_err(|source| Refused { feature: planned.name.clone(), source })?;
-            let Some((rows, frames)) = each.first().map(Array2::dim) else { continue };
-            raw.reserve_exact(frames * rows * channels);
-            for t in 0..frames {
-                for k in 0..rows {
-                    raw.extend(each.iter().map(|values| values[[k, t]]));
-                }
+            // `[frames, rows]` of every channel, mostly contiguous.
+            let each: Vec<_> = each.iter().map(Array2::as_standard_layout).collect();
+            let each: Vec<&[f32]> = each.iter().filter_map(|values| values.as_slice()).collect();
+            if let [values] = each[..] {
+                raw.extend_from_slice(values);
+                continue;
+            }
+            raw.resize(each.iter().map(|values| values.len()).sum(), 0.0);
+            for (i, slots) in raw.chunks_exact_mut(each.len()).enumerate() {
+                slots.iter_mut().zip(&each).for_each(|(slot, values)| *slot = values[i]);
             }
         }
         Ok(())
@@ -186,6 +202,23 @@ impl Drop for Extractor {
             self.plan.give_room(room);
         }
     }
+}
+
+/// The channels of interleaved samples.
+fn apart(samples: &[f32], channels: usize) -> Vec<Vec<f32>> {
+    /// Frames whose samples stay in the cache until each channel has taken its own.
+    const BLOCK: usize = 1 << 10;
+    let plane = |_| Vec::with_capacity(samples.len() / channels);
+    let mut planes: Vec<Vec<f32>> = (0..channels).map(plane).collect();
+    for block in samples.chunks(BLOCK * channels) {
+        for (c, plane) in planes.iter_mut().enumerate() {
+            match block.as_chunks::<8>() {
+                (frames, []) if channels == 8 => plane.extend(frames.iter().map(|frame| frame[c])),
+                _ => plane.extend(block.chunks_exact(channels).map(|frame| frame[c])),
+            }
+        }
+    }
+    planes
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! A configuration planned for one sample rate and number of channels: transforms, windows, filter
 //! banks, all made once and shared by every worker.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use corsmal_dsp::DspError;
 
@@ -68,6 +68,7 @@ pub struct Plan {
     warnings: Vec<String>,
     /// What extractors of this plan have worked in.
     rooms: Mutex<Vec<Room>>,
+    summary_names: OnceLock<Arc<[String]>>,
 }
 
 impl Plan {
@@ -145,7 +146,18 @@ impl Plan {
         }
         let (streams, config) = (streams.into_streams(), config.clone());
         let rooms = Mutex::default();
-        Ok(Self { sample_rate, channels, features, streams, whole, config, warnings, rooms })
+        let summary_names = OnceLock::new();
+        Ok(Self {
+            sample_rate,
+            channels,
+            features,
+            streams,
+            whole,
+            config,
+            warnings,
+            rooms,
+            summary_names,
+        })
     }
 
     /// Whether a feature needs the whole recording, which can then not be cut into spans.
@@ -183,7 +195,11 @@ impl Plan {
 
     /// Names of the statistics of a recording: `feature[coefficient].statistic`, with `chN/` before
     /// where channels stay apart; a vector's values have no statistic in their names.
-    pub fn summary_names(&self) -> Vec<String> {
+    pub fn summary_names(&self) -> Arc<[String]> {
+        self.summary_names.get_or_init(|| self.make_summary_names().into()).clone()
+    }
+
+    fn make_summary_names(&self) -> Vec<String> {
         let Some(summary) = &self.config.summary else { return Vec::new() };
         if let Some(projection) = &self.config.projection {
             return projection.names();

@@ -37,12 +37,13 @@ mod row {
     use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
     pub fn serialize<S: Serializer>(row: &Option<Vec<f32>>, to: S) -> Result<S::Ok, S::Error> {
+        const DIGITS: [char; 16] =
+            ['0', '1', '2', '3', '4', '5', '6', '7', '8', '9', 'a', 'b', 'c', 'd', 'e', 'f'];
         let hex = row.as_ref().map(|row| {
-            use std::fmt::Write;
             let mut hex = String::with_capacity(row.len() * 8);
-            for value in row {
-                // Writing to a string cannot fail.
-                let _ = write!(hex, "{:08x}", value.to_bits().swap_bytes());
+            for byte in row.iter().flat_map(|value| value.to_le_bytes()) {
+                hex.push(DIGITS[usize::from(byte >> 4)]);
+                hex.push(DIGITS[usize::from(byte & 15)]);
             }
             hex
         });

@@ -1,5 +1,7 @@
 //! The output of a run: recordings go in in the order of the inputs.
 
+use std::sync::Arc;
+
 use super::error::RunError;
 use super::frames;
 use crate::engine::{FeatureArray, Plan};
@@ -21,7 +23,7 @@ pub struct Finished {
     /// Its features, already in the form in which they are written.
     pub arrays: Vec<Member>,
     /// Its summary row and the names of the columns.
-    pub row: Option<(Vec<f32>, Vec<String>)>,
+    pub row: Option<(Vec<f32>, Arc<[String]>)>,
 }
 
 /// One array of a recording.
@@ -177,7 +179,7 @@ impl Output {
             match self.table.name_features(&columns) {
                 Ok(()) => {
                     row = Some(values);
-                    names = first.then_some(columns);
+                    names = first.then(|| columns.to_vec());
                 }
                 Err(TableError::Renamed { expected, actual, .. }) => {
                     finished.outcome.status = Status::Mismatch;

@@ -154,9 +154,9 @@ impl Recordings {
                 Some((plan, Features::Summary(row))) => {
                     let names = plan.summary_names();
                     if batch.names.is_empty() {
-                        batch.names = names;
+                        batch.names = names.to_vec();
                         batch.values.extend(row);
-                    } else if batch.names == names {
+                    } else if batch.names == *names {
                         batch.values.extend(row);
                     } else {
                         outcome.status = Status::Mismatch;
@@ -189,7 +189,7 @@ impl Recordings {
                 encoding: SampleEncoding::Float { bytes: 4 },
                 declared_frames: None,
             };
-            self.plans.of(&spec).ok().map(|planned| planned.plan.summary_names())
+            self.plans.of(&spec).ok().map(|planned| planned.plan.summary_names().to_vec())
         };
         let found = match channels {
             Some(channels) => names(channels),
