@@ -41,6 +41,8 @@ def cases(y: Any, n_fft: int) -> dict[str, Callable[[Any], Any]]:
     """By name what to call with either module; defaults but for the transform."""
     framing = {} if n_fft == 2048 else {"n_fft": n_fft, "hop_length": n_fft // 4}
     power = librosa.feature.melspectrogram(y=y, sr=SR, **framing)
+    spectrum = librosa.stft(y, **framing)
+    inverse = {} if n_fft == 2048 else {"hop_length": n_fft // 4}
     shape = ("centroid", "bandwidth", "rolloff", "flatness", "contrast")
 
     def of_shape(name: str) -> Callable[[Any], Any]:
@@ -59,6 +61,13 @@ def cases(y: Any, n_fft: int) -> dict[str, Callable[[Any], Any]]:
         "feature.delta": lambda m: m.feature.delta(power),
         "feature.chroma_stft": lambda m: m.feature.chroma_stft(y=y, sr=SR, **framing),
         "onset.onset_strength": lambda m: m.onset.onset_strength(y=y[0], sr=SR, **framing),
+        "istft": lambda m: m.istft(spectrum, **inverse),
+        "decompose.hpss": lambda m: m.decompose.hpss(spectrum[0]),
+        "cqt": lambda m: m.cqt(y[0], sr=SR),
+        "feature.chroma_cqt": lambda m: m.feature.chroma_cqt(y=y[0], sr=SR),
+        "feature.tonnetz": lambda m: m.feature.tonnetz(y=y[0], sr=SR),
+        "piptrack": lambda m: m.piptrack(y=y[0], sr=SR, **framing),
+        "resample 44.1 to 16 kHz": lambda m: m.resample(y, orig_sr=SR, target_sr=16000),
         "resample 44.1 to 22.05 kHz": lambda m: m.resample(y, orig_sr=SR, target_sr=SR / 2),
     }
 
