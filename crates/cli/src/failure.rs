@@ -25,7 +25,6 @@ impl Failure {
     }
 
     /// The same for work that the user stopped.
-    #[cfg_attr(not(feature = "nets"), expect(dead_code, reason = "for networks"))]
     pub fn interrupted(message: impl Into<String>) -> Self {
         Self { message: message.into(), code: INTERRUPTED }
     }

@@ -2,13 +2,16 @@
 
 use std::ffi::OsStr;
 
-use corsmal_extract::inputs::{self, Input};
+use corsmal_extract::inputs::{self, Input, InputError};
 
 use crate::failure::Failure;
 
 /// The recordings that `names` stand for, at least one. `warn` is told what was passed over.
 pub fn named<S: AsRef<OsStr>>(names: &[S], warn: impl FnOnce(&str)) -> Result<Vec<Input>, Failure> {
-    let collected = inputs::collect(names)?;
+    let collected = match inputs::collect_until(names, crate::interrupt::flag()) {
+        Err(error @ InputError::Stopped) => return Err(Failure::interrupted(error.to_string())),
+        collected => collected?,
+    };
     if let Some(warning) = collected.warning() {
         warn(&warning);
     }

@@ -109,6 +109,8 @@ pub fn main() -> Result<(), Box<dyn Error>> {
     let inputs = inputs::collect(&[path.into_os_string()])?.inputs;
     let options = RunOptions {
         out: folder.path().join("features.npz"),
+        work: None,
+        partition_by: None,
         compression: Compression::Stored,
         jobs: 1,
         shard: "0/1".parse()?,

@@ -1,5 +1,8 @@
 //! Recordings cut into windows, each an input of its own.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use crate::inputs::{Input, InputError, InputSource};
 use crate::survey::{headers, lengths};
 
@@ -22,12 +25,17 @@ pub struct WindowSpan {
 ///
 /// Windows begin at multiples of the hop and are whole: what remains at the end is left out, but a
 /// recording shorter than a window is one window. Both are whole numbers of frames, rounded once.
-/// What cannot be read stays as it is, for its row in the output.
+/// What cannot be read stays as it is, for its row in the output. Waiting for stores ends when `stop` is
+/// set.
 ///
 /// # Errors
 /// Standard input, which cannot be read twice; too many windows; a window with the id of another
-/// input; a label called `recording`, by whose values folds would split recordings.
-pub fn into_windows(inputs: Vec<Input>, span: WindowSpan) -> Result<Vec<Input>, InputError> {
+/// input; a label called `recording`, by whose values folds would split recordings; a stop.
+pub fn into_windows(
+    inputs: Vec<Input>,
+    span: WindowSpan,
+    stop: &Arc<AtomicBool>,
+) -> Result<Vec<Input>, InputError> {
     if let Some(input) = inputs.iter().find(|i| i.labels.iter().any(|(name, _)| name == RECORDING))
     {
         let reason = format!(
@@ -35,8 +43,11 @@ pub fn into_windows(inputs: Vec<Input>, span: WindowSpan) -> Result<Vec<Input>, 
         );
         return Err(InputError::Window { id: input.id.clone(), reason });
     }
-    let headers = headers(&inputs);
-    let lengths = lengths(&inputs, &headers);
+    let headers = headers(&inputs, stop);
+    let lengths = lengths(&inputs, &headers, stop);
+    if stop.load(Ordering::Relaxed) {
+        return Err(InputError::Stopped);
+    }
     let mut windows = Vec::new();
     for ((input, header), length) in inputs.into_iter().zip(headers).zip(lengths) {
         if input.source == InputSource::Stdin {

@@ -60,6 +60,8 @@
 //! let config = Arc::new(Config::preset("logmel")?);
 //! let options = RunOptions {
 //!     out: "features.npz".into(),
+//!     work: None,
+//!     partition_by: None,
 //!     compression: Compression::Stored,
 //!     jobs: 4,
 //!     shard: Shard::default(),
@@ -84,6 +86,7 @@ pub mod inputs;
 pub mod ledger;
 pub mod manifest;
 pub mod merge;
+pub mod merge_stored;
 pub mod params;
 pub mod projection;
 pub mod run;

@@ -18,11 +18,15 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::ledger::{Done, Header, Ledger, LedgerError, ledger_path};
+use crate::run::RunError;
 
 /// What can go wrong with merging.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum MergeError {
+    /// An output or a shard in a store; says which and why.
+    #[error(transparent)]
+    Stored(#[from] RunError),
     /// A shard cannot be read.
     #[error(transparent)]
     Shard(#[from] FeatureFileError),
@@ -247,6 +251,14 @@ impl Merge<'_> {
         }
         Ok(writer.finish()?)
     }
+}
+
+/// How the result of merging `shards` says that it was made.
+///
+/// # Errors
+/// They are not the shards of one run; `out` is named where there are none.
+pub(crate) fn provenance(shards: &[PathBuf], out: &Path) -> Result<Provenance, MergeError> {
+    Ok(in_order(shards, out)?.1)
 }
 
 /// Brings the shards into order, checks that they are all of one run, and says how that was made.

@@ -2,17 +2,17 @@
 //! they fit into one table.
 
 use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use corsmal_audio::{AudioError, BlockSource};
 use rayon::prelude::*;
 
 use crate::config::{Channels, Config};
-use crate::inputs::{Input, InputSource};
+use crate::inputs::{Input, InputSource, stored};
 
 /// Samples read at a time where frames have to be counted.
 const BLOCK: usize = 1 << 16;
-/// Headers of objects that are asked for at the same time.
-const LOOKS: usize = 32;
 /// Different values that a message names.
 const NAMED: usize = 4;
 
@@ -30,25 +30,31 @@ pub struct Header {
 }
 
 /// The header of each input, every file opened once; `None` for standard input and for what cannot
-/// be read, which the run will say.
-pub fn headers(inputs: &[Input]) -> Vec<Option<Header>> {
+/// be read, which the run will say. Waiting for stores ends when `stop` is set.
+pub fn headers(inputs: &[Input], stop: &Arc<AtomicBool>) -> Vec<Option<Header>> {
     let mut sources: Vec<&InputSource> = inputs.iter().filter_map(again).collect();
     sources.sort_unstable();
     sources.dedup();
-    let read = |source: &&InputSource| source.open_header().ok().map(|s| of(s.as_ref()));
-    let look = || sources.par_iter().map(read).collect();
-    let found: Vec<Option<Header>> = match pool_for(&sources) {
-        Some(pool) => pool.install(look),
-        None => look(),
-    };
+    let read = |source: &&InputSource| source.open_header(stop).ok().map(|s| of(s.as_ref()));
+    let stored = sources.iter().any(|source| source.is_stored());
+    let found: Vec<Option<Header>> = on_threads(stored, || sources.par_iter().map(read).collect());
     let known: HashMap<&InputSource, Option<Header>> = sources.into_iter().zip(found).collect();
     inputs.iter().map(|input| again(input).and_then(|s| known.get(s).copied()?)).collect()
 }
 
-/// More threads than cores where answers of stores are waited for.
-fn pool_for(sources: &[&InputSource]) -> Option<rayon::ThreadPool> {
-    let is_stored = sources.iter().any(|source| source.is_stored());
-    is_stored.then(|| rayon::ThreadPoolBuilder::new().num_threads(LOOKS).build().ok()).flatten()
+/// Does work that is parallel in it: on more threads than cores where answers of stores are waited for,
+/// else on those of the caller's pool, or of one of its own. Never on rayon's global ones, which a process
+/// that was forked lacks.
+fn on_threads<T: Send>(waits: bool, work: impl FnOnce() -> T + Send) -> T {
+    let threads = match rayon::current_thread_index() {
+        _ if waits => stored::LOOKS,
+        Some(_) => return work(),
+        None => 0, // one for each core
+    };
+    match stored::pool(threads) {
+        Some(pool) => pool.install(work),
+        None => work(),
+    }
 }
 
 /// What can be read again afterwards.
@@ -64,8 +70,13 @@ fn of(source: &dyn BlockSource) -> Header {
 }
 
 /// The frames of each input, those of every file counted once; `None` for what cannot be read to its
-/// end, which the run will say. `headers` are those of [`headers`].
-pub fn lengths(inputs: &[Input], headers: &[Option<Header>]) -> Vec<Option<u64>> {
+/// end, which the run will say. `headers` are those of [`headers`]. Waiting for stores ends when `stop`
+/// is set.
+pub fn lengths(
+    inputs: &[Input],
+    headers: &[Option<Header>],
+    stop: &Arc<AtomicBool>,
+) -> Vec<Option<u64>> {
     let mut sources: Vec<(&InputSource, Header)> = inputs
         .iter()
         .zip(headers)
@@ -74,9 +85,9 @@ pub fn lengths(inputs: &[Input], headers: &[Option<Header>]) -> Vec<Option<u64>>
     sources.sort_unstable_by_key(|(source, _)| *source);
     sources.dedup_by_key(|(source, _)| *source);
     let count = |(source, header): &(&InputSource, Header)| {
-        header.frames.or_else(|| count_frames(source).ok())
+        header.frames.or_else(|| count_frames(source, stop).ok())
     };
-    let found: Vec<Option<u64>> = sources.par_iter().map(count).collect();
+    let found: Vec<Option<u64>> = on_threads(false, || sources.par_iter().map(count).collect());
     let known: HashMap<&InputSource, Option<u64>> =
         sources.into_iter().map(|(source, _)| source).zip(found).collect();
     inputs.iter().map(|input| again(input).and_then(|s| known.get(s).copied()?)).collect()
@@ -86,8 +97,8 @@ pub fn lengths(inputs: &[Input], headers: &[Option<Header>]) -> Vec<Option<u64>>
 ///
 /// # Errors
 /// It cannot be read to its end.
-fn count_frames(source: &InputSource) -> Result<u64, AudioError> {
-    let mut source = source.open()?;
+fn count_frames(source: &InputSource, stop: &Arc<AtomicBool>) -> Result<u64, AudioError> {
+    let mut source = source.open_until(stop)?;
     let channels = usize::from(source.spec().channels);
     let mut block = vec![0.0; (BLOCK / channels).max(1) * channels];
     let mut frames = 0;
@@ -123,8 +134,9 @@ struct Group<T> {
 }
 
 impl Survey {
-    /// Looks at the headers of `inputs`, where `config` asks for a summary table.
-    pub fn of(inputs: &[Input], config: &Config) -> Self {
+    /// Looks at the headers of `inputs`, where `config` asks for a summary table. Waiting for stores
+    /// ends when `stop` is set; what it says then counts no more.
+    pub fn of(inputs: &[Input], config: &Config, stop: &Arc<AtomicBool>) -> Self {
         if config.summary.is_none() {
             return Self::default();
         }
@@ -133,7 +145,7 @@ impl Survey {
         if !apart && !own_rate {
             return Self::default();
         }
-        let headers = headers(inputs);
+        let headers = headers(inputs, stop);
         let known = || inputs.iter().zip(&headers).filter_map(|(i, h)| Some((i, (*h)?)));
         let mut survey = Self::default();
         if apart {

@@ -55,6 +55,11 @@ impl Draft {
         self.file.as_file().try_clone().map_err(|e| named(&self.path, &e))
     }
 
+    /// Where the file is until it has its name.
+    pub fn place(&self) -> &Path {
+        self.file.path()
+    }
+
     /// Gives the file its name.
     ///
     /// # Errors

@@ -50,6 +50,7 @@ pub mod npy;
 pub mod npz;
 pub mod outcome;
 pub mod parquet;
+pub mod partition;
 pub mod provenance;
 pub mod quote;
 pub mod shard;

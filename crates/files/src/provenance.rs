@@ -8,6 +8,17 @@ use crate::shard::Shard;
 /// Version of the layout in `docs/file-formats.md`.
 pub const LAYOUT_VERSION: u32 = 1;
 
+/// Which part of a partitioned output a file is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Part {
+    /// The label.
+    pub label: String,
+    /// Its value.
+    pub value: String,
+    /// The place of each outcome among the inputs of the run, from 0.
+    pub places: Vec<usize>,
+}
+
 /// Stored in every output; equal runs have equal provenance.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Provenance {
@@ -21,6 +32,9 @@ pub struct Provenance {
     pub inputs_hash: String,
     /// Which part of the inputs the output covers, `0/1` being all.
     pub shard: String,
+    /// Which part of a partitioned output the file is, where that is in several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part: Option<Part>,
     /// The effective configuration as canonical JSON; kept in a place of its own.
     #[serde(skip)]
     pub config: String,
@@ -35,6 +49,7 @@ impl Provenance {
             config_hash,
             inputs_hash,
             shard: shard.to_string(),
+            part: None,
             config,
         }
     }

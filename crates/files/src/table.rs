@@ -164,6 +164,33 @@ impl Table {
         Ok(())
     }
 
+    /// The inputs at some places, in that order, without one of the label columns.
+    pub(crate) fn of_places(&self, places: &[usize], without: &str) -> Result<Self, TableError> {
+        let kept = |name: &&String| *name != without;
+        let mut part = Self::new(self.label_columns.iter().filter(kept).cloned().collect())?;
+        part.name_features(&self.feature_names)?;
+        // The row of each outcome that has one.
+        let mut rows = Vec::with_capacity(self.outcomes.len());
+        let mut next = 0;
+        for outcome in &self.outcomes {
+            rows.push(next);
+            next += usize::from(outcome.status.has_features());
+        }
+        let width = self.feature_names.len();
+        for &place in places {
+            let (outcome, row) = (&self.outcomes[place], rows[place]);
+            if !outcome.status.has_features() {
+                part.push(outcome.clone(), &[], &[])?;
+                continue;
+            }
+            let labels = self.labels().filter(|(name, _)| *name != without);
+            let labels: Vec<(String, String)> =
+                labels.map(|(name, column)| (name.to_owned(), column[row].clone())).collect();
+            part.push(outcome.clone(), &labels, &self.values[row * width..][..width])?;
+        }
+        Ok(part)
+    }
+
     /// Puts a table together from what a reader found.
     ///
     /// # Errors

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use corsmal_extract::engine::{FeatureArray, Plan};
 use corsmal_extract::inputs::{self, Input, InputSource, Member, Place};
-use corsmal_extract::run::{Recordings, RunError as Stopped};
-use corsmal_extract::survey::Survey;
+use corsmal_extract::run::{Piece, Recordings, RunError as Stopped};
+use corsmal_extract::survey::{Header, headers};
 use ndarray::{Array2, Array3};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
@@ -15,8 +15,8 @@ use pyo3::pybacked::PyBackedBytes;
 
 use crate::arrays::into_numpy;
 use crate::errors::{RunError, value_error};
-use crate::extract::{config_of, interruptible};
-use crate::pool::compute;
+use crate::extract::{config_of, input_error, interruptible};
+use crate::pool::jobs;
 
 /// Where the bytes of a row come from.
 #[derive(FromPyObject)]
@@ -55,8 +55,8 @@ fn place_of(path: PathBuf) -> PyResult<Place> {
     }
 }
 
-/// A row: id, source, start and end in seconds.
-type Row = (String, Source, Option<f64>, Option<f64>);
+/// A row: id, source, start and end in seconds; the samples of a piece, whose last one may be open.
+type Row = (String, Source, Option<f64>, Option<f64>, Option<(u64, Option<u64>)>);
 
 /// The frames of a recording by feature [frames, coefficients, channels].
 type Frames<'py> = Vec<Bound<'py, PyAny>>;
@@ -78,8 +78,16 @@ impl PyRecordings {
 
     /// The channels that most of `rows` have, where the width of a summary depends on them.
     fn usual_channels(&self, py: Python<'_>, rows: Vec<Row>) -> PyResult<Option<u16>> {
-        let inputs = inputs_of(rows)?;
-        compute(py, || Survey::of(&inputs, self.0.config()).channels())
+        let (inputs, _) = inputs_of(rows)?;
+        let jobs = jobs()?;
+        let work =
+            |stop: &Arc<AtomicBool>| self.0.usual_channels(&inputs, jobs, stop).map_err(stopped);
+        py.detach(|| interruptible(work, &mut |_| Ok(())))
+    }
+
+    /// Why recordings cannot be cut into pieces.
+    fn piece_refusal(&self) -> Option<String> {
+        self.0.piece_refusal()
     }
 
     /// Computes `rows` with `jobs` threads.
@@ -90,12 +98,12 @@ impl PyRecordings {
         channels: Option<u16>,
         jobs: usize,
     ) -> PyResult<Columns<'py>> {
-        let inputs = inputs_of(rows)?;
+        let (inputs, pieces) = inputs_of(rows)?;
+        if let (true, Some(reason)) = (pieces.iter().any(Option::is_some), self.0.piece_refusal()) {
+            return Err(value_error(format!("recordings cannot be cut into pieces: {reason}")));
+        }
         let work = |stop: &Arc<AtomicBool>| {
-            self.0.extract(&inputs, channels, jobs, stop).map_err(|error| match error {
-                Stopped::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
-                other => RunError::new_err(other.to_string()),
-            })
+            self.0.extract((&inputs, &pieces), channels, jobs, stop).map_err(stopped)
         };
         let batch = py.detach(|| interruptible(work, &mut |_| Ok(())))?;
         let mut outcomes = String::new();
@@ -115,9 +123,17 @@ impl PyRecordings {
     }
 }
 
-fn inputs_of(rows: Vec<Row>) -> PyResult<Vec<Input>> {
-    let input = |(id, source, start, end): Row| {
-        Ok(Input { id, source: source.known()?, start, end, labels: Vec::new() })
+fn stopped(error: Stopped) -> PyErr {
+    match error {
+        Stopped::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
+        other => RunError::new_err(other.to_string()),
+    }
+}
+
+fn inputs_of(rows: Vec<Row>) -> PyResult<(Vec<Input>, Vec<Piece>)> {
+    let input = |(id, source, start, end, piece): Row| {
+        let piece = piece.map(|(first, end)| first..end.unwrap_or(u64::MAX));
+        Ok((Input { id, source: source.known()?, start, end, labels: Vec::new() }, piece))
     };
     rows.into_iter().map(input).collect()
 }
@@ -148,25 +164,28 @@ type Found = (
     Vec<(String, String)>,
 );
 
-/// The recordings that `paths` stand for, and what is to be warned of.
+/// The recordings that `paths` stand for, and what is to be warned of. Web addresses have their query,
+/// which may be a signature: workers need it.
 #[pyfunction]
 pub(crate) fn collect(
     py: Python<'_>,
     paths: Vec<String>,
 ) -> PyResult<(Vec<Found>, Option<String>)> {
-    let found = py
-        .detach(|| inputs::collect(&paths))
-        .map_err(|error| RunError::new_err(error.to_string()))?;
+    let work = |stop: &Arc<AtomicBool>| inputs::collect_until(&paths, stop).map_err(input_error);
+    let found = py.detach(|| interruptible(work, &mut |_| Ok(())))?;
     let warning = found.warning();
     let rows = found.inputs.into_iter().map(|input| {
-        let path = input.source.to_string();
+        let path = match &input.source {
+            InputSource::Object(object) => object.address(),
+            source => source.to_string(),
+        };
         let place = match input.source {
             InputSource::Member(member) => {
                 let fault = member.fault.as_ref().map(serde_json::to_string);
                 let fault = fault.transpose().map_err(value_error)?;
                 let archive = match member.archive {
                     Place::File(path) => path,
-                    Place::Object(object) => object.to_string().into(),
+                    Place::Object(object) => object.address().into(),
                 };
                 Some((archive, member.offset, member.size, fault))
             }
@@ -175,6 +194,34 @@ pub(crate) fn collect(
         Ok((input.id, path, place, input.start, input.end, input.labels))
     });
     Ok((rows.collect::<PyResult<_>>()?, warning))
+}
+
+/// The sample rate and the frames of recordings, by their headers; `None` where these do not say, and where
+/// no frame can be gone to.
+#[pyfunction]
+pub(crate) fn lengths(py: Python<'_>, rows: Vec<Row>) -> PyResult<Vec<Option<(u32, u64)>>> {
+    let (inputs, _) = inputs_of(rows)?;
+    let work = |stop: &Arc<AtomicBool>| match headers(&inputs, stop) {
+        _ if stop.load(Ordering::Relaxed) => Err(PyKeyboardInterrupt::new_err("interrupted")),
+        found => Ok(found),
+    };
+    let found = py.detach(|| interruptible(work, &mut |_| Ok(())))?;
+    let known = |header: Header| header.frames.map(|frames| (header.sample_rate, frames));
+    Ok(found.into_iter().map(|header| header.and_then(known)).collect())
+}
+
+/// Refuses the store of an object where nothing in it can be asked for.
+#[pyfunction]
+pub(crate) fn require_store(py: Python<'_>, name: &str) -> PyResult<()> {
+    inputs::object(name).map_err(value_error)?;
+    let work = |stop: &Arc<AtomicBool>| inputs::require_store(name, stop).map_err(input_error);
+    py.detach(|| interruptible(work, &mut |_| Ok(())))
+}
+
+/// A name as outputs and messages have it: without the query of a web address.
+#[pyfunction]
+pub(crate) fn shown(name: &str) -> String {
+    inputs::shown(name)
 }
 
 /// Whether a name is one of a store, and not of a file.

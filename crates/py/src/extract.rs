@@ -1,5 +1,6 @@
 //! Runs over files, and features of signals in memory.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -8,7 +9,7 @@ use std::time::Duration;
 
 use corsmal_extract::config::{Config, Preset};
 use corsmal_extract::engine::{FeatureArray, Features, Signal, Signals};
-use corsmal_extract::inputs;
+use corsmal_extract::inputs::{self, InputError};
 use corsmal_extract::projection::Projection;
 use corsmal_extract::run::{self, Progress, RunOptions};
 use corsmal_files::npz::Compression;
@@ -84,7 +85,8 @@ impl Progress for Told {
     }
 }
 
-/// Extracts the features of `paths` into the file `out` and gives what is to be warned of.
+/// Extracts the features of `paths` into an output, which is made in a work folder where it is for a store
+/// (`places`), and gives what is to be warned of.
 /// `progress` is called with the recordings done and all of them. An interrupt, or an exception of
 /// `progress`, stops the run, its ledger intact.
 #[pyfunction]
@@ -94,7 +96,7 @@ pub(crate) fn extract(
     paths: Vec<String>,
     config: (String, String),
     overrides: Vec<String>,
-    out: PathBuf,
+    places: (PathBuf, Option<PathBuf>, Option<String>),
     jobs: Option<usize>,
     resume: bool,
     overwrite: bool,
@@ -108,10 +110,21 @@ pub(crate) fn extract(
     };
     let compression = Compression::Stored;
     let shard = "0/1".parse::<Shard>().map_err(value_error)?;
-    let options = RunOptions { out, compression, jobs, shard, resume, overwrite, max_errors: None };
+    let (out, work, partition_by) = places;
+    let options = RunOptions {
+        out,
+        work,
+        partition_by,
+        compression,
+        jobs,
+        shard,
+        resume,
+        overwrite,
+        max_errors: None,
+    };
     let told = Told::default();
     let work = |stop: &Arc<AtomicBool>| {
-        let found = inputs::collect(&paths).map_err(|e| RunError::new_err(e.to_string()))?;
+        let found = inputs::collect_until(&paths, stop).map_err(input_error)?;
         if let Some(skipped) = found.warning() {
             told.warning(&skipped);
         }
@@ -131,6 +144,26 @@ pub(crate) fn extract(
     py.detach(|| interruptible(work, &mut tell))?;
     tell(py)?;
     Ok(told.warnings.into_inner().unwrap_or_else(|e| e.into_inner()))
+}
+
+/// What is wrong with inputs, or an interrupt.
+pub(crate) fn input_error(error: InputError) -> PyErr {
+    match error {
+        InputError::Stopped => PyKeyboardInterrupt::new_err(error.to_string()),
+        error => RunError::new_err(error.to_string()),
+    }
+}
+
+/// Copies an object of a store into a file.
+#[pyfunction]
+pub(crate) fn fetch(py: Python<'_>, name: &str, to: PathBuf) -> PyResult<()> {
+    let object = inputs::object(name).map_err(input_error)?;
+    let work = |stop: &Arc<AtomicBool>| {
+        let failed = |error: std::io::Error| RunError::new_err(format!("{object}: {error}"));
+        let mut file = File::create(&to).map_err(failed)?;
+        run::fetch(&object, &mut file, stop).map(drop).map_err(failed)
+    };
+    py.detach(|| interruptible(work, &mut |_| Ok(())))
 }
 
 /// Fits principal components to the summary of a feature file and writes them to `out`.

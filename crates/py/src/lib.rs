@@ -37,7 +37,7 @@ mod _core {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use crate::batch::{PyRecordings, collect, is_stored};
+    use crate::batch::{PyRecordings, collect, is_stored, lengths, require_store, shown};
     #[pymodule_export]
     use crate::chroma::{chroma, chroma_filter, estimate_tuning, piptrack, pitch_tuning};
     #[pymodule_export]
@@ -47,7 +47,7 @@ mod _core {
     #[pymodule_export]
     use crate::evaluate::evaluate;
     #[pymodule_export]
-    use crate::extract::{PySignal, PySignals, effective_config, extract, fit_projection};
+    use crate::extract::{PySignal, PySignals, effective_config, extract, fetch, fit_projection};
     #[pymodule_export]
     use crate::frontends::{
         m1_stft, m2_mfcc, m3_spectrogram, m4_logmel, m4_windows, m5_a34f136, m5_vggish_patches,

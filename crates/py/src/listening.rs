@@ -16,7 +16,7 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
 use crate::errors::{RunError, value_error};
-use crate::extract::interruptible;
+use crate::extract::{input_error, interruptible};
 use crate::nets::PyTrainedNetwork;
 use crate::pool::{compute, jobs as usual_jobs};
 use crate::scoring::csv;
@@ -46,7 +46,7 @@ fn threads(jobs: Option<usize>) -> PyResult<usize> {
 
 /// One recording for each path.
 fn recordings(paths: &[String]) -> PyResult<Vec<Input>> {
-    let found = inputs::collect(paths).map_err(|e| RunError::new_err(e.to_string()))?.inputs;
+    let found = inputs::collect(paths).map_err(input_error)?.inputs;
     // By number alone a folder of two and a file that is skipped would pass.
     let same = |(input, path): (&Input, &String)| input.source.to_string() == *path;
     if found.len() == paths.len() && found.iter().zip(paths).all(same) {
@@ -219,8 +219,7 @@ pub(crate) fn embed_recordings<'py>(
         interruptible(
             |stop| {
                 let embedder = Embedder::new(name, &weights).map_err(error)?;
-                let found =
-                    inputs::collect(&paths).map_err(|e| RunError::new_err(e.to_string()))?;
+                let found = inputs::collect_until(&paths, stop).map_err(input_error)?;
                 let tell = |input: &Input, status, reason: &str| {
                     failed.push((input.source.to_string(), format!("{status}: {reason}")));
                 };

@@ -1,7 +1,7 @@
 //! Clients of stores, one for each bucket.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, Once, PoisonError};
+use std::sync::{Arc, Mutex, Once};
 use std::time::Duration;
 
 use object_store::aws::{AmazonS3Builder, AmazonS3ConfigKey};
@@ -13,6 +13,7 @@ use object_store::{BackoffConfig, ClientConfigKey, ClientOptions, ObjectStore, R
 
 use crate::error::StoreError;
 use crate::profile;
+use crate::runtime;
 use crate::uri::{Scheme, Uri};
 
 /// Time for one range, so that slow lines of 40 KB/s get through, and time without a byte.
@@ -29,16 +30,16 @@ pub(crate) fn store(uri: &Uri) -> Result<Arc<dyn ObjectStore>, StoreError> {
         // Signed addresses are as many as objects: their clients share connections and are not kept.
         return web(uri, Some(&query.0));
     }
-    if let Some(store) = with_clients(|clients| clients.get(uri.root()).cloned()) {
+    if let Some(store) = with_clients(|clients| clients.get(uri.root()).cloned())? {
         return Ok(store);
     }
     let store = connect(uri)?;
-    Ok(with_clients(|clients| clients.entry(uri.root().to_owned()).or_insert(store).clone()))
+    with_clients(|clients| clients.entry(uri.root().to_owned()).or_insert(store).clone())
 }
 
-fn with_clients<T>(work: impl FnOnce(&mut Clients) -> T) -> T {
+fn with_clients<T>(work: impl FnOnce(&mut Clients) -> T) -> Result<T, StoreError> {
     let process = std::process::id();
-    let mut kept = CLIENTS.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut kept = runtime::lock(&CLIENTS)?;
     let (mut owner, mut clients) = kept.take().unwrap_or_else(|| (process, Clients::new()));
     if owner != process {
         // Those of the parent of a fork: their connections are the parent's.
@@ -47,7 +48,7 @@ fn with_clients<T>(work: impl FnOnce(&mut Clients) -> T) -> T {
     }
     let found = work(&mut clients);
     *kept = Some((owner, clients));
-    found
+    Ok(found)
 }
 
 fn connect(uri: &Uri) -> Result<Arc<dyn ObjectStore>, StoreError> {
@@ -128,7 +129,10 @@ static WEB: Mutex<Option<(u32, HttpClient)>> = Mutex::new(None);
 impl HttpConnector for Shared {
     fn connect(&self, _: &ClientOptions) -> object_store::Result<HttpClient> {
         let process = std::process::id();
-        let mut kept = WEB.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = runtime::lock(&WEB).map_err(|error| object_store::Error::Generic {
+            store: "HTTP",
+            source: error.into(),
+        })?;
         if let Some((_, client)) = kept.as_ref().filter(|(owner, _)| *owner == process) {
             return Ok(client.clone());
         }

@@ -18,8 +18,8 @@ pub enum StoreError {
     /// Nothing has this name.
     #[error("the store has no such object")]
     Missing,
-    /// The store does not let us.
-    #[error("the store refuses: {0}")]
+    /// The store denies access.
+    #[error("the store denied access: {0}")]
     Refused(String),
     /// The client cannot be set up.
     #[error("{0}")]
@@ -27,26 +27,33 @@ pub enum StoreError {
     /// The object is not the one that was read before.
     #[error("{0} while it was read")]
     Changed(String),
-    /// The bytes did not come, however often they were asked for.
+    /// The request failed, and so did every further try.
     #[error("the store failed: {0}")]
     Failed(String),
-    /// The object has no bytes there.
-    #[error("the object ends before the bytes asked for")]
+    /// The range lies behind the end of the object.
+    #[error("the object ends before the requested bytes")]
     Beyond,
     /// The server cannot do what is needed.
     #[error("{0}")]
     Unsupported(String),
+    /// The object is there, and must not be replaced.
+    #[error("the object exists")]
+    Exists,
+    /// The file to be sent cannot be read.
+    #[error("{0}")]
+    File(String),
     /// The caller asked to stop.
     #[error("interrupted")]
     Stopped,
 }
 
 /// Where credentials are looked for.
-const NO_CREDENTIALS: &str = "no credentials were found: set those of the store in the environment \
-     (AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, GOOGLE_APPLICATION_CREDENTIALS, AZURE_STORAGE_*), or \
-     for a public bucket AWS_SKIP_SIGNATURE=true, GOOGLE_SKIP_SIGNATURE=true or AZURE_SKIP_SIGNATURE=true";
-/// Addresses that machines of a cloud get credentials from.
+const NO_CREDENTIALS: &str = "no credentials found: set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, GOOGLE_APPLICATION_CREDENTIALS \
+     or AZURE_STORAGE_* in the environment; for a public bucket set AWS_SKIP_SIGNATURE=true, \
+     GOOGLE_SKIP_SIGNATURE=true or AZURE_SKIP_SIGNATURE=true";
+/// Addresses that machines of a cloud get credentials from, and variables that name others.
 const METADATA: [&str; 3] = ["169.254.169.254", "169.254.170.2", "metadata.google.internal"];
+const ELSEWHERE: [&str; 2] = ["AWS_METADATA_ENDPOINT", "AWS_CONTAINER_CREDENTIALS_FULL_URI"];
 
 /// Answers of a server that is asked too early or too often.
 const LATER: [&str; 2] = ["408 ", "429 "];
@@ -56,11 +63,6 @@ impl StoreError {
     pub(crate) fn is_worth_another_try(&self) -> bool {
         matches!(self, Self::Failed(_))
     }
-
-    /// Whether the fault is the job's: every object of the bucket will have it.
-    pub fn is_of_the_store(&self) -> bool {
-        matches!(self, Self::Refused(_) | Self::Setup(_) | Self::Unsupported(_) | Self::Failed(_))
-    }
 }
 
 impl From<object_store::Error> for StoreError {
@@ -68,6 +70,7 @@ impl From<object_store::Error> for StoreError {
         use object_store::Error as E;
         match &error {
             E::NotFound { .. } => Self::Missing,
+            E::AlreadyExists { .. } => Self::Exists,
             E::Precondition { .. } | E::NotModified { .. } => {
                 Self::Changed("was replaced by another object".into())
             }
@@ -75,9 +78,7 @@ impl From<object_store::Error> for StoreError {
             E::NotSupported { .. } => Self::Unsupported(
                 "the server does not send parts of a file (HTTP ranges): download it".into(),
             ),
-            _ if METADATA.iter().any(|host| error.to_string().contains(host)) => {
-                Self::Setup(NO_CREDENTIALS.into())
-            }
+            _ if is_of_credentials(&error.to_string()) => Self::Setup(NO_CREDENTIALS.into()),
             _ => match words(&error) {
                 // The second is what the client finds itself.
                 answer if answer.starts_with("416 ") || answer.starts_with("Wanted range") => {
@@ -93,6 +94,13 @@ impl From<object_store::Error> for StoreError {
             },
         }
     }
+}
+
+/// Whether an error is of the request for credentials, not of the one for an object.
+fn is_of_credentials(text: &str) -> bool {
+    let named = ELSEWHERE.iter().filter_map(|name| std::env::var(name).ok());
+    let mut named = named.filter(|address| !address.is_empty());
+    METADATA.iter().any(|host| text.contains(host)) || named.any(|address| text.contains(&address))
 }
 
 impl From<StoreError> for io::Error {

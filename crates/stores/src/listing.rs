@@ -1,5 +1,7 @@
 //! Which objects there are.
 
+use std::sync::atomic::AtomicBool;
+
 use futures_util::TryStreamExt;
 
 use crate::connect;
@@ -8,11 +10,12 @@ use crate::object::{Object, Version};
 use crate::runtime;
 use crate::uri::{Scheme, Uri};
 
-/// All objects below a folder, at any depth, sorted by the bytes of their keys.
+/// All objects below a folder, at any depth, sorted by the bytes of their keys. Waiting ends when `stop`
+/// is set.
 ///
 /// # Errors
 /// [`StoreError`]; web servers have no folders that can be listed.
-pub fn list(folder: &Uri) -> Result<Vec<Object>, StoreError> {
+pub fn list(folder: &Uri, stop: &AtomicBool) -> Result<Vec<Object>, StoreError> {
     if folder.scheme == Scheme::Web {
         return Err(StoreError::Unsupported(
             "a web server does not list its files: name them, or list them in a manifest".into(),
@@ -23,7 +26,7 @@ pub fn list(folder: &Uri) -> Result<Vec<Object>, StoreError> {
         let prefix = (!path.is_root()).then_some(path);
         store.list(prefix.as_ref()).try_collect::<Vec<_>>().await
     });
-    let found = runtime::wait(&listing, None)??;
+    let found = runtime::wait(&listing, stop)??;
     let object = |meta: object_store::ObjectMeta| Object {
         uri: folder.with_key(meta.location.as_ref()),
         listed: Some(Version::of(&meta)),

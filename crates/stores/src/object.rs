@@ -1,6 +1,7 @@
 //! An object, and which version of it is read.
 
 use std::fmt;
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use object_store::{ObjectMeta, ObjectStoreExt};
@@ -149,14 +150,19 @@ impl Object {
         self.uri.as_str()
     }
 
-    /// Asks the store which version is there now.
+    /// Its URI, with the query of a web address: see [`Uri::address`].
+    pub fn address(&self) -> String {
+        self.uri.address()
+    }
+
+    /// Asks the store which version is there now. Waiting ends when `stop` is set.
     ///
     /// # Errors
     /// [`StoreError`]: there is none, or the store does not answer.
-    pub fn look(&self) -> Result<Version, StoreError> {
+    pub fn look(&self, stop: &AtomicBool) -> Result<Version, StoreError> {
         let (store, path) = (connect::store(&self.uri)?, self.uri.path()?);
         let head = runtime::spawn(async move { store.head(&path).await });
-        Ok(Version::of(&runtime::wait(&head, None)??))
+        Ok(Version::of(&runtime::wait(&head, stop)??))
     }
 }
 

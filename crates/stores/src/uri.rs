@@ -58,11 +58,6 @@ impl fmt::Display for Uri {
 }
 
 impl Uri {
-    /// Whether `name` is the name of an object in a store that is known.
-    pub fn is_uri(name: &str) -> bool {
-        scheme(name).is_some()
-    }
-
     /// Reads a name such as `s3://bucket/folder/x.wav`. Keys are taken as they stand; only web
     /// addresses have percent encoding.
     ///
@@ -72,12 +67,13 @@ impl Uri {
         let wrong = |reason: String| StoreError::Name { name: without_query(name), reason };
         let Some((scheme, rest)) = scheme(name) else {
             let known: Vec<&str> = SCHEMES.iter().map(|(name, _)| *name).collect();
-            return Err(wrong(format!("is no name in a store ({})", known.join(", "))));
+            let known = known.join("://, ");
+            return Err(wrong(format!("must begin with one of {known}://")));
         };
         let (bucket, key) = rest.split_once('/').unwrap_or((rest, ""));
         let root = name.len() - rest.len() + bucket.len();
         if bucket.is_empty() {
-            return Err(wrong("names no bucket".into()));
+            return Err(wrong("has no bucket".into()));
         }
         let (key, query) = match scheme {
             Scheme::Web => {
@@ -85,7 +81,7 @@ impl Uri {
                     // It would stand in outputs.
                     return Err(StoreError::Name {
                         name: "a web address".into(),
-                        reason: "must hold no user and password".into(),
+                        reason: "must not contain a user name or password".into(),
                     });
                 }
                 let key = key.split_once('#').map_or(key, |(key, _)| key);
@@ -104,6 +100,15 @@ impl Uri {
     /// The whole name, without query.
     pub fn as_str(&self) -> &str {
         &self.text
+    }
+
+    /// The whole name, with the query of a web address. It may hold a signature: for whoever opens the
+    /// object, never for messages or outputs.
+    pub fn address(&self) -> String {
+        match &self.query {
+            Some(Query(query)) => format!("{}?{query}", self.text),
+            None => self.text.clone(),
+        }
     }
 
     /// The key of the object in its bucket, as written.
@@ -194,6 +199,8 @@ mod tests {
         let uri = Uri::parse("https://host:8/a%20b.wav?signature=secret#part").unwrap();
         assert_eq!(uri.path().unwrap().as_ref(), "a b.wav");
         assert_eq!(uri.to_string(), "https://host:8/a%20b.wav");
+        assert_eq!(uri.address(), "https://host:8/a%20b.wav?signature=secret");
+        assert_eq!(Uri::parse(&uri.address()).unwrap(), uri);
         assert!(!format!("{uri:?}").contains("secret"));
         for name in
             ["https://me:secret@host/x.wav", "https:///x.wav?secret", "http://h/a//b?secret"]
@@ -212,10 +219,11 @@ mod tests {
             "s3://b//x.wav",
             "s3://b/../x.wav",
             "hdfs://b/x.wav",
+            "file:///x.wav",
+            "x.wav",
         ] {
             assert!(Uri::parse(name).is_err(), "{name}");
         }
-        assert!(Uri::is_uri("S3://b/x") && !Uri::is_uri("a.wav") && !Uri::is_uri("file:///a.wav"));
         let folder = |name| Uri::parse(name).unwrap().is_folder();
         assert!(
             folder("s3://b") && folder("s3://b/") && folder("s3://b/x/") && !folder("s3://b/x")

@@ -92,6 +92,8 @@ pub fn extract(
     let extract = |overwrite: bool| {
         let options = RunOptions {
             out: path.to_path_buf(),
+            work: None,
+            partition_by: None,
             compression: Compression::Stored,
             jobs,
             shard: Shard::default(),

@@ -85,6 +85,8 @@ impl Store<'_> {
         let extract = |overwrite: bool| {
             let options = run::RunOptions {
                 out: path.clone(),
+                work: None,
+                partition_by: None,
                 compression: Compression::Stored,
                 jobs: self.jobs,
                 shard: Shard::default(),

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use corsmal_extract::config::Config;
 use corsmal_extract::cut::{WindowSpan, into_windows};
+use corsmal_extract::inputs::InputError;
 use corsmal_extract::run::{self, Progress, RunError, RunOptions};
 use corsmal_extract::survey::Survey;
 use corsmal_files::npz::Compression;
@@ -39,9 +40,16 @@ pub struct Args {
     /// The same as the positional argument; these follow the others.
     #[arg(long = "in", short = 'i', value_name = "PATH", num_args = 1..)]
     named: Vec<OsString>,
-    /// Output: .npz or .parquet.
+    /// Output: .npz or .parquet, a file or an object of a store (s3://bucket/feats.npz).
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
+    /// Folder in which an output for a store is made, so that --resume can go on; the current one by
+    /// default.
+    #[arg(long, value_name = "FOLDER")]
+    work: Option<PathBuf>,
+    /// Write a folder of Parquet files, one for each value of a label: OUT/LABEL=VALUE/part.parquet.
+    #[arg(long, value_name = "LABEL")]
+    partition_by: Option<String>,
     #[command(flatten)]
     config: ConfigArgs,
     #[command(flatten)]
@@ -140,12 +148,21 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
     let config = Arc::new(args.config.load()?);
     let names: Vec<OsString> = args.inputs.into_iter().chain(args.named).collect();
     let meter = Meter::new(args.log_format, args.told.quiet);
+    let stop = crate::interrupt::flag();
     let mut found = recordings::named(&names, |warning| meter.warning(warning))?;
     if let Some(window) = args.window {
-        found = into_windows(found, WindowSpan { window, hop: args.hop.unwrap_or(window / 2.0) })?;
+        let span = WindowSpan { window, hop: args.hop.unwrap_or(window / 2.0) };
+        found = match into_windows(found, span, stop) {
+            Err(error @ InputError::Stopped) => {
+                return Err(Failure::interrupted(error.to_string()));
+            }
+            windows => windows?,
+        };
     }
     let options = RunOptions {
         out: args.out,
+        work: args.work,
+        partition_by: args.partition_by,
         compression: if args.compress { Compression::Deflated } else { Compression::Stored },
         jobs: args.jobs.count(),
         shard: args.shard,
@@ -154,7 +171,7 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
         max_errors: if args.strict { Some(0) } else { args.max_errors },
     };
     if args.dry_run {
-        let checked = run::check(&found, &config, &options)?;
+        let checked = run::check(&found, &config, &options, stop)?;
         if let Some(advice) = checked.advice() {
             meter.warning(advice);
         }
@@ -162,11 +179,14 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
         for input in inputs {
             println!("{}\t{}", input.id, input.source);
         }
-        Survey::of(&found, &config).warnings().iter().for_each(|warning| meter.warning(warning));
+        Survey::of(&found, &config, stop)
+            .warnings()
+            .iter()
+            .for_each(|warning| meter.warning(warning));
         meter.checked(inputs.len(), &config.hash());
         return Ok(ExitCode::SUCCESS);
     }
-    match run::run(&found, &config, &options, &meter, crate::interrupt::flag()) {
+    match run::run(&found, &config, &options, &meter, stop) {
         Ok(report) => {
             meter.finish(&report, &options.out);
             if args.told.json {

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use corsmal_extract::merge::Existing;
+use corsmal_extract::merge::{Existing, MergeError};
+use corsmal_extract::merge_stored;
+use corsmal_extract::run::RunError;
 use serde_json::json;
 
 use crate::args::Told;
@@ -21,12 +23,15 @@ Example:
 The result has the same bytes as one run over all inputs. Shards whose summaries differ in width
 (recordings with other channel counts) do not fit into one table and are refused.")]
 pub struct Args {
-    /// The outputs of all shards, in any order.
+    /// The outputs of all shards, in any order: files, or objects of a store.
     #[arg(required = true)]
     shards: Vec<PathBuf>,
-    /// The merged output.
+    /// The merged output: a file, or an object of a store (s3://bucket/feats.npz).
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
+    /// Folder in which what is in a store is copied or made; the current one by default.
+    #[arg(long, value_name = "FOLDER")]
+    work: Option<PathBuf>,
     /// Replace an existing output.
     #[arg(long)]
     overwrite: bool,
@@ -44,7 +49,13 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         (_, true) => Existing::Resume,
         _ => Existing::Keep,
     };
-    corsmal_extract::merge::merge(&args.shards, &args.out, existing)?;
+    let place = (args.out.as_path(), args.work.as_deref());
+    match merge_stored::merge(&args.shards, place, existing, crate::interrupt::flag()) {
+        Err(MergeError::Stored(error @ RunError::Interrupted)) => {
+            return Err(Failure::interrupted(error.to_string()));
+        }
+        merged => merged?,
+    }
     args.told.tell(
         || json!({ "out": args.out, "shards": args.shards }),
         || format!("{}: {} merged", args.out.display(), plural(args.shards.len(), "shard")),

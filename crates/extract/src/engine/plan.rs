@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use corsmal_dsp::DspError;
 
 use super::extractor::Room;
+use super::signal_chain::SignalChain;
 use super::stream::{ExactMember, Framing, SharedStreams, SpectrumMember, Stream};
 use crate::config::Config;
 use crate::features::{Derived, Extent, Feature, Finish, Kernel, WholeKernel};
@@ -163,6 +164,34 @@ impl Plan {
     /// Whether a feature needs the whole recording, which can then not be cut into spans.
     pub fn needs_whole(&self) -> bool {
         !self.whole.is_empty()
+    }
+
+    /// Why frames cannot be computed from a piece of a recording as they are of the whole; `None` where
+    /// every frame depends on a bounded number of samples around it.
+    pub fn piece_refusal(&self) -> Option<String> {
+        if self.config.summary.is_some() {
+            return Some("statistics are those of the whole recording: leave out [summary]".into());
+        }
+        if let Some(reason) = SignalChain::piece_refusal(&self.config.signal) {
+            return Some(reason.into());
+        }
+        if let Some(whole) = self.whole.first() {
+            let name = &self.features[whole.feature].name;
+            return Some(format!("{name} is computed of the whole recording at once"));
+        }
+        self.features.iter().find_map(|feature| {
+            let name = &feature.name;
+            if feature.derived.is_some() {
+                return Some(format!("{name} looks from frame to frame"));
+            }
+            let refers = feature.finish.as_ref().is_some_and(|finish| finish.needs_peaks());
+            refers.then(|| {
+                format!(
+                    "{name} depends on the maximum of the whole recording: set its top_db to \"none\" \
+                     and its ref to a number"
+                )
+            })
+        })
     }
 
     /// Samples between the frames of a feature; 0 for a vector.

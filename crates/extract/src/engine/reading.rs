@@ -83,7 +83,7 @@ pub fn spans(source: &dyn BlockSource, planned: &Planned, crop: &Range<u64>) -> 
     let whole = 0..u64::MAX;
     let separable = source.seekable()
         && !planned.plan.needs_whole()
-        && SignalChain::is_pointwise(&planned.plan.config.signal, planned.resample.is_some());
+        && SignalChain::is_local(&planned.plan.config.signal, planned.resample.is_some());
     let Some(most) = source.most_frames().filter(|_| separable) else {
         return vec![whole];
     };
@@ -115,7 +115,8 @@ pub fn compute(
     let channels = usize::from(source.spec().channels);
     let mut front = SignalChain::new(config, channels, planned.resample.clone(), plan.sample_rate)
         .map_err(|e| Failed::new(Status::Unsupported, e))?;
-    // Padding by reflection may reach back twice the padding of a frame.
+    // Padding by reflection may reach back twice the padding of a frame; one more is for what looks at the
+    // sample before.
     let (before, after) = plan.context();
     let first = span.start.saturating_sub(2 * before as u64 + 1);
     let begin = crop.start.saturating_add(first);

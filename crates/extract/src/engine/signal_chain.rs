@@ -85,10 +85,22 @@ impl SignalChain {
             && self.remaining.is_none()
     }
 
-    /// Whether every output frame depends on one input frame only, at the same position.
-    pub fn is_pointwise(config: &SignalConfig, resampled: bool) -> bool {
-        let SignalConfig { preemphasis, normalize, length, .. } = config;
-        !resampled && *preemphasis == 0.0 && *normalize == Normalize::None && *length == 0.0
+    /// Whether every output frame depends on one input frame at the same position and the one before it
+    /// only, so that a stretch can be computed apart. The stretches that are read begin earlier than
+    /// features need (see `reading::compute`): their first frame, which has none before it, is not used.
+    pub fn is_local(config: &SignalConfig, resampled: bool) -> bool {
+        !resampled && Self::piece_refusal(config).is_none()
+    }
+
+    /// Why a stretch of a signal cannot be computed apart, whatever its sample rate.
+    pub fn piece_refusal(config: &SignalConfig) -> Option<&'static str> {
+        if config.normalize != Normalize::None {
+            Some("signal.normalize needs the level of the whole recording")
+        } else if config.length != 0.0 {
+            Some("signal.length cuts or fills the whole recording")
+        } else {
+            None
+        }
     }
 
     /// Takes interleaved input frames, appends interleaved output frames.

@@ -64,6 +64,11 @@ pub trait Finish: Send + Sync {
     /// Rows whose maximum is needed, and whether it is joint over channels.
     fn peaks(&self) -> Vec<(std::ops::Range<usize>, bool)>;
 
+    /// Whether finished values depend on those maxima.
+    fn needs_peaks(&self) -> bool {
+        !self.peaks().is_empty()
+    }
+
     /// One frame, `raw [rows][channels]` to `out [coefficients][channels]`; `peaks` is
     /// `[peaks][channels]`.
     fn frame(&self, raw: &[f32], peaks: &[f32], channels: usize, out: &mut [f32]);

@@ -126,6 +126,10 @@ impl Finish for Cepstrum {
         vec![(0..self.n_mels, self.db.joint)]
     }
 
+    fn needs_peaks(&self) -> bool {
+        self.db.needs_peak()
+    }
+
     fn frame(&self, raw: &[f32], peaks: &[f32], channels: usize, out: &mut [f32]) {
         let mut clamped = [0.0_f32; 1024];
         let mut heap = Vec::new();

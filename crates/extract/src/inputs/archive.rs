@@ -67,10 +67,14 @@ impl Place {
         }
     }
 
-    fn open(&self, pin: &Pin, purpose: Purpose) -> io::Result<Box<dyn Blocks>> {
+    fn open(
+        &self,
+        purpose: Purpose,
+        with: (&Pin, &Arc<AtomicBool>),
+    ) -> io::Result<Box<dyn Blocks>> {
         match self {
             Self::File(path) => Ok(Box::new(File::open(path)?)),
-            Self::Object(object) => stored::open(object, None, purpose, (pin, &Arc::default())),
+            Self::Object(object) => stored::open(object, None, purpose, with),
         }
     }
 }
@@ -101,14 +105,14 @@ impl Member {
         let unsupported = |actual: &str| AudioError::Unsupported {
             offset,
             actual: actual.into(),
-            expected: "members of a tar that are files of their own, without holes",
+            expected: "regular files in a tar, without holes",
         };
         match self.fault {
             None => {}
             Some(Fault::Link) => return Err(unsupported("a link in a tar")),
             Some(Fault::Sparse) => return Err(unsupported("a sparse file in a tar")),
             Some(Fault::Cut(missing)) => {
-                let actual = format!("the tar ends {missing} bytes before this member does");
+                let actual = format!("a tar that ends {missing} bytes too early");
                 return Err(AudioError::Corrupt { offset, actual, expected: "a whole member" });
             }
         }
@@ -124,14 +128,14 @@ impl Member {
     }
 
     /// The identity of its bytes, as [`identity::of_file`] has it for a file; in a store, that of its
-    /// place and of the archive.
+    /// place and of the archive, for which waiting ends when `stop` is set.
     ///
     /// # Errors
     /// Whatever opening, seeking or reading reports.
-    pub fn identity(&self) -> io::Result<String> {
+    pub fn identity(&self, stop: &AtomicBool) -> io::Result<String> {
         match &self.archive {
             Place::File(path) => identity::of_reader(&mut self.slice(path)?, self.size),
-            Place::Object(object) => Ok(match stored::identity_now(object) {
+            Place::Object(object) => Ok(match stored::identity_now(object, stop) {
                 unknown if unknown.is_empty() || unknown == identity::STREAM => unknown,
                 archive => self.identity_in(&archive),
             }),
@@ -238,7 +242,7 @@ fn is_compressed(file: &mut Box<dyn Blocks>) -> io::Result<bool> {
 /// What is no archive, or damaged so that members may be missed; labels that cannot be read.
 // Without the feature there is no object.
 #[cfg_attr(not(feature = "cloud"), allow(unreachable_code))]
-pub(super) fn contents(place: &Place) -> Result<Contents, InputError> {
+pub(super) fn contents(place: &Place, stop: &Arc<AtomicBool>) -> Result<Contents, InputError> {
     let path = &place.path();
     let failed = |e: io::Error| {
         // The operating system's errors have a number, those of the format do not.
@@ -248,7 +252,7 @@ pub(super) fn contents(place: &Place) -> Result<Contents, InputError> {
         }
     };
     let pin = Pin::default();
-    let mut blocks = place.open(&pin, Purpose::Content).map_err(failed)?;
+    let mut blocks = place.open(Purpose::Content, (&pin, stop)).map_err(failed)?;
     if is_compressed(&mut blocks).map_err(failed)? {
         return Err(compressed(path));
     }
@@ -288,7 +292,7 @@ pub(super) fn contents(place: &Place) -> Result<Contents, InputError> {
     }
     let refused = |reason| InputError::Archive { path: path.into(), reason };
     beside::join(&mut found.recordings, labels).map_err(refused)?;
-    found.is_ended = is_ended(place, &pin, end).map_err(failed)?;
+    found.is_ended = is_ended(place, (&pin, stop), end).map_err(failed)?;
     Ok(found)
 }
 
@@ -342,8 +346,8 @@ fn labels_of(member: &Member, content: &mut impl Read) -> Result<Vec<(String, St
 }
 
 /// Whether a block of zeros follows the last member.
-fn is_ended(place: &Place, pin: &Pin, end: u64) -> io::Result<bool> {
-    let mut blocks = place.open(pin, Purpose::Header)?;
+fn is_ended(place: &Place, with: (&Pin, &Arc<AtomicBool>), end: u64) -> io::Result<bool> {
+    let mut blocks = place.open(Purpose::Header, with)?;
     let mut block = Vec::new();
     blocks.seek(SeekFrom::Start(end.min(i64::MAX as u64)))?;
     blocks.take(BLOCK).read_to_end(&mut block)?;

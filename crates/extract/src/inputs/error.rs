@@ -67,6 +67,9 @@ pub enum InputError {
         /// What is wrong, and where.
         reason: String,
     },
+    /// The caller asked to stop.
+    #[error("interrupted")]
+    Stopped,
     /// The manifests together have too many labels.
     #[error("{reason}")]
     Labels {

@@ -80,17 +80,28 @@ impl InputSource {
     /// # Errors
     /// As [`corsmal_audio::open`].
     pub fn open(&self) -> Result<Box<dyn BlockSource>, AudioError> {
-        let pin = self.pin().unwrap_or_default();
-        self.open_for(Purpose::Content, (&pin, &Arc::default()))
+        self.open_until(&Arc::default())
     }
 
-    /// Opens the recording for a look at its header.
+    /// Opens the recording for a look at its header. Waiting for a store ends when `stop` is set.
     ///
     /// # Errors
     /// As [`corsmal_audio::open`].
-    pub fn open_header(&self) -> Result<Box<dyn BlockSource>, AudioError> {
+    pub fn open_header(&self, stop: &Arc<AtomicBool>) -> Result<Box<dyn BlockSource>, AudioError> {
         let pin = self.pin().unwrap_or_default();
-        self.open_for(Purpose::Header, (&pin, &Arc::default()))
+        self.open_for(Purpose::Header, (&pin, stop))
+    }
+
+    /// As [`InputSource::open`]; waiting for a store ends when `stop` is set.
+    ///
+    /// # Errors
+    /// As [`corsmal_audio::open`].
+    pub(crate) fn open_until(
+        &self,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Box<dyn BlockSource>, AudioError> {
+        let pin = self.pin().unwrap_or_default();
+        self.open_for(Purpose::Content, (&pin, stop))
     }
 
     /// Opens the recording. From a store, all bytes are of the version that the pin keeps, and waiting
@@ -118,10 +129,15 @@ impl InputSource {
 
     /// What its bytes are known by; empty where they cannot be read.
     pub fn identity(&self) -> String {
+        self.identity_until(&AtomicBool::new(false))
+    }
+
+    /// As [`InputSource::identity`]; waiting for a store ends when `stop` is set.
+    pub(crate) fn identity_until(&self, stop: &AtomicBool) -> String {
         match self {
             Self::File(path) => identity::of_file(path).unwrap_or_default(),
-            Self::Object(object) => stored::identity_now(object),
-            Self::Member(member) => member.identity().unwrap_or_default(),
+            Self::Object(object) => stored::identity_now(object, stop),
+            Self::Member(member) => member.identity(stop).unwrap_or_default(),
             Self::Memory(bytes) => identity::of_bytes(bytes),
             Self::Stdin => identity::STREAM.to_string(),
         }

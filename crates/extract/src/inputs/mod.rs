@@ -1,9 +1,9 @@
 //! From what the user names to the list of recordings of a run.
 //!
-//! A name is, in this order of interpretation: `-` (a WAV stream on standard input), an existing
-//! file (a manifest if its extension is one of [`manifest::EXTENSIONS`], an archive if it is `.tar`,
+//! A name is, in this order of interpretation: `-` (a WAV stream on standard input), an object of a
+//! store (`s3://bucket/x`; below), an existing file (a manifest if its extension is one of [`manifest::EXTENSIONS`], an archive if it is `.tar`,
 //! else a recording), an existing folder, a list in braces as `{000..012}.tar` or `{a,b}.wav`, or a
-//! glob. A name such as `s3://bucket/x` is an object of a store, a folder of them where it ends with a
+//! glob. A name such as `s3://bucket/x` is never looked for on a disk: it is an object, a folder of them where it ends with a
 //! slash or no object has it, a list in braces or a glob. Folders and globs give files with an audio extension only, follow
 //! symbolic links, skip names that begin with a dot, and are sorted by the bytes of the path
 //! relative to their root; names keep the order in which they are given.
@@ -22,6 +22,7 @@ mod braces;
 mod error;
 mod folder;
 mod found;
+mod identities;
 mod ids;
 mod input;
 mod objects;
@@ -32,6 +33,8 @@ use std::collections::{BTreeMap, HashSet};
 use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::manifest;
 use folder::{has_extension, is_apple_double, walk};
@@ -39,8 +42,9 @@ use found::{Found, Naming};
 
 pub use archive::{Fault, Member, Place};
 pub use error::InputError;
+pub(crate) use identities::Identities;
 pub use input::{Input, InputSource, list_hash};
-pub use stored::{Object, is_stored, object};
+pub use stored::{Object, is_stored, object, require_store, shown};
 
 /// What names stand for.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -81,13 +85,12 @@ impl Collected {
     /// A sentence about the files skipped, one about archives without an end and one about columns of
     /// manifests that look like times and are none, if there are any.
     pub fn warning(&self) -> Option<String> {
-        let unended = self.unended.first().map(|first| {
-            format!(
-                "{} of the tars have no end mark and may be cut: {}{}",
-                self.unended.len(),
-                first.display(),
-                if self.unended.len() > 1 { ", ..." } else { "" }
-            )
+        let unended = self.unended.first().map(|first| match self.unended.len() {
+            1 => format!("{} has no end mark and may be cut short", first.display()),
+            n => {
+                let first = first.display();
+                format!("{n} tars have no end mark and may be cut short: {first}, ...")
+            }
         });
         let told = told(&self.skipped).into_iter();
         let sentences: Vec<String> = told.chain(unended).chain(self.unused_times()).collect();
@@ -121,10 +124,24 @@ fn no_audio(path: &Path, skipped: &[PathBuf]) -> InputError {
 /// # Errors
 /// [`InputError`] names the path, and in a manifest the line.
 pub fn collect<S: AsRef<OsStr>>(names: &[S]) -> Result<Collected, InputError> {
-    let (mut found, mut skipped, mut unended) = (Vec::new(), Vec::new(), Vec::new());
-    for name in names {
-        find(name.as_ref(), &mut found, &mut skipped, &mut unended)?;
+    collect_until(names, &Arc::default())
+}
+
+/// As [`collect`]; waiting for stores ends when `stop` is set.
+///
+/// # Errors
+/// As [`collect`]; [`InputError::Stopped`].
+pub fn collect_until<S: AsRef<OsStr>>(
+    names: &[S],
+    stop: &Arc<AtomicBool>,
+) -> Result<Collected, InputError> {
+    let mut search = Search::new(stop);
+    let searched = names.iter().try_for_each(|name| search.find(name.as_ref()));
+    if stop.load(Ordering::Relaxed) {
+        return Err(InputError::Stopped);
     }
+    searched?;
+    let Search { found, mut skipped, unended, .. } = search;
     skipped.sort_unstable();
     skipped.dedup();
     // Where nothing but such files was named, the first of them says so.
@@ -156,179 +173,183 @@ pub fn collect<S: AsRef<OsStr>>(names: &[S]) -> Result<Collected, InputError> {
     Ok(Collected { inputs: inputs.collect(), skipped, unended })
 }
 
-fn find(
-    name: &OsStr,
-    found: &mut Vec<Found>,
-    skipped: &mut Vec<PathBuf>,
-    unended: &mut Vec<PathBuf>,
-) -> Result<(), InputError> {
-    if name == "-" {
-        let naming = Naming::Given("stdin".into());
-        let (start, end, labels) = (None, None, Vec::new());
-        let line = None;
-        found.push(Found { source: InputSource::Stdin, naming, start, end, labels, line });
-        return Ok(());
-    }
-    let path = Path::new(name);
-    match std::fs::metadata(path) {
-        Ok(meta) if meta.is_dir() => {
-            let (mut files, before) = (Vec::new(), skipped.len());
-            walk(path, &mut files, skipped)?;
-            if files.is_empty() {
-                return Err(no_audio(path, &skipped[before..]));
-            }
-            push_sorted(path, files, found);
-            Ok(())
-        }
-        Ok(_) if is_apple_double(path) => {
-            skipped.push(path.into());
-            Ok(())
-        }
-        Ok(_) if has_extension(path, &manifest::EXTENSIONS) => find_manifest(path, found, skipped),
-        Ok(_) if archive::is_archive(path) => {
-            find_archive(path, &Place::File(path.into()), found, skipped, unended)
-        }
-        Ok(_) => {
-            if let Some(refusal) = archive::refusal(path) {
-                return Err(refusal);
-            }
-            let relative = path.file_name().map_or_else(|| path.into(), PathBuf::from);
-            found.push(Found::file(path.into(), relative));
-            Ok(())
-        }
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            let missing = || InputError::Missing { path: path.into() };
-            let pattern = name.to_str().ok_or_else(missing)?;
-            if is_stored(pattern) {
-                return objects::find(pattern, found, skipped, unended);
-            }
-            match braces::expand(pattern)? {
-                Some(names) => {
-                    names.iter().try_for_each(|name| find(name.as_ref(), found, skipped, unended))
-                }
-                None if wildcard::is_glob(pattern) => find_glob(pattern, found, skipped, unended),
-                None => Err(missing()),
-            }
-        }
-        Err(error) => Err(InputError::io(path, error)),
-    }
+/// A search for recordings: what was found so far.
+struct Search<'a> {
+    found: Vec<Found>,
+    skipped: Vec<PathBuf>,
+    unended: Vec<PathBuf>,
+    stop: &'a Arc<AtomicBool>,
 }
 
-/// The recordings of an archive; their ids begin with its name.
-fn find_archive(
-    path: &Path,
-    place: &Place,
-    found: &mut Vec<Found>,
-    skipped: &mut Vec<PathBuf>,
-    unended: &mut Vec<PathBuf>,
-) -> Result<(), InputError> {
-    let contents = archive::contents(place)?;
-    if contents.recordings.is_empty() {
-        return Err(no_audio(path, &contents.skipped));
+impl<'a> Search<'a> {
+    fn new(stop: &'a Arc<AtomicBool>) -> Self {
+        Self { found: Vec::new(), skipped: Vec::new(), unended: Vec::new(), stop }
     }
-    let shard = PathBuf::from(path.file_stem().unwrap_or_default());
-    for archive::Entry { member, name, labels } in contents.recordings {
-        let naming = Naming::Derived(shard.join(name));
-        let source = InputSource::Member(Box::new(member));
-        found.push(Found { source, naming, start: None, end: None, labels, line: None });
-    }
-    skipped.extend(contents.skipped);
-    if !contents.is_ended {
-        unended.push(path.into());
-    }
-    Ok(())
-}
 
-fn find_manifest(
-    path: &Path,
-    found: &mut Vec<Found>,
-    skipped: &mut Vec<PathBuf>,
-) -> Result<(), InputError> {
-    // A manifest beside the wrong folder, or one with files that are gone, is mended before the run.
-    let mut unreadable: Option<(u64, String, usize)> = None;
-    let mut stores = HashSet::new();
-    for entry in manifest::read(path)? {
-        let wrong = |reason| InputError::Manifest { path: path.into(), line: entry.line, reason };
-        let mut stored = None;
-        match std::fs::metadata(&entry.path) {
-            _ if is_stored(&entry.written) => {
-                let object = objects::listed(&entry.written, &mut stores);
-                stored = Some(object.map_err(|error| wrong(error.to_string()))?);
-            }
+    /// Adds what another search has found.
+    fn append(&mut self, mut other: Self) {
+        self.found.append(&mut other.found);
+        self.skipped.append(&mut other.skipped);
+        self.unended.append(&mut other.unended);
+    }
+
+    fn find(&mut self, name: &OsStr) -> Result<(), InputError> {
+        if name == "-" {
+            let naming = Naming::Given("stdin".into());
+            let (start, end, labels) = (None, None, Vec::new());
+            let line = None;
+            self.found.push(Found { source: InputSource::Stdin, naming, start, end, labels, line });
+            return Ok(());
+        }
+        // The name of an object is never one of a file.
+        if let Some(uri) = name.to_str().filter(|name| is_stored(name)) {
+            return self.find_object(uri);
+        }
+        let path = Path::new(name);
+        match std::fs::metadata(path) {
             Ok(meta) if meta.is_dir() => {
-                return Err(wrong(format!("{} is a folder", entry.path.display())));
+                let (mut files, before) = (Vec::new(), self.skipped.len());
+                walk(path, &mut files, &mut self.skipped)?;
+                if files.is_empty() {
+                    return Err(no_audio(path, &self.skipped[before..]));
+                }
+                self.push_sorted(path, files);
+                Ok(())
             }
-            Ok(_) if archive::is_archive(&entry.path) => {
-                return Err(wrong(format!(
-                    "{} is an archive of recordings: name it on its own, not in a manifest",
-                    entry.path.display()
-                )));
+            Ok(_) if is_apple_double(path) => {
+                self.skipped.push(path.into());
+                Ok(())
             }
-            Ok(_) if is_apple_double(&entry.path) => {
-                skipped.push(entry.path);
-                continue;
+            Ok(_) if has_extension(path, &manifest::EXTENSIONS) => self.find_manifest(path),
+            Ok(_) if archive::is_archive(path) => {
+                self.find_archive(path, &Place::File(path.into()))
             }
-            Ok(_) => {}
-            Err(error) => {
-                let first = || (entry.line, format!("{}: {error}", entry.path.display()), 0);
-                unreadable.get_or_insert_with(first).2 += 1;
-                continue;
+            Ok(_) => {
+                if let Some(refusal) = archive::refusal(path) {
+                    return Err(refusal);
+                }
+                let relative = path.file_name().map_or_else(|| path.into(), PathBuf::from);
+                self.found.push(Found::file(path.into(), relative));
+                Ok(())
             }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                let missing = || InputError::Missing { path: path.into() };
+                let pattern = name.to_str().ok_or_else(missing)?;
+                match braces::expand(pattern)? {
+                    Some(names) => names.iter().try_for_each(|name| self.find(name.as_ref())),
+                    None if wildcard::is_glob(pattern) => self.find_glob(pattern),
+                    None => Err(missing()),
+                }
+            }
+            Err(error) => Err(InputError::io(path, error)),
         }
-        if let Some(reason) = entry.id.as_deref().and_then(ids::refusal) {
-            return Err(wrong(reason));
+    }
+
+    /// The recordings of an archive; their ids begin with its name.
+    fn find_archive(&mut self, path: &Path, place: &Place) -> Result<(), InputError> {
+        let contents = archive::contents(place, self.stop)?;
+        if contents.recordings.is_empty() {
+            return Err(no_audio(path, &contents.skipped));
         }
-        let naming = match (entry.id, &stored) {
-            (Some(id), _) => Naming::Given(id),
-            (None, Some(object)) => Naming::Derived(stored::key(object).into()),
-            (None, None) => Naming::Derived(entry.written.into()),
-        };
-        let source = match stored {
-            Some(object) => InputSource::Object(object.into()),
-            None => InputSource::File(entry.path),
-        };
-        let (start, end, labels, line) = (entry.start, entry.end, entry.labels, Some(entry.line));
-        found.push(Found { source, naming, start, end, labels, line });
+        let shard = PathBuf::from(path.file_stem().unwrap_or_default());
+        for archive::Entry { member, name, labels } in contents.recordings {
+            let naming = Naming::Derived(shard.join(name));
+            let source = InputSource::Member(Box::new(member));
+            self.found.push(Found { source, naming, start: None, end: None, labels, line: None });
+        }
+        self.skipped.extend(contents.skipped);
+        if !contents.is_ended {
+            self.unended.push(path.into());
+        }
+        Ok(())
     }
-    let Some((line, mut reason, number)) = unreadable else { return Ok(()) };
-    if number > 1 {
-        reason.push_str(&format!("; {} other lines name such files", number - 1));
-    }
-    Err(InputError::Manifest { path: path.into(), line, reason })
-}
 
-fn find_glob(
-    pattern: &str,
-    found: &mut Vec<Found>,
-    skipped: &mut Vec<PathBuf>,
-    unended: &mut Vec<PathBuf>,
-) -> Result<(), InputError> {
-    let (mut files, before) = (Vec::new(), skipped.len());
-    let (mut archives, paths): (Vec<_>, Vec<_>) = wildcard::expand(pattern)?
-        .into_iter()
-        .partition(|path| archive::is_archive(path) && path.is_file());
-    archives.sort_unstable();
-    for path in &archives {
-        find_archive(path, &Place::File(path.clone()), found, skipped, unended)?;
+    fn find_manifest(&mut self, path: &Path) -> Result<(), InputError> {
+        // A manifest beside the wrong folder, or one with files that are gone, is mended before the run.
+        let mut unreadable: Option<(u64, String, usize)> = None;
+        let mut stores = HashSet::new();
+        for entry in manifest::read(path)? {
+            let wrong =
+                |reason| InputError::Manifest { path: path.into(), line: entry.line, reason };
+            let mut stored = None;
+            if is_stored(&entry.written) {
+                let object = objects::listed(&entry.written, &mut stores, self.stop);
+                stored = Some(object.map_err(|error| wrong(error.to_string()))?);
+            } else {
+                match std::fs::metadata(&entry.path) {
+                    Ok(meta) if meta.is_dir() => {
+                        return Err(wrong(format!("{} is a folder", entry.path.display())));
+                    }
+                    Ok(_) if archive::is_archive(&entry.path) => {
+                        return Err(wrong(format!(
+                            "{} is an archive of recordings: name it on its own, not in a manifest",
+                            entry.path.display()
+                        )));
+                    }
+                    Ok(_) if is_apple_double(&entry.path) => {
+                        self.skipped.push(entry.path);
+                        continue;
+                    }
+                    Ok(_) => {}
+                    Err(error) => {
+                        let first =
+                            || (entry.line, format!("{}: {error}", entry.path.display()), 0);
+                        unreadable.get_or_insert_with(first).2 += 1;
+                        continue;
+                    }
+                }
+            }
+            if let Some(reason) = entry.id.as_deref().and_then(ids::refusal) {
+                return Err(wrong(reason));
+            }
+            let naming = match (entry.id, &stored) {
+                (Some(id), _) => Naming::Given(id),
+                (None, Some(object)) => Naming::Derived(stored::key(object).into()),
+                (None, None) => Naming::Derived(entry.written.into()),
+            };
+            let source = match stored {
+                Some(object) => InputSource::Object(object.into()),
+                None => InputSource::File(entry.path),
+            };
+            let (start, end, labels) = (entry.start, entry.end, entry.labels);
+            let line = Some(entry.line);
+            self.found.push(Found { source, naming, start, end, labels, line });
+        }
+        let Some((line, mut reason, number)) = unreadable else { return Ok(()) };
+        if number > 1 {
+            reason.push_str(&format!("; {} other lines name such files", number - 1));
+        }
+        Err(InputError::Manifest { path: path.into(), line, reason })
     }
-    for path in paths {
-        walk(&path, &mut files, skipped)?;
-    }
-    if files.is_empty() && archives.is_empty() {
-        return Err(no_audio(Path::new(pattern), &skipped[before..]));
-    }
-    push_sorted(&wildcard::root(pattern), files, found);
-    Ok(())
-}
 
-fn push_sorted(root: &Path, mut files: Vec<PathBuf>, found: &mut Vec<Found>) {
-    files.sort_unstable_by(|a, b| {
-        a.as_os_str().as_encoded_bytes().cmp(b.as_os_str().as_encoded_bytes())
-    });
-    // A glob with ** matches a folder and what is in it.
-    files.dedup();
-    for path in files {
-        let relative = path.strip_prefix(root).unwrap_or(&path).to_path_buf();
-        found.push(Found::file(path, relative));
+    fn find_glob(&mut self, pattern: &str) -> Result<(), InputError> {
+        let (mut files, before) = (Vec::new(), self.skipped.len());
+        let (mut archives, paths): (Vec<_>, Vec<_>) = wildcard::expand(pattern)?
+            .into_iter()
+            .partition(|path| archive::is_archive(path) && path.is_file());
+        archives.sort_unstable();
+        for path in &archives {
+            self.find_archive(path, &Place::File(path.clone()))?;
+        }
+        for path in paths {
+            walk(&path, &mut files, &mut self.skipped)?;
+        }
+        if files.is_empty() && archives.is_empty() {
+            return Err(no_audio(Path::new(pattern), &self.skipped[before..]));
+        }
+        self.push_sorted(&wildcard::root(pattern), files);
+        Ok(())
+    }
+
+    fn push_sorted(&mut self, root: &Path, mut files: Vec<PathBuf>) {
+        files.sort_unstable_by(|a, b| {
+            a.as_os_str().as_encoded_bytes().cmp(b.as_os_str().as_encoded_bytes())
+        });
+        // A glob with ** matches a folder and what is in it.
+        files.dedup();
+        for path in files {
+            let relative = path.strip_prefix(root).unwrap_or(&path).to_path_buf();
+            self.found.push(Found::file(path, relative));
+        }
     }
 }

@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 
-use corsmal_files::draft::{self, Draft};
+use corsmal_files::draft;
 use corsmal_files::npz::{EntryRecord, intact_entries};
 use serde::Serialize;
 
@@ -191,15 +191,15 @@ impl Ledger {
         remove(&self.path)
     }
 
-    /// As [`Ledger::publish`], where the output was made of the partial one: gives `made` its name,
-    /// then removes the partial output.
+    /// As [`Ledger::publish`], where the output was made of the partial one: `publish` gives it its name,
+    /// then the partial output is removed.
     ///
     /// # Errors
     /// As [`Ledger::publish`].
-    pub fn publish_made(self, made: Draft) -> Result<(), LedgerError> {
+    pub fn publish_made(self, publish: impl FnOnce() -> io::Result<()>) -> Result<(), LedgerError> {
         self.require_ours()?;
         let io = |source| LedgerError::Io { path: self.out.clone(), source };
-        made.publish().map_err(io)?;
+        publish().map_err(io)?;
         sync_folder(&self.out).map_err(io)?;
         self.discard()
     }

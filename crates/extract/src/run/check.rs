@@ -1,16 +1,20 @@
 //! What a run refuses before it starts.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use corsmal_files::feature_file::{FeatureFileError, FeatureTable};
-use corsmal_files::format::OutputFormat;
+use corsmal_files::format::{OutputFormat, require_npz};
 use corsmal_files::provenance::Provenance;
-use corsmal_files::{draft, identity};
+use corsmal_files::{draft, identity, partition};
 
 use super::error::RunError;
 use super::options::{MAX_JOBS, RunOptions, RunReport};
+use super::partitions::PartitionBy;
+use super::stored::StoredOutput;
 use crate::config::Config;
-use crate::inputs::{Input, is_stored, list_hash};
+use crate::inputs::{Identities, Input, list_hash};
 use crate::ledger::{self, Ledger};
 
 /// What is known of a run before it starts.
@@ -21,6 +25,10 @@ pub struct Checked {
     pub(super) provenance: Provenance,
     /// The report of an output that is there already.
     pub(super) done: Option<RunReport>,
+    /// Where the output goes when it is complete, if that is a store.
+    pub(super) stored: Option<StoredOutput>,
+    /// Whether it is there already.
+    pub(super) is_sent: bool,
     advice: Option<String>,
 }
 
@@ -51,9 +59,21 @@ fn advice(inputs: usize, config: &Config, format: OutputFormat) -> Option<String
 ///
 /// # Errors
 /// As [`run`](super::run()), in what concerns the output, the inputs as a whole and the number of jobs.
-pub fn check(inputs: &[Input], config: &Config, options: &RunOptions) -> Result<Checked, RunError> {
-    let format = check_output(options, config)?;
-    let out = &draft::destination(&options.out);
+pub fn check(
+    inputs: &[Input],
+    config: &Config,
+    options: &RunOptions,
+    stop: &Arc<AtomicBool>,
+) -> Result<Checked, RunError> {
+    let by = options.partition_by.as_deref();
+    if let Some(label) = by {
+        PartitionBy::of(label, inputs, options.shard.of(inputs))?;
+    }
+    let stored = StoredOutput::of(&options.out, options.work.as_deref(), by)?;
+    let out = stored.as_ref().map_or(&options.out, |stored| &stored.file);
+    let format = check_output(out, options, config)?;
+    // Without the slash that a folder may be named with.
+    let out = &draft::destination(&out.components().collect::<PathBuf>());
     require_jobs(options.jobs)?;
     let is_out = |i: &&Input| {
         let same = |path: &Path| path.file_name() == out.file_name() && draft::same(path, out);
@@ -65,9 +85,19 @@ pub fn check(inputs: &[Input], config: &Config, options: &RunOptions) -> Result<
     }
     let (text, hash) = (config.to_value().to_string(), config.hash());
     let provenance = Provenance::new(text, hash, list_hash(inputs), options.shard);
-    let mut done = None;
+    let (mut done, mut is_sent) = (None, false);
     if !options.overwrite {
-        done = finished(options.shard.of(inputs), &provenance, out, format)?;
+        let inputs = options.shard.of(inputs);
+        let finished = Finished { inputs, provenance: &provenance, format, by };
+        if let Some(stored) = &stored
+            && let Some(copy) = stored.present(stop)?
+        {
+            let name = PathBuf::from(stored.name());
+            done = Some(finished.report(copy.place(), &name, stop)?);
+            is_sent = true;
+        } else if out.exists() && !is_empty(out) {
+            done = Some(finished.report(out, out, stop)?);
+        }
         if done.is_none() && !options.resume && Ledger::is_pending(out) {
             Ledger::require_idle(out)?;
             return Err(RunError::Pending { path: ledger::ledger_path(out) });
@@ -78,7 +108,7 @@ pub fn check(inputs: &[Input], config: &Config, options: &RunOptions) -> Result<
         Some(_) => None,
         None => advice(options.shard.of(inputs).len(), config, format),
     };
-    Ok(Checked { out: out.clone(), format, provenance, done, advice })
+    Ok(Checked { out: out.clone(), format, provenance, done, stored, is_sent, advice })
 }
 
 /// Refuses numbers of threads that cannot be.
@@ -90,15 +120,21 @@ pub(super) fn require_jobs(jobs: usize) -> Result<(), RunError> {
 }
 
 /// The format of the output, if it can be written.
-fn check_output(options: &RunOptions, config: &Config) -> Result<OutputFormat, RunError> {
-    let out = options.out.as_path();
+fn check_output(
+    out: &Path,
+    options: &RunOptions,
+    config: &Config,
+) -> Result<OutputFormat, RunError> {
     let refuse = |why: String| Err(RunError::Format { path: out.into(), why });
-    if out.to_str().is_some_and(is_stored) {
-        let why =
-            "is in a store, and outputs are files on a disk: write it here, then copy it there";
-        return refuse(why.into());
-    }
-    let format = OutputFormat::of_name(out, options.compression)?;
+    let partitioned = options.partition_by.is_some();
+    let format = match partitioned {
+        false => OutputFormat::of_name(out, options.compression)?,
+        true if require_npz(out).is_ok() => {
+            let why = "is the name of an .npz; --partition-by makes a folder of Parquet files";
+            return refuse(why.into());
+        }
+        true => OutputFormat::Parquet,
+    };
     let complex = |config: &Config| {
         let value = config.to_value();
         let features = value["features"].as_object().into_iter().flatten();
@@ -108,10 +144,15 @@ fn check_output(options: &RunOptions, config: &Config) -> Result<OutputFormat, R
         let why = "Parquet holds no complex numbers: choose another output of stft, or write .npz";
         return refuse(why.into());
     }
-    if out.is_dir() {
+    if out.is_dir() && !partitioned {
         return refuse("is a folder".into());
     }
-    if out.exists() && !out.is_file() {
+    if partitioned && out.exists() {
+        // Not even --overwrite removes what is somebody else's.
+        if !is_empty(out) && !partition::is_partitioned(out) {
+            return refuse("is there and is no partitioned output".into());
+        }
+    } else if out.exists() && !out.is_file() {
         return refuse("is not a regular file".into());
     }
     let target = draft::destination(out);
@@ -123,47 +164,73 @@ fn check_output(options: &RunOptions, config: &Config) -> Result<OutputFormat, R
     Ok(format)
 }
 
-/// The report of an output that is already complete; an error where it holds something else.
-fn finished(
-    inputs: &[Input],
-    provenance: &Provenance,
-    out: &Path,
+/// Whether a path is a folder with nothing in it.
+fn is_empty(path: &Path) -> bool {
+    path.is_dir() && path.read_dir().is_ok_and(|mut all| all.next().is_none())
+}
+
+/// What an output holds that is complete.
+struct Finished<'a> {
+    inputs: &'a [Input],
+    provenance: &'a Provenance,
     format: OutputFormat,
-) -> Result<Option<RunReport>, RunError> {
-    if !out.exists() {
-        return Ok(None);
-    }
-    let refuse = |why: &str| RunError::Exists { path: out.to_path_buf(), why: why.into() };
-    let FeatureTable { table, provenance: theirs, format: found, .. } = FeatureTable::open(out)
-        .map_err(|error| match error {
+    by: Option<&'a str>,
+}
+
+impl Finished<'_> {
+    /// The report of the complete output in `file`, which messages call `name`; an error where it holds
+    /// something else.
+    fn report(
+        &self,
+        file: &Path,
+        name: &Path,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<RunReport, RunError> {
+        let refuse = |why: &str| RunError::Exists { path: name.to_path_buf(), why: why.into() };
+        let opened = match self.by {
+            None => FeatureTable::open(file).map(|table| (table, None)),
+            Some(_) => partition::open(file).map(|(table, label)| (table, Some(label))),
+        };
+        let (opened, label) = opened.map_err(|error| match error {
             FeatureFileError::Io { source, .. } => refuse(&format!("cannot be read: {source}")),
             _ => refuse("is not an output of this tool"),
         })?;
-    if found != format {
-        return Err(refuse(&format!("is {found}, not {format}")));
+        if let Some(label) = label.filter(|label| Some(label.as_str()) != self.by) {
+            return Err(refuse(&format!("is partitioned by {label}")));
+        }
+        let FeatureTable { table, provenance: theirs, format: found, .. } = opened;
+        let (format, provenance) = (self.format, self.provenance);
+        if found != format {
+            return Err(refuse(&format!("is {found}, not {format}")));
+        }
+        if theirs != *provenance {
+            let why = if theirs.config_hash != provenance.config_hash {
+                "holds features of another configuration"
+            } else if theirs.inputs_hash != provenance.inputs_hash {
+                "holds features of other inputs"
+            } else if theirs.shard != provenance.shard {
+                "holds another shard"
+            } else {
+                "was written by another version of this tool"
+            };
+            return Err(refuse(why));
+        }
+        let outcomes = table.outcomes().to_vec();
+        if outcomes.iter().any(|outcome| outcome.identity == identity::STREAM) {
+            let why = "holds features of a stream, which cannot be read again to compare";
+            return Err(refuse(why));
+        }
+        let now = Identities::of(self.inputs, stop);
+        let same = outcomes.len() == self.inputs.len()
+            && outcomes.iter().enumerate().all(|(i, outcome)| outcome.identity == now.get(i));
+        if stop.load(Ordering::Relaxed) {
+            return Err(RunError::Interrupted);
+        }
+        if !same {
+            return Err(refuse("holds features of files that have changed since"));
+        }
+        Ok(RunReport { resumed: outcomes.len(), outcomes, up_to_date: true })
     }
-    if theirs != *provenance {
-        let why = if theirs.config_hash != provenance.config_hash {
-            "holds features of another configuration"
-        } else if theirs.inputs_hash != provenance.inputs_hash {
-            "holds features of other inputs"
-        } else if theirs.shard != provenance.shard {
-            "holds another shard"
-        } else {
-            "was written by another version of this tool"
-        };
-        return Err(refuse(why));
-    }
-    let outcomes = table.outcomes().to_vec();
-    if outcomes.iter().any(|outcome| outcome.identity == identity::STREAM) {
-        return Err(refuse("holds features of a stream, which cannot be read again to compare"));
-    }
-    let same = outcomes.len() == inputs.len()
-        && outcomes.iter().zip(inputs).all(|(o, i)| o.identity == i.source.identity());
-    if !same {
-        return Err(refuse("holds features of files that have changed since"));
-    }
-    Ok(Some(RunReport { resumed: outcomes.len(), outcomes, up_to_date: true }))
 }
 
 #[cfg(test)]

@@ -54,6 +54,34 @@ pub enum RunError {
     /// No file can be made in the folder of the output; says which and why.
     #[error(transparent)]
     Folder(std::io::Error),
+    /// The output cannot be partitioned so.
+    #[error("cannot partition by {label:?}: {why}")]
+    Partition {
+        /// The label.
+        label: String,
+        /// Why, and what is allowed.
+        why: String,
+    },
+    /// An output in a store cannot be looked at, or have its name.
+    #[error("{name}: {reason}")]
+    Store {
+        /// Its URI.
+        name: String,
+        /// What is wrong with it, or with the store.
+        reason: String,
+    },
+    /// The finished output did not reach its store.
+    #[error(
+        "{name}: {reason}; it is complete in {file}: the same command, merge with --resume, sends it again"
+    )]
+    Unsent {
+        /// Its URI.
+        name: String,
+        /// The file.
+        file: PathBuf,
+        /// What the store said.
+        reason: String,
+    },
     /// More failures than allowed.
     #[error("stopped after {failed} failed files ({limit} allowed), the last: {last}")]
     TooManyErrors {

@@ -1,6 +1,8 @@
 //! The frames of a run, from the archive in which they waited, as Parquet.
 
-use corsmal_files::draft::Draft;
+use std::fs::File;
+use std::path::Path;
+
 use corsmal_files::layout;
 use corsmal_files::npz::{NpzError, NpzFile};
 use corsmal_files::parquet::{Frames, FramesWriter};
@@ -10,31 +12,35 @@ use corsmal_files::table::Table;
 use super::error::RunError;
 use crate::ledger::Ledger;
 
-/// Writes the frames of the complete partial output into a Parquet file that has no name yet.
+/// The archive of the complete partial output.
+///
+/// # Errors
+/// It cannot be read.
+pub(super) fn archive(ledger: &Ledger) -> Result<NpzFile, RunError> {
+    let (_, part) = ledger.part()?;
+    Ok(NpzFile::open(&part)?)
+}
+
+/// Writes the frames of the rows of a table into a file, which errors call `path`.
 ///
 /// # Errors
 /// The archive cannot be read, or the file not be written.
-pub(super) fn of_archive(
-    ledger: &Ledger,
+pub(super) fn write(
+    archive: &mut NpzFile,
+    (file, path): (File, &Path),
     table: &Table,
     provenance: &Provenance,
-) -> Result<Draft, RunError> {
-    let (_, part) = ledger.part()?;
-    let mut archive = NpzFile::open(&part)?;
-    let out = ledger.out();
-    let made = Draft::create(out).map_err(RunError::Folder)?;
-    let file = made.handle().map_err(RunError::Folder)?;
-    let mut writer = FramesWriter::over(file, out, table, provenance)?;
+) -> Result<(), RunError> {
+    let mut writer = FramesWriter::over(file, path, table, provenance)?;
     let features = provenance.features();
     for id in table.ids() {
         let row = features.iter().map(|feature| {
             let feature = (features.len() > 1).then_some(feature.as_str());
-            frames(&mut archive, id, feature)
+            frames(archive, id, feature)
         });
         writer.push(row.collect::<Result<_, _>>()?)?;
     }
-    writer.finish()?;
-    Ok(made)
+    Ok(writer.finish()?)
 }
 
 /// One feature of one recording; empty where that is too short for any frame.

@@ -12,8 +12,12 @@ pub const MAX_JOBS: usize = 1024;
 /// How to run.
 #[derive(Debug, Clone)]
 pub struct RunOptions {
-    /// The output, `.npz` or `.parquet`.
+    /// The output, `.npz` or `.parquet`: a file, or an object of a store by its URI.
     pub out: PathBuf,
+    /// Folder in which an output for a store is made; by default the current one.
+    pub work: Option<PathBuf>,
+    /// Label by whose values the output is partitioned: a folder of Parquet files.
+    pub partition_by: Option<String>,
     /// Compression of `.npz` members.
     pub compression: Compression,
     /// Worker threads, 1 to [`MAX_JOBS`].

@@ -4,9 +4,11 @@ use std::sync::Arc;
 
 use super::error::RunError;
 use super::frames;
+use super::partitions::PartitionBy;
 use crate::engine::{FeatureArray, Plan};
 use crate::inputs::Input;
 use crate::ledger::{Ledger, Record};
+use corsmal_files::draft::Draft;
 use corsmal_files::format::OutputFormat;
 use corsmal_files::layout;
 use corsmal_files::npy::{DType, Header};
@@ -216,15 +218,35 @@ impl Output {
         self.table
     }
 
-    /// Completes the output and gives it its name; returns the table.
-    pub fn publish(self, provenance: &Provenance) -> Result<Table, RunError> {
+    /// Completes the output and gives it its name; returns the table. In several files where it is
+    /// partitioned.
+    pub fn publish(
+        self,
+        provenance: &Provenance,
+        by: Option<&PartitionBy<'_>>,
+    ) -> Result<Table, RunError> {
         let Self { partial, table, .. } = self;
         if let Some(Partial { ledger, writer, format }) = partial {
+            if let Some(by) = by {
+                let archive = match writer {
+                    Some(writer) => {
+                        writer.finish()?;
+                        Some(frames::archive(&ledger)?)
+                    }
+                    None => None,
+                };
+                by.write(ledger, archive, &table, provenance)?;
+                return Ok(table);
+            }
             match writer {
                 Some(writer) if format == OutputFormat::Parquet => {
                     writer.finish()?;
-                    let made = frames::of_archive(&ledger, &table, provenance)?;
-                    ledger.publish_made(made)?;
+                    let out = ledger.out().to_path_buf();
+                    let made = Draft::create(&out).map_err(RunError::Folder)?;
+                    let file = made.handle().map_err(RunError::Folder)?;
+                    let mut archive = frames::archive(&ledger)?;
+                    frames::write(&mut archive, (file, &out), &table, provenance)?;
+                    ledger.publish_made(|| made.publish())?;
                     return Ok(table);
                 }
                 Some(mut writer) => {

@@ -2,6 +2,7 @@
 //! and when. Same features and outcomes as in a run.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,7 +17,7 @@ use super::error::RunError;
 use super::output::other_width;
 use super::work::{self, broken, outcome_of};
 use crate::config::Config;
-use crate::engine::{Failed, FeatureArray, Features, Plan, Plans, Watch};
+use crate::engine::{Failed, FeatureArray, Features, Plan, Planned, Plans, Watch};
 use crate::inputs::Input;
 use crate::survey::Survey;
 
@@ -48,6 +49,10 @@ pub struct Batch {
     pub frames: Vec<Option<(Arc<Plan>, Vec<FeatureArray>)>>,
 }
 
+/// The samples of a recording, from the start of its stretch, at which the frames of a piece are anchored;
+/// `None` for the whole recording.
+pub type Piece = Option<Range<u64>>;
+
 type Computed = Option<(Arc<Plan>, Features)>;
 
 impl Recordings {
@@ -62,7 +67,33 @@ impl Recordings {
         &self.config
     }
 
-    /// Computes recordings with `jobs` threads. A summary is as wide as recordings of `channels`
+    /// The number of channels that most of `inputs` have, where the width of a summary depends on it. Their
+    /// headers are read with `jobs` threads, those of objects with more.
+    ///
+    /// # Errors
+    /// The threads cannot be started, or `stop` was set.
+    pub fn usual_channels(
+        &self,
+        inputs: &[Input],
+        jobs: usize,
+        stop: &Arc<AtomicBool>,
+    ) -> Result<Option<u16>, RunError> {
+        let survey = pool(jobs)?.install(|| Survey::of(inputs, &self.config, stop));
+        match stop.load(Ordering::Relaxed) {
+            true => Err(RunError::Interrupted),
+            false => Ok(survey.channels()),
+        }
+    }
+
+    /// Why this configuration has no frames of pieces of recordings; `None` where it has, as far as can be
+    /// said before a recording is opened.
+    pub fn piece_refusal(&self) -> Option<String> {
+        let planned = USUAL_CHANNELS.into_iter().find_map(|channels| self.usual(channels));
+        planned.and_then(|planned| planned.plan.piece_refusal())
+    }
+
+    /// Computes recordings with `jobs` threads; of those with a piece, the frames that are anchored at its
+    /// samples, as the whole recording has them. A summary is as wide as recordings of `channels`
     /// channels make it; `None` is the number that most of these have, as in a run.
     ///
     /// # Errors
@@ -70,7 +101,7 @@ impl Recordings {
     /// outcome.
     pub fn extract(
         &self,
-        inputs: &[Input],
+        (inputs, pieces): (&[Input], &[Piece]),
         channels: Option<u16>,
         jobs: usize,
         stop: &Arc<AtomicBool>,
@@ -78,9 +109,14 @@ impl Recordings {
         let computed: Result<Vec<(Outcome, Computed)>, RunError> = pool(jobs)?.install(|| {
             let survey = match channels {
                 Some(channels) => Survey::of_channels(channels, &self.config),
-                None => Survey::of(inputs, &self.config),
+                None => Survey::of(inputs, &self.config, stop),
             };
-            inputs.par_iter().map(|input| self.recording(input, &survey, stop)).collect()
+            let each = inputs.par_iter().enumerate();
+            each.map(|(i, input)| {
+                let piece = pieces.get(i).and_then(Option::as_ref);
+                self.recording((input, piece), &survey, stop)
+            })
+            .collect()
         });
         Ok(self.batch(computed?, channels))
     }
@@ -97,20 +133,21 @@ impl Recordings {
         stop: &'a Arc<AtomicBool>,
     ) -> Result<InOrder<'a>, RunError> {
         let pool = pool(jobs)?;
-        let survey = pool.install(|| Survey::of(inputs, &self.config));
+        let survey = pool.install(|| Survey::of(inputs, &self.config, stop));
         let ready = VecDeque::new();
         Ok(InOrder { recordings: self, rest: inputs, ready, pool, survey, stop })
     }
 
     fn recording(
         &self,
-        input: &Input,
+        (input, piece): (&Input, Option<&Range<u64>>),
         survey: &Survey,
         stop: &Arc<AtomicBool>,
     ) -> Result<(Outcome, Computed), RunError> {
         let mut outcome = outcome_of(input);
-        let computed =
-            catch_unwind(AssertUnwindSafe(|| self.features(input, survey, stop, &mut outcome)));
+        let computed = catch_unwind(AssertUnwindSafe(|| {
+            self.features((input, piece), survey, stop, &mut outcome)
+        }));
         match computed.unwrap_or_else(|_| Err(broken())) {
             Ok(None) => Err(RunError::Interrupted),
             Err(_) if input.source.is_stored() && stop.load(Ordering::Relaxed) => {
@@ -129,7 +166,7 @@ impl Recordings {
 
     fn features(
         &self,
-        input: &Input,
+        (input, piece): (&Input, Option<&Range<u64>>),
         survey: &Survey,
         stop: &Arc<AtomicBool>,
         outcome: &mut Outcome,
@@ -137,6 +174,10 @@ impl Recordings {
         let watch = Watch::begin(input);
         let opened = work::open(input, &watch, (&self.plans, survey), stop, outcome)?;
         let planned = opened.planned.clone();
+        if let Some(piece) = piece {
+            let found = work::piece(opened, piece, (&watch, &self.folder), stop, outcome)?;
+            return Ok(found.map(|features| (planned.plan, features)));
+        }
         let Some(recording) = work::whole(opened, &watch, &self.folder, stop, outcome)? else {
             return Ok(None);
         };
@@ -179,23 +220,27 @@ impl Recordings {
         if self.config.summary.is_none() {
             return Vec::new();
         }
-        let rate = self.config.signal.sample_rate;
-        let rate = if rate > 0.0 { rate } else { USUAL_RATE };
-        let names = |channels: u16| {
-            let spec = AudioSpec {
-                sample_rate: rate as u32,
-                channels,
-                format: "none".into(),
-                encoding: SampleEncoding::Float { bytes: 4 },
-                declared_frames: None,
-            };
-            self.plans.of(&spec).ok().map(|planned| planned.plan.summary_names().to_vec())
-        };
+        let names =
+            |channels| self.usual(channels).map(|planned| planned.plan.summary_names().to_vec());
         let found = match channels {
             Some(channels) => names(channels),
             None => USUAL_CHANNELS.into_iter().find_map(names),
         };
         found.unwrap_or_default()
+    }
+
+    /// The plan for usual recordings of so many channels, where there is one.
+    fn usual(&self, channels: u16) -> Option<Planned> {
+        let rate = self.config.signal.sample_rate;
+        let rate = if rate > 0.0 { rate } else { USUAL_RATE };
+        let spec = AudioSpec {
+            sample_rate: rate as u32,
+            channels,
+            format: "none".into(),
+            encoding: SampleEncoding::Float { bytes: 4 },
+            declared_frames: None,
+        };
+        self.plans.of(&spec).ok()
     }
 }
 
@@ -229,7 +274,8 @@ impl<'a> Iterator for InOrder<'a> {
             let (part, rest) = self.rest.split_at(together);
             self.rest = rest;
             let compute = |input: &'a Input| {
-                let (outcome, found) = self.recordings.recording(input, &self.survey, self.stop)?;
+                let (outcome, found) =
+                    self.recordings.recording((input, None), &self.survey, self.stop)?;
                 let features = found.map(|(_, features)| features);
                 Ok(Recorded { input, outcome, features })
             };

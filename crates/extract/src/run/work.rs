@@ -78,6 +78,36 @@ pub(super) fn whole(
     Ok(watch.settle(computed)?.then_some(recording))
 }
 
+/// Computes the frames of a piece of a recording, those anchored at the samples `piece`; the same as the
+/// whole recording has there. `None` where the run was stopped.
+pub(super) fn piece(
+    mut opened: Opened,
+    piece: &Range<u64>,
+    (watch, folder): (&Watch, &Path),
+    stop: &AtomicBool,
+    outcome: &mut Outcome,
+) -> Result<Option<Features>, Failed> {
+    let Opened { source, planned, crop, .. } = &mut opened;
+    let resampled = planned.resample.is_some().then_some("the recording is resampled");
+    let refusal = planned.plan.piece_refusal().or(resampled.map(String::from));
+    if let Some(reason) = refusal {
+        let reason = format!("a piece of it has no frames of its own: {reason}");
+        return Err(Failed::new(Status::Unsupported, reason));
+    }
+    let mut recording = Recording::new(planned.plan.clone(), folder);
+    let decoded = &mut outcome.decoded_frames;
+    let computed =
+        reading::compute(source.as_mut(), planned, (&*crop, piece), stop, decoded, |part| {
+            recording.add(part).map_err(Failed::temporary)
+        });
+    reading::describe(outcome, source.as_ref());
+    if !watch.settle(computed)? {
+        return Ok(None);
+    }
+    watch.check_content(&outcome.identity)?;
+    Ok(Some(recording.finish()?))
+}
+
 /// A span of a recording that was cut.
 pub(super) struct SpanJob {
     pub input: usize,

@@ -46,6 +46,8 @@ fn run_on(
     let config = Arc::new(Config::preset(preset).unwrap());
     let mut options = RunOptions {
         out: folder.join("out.npz"),
+        work: None,
+        partition_by: None,
         compression: Compression::Stored,
         jobs: 2,
         shard: Shard::default(),
@@ -215,6 +217,8 @@ fn a_recording_that_changes_while_it_is_read_has_no_features() {
                 inputs::collect(&[text(&folder.path().join("audio")).to_string()]).unwrap().inputs;
             let options = RunOptions {
                 out: folder.path().join("out.npz"),
+                work: None,
+                partition_by: None,
                 compression: Compression::Stored,
                 jobs: 1,
                 shard: Shard::default(),

@@ -60,7 +60,7 @@ fn recordings_one_by_one_are_those_of_one_call() {
     let (inputs, stop) = (inputs(), Arc::new(AtomicBool::new(false)));
     for preset in ["esc26", "logmel"] {
         let recordings = Recordings::new(Arc::new(Config::preset(preset).unwrap()));
-        let (outcomes, all) = together(recordings.extract(&inputs, None, 2, &stop).unwrap());
+        let (outcomes, all) = together(recordings.extract((&inputs, &[]), None, 2, &stop).unwrap());
         assert!(!all.is_empty());
         for jobs in [1, 3] {
             let (mut found, mut row) = (Vec::new(), Vec::new());

@@ -9,6 +9,7 @@ mod in_order;
 mod inputs;
 mod outputs;
 mod own_feature;
+mod pieces;
 mod projection;
 mod resume;
 mod support;

@@ -43,6 +43,8 @@ fn extract(folder: &Path, config: Config, out: &Path) -> Table {
     let found = inputs::collect(&[text(folder).to_string()]).unwrap().inputs;
     let options = RunOptions {
         out: out.to_path_buf(),
+        work: None,
+        partition_by: None,
         compression: Compression::Stored,
         jobs: 2,
         shard: Shard::default(),

@@ -1,6 +1,7 @@
 //! Recordings cut into windows.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use corsmal_extract::cut::{WindowSpan, into_windows};
 use corsmal_extract::inputs::{Input, InputSource};
@@ -18,7 +19,7 @@ fn windows(bytes: &[u8]) -> Vec<Input> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x");
     std::fs::write(&path, bytes).unwrap();
-    into_windows(vec![input(&path)], WindowSpan { window: 0.1, hop: 0.1 }).unwrap()
+    into_windows(vec![input(&path)], WindowSpan { window: 0.1, hop: 0.1 }, &Arc::default()).unwrap()
 }
 
 #[test]

@@ -105,7 +105,7 @@ impl ObjectReader {
     fn look(&self) -> Result<(), StoreError> {
         let Source { store, path, .. } = self.object.clone();
         let head = runtime::spawn(async move { store.head(&path).await });
-        let meta = runtime::wait(&head, Some(&self.stop))?;
+        let meta = runtime::wait(&head, &self.stop)?;
         self.object.pin.meet(Version::of(&meta?))
     }
 
@@ -153,7 +153,7 @@ impl ObjectReader {
             self.start(number);
         }
         let Some((_, coming)) = self.coming.take() else { return Ok(()) };
-        let bytes = runtime::wait(&coming, Some(&self.stop))??;
+        let bytes = runtime::wait(&coming, &self.stop)??;
         if self.held.len() == HELD {
             self.held.pop_front();
         }

@@ -136,7 +136,7 @@ impl Case {
             inner.put(&path, payload).await.unwrap();
             inner
         });
-        let inner = runtime::wait(&put, None).unwrap();
+        let inner = runtime::wait(&put, &AtomicBool::new(false)).unwrap();
         let (faults, asked) = (Mutex::new(faults.to_vec()), Mutex::new(Vec::new()));
         let store = Arc::new(Faulty { inner, faults, asked });
         Self { store, content, pin: Pin::default(), stop: Arc::default() }

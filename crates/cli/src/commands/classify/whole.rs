@@ -129,7 +129,9 @@ fn by_format(found: &[Input], formats: &FormatRule, meter: &Meter) -> Vec<Input>
     let mut accepted = Vec::new();
     for input in found {
         let can_be_read_again = input.source != InputSource::Stdin;
-        let header = can_be_read_again.then(|| input.source.open_header().ok()).flatten();
+        let header = can_be_read_again
+            .then(|| input.source.open_header(crate::interrupt::flag()).ok())
+            .flatten();
         let spec = header.as_ref().map(|source| source.spec());
         let channels = spec.map(|spec| u32::from(spec.channels));
         match formats.check(spec.map(|spec| spec.sample_rate), channels) {

@@ -22,6 +22,7 @@ use std::process::ExitCode;
 use corsmal_files::feature_file::FeatureFile;
 use corsmal_files::format::Content;
 use corsmal_files::layout;
+use corsmal_files::partition::is_partitioned;
 
 use crate::failure::Failure;
 use kind::Kind;
@@ -58,6 +59,10 @@ pub struct Args {
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let picture = args.picture.check()?;
     match args.paths.as_slice() {
+        [path] if is_partitioned(path) => match &picture {
+            None => output::inspect(path, args.json),
+            Some(_) => Err(Failure::new("--picture: name one of the files in the folder")),
+        },
         [path] if !path.is_dir() => single(path, picture.as_ref(), args.json),
         paths => {
             if picture.is_some() {

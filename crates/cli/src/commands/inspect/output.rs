@@ -5,11 +5,12 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use corsmal_extract::projection::Projection;
-use corsmal_files::feature_file::FeatureFile;
+use corsmal_files::feature_file::{FeatureFile, FeatureTable};
 use corsmal_files::layout;
 use corsmal_files::npz::NpzFile;
 use corsmal_files::outcome::Outcome;
 use corsmal_files::parquet::ParquetFile;
+use corsmal_files::partition;
 use corsmal_files::provenance::Provenance;
 use corsmal_files::table::Table;
 use serde::Serialize;
@@ -78,6 +79,12 @@ type Failed = Box<dyn std::error::Error>;
 
 /// A feature file: all of it where it is one of ours, else its members.
 fn read(path: &Path) -> Result<Contents, Failed> {
+    if path.is_dir() {
+        let FeatureTable { table, provenance, .. } = partition::open(path)?.0;
+        let features = provenance.features();
+        let frames = if table.feature_names().is_empty() { features } else { Vec::new() };
+        return of_table(path, "parquet files", (table, provenance), &frames);
+    }
     match FeatureFile::open(path)? {
         FeatureFile::Npz(file) => npz(file),
         FeatureFile::Npy(file) => {
@@ -127,7 +134,16 @@ fn parquet(file: &ParquetFile) -> Result<Contents, Failed> {
     if !file.is_ours() {
         return foreign_parquet(file);
     }
-    let found = file.table()?;
+    of_table(file.path(), "parquet", file.table()?, &file.frame_features())
+}
+
+/// A table of ours, with the columns of frames beside it.
+fn of_table(
+    path: &Path,
+    format: &'static str,
+    found: (Table, Provenance),
+    frames: &[String],
+) -> Result<Contents, Failed> {
     let table = &found.0;
     let column = |name: &str, kind: &str| Member {
         name: name.to_owned(),
@@ -136,13 +152,12 @@ fn parquet(file: &ParquetFile) -> Result<Contents, Failed> {
     };
     let labels = table.labels().map(|(name, _)| column(name, "text"));
     let features = table.feature_names().iter().map(|name| column(name, "float32"));
-    let frames = file.frame_features();
     let frames = frames.iter().map(|name| column(name, "lists"));
     let columns = std::iter::once(column("id", "text")).chain(labels);
     let members = columns.chain(features).chain(frames).collect();
-    let path = file.path().display().to_string();
+    let path = path.display().to_string();
     let run = Some(Run::new(found)?);
-    Ok(Contents { path, format: "parquet", members, run, projection: None })
+    Ok(Contents { path, format, members, run, projection: None })
 }
 
 /// A table of another tool.
@@ -226,7 +241,10 @@ impl Contents {
         let arrays = format!(
             "{} · {}",
             self.format,
-            plural(self.members.len(), if self.format == "parquet" { "column" } else { "member" })
+            plural(
+                self.members.len(),
+                if self.format.starts_with("parquet") { "column" } else { "member" }
+            )
         );
         lines.push(match &self.run {
             None => format!("  {arrays}"),

@@ -6,8 +6,11 @@ mod frames;
 mod full_disk;
 mod long;
 mod outputs;
+mod partitions;
 mod projection;
 mod refusals;
+#[cfg(unix)]
+mod slurm;
 mod streams;
 pub(crate) mod support;
 mod tables;

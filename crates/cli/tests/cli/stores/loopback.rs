@@ -1,4 +1,5 @@
-//! A store on the loopback: the part of S3 that reading needs, and a web server, failing as told.
+//! A store on the loopback: the part of S3 that reading and writing whole objects need, and a web server,
+//! failing as told.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -25,6 +26,10 @@ pub enum Fault {
     Denied,
     /// The object is replaced by this one, before the answer.
     Replaced(Vec<u8>),
+    /// No answer comes.
+    Silent,
+    /// The answer takes its time.
+    Late(Duration),
 }
 
 #[derive(Default)]
@@ -34,6 +39,12 @@ struct State {
     /// Method, key and range of each request for an object.
     asked: Vec<String>,
     unsigned: usize,
+    /// Parts of objects that are not complete, by the number of the upload.
+    uploads: BTreeMap<String, BTreeMap<usize, Vec<u8>>>,
+    begun: usize,
+    /// Requests that are answered now, and the most at a time.
+    open: usize,
+    most_open: usize,
 }
 
 /// The server; its objects are `bucket/key`.
@@ -62,6 +73,21 @@ impl Loopback {
         self.state.lock().unwrap().objects.insert(key.into(), bytes.into());
     }
 
+    pub fn get(&self, key: &str) -> Option<Vec<u8>> {
+        self.state.lock().unwrap().objects.get(key).cloned()
+    }
+
+    /// Uploads of parts that were neither completed nor given up.
+    pub fn uploads(&self) -> usize {
+        self.state.lock().unwrap().uploads.len()
+    }
+
+    /// The most requests that were answered at the same time since [`Loopback::asked`].
+    pub fn most_at_once(&self) -> usize {
+        self.state.lock().unwrap().most_open
+    }
+
+    /// Faults of the next answers to GET of a key; those of other methods as `HEAD key`, `PUT key`.
     pub fn fail(&self, key: &str, faults: &[Fault]) {
         let queue = faults.iter().cloned().collect();
         self.state.lock().unwrap().faults.insert(key.into(), queue);
@@ -69,7 +95,9 @@ impl Loopback {
 
     /// What was asked for since the last call.
     pub fn asked(&self) -> Vec<String> {
-        std::mem::take(&mut self.state.lock().unwrap().asked)
+        let mut state = self.state.lock().unwrap();
+        state.most_open = state.open;
+        std::mem::take(&mut state.asked)
     }
 
     /// Requests to S3 without a signature.
@@ -101,12 +129,19 @@ impl Loopback {
     fn serve(&self, mut stream: TcpStream) {
         let mut lines = BufReader::new(stream.try_clone().unwrap());
         // As long as the client keeps the connection.
-        while let Some((request, headers)) = read_request(&mut lines) {
+        while let Some((request, headers, body)) = read_request(&mut lines) {
             let mut words = request.split_whitespace();
             let (Some(method), Some(target)) = (words.next(), words.next()) else { return };
             let (path, query) = target.split_once('?').unwrap_or((target, ""));
             let key = decoded(path.trim_start_matches('/'));
-            if self.answer(&mut stream, (method, &key, query), &headers).is_none() {
+            {
+                let mut state = self.state.lock().unwrap();
+                state.open += 1;
+                state.most_open = state.most_open.max(state.open);
+            }
+            let answered = self.answer(&mut stream, (method, &key, query), &headers, body);
+            self.state.lock().unwrap().open -= 1;
+            if answered.is_none() {
                 return;
             }
         }
@@ -118,6 +153,7 @@ impl Loopback {
         stream: &mut TcpStream,
         (method, key, query): (&str, &str, &str),
         headers: &HashMap<String, String>,
+        body: Vec<u8>,
     ) -> Option<()> {
         let mut state = self.state.lock().unwrap();
         if !key.starts_with("web/") && !headers.contains_key("authorization") {
@@ -136,10 +172,31 @@ impl Loopback {
         }
         let range = headers.get("range").cloned();
         state.asked.push(format!("{method} {key} {}", range.clone().unwrap_or_default()));
-        let fault = match method {
-            "GET" => state.faults.get_mut(key).and_then(VecDeque::pop_front),
-            _ => None,
+        let fault_of = match method {
+            "GET" => key.to_owned(),
+            _ => format!("{method} {key}"),
         };
+        let fault = state.faults.get_mut(&fault_of).and_then(VecDeque::pop_front);
+        match fault {
+            Some(Fault::Silent) => {
+                drop(state);
+                std::thread::sleep(Duration::from_secs(600));
+                return None;
+            }
+            Some(Fault::Late(time)) => {
+                drop(state);
+                std::thread::sleep(time);
+                state = self.state.lock().unwrap();
+            }
+            _ => {}
+        }
+        if ["PUT", "POST", "DELETE"].contains(&method)
+            && !matches!(fault, Some(Fault::Busy | Fault::Denied))
+        {
+            let (status, tags, text) = write(&mut state, (method, key, query), headers, body);
+            drop(state);
+            return reply(stream, status, &tags, text.as_bytes(), method);
+        }
         if let Some(Fault::Replaced(bytes)) = &fault {
             state.objects.insert(key.into(), bytes.clone());
         }
@@ -202,7 +259,65 @@ impl Loopback {
     }
 }
 
-fn read_request(lines: &mut impl BufRead) -> Option<(String, HashMap<String, String>)> {
+/// Takes a whole object, or a part of one.
+fn write(
+    state: &mut State,
+    (method, key, query): (&str, &str, &str),
+    headers: &HashMap<String, String>,
+    body: Vec<u8>,
+) -> (&'static str, String, String) {
+    let value = |name: &str| {
+        let pairs = query.split('&').filter_map(|pair| pair.split_once('='));
+        pairs.filter(|(key, _)| *key == name).map(|(_, value)| decoded(value)).next()
+    };
+    let tag = |body: &[u8]| format!("ETag: {}\r\n", etag(body));
+    let done = |tags| ("200 OK", tags, String::new());
+    match (method, value("uploadId")) {
+        ("POST", None) => {
+            state.begun += 1;
+            let id = format!("upload{}", state.begun);
+            state.uploads.insert(id.clone(), BTreeMap::new());
+            let text = format!(
+                "<InitiateMultipartUploadResult><UploadId>{id}</UploadId>\
+                 </InitiateMultipartUploadResult>"
+            );
+            ("200 OK", String::new(), text)
+        }
+        ("PUT", Some(id)) => {
+            let number = value("partNumber").unwrap().parse().unwrap();
+            let tags = tag(&body);
+            state.uploads.get_mut(&id).unwrap().insert(number, body);
+            done(tags)
+        }
+        ("POST", Some(id)) => {
+            let whole: Vec<u8> =
+                state.uploads.remove(&id).unwrap().into_values().flatten().collect();
+            let text = format!(
+                "<CompleteMultipartUploadResult><ETag>{}</ETag></CompleteMultipartUploadResult>",
+                etag(&whole)
+            );
+            state.objects.insert(key.into(), whole);
+            ("200 OK", String::new(), text)
+        }
+        ("DELETE", Some(id)) => {
+            state.uploads.remove(&id);
+            ("204 No Content", String::new(), String::new())
+        }
+        _ => {
+            let only_new = headers.get("if-none-match").is_some_and(|tag| tag == "*");
+            if only_new && state.objects.contains_key(key) {
+                return ("412 Precondition Failed", String::new(), String::new());
+            }
+            let tags = tag(&body);
+            state.objects.insert(key.into(), body);
+            done(tags)
+        }
+    }
+}
+
+type Request = (String, HashMap<String, String>, Vec<u8>);
+
+fn read_request(lines: &mut impl BufRead) -> Option<Request> {
     let line = |lines: &mut dyn BufRead| {
         let mut line = String::new();
         lines.take(1 << 16).read_line(&mut line).ok()?;
@@ -213,7 +328,10 @@ fn read_request(lines: &mut impl BufRead) -> Option<(String, HashMap<String, Str
     while let Some((name, value)) = line(lines)?.split_once(':') {
         headers.insert(name.to_ascii_lowercase(), value.trim().to_owned());
     }
-    (!request.is_empty()).then_some((request, headers))
+    let length = headers.get("content-length").and_then(|length| length.parse().ok());
+    let mut body = vec![0; length.unwrap_or(0)];
+    lines.read_exact(&mut body).ok()?;
+    (!request.is_empty()).then_some((request, headers, body))
 }
 
 fn head(status: &str, tags: &str, length: usize) -> String {

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::io;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -14,6 +15,11 @@ pub enum Object {}
 impl Object {
     /// Its URI.
     pub fn name(&self) -> &str {
+        match *self {}
+    }
+
+    /// Its URI, with the query of a web address.
+    pub fn address(&self) -> String {
         match *self {}
     }
 }
@@ -35,7 +41,7 @@ impl Pin {
 }
 
 pub(super) fn parse(_: &str) -> Result<Object, String> {
-    Err("this build reads no object stores: one with `--features cloud` does, and so does the Python \
+    Err("this build knows no object stores: one with `--features cloud` does, and so does the Python \
          package; or mount the bucket (s3fs, gcsfuse, rclone mount), or copy the files"
         .into())
 }
@@ -57,11 +63,15 @@ pub(crate) fn identity_of_read(_: &Pin) -> Option<String> {
     None
 }
 
-pub(crate) fn identity_now(object: &Object) -> String {
+pub(crate) fn identity_now(object: &Object, _: &AtomicBool) -> String {
     match *object {}
 }
 
-pub(crate) fn look(object: &Object) -> Result<Option<Object>, String> {
+pub(crate) fn look(object: &Object, _: &AtomicBool) -> Result<Option<Object>, String> {
+    match *object {}
+}
+
+pub(crate) fn setup_fault(object: &Object, _: &AtomicBool) -> Option<String> {
     match *object {}
 }
 
@@ -69,8 +79,17 @@ pub(crate) fn as_read(object: &Object, _: &Pin) -> Object {
     match *object {}
 }
 
-pub(crate) fn list(folder: &Object) -> Result<Vec<Object>, String> {
+pub(crate) fn list(folder: &Object, _: &AtomicBool) -> Result<Vec<Object>, String> {
     match *folder {}
+}
+
+pub(crate) fn upload(
+    _: &Path,
+    object: &Object,
+    _: bool,
+    _: &Arc<AtomicBool>,
+) -> Result<(), String> {
+    match *object {}
 }
 
 pub(crate) fn key(object: &Object) -> &str {

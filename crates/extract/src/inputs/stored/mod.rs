@@ -7,6 +7,7 @@ mod absent;
 mod present;
 
 use std::io::{Read, Seek};
+use std::sync::atomic::AtomicBool;
 
 use super::error::InputError;
 
@@ -32,14 +33,23 @@ pub(crate) enum Purpose {
     Content,
 }
 
-/// Beginnings of the names of objects, whether or not they can be read.
-const SCHEMES: [&str; 10] =
-    ["s3", "s3a", "gs", "gcs", "az", "abfs", "abfss", "http", "https", "hdfs"];
+/// Requests that wait at the same time.
+pub(crate) const LOOKS: usize = 32;
 
-/// Whether a name is one of a store, and not of a file.
+/// Threads that wait for stores, more than there are cores; `None` where they cannot be started.
+pub(crate) fn pool(threads: usize) -> Option<rayon::ThreadPool> {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok()
+}
+
+/// Whether a name is one of a store, and not of a file: it begins with a scheme other than `file`. One
+/// letter is a drive. Which schemes can be read, [`object`] says.
 pub fn is_stored(name: &str) -> bool {
-    name.split_once("://")
-        .is_some_and(|(scheme, _)| SCHEMES.iter().any(|known| scheme.eq_ignore_ascii_case(known)))
+    let Some((scheme, _)) = name.split_once("://") else { return false };
+    let allowed = |b: u8| b.is_ascii_alphanumeric() || b"+-.".contains(&b);
+    scheme.len() > 1
+        && scheme.starts_with(|first: char| first.is_ascii_alphabetic())
+        && scheme.bytes().all(allowed)
+        && !scheme.eq_ignore_ascii_case("file")
 }
 
 /// The object of this name.
@@ -50,8 +60,21 @@ pub fn object(name: &str) -> Result<Object, InputError> {
     parse(name).map_err(|reason| InputError::Store { name: shown(name), reason })
 }
 
+/// Refuses a store of which no object can be asked for: where credentials are missing, each of them would
+/// take seconds to fail. What is wrong with this object alone is not looked at. Waiting ends when `stop` is
+/// set.
+///
+/// # Errors
+/// [`InputError::Store`].
+pub fn require_store(name: &str, stop: &AtomicBool) -> Result<(), InputError> {
+    match setup_fault(&object(name)?, stop) {
+        None => Ok(()),
+        Some(reason) => Err(InputError::Store { name: shown(name), reason }),
+    }
+}
+
 /// A name without the query of a web address, which may hold a signature, or its user and password.
-fn shown(name: &str) -> String {
+pub fn shown(name: &str) -> String {
     let is_web = name.get(..4).is_some_and(|scheme| scheme.eq_ignore_ascii_case("http"));
     match name.split(['?', '#']).next() {
         Some(name) if is_web && name.contains('@') => "a web address".into(),
@@ -66,10 +89,14 @@ mod tests {
 
     #[test]
     fn names_of_stores_are_told_from_files() {
-        for name in ["s3://b/x.wav", "S3://b", "https://h/x.wav?a=b", "hdfs://n/x.wav"] {
+        for name in
+            ["s3://b/x.wav", "S3://b", "https://h/x.wav?a=b", "hdfs://n/x.wav", "git+ssh://x"]
+        {
             assert!(is_stored(name), "{name}");
         }
-        for name in ["x.wav", "/a/s3/x.wav", "file:///x.wav", "c://x.wav", "s3:/b"] {
+        for name in
+            ["x.wav", "/a/s3/x.wav", "file:///x.wav", "c://x.wav", "s3:/b", "a/b://x", "://x"]
+        {
             assert!(!is_stored(name), "{name}");
         }
         for name in ["https://h/x.wav?secret", "http://me:secret@h/x.wav"] {

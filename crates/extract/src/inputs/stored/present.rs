@@ -1,11 +1,12 @@
 //! Objects, by the crate `corsmal-stores`.
 
 use std::io;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use corsmal_files::identity;
-use corsmal_stores::{ObjectReader, StoreError, Uri, Version};
+use corsmal_stores::{Existing, ObjectReader, StoreError, Uri, Version};
 
 use super::{Blocks, Purpose};
 
@@ -50,17 +51,25 @@ pub(crate) fn identity_of_read(pin: &Pin) -> Option<String> {
 }
 
 /// What the object is known by now; empty where it cannot be asked.
-pub(crate) fn identity_now(object: &Object) -> String {
-    let version = object.listed.clone().or_else(|| object.look().ok());
+pub(crate) fn identity_now(object: &Object, stop: &AtomicBool) -> String {
+    let version = object.listed.clone().or_else(|| object.look(stop).ok());
     version.map(|version| identity_of(&version)).unwrap_or_default()
 }
 
 /// The object with its present version; `None` where there is none.
-pub(crate) fn look(object: &Object) -> Result<Option<Object>, String> {
-    match object.look() {
+pub(crate) fn look(object: &Object, stop: &AtomicBool) -> Result<Option<Object>, String> {
+    match object.look(stop) {
         Ok(version) => Ok(Some(Object { uri: object.uri.clone(), listed: Some(version) })),
         Err(StoreError::Missing) => Ok(None),
         Err(error) => Err(error.to_string()),
+    }
+}
+
+/// Why no object of its store can be asked for at all, such as credentials that are not there.
+pub(crate) fn setup_fault(object: &Object, stop: &AtomicBool) -> Option<String> {
+    match object.look(stop) {
+        Err(error @ StoreError::Setup(_)) => Some(error.to_string()),
+        _ => None,
     }
 }
 
@@ -70,8 +79,19 @@ pub(crate) fn as_read(object: &Object, pin: &Pin) -> Object {
 }
 
 /// All objects below a folder, sorted by their keys.
-pub(crate) fn list(folder: &Object) -> Result<Vec<Object>, String> {
-    corsmal_stores::list(&folder.uri).map_err(|e| e.to_string())
+pub(crate) fn list(folder: &Object, stop: &AtomicBool) -> Result<Vec<Object>, String> {
+    corsmal_stores::list(&folder.uri, stop).map_err(|e| e.to_string())
+}
+
+/// Puts a file into a store, whole or not at all; `replace` says whether another object may be there.
+pub(crate) fn upload(
+    file: &Path,
+    object: &Object,
+    replace: bool,
+    stop: &Arc<AtomicBool>,
+) -> Result<(), String> {
+    let existing = if replace { Existing::Replace } else { Existing::Keep };
+    corsmal_stores::upload(file, object, existing, stop).map_err(|e| e.to_string())
 }
 
 /// The key in its bucket.

@@ -1,0 +1,236 @@
+//! Outputs in several files: a folder with a Parquet file for each value of a label, named as Hive and
+//! pyarrow have it, `type=rice/part.parquet`.
+//!
+//! The label is in the name of the subfolder only: a column of it in the file would contradict the type that
+//! readers guess from names. Each file is a whole output of its recordings, and says which places they had
+//! among the inputs, so that the folder gives back the table of the run.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::feature_file::{FeatureFileError, FeatureTable};
+use crate::format::OutputFormat;
+use crate::parquet::{ParquetFile, ParquetTableError};
+use crate::provenance::{Part, Provenance};
+use crate::table::{Table, TableError};
+
+/// Name of the file in each subfolder.
+pub const FILE: &str = "part.parquet";
+/// The value that stands for none, as Hive has it.
+const NONE: &str = "__HIVE_DEFAULT_PARTITION__";
+/// Most values of the label: each is a folder.
+pub const MOST: usize = 10_000;
+
+/// A part and its table, which lacks the label.
+#[derive(Debug)]
+pub struct Partition {
+    /// Which part it is.
+    pub part: Part,
+    /// Its rows and outcomes.
+    pub table: Table,
+}
+
+/// The parts of a table by a label, sorted by its values; `values` has one for each outcome.
+///
+/// # Errors
+/// [`TableError`], of which a table has none that is whole.
+pub fn split(table: &Table, label: &str, values: &[String]) -> Result<Vec<Partition>, TableError> {
+    let mut places: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    for (place, value) in values.iter().enumerate().take(table.outcomes().len()) {
+        places.entry(value).or_default().push(place);
+    }
+    let part = |(value, places): (&str, Vec<usize>)| {
+        let table = table.of_places(&places, label)?;
+        Ok(Partition { part: Part { label: label.into(), value: value.into(), places }, table })
+    };
+    places.into_iter().map(part).collect()
+}
+
+/// Name of the subfolder of a value.
+pub fn folder(label: &str, value: &str) -> String {
+    let value = if value.is_empty() { NONE.into() } else { encoded(value) };
+    format!("{}={value}", encoded(label))
+}
+
+/// Percent encoding of all but letters, digits and `-._~`; readers of Hive folders decode it.
+fn encoded(text: &str) -> String {
+    let mut name = String::new();
+    for byte in text.bytes() {
+        match byte {
+            b'0'..=b'9' | b'a'..=b'z' | b'A'..=b'Z' | b'-' | b'.' | b'_' | b'~' => {
+                name.push(char::from(byte));
+            }
+            _ => name.push_str(&format!("%{byte:02X}")),
+        }
+    }
+    name
+}
+
+/// The files of a folder, sorted by name, where it is a partitioned output and nothing else.
+fn files(path: &Path) -> io::Result<Option<Vec<PathBuf>>> {
+    let mut files = Vec::new();
+    for entry in path.read_dir()? {
+        let entry = entry?;
+        let file = entry.path().join(FILE);
+        let is_part = entry.file_name().to_str().is_some_and(|name| name.contains('='));
+        if !is_part || !file.is_file() || entry.path().read_dir()?.count() != 1 {
+            return Ok(None);
+        }
+        files.push(file);
+    }
+    files.sort_unstable();
+    Ok((!files.is_empty()).then_some(files))
+}
+
+/// Whether a path is the folder of a partitioned output, by the names in it.
+pub fn is_partitioned(path: &Path) -> bool {
+    path.is_dir() && files(path).is_ok_and(|files| files.is_some())
+}
+
+/// Reads the table of a partitioned output, in the order of its run, and the label.
+///
+/// # Errors
+/// [`FeatureFileError`]; parts of several runs, or not all of one.
+pub fn open(path: &Path) -> Result<(FeatureTable, String), FeatureFileError> {
+    let io = |source| FeatureFileError::Io { path: path.into(), source };
+    let foreign = || FeatureFileError::Foreign { path: path.into() };
+    let files = files(path).map_err(io)?.ok_or_else(foreign)?;
+    let wrong = |file: &Path, expected: &str, actual: String| {
+        let (path, expected) = (file.into(), expected.into());
+        FeatureFileError::Parquet(ParquetTableError::Layout { path, expected, actual })
+    };
+    let mut parts: Vec<Partition> = Vec::new();
+    let mut first: Option<Provenance> = None;
+    for file in &files {
+        let (table, mut provenance) = ParquetFile::open(file)?.table()?;
+        let part = provenance.part.take().ok_or_else(foreign)?;
+        let name = folder(&part.label, &part.value);
+        if file.parent().and_then(Path::file_name).is_none_or(|found| *found != *name) {
+            return Err(wrong(file, "the folder of its part", name));
+        }
+        let same = parts.first().is_none_or(|other| other.part.label == part.label);
+        if !same || first.as_ref().is_some_and(|first| *first != provenance) {
+            return Err(wrong(file, "parts of one run", "another one".into()));
+        }
+        first.get_or_insert(provenance);
+        parts.push(Partition { part, table });
+    }
+    let (Some(provenance), Some(label)) = (first, parts.first().map(|p| p.part.label.clone()))
+    else {
+        return Err(foreign());
+    };
+    let table = joined(&label, &parts).map_err(|actual| {
+        let actual =
+            actual.map_or_else(|e| e.to_string(), |place| format!("none for input {place}"));
+        wrong(path, "a part for every input", actual)
+    })?;
+    Ok((
+        FeatureTable { path: path.into(), table, provenance, format: OutputFormat::Parquet },
+        label,
+    ))
+}
+
+/// The table of all parts; else the first place that is missing or there twice.
+fn joined(label: &str, parts: &[Partition]) -> Result<Table, Result<usize, TableError>> {
+    let mut places = Vec::new();
+    let mut columns: Vec<String> = Vec::new();
+    for (index, Partition { part, table }) in parts.iter().enumerate() {
+        columns = table.labels().map(|(name, _)| name.to_owned()).collect();
+        if part.places.len() != table.outcomes().len() {
+            return Err(Ok(part.places.len()));
+        }
+        let mut row = 0;
+        for (outcome, place) in table.outcomes().iter().zip(&part.places) {
+            places.push((*place, index, outcome, row));
+            row += usize::from(outcome.status.has_features());
+        }
+    }
+    places.sort_unstable_by_key(|(place, ..)| *place);
+    if let Some(missing) = places.iter().enumerate().position(|(i, (place, ..))| i != *place) {
+        return Err(Ok(missing));
+    }
+    columns.push(label.into());
+    let mut all = Table::new(columns).map_err(Err)?;
+    for (_, index, outcome, row) in places {
+        let Partition { part, table } = &parts[index];
+        let (mut labels, mut values) = (Vec::new(), Vec::new());
+        if outcome.status.has_features() {
+            all.name_features(table.feature_names()).map_err(Err)?;
+            labels.extend(
+                table.labels().map(|(name, column)| (name.to_owned(), column[row].clone())),
+            );
+            labels.push((label.into(), part.value.clone()));
+            values.extend(table.values().row(row));
+        }
+        all.push(outcome.clone(), &labels, &values).map_err(Err)?;
+    }
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::outcome::{Outcome, Status};
+    use crate::parquet::write;
+    use crate::shard::Shard;
+
+    fn table() -> (Table, Vec<String>) {
+        let mut table = Table::new(vec!["take".into(), "type".into()]).unwrap();
+        table.name_features(&["rms.mean".into()]).unwrap();
+        let mut values = Vec::new();
+        for (i, value) in ["rice", "a/b", "", "rice", "ü=%", "."].into_iter().enumerate() {
+            let labels = [("take".into(), i.to_string()), ("type".into(), value.into())];
+            let status = if i == 3 { Status::Corrupt } else { Status::Ok };
+            let outcome = Outcome::new(format!("r{i}"), "x.wav", status, "");
+            table.push(outcome, &labels, &[i as f32]).unwrap();
+            values.push(value.to_owned());
+        }
+        (table, values)
+    }
+
+    /// Writes the parts below a folder.
+    fn write_parts(path: &Path, parts: &[Partition]) {
+        for Partition { part, table } in parts {
+            let mut made = Provenance::new("{}".into(), "c".into(), "i".into(), Shard::default());
+            let folder = path.join(folder(&part.label, &part.value));
+            made.part = Some(part.clone());
+            std::fs::create_dir_all(&folder).unwrap();
+            write(&folder.join(FILE), table, &made).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_folder_gives_back_the_table() {
+        let (table, values) = table();
+        let parts = split(&table, "type", &values).unwrap();
+        let names: Vec<String> = parts.iter().map(|p| folder("type", &p.part.value)).collect();
+        let none = format!("type={NONE}");
+        assert_eq!(names, [&*none, "type=.", "type=a%2Fb", "type=rice", "type=%C3%BC%3D%25"]);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out");
+        write_parts(&path, &parts);
+        assert!(is_partitioned(&path));
+        let (found, label) = open(&path).unwrap();
+        assert_eq!((found.table, label.as_str()), (table, "type"));
+    }
+
+    #[test]
+    fn folders_of_something_else_are_told() {
+        let (table, values) = table();
+        let parts = split(&table, "type", &values).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out");
+        write_parts(&path, &parts[1..]);
+        let error = open(&path).unwrap_err().to_string();
+        assert!(error.contains("none for input 2"), "{error}");
+        write_parts(&path, &parts);
+        std::fs::rename(path.join("type=rice"), path.join("type=water")).unwrap();
+        assert!(open(&path).unwrap_err().to_string().contains("type=rice"));
+        std::fs::rename(path.join("type=water"), path.join("type=rice")).unwrap();
+        std::fs::write(path.join("type=rice/notes.txt"), "mine").unwrap();
+        assert!(!is_partitioned(&path), "files that are not ours");
+        assert!(!is_partitioned(folder.path()) && !is_partitioned(&path.join("none")));
+        assert!(matches!(open(&path), Err(FeatureFileError::Foreign { .. })));
+    }
+}
