@@ -16,10 +16,12 @@ from .errors import ParameterError
 ID, PATH, BYTES, START, END = "id", "path", "bytes", "start", "end"
 #: Columns that say where in an archive a recording lies, as `corsmal_feat.ray.manifest` has them.
 PLACE = ("archive", "offset", "size", "fault")
+#: Columns that say which samples the frames of a piece are anchored at.
+PIECE = ("first_sample", "end_sample")
 
 
 def rows_of(batch: Any) -> list[Any]:
-    """The rows of a batch as the extension takes them: id, source, start, end."""
+    """The rows of a batch as the extension takes them: id, source, start, end, piece."""
     pa = arrow()
     if not isinstance(batch, pa.RecordBatch | pa.Table):
         raise ParameterError(f"batch must be a RecordBatch or Table of pyarrow, not {type(batch)}")
@@ -47,6 +49,7 @@ def rows_of(batch: Any) -> list[Any]:
     )
     ids = column(ID, pa.string())
     starts, ends = column(START, pa.float64()), column(END, pa.float64())
+    firsts, lasts = (column(name, pa.uint64()) for name in PIECE)
     rows = []
     for i in range(batch.num_rows):
         path = "" if paths[i] is None else _local(paths[i])
@@ -59,8 +62,29 @@ def rows_of(batch: Any) -> list[Any]:
             if time is not None and not 0 <= time < np.inf:
                 raise ParameterError(f"row {i}: {time} is not a time in seconds")
         name = ids[i] if ids[i] is not None else (path or str(i))
-        rows.append((name, source, starts[i], ends[i]))
+        piece = None if firsts[i] is None else (firsts[i], lasts[i])
+        if piece is not None and piece[1] is not None and piece[1] <= piece[0]:
+            raise ParameterError(f"row {i}: a piece from sample {piece[0]} to {piece[1]} is empty")
+        rows.append((name, source, starts[i], ends[i], piece))
     return rows
+
+
+#: Stores that this process has asked for an object.
+_asked: set[str] = set()
+
+
+def require_stores(rows: list[Any]) -> None:
+    """Refuses rows of stores that this process has no way to ask, such as credentials.
+
+    That is a fault of the job: each recording alone would take seconds to fail by it.
+    """
+    for _, source, *_ in rows:
+        name = source[1] if isinstance(source, tuple) else source
+        if isinstance(name, str) and _core.is_stored(name):
+            store = "/".join(name.split("/", 3)[:3])
+            if store not in _asked:
+                _core.require_store(name)
+                _asked.add(store)
 
 
 def _local(path: str) -> str:
@@ -68,11 +92,8 @@ def _local(path: str) -> str:
     if "://" not in path or _core.is_stored(path):
         return path
     parts = urlsplit(path)
-    if parts.scheme != "file" or parts.netloc not in ("", "localhost"):
-        raise ParameterError(
-            f"{path}: only paths and URIs of files and objects (s3://, gs://, az://, https://) are"
-            " read; let the engine put the content into a column bytes"
-        )
+    if parts.netloc not in ("", "localhost"):
+        raise ParameterError(f"{path}: a URI of a file must name no other machine")
     return unquote(parts.path)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import _core
 from ._batch_columns import Flags, Singles, arrow, nested, no_rows, scalars, vectors
-from ._batch_rows import BYTES, ID, PATH, PLACE, rows_of
+from ._batch_rows import BYTES, ID, PATH, PLACE, require_stores, rows_of
 from ._computation import Computation, stamp_of
 from ._extract import Config, StrPath, configuration
 from ._features import GOOD
@@ -90,10 +90,18 @@ class Job:
     def extract(self, batch: Any, jobs: int) -> Any:
         """Computes a batch."""
         extract = self.computation.recordings.extract
-        lines, names, values, frames = extract(rows_of(batch), self.channels, jobs)
+        rows = rows_of(batch)
+        require_stores(rows)
+        lines, names, values, frames = extract(rows, self.channels, jobs)
         outcomes = [json.loads(line) for line in lines.splitlines()]
         _keep_paths(batch, outcomes)
         return self._assemble(batch, outcomes, names, values, frames)
+
+    def require_pieces(self) -> None:
+        """Refuses configurations that have no frames of pieces of recordings."""
+        reason = self.computation.recordings.piece_refusal()
+        if reason is not None:
+            raise ParameterError(f"recordings cannot be cut into pieces: {reason}")
 
     def failed(self, batch: Any, status: str, reason: str) -> Any:
         """The rows of recordings that are not read at all."""
@@ -207,9 +215,10 @@ def _model(path: StrPath) -> TrainedModel:
 
 
 def _keep_paths(batch: Any, outcomes: list[dict[str, Any]]) -> None:
-    """Outcomes have the paths as given; content in memory has none."""
+    """Outcomes have the paths as given, but for the query of a web address, which may be a
+    signature; content in memory has none."""
     given = [None] * len(outcomes)
     if PATH in batch.schema.names:
         given = batch.column(PATH).to_pylist()
     for row, path in zip(outcomes, given, strict=True):
-        row["path"] = path
+        row["path"] = None if path is None else _core.shown(path)

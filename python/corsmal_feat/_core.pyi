@@ -56,6 +56,7 @@ __all__ = [
     "estimate_tuning",
     "evaluate",
     "extract",
+    "fetch",
     "fft_frequencies",
     "fit_projection",
     "fuse",
@@ -65,6 +66,7 @@ __all__ = [
     "is_stored",
     "istft",
     "jobs",
+    "lengths",
     "load_calibration",
     "load_depth",
     "load_mask",
@@ -97,11 +99,13 @@ __all__ = [
     "power_to_db",
     "read_weights",
     "region",
+    "require_store",
     "resample",
     "rms",
     "rms_of_spectrogram",
     "score",
     "separate",
+    "shown",
     "sk_resize",
     "spec9216",
     "spectral_bandwidth",
@@ -241,7 +245,7 @@ def extract(
     paths: list[str],
     config: tuple[str, str],
     overrides: list[str],
-    out: str | os.PathLike[str],
+    places: tuple[str, str | None, str | None],
     jobs: int | None,
     resume: bool,
     overwrite: bool,
@@ -255,6 +259,7 @@ class Recordings:
         self, rows: list[Any], channels: int | None, jobs: int
     ) -> tuple[str, list[str], _Singles, list[list[_Singles] | None]]: ...
     def usual_channels(self, rows: list[Any]) -> int | None: ...
+    def piece_refusal(self) -> str | None: ...
 
 _Place = tuple[str, int, int, str | None]
 
@@ -265,6 +270,10 @@ def collect(
     str | None,
 ]: ...
 def is_stored(name: str) -> bool: ...
+def lengths(rows: list[Any]) -> list[tuple[int, int] | None]: ...
+def require_store(name: str) -> None: ...
+def shown(name: str) -> str: ...
+def fetch(name: str, to: str | os.PathLike[str]) -> None: ...
 
 @final
 class Recording:

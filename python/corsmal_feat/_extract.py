@@ -37,6 +37,8 @@ def extract(
     set: Mapping[str, Any] | None = None,
     jobs: int | None = None,
     out: StrPath | None = None,
+    work: StrPath | None = None,
+    partition_by: str | None = None,
     resume: bool = False,
     overwrite: bool = False,
     progress: bool | Progress = False,
@@ -50,8 +52,12 @@ def extract(
     config : instead of a preset a TOML file, TOML text, or the tables as a dict
     set : single keys to change, as {"mfcc.n_mels": 64, "signal.channels": "mean"}
     jobs : worker threads; by default one for each core
-    out : where to keep the output, `.npz` or `.parquet`; by default in a temporary file, removed
-        once it is loaded
+    out : where to keep the output, `.npz` or `.parquet`, a file or an object of a store
+        ("s3://bucket/features.npz"); by default in a temporary file, removed once it is loaded
+    work : folder in which an output for a store is made, so that `resume` can go on; by default the
+        current one
+    partition_by : label by whose values `out` is divided: a folder `out` with a file
+        `label=value/part.parquet` for each of them
     resume : continue an interrupted run to `out`
     overwrite : replace `out`
     progress : True tells on the standard error stream how many recordings are done; a function is
@@ -84,12 +90,16 @@ def extract(
     if jobs is not None and jobs > MOST_JOBS:
         raise ParameterError(f"jobs must be 1 to {MOST_JOBS}, not {jobs}")
     if out is not None:
-        return _run(inputs, chosen, overrides, os.fspath(out), jobs, resume, overwrite, progress)
-    if resume or overwrite:
-        raise ParameterError("resume and overwrite need out: nothing is kept without it")
+        places = (os.fspath(out), None if work is None else os.fspath(work), partition_by)
+        return _run(inputs, chosen, overrides, places, jobs, resume, overwrite, progress)
+    if resume or overwrite or work is not None or partition_by is not None:
+        raise ParameterError(
+            "resume, overwrite, work and partition_by need out: nothing is kept without it"
+        )
     with tempfile.TemporaryDirectory(prefix="corsmal_feat_") as folder:
         temporary = str(Path(folder, "features.npz"))
-        features = _run(inputs, chosen, overrides, temporary, jobs, False, False, progress)
+        places = (temporary, None, None)
+        features = _run(inputs, chosen, overrides, places, jobs, False, False, progress)
         # The file goes with its folder.
         features.arrays, features.times = dict(features.arrays), dict(features.times)
         return features
@@ -99,7 +109,7 @@ def _run(
     inputs: list[str],
     config: tuple[str, str],
     overrides: list[str],
-    out: str,
+    places: tuple[str, str | None, str | None],
     jobs: int | None,
     resume: bool,
     overwrite: bool,
@@ -110,12 +120,12 @@ def _run(
         raise ParameterError(f"progress must be True, False or a function, not {progress!r}")
     if progress in (True,):
         tell = _to_stderr
-    found = _core.extract(inputs, config, overrides, out, jobs, resume, overwrite, tell)
+    found = _core.extract(inputs, config, overrides, places, jobs, resume, overwrite, tell)
     if tell is _to_stderr:
         print(file=sys.stderr)
     for message in found:
         warn(message)
-    return load_features(out)
+    return load_features(places[0])
 
 
 def _to_stderr(done: int, total: int) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,7 +17,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._features_npz import of_npz
-from ._features_parquet import of_parquet
+from ._features_parquet import of_parquet, of_partitions
 from ._refusals import refuses
 from .errors import ParameterError, UnknownIdError
 
@@ -82,13 +83,15 @@ class Features:
         Parameters
         ----------
         path : path
-            `.npz`, or `.parquet` (needs pyarrow).
+            `.npz`, or `.parquet` (needs pyarrow), or the folder of a partitioned output.
 
         Returns
         -------
         Features
         """
         name = os.fspath(path)
+        if os.path.isdir(name):
+            return cls(**of_partitions(name))
         with open(name, "rb") as file:
             parquet = file.read(4) == b"PAR1"
         return cls(**(of_parquet(name) if parquet else of_npz(name)))
@@ -271,7 +274,9 @@ def load_features(path: StrPath) -> Features:
     Parameters
     ----------
     path : path
-        `.npz`, or `.parquet` (needs pyarrow; pandas and polars read such files, too).
+        `.npz`, or `.parquet` (needs pyarrow; pandas and polars read such files, too); the folder
+        of a partitioned output; an object of a store, "s3://bucket/features.npz", which is copied
+        into memory.
 
     Returns
     -------
@@ -285,4 +290,13 @@ def load_features(path: StrPath) -> Features:
     >>> features["water/3"].shape
     (26,)
     """
-    return Features.load(path)
+    name = os.fspath(path)
+    if not _core.is_stored(name):
+        return Features.load(path)
+    with tempfile.TemporaryDirectory(prefix="corsmal_feat_") as folder:
+        copy = os.path.join(folder, os.path.basename(name) or "features")
+        _core.fetch(name, copy)
+        features = Features.load(copy)
+        # The file goes with its folder.
+        features.arrays, features.times = dict(features.arrays), dict(features.times)
+        return features

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,8 +41,59 @@ def _ids(name: str, column: list[Any]) -> list[str]:
     return list(ids)
 
 
+def of_partitions(name: str) -> dict[str, Any]:
+    """The fields of `Features` of a partitioned output, in the order of its inputs."""
+    files = sorted(Path(name).glob("*=*/part.parquet"))
+    if not files:
+        raise ParameterError(f"{name} is a folder without parts (label=value/part.parquet)")
+    read = [_read(os.fspath(file)) for file in files]
+    parts = [found for found, _ in read]
+    first, label = parts[0], (read[0][1] or {}).get("label")
+    places: list[tuple[int, int, int]] = []
+    for number, (file, (found, of)) in enumerate(zip(files, read, strict=True)):
+        if of is None or len(of["places"]) != len(found["outcomes"]):
+            raise ParameterError(f"{file} is no part of an output of corsmal-feat")
+        same = all(found[k] == first[k] for k in ("config_hash", "names"))
+        if not same or of["label"] != label:
+            raise ParameterError(f"{file} is a part of another output than {files[0]}")
+        places += [(place, number, at) for at, place in enumerate(of["places"])]
+        found["labels"][label] = np.array([of["value"]] * len(found["ids"]), dtype=np.str_)
+    places.sort()
+    if [place for place, _, _ in places] != list(range(len(places))):
+        raise ParameterError(f"{name}: a part of the output is missing")
+    outcomes = [parts[number]["outcomes"][at] for _, number, at in places]
+    rows = {i: row for row, i in enumerate(i for part in parts for i in part["ids"])}
+    ids = [row["id"] for row in outcomes if row["id"] in rows]
+    order = np.array([rows[i] for i in ids], dtype=np.intp)
+
+    def joined(key: str) -> Values:
+        values: Values = np.concatenate([part["labels"][key] for part in parts])[order]
+        return values
+
+    def of_ids(key: str) -> dict[str, Any]:
+        all_parts = {k: v for part in parts for k, v in part[key].items()}
+        return {i: all_parts[i] for i in ids if i in all_parts}
+
+    summary = None
+    if first["summary"] is not None:
+        summary = np.concatenate([part["summary"] for part in parts])[order]
+    return first | {
+        "ids": ids,
+        "arrays": of_ids("arrays"),
+        "times": of_ids("times"),
+        "summary": summary,
+        "labels": {key: joined(key) for key in first["labels"]},
+        "outcomes": outcomes,
+    }
+
+
 def of_parquet(name: str) -> dict[str, Any]:
     """The fields of `Features` of a Parquet file."""
+    return _read(name)[0]
+
+
+def _read(name: str) -> tuple[dict[str, Any], dict[str, Any] | None]:
+    """The fields of `Features` of a file, and which part of a partitioned output it is."""
     try:
         parquet = import_module("pyarrow.parquet")
         failed = import_module("pyarrow").ArrowInvalid
@@ -50,7 +103,8 @@ def of_parquet(name: str) -> dict[str, Any]:
             "pandas.read_parquet and polars.read_parquet give the table, too"
         ) from error
     try:
-        table = parquet.read_table(name)
+        # Of one file: its folder, `label=value`, says nothing here.
+        table = parquet.ParquetFile(name).read()
     except failed as error:
         raise ParameterError(f"{name} is not a readable Parquet file: {error}") from error
     metadata = table.schema.metadata or {}
@@ -80,7 +134,7 @@ def of_parquet(name: str) -> dict[str, Any]:
         rows = np.stack([columns[k] for k in names], axis=1).astype(np.float32)
     outcomes = metadata.get(b"corsmal.outcomes", b"").splitlines()
     meta = json.loads(metadata.get(b"corsmal.meta", b"{}"))
-    return {
+    fields = {
         "ids": ids,
         "arrays": _lists(name, table, ids, {k: k for k in frames}),
         "times": _lists(name, table, ids, {k: f"__times__/{k}" for k in frames}),
@@ -91,6 +145,7 @@ def of_parquet(name: str) -> dict[str, Any]:
         "config_hash": meta.get("config_hash", ""),
         "outcomes": [json.loads(line) for line in outcomes if line],
     }
+    return fields, meta.get("part")
 
 
 def _holds_frames(schema: Any, feature: str) -> bool:

@@ -10,10 +10,11 @@ from typing import Any
 
 from ._batches import Job
 from ._extract import MOST_JOBS, Config, StrPath
+from ._pieces import join_pieces
 from ._refusals import refuses
 from .errors import ParameterError
 
-__all__ = ["extract_batch"]
+__all__ = ["extract_batch", "join_pieces"]
 
 
 @refuses

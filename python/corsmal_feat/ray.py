@@ -24,6 +24,7 @@ from ._batch_rows import absolute, rows_of
 from ._batches import Job
 from ._extract import Config, StrPath
 from ._parts import ATTEMPTS, DEATHS, PARTS, compute_part, write_whole
+from ._pieces import cut
 from ._refusals import refuses
 from ._warnings import warn
 from .errors import CorsmalFeatError, ParameterError, RunError
@@ -33,22 +34,29 @@ __all__ = ["Accounting", "extract", "manifest"]
 _JOB = "job.json"
 #: Batches that wait for each core.
 _AHEAD = 2
+#: Seconds without a finished part after which it is said that there is none.
+_SILENCE = 300.0
 
 
 @refuses
-def manifest(paths: StrPath | Iterable[StrPath]) -> Any:
+def manifest(paths: StrPath | Iterable[StrPath], *, longest: float | None = None) -> Any:
     """The recordings that names stand for, as the command `corsmal-feat extract` takes them.
 
     Parameters
     ----------
     paths : folders, globs, files, manifests (`.csv`, `.jsonl`), tar shards as
         `shards/{000..999}.tar`; or one `.parquet` file with the columns of the table below
+    longest : seconds; longer recordings are cut into pieces, each a row, whose frames put together
+        by `corsmal_feat.arrow.join_pieces` are those of the whole recording, bit for bit.
+        Statistics, and features that depend on the whole recording, have no pieces:
+        `extract_batch` refuses them
 
     Returns
     -------
     pyarrow.Table
         `id`, `path`, `start`, `end`, labels and, where recordings lie in tars, `archive`, `offset`,
-        `size` and `fault`.
+        `size` and `fault`; with `longest` also `recording`, `first_sample` and `end_sample`. Web
+        addresses have their query, which may be a signature: treat the table as a secret then.
 
     Raises
     ------
@@ -58,9 +66,10 @@ def manifest(paths: StrPath | Iterable[StrPath]) -> Any:
     names = [os.fspath(p) for p in ([paths] if isinstance(paths, str | os.PathLike) else paths)]
     if len(names) == 1 and names[0].lower().endswith(".parquet"):
         try:
-            return import_module("pyarrow.parquet").read_table(names[0])
+            table = import_module("pyarrow.parquet").read_table(names[0])
         except (OSError, pa.ArrowInvalid) as error:
             raise RunError(f"{names[0]}: {error}") from error
+        return table if longest is None else cut(table, longest)
     found, warning = _core.collect(names)
     if warning is not None:
         warn(warning)
@@ -81,7 +90,8 @@ def manifest(paths: StrPath | Iterable[StrPath]) -> Any:
         if name in columns:
             raise ParameterError(f"the label {name!r} has the name of another column: rename it")
         columns[name] = pa.array([row[5][i][1] for row in found], text)
-    return pa.table(columns)
+    table = pa.table(columns)
+    return table if longest is None else cut(table, longest)
 
 
 @refuses
@@ -96,6 +106,7 @@ def extract(
     model: StrPath | None = None,
     summary: str = "columns",
     channels: int | None = None,
+    longest: float | None = None,
     rows: int = 64,
     address: str | None = None,
     progress: Callable[[int, int], object] | None = None,
@@ -113,6 +124,7 @@ def extract(
     preset, config, set, projection, model, summary : see `corsmal_feat.arrow.extract_batch`
     channels : as there; by default what most recordings have, for which this process reads their
         headers
+    longest : seconds above which recordings are cut into pieces, see `manifest`
     rows : recordings of a task, and of a file
     address : of a running cluster; by default the one that Ray finds, or a new one on this machine
     progress : called with the files done and all of them
@@ -137,7 +149,13 @@ def extract(
     pa = pyarrow()
     if rows < 1:
         raise ParameterError(f"rows must be at least 1, not {rows}")
-    table = paths if isinstance(paths, pa.Table) else manifest(paths)
+    job = Job.of(preset, config, set, projection, model, summary, channels)
+    if longest is not None:
+        job.require_pieces()
+    if isinstance(paths, pa.Table):
+        table = paths if longest is None else cut(paths, longest)
+    else:
+        table = manifest(paths, longest=longest)
     if "bytes" in table.schema.names:
         raise ParameterError("a manifest has paths, no bytes: workers read them where they lie")
     known = rows_of(table)
@@ -149,7 +167,6 @@ def extract(
     table = table.add_column(0, "id", pa.array(ids, pa.string())).combine_chunks()
     # Workers have other current folders, and files there may be others.
     projection, model = (None if p is None else os.path.abspath(p) for p in (projection, model))
-    job = Job.of(preset, config, set, projection, model, summary, channels)
     if channels is None:
         channels = job.computation.recordings.usual_channels(known)
     options = {
@@ -175,7 +192,8 @@ def _claim(folder: Path, job: Job, table: Any, channels: int | None, rows: int) 
     """Makes the folder this job's, or finds that it is."""
     digest = hashlib.blake2b(digest_size=32)
     for batch in table.to_batches(1 << 16):
-        digest.update(json.dumps(batch.to_pylist(), default=str).encode())
+        rows_here = [{k: _known_by(v) for k, v in row.items()} for row in batch.to_pylist()]
+        digest.update(json.dumps(rows_here, default=str).encode())
     model = None if job.model is None else _digest(job.model.path)
     this = {
         "tool_version": _core.__version__,
@@ -202,6 +220,11 @@ def _claim(folder: Path, job: Job, table: Any, channels: int | None, rows: int) 
             f"{folder} holds another job: {other[0]} is {that.get(other[0])!r} there, here"
             f" {this[other[0]]!r}; give another folder or empty it"
         )
+
+
+def _known_by(value: Any) -> Any:
+    """A value without what signs a web address: signed anew it is the same recording."""
+    return _core.shown(value) if isinstance(value, str) and _core.is_stored(value) else value
 
 
 def _digest(path: str) -> str:
@@ -242,7 +265,11 @@ def _compute(
         while waiting and len(running) < _AHEAD * cores:
             name, part = waiting.pop()
             running[task.remote(part, str(folder), name, options)] = (name, part)
-        (ready, *_), _ = ray.wait(list(running), num_returns=1)
+        finished, _ = ray.wait(list(running), num_returns=1, timeout=_SILENCE)
+        if not finished:
+            warn(f"no part was finished in {_SILENCE:.0f} s: `ray status` says what the cores do")
+            continue
+        ready = finished[0]
         name, part = running.pop(ready)
         try:
             ray.get(ready)
@@ -280,6 +307,11 @@ def _main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--model", help="file of a classifier: adds predictions")
     parser.add_argument("--summary", choices=("columns", "list"), default="columns")
     parser.add_argument("--channels", type=int, help="channels that recordings must have")
+    parser.add_argument(
+        "--longest",
+        type=float,
+        help="cut longer recordings into pieces of so many seconds (frames only)",
+    )
     parser.add_argument("--rows", type=int, default=64, help="recordings of a task (64)")
     parser.add_argument("--address", help="of a running cluster, such as auto")
     given = vars(parser.parse_args(arguments))

@@ -235,7 +235,7 @@ def test_jobs_that_cannot_be(recordings: list[Path]):
     refused("needs a column path", batch.drop_columns(["path"]))
     refused("rename it", batch.append_column("status", batch["id"]))
     refused("a column twice", batch.append_column("id", batch["id"]))
-    refused("only paths and URIs", pa.RecordBatch.from_pydict({"path": ["ftp://b/x.wav"]}))
+    refused("must begin with one of s3://", pa.RecordBatch.from_pydict({"path": ["ftp://b/x.wav"]}))
     refused("not a time", pa.RecordBatch.from_pydict({"path": ["x"], "start": [-1.0]}))
     refused("the column start", pa.RecordBatch.from_pydict({"path": ["x"], "start": ["soon"]}))
     refused("none.model", model="none.model", preset=None)

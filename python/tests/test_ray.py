@@ -21,7 +21,7 @@ pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")
 
 import corsmal_feat.ray  # noqa: E402
-from corsmal_feat.arrow import extract_batch  # noqa: E402
+from corsmal_feat.arrow import extract_batch, join_pieces  # noqa: E402
 
 RECORDINGS = 400
 ROWS = 16
@@ -86,6 +86,8 @@ def environment(tmp_path: Path) -> dict[str, str]:
         "PYTHONPATH": path,
         "SCALE_TEST_LOG": str(tmp_path / "log"),
         "RAY_USAGE_STATS_ENABLED": "0",
+        # Ray's workers are at 15: on a busy machine their imports alone take a minute.
+        "RAY_worker_niceness": "0",
         "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
     }
 
@@ -208,6 +210,7 @@ def cluster():
     import ray
 
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    os.environ.setdefault("RAY_worker_niceness", "0")
     package = str(Path(cf.__file__).parent.parent)
     ray.init(
         "local",
@@ -252,6 +255,20 @@ def test_a_folder_is_one_job_and_stays_whole(audio: Path, tmp_path: Path, cluste
         cf.ray.extract(pa.table({"path": ["a.wav", "a.wav"]}), tmp_path / "twice", preset="esc26")
     with pytest.raises(cf.ParameterError, match="did you mean"):
         cf.ray.extract(some, tmp_path / "none", preset="esc62")
+
+
+def test_pieces_of_recordings_come_from_several_tasks(audio: Path, tmp_path: Path, cluster):
+    some = sorted(audio.glob("r00*.wav"))[:3]
+    config = "[features.melspectrogram]\nn_fft = 512\nhop_length = 160\n[features.rms]"
+    out = tmp_path / "out"
+    found = cf.ray.extract(some, out, config=config, longest=0.1, rows=1)
+    assert found.recordings == len(found.parts) == 6
+    parts = pa.concat_tables([pq.read_table(path) for path in found.parts])
+    whole = extract_batch(cf.ray.manifest(some), config=config)
+    assert join_pieces(parts).to_pylist() == whole.to_pylist()
+    assert cf.ray.extract(some, out, config=config, longest=0.1, rows=1).done_before == 6
+    with pytest.raises(cf.RunError, match="another job: manifest"):
+        cf.ray.extract(some, out, config=config, rows=1)
 
 
 # Of Ray itself.

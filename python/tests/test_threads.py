@@ -7,10 +7,12 @@ import os
 import sys
 import threading
 import time
+from pathlib import Path
 
 import corsmal_feat
 import numpy as np
 import pytest
+from test_arrow import write
 
 Y = np.random.default_rng(0).normal(size=(3, 30000)).astype(np.float32)
 
@@ -55,6 +57,22 @@ def test_a_fork_of_a_used_package_goes_on() -> None:
     with multiprocessing.get_context("fork").Pool(2) as pool:
         assert pool.map_async(checksum, range(4)).get(timeout=60) == [want] * 4
     assert checksum(0) == want
+
+
+def table(folder: str) -> list[float]:
+    values = corsmal_feat.extract(folder, preset="esc26").summary
+    assert values is not None
+    return [float(x) for x in values.sum(axis=0)]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_fork_of_a_process_that_has_extracted_goes_on(tmp_path: Path) -> None:
+    for seed in range(4):
+        write(tmp_path / f"r{seed}.wav", seed)
+    want = table(str(tmp_path))
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        assert pool.map_async(table, [str(tmp_path)] * 4).get(timeout=60) == [want] * 4
 
 
 def test_other_threads_run_meanwhile() -> None:

@@ -1,0 +1,193 @@
+"""Long recordings in pieces, and their frames put together again."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from ._batch_columns import Singles, arrow, nested
+from ._batch_rows import ID, PIECE, rows_of
+from ._features import GOOD
+from .errors import ParameterError
+
+#: Column with the id of the recording that a piece is of.
+RECORDING = "recording"
+#: Shorter pieces, in seconds, would be mostly context.
+_SHORTEST = 0.1
+
+
+def cut(table: Any, longest: float) -> Any:
+    """A manifest with a row for each piece of recordings of more than `longest` seconds.
+
+    Every piece is of so many whole samples but the last, which goes to the end. What has no length
+    in its header stays whole, as do stretches whose end is behind that of the recording.
+    """
+    pa = arrow()
+    if not math.isfinite(longest) or longest < _SHORTEST:
+        raise ParameterError(f"longest must be at least {_SHORTEST} seconds, not {longest}")
+    taken = [name for name in (RECORDING, *PIECE) if name in table.schema.names]
+    if taken:
+        raise ParameterError(f"the manifest has a column {taken[0]}, which pieces need: rename it")
+    rows = rows_of(table)
+    places: list[int] = []
+    ids: list[str] = []
+    samples: list[tuple[int | None, int | None]] = []
+    for i, (row, header) in enumerate(zip(rows, _core.lengths(rows), strict=True)):
+        bounds = [] if header is None else _bounds(*header, row[2], row[3], longest)
+        for first, last in bounds:
+            places.append(i)
+            ids.append(f"{row[0]}@{_seconds(first / header[0])}" if header else row[0])
+            samples.append((first, last))
+        if not bounds:
+            places.append(i)
+            ids.append(row[0])
+            samples.append((None, None))
+    names = [name for name in table.schema.names if name != ID]
+    pieces = table.select(names).take(pa.array(places, pa.int64()))
+    pieces = pieces.add_column(0, ID, pa.array(ids, pa.string()))
+    recordings = pa.array([rows[i][0] for i in places], pa.string())
+    pieces = pieces.append_column(RECORDING, recordings)
+    for k, name in enumerate(PIECE):
+        pieces = pieces.append_column(name, pa.array([s[k] for s in samples], pa.uint64()))
+    return pieces
+
+
+def _bounds(
+    rate: int, frames: int, start: float | None, end: float | None, longest: float
+) -> list[tuple[int, int | None]]:
+    """First and last sample of each piece, from the start of the stretch; none: it is not cut."""
+
+    def sample(seconds: float) -> int:
+        # As the engine has it: the last one that does not begin later.
+        return int(seconds * rate + 1e-3)
+
+    first = 0 if start is None else sample(start)
+    last = frames if end is None else sample(end)
+    length, step = last - first, round(longest * rate)
+    if last > frames or length <= step:
+        return []
+    firsts = list(range(0, length, step))
+    return [(a, b) for a, b in zip(firsts, [*firsts[1:], None], strict=True)]
+
+
+def _seconds(time: float) -> str:
+    return repr(round(time, 6))
+
+
+def join_pieces(found: Any) -> Any:
+    """Frames of pieces put together: a row for each recording, as `extract_batch` gives it uncut.
+
+    Parameters
+    ----------
+    found : pyarrow.Table
+        What `extract_batch` gave for a manifest with `longest`: all pieces of a recording follow
+        each other in their order. Other rows stay as they are.
+
+    Returns
+    -------
+    pyarrow.Table
+        Without the columns of pieces. A recording with a piece that has no features has none: its
+        status and reason are those of that piece.
+
+    Raises
+    ------
+    ParameterError : pieces are missing, or not in order
+
+    Examples
+    --------
+    >>> from corsmal_feat.arrow import extract_batch, join_pieces
+    >>> from corsmal_feat.ray import manifest
+    >>> cut = manifest("rice.wav", longest=0.5)
+    >>> cut["id"].to_pylist()
+    ['rice@0.0', 'rice@0.5']
+    >>> found = extract_batch(cut, config={"features": {"rms": {}}})
+    >>> join_pieces(found)["id"].to_pylist()
+    ['rice']
+    """
+    pa = arrow()
+    if not isinstance(found, pa.Table):
+        raise ParameterError(f"found must be a pyarrow.Table, not {type(found)}")
+    for name in (RECORDING, *PIECE):
+        if name not in found.schema.names:
+            raise ParameterError(f"found has no column {name}: nothing in it was cut")
+    recordings = found[RECORDING].to_pylist()
+    starts = [i for i, name in enumerate(recordings) if i == 0 or recordings[i - 1] != name]
+    groups = [range(a, b) for a, b in zip(starts, [*starts[1:], len(recordings)], strict=True)]
+    if len({recordings[group[0]] for group in groups}) != len(groups):
+        raise ParameterError("the pieces of a recording must follow each other: sort the table")
+    columns = {}
+    statuses = found["status"].to_pylist()
+    bad = [next((i for i in group if statuses[i] not in GOOD), None) for group in groups]
+    # What every piece says of its recording, the worst first: it is cut short where any of them is.
+    told = [
+        fault if fault is not None else next((i for i in group if statuses[i] != "ok"), group[0])
+        for group, fault in zip(groups, bad, strict=True)
+    ]
+    _require_whole(found, groups, recordings)
+    for field in found.schema:
+        name = field.name
+        if name in (RECORDING, *PIECE):
+            continue
+        column = found[name]
+        if name == ID:
+            columns[name] = pa.array([recordings[group[0]] for group in groups], field.type)
+        elif _is_nested(field.type):
+            columns[name] = _joined(column, groups, bad)
+        elif name == "decoded_frames":
+            counts = column.to_pylist()
+            sums = [sum(counts[i] or 0 for i in group) for group in groups]
+            columns[name] = pa.array(sums, field.type)
+        elif name == "repairs":
+            repairs = column.to_pylist()
+            unions = [list(dict.fromkeys(r for i in g for r in repairs[i] or ())) for g in groups]
+            columns[name] = pa.array(unions, field.type)
+        else:
+            columns[name] = column.take(pa.array(told, pa.int64()))
+    return pa.table(columns).replace_schema_metadata(found.schema.metadata)
+
+
+def _require_whole(found: Any, groups: list[range], recordings: list[str]) -> None:
+    """Refuses recordings without all their pieces in order, from the first sample to the end."""
+    firsts, ends = (found[name].to_pylist() for name in PIECE)
+    for group in groups:
+        bounds = [(firsts[i], ends[i]) for i in group]
+        if bounds == [(None, None)]:
+            continue
+        reached: int | None = 0
+        for first, end in bounds:
+            if first != reached:
+                break
+            reached = end
+        else:
+            if reached is None:
+                continue
+        raise ParameterError(
+            f"pieces of {recordings[group[0]]!r} are missing, or not in their order"
+        )
+
+
+def _is_nested(kind: Any) -> bool:
+    types = arrow().types
+    return bool(types.is_list(kind) and types.is_list(kind.value_type))
+
+
+def _joined(column: Any, groups: list[range], bad: list[int | None]) -> Any:
+    """Frames [channels][coefficients][frames] one behind the other."""
+    rows: list[Singles | None] = []
+    for group, fault in zip(groups, bad, strict=True):
+        pieces = [] if fault is not None else [_array(column[i]) for i in group]
+        rows.append(np.concatenate(pieces) if pieces else None)
+    return nested(rows)
+
+
+def _array(row: Any) -> Singles:
+    """A row [channels][coefficients][frames] as an array [frames, coefficients, channels]."""
+    channels = row.values
+    coefficients = channels.flatten()
+    values = coefficients.flatten()
+    shape = (len(channels), len(coefficients) // max(1, len(channels)))
+    frames = len(values) // max(1, len(coefficients))
+    return np.asarray(values, dtype=np.float32).reshape(*shape, frames).T

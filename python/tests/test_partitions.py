@@ -1,0 +1,87 @@
+"""Partitioned outputs: for pyarrow, pandas and this package."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import corsmal_feat as cf
+import numpy as np
+import pytest
+from test_arrow import write
+
+pa = pytest.importorskip("pyarrow")
+dataset = pytest.importorskip("pyarrow.dataset")
+
+
+@pytest.fixture(scope="module")
+def listed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("audio")
+    rows = ["path,take,type"]
+    for i, kind in enumerate(["rice", "water/ü", "", "rice", "7", "water/ü", "rice"]):
+        write(folder / f"r{i}.wav", i)
+        rows.append(f"r{i}.wav,{i},{kind}")
+    (folder / "r3.wav").write_text("no audio")
+    (folder / "list.csv").write_text("\n".join(rows) + "\n")
+    return folder / "list.csv"
+
+
+@pytest.mark.parametrize("preset", ["mfcc-zcr", "logmel"])
+def test_a_partitioned_output_is_the_whole_one_in_parts(listed: Path, tmp_path: Path, preset: str):
+    whole = cf.extract(listed, preset=preset, out=tmp_path / "whole.parquet")
+    out = tmp_path / "parts"
+    made = cf.extract(listed, preset=preset, out=out, partition_by="type")
+    for found in (made, cf.load_features(out)):
+        assert found.ids == whole.ids and found.outcomes == whole.outcomes
+        assert found.names == whole.names and found.config == whole.config
+        assert list(found.labels) == ["take", "type"]
+        for label in found.labels:
+            assert found.labels[label].tolist() == whole.labels[label].tolist()
+        if whole.summary is not None:
+            np.testing.assert_array_equal(found.summary, whole.summary)
+        assert list(found.arrays) == list(whole.arrays)
+        for key in whole.arrays:
+            np.testing.assert_array_equal(found[key], whole[key])
+            np.testing.assert_array_equal(found.times[key], whole.times[key])
+    # As others read it.
+    table = dataset.dataset(out, format="parquet", partitioning="hive").to_table()
+    assert sorted(table["id"].to_pylist()) == sorted(whole.ids)
+    kinds = dict(zip(table["id"].to_pylist(), table["type"].to_pylist(), strict=True))
+    assert kinds == {
+        "r0": "rice",
+        "r1": "water/ü",
+        "r2": None,
+        "r4": "7",
+        "r5": "water/ü",
+        "r6": "rice",
+    }
+    names = {path.name for path in out.iterdir()}
+    assert names == {
+        "type=rice",
+        "type=water%2F%C3%BC",
+        "type=7",
+        "type=__HIVE_DEFAULT_PARTITION__",
+    }
+    one = cf.load_features(out / "type=rice" / "part.parquet")
+    assert one.ids == ["r0", "r6"] and [row["status"] for row in one.outcomes] == [
+        "ok",
+        "not_audio",
+        "ok",
+    ]
+
+
+def test_folders_that_are_none_are_refused(listed: Path, tmp_path: Path):
+    out = tmp_path / "parts"
+    cf.extract(
+        listed, preset="esc26", set={"signal.channels": "mean"}, out=out, partition_by="type"
+    )
+    with pytest.raises(cf.ParameterError, match="without parts"):
+        cf.load_features(tmp_path)
+    (out / "type=7" / "part.parquet").unlink()
+    with pytest.raises(cf.ParameterError, match="a part of the output is missing"):
+        cf.load_features(out)
+    with pytest.raises(cf.RunError, match="no partitioned output"):
+        cf.extract(listed, preset="esc26", out=out, partition_by="type", overwrite=True)
+    with pytest.raises(cf.RunError, match="labels of the inputs are take, type"):
+        cf.extract(listed, preset="esc26", out=tmp_path / "x", partition_by="kind")
+    with pytest.raises(cf.ParameterError, match="need out"):
+        cf.extract(listed, partition_by="type")
