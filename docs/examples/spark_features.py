@@ -1,0 +1,45 @@
+"""Features of a manifest with Spark.
+
+    spark-submit spark_features.py manifest.parquet features/
+
+Needs pyspark, pandas, pyarrow and corsmal-feat on all machines.
+"""
+
+import os
+import sys
+from collections.abc import Iterator
+
+import pyarrow as pa
+from corsmal_feat.arrow import extract_batch
+from pyspark.sql import SparkSession
+from pyspark.sql.pandas.types import from_arrow_schema
+
+OPTIONS = {"preset": "mfcc-zcr", "channels": 2}
+
+
+def features(batches: Iterator[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
+    """`mapInArrow` passes the batches of a partition one by one."""
+    for batch in batches:
+        yield extract_batch(batch, **OPTIONS)
+
+
+def main(manifest: str, out: str) -> None:
+    """Computes all rows, and compares their number with that of the manifest."""
+    # Workers start their own Python: this one, unless the cluster says otherwise.
+    os.environ.setdefault("PYSPARK_PYTHON", sys.executable)
+    batches = ("spark.sql.execution.arrow.maxRecordsPerBatch", "64")
+    spark = SparkSession.builder.config(*batches).getOrCreate()
+    table = spark.read.parquet(manifest).select("path")
+    # The schema comes from a call on no rows.
+    empty = extract_batch(pa.table({"path": pa.array([], pa.string())}), **OPTIONS)
+    found = table.mapInArrow(features, from_arrow_schema(empty.schema))
+    found.write.parquet(out, compression="zstd")
+    counted, wanted = spark.read.parquet(out).count(), table.count()
+    spark.stop()
+    if counted != wanted:
+        sys.exit(f"{counted} rows of {wanted}")
+    print(f"{counted} rows")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
