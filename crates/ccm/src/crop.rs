@@ -1,13 +1,12 @@
 //! What the vision baseline sees: the container in the last frame of a view, cut out.
 
-use std::ops::ControlFlow;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use corsmal_files::draft;
 use corsmal_vision::{Detection, Rgb};
 
-use crate::capacity::{Kind, Problem, Views, each, key, training};
+use crate::capacity::{Problem, Views, each, key, require_colours, training};
 use crate::dataset::{DataSet, Recording};
 use crate::error::{CcmError, Result};
 use crate::submission::RowKey;
@@ -16,37 +15,44 @@ use crate::submission::RowKey;
 pub const LABELS: [&str; 2] = ["cup", "wine glass"];
 /// What the label of an opaque container is, of level and type.
 pub const OPAQUE: &str = "opaque";
+/// How the name of the folder begins in which pictures wait.
+const HIDDEN: &[u8] = b".crops-";
 /// Table of labels among the pictures of [`write()`].
 pub const LABEL_FILE: &str = "labels.csv";
 
-/// The container in the last colour image of each view: what a mask in `masks/` shows, or else the most
-/// confident cup or wine glass among the detections, cut out along the edges of its mask or its box.
-pub fn crops(views: &Views) -> [std::result::Result<Rgb, Problem>; 4] {
+/// The container in the last colour frame of each view: what a mask in `masks/` shows, or else the most
+/// confident cup or wine glass among the detections, cut out along the edges of its mask or its box. Once `stop` is
+/// set, what is left is missing.
+pub fn crops(views: &Views, stop: &AtomicBool) -> [std::result::Result<Rgb, Problem>; 4] {
     let detections = views.detections().map(Option::unwrap_or_default);
-    [1, 2, 3, 4].map(|view| crop(views, detections.as_deref().map_err(Clone::clone)?, view))
+    [1, 2, 3, 4].map(|view| crop(views, detections.as_deref().map_err(Clone::clone)?, view, stop))
 }
 
-fn crop(views: &Views, detections: &[Detection], view: u8) -> std::result::Result<Rgb, Problem> {
-    let frames = views.frames(Kind::Rgb, view)?;
-    let last =
-        frames.last().ok_or_else(|| Problem::Missing(format!("no colour image of view {view}")))?;
-    let mut shown = None;
-    views.colours(
-        view,
-        |number| number == last.number,
-        |_, image| {
-            shown = Some(image);
-            ControlFlow::Break(())
-        },
-    )?;
+fn crop(
+    views: &Views,
+    detections: &[Detection],
+    view: u8,
+    stop: &AtomicBool,
+) -> std::result::Result<Rgb, Problem> {
+    let colours = views.colours(view)?;
+    let last = colours.numbers().pop();
+    let last = last.ok_or_else(|| Problem::Missing(format!("no colour image of view {view}")))?;
+    // Before a video is decoded to its end.
+    views.shows(detections, (view, last), &LABELS)?;
+    let (mut reader, mut shown) = (colours.read()?, None);
+    while let Some((_, image)) = reader.next(|number| number == last)? {
+        if stop.load(Ordering::SeqCst) {
+            return Err(Problem::Missing("interrupted".into()));
+        }
+        shown = image.or(shown);
+    }
     let image = shown.ok_or_else(|| Problem::Damaged(format!("view {view} has no last frame")))?;
     let size = (image.width, image.height);
-    let edges = views.edges(detections, (view, last.number), &LABELS, size)?;
-    // Detectors also give boxes without area, and beyond the picture: nothing that could be seen.
+    let edges = views.edges(detections, (view, last), &LABELS, size)?;
+    // Detectors also give boxes without area, and beyond the picture.
     image.part(edges).ok_or_else(|| {
-        let path = last.path.display();
         Problem::Missing(format!(
-            "{path}: the container would lie at {edges:?}, where nothing is to be seen"
+            "view {view}, frame {last}: the container at {edges:?} is outside the image or without area"
         ))
     })
 }
@@ -67,8 +73,8 @@ pub struct Written {
 }
 
 /// Writes the crops of all labelled training recordings as PNG into a new or empty folder, and
-/// [`LABEL_FILE`] with the columns `id`, `container`, `view`, `level` and `type`. The folder appears when all
-/// is written.
+/// [`LABEL_FILE`] with the columns `id`, `container`, `view`, `level` and `type`. Their labels are
+/// written last; an interrupted run leaves nothing behind.
 ///
 /// # Errors
 /// [`CcmError`] when the data set cannot be opened or shows no container, the folder holds files, something
@@ -80,25 +86,50 @@ pub fn write(
     jobs: usize,
     interrupted: &AtomicBool,
 ) -> Result<Written> {
-    let set = DataSet::open(data)?;
     let io = |e| CcmError::io(out, e);
-    if out.exists() && std::fs::read_dir(out).map_err(io)?.next().is_some() {
+    let created = !out.exists();
+    std::fs::create_dir_all(out).map_err(io)?;
+    // Pictures without their labels would look like a finished folder: they wait in a hidden one.
+    let visible = |entry: &std::io::Result<std::fs::DirEntry>| {
+        let left = |e: &std::fs::DirEntry| e.file_name().as_encoded_bytes().starts_with(HIDDEN);
+        !entry.as_ref().is_ok_and(left)
+    };
+    if std::fs::read_dir(out).map_err(io)?.any(|entry| visible(&entry)) {
         return Err(CcmError::Request(format!(
             "{}: holds files; choose a new or empty folder",
             out.display()
         )));
     }
-    let parent = out.parent().filter(|parent| *parent != Path::new("")).unwrap_or(Path::new("."));
-    std::fs::create_dir_all(parent).map_err(io)?;
-    // Pictures without their labels would look like a finished folder.
-    let hidden = tempfile::Builder::new().prefix(".crops-").tempdir_in(parent).map_err(io)?;
-    let made = hidden.path().join("crops");
-    std::fs::create_dir(&made).map_err(io)?;
+    let prefix = std::str::from_utf8(HIDDEN).unwrap_or_default();
+    let hidden = tempfile::Builder::new().prefix(prefix).tempdir_in(out).map_err(io)?;
+    let written = write_into(data, detections, (out, hidden.path()), jobs, interrupted);
+    drop(hidden);
+    if written.is_err() && created {
+        // Empty, or not ours to remove.
+        let _ = std::fs::remove_dir(out);
+    }
+    written
+}
+
+/// Writes into a hidden folder, then moves all into `out`.
+fn write_into(
+    data: &Path,
+    detections: Option<&Path>,
+    (out, hidden): (&Path, &Path),
+    jobs: usize,
+    interrupted: &AtomicBool,
+) -> Result<Written> {
+    let set = DataSet::open(data)?;
+    let io = |e| CcmError::io(out, e);
     let labelled = |r: &Recording| r.container.is_some() && r.name.is_some();
     let recordings: Vec<Recording> = training(&set).into_iter().filter(labelled).collect();
+    require_colours(&recordings)?;
     let found = each(&recordings, jobs, &|_, _| {}, interrupted, |recording| {
-        write_recording(recording, detections, &made)
+        write_recording(recording, detections, hidden, interrupted)
     })?;
+    if interrupted.load(Ordering::SeqCst) {
+        return Err(CcmError::Interrupted);
+    }
     let mut written = Written {
         crops: 0,
         recordings: recordings.len(),
@@ -128,23 +159,28 @@ pub fn write(
             recordings.len()
         )));
     }
-    draft::write(&made.join(LABEL_FILE), table.as_bytes()).map_err(CcmError::Write)?;
-    if out.exists() {
-        std::fs::remove_dir(out).map_err(io)?;
+    for entry in std::fs::read_dir(hidden).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        std::fs::rename(&path, out.join(path.file_name().unwrap_or_default())).map_err(io)?;
     }
-    std::fs::rename(&made, out).map_err(io)?;
+    draft::write(&out.join(LABEL_FILE), table.as_bytes()).map_err(CcmError::Write)?;
     Ok(written)
 }
 
 /// Lines of the table, and why views have none; or the fault of a damaged file.
 type Rows = std::result::Result<(Vec<String>, Vec<String>), String>;
 
-fn write_recording(recording: &Recording, detections: Option<&Path>, out: &Path) -> Result<Rows> {
+fn write_recording(
+    recording: &Recording,
+    detections: Option<&Path>,
+    out: &Path,
+    stop: &AtomicBool,
+) -> Result<Rows> {
     let (Some(container), Some(name)) = (recording.container, recording.name) else {
         return Ok(Ok((Vec::new(), Vec::new())));
     };
     let (mut found, mut absent) = (Vec::new(), Vec::new());
-    for (view, crop) in (1..).zip(crops(&Views::of(recording, detections))) {
+    for (view, crop) in (1..).zip(crops(&Views::of(recording, detections), stop)) {
         match crop {
             Ok(crop) => found.push((view, crop)),
             Err(Problem::Missing(reason)) => absent.push(reason),

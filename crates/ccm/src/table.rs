@@ -43,10 +43,10 @@ impl Table {
         if header.iter().all(String::is_empty) {
             return Err(fault("it is empty; a header line is needed".into()));
         }
-        // Columns are found in upper and lower case: the first of two would count, whatever the other says.
+        // Columns are found ignoring case: the first of two would count, whatever the other says.
         if let Some(name) = csv_text::repeated(header.iter().map(|h| h.to_ascii_lowercase())) {
             return Err(fault(format!(
-                "two columns have the name {name:?}, but for upper and lower case; rename one of them"
+                "two columns are named {name:?} (case is ignored); rename one"
             )));
         }
         let mut rows = Vec::new();

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use corsmal_ccm::CcmError;
-use corsmal_ccm::capacity::{Kind, Problem, Views};
+use corsmal_ccm::capacity::{Problem, Views};
 use corsmal_ccm::crop::{self, Written, crops};
 use corsmal_ccm::dataset::{Container, DataSet, Filling, FillingLevel, FillingType, SequenceName};
 use corsmal_ccm::synth::write_views;
@@ -37,6 +37,11 @@ fn views(dir: &Path) -> Views {
     Views::of(&DataSet::open(dir).unwrap().recordings[0], None)
 }
 
+/// What is cut out of each view.
+fn seen_by(views: &Views) -> [Result<Rgb, Problem>; 4] {
+    crops(views, &AtomicBool::new(false))
+}
+
 /// Size and first pixel.
 fn seen(crop: &Result<Rgb, Problem>) -> (usize, usize, u8, u8) {
     let crop = crop.as_ref().unwrap();
@@ -65,7 +70,7 @@ fn the_best_cup_or_glass_of_the_last_frame_is_cut_out() {
                  7,2,cup,0.2,30.5,20,50,40,\n\
                  0,3,cup,0.9,0,0,5,5,\n";
     write(&base.join(format!("detections/{name}.csv")), table.as_bytes());
-    let found = crops(&views(dir.path()));
+    let found = seen_by(&views(dir.path()));
     assert_eq!(seen(&found[0]), (3, 2, 10, 5));
     assert_eq!(seen(&found[1]), (10, 10, 30, 20));
     let reason = |view: usize| match &found[view] {
@@ -79,7 +84,7 @@ fn the_best_cup_or_glass_of_the_last_frame_is_cut_out() {
     let mut other = Mask::empty(40, 30);
     other.data[2 * 40 + 39] = true;
     write(&base.join(format!("masks/{name}/c2/0007.png")), &other.to_png().unwrap());
-    assert_eq!(seen(&crops(&views(dir.path()))[1]), (1, 1, 39, 2));
+    assert_eq!(seen(&seen_by(&views(dir.path()))[1]), (1, 1, 39, 2));
 }
 
 #[test]
@@ -88,13 +93,14 @@ fn damaged_files_are_named() {
     let (base, name) = recording(dir.path(), 3);
     write(&base.join(format!("rgb/{name}/c1/0000.png")), &image(40, 30).to_png().unwrap());
     write(&base.join(format!("rgb/{name}/c2/0000.png")), b"no image");
-    let fault = |view: usize, expected: &str| match &crops(&views(dir.path()))[view - 1] {
+    let fault = |view: usize, expected: &str| match &seen_by(&views(dir.path()))[view - 1] {
         Err(Problem::Damaged(reason)) => assert!(reason.contains(expected), "{reason}"),
         other => panic!("{other:?}"),
     };
-    fault(2, "c2/0000.png");
     let table = base.join(format!("detections/{name}.csv"));
     let header = "frame,view,label,score,x_min,y_min,x_max,y_max,mask\n";
+    write(&table, format!("{header}0,2,cup,0.9,0,0,9,9,\n").as_bytes());
+    fault(2, "c2/0000.png");
     write(&base.join("detections/m.png"), &Mask::empty(41, 30).to_png().unwrap());
     write(&table, format!("{header}0,1,cup,0.9,0,0,9,9,m.png\n").as_bytes());
     fault(1, "41 by 30 px; its image has 40 by 30");
@@ -109,18 +115,25 @@ fn boxes_of_nothing_are_no_damage() {
     let (base, name) = recording(dir.path(), 3);
     write(&base.join(format!("rgb/{name}/c1/0000.png")), &image(40, 30).to_png().unwrap());
     let table = base.join(format!("detections/{name}.csv"));
-    for bounds in ["40,0,60,9", "5,5,5,9", "5,30,9,40", "-9,-9,-1,-1", "7,7,7,7"] {
+    for bounds in
+        ["40,0,60,9", "5,5,5,9", "5,30,9,40", "-9,-9,-1,-1", "7,7,7,7", "-1000000,0,0,1000000"]
+    {
         let header = "frame,view,label,score,x_min,y_min,x_max,y_max,mask\n";
         write(&table, format!("{header}0,1,cup,0.9,{bounds},\n").as_bytes());
-        match &crops(&views(dir.path()))[0] {
-            Err(Problem::Missing(reason)) => assert!(reason.contains("nothing is to be seen")),
+        match &seen_by(&views(dir.path()))[0] {
+            Err(Problem::Missing(reason)) => {
+                assert!(reason.contains("outside the image or without area"))
+            }
             other => panic!("{bounds}: {other:?}"),
         }
     }
-    // As wide as a pixel once its edges are whole.
+    // Partly beyond the picture; as wide as a pixel once its edges are whole.
+    let header = "frame,view,label,score,x_min,y_min,x_max,y_max\n";
+    write(&table, format!("{header}0,1,cup,0.9,-1000000,-7,3,1000000\n").as_bytes());
+    assert_eq!(seen(&seen_by(&views(dir.path()))[0]), (3, 30, 0, 0));
     let header = "frame,view,label,score,x_min,y_min,x_max,y_max\n";
     write(&table, format!("{header}0,1,cup,0.9,5.2,5,5.4,9\n").as_bytes());
-    assert_eq!(seen(&crops(&views(dir.path()))[0]), (1, 4, 5, 5));
+    assert_eq!(seen(&seen_by(&views(dir.path()))[0]), (1, 4, 5, 5));
 }
 
 /// A video counts where there are no images of its frames.
@@ -135,12 +148,12 @@ fn frames_may_be_in_a_video() {
     }
     let table = "frame,view,label,score,x_min,y_min,x_max,y_max\n19,1,cup,0.9,2,3,10,20\n";
     write(&base.join(format!("detections/{name}.csv")), table.as_bytes());
-    let seen_by = views(dir.path());
-    assert_eq!(seen_by.frames(Kind::Rgb, 2).unwrap().len(), 20);
+    let all = views(dir.path());
+    assert_eq!(all.colours(2).unwrap().numbers().len(), 20);
     // The first and, from the end, the 20th frame, whatever the table ends with.
-    assert_eq!(seen_by.ends(&[], 20).unwrap(), Some((0, 0)));
-    assert_eq!(seen_by.ends(&[], 19).unwrap(), Some((0, 1)));
-    match &crops(&seen_by)[0] {
+    assert_eq!(all.ends(&[], 20).unwrap(), Some((0, 0)));
+    assert_eq!(all.ends(&[], 19).unwrap(), Some((0, 1)));
+    match &seen_by(&all)[0] {
         Ok(crop) => assert_eq!((crop.width, crop.height, crop.data[1] < 20), (8, 17, true)),
         Err(Problem::Damaged(reason)) => {
             assert!(reason.contains("_c1.mp4: this program was built without video"), "{reason}");
@@ -153,14 +166,24 @@ fn frames_may_be_in_a_video() {
         write(&base.join(format!("masks/{name}/c{view}/0007.png")), &mask);
     }
     assert_eq!(views(dir.path()).ends(&[], 20).unwrap(), Some((7, 7)));
-    write(&base.join(format!("rgb/{name}_c3.mp4")), &shades[..200]);
-    let damaged = views(dir.path()).frames(Kind::Rgb, 3).unwrap_err();
+    // A damaged video fails where its pictures are wanted, and nowhere else.
+    for view in [1, 2, 3] {
+        write(&base.join(format!("rgb/{name}_c{view}.mp4")), &shades[..200]);
+    }
+    std::fs::remove_dir_all(base.join("masks")).unwrap();
+    let all = views(dir.path());
+    let damaged = all.colours(3).err().unwrap();
     assert!(
         matches!(&damaged, Problem::Damaged(reason) if reason.contains("_c3.mp4")),
         "{damaged:?}"
     );
-    write(&base.join(format!("rgb/{name}/c1/0004.png")), &image(40, 30).to_png().unwrap());
-    assert_eq!(views(dir.path()).frames(Kind::Rgb, 1).unwrap()[0].number, 4);
+    assert_eq!(all.ends(&all.detections().unwrap().unwrap(), 20).unwrap(), Some((0, 0)));
+    assert_eq!(all.ends(&[], 20).unwrap(), None);
+    // An empty folder hides no video, images do.
+    std::fs::create_dir_all(base.join(format!("rgb/{name}/c3"))).unwrap();
+    assert!(views(dir.path()).colours(3).is_err());
+    write(&base.join(format!("rgb/{name}/c3/0004.png")), &image(40, 30).to_png().unwrap());
+    assert_eq!(views(dir.path()).colours(3).unwrap().numbers(), [4]);
 }
 
 /// In a folder of their own, tables lie by container, or by part where that is not known.
@@ -232,11 +255,16 @@ fn labelled_pictures_are_written_once() {
     assert!(!again.join("4_s0_fi2_fu2_b0_l0_c1.png").exists());
 
     // What is broken off leaves nothing that looks like a folder of pictures.
-    let before = std::fs::read_dir(dir.path()).unwrap().count();
     let broken_off = dir.path().join("broken-off");
-    let error = crop::write(&data, None, &broken_off, 2, &AtomicBool::new(true)).unwrap_err();
-    assert!(matches!(error, CcmError::Interrupted), "{error}");
-    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), before);
+    let stopped = || crop::write(&data, None, &broken_off, 2, &AtomicBool::new(true)).unwrap_err();
+    assert!(matches!(stopped(), CcmError::Interrupted));
+    assert!(!broken_off.exists());
+    // A folder of the user stays, with what a killed run left in it; the next run passes that over.
+    std::fs::create_dir_all(broken_off.join(".crops-killed")).unwrap();
+    assert!(matches!(stopped(), CcmError::Interrupted));
+    assert_eq!(std::fs::read_dir(&broken_off).unwrap().count(), 1);
+    crop::write(&data, None, &broken_off, 2, &AtomicBool::new(false)).unwrap();
+    assert!(broken_off.join("labels.csv").exists());
 }
 
 #[test]
@@ -246,6 +274,11 @@ fn a_data_set_without_containers_is_refused() {
     recording(&data, 3);
     let error = crop::write(&data, None, &dir.path().join("out"), 1, &AtomicBool::new(false));
     let error = error.unwrap_err().to_string();
-    assert!(error.contains("none of 1 labelled training recordings"), "{error}");
+    assert!(error.contains("none of 1 recordings has colour frames"), "{error}");
+    let (base, name) = recording(&data, 4);
+    write(&base.join(format!("rgb/{name}/c2/0000.png")), &image(40, 30).to_png().unwrap());
+    let error = crop::write(&data, None, &dir.path().join("out"), 1, &AtomicBool::new(false));
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("none of 2 labelled training recordings"), "{error}");
     assert!(error.contains("no colour image of view 1"), "{error}");
 }

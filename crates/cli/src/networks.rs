@@ -50,7 +50,7 @@ impl Request<'_> {
             Examples::of_file(definition, path, &members.names())?
         } else if takes_pictures || self.dataset.crops.is_some() {
             members.refuse()?;
-            // Labels that were named count alone.
+            // Only the labels given by --labels count.
             let own = !self.dataset.has_labels();
             let seen =
                 Examples::of_pictures(definition, (path, own), interrupt::flag(), |id, reason| {

@@ -23,6 +23,11 @@ impl Column {
         column
     }
 
+    /// None yet, with room for so many of so many numbers each.
+    pub fn with_capacity(items: usize, numbers: usize) -> Self {
+        Self { values: Vec::with_capacity(items.saturating_mul(numbers)), offsets: vec![0] }
+    }
+
     /// Adds an item behind the others.
     pub fn push(&mut self, item: &[f32]) {
         self.values.extend_from_slice(item);

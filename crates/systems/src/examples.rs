@@ -126,7 +126,9 @@ impl Examples {
     ) -> Result<Self> {
         let pictures = Pictures::find(definition, folder)?;
         pictures.require_memory(corsmal_files::memory::available())?;
-        let (mut ids, mut column, mut outcomes) = (Vec::new(), Column::of([]), Vec::new());
+        // At once: what grows by doubling is there twice.
+        let mut column = Column::with_capacity(pictures.len(), pictures.numbers());
+        let (mut ids, mut outcomes) = (Vec::new(), Vec::new());
         for part in pictures.parts() {
             for Picture { id, path, identity, item } in pictures.read(part, stop)? {
                 let place = path.display().to_string();

@@ -57,6 +57,19 @@ impl<'a> Learning<'a> {
         }
     }
 
+    /// Names damaged files of views, each with its recording; their recordings go on without them.
+    pub fn note_damaged(&self, damaged: &[String]) {
+        for fault in damaged {
+            (self.work.progress)(&format!("{}: {fault}", self.system));
+        }
+        if let Some(first) = damaged.first() {
+            self.note(format!(
+                "{} damaged files count as nothing seen; the first, {first}.",
+                damaged.len()
+            ));
+        }
+    }
+
     /// An error with the system's name.
     pub fn fault(&self, error: &dyn std::fmt::Display) -> CcmError {
         CcmError::Request(format!("{}: {error}", self.system))

@@ -4,7 +4,7 @@ use corsmal_ccm::capacity::Problem;
 use corsmal_ccm::dataset::{Container, FillingLevel, FillingType};
 use corsmal_models::argmax;
 use corsmal_nets::items::Items;
-use corsmal_vision::Category;
+use corsmal_vision::category::{self, Category};
 
 use crate::definition::{Definition, Settings};
 use crate::learning::{self, Learning, array};
@@ -18,7 +18,8 @@ pub(crate) const M3: Definition = Definition {
     limits: &["Detections (YOLOv4's in the paper) are read from tables beside the recordings, of any detector. The \
                paper does not say how a spectrogram becomes 6,193 numbers, nor what counts where nothing is \
                detected: those are our choice. Its capacity: `corsmal-feat capacity train --method m3`, then \
-               `benchmark --capacity m3=MODEL`."],
+               `benchmark --capacity m3=MODEL`. A category that no training recording has gets no answer; \
+               --weights m3-mlp=FILE is what all six perceptrons begin with."],
     make: |settings| Box::new(Concatenation(settings)),
 };
 
@@ -45,30 +46,47 @@ impl System for Concatenation {
 
     fn prepare<'a>(&'a self, work: &'a Work<'a>) -> Result<Box<dyn Prepared + 'a>> {
         let learning = Learning::new("M3", work, &self.0);
-        let mut voted = Vec::with_capacity(work.subjects.len());
-        for subject in &work.subjects {
+        let (mut voted, mut damaged) = (Vec::with_capacity(work.subjects.len()), Vec::new());
+        // Without a table, and with one that shows no container: of training, and of test recordings.
+        let (mut untold, mut unseen) = ([0; 2], [0; 2]);
+        for (at, subject) in work.subjects.iter().enumerate() {
             work.go_on()?;
-            voted.push(match subject.views.vote(work.seed) {
-                Ok(vote) => Some(vote.category),
-                Err(Problem::Missing(_)) => None,
-                Err(Problem::Damaged(reason)) => {
-                    let id = &subject.input.id;
-                    return Err(learning.fault(&format!("{id}: {reason}")));
+            let part = usize::from(at >= work.training);
+            let fault = |reason: String| format!("{}: {reason}", subject.input.id);
+            let category = match subject.views.detections() {
+                Ok(None) => {
+                    untold[part] += 1;
+                    None
                 }
-            });
+                Ok(Some(table)) => {
+                    let vote = category::vote(&table, category::SHARE, work.seed);
+                    unseen[part] += usize::from(vote.is_none());
+                    vote.map(|vote| vote.category)
+                }
+                Err(Problem::Missing(reason) | Problem::Damaged(reason)) => {
+                    damaged.push(fault(reason));
+                    None
+                }
+            };
+            voted.push(category);
         }
-        let count = voted.len();
-        let without = voted.iter().filter(|category| category.is_none()).count();
-        if without == count {
-            return Err(learning.fault(
-                &"no recording has a table of detections with a container: it needs detections/, or --detections, \
-                  see docs/vision.md",
-            ));
+        if voted[..work.training].iter().all(Option::is_none) {
+            let first = damaged.first().map(|first| format!("; the first damaged one, {first}"));
+            return Err(learning.fault(&format!(
+                "no training recording has a table of detections with a container: it needs detections/, or \
+                 --detections, see docs/vision.md{}",
+                first.unwrap_or_default()
+            )));
         }
-        if without > 0 {
-            learning.note(format!(
-                "no container was detected in {without} of {count} recordings, which count as wrong."
-            ));
+        learning.note_damaged(&damaged);
+        for (why, counts) in
+            [("have no table of detections", untold), ("show no container to the detector", unseen)]
+        {
+            for (part, count) in ["training", "test"].into_iter().zip(counts).filter(|(_, n)| *n > 0) {
+                learning.note(format!(
+                    "{count} {part} recordings {why}: they have neither level nor type, which counts as wrong."
+                ));
+            }
         }
         let known: Vec<Option<Category>> = work
             .subjects
@@ -110,7 +128,7 @@ impl Prepared for Ready<'_> {
             if taught.is_empty() {
                 let (name, asked) = (category.name(), asked.len());
                 self.learning.note(format!(
-                    "no training recording of a fold shows a {name}: {asked} with that vote count as wrong."
+                    "no training recording of a fold has a {name}: {asked} with that vote count as wrong."
                 ));
                 continue;
             }

@@ -57,7 +57,7 @@ impl System for Baseline {
         let Some((width, height)) = definition.picture() else {
             return Err(learning.fault(&"its networks take no pictures"));
         };
-        // Sight alone, before anything is learned: what cannot be read ends the run here.
+        // Sight alone, before anything is learned.
         let (subjects, stop) = (&work.subjects, work.stop);
         let seen: Vec<Result<_>> = subjects
             .par_iter()
@@ -70,16 +70,22 @@ impl System for Baseline {
                     Err(Problem::Missing(_)) => Ok(None),
                     Err(Problem::Damaged(reason)) => Err((subject.input.id.clone(), reason)),
                 };
-                Ok(crops(&subject.views).map(item))
+                Ok(crops(&subject.views, stop).map(item))
             })
             .collect();
+        work.go_on()?;
         let (mut column, mut subject_of) = (Column::of([]), Vec::new());
         let mut item_of = vec![[None; VIEWS]; work.subjects.len()];
+        let mut damaged = Vec::new();
         for (subject, seen) in seen.into_iter().enumerate() {
             for (view, item) in seen?.into_iter().enumerate() {
-                let item = item.map_err(|(id, reason): (String, String)| {
-                    learning.fault(&format!("{id}: {reason}"))
-                })?;
+                let item = match item {
+                    Ok(item) => item,
+                    Err((id, reason)) => {
+                        damaged.push(format!("{id}: {reason}"));
+                        None
+                    }
+                };
                 let Some(item) = item else { continue };
                 item_of[subject][view] = Some(subject_of.len());
                 column.push(&item);
@@ -87,17 +93,20 @@ impl System for Baseline {
             }
         }
         if subject_of.iter().all(|&subject| subject >= work.training) {
-            return Err(learning.fault(
-                &"no view of a training recording shows a container: it needs extracted colour frames \
-                  (rgb/) and tables of detections (detections/), see docs/vision.md",
-            ));
+            let first = damaged.first().map(|first| format!("; the first damaged one, {first}"));
+            return Err(learning.fault(&format!(
+                "no view of a training recording shows a container: it needs colour frames (rgb/) and tables of \
+                 detections (detections/), see docs/vision.md{}",
+                first.unwrap_or_default()
+            )));
         }
+        learning.note_damaged(&damaged);
         for view in 0..VIEWS {
             let without = item_of.iter().filter(|items| items[view].is_none()).count();
             if without > 0 {
                 learning.note(format!(
-                    "view {}: no cup or wine glass in the last frame of {without} of {} recordings, which \
-                     count as wrong.",
+                    "view {}: no picture of a cup or wine glass in the last frame of {without} of {} recordings, \
+                     which have neither level nor type and count as wrong.",
                     view + 1,
                     work.subjects.len()
                 ));

@@ -81,14 +81,28 @@ impl Pictures {
         Ok(Self { folder: folder.into(), named, size })
     }
 
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.named.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.named.is_empty()
+    }
+
+    /// Numbers that the network takes of each.
+    pub fn numbers(&self) -> usize {
+        3 * self.size.0 * self.size.1
+    }
+
     /// Refuses more of them than memory holds at a time, as a training does; of what is free in bytes, where
     /// that is known.
     ///
     /// # Errors
     /// [`SystemError::TooMuchMemory`].
     pub fn require_memory(&self, available: Option<u64>) -> Result<()> {
-        let (width, height) = self.size;
-        let needed = self.named.len() as u64 * (width * height * 3 * size_of::<f32>()) as u64;
+        let needed = self.named.len() as u64 * (self.numbers() * size_of::<f32>()) as u64;
         match available.filter(|available| needed > *available) {
             None => Ok(()),
             Some(available) => {

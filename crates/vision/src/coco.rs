@@ -6,6 +6,7 @@ use serde::de::{Deserialize, Deserializer, Error, IgnoredAny, MapAccess, SeqAcce
 
 use crate::image::{MAX_PIXELS, MAX_SIDE};
 use crate::mask::Mask;
+use crate::polygon;
 
 /// Largest number of coordinates of a mask's polygons.
 const MAX_COORDINATES: usize = 1 << 17;
@@ -120,7 +121,7 @@ impl Segmentation {
                 let (width, height) = size.ok_or("polygons need the size of the image")?;
                 let mut out = Mask::empty(width, height);
                 for polygon in polygons {
-                    fill(polygon, &mut out);
+                    polygon::fill(polygon, &mut out);
                 }
                 Ok(out)
             }
@@ -315,30 +316,6 @@ pub fn compress(mask: &Mask) -> String {
         }
     }
     text
-}
-
-/// Adds the pixels whose centres lie in a polygon (even-odd); a pixel covers 0 to 1.
-fn fill(polygon: &[f32], mask: &mut Mask) {
-    let points: Vec<(f64, f64)> =
-        polygon.chunks_exact(2).map(|p| (f64::from(p[0]), f64::from(p[1]))).collect();
-    let width = mask.width;
-    let mut cuts = Vec::new();
-    for (row, pixels) in mask.data.chunks_exact_mut(width).enumerate() {
-        let y = row as f64 + 0.5;
-        cuts.clear();
-        for (i, &(x0, y0)) in points.iter().enumerate() {
-            let (x1, y1) = points[(i + 1) % points.len()];
-            if (y0 <= y) != (y1 <= y) {
-                cuts.push(x0 + (y - y0) / (y1 - y0) * (x1 - x0));
-            }
-        }
-        cuts.sort_by(f64::total_cmp);
-        for pair in cuts.chunks_exact(2) {
-            let edge = |x: f64| (x - 0.5).ceil().clamp(0.0, width as f64) as usize;
-            let (from, to) = (edge(pair[0]), edge(pair[1]));
-            pixels[from..to.max(from)].fill(true);
-        }
-    }
 }
 
 #[cfg(test)]

@@ -128,7 +128,7 @@ impl Rgb {
 }
 
 impl Mask {
-    /// Reads a PNG; a pixel belongs to the mask where its first channel is not 0.
+    /// Reads a PNG; a pixel belongs to the mask where it is not black, whatever its transparency.
     ///
     /// # Errors
     /// [`VisionError`] when the file is damaged, too large, or no PNG.
@@ -138,8 +138,10 @@ impl Mask {
         let mut data = Vec::new();
         let (width, height) = decode_png(&bytes, path, kept, |row, format| {
             let bytes = format.bits.div_ceil(8);
+            // Classes in a palette have colours of any channel.
+            let colours = if format.channels > 2 { 3 } else { 1 };
             let pixels = row.chunks_exact(format.channels * bytes);
-            data.extend(pixels.map(|pixel| pixel[..bytes].iter().any(|&byte| byte != 0)));
+            data.extend(pixels.map(|pixel| pixel[..colours * bytes].iter().any(|&byte| byte != 0)));
             Ok(())
         })?;
         Ok(Self { width, height, data })
@@ -302,7 +304,7 @@ mod tests {
 
     /// Cut to 8 bits, a 1 of 16 bits would be outside.
     #[test]
-    fn a_mask_of_any_depth_is_what_is_not_0() {
+    fn a_mask_of_any_depth_is_what_is_not_black() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("m.png");
         for value in [1, 255, 256, u16::MAX] {
@@ -310,6 +312,18 @@ mod tests {
             std::fs::write(&path, deep.to_png().unwrap()).unwrap();
             assert_eq!(Mask::read(&path).unwrap().data, [false, true, false], "{value}");
         }
+        let green = Rgb { width: 2, height: 1, data: vec![0, 0, 0, 0, 128, 0] };
+        std::fs::write(&path, green.to_png().unwrap()).unwrap();
+        assert_eq!(Mask::read(&path).unwrap().data, [false, true]);
+        let clear = encode_png(
+            2,
+            1,
+            png::ColorType::Rgba,
+            png::BitDepth::Eight,
+            &[0, 0, 0, 255, 1, 0, 0, 0],
+        );
+        std::fs::write(&path, clear.unwrap()).unwrap();
+        assert_eq!(Mask::read(&path).unwrap().data, [false, true]);
         for depth in [png::BitDepth::One, png::BitDepth::Two, png::BitDepth::Four] {
             let bytes = [0b1000_0000];
             let grey = png::ColorType::Grayscale;

@@ -4,7 +4,6 @@
 
 mod muxed;
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use corsmal_vision::{Rgb, Video};
@@ -33,14 +32,11 @@ fn refused(bytes: &[u8]) -> String {
 fn pictures(path: &Path) -> Result<Vec<(u32, Rgb)>, String> {
     let mut all = Vec::new();
     let video = Video::open(path).map_err(|e| e.to_string())?;
-    let read = video.pictures(
-        |_| true,
-        |number, picture| {
-            all.push((number, picture));
-            ControlFlow::Continue(())
-        },
-    );
-    read.map(|()| all).map_err(|e| e.to_string())
+    let mut pictures = video.pictures().map_err(|e| e.to_string())?;
+    while let Some((number, picture)) = pictures.next(|_| true).map_err(|e| e.to_string())? {
+        all.push((number, picture.unwrap()));
+    }
+    Ok(all)
 }
 
 #[test]
@@ -67,8 +63,13 @@ fn damaged_files_are_refused() {
     let most = u32::MAX.to_be_bytes();
     // Counts that a file claims, sizes of nothing, and boxes that leave theirs.
     assert!(changed(place(b"stsz") + 12, &most).contains("4294967295 frames; the limit is 100000"));
-    assert!(changed(place(b"stsz") + 12, &[0, 0, 0, 5]).contains("tells where 4 of 5 frames are"));
+    assert!(changed(place(b"stsz") + 12, &[0, 0, 0, 5]).contains("locates 4 of 5 frames"));
     assert!(changed(place(b"stco") + 8, &most).contains("a table of 4294967295 entries ends"));
+    assert!(changed(place(b"stts") + 12, &[0, 0, 0, 3]).contains("when 3 of 4 frames are shown"));
+    // Frames that players do not show, or turn.
+    assert!(changed(place(b"elst") + 19, &[2]).contains("edit list leaves out 2 of 4 frames"));
+    assert!(changed(place(b"elst") + 12, &[0, 0, 3, 232]).contains("leaves out 3 of 4 frames"));
+    assert!(changed(place(b"tkhd") + 44, &[0; 4]).contains("to be turned"));
     assert!(changed(place(b"stco") + 12, &most).contains("it ends before frame 0"));
     assert!(changed(place(b"avcC") - 4, &[0; 4]).contains("box avcC has 0 bytes"));
     assert!(changed(place(b"trak") - 4, &most).contains("box trak has 4294967295 bytes"));
@@ -179,32 +180,40 @@ mod decoded {
             assert_eq!(all.len(), 20);
             check(&all);
         }
-        // Only those that are wanted, and none after the reader has enough.
+        // Pictures only of those that are wanted.
         let video = Video::open(&shades()).unwrap();
-        let mut seen = Vec::new();
-        let read = video.pictures(
-            |number| number % 4 == 3,
-            |number, _| {
-                seen.push(number);
-                if number >= 11 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            },
-        );
-        read.unwrap();
-        assert_eq!(seen, [3, 7, 11]);
+        let (mut pictures, mut seen) = (video.pictures().unwrap(), Vec::new());
+        while let Some((number, picture)) = pictures.next(|number| number % 4 == 3).unwrap() {
+            seen.extend(picture.map(|_| number));
+        }
+        assert_eq!(seen, [3, 7, 11, 15, 19]);
     }
 
-    /// Twelve frames, each brighter, in another order than they are shown, made by
-    /// `ffmpeg -f lavfi -i "nullsrc=s=32x24:r=10:d=1.2,geq=lum='30+15*N':cb=128:cr=128" -c:v libx264 -bf 2
-    /// -x264-params b-adapt=0:scenecut=0:keyint=12 -pix_fmt yuv420p`; ffmpeg's own red values beside.
+    /// Twelve frames in another order than they are shown, each in another colour, made by
+    /// `ffmpeg -f lavfi -i "nullsrc=s=32x24:r=10:d=1.2,geq=lum='60+10*N':cb='90+5*N':cr='170-6*N'" -c:v libx264 -bf 2
+    /// -x264-params b-adapt=0:scenecut=0:keyint=12 -crf 4 -pix_fmt yuv420p`, with an edit list that hides nothing.
     #[test]
     fn frames_come_as_they_are_shown() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reordered.mp4");
         let found = pictures(&path).unwrap();
         assert_eq!(found.len(), 12);
         for (k, (number, picture)) in found.iter().enumerate() {
-            let red = (255.0 / 219.0 * (14.0 + 15.0 * k as f64)).round() as u8;
+            let n = k as f64;
+            let (y, cb, cr) = (60.0 + 10.0 * n, -38.0 + 5.0 * n, 42.0 - 6.0 * n);
+            // ITU-R BT.601, limited range.
+            let light = 1.164_383 * (y - 16.0);
+            let want = [
+                light + 1.596_027 * cr,
+                light - 0.391_762 * cb - 0.812_968 * cr,
+                light + 2.017_232 * cb,
+            ];
             assert_eq!(*number as usize, k);
-            assert!(picture.data[100].abs_diff(red) <= 3, "{k}: {} not {red}", picture.data[100]);
+            let got = &picture.data[3 * (12 * 32 + 16)..][..3];
+            let near = got
+                .iter()
+                .zip(want)
+                .all(|(got, want)| (f64::from(*got) - want.clamp(0.0, 255.0)).abs() <= 4.0);
+            assert!(near, "frame {k}: {got:?} not {want:?}");
         }
     }
 
@@ -223,7 +232,7 @@ mod decoded {
         let said = refuse(&setup, &empty);
         assert!(said.contains("frame") && said.contains("v.mp4"), "{said}");
         assert!(refuse(&setup[..3], &frames).contains("avcC"));
-        assert!(refuse(&[], &frames).contains("its codec is avc1"));
+        assert!(refuse(&[], &frames).contains("a damaged box avcC"));
         let other = muxed::mp4(b"mp4v", &setup, &frames);
         let said = pictures(&written(folder.path(), &other)).unwrap_err();
         assert!(said.contains("its codec is mp4v; of videos H.264 (avc1) is read"), "{said}");

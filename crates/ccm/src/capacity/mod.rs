@@ -2,6 +2,7 @@
 //!
 //! `docs/vision.md` says what is published, what is corrected and what is our reading.
 
+mod colours;
 mod combine;
 mod methods;
 mod model;
@@ -19,6 +20,7 @@ use crate::dataset::{Container, DataSet, Recording, Subset};
 use crate::error::{CcmError, Result};
 use crate::submission::RowKey;
 
+pub use colours::{Colours, Reader, require_colours};
 pub use combine::combine_files;
 pub use methods::{Estimate, M5_FROM_END, RegionNetwork, Sizes};
 use model::Sample;

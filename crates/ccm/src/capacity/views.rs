@@ -6,24 +6,20 @@
 //! `view1/calib/<id>.pickle`, `view1/depth/<id>/0000.png`, `view1/rgb/<id>/0000.png`,
 //! `view1/rgb/<id>.mp4`, `view1/masks/<id>/0000.png`, and `detections/<id>.csv` or `.json`. Calibrations may be `.json`.
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use corsmal_vision::category::Vote;
 use corsmal_vision::{
-    Calibration, Camera, Depth, Detection, Mask, Rgb, Video, VisionError, read_detections,
+    Calibration, Camera, Depth, Detection, Mask, Video, VisionError, read_detections,
 };
 
+use super::colours::Colours;
 use crate::dataset::Recording;
 
 /// Columns and rows of the data set's images.
 pub(super) const IMAGE_SIZE: (usize, usize) = (1280, 720);
 /// Frames that are listed of one view at most.
 const MAX_FRAMES: usize = 100_000;
-
-/// What the names of videos end in.
-const VIDEO: &str = "mp4";
 
 /// Where the files of a recording's views are.
 #[derive(Clone, Debug)]
@@ -70,15 +66,8 @@ impl Kind {
 pub struct Frame {
     /// Its number in the video, from 0.
     pub number: u32,
-    /// The image, or the video that it is in.
+    /// The image.
     pub path: PathBuf,
-}
-
-impl Frame {
-    /// Whether it is in a video, and no image of its own.
-    fn is_in_video(&self) -> bool {
-        self.path.extension().is_some_and(|extension| extension == VIDEO)
-    }
 }
 
 /// Why something could not be used.
@@ -146,11 +135,10 @@ impl Views {
         Ok(Calibration::load(&path)?.rgb)
     }
 
-    /// The frames of a view of one kind, in their order; none where there is no folder. Where there is a video
-    /// instead of colour images, those of the video.
+    /// The frames of a view of one kind, in their order; none where there is no folder.
     ///
     /// # Errors
-    /// The folder or the video cannot be read, or `view` is not 1 to 4.
+    /// The folder cannot be read, or `view` is not 1 to 4.
     pub fn frames(&self, kind: Kind, view: u8) -> Result<&[Frame], Problem> {
         let of_kind = &self.frames[kind as usize];
         let list = of_kind
@@ -176,7 +164,7 @@ impl Views {
             base.join(format!("view{view}/{kind}/{stem}")),
         ];
         let Some(folder) = folders.iter().find(|folder| folder.is_dir()) else {
-            return if kind == Kind::Rgb.folder() { self.video(view) } else { Ok(Vec::new()) };
+            return Ok(Vec::new());
         };
         let unreadable = |e| Problem::Damaged(format!("{}: {e}", folder.display()));
         let mut frames = Vec::new();
@@ -197,41 +185,27 @@ impl Views {
         Ok(frames)
     }
 
-    /// The frames of the video of a view; none where there is none.
-    fn video(&self, view: u8) -> Result<Vec<Frame>, Problem> {
+    /// The video of a view, where there is one.
+    fn video(&self, view: u8) -> Result<Option<Video>, Problem> {
         let Self { base, stem, .. } = self;
         let videos = [
-            base.join(format!("rgb/{stem}_c{view}.{VIDEO}")),
-            base.join(format!("view{view}/rgb/{stem}.{VIDEO}")),
+            base.join(format!("rgb/{stem}_c{view}.mp4")),
+            base.join(format!("view{view}/rgb/{stem}.mp4")),
         ];
-        let Some(path) = videos.into_iter().find(|path| path.is_file()) else {
-            return Ok(Vec::new());
-        };
-        let frames = Video::open(&path)?.len() as u32;
-        Ok((0..frames).map(|number| Frame { number, path: path.clone() }).collect())
+        let found = videos.into_iter().find(|path| path.is_file());
+        Ok(found.map(|path| Video::open(&path)).transpose()?)
     }
 
-    /// Reads those colour images of a view that are `wanted`, in their order, until `each` breaks off. A video
-    /// is decoded once.
+    /// The colour frames of a view: its images or, where there are none, its video.
     ///
     /// # Errors
-    /// An image is damaged; the video is, or this program was built without video.
-    pub fn colours(
-        &self,
-        view: u8,
-        wanted: impl Fn(u32) -> bool,
-        mut each: impl FnMut(u32, Rgb) -> ControlFlow<()>,
-    ) -> Result<(), Problem> {
-        let frames = self.frames(Kind::Rgb, view)?;
-        if let Some(first) = frames.first().filter(|frame| frame.is_in_video()) {
-            return Ok(Video::open(&first.path)?.pictures(wanted, each)?);
+    /// The folder or the video cannot be read, or `view` is not 1 to 4.
+    pub fn colours(&self, view: u8) -> Result<Colours<'_>, Problem> {
+        let images = self.frames(Kind::Rgb, view)?;
+        match images.is_empty().then(|| self.video(view)).transpose()?.flatten() {
+            Some(video) => Ok(Colours::of_video(video)),
+            None => Ok(Colours::of_images(images)),
         }
-        for frame in frames.iter().filter(|frame| wanted(frame.number)) {
-            if each(frame.number, Rgb::read(&frame.path)?).is_break() {
-                break;
-            }
-        }
-        Ok(())
     }
 
     /// What a detector saw in all views; `None` where there is no table.
@@ -254,12 +228,20 @@ impl Views {
         }
     }
 
-    /// Kind of container that a random share of the frames of all views votes for, as M3 tells it.
+    /// Whether something says where the object is in a frame of a view, as [`Views::edges`] finds it.
     ///
     /// # Errors
-    /// No frame shows a container; the table of detections is damaged.
-    pub fn vote(&self, seed: u64) -> Result<Vote, Problem> {
-        super::methods::vote(&super::methods::table(self)?, seed)
+    /// Nothing does.
+    pub fn shows(
+        &self,
+        detections: &[Detection],
+        (view, frame): (u8, u32),
+        labels: &[&str],
+    ) -> Result<(), Problem> {
+        match self.image(Kind::Masks, view, frame)? {
+            Some(_) => Ok(()),
+            None => best(detections, (view, frame), labels, 0.0).map(|_| ()),
+        }
     }
 
     /// A depth image of a view.
@@ -339,9 +321,9 @@ impl Views {
     /// Numbers of the first frame of the side views' video and of the one `from_end` from its end, the last
     /// where there are fewer; `None` where nothing says how long it is.
     ///
-    /// The video's frames are the images that both views have: colour, depth, or else masks; then those of the
-    /// videos. A table of detections has no row for a frame in which nothing was found: it counts from 0 to its
-    /// last frame.
+    /// The video's frames are the images that both views have: colour, depth, or else masks; then those of both
+    /// videos, which may be numbered otherwise; a video that cannot be read says nothing. A table of detections has
+    /// no row for a frame in which nothing was found: it counts from 0 to its last frame.
     ///
     /// # Errors
     /// A folder cannot be read.
@@ -350,20 +332,24 @@ impl Views {
         detections: &[Detection],
         from_end: usize,
     ) -> Result<Option<(u32, u32)>, Problem> {
-        // Images may be numbered otherwise than the frames of a video that lies beside them.
-        let sources =
-            [(Kind::Rgb, false), (Kind::Depth, false), (Kind::Masks, false), (Kind::Rgb, true)];
-        for (kind, video) in sources {
+        let ends = |numbers: &[u32]| {
+            let (first, last) = (numbers.first()?, numbers.last()?);
+            let late = numbers.len().checked_sub(from_end).and_then(|at| numbers.get(at));
+            Some((*first, *late.unwrap_or(last)))
+        };
+        for kind in [Kind::Rgb, Kind::Depth, Kind::Masks] {
             let other = self.frames(kind, 2)?;
-            let shared = |f: &&Frame| {
-                f.is_in_video() == video
-                    && other.binary_search_by_key(&f.number, |o| o.number).is_ok()
-            };
+            let shared = |f: &&Frame| other.binary_search_by_key(&f.number, |o| o.number).is_ok();
             let numbers: Vec<u32> =
                 self.frames(kind, 1)?.iter().filter(shared).map(|f| f.number).collect();
-            if let (Some(first), Some(last)) = (numbers.first(), numbers.last()) {
-                let late = numbers.len().checked_sub(from_end).and_then(|at| numbers.get(at));
-                return Ok(Some((*first, *late.unwrap_or(last))));
+            if let Some(found) = ends(&numbers) {
+                return Ok(Some(found));
+            }
+        }
+        if let (Ok(Some(one)), Ok(Some(other))) = (self.video(1), self.video(2)) {
+            let numbers: Vec<u32> = (0..one.len().min(other.len()) as u32).collect();
+            if let Some(found) = ends(&numbers) {
+                return Ok(Some(found));
             }
         }
         let last = detections.iter().map(|d| d.frame).max();

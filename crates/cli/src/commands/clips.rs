@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
-use corsmal_ccm::capacity::{Kind, Problem, Views};
+use corsmal_ccm::capacity::{Problem, Views, require_colours};
 use corsmal_ccm::dataset::{Container, DataSet, SequenceName};
 use corsmal_files::format::require_npz;
 use corsmal_nets::dataset::Dataset;
@@ -27,6 +27,7 @@ pub fn run(args: &Args, data: &Path, model: &Path, library: &Path) -> Result<Exi
     let identity = corsmal_files::identity::of_file(model)
         .map_err(|e| Failure::new(format!("{}: {e}", model.display())))?;
     let set = DataSet::open(data)?;
+    require_colours(&set.recordings)?;
     let runtime = Runtime::load(library, args.jobs.count())?;
     let mut embedder = ClipEmbedder::open(&runtime, model)?;
     let (mut ids, mut view_of, mut names) = (Vec::new(), Vec::new(), Vec::new());
@@ -95,7 +96,8 @@ enum Fault {
 
 impl From<Problem> for Fault {
     fn from(problem: Problem) -> Self {
-        Self::Recording(super::frames::reason(problem))
+        let (Problem::Missing(reason) | Problem::Damaged(reason)) = problem;
+        Self::Recording(reason)
     }
 }
 
@@ -103,42 +105,38 @@ impl From<Problem> for Fault {
 fn sequences(embedder: &mut ClipEmbedder, views: &Views) -> Result<Vec<Vec<f32>>, Fault> {
     let mut sequences = Vec::new();
     for view in 1..=VIEWS {
-        let frames = views.frames(Kind::Rgb, view)?;
-        let numbers: Vec<u32> = frames.iter().map(|frame| frame.number).collect();
-        check(view, &numbers).map_err(Fault::Recording)?;
-        let used = numbers.len() / FRAMES * FRAMES;
-        let end = numbers[used - 1];
+        let colours = views.colours(view)?;
+        let numbers = colours.numbers();
+        let used = check(view, &numbers).map_err(Fault::Recording)?;
         let mut sequence = Vec::with_capacity(used / FRAMES * FEATURES);
         let mut window = Vec::with_capacity(FRAMES);
-        super::frames::each(
-            views,
-            view,
-            |number| number <= end,
-            |_, image| {
-                if crate::interrupt::flag().load(Ordering::SeqCst) {
-                    return Err(Fault::Interrupted);
-                }
-                window.push(clip::frame(&image));
-                if window.len() == FRAMES {
-                    sequence.extend(embedder.embed(&clip::window(&window)).map_err(Fault::Model)?);
-                    window.clear();
-                }
-                Ok(())
-            },
-        )?;
+        let mut reader = colours.read()?;
+        // Not further than the last window.
+        for _ in 0..used {
+            if crate::interrupt::flag().load(Ordering::SeqCst) {
+                return Err(Fault::Interrupted);
+            }
+            let Some((_, Some(image))) = reader.next(|_| true)? else { break };
+            window.push(clip::frame(&image));
+            if window.len() == FRAMES {
+                sequence.extend(embedder.embed(&clip::window(&window)).map_err(Fault::Model)?);
+                window.clear();
+            }
+        }
         sequences.push(sequence);
     }
     Ok(sequences)
 }
 
-/// Refuses frames that windows cannot be made of.
-fn check(view: u8, numbers: &[u32]) -> Result<(), String> {
+/// How many frames windows are made of; refuses those that none can be made of.
+fn check(view: u8, numbers: &[u32]) -> Result<usize, String> {
     let found = numbers.len();
     if found < FRAMES {
         return Err(format!("view {view} has {found} colour frames; a window has {FRAMES}"));
     }
-    match numbers.windows(2).find(|pair| pair[1] != pair[0] + 1) {
-        None => Ok(()),
+    let used = found / FRAMES * FRAMES;
+    match numbers[..used].windows(2).find(|pair| pair[0].checked_add(1) != Some(pair[1])) {
+        None => Ok(used),
         Some(pair) if pair[0] == pair[1] => {
             Err(format!("view {view} has two images of frame {}", pair[0]))
         }
@@ -158,13 +156,17 @@ mod tests {
     fn windows_have_no_gaps() {
         let refused = |numbers: &[u32]| check(2, numbers).unwrap_err();
         let all: Vec<u32> = (1..=20).collect();
-        assert_eq!(check(2, &all), Ok(()));
+        assert_eq!(check(2, &all), Ok(16));
         assert!(refused(&all[..15]).contains("view 2 has 15 colour frames; a window has 16"));
-        let gap = [&all[..17], &all[18..]].concat();
-        assert!(refused(&gap).contains("after frame 17 comes frame 19"));
+        let gap = [&all[..7], &all[8..]].concat();
+        assert!(refused(&gap).contains("after frame 7 comes frame 9"));
+        // Behind the last window a gap does no harm.
+        assert_eq!(check(2, &[&all[..16], &[18]].concat()), Ok(16));
         let sampled: Vec<u32> = all.iter().map(|number| 8 * number).collect();
         assert!(refused(&sampled).contains("after frame 8 comes frame 16"));
         let twice = [&all[..4], &all[3..]].concat();
         assert!(refused(&twice).contains("two images of frame 4"));
+        let most: Vec<u32> = (0..16).map(|k| u32::MAX - 15 + k).chain([u32::MAX; 16]).collect();
+        assert!(refused(&most).contains("two images of frame 4294967295"));
     }
 }

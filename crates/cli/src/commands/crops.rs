@@ -22,7 +22,7 @@ Examples:
 Writes a picture for each view of a labelled training recording whose last colour frame shows a cup or
 wine glass, and labels.csv with the columns id, container, view, level and type. Level and type are
 \"opaque\" where the container hides what it holds. docs/vision.md lists the files that the command reads.
-The folder appears when all is written: nothing is left of an interrupted run.
+Labels are written last; an interrupted run leaves nothing behind.
 
 Exit codes: 0 all fine, 1 some recordings have damaged files, 2 could not run, 130 interrupted.")]
 pub struct Args {

@@ -99,6 +99,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     use crate::plural::plural;
 
     let set = DataSet::open(&args.data)?;
+    corsmal_ccm::capacity::require_colours(&set.recordings)?;
     let runtime = Runtime::load(&args.library, args.jobs.count())?;
     let mut detector = Detector::open(&runtime, &args.model)?;
     let tables: Vec<PathBuf> = set
@@ -140,13 +141,6 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         }
     }
     let (out, recordings) = (&args.out, set.recordings.len());
-    if without == recordings {
-        return Err(Failure::new(format!(
-            "{}: none of {} has colour frames (rgb/SEQUENCE/c1/0000.png or rgb/SEQUENCE_c1.mp4; see docs/vision.md)",
-            args.data.display(),
-            plural(recordings, "recording")
-        )));
-    }
     args.told.tell(
         || {
             json!({
@@ -219,7 +213,10 @@ enum Fault {
 #[cfg(feature = "onnx")]
 impl From<corsmal_ccm::capacity::Problem> for Fault {
     fn from(problem: corsmal_ccm::capacity::Problem) -> Self {
-        Self::Recording(super::frames::reason(problem))
+        use corsmal_ccm::capacity::Problem;
+
+        let (Problem::Missing(reason) | Problem::Damaged(reason)) = problem;
+        Self::Recording(reason)
     }
 }
 
@@ -230,34 +227,37 @@ fn seen(
     views: &corsmal_ccm::capacity::Views,
     args: &Args,
 ) -> Result<Option<Vec<serde_json::Value>>, Fault> {
-    use corsmal_ccm::capacity::Kind;
-
-    let ends = views.ends(&[], corsmal_ccm::capacity::M5_FROM_END)?;
+    let ends = match args.frames {
+        Frames::Ends => views.ends(&[], corsmal_ccm::capacity::M5_FROM_END)?,
+        Frames::Every(_) => None,
+    };
     let (mut rows, mut any) = (Vec::new(), false);
     for view in chosen_views(args) {
-        let last = views.frames(Kind::Rgb, view)?.last().map(|frame| frame.number);
-        any |= last.is_some();
+        let colours = views.colours(view)?;
+        let numbers = colours.numbers();
+        let Some(&last) = numbers.last() else { continue };
+        any = true;
         let wanted = |number: u32| {
             let chosen = match args.frames {
                 // By number, as `capacity` takes them.
                 Frames::Every(step) => (number as usize).is_multiple_of(step),
                 Frames::Ends => ends.is_some_and(|(a, b)| [a, b].contains(&number)),
             };
-            chosen || Some(number) == last
+            chosen || number == last
         };
-        let mut look = |number: u32, image: corsmal_vision::Rgb| -> Result<(), Fault> {
+        let mut reader = colours.read()?;
+        while let Some((number, image)) = reader.next(wanted)? {
             if crate::interrupt::flag().load(std::sync::atomic::Ordering::SeqCst) {
                 return Err(Fault::Interrupted);
             }
+            let Some(image) = image else { continue };
             let size = (image.width, image.height);
             let found = detector
                 .detect(&image, |found| found.rows((view, number), size, args.score as f32));
             let path = args.model.display();
             let found = found.map_err(|e| Fault::Model(e.into()))?;
             rows.extend(found.map_err(|e| Fault::Model(Failure::new(format!("{path}: {e}"))))?);
-            Ok(())
-        };
-        super::frames::each(views, view, wanted, &mut look)?;
+        }
     }
     Ok(any.then_some(rows))
 }

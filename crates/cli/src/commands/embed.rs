@@ -19,7 +19,8 @@ Bring your own weights, under the names of the usual PyTorch port (features.0.we
 embeddings.4.bias); a .pth is read without running it. The .npz has X, rows of 128 numbers for each
 .96 s of one recording after another, offsets, where each recording begins, and ids; label columns of
 a manifest are kept. r21d embeds windows of 16 colour frames of the four views of a data set, 512 numbers
-each, by an ONNX model (docs/vision.md); the member view says which view a sequence is.
+each, by an ONNX model (docs/vision.md); the member view says which view a sequence is. It needs every frame
+of a view, as images or, in a build with the feature `video`, as H.264 in MP4.
 
 Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 interrupted.")]
 pub struct Args {

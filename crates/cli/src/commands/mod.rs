@@ -18,8 +18,6 @@ mod embed;
 mod evaluate;
 mod extract;
 mod features;
-#[cfg(feature = "onnx")]
-mod frames;
 mod fuse;
 mod inspect;
 mod merge;

@@ -13,6 +13,7 @@ mod formats;
 mod fusion;
 mod hostile;
 mod inspect;
+mod inspect_kinds;
 mod journey;
 mod live;
 mod models;
@@ -24,5 +25,7 @@ mod onnx;
 mod pictures;
 mod scoring;
 mod stores;
+#[cfg(feature = "nets")]
+mod systems;
 #[cfg(not(feature = "nets"))]
 mod without_networks;

@@ -13,11 +13,14 @@ fn write(path: &Path, bytes: &[u8]) {
     std::fs::write(path, bytes).unwrap();
 }
 
+/// Names of the recordings of even and of odd containers.
+const NAMES: [&str; 2] = ["s0_fi3_fu2_b0_l0", "s0_fi1_fu1_b0_l0"];
+
 /// A recording of each of six containers, seen as a few pixels by views 1 and 2, where a detector finds
 /// something everywhere but in the first recording's view 2.
 fn data(folder: &Path) {
     for container in 1..=6u8 {
-        let name = ["s0_fi3_fu2_b0_l0", "s0_fi1_fu1_b0_l0"][usize::from(container % 2)];
+        let name = NAMES[usize::from(container % 2)];
         let base = folder.join(format!("train/{container}"));
         write(&base.join(format!("audio/{name}_audio.wav")), b"");
         let mut table = String::from("frame,view,label,score,x_min,y_min,x_max,y_max,mask\n");
@@ -97,7 +100,7 @@ fn crops_train_a_network_that_classifies_pictures() {
     let of = |table: &str, id: &str| table.lines().find(|l| l.starts_with(id)).map(str::to_owned);
     assert_eq!(of(&one, "1_s0_fi1_fu1_b0_l0_c1"), of(&table, "1_s0_fi1_fu1_b0_l0_c1"));
 
-    // Labels that are named count alone: those among the pictures, which lack most of these, are not read.
+    // Only the labels given by --labels count: those among the pictures are not read.
     let (few, labels) = (path("few"), path("labels.csv"));
     std::fs::create_dir(&few).unwrap();
     let mut table = String::from("id,held\n");
@@ -168,6 +171,8 @@ fn each_view_answers_alone_in_the_benchmark() {
     let table = tables.join("5/s0_fi1_fu1_b0_l0.csv");
     let rows = std::fs::read_to_string(&table).unwrap();
     std::fs::write(&table, rows.replacen("2,1,14,11", "14,1,14,11", 1)).unwrap();
+    // So is a damaged image.
+    std::fs::write(ccm.join("train/6/rgb/s0_fi3_fu2_b0_l0/c2/0003.png"), b"no image").unwrap();
     let words = ["benchmark", "--data", text(&ccm), "--out", text(&out), "--methods", "mask-rn"];
     let words = [&words[..], &["--detections", text(&tables)]].concat();
     let said = done(&[&words[..], &["--epochs", "1"]].concat());
@@ -190,16 +195,60 @@ fn each_view_answers_alone_in_the_benchmark() {
     assert!(out.join("figures/mask-rn-rgb1-level-confusion.svg").exists());
     let report = read("report.json");
     for note in [
-        "view 1: no cup or wine glass in the last frame of 1 of 6 recordings",
-        "view 2: no cup or wine glass in the last frame of 1 of 6 recordings",
-        "view 4: no cup or wine glass in the last frame of 6 of 6 recordings",
+        "view 1: no picture of a cup or wine glass in the last frame of 1 of 6 recordings",
+        "view 2: no picture of a cup or wine glass in the last frame of 2 of 6 recordings",
+        "1 damaged files count as nothing seen; the first, ",
+        "c2/0003.png",
+        "view 4: no picture of a cup or wine glass in the last frame of 6 of 6 recordings",
         "resnet18_level was trained for 1 epoch, its recipe has 30.",
     ] {
         assert!(report.contains(note), "{note}");
     }
     let message = refused(&[&words[..], &["--weights", "m1=w.pth"]].concat());
     assert!(message.contains("no system of this run has that network"), "{message}");
-    std::fs::write(ccm.join("train/1/rgb/s0_fi1_fu1_b0_l0/c1/0003.png"), b"no image").unwrap();
+    for container in 1..=6 {
+        std::fs::write(tables.join(format!("{container}/{}.csv", NAMES[container % 2])), "x")
+            .unwrap();
+    }
     let message = refused(&[&words[..], &["--quiet"]].concat());
-    assert!(message.contains("Mask + RN: ") && message.contains("0003.png"), "{message}");
+    assert!(message.contains("no view of a training recording shows a container"), "{message}");
+    assert!(message.contains("the first damaged one, "), "{message}");
+}
+
+#[test]
+fn crops_of_videos_need_the_feature() {
+    let folder = tempfile::tempdir().unwrap();
+    let (ccm, out) = (folder.path().join("ccm"), folder.path().join("crops"));
+    data(&ccm);
+    // A video instead of the images of one view; the table tells of its last frame.
+    let base = ccm.join("train/3");
+    let shades = Path::new(env!("CARGO_MANIFEST_DIR")).join("../vision/tests/shades.mp4");
+    std::fs::remove_dir_all(base.join(format!("rgb/{}/c1", NAMES[1]))).unwrap();
+    std::fs::copy(shades, base.join(format!("rgb/{}_c1.mp4", NAMES[1]))).unwrap();
+    let table = base.join(format!("detections/{}.csv", NAMES[1]));
+    let rows = std::fs::read_to_string(&table).unwrap();
+    std::fs::write(&table, format!("{rows}19,1,cup,0.8,2,3,10,20,\n")).unwrap();
+    let output = run(&["crops", "--data", text(&ccm), "--out", text(&out)]);
+    let picture = out.join(format!("3_{}_c1.png", NAMES[1]));
+    if cfg!(feature = "video") {
+        assert_eq!(output.status.code(), Some(0));
+        let cup = corsmal_vision::Rgb::read(&picture).unwrap();
+        // The brightest of its frames, red on the left.
+        assert_eq!((cup.width, cup.height), (8, 17));
+        assert!(cup.data[0] > 190 && cup.data[1] < 20, "{:?}", &cup.data[..3]);
+    } else {
+        assert_eq!(output.status.code(), Some(1));
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(said.contains("_c1.mp4: this program was built without video"), "{said}");
+        assert!(!picture.exists() && out.join("labels.csv").exists());
+        // Where there are only videos, that is said at once.
+        let others = ccm.join("train");
+        for container in [1, 2, 4, 5, 6] {
+            std::fs::remove_dir_all(others.join(container.to_string())).unwrap();
+        }
+        std::fs::remove_dir_all(base.join(format!("rgb/{}", NAMES[1]))).unwrap();
+        let again = folder.path().join("again");
+        let message = refused(&["crops", "--data", text(&ccm), "--out", text(&again)]);
+        assert!(message.contains("built without video") && !again.exists(), "{message}");
+    }
 }

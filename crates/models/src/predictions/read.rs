@@ -50,7 +50,7 @@ impl PredictionTable {
     }
 }
 
-/// Columns that are known by their names, in upper and lower case.
+/// Columns that are known by their names, ignoring case.
 const MEANT: [&str; 8] =
     ["id", "path", "true", "predicted", "sequence", "object", "container", "container id"];
 
@@ -76,9 +76,7 @@ impl PredictionColumns {
             if header.iter().filter(|h| h.eq_ignore_ascii_case(name)).count() > 1 {
                 return Err(content(
                     path,
-                    format!(
-                        "two columns have the name {name:?}, but for upper and lower case; rename one of them"
-                    ),
+                    format!("two columns are named {name:?} (case is ignored); rename one"),
                 ));
             }
         }

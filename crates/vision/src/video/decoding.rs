@@ -1,7 +1,8 @@
 //! H.264 by Cisco's OpenH264.
 
+use std::collections::VecDeque;
+use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
-use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
@@ -16,77 +17,122 @@ use crate::image::{Rgb, check_size};
 /// What begins a unit of a stream.
 const START: [u8; 4] = [0, 0, 0, 1];
 
-/// As [`super::Video::pictures`].
-pub(super) fn pictures(
-    track: &Track,
-    file: &mut (impl Read + Seek),
-    path: &Path,
-    wanted: impl Fn(u32) -> bool,
-    mut each: impl FnMut(u32, Rgb) -> ControlFlow<()>,
-) -> Result<()> {
-    let damaged = |reason: String| VisionError::file(path, reason);
-    if track.setup.is_empty() {
-        let codec = track.codec.escape_ascii();
-        return Err(damaged(format!(
-            "its codec is {codec}; of videos H.264 (avc1) is read: extract the frames as PNG or JPEG \
-             (docs/vision.md)"
-        )));
+/// A decoder that goes through a video.
+pub(super) struct Decoding<'v> {
+    track: &'v Track,
+    path: &'v Path,
+    file: File,
+    decoder: Decoder,
+    /// Bytes of the length before each unit of a frame.
+    length: usize,
+    /// Parameter sets at first; then what is decoded.
+    stream: Vec<u8>,
+    /// Frames that have been given to the decoder.
+    given: usize,
+    /// Frames that it has given back.
+    shown: u32,
+    /// Those that it held back until the end.
+    last: Option<VecDeque<(u32, Option<Rgb>)>>,
+}
+
+impl<'v> Decoding<'v> {
+    /// Before the first frame.
+    pub(super) fn begin(track: &'v Track, path: &'v Path) -> Result<Self> {
+        let damaged = |reason: String| VisionError::file(path, reason);
+        let setup = track.setup.as_deref().ok_or_else(|| {
+            let codec = track.codec.escape_ascii();
+            damaged(format!(
+                "its codec is {codec}; of videos H.264 (avc1) is read: extract the frames as PNG or JPEG \
+                 (docs/vision.md)"
+            ))
+        })?;
+        let setup = setup_of(setup).ok_or_else(|| damaged("a damaged box avcC".into()))?;
+        let Setup { prefix, length } = setup;
+        // Frames come in the order in which they are shown only where none is asked for before its turn.
+        let config = DecoderConfig::new().flush_after_decode(Flush::NoFlush);
+        let decoder = Decoder::with_api_config(OpenH264API::from_source(), config);
+        let decoder = decoder.map_err(|e| damaged(format!("no decoder: {e}")))?;
+        let file = File::open(path).map_err(|e| VisionError::io(path, e))?;
+        let stream = prefix;
+        Ok(Self { track, path, file, decoder, length, stream, given: 0, shown: 0, last: None })
     }
-    // Frames come in the order in which they are shown only where none is asked for before its turn.
-    let config = DecoderConfig::new().flush_after_decode(Flush::NoFlush);
-    let decoder = Decoder::with_api_config(OpenH264API::from_source(), config);
-    let mut decoder = decoder.map_err(|e| damaged(format!("no decoder: {e}")))?;
-    let setup = setup(&track.setup).ok_or_else(|| damaged("a damaged box avcC".into()))?;
-    let Setup { prefix, length } = setup;
-    let mut shown = 0;
-    let mut show = |picture: Option<Rgb>| {
-        let number = shown;
-        shown += 1;
-        picture.map_or(ControlFlow::Continue(()), |picture| each(number, picture))
-    };
-    let mut next = 0;
-    let mut convert = |yuv: &DecodedYUV<'_>| {
-        let number = next;
-        next += 1;
-        if wanted(number) { rgb(yuv, path).map(Some) } else { Ok(None) }
-    };
-    let mut stream = prefix;
-    for (number, &(at, bytes)) in track.frames.iter().enumerate() {
+
+    /// As [`super::Pictures::next`].
+    pub(super) fn next(
+        &mut self,
+        wanted: &dyn Fn(u32) -> bool,
+    ) -> Result<Option<(u32, Option<Rgb>)>> {
+        while self.given < self.track.frames.len() {
+            if let Some(found) = self.decode(wanted)? {
+                return Ok(Some(found));
+            }
+        }
+        if self.last.is_none() {
+            self.last = Some(self.flush(wanted)?);
+        }
+        if let Some(found) = self.last.as_mut().and_then(VecDeque::pop_front) {
+            return Ok(Some(found));
+        }
+        match self.shown as usize == self.track.frames.len() {
+            true => Ok(None),
+            false => {
+                let (shown, count) = (self.shown, self.track.frames.len());
+                Err(self.damaged(format!("{shown} of {count} frames can be decoded")))
+            }
+        }
+    }
+
+    /// Gives a frame to the decoder; what it gives back.
+    fn decode(&mut self, wanted: &dyn Fn(u32) -> bool) -> Result<Option<(u32, Option<Rgb>)>> {
+        let (number, path) = (self.given, self.path);
+        let (at, bytes) = self.track.frames[number];
+        let io = |e| VisionError::io(path, e);
         let mut frame = Vec::new();
-        file.seek(SeekFrom::Start(at)).map_err(|e| VisionError::io(path, e))?;
-        file.take(bytes.into()).read_to_end(&mut frame).map_err(|e| VisionError::io(path, e))?;
-        units(&frame, length, &mut stream)
-            .ok_or_else(|| damaged(format!("frame {number} is damaged")))?;
-        let found = guarded(|| match decoder.decode(&stream) {
-            Ok(Some(yuv)) => convert(&yuv).map(Some),
+        self.file.seek(SeekFrom::Start(at)).map_err(io)?;
+        self.file.by_ref().take(bytes.into()).read_to_end(&mut frame).map_err(io)?;
+        units(&frame, self.length, &mut self.stream)
+            .ok_or_else(|| self.damaged(format!("frame {number} is damaged")))?;
+        self.given += 1;
+        let Self { decoder, stream, shown, .. } = self;
+        let found = guarded(|| match decoder.decode(stream) {
+            Ok(Some(yuv)) => Some(converted(&yuv, shown, wanted, path)).transpose(),
             Ok(None) => Ok(None),
-            Err(error) => Err(damaged(format!("frame {number} cannot be decoded: {error}"))),
+            Err(error) => {
+                let reason = format!("frame {number} cannot be decoded: {error}");
+                Err(VisionError::file(path, reason))
+            }
         });
-        let found =
-            found.ok_or_else(|| damaged(format!("the decoder gave up on frame {number}")))?;
-        if let Some(picture) = found?
-            && show(picture).is_break()
-        {
-            return Ok(());
-        }
-        stream.clear();
+        self.stream.clear();
+        found.ok_or_else(|| self.damaged(format!("the decoder failed on frame {number}")))?
     }
-    let last = guarded(|| {
-        let left = decoder.flush_remaining();
-        let left = left.map_err(|e| damaged(format!("its last frames cannot be decoded: {e}")))?;
-        left.iter().map(&mut convert).collect::<Result<Vec<_>>>()
-    });
-    for picture in
-        last.ok_or_else(|| damaged("the decoder gave up on its last frames".into()))??
-    {
-        if show(picture).is_break() {
-            return Ok(());
-        }
+
+    /// What the decoder still holds after the last frame.
+    fn flush(&mut self, wanted: &dyn Fn(u32) -> bool) -> Result<VecDeque<(u32, Option<Rgb>)>> {
+        let Self { decoder, shown, path, .. } = self;
+        let left = guarded(|| {
+            let left = decoder.flush_remaining().map_err(|e| {
+                VisionError::file(path, format!("its last frames cannot be decoded: {e}"))
+            })?;
+            left.iter().map(|yuv| converted(yuv, shown, wanted, path)).collect()
+        });
+        left.ok_or_else(|| self.damaged("the decoder failed on its last frames".into()))?
     }
-    match shown as usize == track.frames.len() {
-        true => Ok(()),
-        false => Err(damaged(format!("{shown} of {} frames can be decoded", track.frames.len()))),
+
+    fn damaged(&self, reason: String) -> VisionError {
+        VisionError::file(self.path, reason)
     }
+}
+
+/// A frame with the next number, and its picture where that is wanted.
+fn converted(
+    yuv: &DecodedYUV<'_>,
+    shown: &mut u32,
+    wanted: &dyn Fn(u32) -> bool,
+    path: &Path,
+) -> Result<(u32, Option<Rgb>)> {
+    let number = *shown;
+    *shown += 1;
+    Ok((number, if wanted(number) { Some(rgb(yuv, path)?) } else { None }))
 }
 
 /// Runs foreign code; `None` where it panics.
@@ -102,7 +148,7 @@ struct Setup {
     length: usize,
 }
 
-fn setup(bytes: &[u8]) -> Option<Setup> {
+fn setup_of(bytes: &[u8]) -> Option<Setup> {
     let length = usize::from(bytes.get(4)? & 3) + 1;
     let (mut prefix, mut at) = (Vec::new(), 5);
     for mask in [0x1f, 0xff] {

@@ -7,7 +7,6 @@ mod mp4;
 
 use std::fs::File;
 use std::io::BufReader;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Result, VisionError};
@@ -43,36 +42,46 @@ impl Video {
         self.len() == 0
     }
 
-    /// Gives each frame that is `wanted` by its number, from 0, in the order in which they are shown, until
-    /// `each` breaks off. All frames before one are decoded.
+    /// Whether this program decodes videos.
+    pub const DECODES: bool = cfg!(feature = "video");
+
+    /// Begins with its first frame. Colours are taken for BT.601 of limited range, as those of videos that say
+    /// nothing else.
     ///
     /// # Errors
-    /// [`VisionError`] for another codec, damaged frames, and where this program was built without the feature.
-    #[cfg(not(feature = "video"))]
-    pub fn pictures(
-        &self,
-        _: impl Fn(u32) -> bool,
-        _: impl FnMut(u32, Rgb) -> ControlFlow<()>,
-    ) -> Result<()> {
+    /// [`VisionError`] for another codec, and where this program was built without the feature.
+    pub fn pictures(&self) -> Result<Pictures<'_>> {
+        #[cfg(feature = "video")]
+        return decoding::Decoding::begin(&self.track, &self.path).map(Pictures);
+        #[cfg(not(feature = "video"))]
         Err(VisionError::file(
             &self.path,
             "this program was built without video: extract the frames as PNG or JPEG (docs/vision.md), or build \
              it with `--features video`",
         ))
     }
+}
 
-    /// Gives each frame that is `wanted` by its number, from 0, in the order in which they are shown, until
-    /// `each` breaks off. All frames before one are decoded.
+/// The pictures of a video, one after another.
+pub struct Pictures<'v>(
+    #[cfg(feature = "video")] decoding::Decoding<'v>,
+    #[cfg(not(feature = "video"))] std::convert::Infallible,
+    #[cfg(not(feature = "video"))] std::marker::PhantomData<&'v Video>,
+);
+
+impl Pictures<'_> {
+    /// Decodes the next frame as they are shown: its number, from 0, and its picture where that is `wanted`; `None`
+    /// after the last.
     ///
     /// # Errors
-    /// [`VisionError`] for another codec, and damaged frames.
-    #[cfg(feature = "video")]
-    pub fn pictures(
-        &self,
-        wanted: impl Fn(u32) -> bool,
-        each: impl FnMut(u32, Rgb) -> ControlFlow<()>,
-    ) -> Result<()> {
-        let mut file = File::open(&self.path).map_err(|e| VisionError::io(&self.path, e))?;
-        decoding::pictures(&self.track, &mut file, &self.path, wanted, each)
+    /// [`VisionError`] for a damaged frame, and where there are fewer than the index tells of.
+    pub fn next(&mut self, wanted: impl Fn(u32) -> bool) -> Result<Option<(u32, Option<Rgb>)>> {
+        #[cfg(feature = "video")]
+        return self.0.next(&wanted);
+        #[cfg(not(feature = "video"))]
+        {
+            let _ = wanted;
+            match self.0 {}
+        }
     }
 }

@@ -15,6 +15,8 @@ pub(crate) const MAX_FRAMES: usize = 100_000;
 const MAX_FRAME: u32 = 32 << 20;
 /// Said of a file whose frames are not all in its index.
 const FRAGMENTED: &str = "it is fragmented; `ffmpeg -i IN -c copy OUT.mp4` makes one that is not";
+/// Said of a file whose edit list leaves something out.
+const EDITED: &str = "`ffmpeg -i IN OUT.mp4` makes a file of what is shown";
 /// What comes before the boxes of a `VisualSampleEntry`.
 const VISUAL_ENTRY: usize = 78;
 
@@ -24,8 +26,8 @@ const VISUAL_ENTRY: usize = 78;
 pub(super) struct Track {
     /// Codec, such as `avc1`.
     pub(super) codec: [u8; 4],
-    /// Content of its `avcC` box; empty for other codecs.
-    pub(super) setup: Vec<u8>,
+    /// Content of its `avcC` box; `None` for other codecs.
+    pub(super) setup: Option<Vec<u8>>,
     /// First byte and number of bytes of each frame, in decoding order.
     pub(super) frames: Vec<(u64, u32)>,
 }
@@ -46,7 +48,19 @@ pub(super) fn read(file: &mut (impl Read + Seek), size: u64) -> Result<Track, St
         let media = child(track, b"mdia")?;
         // Version, flags, a reserved number; then what handles the media.
         if child(media, b"hdlr")?.get(8..12) == Some(b"vide") {
-            return self::track(child(child(media, b"minf")?, b"stbl")?, size);
+            upright(child(track, b"tkhd")?)?;
+            let table = child(child(media, b"minf")?, b"stbl")?;
+            let found = self::track(table, size)?;
+            let edits = child(track, b"edts").and_then(|edits| child(edits, b"elst"));
+            if let Ok(edits) = edits {
+                let timescale = |header: &[u8]| {
+                    u32_at(header, if header.first() == Some(&1) { 20 } else { 12 })
+                };
+                let movie = timescale(child(&index, b"mvhd")?)?;
+                let media = timescale(child(media, b"mdhd")?)?;
+                whole(edits, &shown(table, found.frames.len())?, (movie, media))?;
+            }
+            return Ok(found);
         }
     }
     Err("it has no video track".into())
@@ -93,26 +107,99 @@ fn index(file: &mut (impl Read + Seek), size: u64) -> Result<Vec<u8>, String> {
     Err("it has no index (moov): perhaps its recording was broken off".into())
 }
 
+/// Refuses pictures that are to be turned: frames that others extracted are.
+fn upright(header: &[u8]) -> Result<(), String> {
+    const UPRIGHT: [u32; 9] = [1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30];
+    let at = if header.first() == Some(&1) { 52 } else { 40 };
+    let same = (0..9).all(|i| u32_at(header, at + 4 * i) == Ok(UPRIGHT[i]));
+    if same { Ok(()) } else { Err("its pictures are to be turned (tkhd)".into()) }
+}
+
+/// When each frame is shown, in units of the media.
+fn shown(table: &[u8], count: usize) -> Result<Vec<i64>, String> {
+    let mut times = Vec::with_capacity(count);
+    let mut at = 0i64;
+    for run in entries(child(table, b"stts")?, 8)? {
+        let (frames, step) = (u32_at(run, 0)? as usize, i64::from(u32_at(run, 4)?));
+        for _ in 0..frames.min(count - times.len()) {
+            times.push(at);
+            at += step;
+        }
+    }
+    if times.len() != count {
+        return Err(format!("its index tells when {} of {count} frames are shown", times.len()));
+    }
+    if let Ok(later) = child(table, b"ctts") {
+        let mut frame = 0;
+        for run in entries(later, 8)? {
+            let frames = (u32_at(run, 0)? as usize).min(count - frame);
+            let by = u32_at(run, 4)? as i32;
+            times[frame..frame + frames].iter_mut().for_each(|time| *time += i64::from(by));
+            frame += frames;
+        }
+    }
+    Ok(times)
+}
+
+/// Refuses an edit list that leaves frames out: players do not show them, and they have no number.
+fn whole(edits: &[u8], times: &[i64], (movie, media): (u32, u32)) -> Result<(), String> {
+    let long = edits.first() == Some(&1);
+    let width = if long { 20 } else { 12 };
+    let mut parts = Vec::new();
+    for edit in entries(edits, width)? {
+        let (length, start) = match long {
+            true => (u64_at(edit, 0)?, u64_at(edit, 8)? as i64),
+            false => (u64::from(u32_at(edit, 0)?), i64::from(u32_at(edit, 4)? as i32)),
+        };
+        // Nothing is shown for a while: no frame is left out.
+        if start != -1 {
+            parts.push((length, start));
+        }
+    }
+    let (length, start) = match parts[..] {
+        [] => return Ok(()),
+        [part] => part,
+        _ => return Err(format!("its edit list has {} parts; {EDITED}", parts.len())),
+    };
+    let end = u128::from(length) * u128::from(media) / u128::from(movie.max(1));
+    // A length of 0 is that of the media.
+    let end = if length == 0 { i128::MAX } else { i128::from(start) + end as i128 };
+    let hidden = times.iter().filter(|&&t| t < start || i128::from(t) >= end).count();
+    match hidden {
+        0 => Ok(()),
+        _ => Err(format!("its edit list leaves out {hidden} of {} frames; {EDITED}", times.len())),
+    }
+}
+
 /// The frames of a table of samples, in a file of `size` bytes.
 fn track(table: &[u8], size: u64) -> Result<Track, String> {
     let descriptions = child(table, b"stsd")?.get(8..).unwrap_or_default();
-    let (codec, entry) = *children(descriptions)?.first().ok_or("no description of its video")?;
+    let (codec, entry) = match children(descriptions)?[..] {
+        [only] => only,
+        ref all => return Err(format!("{} descriptions of its video; one is read", all.len())),
+    };
     let setup = match codec == *b"avc1" || codec == *b"avc3" {
-        true => child(entry.get(VISUAL_ENTRY..).unwrap_or_default(), b"avcC")?.to_vec(),
-        false => Vec::new(),
+        true => Some(child(entry.get(VISUAL_ENTRY..).unwrap_or_default(), b"avcC")?.to_vec()),
+        false => None,
     };
     let sizes = child(table, b"stsz")?;
     let (every, count) = (u32_at(sizes, 4)?, u32_at(sizes, 8)? as usize);
     if count > MAX_FRAMES {
         return Err(format!("{count} frames; the limit is {MAX_FRAMES}"));
     }
-    let chunks = match child(table, b"stco") {
-        Ok(offsets) => entries(offsets, 4)?.map(|e| u32_at(e, 0).map(u64::from)).collect(),
-        Err(_) => entries(child(table, b"co64")?, 8)?.map(|e| u64_at(e, 0)).collect(),
+    // No more chunks than frames are of use.
+    let chunks: Vec<u64> = match child(table, b"stco") {
+        Ok(offsets) => {
+            let offsets = entries(offsets, 4)?.take(count);
+            offsets.map(|e| u32_at(e, 0).map(u64::from)).collect::<Result<_, _>>()?
+        }
+        Err(_) => {
+            let offsets = entries(child(table, b"co64")?, 8)?.take(count);
+            offsets.map(|e| u64_at(e, 0)).collect::<Result<_, _>>()?
+        }
     };
-    let chunks: Vec<u64> = Result::from_iter::<Vec<Result<u64, String>>>(chunks)?;
     let mut runs = entries(child(table, b"stsc")?, 12)?.peekable();
-    let (mut frames, mut in_chunk) = (Vec::with_capacity(count), 0);
+    let (mut frames, mut in_chunk, mut all) = (Vec::with_capacity(count), 0, 0);
     for (number, &chunk) in (1u32..).zip(&chunks) {
         while let Some(run) = runs.next_if(|run| u32_at(run, 0).is_ok_and(|first| first <= number))
         {
@@ -133,13 +220,18 @@ fn track(table: &[u8], size: u64) -> Result<Track, String> {
             if bytes > MAX_FRAME {
                 return Err(format!("frame {frame} has {bytes} bytes; the limit is {MAX_FRAME}"));
             }
+            // Frames that lie in each other would be read again and again.
+            all += u64::from(bytes);
+            if all > size {
+                return Err("its frames have more bytes than the file".into());
+            }
             frames.push((at, bytes));
             at = end;
         }
     }
     match frames.len() == count {
         true => Ok(Track { codec, setup, frames }),
-        false => Err(format!("its index tells where {} of {count} frames are", frames.len())),
+        false => Err(format!("its index locates {} of {count} frames", frames.len())),
     }
 }
 

@@ -43,9 +43,15 @@ pub fn mp4(codec: &[u8; 4], setup: &[u8], frames: &[Vec<u8>]) -> Vec<u8> {
     ];
     let handler = |kind: &[u8; 4]| boxed(b"hdlr", &[&[0; 8], &kind[..], &[0; 13]].concat());
     let minf = boxed(b"minf", &boxed(b"stbl", &stbl.concat()));
-    let media = |kind| boxed(b"mdia", &[handler(kind), minf.clone()].concat());
+    let clock = boxed(b"mdhd", &numbers(&[0, 0, 0, 1, 0, 0]));
+    let media = |kind| boxed(b"mdia", &[clock.clone(), handler(kind), minf.clone()].concat());
     let sound = boxed(b"trak", &boxed(b"mdia", &handler(b"soun")));
-    let video = boxed(b"trak", &[boxed(b"tkhd", &[0; 84]), media(b"vide")].concat());
-    file.extend(boxed(b"moov", &[boxed(b"mvhd", &[0; 100]), sound, video].concat()));
+    // Everything is shown, upright.
+    let edits = boxed(b"edts", &table(b"elst", 3, &[frames.len() as u32 * 1000, 0, 1 << 16]));
+    let matrix = numbers(&[1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30, 0, 0]);
+    let header = boxed(b"tkhd", &[vec![0; 40], matrix].concat());
+    let video = boxed(b"trak", &[header, edits, media(b"vide")].concat());
+    let movie = boxed(b"mvhd", &[numbers(&[0, 0, 0, 1000]), vec![0; 84]].concat());
+    file.extend(boxed(b"moov", &[movie, sound, video].concat()));
     file
 }

@@ -15,7 +15,7 @@ use serde_json::Value;
 use super::calibration;
 use super::model::flatten;
 use super::refusal::{corrupt, to_json};
-use super::table::Counter;
+use super::table::{Counter, Scored};
 use crate::failure::Failure;
 
 /// Largest value, and longest line, that is read.
@@ -45,7 +45,7 @@ pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
     let value = value.filter(|value| !is_record(path, value));
     let Some(value) = value else {
         return match records(path) {
-            Ok((counter, table)) => counter.finish(path, "jsonl", table.as_ref()).print(json),
+            Ok((counter, table)) => counter.finish(path, "jsonl", table).print(json),
             Err(reason) => refused(reason),
         };
     };
@@ -112,9 +112,11 @@ fn unmarked(text: &[u8]) -> &[u8] {
 }
 
 /// Objects line by line, counted, and as the table that `score` would read of them.
-fn records(path: &Path) -> Result<(Counter, Option<PredictionTable>), String> {
+fn records(path: &Path) -> Result<(Counter, Option<Scored>), String> {
     let mut reader = BufReader::new(File::open(path).map_err(|e| e.to_string())?);
     let mut table: Option<(Vec<String>, Counter)> = None;
+    // Counting takes no memory, scoring does.
+    let scored = std::fs::metadata(path).is_ok_and(|file| file.len() <= MAX_BYTES);
     let mut csv = csv::Writer::from_writer(Vec::new());
     let mut line = Vec::new();
     for number in 1.. {
@@ -140,14 +142,14 @@ fn records(path: &Path) -> Result<(Counter, Option<PredictionTable>), String> {
         if table.is_none() {
             let columns: Vec<String> = record.keys().cloned().collect();
             let counter = Counter::new(columns.clone());
-            if counter.has_truth() {
+            if scored && counter.has_truth() {
                 csv.write_record(&columns).map_err(|e| e.to_string())?;
             }
             table = Some((columns, counter));
         }
         if let Some((columns, counter)) = &mut table {
             counter.add(cell);
-            if counter.has_truth() {
+            if scored && counter.has_truth() {
                 csv.write_record(columns.iter().map(|column| cell(column)))
                     .map_err(|e| e.to_string())?;
             }
@@ -155,7 +157,10 @@ fn records(path: &Path) -> Result<(Counter, Option<PredictionTable>), String> {
     }
     let (_, counter) = table.ok_or("no line")?;
     let text = csv.into_inner().map_err(|e| e.to_string())?;
-    let table = counter.has_truth().then(|| PredictionTable::parse(&text, path).ok()).flatten();
+    let table = counter.has_truth().then(|| match scored {
+        true => PredictionTable::parse(&text, path).map_err(|e| e.to_string()),
+        false => Err(format!("more than {} MiB", MAX_BYTES >> 20)),
+    });
     Ok((counter, table))
 }
 

@@ -53,7 +53,13 @@ pub(super) struct Contents {
     counts: BTreeMap<String, Counts>,
     /// Share of right predictions as `score` counts it, where each row has its true class.
     accuracy: Option<f64>,
+    /// Why there is none, where there are true classes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    not_scored: Option<String>,
 }
+
+/// Predictions with true classes, or why they cannot be scored.
+pub(super) type Scored = Result<PredictionTable, String>;
 
 /// Counts the rows of a table as they come.
 pub(super) struct Counter {
@@ -95,23 +101,29 @@ impl Counter {
         self,
         path: &Path,
         format: &'static str,
-        predictions: Option<&PredictionTable>,
+        predictions: Option<Scored>,
     ) -> Contents {
         let Self { columns, counts, rows } = self;
         let has = |names: &[&str]| names.iter().all(|name| columns.iter().any(|c| c == name));
         let kind = KINDS.iter().find(|(_, of)| has(of)).map_or("table", |(kind, _)| *kind);
+        let scored = predictions.map(|table| accuracy(&table?)).transpose();
+        let prefix = format!("{}: ", path.display());
+        let (accuracy, not_scored) = match scored {
+            Ok(accuracy) => (accuracy, None),
+            Err(reason) => (None, Some(reason.strip_prefix(&prefix).unwrap_or(&reason).to_owned())),
+        };
         let path = path.display().to_string();
-        let accuracy = predictions.and_then(accuracy);
-        Contents { path, format, kind, rows, columns, counts, accuracy }
+        Contents { path, format, kind, rows, columns, counts, accuracy, not_scored }
     }
 }
 
-/// The accuracy that `score` prints; `None` for numbers, and where it refuses the table.
-fn accuracy(table: &PredictionTable) -> Option<f64> {
+/// The accuracy that `score` prints, or why there is none.
+fn accuracy(table: &PredictionTable) -> Result<f64, String> {
     // The interval is not shown.
     match table.score(&Scoring { draws: 0, ..Scoring::default() }) {
-        Ok(ScoreReport::Classes(report)) => Some(report.scores.accuracy),
-        Ok(ScoreReport::Numbers(_)) | Err(_) => None,
+        Ok(ScoreReport::Classes(report)) => Ok(report.scores.accuracy),
+        Ok(ScoreReport::Numbers(_)) => Err("the true values are numbers".into()),
+        Err(error) => Err(error.to_string()),
     }
 }
 
@@ -134,8 +146,9 @@ fn read(path: &Path) -> Result<Contents, csv::Error> {
             place(column).and_then(|at| record.get(at)).unwrap_or_default().to_owned()
         });
     }
-    let predictions = counter.has_truth().then(|| PredictionTable::read(path).ok()).flatten();
-    Ok(counter.finish(path, "csv", predictions.as_ref()))
+    let predictions =
+        counter.has_truth().then(|| PredictionTable::read(path).map_err(|e| e.to_string()));
+    Ok(counter.finish(path, "csv", predictions))
 }
 
 impl Contents {
@@ -175,6 +188,9 @@ impl Contents {
         }
         if let Some(accuracy) = self.accuracy {
             out.push_str(&format!("\n  accuracy   {:.2} %\n", 100.0 * accuracy));
+        }
+        if let Some(reason) = &self.not_scored {
+            out.push_str(&format!("\n  accuracy   not scored: {reason}\n"));
         }
         out
     }

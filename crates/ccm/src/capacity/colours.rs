@@ -1,0 +1,103 @@
+//! The colour frames of a view: images, or else a video.
+
+use corsmal_vision::{Pictures, Rgb, Video};
+
+use super::views::{Frame, Problem, Views};
+use crate::dataset::Recording;
+use crate::error::{CcmError, Result};
+
+/// Views of a recording.
+const VIEWS: std::ops::RangeInclusive<u8> = 1..=4;
+
+/// The colour frames of a view.
+pub struct Colours<'v>(Source<'v>);
+
+enum Source<'v> {
+    Images(&'v [Frame]),
+    Video(Video),
+}
+
+impl<'v> Colours<'v> {
+    pub(super) fn of_images(images: &'v [Frame]) -> Self {
+        Self(Source::Images(images))
+    }
+
+    pub(super) fn of_video(video: Video) -> Self {
+        Self(Source::Video(video))
+    }
+
+    /// Their numbers, in their order.
+    pub fn numbers(&self) -> Vec<u32> {
+        match &self.0 {
+            Source::Images(images) => images.iter().map(|image| image.number).collect(),
+            Source::Video(video) => (0..video.len() as u32).collect(),
+        }
+    }
+
+    /// Before the first of them.
+    ///
+    /// # Errors
+    /// A video that this program does not decode.
+    pub fn read(&self) -> std::result::Result<Reader<'_>, Problem> {
+        Ok(Reader(match &self.0 {
+            Source::Images(images) => Reading::Images(images.iter()),
+            Source::Video(video) => Reading::Video(Box::new(video.pictures()?)),
+        }))
+    }
+}
+
+/// Reads colour frames one after another.
+pub struct Reader<'c>(Reading<'c>);
+
+enum Reading<'c> {
+    Images(std::slice::Iter<'c, Frame>),
+    Video(Box<Pictures<'c>>),
+}
+
+impl Reader<'_> {
+    /// The number of the next frame, and its picture where that is `wanted`; `None` after the last. Frames of a video
+    /// are all decoded, so that the caller may look up in between.
+    ///
+    /// # Errors
+    /// It is damaged.
+    pub fn next(
+        &mut self,
+        wanted: impl Fn(u32) -> bool,
+    ) -> std::result::Result<Option<(u32, Option<Rgb>)>, Problem> {
+        match &mut self.0 {
+            Reading::Video(pictures) => Ok(pictures.next(wanted)?),
+            Reading::Images(images) => match images.next() {
+                None => Ok(None),
+                Some(Frame { number, path }) => {
+                    let picture = wanted(*number).then(|| Rgb::read(path)).transpose()?;
+                    Ok(Some((*number, picture)))
+                }
+            },
+        }
+    }
+}
+
+/// Refuses recordings none of which has a colour frame, and those in videos where this program decodes none.
+///
+/// # Errors
+/// [`CcmError::Request`] that says what was looked for.
+pub fn require_colours(recordings: &[Recording]) -> Result<()> {
+    for recording in recordings {
+        let views = Views::of(recording, None);
+        for view in VIEWS {
+            match views.colours(view) {
+                Ok(colours) if colours.numbers().is_empty() => {}
+                Ok(Colours(Source::Video(video))) if !Video::DECODES => {
+                    let refusal = video.pictures().err().map(|e| e.to_string());
+                    return Err(CcmError::Request(refusal.unwrap_or_default()));
+                }
+                // What is damaged is said of its recording.
+                Ok(_) | Err(_) => return Ok(()),
+            }
+        }
+    }
+    Err(CcmError::Request(format!(
+        "none of {} recordings has colour frames (rgb/SEQUENCE/c1/0000.png or rgb/SEQUENCE_c1.mp4; see docs/vision.md)",
+        recordings.len()
+    )))
+}
