@@ -186,7 +186,7 @@ impl Views {
     }
 
     /// The video of a view, where there is one.
-    fn video(&self, view: u8) -> Result<Option<Video>, Problem> {
+    pub(super) fn video(&self, view: u8) -> Result<Option<Video>, Problem> {
         let Self { base, stem, .. } = self;
         let videos = [
             base.join(format!("rgb/{stem}_c{view}.mp4")),
@@ -316,44 +316,6 @@ impl Views {
             }),
         };
         edges.ok_or_else(|| absent(view, frame))
-    }
-
-    /// Numbers of the first frame of the side views' video and of the one `from_end` from its end, the last
-    /// where there are fewer; `None` where nothing says how long it is.
-    ///
-    /// The video's frames are the images that both views have: colour, depth, or else masks; then those of both
-    /// videos, which may be numbered otherwise; a video that cannot be read says nothing. A table of detections has
-    /// no row for a frame in which nothing was found: it counts from 0 to its last frame.
-    ///
-    /// # Errors
-    /// A folder cannot be read.
-    pub fn ends(
-        &self,
-        detections: &[Detection],
-        from_end: usize,
-    ) -> Result<Option<(u32, u32)>, Problem> {
-        let ends = |numbers: &[u32]| {
-            let (first, last) = (numbers.first()?, numbers.last()?);
-            let late = numbers.len().checked_sub(from_end).and_then(|at| numbers.get(at));
-            Some((*first, *late.unwrap_or(last)))
-        };
-        for kind in [Kind::Rgb, Kind::Depth, Kind::Masks] {
-            let other = self.frames(kind, 2)?;
-            let shared = |f: &&Frame| other.binary_search_by_key(&f.number, |o| o.number).is_ok();
-            let numbers: Vec<u32> =
-                self.frames(kind, 1)?.iter().filter(shared).map(|f| f.number).collect();
-            if let Some(found) = ends(&numbers) {
-                return Ok(Some(found));
-            }
-        }
-        if let (Ok(Some(one)), Ok(Some(other))) = (self.video(1), self.video(2)) {
-            let numbers: Vec<u32> = (0..one.len().min(other.len()) as u32).collect();
-            if let Some(found) = ends(&numbers) {
-                return Ok(Some(found));
-            }
-        }
-        let last = detections.iter().map(|d| d.frame).max();
-        Ok(last.map(|last| (0, (last + 1).checked_sub(from_end as u32).unwrap_or(last))))
     }
 
     /// Numbers of the frames in which every one of `views` has a mask or a detection.
