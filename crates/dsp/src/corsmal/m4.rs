@@ -62,6 +62,9 @@ impl M4LogMel {
         let rows = |count| vec![DoubleRow::EMPTY; count];
         let (mut work, mut power, mut energies) =
             (rows(n_fft), rows(spectrum.n_bins()), rows(BANDS));
+        // Behind the window there are zeros only.
+        let used = length.min(n_fft);
+        let mut values = [0.0; BANDS * DoubleRow::SLOTS];
         let mut out = Array3::zeros((frames, BANDS, channels));
         let mut emphasised = Vec::new();
         for (c, signal) in y.outer_iter().enumerate() {
@@ -70,15 +73,17 @@ impl M4LogMel {
             let needed = frames.next_multiple_of(DoubleRow::SLOTS) * step + n_fft;
             emphasised.resize(n.max(needed), 0.0);
             for first in (0..frames).step_by(DoubleRow::SLOTS) {
-                DoubleRow::gather(&emphasised[first * step..], step, &window, &mut work);
+                let samples = &emphasised[first * step..];
+                DoubleRow::gather(samples, step, &window[..used], &mut work[..used]);
+                work[used..].fill(DoubleRow::EMPTY);
                 spectrum.power(&mut work, &mut power);
                 weighted_sums(&bank, &power, &mut energies);
-                to_decibels(&mut energies, n_fft as f64, decibels / 10.0);
+                to_decibels(&energies, n_fft as f64, decibels / 10.0, &mut values);
                 let last = frames.min(first + DoubleRow::SLOTS);
                 let mut part = out.slice_mut(s![first..last, .., c]);
                 for (s, mut frame) in part.outer_iter_mut().enumerate() {
-                    let values = energies.iter().map(|row| row.0[s] as f32);
-                    frame.iter_mut().zip(values).for_each(|(slot, x)| *slot = x);
+                    let values = values.as_chunks::<{ DoubleRow::SLOTS }>().0;
+                    frame.iter_mut().zip(values).for_each(|(slot, x)| *slot = x[s] as f32);
                 }
             }
         }
@@ -104,18 +109,21 @@ fn pre_emphasised(signal: &[f32], out: &mut Vec<f64>) {
     );
 }
 
-/// Decibels times `factor` of energies of transforms that are not yet divided by their length; of
-/// silence those of the smallest step above 1.
-fn to_decibels(energies: &mut [DoubleRow], n_fft: f64, factor: f64) {
+/// Decibels times `factor` of energies of transforms that are not yet divided by their length, row
+/// after row; of silence those of the smallest step above 1.
+fn to_decibels(energies: &[DoubleRow], n_fft: f64, factor: f64, values: &mut [f64]) {
+    for (values, row) in values.chunks_exact_mut(DoubleRow::SLOTS).zip(energies) {
+        values.copy_from_slice(&row.0);
+    }
+    // One long loop: rows of eight would be computed value by value.
     vectorized(
         #[inline(always)]
         || {
-            for row in energies {
-                for energy in &mut row.0 {
-                    let scaled = *energy / n_fft;
-                    let normal = if scaled == 0.0 { f64::EPSILON } else { scaled };
-                    *energy = factor * decibel_double(normal.max(f64::MIN_POSITIVE));
-                }
+            for value in values {
+                let scaled = *value / n_fft;
+                let normal = if scaled == 0.0 { f64::EPSILON } else { scaled };
+                let least = if normal < f64::MIN_POSITIVE { f64::MIN_POSITIVE } else { normal };
+                *value = factor * decibel_double(least);
             }
         },
     );

@@ -111,6 +111,19 @@ impl<T: Lane> SincPlan<T> {
         1.0 / self.ratio
     }
 
+    /// Outputs from the one at `time` on that lie before frame `end`.
+    fn outputs_before(&self, end: usize, mut time: f64) -> usize {
+        if let Weights::Same { down, .. } = &self.weights {
+            return end.saturating_sub(time as usize).div_ceil(*down);
+        }
+        let mut count = 0;
+        while (time as usize) < end {
+            time += self.step();
+            count += 1;
+        }
+        count
+    }
+
     /// Outputs from the one at `time` on, in frames; the time of the next one. `samples` begin
     /// `before - 1` frames before frame `start` and cover all that the outputs depend on.
     fn run(&self, samples: &[T], start: usize, time: f64, out: &mut [T]) -> f64 {
@@ -336,11 +349,7 @@ impl SincStream {
             strided(input, c, channels, &mut held[from..], |x| x);
         }
         let complete = self.known().saturating_sub(self.plan.after);
-        let (mut time, mut count) = (self.time, 0);
-        while (time as usize) < complete {
-            time += self.plan.step();
-            count += 1;
-        }
+        let count = self.plan.outputs_before(complete, self.time);
         self.give(count, out);
         let spent = (self.time as usize).min(self.known()) - self.start;
         self.held.iter_mut().for_each(|held| drop(held.drain(..spent)));
