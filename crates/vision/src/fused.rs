@@ -3,11 +3,9 @@
 //!
 //! This is beyond the paper. Every method's estimates are compared with known capacities, category by
 //! category, in logarithms: the mean of the differences is its bias, their spread its uncertainty. An
-//! estimate is the mean of the corrected estimates at hand, weighted by the inverse of their variances. Where a
-//! single method did better on containers that nothing was learned from, it counts alone: a few containers tell
-//! little about biases.
+//! estimate is the mean of the corrected estimates at hand, weighted by the inverse of their variances.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
@@ -38,9 +36,6 @@ pub struct Fusion {
     pub methods: BTreeMap<Category, BTreeMap<String, MethodError>>,
     /// Mean and standard deviation of the logarithm of the capacity in mL, by category.
     pub priors: BTreeMap<Category, [f64; 2]>,
-    /// The method that, as it is, did better than the mean on containers held out, by category.
-    #[serde(default)]
-    pub single: BTreeMap<Category, String>,
 }
 
 /// One example to learn from.
@@ -68,20 +63,8 @@ pub struct Fused {
 }
 
 impl Fusion {
-    /// Learns biases and spreads, and where a single method does better.
+    /// Learns biases and spreads.
     pub fn fit(examples: &[Example]) -> Self {
-        let mut fusion = Self::spreads(examples);
-        for category in Category::ALL {
-            let of_category: Vec<_> =
-                examples.iter().filter(|e| e.category == category).cloned().collect();
-            if let Some(method) = best_single(&of_category) {
-                fusion.single.insert(category, method);
-            }
-        }
-        fusion
-    }
-
-    fn spreads(examples: &[Example]) -> Self {
         let mut fusion = Self::default();
         for category in Category::ALL {
             let of_category: Vec<_> = examples.iter().filter(|e| e.category == category).collect();
@@ -121,14 +104,6 @@ impl Fusion {
         let sound = |mean: f64, deviation: f64| {
             mean.abs() <= MAX_LOG && (FLOOR..=MAX_LOG).contains(&deviation)
         };
-        let known =
-            |category, name| self.methods.get(category).is_some_and(|of| of.contains_key(name));
-        if let Some((category, name)) = self.single.iter().find(|(c, name)| !known(*c, *name)) {
-            let category = category.name();
-            return Err(format!(
-                "{name} of category {category}: counts alone, and nothing is known of it"
-            ));
-        }
         let methods = self.methods.iter().flat_map(|(category, of)| {
             of.iter().map(move |(name, r)| (category, name.as_str(), r.bias, r.deviation))
         });
@@ -147,18 +122,6 @@ impl Fusion {
     /// The estimate for a container of a category; `None` where nothing is known of it.
     pub fn estimate(&self, category: Category, estimates: &BTreeMap<String, f64>) -> Option<Fused> {
         let known = self.methods.get(&category);
-        let single = self.single.get(&category).and_then(|name| {
-            let (capacity, of) = (*estimates.get(name)?, known?.get(name)?);
-            let methods = vec![name.clone()];
-            capacity.ln().is_finite().then_some(Fused {
-                capacity,
-                deviation: of.deviation,
-                methods,
-            })
-        });
-        if single.is_some() {
-            return single;
-        }
         let mut parts: Vec<(String, f64, f64)> = estimates
             .iter()
             .filter_map(|(method, estimate)| {
@@ -178,32 +141,6 @@ impl Fusion {
             methods: parts.into_iter().map(|(method, ..)| method).collect(),
         })
     }
-}
-
-/// The method whose estimates as they are score higher than the weighted mean, each container estimated by what the
-/// others of its category taught; `None` where none does, or there is one container.
-fn best_single(examples: &[Example]) -> Option<String> {
-    let containers: BTreeSet<u8> = examples.iter().map(|e| e.container).collect();
-    if containers.len() < 2 {
-        return None;
-    }
-    let (mut mean, mut alone) = (0.0, BTreeMap::<&str, f64>::new());
-    for container in containers {
-        let (own, others): (Vec<_>, Vec<_>) =
-            examples.iter().partition(|e| e.container == container);
-        let fusion = Fusion::spreads(&others.into_iter().cloned().collect::<Vec<_>>());
-        for example in own {
-            // The benchmark's score.
-            let score = |e: f64| (-((e - example.capacity) / example.capacity).abs()).exp();
-            let fused = fusion.estimate(example.category, &example.estimates);
-            mean += fused.map_or(0.0, |fused| score(fused.capacity));
-            for (method, &estimate) in &example.estimates {
-                *alone.entry(method).or_default() += score(estimate);
-            }
-        }
-    }
-    let best = alone.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
-    best.filter(|(_, score)| *score > mean).map(|(method, _)| method.to_owned())
 }
 
 /// Every container counts once: the bias is the mean of their means.
@@ -257,27 +194,8 @@ mod tests {
             assert!(error.starts_with("good of category cup: "), "{error}");
         }
         fusion.methods.clear();
-        fusion.single.clear();
         fusion.priors.insert(Category::Box, [1e9, 0.1]);
         assert!(fusion.check().unwrap_err().starts_with("prior of category box"));
-    }
-
-    #[test]
-    fn a_method_that_needs_no_correction_counts_alone() {
-        // Two containers say that `good` is 10 % too low or high: corrected by either it is worse on the other.
-        let examples = [example(1, 500.0, 450.0, 900.0), example(2, 200.0, 220.0, 30.0)];
-        let mut fusion = Fusion::fit(&examples);
-        assert_eq!(fusion.single.get(&Category::Cup).map(String::as_str), Some("good"));
-        let both = [("good".to_string(), 120.0), ("bad".to_string(), 900.0)].into();
-        let found = fusion.estimate(Category::Cup, &both).unwrap();
-        assert_eq!((found.capacity, &found.methods[..]), (120.0, &["good".to_string()][..]));
-        // Where it has no estimate, the others and the prior do what they can.
-        let other = [("bad".to_string(), 900.0)].into();
-        let found = fusion.estimate(Category::Cup, &other).unwrap();
-        assert_eq!(found.methods, ["bad", "prior"]);
-        assert!(Fusion::fit(&examples[..1]).single.is_empty());
-        fusion.single.insert(Category::Cup, "unheard".into());
-        assert!(fusion.check().unwrap_err().starts_with("unheard of category cup"));
     }
 
     #[test]
