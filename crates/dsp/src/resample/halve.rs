@@ -76,7 +76,12 @@ impl Halve {
         })))
     }
 
-    /// Outputs that one pass over the lanes makes of a channel.
+    /// Outputs of each channel that one pass over the lanes makes.
+    pub fn pass(&self, channels: usize) -> u64 {
+        (LANES.div_ceil(channels) * self.0.block) as u64
+    }
+
+    /// [`Self::pass`] of one channel.
     pub fn span(&self) -> usize {
         LANES * self.0.block
     }

@@ -57,6 +57,14 @@ impl Stage {
         }
     }
 
+    /// Outputs of so many channels that cost as much as one of them.
+    pub fn pass(&self, channels: usize) -> u64 {
+        match self {
+            Self::Halve(halve) => halve.pass(channels),
+            Self::Fir(_) | Self::Poly(_) => 1,
+        }
+    }
+
     /// Outputs of a channel that one thread should make at a time.
     pub fn span(&self) -> usize {
         match self {

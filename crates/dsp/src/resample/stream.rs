@@ -9,8 +9,8 @@ use super::stage::Frames;
 use crate::error::Result;
 
 /// Converts interleaved frames as they come; the outputs do not depend on how the input is cut into
-/// blocks. Output lags by the filters' reach, where the rate is halved by a block of transforms (2048
-/// input frames at 2:1).
+/// blocks. Output lags by the filters' reach, where the rate is halved by a pass of transforms
+/// (26,948 input frames of one channel at 2:1, 3,708 of eight).
 ///
 /// ```
 /// use std::sync::Arc;
@@ -70,7 +70,7 @@ impl ResampleStream {
     pub fn push(&mut self, input: &[f32], out: &mut Vec<f32>) -> Result<()> {
         check_interleaved(self.channels, input)?;
         self.pushed += (input.len() / self.channels) as u64;
-        self.run(input, out);
+        self.run(input, out, false);
         Ok(())
     }
 
@@ -81,9 +81,8 @@ impl ResampleStream {
         let needed = self.plan.input_range(0..filtered).end - self.pushed as i64;
         let from = out.len();
         let before = self.given;
-        if needed > 0 {
-            self.run(&vec![0.0; needed as usize * self.channels], out);
-        }
+        let zeros = vec![0.0; needed.max(0) as usize * self.channels];
+        self.run(&zeros, out, true);
         // Outputs beyond the rounded length are dropped, and one that is missing is a zero.
         let keep = filtered.saturating_sub(before) as usize * self.channels;
         out.truncate(from + keep.min(out.len() - from));
@@ -91,13 +90,16 @@ impl ResampleStream {
         out.resize(from + total * self.channels, 0.0);
     }
 
-    fn run(&mut self, input: &[f32], out: &mut Vec<f32>) {
+    /// Takes `input` and appends what is complete; until the stream `ends`, whole passes only.
+    fn run(&mut self, input: &[f32], out: &mut Vec<f32>, ends: bool) {
         let channels = self.channels;
         let mut block = None;
         for (stage, buffer) in self.plan.stages.iter().zip(&mut self.buffers) {
             buffer.data.extend_from_slice(block.as_deref().unwrap_or(input));
             let end = buffer.start + (buffer.data.len() / channels) as i64;
-            let ready: Range<u64> = buffer.next..stage.available(end).max(buffer.next);
+            let available = stage.available(end);
+            let left = if ends { 0 } else { available % stage.pass(channels) };
+            let ready: Range<u64> = buffer.next..(available - left).max(buffer.next);
             let mut made = Vec::new();
             if !ready.is_empty() {
                 let frames = Frames { data: &buffer.data, start: buffer.start };
