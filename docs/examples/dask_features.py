@@ -5,7 +5,10 @@
 Needs dask, distributed, pyarrow and corsmal-feat on all machines, and a file system that they share.
 """
 
+import hashlib
+import json
 import sys
+import uuid
 from pathlib import Path
 
 import pyarrow as pa
@@ -14,12 +17,20 @@ from corsmal_feat.arrow import extract_batch
 from dask.distributed import Client, as_completed
 
 ROWS = 64
+OPTIONS = {"preset": "mfcc-zcr", "channels": 2}
+
+
+def name(number: int, batch: pa.Table) -> str:
+    """A file by its place, its recordings and the options: another job has other names."""
+    text = json.dumps([batch.to_pylist(), OPTIONS], default=str)
+    return f"{number:08d}-{hashlib.blake2b(text.encode(), digest_size=8).hexdigest()}.parquet"
 
 
 def part(batch: pa.Table, path: str) -> int:
     """Computes some rows into a file, whole or not at all; gives its rows."""
-    found = extract_batch(batch, preset="mfcc-zcr", channels=2)
-    draft = Path(path).with_suffix(".draft")
+    found = extract_batch(batch, **OPTIONS)
+    # Dask may run a task twice at the same time.
+    draft = Path(path).with_suffix(f".{uuid.uuid4().hex}.draft")
     pq.write_table(found, draft, compression="zstd")
     draft.replace(path)
     return found.num_rows
@@ -29,20 +40,18 @@ def main(manifest: str, out: str, scheduler: str | None = None) -> None:
     """Computes what is not there yet, and compares the rows with the manifest."""
     table, folder = pq.read_table(manifest), Path(out).absolute()
     folder.mkdir(parents=True, exist_ok=True)
-    parts = {
-        str(folder / f"{at:09d}.parquet"): table.slice(at, ROWS)
-        for at in range(0, table.num_rows, ROWS)
-    }
+    batches = [table.slice(at, ROWS) for at in range(0, table.num_rows, ROWS)]
+    parts = {str(folder / name(i, batch)): batch for i, batch in enumerate(batches)}
     # Without a scheduler: processes of one thread on this machine.
     with Client(scheduler) if scheduler else Client(threads_per_worker=1) as client:
         open_parts = {path: rows for path, rows in parts.items() if not Path(path).exists()}
         futures = [client.submit(part, rows, path, retries=2) for path, rows in open_parts.items()]
         for done in as_completed(futures):
             done.result()
-    counted = sum(pq.read_metadata(path).num_rows for path in parts)
-    if counted != table.num_rows:
-        sys.exit(f"{counted} rows of {table.num_rows}")
-    print(f"{counted} rows in {len(parts)} parts")
+    found = [i for path in parts for i in pq.read_table(path, columns=["path"])["path"].to_pylist()]
+    if found != table["path"].to_pylist():
+        sys.exit(f"{len(found)} rows, which are not those of the manifest ({table.num_rows})")
+    print(f"{len(found)} rows in {len(parts)} parts")
 
 
 if __name__ == "__main__":

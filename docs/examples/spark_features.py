@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 
 import pyarrow as pa
+import pyarrow.parquet as pq
 from corsmal_feat.arrow import extract_batch
 from pyspark.sql import SparkSession
 from pyspark.sql.pandas.types import from_arrow_schema
@@ -29,9 +30,10 @@ def main(manifest: str, out: str) -> None:
     os.environ.setdefault("PYSPARK_PYTHON", sys.executable)
     batches = ("spark.sql.execution.arrow.maxRecordsPerBatch", "64")
     spark = SparkSession.builder.config(*batches).getOrCreate()
-    table = spark.read.parquet(manifest).select("path")
+    table = spark.read.parquet(manifest)
     # The schema comes from a call on no rows.
-    empty = extract_batch(pa.table({"path": pa.array([], pa.string())}), **OPTIONS)
+    columns = pq.read_schema(manifest).empty_table()
+    empty = extract_batch(columns, **OPTIONS)
     found = table.mapInArrow(features, from_arrow_schema(empty.schema))
     found.write.parquet(out, compression="zstd")
     counted, wanted = spark.read.parquet(out).count(), table.count()

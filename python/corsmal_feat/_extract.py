@@ -69,6 +69,7 @@ def extract(
     Returns
     -------
     Features
+        Of an output in a store all arrays are read back into memory; the command does not.
 
     Examples
     --------

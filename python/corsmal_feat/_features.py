@@ -294,7 +294,7 @@ def load_features(path: StrPath) -> Features:
     if not _core.is_stored(name):
         return Features.load(path)
     with tempfile.TemporaryDirectory(prefix="corsmal_feat_") as folder:
-        copy = os.path.join(folder, os.path.basename(name) or "features")
+        copy = os.path.join(folder, "features")
         _core.fetch(name, copy)
         features = Features.load(copy)
         # The file goes with its folder.

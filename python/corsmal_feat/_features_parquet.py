@@ -8,6 +8,7 @@ import os
 from importlib import import_module
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 import numpy.typing as npt
@@ -53,13 +54,14 @@ def of_partitions(name: str) -> dict[str, Any]:
     for number, (file, (found, of)) in enumerate(zip(files, read, strict=True)):
         if of is None or len(of["places"]) != len(found["outcomes"]):
             raise ParameterError(f"{file} is no part of an output of corsmal-feat")
-        same = all(found[k] == first[k] for k in ("config_hash", "names"))
-        if not same or of["label"] != label:
+        if file.parent.name != _folder(of["label"], of["value"]):
+            raise ParameterError(f"{file} is the part {_folder(of['label'], of['value'])}")
+        if _run(read[number]) != _run(read[0]):
             raise ParameterError(f"{file} is a part of another output than {files[0]}")
         places += [(place, number, at) for at, place in enumerate(of["places"])]
         found["labels"][label] = np.array([of["value"]] * len(found["ids"]), dtype=np.str_)
     places.sort()
-    if [place for place, _, _ in places] != list(range(len(places))):
+    if [place for place, _, _ in places] != list(range(read[0][1]["inputs"])):
         raise ParameterError(f"{name}: a part of the output is missing")
     outcomes = [parts[number]["outcomes"][at] for _, number, at in places]
     rows = {i: row for row, i in enumerate(i for part in parts for i in part["ids"])}
@@ -74,6 +76,8 @@ def of_partitions(name: str) -> dict[str, Any]:
         all_parts = {k: v for part in parts for k, v in part[key].items()}
         return {i: all_parts[i] for i in ids if i in all_parts}
 
+    keys = [key for key in first["labels"] if key != label]
+    keys.insert(read[0][1]["column"], label)
     summary = None
     if first["summary"] is not None:
         summary = np.concatenate([part["summary"] for part in parts])[order]
@@ -82,9 +86,21 @@ def of_partitions(name: str) -> dict[str, Any]:
         "arrays": of_ids("arrays"),
         "times": of_ids("times"),
         "summary": summary,
-        "labels": {key: joined(key) for key in first["labels"]},
+        "labels": {key: joined(key) for key in keys},
         "outcomes": outcomes,
     }
+
+
+def _folder(label: str, value: str) -> str:
+    """The folder of a part, as Hive has it."""
+    none = "__HIVE_DEFAULT_PARTITION__"
+    return f"{quote(label, safe='')}={quote(value, safe='') if value else none}"
+
+
+def _run(read: tuple[dict[str, Any], dict[str, Any]]) -> tuple[Any, ...]:
+    """What parts of one output have in common."""
+    found, part = read
+    return found["names"], [part[k] for k in ("label", "column", "inputs", "run")]
 
 
 def of_parquet(name: str) -> dict[str, Any]:
@@ -92,8 +108,9 @@ def of_parquet(name: str) -> dict[str, Any]:
     return _read(name)[0]
 
 
-def _read(name: str) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    """The fields of `Features` of a file, and which part of a partitioned output it is."""
+def _read(name: str) -> tuple[dict[str, Any], Any]:
+    """The fields of `Features` of a file, and which part of a partitioned output it is: what its
+    metadata say, and the run that wrote it."""
     try:
         parquet = import_module("pyarrow.parquet")
         failed = import_module("pyarrow").ArrowInvalid
@@ -145,7 +162,8 @@ def _read(name: str) -> tuple[dict[str, Any], dict[str, Any] | None]:
         "config_hash": meta.get("config_hash", ""),
         "outcomes": [json.loads(line) for line in outcomes if line],
     }
-    return fields, meta.get("part")
+    part = meta.pop("part", None)
+    return fields, None if part is None else part | {"run": meta}
 
 
 def _holds_frames(schema: Any, feature: str) -> bool:

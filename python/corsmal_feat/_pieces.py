@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import Any
 
@@ -11,10 +12,15 @@ from . import _core
 from ._batch_columns import Singles, arrow, nested
 from ._batch_rows import ID, PIECE, rows_of
 from ._features import GOOD
+from ._refusals import refuses
 from .errors import ParameterError
 
 #: Column with the id of the recording that a piece is of.
 RECORDING = "recording"
+#: Values of a column of nested lists.
+_VALUES = 2**31 - 1
+#: Pieces of a recording above which it stays whole.
+_MOST = 100_000
 #: Shorter pieces, in seconds, would be mostly context.
 _SHORTEST = 0.1
 
@@ -22,8 +28,9 @@ _SHORTEST = 0.1
 def cut(table: Any, longest: float) -> Any:
     """A manifest with a row for each piece of recordings of more than `longest` seconds.
 
-    Every piece is of so many whole samples but the last, which goes to the end. What has no length
-    in its header stays whole, as do stretches whose end is behind that of the recording.
+    Every piece is of so many whole samples but the last, which goes to the end. Compressed audio
+    stays whole, since only decoding leads to its samples, as do stretches whose end is behind that
+    of the recording.
     """
     pa = arrow()
     if not math.isfinite(longest) or longest < _SHORTEST:
@@ -66,8 +73,8 @@ def _bounds(
 
     first = 0 if start is None else sample(start)
     last = frames if end is None else sample(end)
-    length, step = last - first, round(longest * rate)
-    if last > frames or length <= step:
+    length, step = last - first, max(1, round(longest * rate))
+    if last > frames or length <= step or length // step > _MOST:
         return []
     firsts = list(range(0, length, step))
     return [(a, b) for a, b in zip(firsts, [*firsts[1:], None], strict=True)]
@@ -77,6 +84,7 @@ def _seconds(time: float) -> str:
     return repr(round(time, 6))
 
 
+@refuses
 def join_pieces(found: Any) -> Any:
     """Frames of pieces put together: a row for each recording, as `extract_batch` gives it uncut.
 
@@ -118,7 +126,12 @@ def join_pieces(found: Any) -> Any:
     groups = [range(a, b) for a, b in zip(starts, [*starts[1:], len(recordings)], strict=True)]
     if len({recordings[group[0]] for group in groups}) != len(groups):
         raise ParameterError("the pieces of a recording must follow each other: sort the table")
-    columns = {}
+    config = json.loads((found.schema.metadata or {}).get(b"corsmal.config", b"{}"))
+    features = {name for name in config.get("features", ()) if _is_nested(found, name)}
+    columns: dict[str, Any] = {}
+    arrays: dict[str, list[Singles | None]] = {}
+    #: Recordings without a frame of a feature, and that feature.
+    empty: dict[int, str] = {}
     statuses = found["status"].to_pylist()
     bad = [next((i for i in group if statuses[i] not in GOOD), None) for group in groups]
     # What every piece says of its recording, the worst first: it is cut short where any of them is.
@@ -134,19 +147,51 @@ def join_pieces(found: Any) -> Any:
         column = found[name]
         if name == ID:
             columns[name] = pa.array([recordings[group[0]] for group in groups], field.type)
-        elif _is_nested(field.type):
-            columns[name] = _joined(column, groups, bad)
+        elif name in features:
+            rows = _joined(column, groups, bad)
+            for k, row in enumerate(rows):
+                if row is not None and len(groups[k]) > 1 and not len(row):
+                    empty.setdefault(k, name)
+            arrays[name] = rows
+            columns[name] = None
         elif name == "decoded_frames":
             counts = column.to_pylist()
-            sums = [sum(counts[i] or 0 for i in group) for group in groups]
+            sums = [_sum([counts[i] for i in group]) for group in groups]
             columns[name] = pa.array(sums, field.type)
         elif name == "repairs":
             repairs = column.to_pylist()
-            unions = [list(dict.fromkeys(r for i in g for r in repairs[i] or ())) for g in groups]
+            unions = [
+                repairs[g[0]]
+                if len(g) == 1
+                else list(dict.fromkeys(r for i in g for r in repairs[i] or ()))
+                for g in groups
+            ]
             columns[name] = pa.array(unions, field.type)
         else:
             columns[name] = column.take(pa.array(told, pa.int64()))
+    for name, rows in arrays.items():
+        columns[name] = nested([None if k in empty else row for k, row in enumerate(rows)])
+    if empty:
+        _fail(columns, empty)
     return pa.table(columns).replace_schema_metadata(found.schema.metadata)
+
+
+def _fail(columns: dict[str, Any], empty: dict[int, str]) -> None:
+    """Recordings without a frame of a feature have none of any, as uncut."""
+    pa = arrow()
+    told = {name: columns[name].to_pylist() for name in ("status", "reason", "decoded_frames")}
+    for k, name in empty.items():
+        if told["decoded_frames"][k]:
+            told["status"][k], told["reason"][k] = "too_short", f"no frame of {name}"
+        else:
+            told["status"][k], told["reason"][k] = "empty", "no samples"
+    for name in ("status", "reason"):
+        columns[name] = pa.array(told[name], pa.string())
+
+
+def _sum(counts: list[int | None]) -> int | None:
+    known = [count for count in counts if count is not None]
+    return sum(known) if known else None
 
 
 def _require_whole(found: Any, groups: list[range], recordings: list[str]) -> None:
@@ -169,18 +214,26 @@ def _require_whole(found: Any, groups: list[range], recordings: list[str]) -> No
         )
 
 
-def _is_nested(kind: Any) -> bool:
-    types = arrow().types
+def _is_nested(table: Any, name: str) -> bool:
+    if name not in table.schema.names:
+        return False
+    types, kind = arrow().types, table.schema.field(name).type
     return bool(types.is_list(kind) and types.is_list(kind.value_type))
 
 
-def _joined(column: Any, groups: list[range], bad: list[int | None]) -> Any:
+def _joined(column: Any, groups: list[range], bad: list[int | None]) -> list[Singles | None]:
     """Frames [channels][coefficients][frames] one behind the other."""
     rows: list[Singles | None] = []
     for group, fault in zip(groups, bad, strict=True):
         pieces = [] if fault is not None else [_array(column[i]) for i in group]
         rows.append(np.concatenate(pieces) if pieces else None)
-    return nested(rows)
+    values = sum(row.size for row in rows if row is not None)
+    if values > _VALUES:
+        raise ParameterError(
+            f"{values} values are more than the {_VALUES} that a column of Arrow holds: join fewer"
+            " recordings at a time"
+        )
+    return rows
 
 
 def _array(row: Any) -> Singles:

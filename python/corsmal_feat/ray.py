@@ -46,10 +46,10 @@ def manifest(paths: StrPath | Iterable[StrPath], *, longest: float | None = None
     ----------
     paths : folders, globs, files, manifests (`.csv`, `.jsonl`), tar shards as
         `shards/{000..999}.tar`; or one `.parquet` file with the columns of the table below
-    longest : seconds; longer recordings are cut into pieces, each a row, whose frames put together
-        by `corsmal_feat.arrow.join_pieces` are those of the whole recording, bit for bit.
-        Statistics, and features that depend on the whole recording, have no pieces:
-        `extract_batch` refuses them
+    longest : seconds; longer recordings of uncompressed audio (WAV, AIFF, ...) are cut into pieces,
+        each a row, whose frames put together by `corsmal_feat.arrow.join_pieces` are those of the
+        whole recording, bit for bit. Statistics, and features that depend on the whole recording,
+        have no pieces: `extract_batch` refuses them
 
     Returns
     -------
@@ -153,11 +153,11 @@ def extract(
     if longest is not None:
         job.require_pieces()
     if isinstance(paths, pa.Table):
+        _require_paths(paths)
         table = paths if longest is None else cut(paths, longest)
     else:
         table = manifest(paths, longest=longest)
-    if "bytes" in table.schema.names:
-        raise ParameterError("a manifest has paths, no bytes: workers read them where they lie")
+    _require_paths(table)
     known = rows_of(table)
     ids = [row[0] for row in known]
     twice = [name for name, count in Counter(ids).items() if count > 1]
@@ -186,6 +186,11 @@ def extract(
     if left:
         _compute(left, folder, options, address, (len(done), progress))
     return account(folder, list(parts), ids, len(done))
+
+
+def _require_paths(table: Any) -> None:
+    if "bytes" in table.schema.names:
+        raise ParameterError("a manifest has paths, no bytes: workers read them where they lie")
 
 
 def _claim(folder: Path, job: Job, table: Any, channels: int | None, rows: int) -> None:

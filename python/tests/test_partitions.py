@@ -16,10 +16,10 @@ dataset = pytest.importorskip("pyarrow.dataset")
 @pytest.fixture(scope="module")
 def listed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("audio")
-    rows = ["path,take,type"]
+    rows = ["path,type,take"]
     for i, kind in enumerate(["rice", "water/ü", "", "rice", "7", "water/ü", "rice"]):
         write(folder / f"r{i}.wav", i)
-        rows.append(f"r{i}.wav,{i},{kind}")
+        rows.append(f"r{i}.wav,{kind},{i}")
     (folder / "r3.wav").write_text("no audio")
     (folder / "list.csv").write_text("\n".join(rows) + "\n")
     return folder / "list.csv"
@@ -33,7 +33,7 @@ def test_a_partitioned_output_is_the_whole_one_in_parts(listed: Path, tmp_path: 
     for found in (made, cf.load_features(out)):
         assert found.ids == whole.ids and found.outcomes == whole.outcomes
         assert found.names == whole.names and found.config == whole.config
-        assert list(found.labels) == ["take", "type"]
+        assert list(found.labels) == ["type", "take"]
         for label in found.labels:
             assert found.labels[label].tolist() == whole.labels[label].tolist()
         if whole.summary is not None:
@@ -79,9 +79,28 @@ def test_folders_that_are_none_are_refused(listed: Path, tmp_path: Path):
     (out / "type=7" / "part.parquet").unlink()
     with pytest.raises(cf.ParameterError, match="a part of the output is missing"):
         cf.load_features(out)
+    (out / "type=7").rmdir()
+    (out / "type=rice").rename(out / "type=7")
+    with pytest.raises(cf.ParameterError, match="is the part type=rice"):
+        cf.load_features(out)
+    (out / "type=7").rename(out / "type=rice")
+    (out / "notes.txt").write_text("mine")
     with pytest.raises(cf.RunError, match="no partitioned output"):
         cf.extract(listed, preset="esc26", out=out, partition_by="type", overwrite=True)
-    with pytest.raises(cf.RunError, match="labels of the inputs are take, type"):
+    with pytest.raises(cf.RunError, match="labels of the inputs are type, take"):
         cf.extract(listed, preset="esc26", out=tmp_path / "x", partition_by="kind")
     with pytest.raises(cf.ParameterError, match="need out"):
         cf.extract(listed, partition_by="type")
+
+
+def test_the_last_part_is_missed_too(listed: Path, tmp_path: Path):
+    rows = listed.read_text().splitlines()
+    ordered = listed.with_name("ordered.csv")
+    ordered.write_text("\n".join([rows[0], *sorted(rows[1:], key=lambda row: row.split(",")[1])]))
+    out = tmp_path / "parts"
+    cf.extract(ordered, preset="mfcc-zcr", out=out, partition_by="type")
+    last = max(out.iterdir())
+    (last / "part.parquet").unlink()
+    last.rmdir()
+    with pytest.raises(cf.ParameterError, match="a part of the output is missing"):
+        cf.load_features(out)

@@ -92,3 +92,24 @@ def test_pieces_that_are_not_all_there_are_not_put_together(audio: Path):
     taken = pa.table({"path": ["x.wav"], "recording": ["x"]})
     with pytest.raises(cf.ParameterError, match="recording, which pieces need"):
         cf.ray.extract(taken, audio / "out", config=FRAMES, longest=1)
+
+
+def test_recordings_without_a_frame_fail_as_they_do_uncut(audio: Path):
+    whole, cut = manifest(audio / "long.wav"), manifest(audio / "long.wav", longest=1)
+    for config, status in [
+        ("[signal]\nstart = 20.0\n[features.rms]\n", "empty"),
+        ('[features.stft]\ncenter = false\nn_fft = 131072\noutput = "power"\n', "too_short"),
+    ]:
+        expected = extract_batch(whole, config=config)
+        found = join_pieces(extract_batch(cut, config=config))
+        assert expected["status"].to_pylist() == found["status"].to_pylist() == [status]
+        assert found.column(found.num_columns - 1).to_pylist() == [None]
+
+
+def test_odd_headers_and_columns(audio: Path, tmp_path: Path):
+    write(tmp_path / "slow.wav", 3, seconds=50, rate=2)
+    assert manifest(tmp_path / "slow.wav", longest=0.1).num_rows == 100
+    label = pa.array([[["a"]]], pa.list_(pa.list_(pa.string())))
+    table = manifest(audio / "short.wav", longest=1).append_column("notes", label)
+    found = join_pieces(extract_batch(table, config=FRAMES))
+    assert found["notes"].to_pylist() == [[["a"]]]

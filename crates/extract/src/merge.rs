@@ -253,14 +253,6 @@ impl Merge<'_> {
     }
 }
 
-/// How the result of merging `shards` says that it was made.
-///
-/// # Errors
-/// They are not the shards of one run; `out` is named where there are none.
-pub(crate) fn provenance(shards: &[PathBuf], out: &Path) -> Result<Provenance, MergeError> {
-    Ok(in_order(shards, out)?.1)
-}
-
 /// Brings the shards into order, checks that they are all of one run, and says how that was made.
 fn in_order(shards: &[PathBuf], out: &Path) -> Result<(Vec<Piece>, Provenance), MergeError> {
     let mut pieces = Vec::with_capacity(shards.len());

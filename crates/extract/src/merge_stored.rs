@@ -4,13 +4,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use corsmal_files::feature_file::FeatureFile;
+use tempfile::TempDir;
 
+use crate::inputs::is_stored;
 use crate::merge::{self, Existing, MergeError};
-use crate::run::{RunError, StoredOutput};
+use crate::run::{RunError, StoredOutput, fetch_to};
 
-/// As [`merge::merge`], where the result or shards may be in stores: they are copied into `work`, by default the
-/// current folder, the result is made there, and sent when it is complete. Waiting ends when `stop` is set.
+/// As [`merge::merge`], where the result or shards may be in stores: shards are copied into a temporary folder
+/// in `work`, by default the current one, the result is made in `work`, and sent when it is complete. Waiting
+/// ends when `stop` is set.
 ///
 /// # Errors
 /// As [`merge::merge`]; [`MergeError::Stored`].
@@ -20,51 +22,40 @@ pub fn merge(
     existing: Existing,
     stop: &Arc<AtomicBool>,
 ) -> Result<(), MergeError> {
-    let mut copies = Vec::new();
-    let merged = merge_copies(shards, (out, work), existing, stop, &mut copies);
-    // The first error is the one that matters.
-    let forgotten = copies.iter().try_for_each(StoredOutput::forget);
-    merged?;
-    Ok(forgotten?)
-}
-
-/// Copies shards that are in stores, which `copies` tells, and merges all.
-fn merge_copies(
-    shards: &[PathBuf],
-    (out, work): (&Path, Option<&Path>),
-    existing: Existing,
-    stop: &Arc<AtomicBool>,
-    copies: &mut Vec<StoredOutput>,
-) -> Result<(), MergeError> {
-    let mut here = Vec::new();
-    for shard in shards {
-        match StoredOutput::of(shard, work, None)? {
-            None => here.push(shard.clone()),
-            Some(stored) => {
-                let copy = stored.present(stop)?.ok_or_else(|| RunError::Store {
-                    name: stored.name(),
-                    reason: "the store has no such object".into(),
-                })?;
-                copy.publish().map_err(RunError::Folder)?;
-                here.push(stored.file.clone());
-                copies.push(stored);
-            }
-        }
-    }
-    let Some(stored) = StoredOutput::of(out, work, None)? else {
-        return merge::merge(&here, out, existing);
-    };
-    if existing != Existing::Overwrite && stored.is_there(stop)? {
+    let stored = StoredOutput::of(out, work, None)?;
+    if let Some(stored) = &stored
+        && existing != Existing::Overwrite
+        && stored.is_there(stop)?
+    {
         return Err(MergeError::Exists { path: stored.name().into() });
     }
-    if existing == Existing::Resume && stored.file.exists() {
-        // One that is complete, and was not sent.
-        let provenance = merge::provenance(&here, &stored.file)?;
-        if FeatureFile::open(&stored.file)?.provenance()? != provenance {
-            return Err(MergeError::Exists { path: stored.file });
-        }
-    } else {
-        merge::merge(&here, &stored.file, existing)?;
+    // Removed when it is dropped.
+    let mut copies: Option<TempDir> = None;
+    let mut here = Vec::with_capacity(shards.len());
+    for (index, shard) in shards.iter().enumerate() {
+        let Some(name) = shard.to_str().filter(|name| is_stored(name)) else {
+            here.push(shard.clone());
+            continue;
+        };
+        let folder = match &copies {
+            Some(folder) => folder.path(),
+            None => copies.insert(temporary(work)?).path(),
+        };
+        let copy = folder.join(index.to_string());
+        fetch_to(name, &copy, stop)?;
+        here.push(copy);
     }
+    let Some(stored) = stored else {
+        return merge::merge(&here, out, existing);
+    };
+    // A result that was not sent is made again: its shards may be others by now.
+    let local = if stored.file.exists() { Existing::Overwrite } else { existing };
+    merge::merge(&here, &stored.file, local)?;
     Ok(stored.publish(existing == Existing::Overwrite, stop)?)
+}
+
+fn temporary(work: Option<&Path>) -> Result<TempDir, MergeError> {
+    let work = work.unwrap_or(Path::new("."));
+    let made = tempfile::Builder::new().prefix(".corsmal-feat-merge-").tempdir_in(work);
+    Ok(made.map_err(RunError::Folder)?)
 }

@@ -40,9 +40,12 @@ pub fn split(table: &Table, label: &str, values: &[String]) -> Result<Vec<Partit
     for (place, value) in values.iter().enumerate().take(table.outcomes().len()) {
         places.entry(value).or_default().push(place);
     }
+    let column = table.labels().position(|(name, _)| name == label).unwrap_or_default();
+    let inputs = table.outcomes().len();
     let part = |(value, places): (&str, Vec<usize>)| {
         let table = table.of_places(&places, label)?;
-        Ok(Partition { part: Part { label: label.into(), value: value.into(), places }, table })
+        let part = Part { label: label.into(), value: value.into(), column, inputs, places };
+        Ok(Partition { part, table })
     };
     places.into_iter().map(part).collect()
 }
@@ -109,7 +112,10 @@ pub fn open(path: &Path) -> Result<(FeatureTable, String), FeatureFileError> {
         if file.parent().and_then(Path::file_name).is_none_or(|found| *found != *name) {
             return Err(wrong(file, "the folder of its part", name));
         }
-        let same = parts.first().is_none_or(|other| other.part.label == part.label);
+        let same = parts.first().is_none_or(|other| {
+            let known = |part: &Part| (part.label.clone(), part.column, part.inputs);
+            known(&other.part) == known(&part)
+        });
         if !same || first.as_ref().is_some_and(|first| *first != provenance) {
             return Err(wrong(file, "parts of one run", "another one".into()));
         }
@@ -150,7 +156,14 @@ fn joined(label: &str, parts: &[Partition]) -> Result<Table, Result<usize, Table
     if let Some(missing) = places.iter().enumerate().position(|(i, (place, ..))| i != *place) {
         return Err(Ok(missing));
     }
-    columns.push(label.into());
+    // A hole at the end is none between places.
+    let first = parts.first().map(|partition| &partition.part);
+    let (inputs, at) = first.map_or((0, 0), |part| (part.inputs, part.column));
+    if places.len() != inputs {
+        return Err(Ok(places.len()));
+    }
+    let at = at.min(columns.len());
+    columns.insert(at, label.into());
     let mut all = Table::new(columns).map_err(Err)?;
     for (_, index, outcome, row) in places {
         let Partition { part, table } = &parts[index];
@@ -160,7 +173,7 @@ fn joined(label: &str, parts: &[Partition]) -> Result<Table, Result<usize, Table
             labels.extend(
                 table.labels().map(|(name, column)| (name.to_owned(), column[row].clone())),
             );
-            labels.push((label.into(), part.value.clone()));
+            labels.insert(at, (label.into(), part.value.clone()));
             values.extend(table.values().row(row));
         }
         all.push(outcome.clone(), &labels, &values).map_err(Err)?;
@@ -176,11 +189,11 @@ mod tests {
     use crate::shard::Shard;
 
     fn table() -> (Table, Vec<String>) {
-        let mut table = Table::new(vec!["take".into(), "type".into()]).unwrap();
+        let mut table = Table::new(vec!["type".into(), "take".into()]).unwrap();
         table.name_features(&["rms.mean".into()]).unwrap();
         let mut values = Vec::new();
         for (i, value) in ["rice", "a/b", "", "rice", "ü=%", "."].into_iter().enumerate() {
-            let labels = [("take".into(), i.to_string()), ("type".into(), value.into())];
+            let labels = [("type".into(), value.into()), ("take".into(), i.to_string())];
             let status = if i == 3 { Status::Corrupt } else { Status::Ok };
             let outcome = Outcome::new(format!("r{i}"), "x.wav", status, "");
             table.push(outcome, &labels, &[i as f32]).unwrap();
@@ -224,6 +237,13 @@ mod tests {
         write_parts(&path, &parts[1..]);
         let error = open(&path).unwrap_err().to_string();
         assert!(error.contains("none for input 2"), "{error}");
+        // Of the last input, too: the part of `.`.
+        std::fs::remove_dir_all(path.join("type=.")).unwrap();
+        let last: Vec<&Partition> = parts.iter().filter(|p| p.part.value != ".").collect();
+        assert_eq!(last.len(), 4);
+        last.iter().for_each(|part| write_parts(&path, std::slice::from_ref(part)));
+        let error = open(&path).unwrap_err().to_string();
+        assert!(error.contains("none for input 5"), "{error}");
         write_parts(&path, &parts);
         std::fs::rename(path.join("type=rice"), path.join("type=water")).unwrap();
         assert!(open(&path).unwrap_err().to_string().contains("type=rice"));

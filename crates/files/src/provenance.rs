@@ -15,6 +15,10 @@ pub struct Part {
     pub label: String,
     /// Its value.
     pub value: String,
+    /// Where the label stands among the label columns of the run, from 0.
+    pub column: usize,
+    /// Inputs of the run.
+    pub inputs: usize,
     /// The place of each outcome among the inputs of the run, from 0.
     pub places: Vec<usize>,
 }

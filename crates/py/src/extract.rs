@@ -1,6 +1,5 @@
 //! Runs over files, and features of signals in memory.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -157,11 +156,11 @@ pub(crate) fn input_error(error: InputError) -> PyErr {
 /// Copies an object of a store into a file.
 #[pyfunction]
 pub(crate) fn fetch(py: Python<'_>, name: &str, to: PathBuf) -> PyResult<()> {
-    let object = inputs::object(name).map_err(input_error)?;
     let work = |stop: &Arc<AtomicBool>| {
-        let failed = |error: std::io::Error| RunError::new_err(format!("{object}: {error}"));
-        let mut file = File::create(&to).map_err(failed)?;
-        run::fetch(&object, &mut file, stop).map(drop).map_err(failed)
+        run::fetch_to(name, &to, stop).map_err(|error| match error {
+            run::RunError::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
+            other => RunError::new_err(other.to_string()),
+        })
     };
     py.detach(|| interruptible(work, &mut |_| Ok(())))
 }

@@ -100,7 +100,12 @@ impl From<object_store::Error> for StoreError {
 fn is_of_credentials(text: &str) -> bool {
     let named = ELSEWHERE.iter().filter_map(|name| std::env::var(name).ok());
     let mut named = named.filter(|address| !address.is_empty());
-    METADATA.iter().any(|host| text.contains(host)) || named.any(|address| text.contains(&address))
+    // Not the beginning of another address, such as one of more digits.
+    let holds = |address: &str| {
+        let mut behind = text.match_indices(address).map(|(at, _)| &text[at + address.len()..]);
+        behind.any(|rest| !rest.starts_with(|c: char| c.is_ascii_alphanumeric()))
+    };
+    METADATA.iter().any(|host| holds(host)) || named.any(|address| holds(&address))
 }
 
 impl From<StoreError> for io::Error {

@@ -94,7 +94,7 @@ impl Sending {
     }
 
     async fn parts(self, content: File, stop: &AtomicBool) -> Result<(), StoreError> {
-        let mut upload = self.store.put_multipart(&self.path).await?;
+        let mut upload = until(self.store.put_multipart(&self.path), stop).await??;
         let sent = until(self.send(upload.as_mut(), content), stop).await;
         match sent.and_then(|sent| sent) {
             Ok(()) => Ok(()),

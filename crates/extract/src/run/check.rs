@@ -11,7 +11,7 @@ use corsmal_files::{draft, identity, partition};
 
 use super::error::RunError;
 use super::options::{MAX_JOBS, RunOptions, RunReport};
-use super::partitions::PartitionBy;
+use super::partitions::{PartitionBy, is_ours};
 use super::stored::StoredOutput;
 use crate::config::Config;
 use crate::inputs::{Identities, Input, list_hash};
@@ -86,16 +86,21 @@ pub fn check(
     let (text, hash) = (config.to_value().to_string(), config.hash());
     let provenance = Provenance::new(text, hash, list_hash(inputs), options.shard);
     let (mut done, mut is_sent) = (None, false);
+    let own = options.shard.of(inputs);
+    let finished = Finished { inputs: own, provenance: &provenance, format, by };
+    if options.overwrite && stored.is_some() && out.exists() {
+        // What did not reach its store is sent, not made again.
+        done = finished.report(out, out, stop).ok();
+    }
     if !options.overwrite {
-        let inputs = options.shard.of(inputs);
-        let finished = Finished { inputs, provenance: &provenance, format, by };
         if let Some(stored) = &stored
             && let Some(copy) = stored.present(stop)?
         {
             let name = PathBuf::from(stored.name());
             done = Some(finished.report(copy.place(), &name, stop)?);
             is_sent = true;
-        } else if out.exists() && !is_empty(out) {
+        } else if out.exists() && !(out.is_dir() && is_ours(out) && !partition::is_partitioned(out))
+        {
             done = Some(finished.report(out, out, stop)?);
         }
         if done.is_none() && !options.resume && Ledger::is_pending(out) {
@@ -149,7 +154,7 @@ fn check_output(
     }
     if partitioned && out.exists() {
         // Not even --overwrite removes what is somebody else's.
-        if !is_empty(out) && !partition::is_partitioned(out) {
+        if !is_ours(out) {
             return refuse("is there and is no partitioned output".into());
         }
     } else if out.exists() && !out.is_file() {
@@ -162,11 +167,6 @@ fn check_output(
     }
     draft::check_place(&target).map_err(RunError::Folder)?;
     Ok(format)
-}
-
-/// Whether a path is a folder with nothing in it.
-fn is_empty(path: &Path) -> bool {
-    path.is_dir() && path.read_dir().is_ok_and(|mut all| all.next().is_none())
 }
 
 /// What an output holds that is complete.

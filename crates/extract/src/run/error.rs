@@ -72,7 +72,7 @@ pub enum RunError {
     },
     /// The finished output did not reach its store.
     #[error(
-        "{name}: {reason}; it is complete in {file}: the same command, merge with --resume, sends it again"
+        "{name}: {reason}; the finished output is in {file}: run the same command again to send it"
     )]
     Unsent {
         /// Its URI.

@@ -35,7 +35,7 @@ pub use check::{Checked, check};
 pub use error::RunError;
 pub use options::{MAX_JOBS, Progress, Quiet, RunOptions, RunReport};
 pub use recordings::{Batch, InOrder, Piece, Recorded, Recordings};
-pub use stored::{StoredOutput, fetch};
+pub use stored::{StoredOutput, fetch_to};
 
 /// Extracts the features of `inputs` into one output. `stop` ends the run early, its ledger intact. An
 /// output for a store is made in a file of the work folder, with ledger and partial output beside it; when

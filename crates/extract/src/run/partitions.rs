@@ -1,20 +1,26 @@
 //! An output in several files, by the values of a label.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use corsmal_files::draft;
 use corsmal_files::npz::NpzFile;
 use corsmal_files::parquet;
 use corsmal_files::partition::{self, FILE, MOST, Partition};
 use corsmal_files::provenance::Provenance;
+use corsmal_files::quote::quoted;
 use corsmal_files::table::Table;
+use tempfile::TempDir;
 
 use super::error::RunError;
 use super::frames;
 use crate::inputs::Input;
 use crate::ledger::Ledger;
+
+/// Longest name of a folder in bytes.
+const LONGEST: usize = 255;
 
 /// The label by whose values an output is partitioned, and the inputs that have them.
 pub struct PartitionBy<'a> {
@@ -48,6 +54,21 @@ impl<'a> PartitionBy<'a> {
                 format!("it has {} values, and each is a folder: at most {MOST}", values.len());
             return Err(refuse(why));
         }
+        let mut folders = BTreeMap::new();
+        for value in &values {
+            let folder = partition::folder(label, value);
+            if folder.len() > LONGEST {
+                let value = quoted(value);
+                return Err(refuse(format!(
+                    "the value {value} is too long for the name of a folder"
+                )));
+            }
+            // Some systems tell no capital letters apart.
+            if let Some(other) = folders.insert(folder.to_lowercase(), value) {
+                let (a, b) = (quoted(other), quoted(value));
+                return Err(refuse(format!("the values {a} and {b} would share a folder")));
+            }
+        }
         Ok(by)
     }
 
@@ -74,18 +95,15 @@ impl<'a> PartitionBy<'a> {
         table: &Table,
         provenance: &Provenance,
     ) -> Result<(), RunError> {
-        // The lock of the ledger keeps others away from both.
         let out = ledger.out().to_path_buf();
-        let (made, replaced) = (beside(&out, ".parts"), beside(&out, ".replaced"));
         let io = |path: &Path| {
             let path = path.display().to_string();
             move |e: io::Error| RunError::Folder(io::Error::new(e.kind(), format!("{path}: {e}")))
         };
-        for left in [&made, &replaced] {
-            if left.exists() {
-                fs::remove_dir_all(left).map_err(io(left))?;
-            }
-        }
+        // Removed when it is dropped, with the output that this one replaces.
+        let beside = self.beside(&out).map_err(io(&out))?;
+        let (made, replaced) = (beside.path().join("made"), beside.path().join("replaced"));
+        fs::create_dir(&made).map_err(io(&made))?;
         for Partition { part, table } in partition::split(table, self.label, &self.values())? {
             let folder = made.join(partition::folder(&part.label, &part.value));
             fs::create_dir_all(&folder).map_err(io(&folder))?;
@@ -98,30 +116,48 @@ impl<'a> PartitionBy<'a> {
             }
             sync(&folder).map_err(io(&folder))?;
         }
-        if !made.exists() {
-            // Of no inputs there is no part.
-            fs::create_dir(&made).map_err(io(&made))?;
-        }
         sync(&made).map_err(io(&made))?;
         drop(archive);
-        ledger.publish_made(|| {
-            // No system call that all systems have replaces a folder: for a moment there is none.
-            if out.exists() {
-                fs::rename(&out, &replaced)?;
+        ledger
+            .publish_made(|| {
+                // No call that all systems have replaces a folder: for a moment there is none.
+                if out.exists() {
+                    // It may be another one than when the run began.
+                    if !is_ours(&out) {
+                        return Err(io::Error::other(
+                            "is there by now, and is no partitioned output",
+                        ));
+                    }
+                    fs::rename(&out, &replaced)?;
+                }
+                fs::rename(&made, &out).inspect_err(|_| {
+                    let _ = fs::rename(&replaced, &out);
+                })
+            })
+            .map_err(RunError::from)
+    }
+
+    /// A hidden folder beside the output, without what a killed run has left of the same kind: the lock of
+    /// the ledger keeps other runs of this output away.
+    fn beside(&self, out: &Path) -> io::Result<TempDir> {
+        let mut prefix = std::ffi::OsString::from(".");
+        prefix.push(out.file_name().unwrap_or_default());
+        prefix.push(".partitions-");
+        for entry in draft::folder(out).read_dir()?.flatten() {
+            let name = entry.file_name();
+            let random = name.as_encoded_bytes().strip_prefix(prefix.as_encoded_bytes());
+            if random.is_some_and(|r| r.len() == 6 && r.iter().all(u8::is_ascii_alphanumeric)) {
+                fs::remove_dir_all(entry.path())?;
             }
-            fs::rename(&made, &out)
-        })?;
-        if replaced.exists() {
-            fs::remove_dir_all(&replaced).map_err(io(&replaced))?;
         }
-        Ok(())
+        tempfile::Builder::new().prefix(&prefix).tempdir_in(draft::folder(out))
     }
 }
 
-fn beside(out: &Path, suffix: &str) -> PathBuf {
-    let mut path = out.as_os_str().to_owned();
-    path.push(suffix);
-    path.into()
+/// Whether a partitioned output may be written in place of what is there: nothing, or another one.
+pub fn is_ours(out: &Path) -> bool {
+    let is_empty = out.is_dir() && out.read_dir().is_ok_and(|mut all| all.next().is_none());
+    !out.exists() || is_empty || partition::is_partitioned(out)
 }
 
 /// Makes the names in a folder survive a power cut.

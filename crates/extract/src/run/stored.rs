@@ -1,5 +1,6 @@
 //! Outputs in stores: made in a file first, then put there whole.
 
+use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,7 +12,7 @@ use corsmal_files::npz::Compression;
 
 use super::error::RunError;
 use crate::inputs::stored::{self, Purpose};
-use crate::inputs::{Object, is_stored, object, shown};
+use crate::inputs::{InputError, Object, is_stored, object, shown};
 
 /// Hexadecimal digits that keep the files of outputs with one name apart.
 const DIGITS: usize = 12;
@@ -45,7 +46,7 @@ impl StoredOutput {
         OutputFormat::of_name(out, Compression::Stored)?;
         let refused = |reason: String| RunError::Store { name: shown(name), reason };
         let object = object(name).map_err(|error| match error {
-            crate::inputs::InputError::Store { name, reason } => RunError::Store { name, reason },
+            InputError::Store { name, reason } => RunError::Store { name, reason },
             other => refused(other.to_string()),
         })?;
         if stored::is_web(&object) {
@@ -126,11 +127,28 @@ impl StoredOutput {
     }
 }
 
+/// Copies the object of this name into a new file.
+///
+/// # Errors
+/// [`RunError::Store`], [`RunError::Interrupted`].
+pub fn fetch_to(name: &str, file: &Path, stop: &Arc<AtomicBool>) -> Result<(), RunError> {
+    let failed = |reason: String| match stop.load(Ordering::Relaxed) {
+        true => RunError::Interrupted,
+        false => RunError::Store { name: shown(name), reason },
+    };
+    let object = object(name).map_err(|error| match error {
+        InputError::Store { name, reason } => RunError::Store { name, reason },
+        other => failed(other.to_string()),
+    })?;
+    let mut copy = File::create(file).map_err(|e| failed(e.to_string()))?;
+    fetch(&object, &mut copy, stop).map(drop).map_err(|e| failed(e.to_string()))
+}
+
 /// Copies an object, all of it of one version. Waiting ends when `stop` is set.
 ///
 /// # Errors
 /// Whatever reading or writing reports.
-pub fn fetch(object: &Object, to: &mut impl Write, stop: &Arc<AtomicBool>) -> io::Result<u64> {
+fn fetch(object: &Object, to: &mut impl Write, stop: &Arc<AtomicBool>) -> io::Result<u64> {
     let pin = stored::pin_to_listed(object);
     let mut bytes = stored::open(object, None, Purpose::Content, (&pin, stop))?;
     io::copy(&mut bytes, to)

@@ -111,8 +111,29 @@ fn what_cannot_be_partitioned_is_refused_and_nothing_is_removed() {
         assert!(refused.stderr.contains(reason), "{out}: {}", refused.stderr);
     }
     assert_eq!(fs::read_to_string(at("mine/notes.txt")).unwrap(), "mine");
+    // Neighbours with names that one might think of stay.
+    for name in ["empty.parts", "empty.replaced"] {
+        fs::create_dir(at(name)).unwrap();
+        fs::write(at(name).join("notes.txt"), "mine").unwrap();
+    }
     run("empty", &["--partition-by", "type"]).with(0);
     assert_eq!(names(&at("empty")).len(), 3);
+    run("empty", &["--partition-by", "type"]).with(0);
+    for name in ["empty.parts", "empty.replaced"] {
+        assert_eq!(fs::read_to_string(at(name).join("notes.txt")).unwrap(), "mine");
+    }
+    assert!(!names(folder.path()).iter().any(|name| name.starts_with(".empty")));
+    for (values, reason) in [
+        (["Rice", "rice"], "would share a folder"),
+        (["", "__HIVE_DEFAULT_PARTITION__"], "would share a folder"),
+        ([&*"水".repeat(29), "x"], "too long for the name of a folder"),
+    ] {
+        let rows = format!("path,type\nr000.wav,{}\nr001.wav,{}\n", values[0], values[1]);
+        fs::write(at("odd.csv"), rows).unwrap();
+        let more = ["--preset", "mfcc-zcr", "--partition-by", "type"];
+        let refused = extract(&at("odd.csv"), &at("odd"), &more).with(2);
+        assert!(refused.stderr.contains(reason), "{}", refused.stderr);
+    }
     let unlabelled =
         extract(&at("r000.wav"), &at("x"), &["--preset", "mfcc-zcr", "--partition-by", "type"]);
     assert!(unlabelled.with(2).stderr.contains("have no labels"));

@@ -11,7 +11,8 @@ fn the_tasks_of_an_array_job_make_one_run() {
     const TASKS: usize = 3;
     let folder = folder(10);
     let at = |name: &str| folder.path().join(name);
-    extract(&at("audio"), &at("whole.npz"), &["--preset", "mfcc-zcr"]).with(0);
+    fs::write(at("audio/00/bad.wav"), b"no audio").unwrap();
+    extract(&at("audio"), &at("whole.npz"), &["--preset", "mfcc-zcr"]).with(1);
     let bin = std::path::Path::new(env!("CARGO_BIN_EXE_corsmal-feat")).parent().unwrap().to_owned();
     let path = format!("{}:{}", bin.display(), std::env::var("PATH").unwrap_or_default());
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/examples/slurm.sh");
@@ -19,7 +20,7 @@ fn the_tasks_of_an_array_job_make_one_run() {
         let mut command = Command::new("bash");
         command.arg(script).arg(at("audio")).arg(at("parts")).env("PATH", &path);
         command.env("SLURM_ARRAY_TASK_ID", index.to_string());
-        command.env("SLURM_ARRAY_TASK_COUNT", TASKS.to_string());
+        command.env("TASKS", TASKS.to_string());
         ended(command.env("SLURM_CPUS_PER_TASK", "1")).with(0)
     };
     (0..TASKS).for_each(|index| drop(task(index)));

@@ -98,9 +98,9 @@ fn an_output_that_did_not_arrive_is_sent_again() {
     let (uri, key) = ("s3://lab/out/x.npz", "PUT lab/out/x.npz");
     twins.store.fail(key, &vec![Fault::Denied; 9]);
     let failed = ended(&mut twins.send(uri, &SUMMARY)).with(2);
-    let told = "denied access: 403 Forbidden (AccessDenied); it is complete in ";
+    let told = "denied access: 403 Forbidden (AccessDenied); the finished output is in ";
     assert!(
-        failed.stderr.contains(told) && failed.stderr.contains("sends it again"),
+        failed.stderr.contains(told) && failed.stderr.contains("to send it"),
         "{}",
         failed.stderr
     );
@@ -177,7 +177,7 @@ fn shards_in_a_bucket_are_merged_into_the_object_of_one_run() {
             ended(&mut command)
         };
         twins.store.fail(&format!("PUT lab/out/{name}"), &[Fault::Denied]);
-        assert!(merge(&[]).with(2).stderr.contains("it is complete in"));
+        assert!(merge(&[]).with(2).stderr.contains("the finished output is in"));
         merge(&["--resume"]).with(0);
         assert!(
             twins.store.get(&format!("lab/out/{name}")).unwrap()
@@ -188,4 +188,39 @@ fn shards_in_a_bucket_are_merged_into_the_object_of_one_run() {
         merge(&["--overwrite"]).with(0);
         assert_eq!(twins.left(), Vec::<String>::new(), "{name}");
     }
+}
+
+#[test]
+fn an_output_that_could_not_replace_another_is_sent_without_computing() {
+    let twins = Twins::new();
+    let (uri, key) = ("s3://lab/out/x.parquet", "lab/out/x.parquet");
+    twins.store.put(key, b"the old one");
+    let over = [&SUMMARY[..], &["--overwrite"]].concat();
+    twins.store.fail(&format!("PUT {key}"), &[Fault::Denied]);
+    ended(&mut twins.send(uri, &over)).with(2);
+    let made = twins.at("work").join(&twins.left()[0]);
+    let before = fs::metadata(&made).unwrap().modified().unwrap();
+    twins.store.fail(&format!("PUT {key}"), &[Fault::Denied]);
+    ended(&mut twins.send(uri, &over)).with(2);
+    assert_eq!(fs::metadata(&made).unwrap().modified().unwrap(), before, "made again");
+    ended(&mut twins.send(uri, &over)).with(0);
+    twins.local("audio", "x.parquet", &SUMMARY).with(0);
+    assert!(twins.store.get(key).unwrap() == fs::read(twins.at("x.parquet")).unwrap());
+    assert_eq!(twins.left(), Vec::<String>::new());
+}
+
+#[test]
+fn ctrl_c_ends_an_upload_in_parts_before_it_begins() {
+    let twins = Twins::new();
+    twins.wav("audio/long.wav", 2, 1_600_000);
+    let (uri, key) = ("s3://lab/out/x.npz", "POST lab/out/x.npz");
+    twins.store.fail(key, &[Fault::Silent]);
+    let mut command = twins.send(uri, &["--add", "stft", "--set", "stft.output=magnitude"]);
+    let mut sending = command.stderr(Stdio::null()).spawn().unwrap();
+    while !twins.store.asked().iter().any(|asked| asked.starts_with(key)) {
+        assert!(sending.try_wait().unwrap().is_none(), "it should wait");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert_eq!(interrupt(&mut sending), Some(130));
+    assert_eq!((twins.left().len(), twins.store.get("lab/out/x.npz")), (1, None));
 }
