@@ -1,7 +1,7 @@
 //! The recordings that names in stores stand for.
 
 // Without the feature there is no object, and the compiler sees that nothing below can happen.
-#![cfg_attr(not(feature = "cloud"), allow(unreachable_code, unused_variables))]
+#![cfg_attr(not(feature = "cloud"), allow(unreachable_code, unused_mut, unused_variables))]
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
