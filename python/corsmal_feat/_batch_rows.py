@@ -97,6 +97,7 @@ def _local(path: str) -> str:
     return unquote(parts.path)
 
 
-def absolute(path: str) -> str:
+def absolute(path: str | os.PathLike[str]) -> str:
     """A path that workers with another current folder find, too; URIs of objects stay."""
-    return path if _core.is_stored(path) else os.path.abspath(path)
+    name = os.fspath(path)
+    return name if _core.is_stored(name) else os.path.abspath(name)

@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import tarfile
 import time
 import wave
 from pathlib import Path
@@ -255,6 +256,20 @@ def test_a_folder_is_one_job_and_stays_whole(audio: Path, tmp_path: Path, cluste
         cf.ray.extract(pa.table({"path": ["a.wav", "a.wav"]}), tmp_path / "twice", preset="esc26")
     with pytest.raises(cf.ParameterError, match="did you mean"):
         cf.ray.extract(some, tmp_path / "none", preset="esc62")
+
+
+def test_tar_shards_are_read_by_workers(audio: Path, tmp_path: Path, cluster):
+    some = sorted(audio.glob("r00*.wav"))[:4]
+    for shard in range(2):
+        with tarfile.open(tmp_path / f"{shard}.tar", "w") as tar:
+            for path in some[2 * shard : 2 * shard + 2]:
+                tar.add(path, path.name)
+    found = cf.ray.extract(str(tmp_path / "{0..1}.tar"), tmp_path / "out", preset="esc26", rows=2)
+    parts = pa.concat_tables([pq.read_table(path) for path in found.parts])
+    assert parts["id"].to_pylist() == ["0/r000", "0/r001", "1/r002", "1/r003"]
+    run = cf.extract(some, preset="esc26")
+    values = np.stack([parts[name].to_numpy() for name in run.names], axis=1)
+    np.testing.assert_array_equal(values, run.summary)
 
 
 def test_pieces_of_recordings_come_from_several_tasks(audio: Path, tmp_path: Path, cluster):
