@@ -2,7 +2,8 @@
 
     python dask_features.py manifest.parquet features/ [scheduler:8786]
 
-Needs dask, distributed, pyarrow and corsmal-feat on all machines, and a file system that they share.
+Needs dask, distributed, pyarrow and corsmal-feat on all machines, and a file system that
+they share.
 """
 
 import hashlib

@@ -262,7 +262,7 @@ def embed(
     Traceback (most recent call last):
     ...
     corsmal_feat.errors.ParameterError: m2_type gives classes, not embeddings; vggish gives embeddings
-    """
+    """  # noqa: E501
     rows, failed = _core.embed_recordings(
         name, paths_of(recordings), os.fspath(weights), jobs_of(jobs)
     )
