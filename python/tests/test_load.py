@@ -155,7 +155,7 @@ def test_impossible_parts_are_refused(recordings: dict[str, Path], tmp_path: Pat
         with pytest.raises(cf.MissingFileError, match=r"nothing\.wav") as caught:
             read(tmp_path / "nothing.wav")
         assert isinstance(caught.value, FileNotFoundError)
-    with pytest.raises(cf.CorsmalFeatError, match="directory"):
+    with pytest.raises(cf.CorsmalFeatError, match="folder without parts"):
         cf.load_features(tmp_path)
     np.savez(tmp_path / "features.npz", a=np.zeros(3))
     with pytest.raises(cf.DecodeError, match="load_features"):
