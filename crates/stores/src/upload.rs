@@ -153,9 +153,10 @@ async fn until<T>(work: impl Future<Output = T>, stop: &AtomicBool) -> Result<T,
             tokio::time::sleep(LOOK).await;
         }
     };
-    match select(pin!(work), pin!(stopped)).await {
-        Either::Left((result, _)) => Ok(result),
-        Either::Right(_) => Err(StoreError::Stopped),
+    // Looked at first: work that never waits would be done before.
+    match select(pin!(stopped), pin!(work)).await {
+        Either::Left(_) => Err(StoreError::Stopped),
+        Either::Right((result, _)) => Ok(result),
     }
 }
 
