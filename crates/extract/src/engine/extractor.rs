@@ -37,7 +37,7 @@ pub struct Extractor {
     plan: Arc<Plan>,
     cursors: Vec<Cursor>,
     raw: Vec<Vec<f32>>,
-    room: Room,
+    workspace: Workspace,
     head: usize,
     /// Absolute index of the sample at `head`.
     first: u64,
@@ -46,7 +46,7 @@ pub struct Extractor {
 /// The memory that an extractor works in, handed on to the next one of its plan: made anew for each
 /// recording, it would leave a hole in the heap for each.
 #[derive(Default)]
-pub struct Room {
+pub struct Workspace {
     /// Interleaved samples; those before the extractor's `head` are done with.
     buffer: Vec<f32>,
     scratch: Scratch,
@@ -61,8 +61,8 @@ impl Extractor {
     pub fn new(plan: Arc<Plan>, span: Range<u64>, first: u64) -> Self {
         let cursors = plan.streams.iter().map(|s| Cursor::new(&s.framing(), &span)).collect();
         let raw = vec![Vec::new(); plan.features.len()];
-        let room = plan.take_room();
-        Self { plan, cursors, raw, room, head: 0, first }
+        let workspace = plan.take_workspace();
+        Self { plan, cursors, raw, workspace, head: 0, first }
     }
 
     /// Channels that are pushed.
@@ -72,28 +72,28 @@ impl Extractor {
 
     /// Room for `frames` more frames, to be filled and then reported by [`Extractor::commit`].
     pub fn room(&mut self, frames: usize) -> &mut [f32] {
-        let length = self.room.buffer.len();
-        self.room.buffer.resize(length + frames * self.plan.channels, 0.0);
-        &mut self.room.buffer[length..]
+        let length = self.workspace.buffer.len();
+        self.workspace.buffer.resize(length + frames * self.plan.channels, 0.0);
+        &mut self.workspace.buffer[length..]
     }
 
     /// Keeps `filled` of the `room` frames last asked for, and computes what they complete.
     pub fn commit(&mut self, room: usize, filled: usize) {
         let unused = (room - filled) * self.plan.channels;
-        self.room.buffer.truncate(self.room.buffer.len() - unused);
+        self.workspace.buffer.truncate(self.workspace.buffer.len() - unused);
         self.advance(None);
         self.compact();
     }
 
     /// Takes interleaved samples (whole frames).
     pub fn push(&mut self, samples: &[f32]) {
-        self.room.buffer.extend_from_slice(samples);
+        self.workspace.buffer.extend_from_slice(samples);
         self.commit(0, 0);
     }
 
     /// Frames of the signal up to the last that was pushed.
     pub fn reached(&self) -> u64 {
-        self.first + ((self.room.buffer.len() - self.head) / self.plan.channels) as u64
+        self.first + ((self.workspace.buffer.len() - self.head) / self.plan.channels) as u64
     }
 
     /// Number of values computed and not yet taken.
@@ -129,14 +129,14 @@ impl Extractor {
         let owned = if self.plan.channels == 1 {
             Vec::new()
         } else {
-            apart(&self.room.buffer, self.plan.channels)
+            apart(&self.workspace.buffer, self.plan.channels)
         };
         let planes: Vec<&[f32]> = if owned.is_empty() {
-            vec![&self.room.buffer]
+            vec![&self.workspace.buffer]
         } else {
             // Long recordings are not held twice.
-            if self.room.buffer.capacity() > MAX_BUFFER {
-                self.room.buffer = Vec::new();
+            if self.workspace.buffer.capacity() > MAX_BUFFER {
+                self.workspace.buffer = Vec::new();
             }
             owned.iter().map(Vec::as_slice).collect()
         };
@@ -163,9 +163,10 @@ impl Extractor {
     }
 
     fn advance(&mut self, total: Option<u64>) {
-        let window = Window { samples: &self.room.buffer[self.head..], first: self.first, total };
+        let window =
+            Window { samples: &self.workspace.buffer[self.head..], first: self.first, total };
         for (stream, cursor) in self.plan.streams.iter().zip(&mut self.cursors) {
-            let (raw, scratch) = (&mut self.raw, &mut self.room.scratch);
+            let (raw, scratch) = (&mut self.raw, &mut self.workspace.scratch);
             cursor.advance(stream.as_ref(), self.plan.channels, &window, raw, scratch);
         }
     }
@@ -182,13 +183,13 @@ impl Extractor {
             .map(|(cursor, stream)| cursor.keep_from(&stream.framing()))
             .min()
             .unwrap_or(u64::MAX);
-        let held = ((self.room.buffer.len() - self.head) / self.plan.channels) as u64;
+        let held = ((self.workspace.buffer.len() - self.head) / self.plan.channels) as u64;
         let done = keep.saturating_sub(self.first).min(held);
         self.first += done;
         self.head += done as usize * self.plan.channels;
-        if self.head > self.room.buffer.len() / 2 {
-            self.room.buffer.copy_within(self.head.., 0);
-            self.room.buffer.truncate(self.room.buffer.len() - self.head);
+        if self.head > self.workspace.buffer.len() / 2 {
+            self.workspace.buffer.copy_within(self.head.., 0);
+            self.workspace.buffer.truncate(self.workspace.buffer.len() - self.head);
             self.head = 0;
         }
     }
@@ -196,10 +197,10 @@ impl Extractor {
 
 impl Drop for Extractor {
     fn drop(&mut self) {
-        let mut room = std::mem::take(&mut self.room);
-        if room.buffer.capacity() <= MAX_BUFFER {
-            room.buffer.clear();
-            self.plan.give_room(room);
+        let mut workspace = std::mem::take(&mut self.workspace);
+        if workspace.buffer.capacity() <= MAX_BUFFER {
+            workspace.buffer.clear();
+            self.plan.give_workspace(workspace);
         }
     }
 }
@@ -236,16 +237,16 @@ mod tests {
             extractor.finish(true).unwrap().raw
         };
         let first = compute(8000);
-        let place = |room: &Room| (room.buffer.as_ptr(), room.buffer.capacity());
-        let room = plan.take_room();
-        let before = place(&room);
-        assert!(before.1 >= 16_000 && !room.scratch.frames.is_empty());
-        plan.give_room(room);
+        let place = |work: &Workspace| (work.buffer.as_ptr(), work.buffer.capacity());
+        let workspace = plan.take_workspace();
+        let before = place(&workspace);
+        assert!(before.1 >= 16_000 && !workspace.scratch.frames.is_empty());
+        plan.give_workspace(workspace);
         assert_eq!(compute(8000), first);
-        assert_eq!(place(&plan.take_room()), before);
-        assert!(plan.take_room().buffer.capacity() == 0, "one was at work at a time");
+        assert_eq!(place(&plan.take_workspace()), before);
+        assert!(plan.take_workspace().buffer.capacity() == 0, "one was at work at a time");
 
         compute(MAX_BUFFER);
-        assert!(plan.take_room().buffer.capacity() == 0, "long ones are given back");
+        assert!(plan.take_workspace().buffer.capacity() == 0, "long ones are given back");
     }
 }

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use corsmal_dsp::DspError;
 
-use super::extractor::Room;
+use super::extractor::Workspace;
 use super::signal_chain::SignalChain;
 use super::stream::{ExactMember, Framing, SharedStreams, SpectrumMember, Stream};
 use crate::config::Config;
@@ -68,7 +68,7 @@ pub struct Plan {
     pub config: Arc<Config>,
     warnings: Vec<String>,
     /// What extractors of this plan have worked in.
-    rooms: Mutex<Vec<Room>>,
+    workspaces: Mutex<Vec<Workspace>>,
     summary_names: OnceLock<Arc<[String]>>,
 }
 
@@ -146,7 +146,7 @@ impl Plan {
             });
         }
         let (streams, config) = (streams.into_streams(), config.clone());
-        let rooms = Mutex::default();
+        let workspaces = Mutex::default();
         let summary_names = OnceLock::new();
         Ok(Self {
             sample_rate,
@@ -156,7 +156,7 @@ impl Plan {
             whole,
             config,
             warnings,
-            rooms,
+            workspaces,
             summary_names,
         })
     }
@@ -203,13 +203,13 @@ impl Plan {
     }
 
     /// Memory for an extractor to work in.
-    pub(super) fn take_room(&self) -> Room {
-        self.rooms.lock().unwrap_or_else(|e| e.into_inner()).pop().unwrap_or_default()
+    pub(super) fn take_workspace(&self) -> Workspace {
+        self.workspaces.lock().unwrap_or_else(|e| e.into_inner()).pop().unwrap_or_default()
     }
 
     /// Keeps the memory of an extractor for the next one.
-    pub(super) fn give_room(&self, room: Room) {
-        self.rooms.lock().unwrap_or_else(|e| e.into_inner()).push(room);
+    pub(super) fn give_workspace(&self, workspace: Workspace) {
+        self.workspaces.lock().unwrap_or_else(|e| e.into_inner()).push(workspace);
     }
 
     /// What the user should know of parameters that are possible but odd.
