@@ -97,6 +97,17 @@ pub(super) struct Run {
     pub(super) tests: Vec<Vec<Estimate>>,
 }
 
+impl Run {
+    /// Why the tables have no row of it, where it answers for no recording.
+    fn silent(&self) -> Option<String> {
+        let mut all = self.held_out.iter().map(|(_, e)| e).chain(self.tests.iter().flatten());
+        let answers = |e: &Estimate| e.level.is_some() || e.kind.is_some();
+        (!all.any(answers)).then(|| {
+            format!("{}: no answer for any recording, so the tables have no row", self.name)
+        })
+    }
+}
+
 impl<'a> Work<'a> {
     pub(super) fn new(
         set: &DataSet,
@@ -186,5 +197,32 @@ pub(super) fn run(system: &dyn System, work: &Work<'_>, rows: &Rows) -> Result<V
     if let Some(first) = runs.first_mut() {
         first.notes = prepared.notes();
     }
+    for run in &mut runs {
+        if let Some(silent) = run.silent() {
+            (work.progress)(&silent);
+            run.notes.push(silent);
+        }
+    }
     Ok(runs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_system_without_any_answer_is_told() {
+        let mut run = Run {
+            system: "mask-rn",
+            name: "Mask + RN".into(),
+            slug: "mask-rn".into(),
+            inputs: String::new(),
+            notes: Vec::new(),
+            held_out: vec![(0, Estimate::default()), (1, Estimate::default())],
+            tests: vec![vec![Estimate::default()]],
+        };
+        assert!(run.silent().unwrap().starts_with("Mask + RN: no answer"));
+        run.tests[0][0].level = Some(0);
+        assert_eq!(run.silent(), None);
+    }
 }
