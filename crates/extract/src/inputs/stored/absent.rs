@@ -41,7 +41,7 @@ impl Pin {
 }
 
 pub(super) fn parse(_: &str) -> Result<Object, String> {
-    Err("this build knows no object stores: one with `--features cloud` does, and so does the Python \
+    Err("this build cannot read object stores: one with `--features cloud` can, and so can the Python \
          package; or mount the bucket (s3fs, gcsfuse, rclone mount), or copy the files"
         .into())
 }
