@@ -86,7 +86,7 @@ pub mod inputs;
 pub mod ledger;
 pub mod manifest;
 pub mod merge;
-pub mod merge_stored;
+
 pub mod params;
 pub mod projection;
 pub mod run;

@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use corsmal_extract::merge::{Existing, MergeError};
-use corsmal_extract::merge_stored;
+use corsmal_extract::merge::{Existing, MergeError, stored};
 use corsmal_extract::run::RunError;
 use serde_json::json;
 
@@ -50,8 +49,8 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         _ => Existing::Keep,
     };
     let place = (args.out.as_path(), args.work.as_deref());
-    match merge_stored::merge(&args.shards, place, existing, crate::interrupt::flag()) {
-        Err(MergeError::Stored(error @ RunError::Interrupted)) => {
+    match stored::merge(&args.shards, place, existing, crate::interrupt::flag()) {
+        Err(MergeError::Run(error @ RunError::Interrupted)) => {
             return Err(Failure::interrupted(error.to_string()));
         }
         merged => merged?,

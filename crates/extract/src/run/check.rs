@@ -70,6 +70,9 @@ pub fn check(
         PartitionBy::of(label, inputs, options.shard.of(inputs))?;
     }
     let stored = StoredOutput::of(&options.out, options.work.as_deref(), by)?;
+    if let (None, Some(work)) = (&stored, &options.work) {
+        return Err(RunError::Work { path: options.out.clone(), work: work.clone() });
+    }
     let out = stored.as_ref().map_or(&options.out, |stored| &stored.file);
     let format = check_output(out, options, config)?;
     // Without the slash that a folder may be named with.

@@ -62,6 +62,16 @@ pub enum RunError {
         /// Why, and what is allowed.
         why: String,
     },
+    /// A work folder without anything in a store.
+    #[error(
+        "{path} is not in a store: the work folder {work} is only for outputs and shards in stores"
+    )]
+    Work {
+        /// The output.
+        path: PathBuf,
+        /// The folder.
+        work: PathBuf,
+    },
     /// An output in a store cannot be looked at, or have its name.
     #[error("{name}: {reason}")]
     Store {

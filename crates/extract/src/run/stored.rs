@@ -65,6 +65,16 @@ impl StoredOutput {
         Ok(Some(Self { object, file: work.join(file) }))
     }
 
+    /// The same, made in a file that no other kind of work writes.
+    pub(crate) fn kept_apart(mut self, by: &str) -> Self {
+        let text = |part: Option<&std::ffi::OsStr>| {
+            part.unwrap_or_default().to_string_lossy().into_owned()
+        };
+        let (stem, extension) = (text(self.file.file_stem()), text(self.file.extension()));
+        self.file.set_file_name(format!("{stem}-{by}.{extension}"));
+        self
+    }
+
     /// The name of the object.
     pub fn name(&self) -> String {
         self.object.to_string()

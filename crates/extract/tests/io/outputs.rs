@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use crate::support::{python, text};
 use corsmal_extract::merge::{Existing, merge};
@@ -15,6 +16,9 @@ use corsmal_files::shard::Shard;
 use corsmal_files::table::{Table, TableError};
 use proptest::prelude::*;
 use tempfile::TempDir;
+
+/// Nobody stops a merge.
+static GO: AtomicBool = AtomicBool::new(false);
 
 const NAMES: [&str; 2] = ["mfcc.mean", "zcr.std"];
 const INPUTS: usize = 7;
@@ -127,7 +131,7 @@ fn merged_shards_are_the_whole_run_byte_for_byte() {
             for (file, index) in shards.iter().rev().zip(0..) {
                 write_npz(file, compression, Shard { index, count });
             }
-            merge(&shards, &path("merged.npz"), Existing::Overwrite).unwrap();
+            merge(&shards, &path("merged.npz"), Existing::Overwrite, &GO).unwrap();
             let equal =
                 fs::read(path("merged.npz")).unwrap() == fs::read(path("whole.npz")).unwrap();
             assert!(equal, "{count} shards, {compression:?}");
@@ -141,7 +145,7 @@ fn merged_shards_are_the_whole_run_byte_for_byte() {
         shards.push(path(&format!("{index}.parquet")));
         parquet::write(&shards[index], &table(shard), &provenance(shard)).unwrap();
     }
-    merge(&shards, &path("merged.parquet"), Existing::Keep).unwrap();
+    merge(&shards, &path("merged.parquet"), Existing::Keep, &GO).unwrap();
     let merged = fs::read(path("merged.parquet")).unwrap();
     assert!(merged == fs::read(path("whole.parquet")).unwrap());
 }
@@ -155,19 +159,19 @@ fn only_the_shards_of_one_run_are_merged() {
         write_npz(&path(&name), Compression::Stored, Shard { index, count: 2 });
     }
     let out = path("merged.npz");
-    let error = merge(&[path("1.npz")], &out, Existing::Keep).unwrap_err().to_string();
+    let error = merge(&[path("1.npz")], &out, Existing::Keep, &GO).unwrap_err().to_string();
     assert!(error.contains("expected all 2 shards, found 1"), "{error}");
     let error =
-        merge(&[path("0.npz"), path("0.npz")], &out, Existing::Keep).unwrap_err().to_string();
+        merge(&[path("0.npz"), path("0.npz")], &out, Existing::Keep, &GO).unwrap_err().to_string();
     assert!(error.contains("expected shard 1/2, found 0/2"), "{error}");
-    assert!(merge(&[], &out, Existing::Keep).is_err());
+    assert!(merge(&[], &out, Existing::Keep, &GO).is_err());
     let mut writer = NpzWriter::create(&path("1.npz"), Compression::Stored).unwrap();
     let shard = Shard { index: 1, count: 2 };
     let other = Provenance { config_hash: "other".into(), ..provenance(shard) };
     layout::write_table(&mut writer, &table(shard), &other).unwrap();
     writer.finish().unwrap();
     let error =
-        merge(&[path("0.npz"), path("1.npz")], &out, Existing::Keep).unwrap_err().to_string();
+        merge(&[path("0.npz"), path("1.npz")], &out, Existing::Keep, &GO).unwrap_err().to_string();
     assert!(error.contains("1.npz: expected configuration "), "{error}");
     assert!(error.ends_with(", found other"), "{error}");
     assert!(!out.exists());

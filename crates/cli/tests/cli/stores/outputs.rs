@@ -191,6 +191,38 @@ fn shards_in_a_bucket_are_merged_into_the_object_of_one_run() {
 }
 
 #[test]
+fn a_merge_leaves_an_unsent_output_of_extract_alone() {
+    let twins = Twins::new();
+    let (part, out) = ("s3://lab/parts/x.npz", "s3://lab/out/x.npz");
+    ended(&mut twins.send(part, &[])).with(0);
+    twins.store.fail("PUT lab/out/x.npz", &[Fault::Denied]);
+    ended(&mut twins.send(out, &[])).with(2);
+    let left = twins.left();
+    assert_eq!(left.len(), 1, "{left:?}");
+    let file = twins.at("work").join(&left[0]);
+    fs::write(&file, "not to be lost").unwrap();
+    let mut command = twins.store.tool();
+    command.args(["merge", part, "--out", out, "--work"]).arg(twins.at("work"));
+    ended(&mut command).with(0);
+    assert_eq!(twins.left(), left);
+    assert_eq!(fs::read(&file).unwrap(), b"not to be lost");
+}
+
+#[test]
+fn a_work_folder_without_anything_in_a_store_is_refused() {
+    let twins = Twins::new();
+    let work = twins.at("work");
+    let work = work.to_str().unwrap();
+    let refused = twins.local("audio", "x.npz", &["--work", work]).with(2);
+    assert!(refused.stderr.contains("is not in a store"), "{}", refused.stderr);
+    twins.local("audio", "x.npz", &[]).with(0);
+    let mut command = twins.store.tool();
+    command.arg("merge").arg(twins.at("x.npz")).args(["--work", work, "--out"]);
+    let refused = ended(command.arg(twins.at("y.npz"))).with(2);
+    assert!(refused.stderr.contains("is not in a store"), "{}", refused.stderr);
+}
+
+#[test]
 fn an_output_that_could_not_replace_another_is_sent_without_computing() {
     let twins = Twins::new();
     let (uri, key) = ("s3://lab/out/x.parquet", "lab/out/x.parquet");

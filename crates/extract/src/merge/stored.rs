@@ -6,28 +6,34 @@ use std::sync::atomic::AtomicBool;
 
 use tempfile::TempDir;
 
+use super::Existing;
+use super::error::MergeError;
 use crate::inputs::is_stored;
-use crate::merge::{self, Existing, MergeError};
 use crate::run::{RunError, StoredOutput, fetch_to};
 
-/// As [`merge::merge`], where the result or shards may be in stores: shards are copied into a temporary folder
+/// As [`super::merge`], where the result or shards may be in stores: shards are copied into a temporary folder
 /// in `work`, by default the current one, the result is made in `work`, and sent when it is complete. Waiting
 /// ends when `stop` is set.
 ///
 /// # Errors
-/// As [`merge::merge`]; [`MergeError::Stored`].
+/// As [`super::merge`].
 pub fn merge(
     shards: &[PathBuf],
     (out, work): (&Path, Option<&Path>),
     existing: Existing,
     stop: &Arc<AtomicBool>,
 ) -> Result<(), MergeError> {
-    let stored = StoredOutput::of(out, work, None)?;
+    // Apart from an output of `extract` that has not reached its store.
+    let stored = StoredOutput::of(out, work, None)?.map(|stored| stored.kept_apart("merged"));
     if let Some(stored) = &stored
         && existing != Existing::Overwrite
         && stored.is_there(stop)?
     {
         return Err(MergeError::Exists { path: stored.name().into() });
+    }
+    let is_any_stored = shards.iter().any(|shard| shard.to_str().is_some_and(is_stored));
+    if let (None, false, Some(work)) = (&stored, is_any_stored, work) {
+        return Err(RunError::Work { path: out.into(), work: work.into() }.into());
     }
     // Removed when it is dropped.
     let mut copies: Option<TempDir> = None;
@@ -46,11 +52,11 @@ pub fn merge(
         here.push(copy);
     }
     let Some(stored) = stored else {
-        return merge::merge(&here, out, existing);
+        return super::merge(&here, out, existing, stop);
     };
     // A result that was not sent is made again: its shards may be others by now.
     let local = if stored.file.exists() { Existing::Overwrite } else { existing };
-    merge::merge(&here, &stored.file, local)?;
+    super::merge(&here, &stored.file, local, stop)?;
     Ok(stored.publish(existing == Existing::Overwrite, stop)?)
 }
 

@@ -1,78 +1,31 @@
 //! Puts the outputs of all shards of a run together into the file that one run would have written,
 //! byte for byte.
 
+mod error;
+mod order;
+pub mod stored;
+
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use corsmal_files::draft;
-use corsmal_files::feature_file::{FeatureFile, FeatureFileError};
-use corsmal_files::format::{FormatError, OutputFormat};
-use corsmal_files::identity::{self, Stamp};
+use corsmal_files::feature_file::FeatureFile;
+use corsmal_files::format::OutputFormat;
 use corsmal_files::layout;
 use corsmal_files::npz::{Compression, EntryRecord, NpzError, NpzWriter};
-use corsmal_files::parquet::{self, FramesWriter, ParquetFile, ParquetTableError};
+use corsmal_files::parquet::{self, FramesWriter, ParquetFile};
 use corsmal_files::provenance::Provenance;
-use corsmal_files::shard::Shard;
-use corsmal_files::table::{Table, TableError};
+use corsmal_files::table::Table;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-use crate::ledger::{Done, Header, Ledger, LedgerError, ledger_path};
+use crate::ledger::{Done, Header, Ledger, ledger_path};
 use crate::run::RunError;
 
-/// What can go wrong with merging.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum MergeError {
-    /// An output or a shard in a store; says which and why.
-    #[error(transparent)]
-    Stored(#[from] RunError),
-    /// A shard cannot be read.
-    #[error(transparent)]
-    Shard(#[from] FeatureFileError),
-    /// A member of a shard cannot be read, or the result not be written.
-    #[error(transparent)]
-    Npz(#[from] NpzError),
-    /// The Parquet result cannot be written.
-    #[error(transparent)]
-    Parquet(#[from] ParquetTableError),
-    /// The result cannot be put in its place.
-    #[error(transparent)]
-    Ledger(#[from] LedgerError),
-    /// The result is there already, or an interrupted run that was to write it.
-    #[error("{path} exists; --overwrite replaces it, --resume continues an interrupted merge")]
-    Exists {
-        /// The output or its ledger.
-        path: PathBuf,
-    },
-    /// The result must have another name.
-    #[error(transparent)]
-    Name(#[from] FormatError),
-    /// The files are not the shards of one run.
-    #[error("{path}: expected {expected}, found {actual}")]
-    NotOneRun {
-        /// The file that does not fit.
-        path: PathBuf,
-        /// What would fit.
-        expected: String,
-        /// What it is.
-        actual: String,
-    },
-    /// A shard is no longer the file that was found first.
-    #[error("{path} was changed while it was merged; merge again once nothing writes it")]
-    Changed {
-        /// The shard.
-        path: PathBuf,
-    },
-    /// The tables of two shards do not fit together.
-    #[error("{path}: {source}")]
-    Table {
-        /// The file that does not fit the ones before.
-        path: PathBuf,
-        /// Why.
-        source: TableError,
-    },
-}
+use error::go_on;
+use order::{Piece, in_order, not_one_run};
+
+pub use error::MergeError;
 
 /// What to do with what stands where the result is to be.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -84,31 +37,6 @@ pub enum Existing {
     Resume,
     /// Replace it.
     Overwrite,
-}
-
-/// A shard as it was found.
-struct Piece {
-    path: PathBuf,
-    identity: String,
-    stamp: Option<Stamp>,
-}
-
-impl Piece {
-    /// Takes the identity of a file before anything is read from it.
-    fn find(path: &Path) -> Result<Self, MergeError> {
-        let io = |e| NpzError::io(path, e);
-        let stamp = Stamp::of_path(path).map_err(io)?;
-        let identity = identity::of_file(path).map_err(io)?;
-        Ok(Self { path: path.into(), identity, stamp })
-    }
-
-    /// Refuses what was read where the file is another one by now.
-    fn require_same(&self) -> Result<(), MergeError> {
-        match Stamp::of_path(&self.path) {
-            Ok(now) if now == self.stamp => Ok(()),
-            _ => Err(MergeError::Changed { path: self.path.clone() }),
-        }
-    }
 }
 
 /// A shard whose arrays are in the result.
@@ -127,10 +55,16 @@ impl Done for Merged {
 
 /// Merges all shards of a run, given in any order, one after the other. As in a run, `out` appears
 /// only when it is complete, nothing else writes it meanwhile, and what was interrupted can go on.
+/// `stop` ends the merge early, its ledger intact.
 ///
 /// # Errors
 /// [`MergeError`] names the shard that does not fit.
-pub fn merge(shards: &[PathBuf], out: &Path, existing: Existing) -> Result<(), MergeError> {
+pub fn merge(
+    shards: &[PathBuf],
+    out: &Path,
+    existing: Existing,
+    stop: &AtomicBool,
+) -> Result<(), MergeError> {
     let mut format = OutputFormat::of_name(out, Compression::Stored)?;
     let out = &draft::destination(out);
     let pending = Ledger::is_pending(out).then(|| ledger_path(out));
@@ -140,7 +74,7 @@ pub fn merge(shards: &[PathBuf], out: &Path, existing: Existing) -> Result<(), M
         (Some(path), Existing::Resume) if path == *out => return Err(MergeError::Exists { path }),
         _ => {}
     }
-    let (shards, provenance) = in_order(shards, out)?;
+    let (shards, provenance) = in_order(shards, out, stop)?;
     if let (OutputFormat::Npz(compression), Some(first)) = (&mut format, shards.first())
         && let FeatureFile::Npz(npz) = &mut FeatureFile::open(&first.path)?
     {
@@ -156,9 +90,10 @@ pub fn merge(shards: &[PathBuf], out: &Path, existing: Existing) -> Result<(), M
     } else {
         (Ledger::create(out, &header)?, Vec::new())
     };
-    let mut merge = Merge { ledger, shards: &shards, provenance: &provenance, format };
+    let mut merge = Merge { ledger, shards: &shards, provenance: &provenance, format, stop };
     match merge.write(done) {
         Ok(()) => Ok(merge.ledger.publish()?),
+        Err(error @ MergeError::Run(RunError::Interrupted)) => Err(error),
         Err(error) => {
             // The first error is the one that matters. A shard that does not fit never will.
             let _ = merge.ledger.discard();
@@ -173,6 +108,7 @@ struct Merge<'a> {
     shards: &'a [Piece],
     provenance: &'a Provenance,
     format: OutputFormat,
+    stop: &'a AtomicBool,
 }
 
 impl Merge<'_> {
@@ -195,6 +131,7 @@ impl Merge<'_> {
         let mut joined: Option<Table> = None;
         let mut frames = false;
         for (index, piece) in self.shards.iter().enumerate() {
+            go_on(self.stop)?;
             let shard = &piece.path;
             let mut file = FeatureFile::open(shard)?;
             let read = file.table()?;
@@ -218,6 +155,7 @@ impl Merge<'_> {
             if let (Some(writer), FeatureFile::Npz(npz)) = (&mut writer, &mut file) {
                 let frames = npz.names().iter().filter(|name| layout::is_frame_level(name));
                 for name in frames.cloned().collect::<Vec<_>>() {
+                    go_on(self.stop)?;
                     let (entry, raw) = npz.raw(&name)?;
                     entries.push(writer.copy(&entry, raw)?);
                 }
@@ -244,6 +182,7 @@ impl Merge<'_> {
         for piece in self.shards {
             let mut file = ParquetFile::open(&piece.path)?;
             for row in 0..file.table()?.0.ids().len() {
+                go_on(self.stop)?;
                 let frames = features.iter().map(|feature| file.frames(row, feature));
                 writer.push(frames.collect::<Result<_, _>>()?)?;
             }
@@ -253,56 +192,16 @@ impl Merge<'_> {
     }
 }
 
-/// Brings the shards into order, checks that they are all of one run, and says how that was made.
-fn in_order(shards: &[PathBuf], out: &Path) -> Result<(Vec<Piece>, Provenance), MergeError> {
-    let mut pieces = Vec::with_capacity(shards.len());
-    for path in shards {
-        let piece = Piece::find(path)?;
-        pieces.push((piece, FeatureFile::open(path)?.provenance()?));
-    }
-    pieces.sort_by_key(|(_, made)| made.shard.parse::<Shard>().map_or(0, |s| s.index));
-    let count = pieces.len();
-    let Some(first) = pieces.first().map(|(_, made)| made.clone()) else {
-        return Err(not_one_run(out, "at least one shard".into(), "none".into()));
-    };
-    let mut ordered = Vec::with_capacity(count);
-    for (index, (piece, made)) in pieces.into_iter().enumerate() {
-        let path = &piece.path;
-        let shard = Shard { index, count }.to_string();
-        let of = made.shard.parse::<Shard>().map_or(count, |s| s.count);
-        if of != count {
-            return Err(not_one_run(path, format!("all {of} shards"), format!("{count}")));
-        }
-        if made.shard != shard {
-            return Err(not_one_run(path, format!("shard {shard}"), made.shard));
-        }
-        let fields = |p: &Provenance| {
-            [
-                ("layout version", p.layout_version.to_string()),
-                ("tool version", p.tool_version.clone()),
-                ("configuration", p.config_hash.clone()),
-                ("input list", p.inputs_hash.clone()),
-                ("configuration text", p.config.clone()),
-            ]
-        };
-        let both = fields(&first).into_iter().zip(fields(&made));
-        if let Some(((field, expected), (_, found))) = both.into_iter().find(|(a, b)| a != b) {
-            return Err(not_one_run(path, format!("{field} {expected}"), found));
-        }
-        ordered.push(piece);
-    }
-    Ok((ordered, Provenance { shard: Shard::default().to_string(), ..first }))
-}
-
-fn not_one_run(path: &Path, expected: String, actual: String) -> MergeError {
-    MergeError::NotOneRun { path: path.into(), expected, actual }
-}
-
 #[cfg(test)]
 mod tests {
     use corsmal_files::outcome::{Outcome, Status};
+    use corsmal_files::provenance::Part;
+    use corsmal_files::shard::Shard;
 
     use super::*;
+
+    /// Nobody stops the merge.
+    static GO: AtomicBool = AtomicBool::new(false);
 
     /// A shard of two recordings.
     fn shard(path: &Path, compression: Compression, shard: Shard) -> Provenance {
@@ -330,7 +229,7 @@ mod tests {
                 provenance = Some(shard(file, compression, Shard { index, count: 3 }));
             }
             let whole = path("whole.npz");
-            merge(&shards, &whole, Existing::Overwrite).unwrap();
+            merge(&shards, &whole, Existing::Overwrite, &GO).unwrap();
             let expected = std::fs::read(&whole).unwrap();
 
             let provenance =
@@ -343,7 +242,8 @@ mod tests {
                 let ledger = Ledger::create(&out, &header).unwrap();
                 let two: Vec<Piece> =
                     shards[..2].iter().map(|path| Piece::find(path).unwrap()).collect();
-                let mut two = Merge { ledger, shards: &two, provenance: &provenance, format };
+                let mut two =
+                    Merge { ledger, shards: &two, provenance: &provenance, format, stop: &GO };
                 two.write(Vec::new()).unwrap();
                 // As a kill would leave it.
                 drop(two);
@@ -353,11 +253,11 @@ mod tests {
                     bytes[200] ^= 1;
                     std::fs::write(&part, bytes).unwrap();
                 }
-                let refused = merge(&shards, &out, Existing::Keep).unwrap_err();
+                let refused = merge(&shards, &out, Existing::Keep, &GO).unwrap_err();
                 assert!(refused.to_string().contains("out.npz.ledger exists"), "{refused}");
-                merge(&shards, &out, Existing::Resume).unwrap();
+                merge(&shards, &out, Existing::Resume, &GO).unwrap();
                 assert!(std::fs::read(&out).unwrap() == expected, "{compression:?}");
-                let there = merge(&shards, &out, Existing::Resume).unwrap_err();
+                let there = merge(&shards, &out, Existing::Resume, &GO).unwrap_err();
                 assert!(there.to_string().contains("out.npz exists"), "{there}");
                 std::fs::remove_file(&out).unwrap();
             }
@@ -378,8 +278,53 @@ mod tests {
         std::fs::copy(&path, &other).unwrap();
         std::fs::rename(&other, &path).unwrap();
         let ledger = Ledger::create(&out, &header).unwrap();
-        let mut merge = Merge { ledger, shards: &pieces, provenance: &provenance, format };
+        let mut merge =
+            Merge { ledger, shards: &pieces, provenance: &provenance, format, stop: &GO };
         let refused = merge.write(Vec::new()).unwrap_err();
         assert!(refused.to_string().contains("0.npz was changed"), "{refused}");
+    }
+
+    #[test]
+    fn a_merge_that_is_stopped_goes_on_later() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let shards: Vec<PathBuf> = (0..2).map(|i| path(&format!("{i}.npz"))).collect();
+        for (index, file) in shards.iter().enumerate() {
+            shard(file, Compression::Stored, Shard { index, count: 2 });
+        }
+        let (out, whole) = (path("out.npz"), path("whole.npz"));
+        merge(&shards, &whole, Existing::Keep, &GO).unwrap();
+
+        let (pieces, provenance) = in_order(&shards, &out, &GO).unwrap();
+        let format = OutputFormat::Npz(Compression::Stored);
+        let header = Header::new(&provenance, format_args!("merge of 2, {format}"));
+        let ledger = Ledger::create(&out, &header).unwrap();
+        let stop = AtomicBool::new(true);
+        let mut stopped =
+            Merge { ledger, shards: &pieces, provenance: &provenance, format, stop: &stop };
+        let error = stopped.write(Vec::new()).unwrap_err();
+        assert!(matches!(error, MergeError::Run(RunError::Interrupted)), "{error}");
+        drop(stopped);
+        let error = merge(&shards, &out, Existing::Resume, &stop).unwrap_err();
+        assert!(matches!(error, MergeError::Run(RunError::Interrupted)), "{error}");
+        assert!(Ledger::is_pending(&out));
+        merge(&shards, &out, Existing::Resume, &GO).unwrap();
+        assert!(std::fs::read(&out).unwrap() == std::fs::read(&whole).unwrap());
+    }
+
+    #[test]
+    fn parts_of_a_partitioned_output_are_no_shards() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("part.parquet");
+        let mut made = Provenance::new("{}".into(), "c".into(), "i".into(), Shard::default());
+        let (label, value) = ("type".into(), "rice".into());
+        made.part = Some(Part { label, value, column: 0, inputs: 2, places: vec![1] });
+        let mut table = Table::new(Vec::new()).unwrap();
+        table.push(Outcome::new("a".into(), "a.wav", Status::Corrupt, ""), &[], &[]).unwrap();
+        parquet::write(&file, &table, &made).unwrap();
+        let out = folder.path().join("out.parquet");
+        let refused = merge(&[file], &out, Existing::Keep, &GO).unwrap_err().to_string();
+        assert!(refused.contains("the part type=rice of a partitioned output"), "{refused}");
+        assert!(!out.exists());
     }
 }
