@@ -12,10 +12,9 @@ use corsmal_extract::run::{self, Progress, RunError, RunOptions};
 use corsmal_extract::survey::Survey;
 use corsmal_files::npz::Compression;
 use corsmal_files::shard::Shard;
-use serde_json::json;
 
 use crate::args::{Jobs, Told};
-use crate::failure::{COULD_NOT_RUN, FAILED_FILES, Failure, INTERRUPTED};
+use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
 use crate::progress::{LogFormat, Meter};
 use crate::recordings;
 
@@ -137,8 +136,9 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let format = args.log_format;
     match (extract(args), format) {
         (Err(failure), LogFormat::Json) => {
-            eprintln!("{}", json!({"event": "error", "message": failure.to_string()}));
-            Ok(ExitCode::from(COULD_NOT_RUN))
+            let event = if failure.code() == INTERRUPTED { "interrupted" } else { "error" };
+            Meter::stopped(format, event, &failure.to_string());
+            Ok(ExitCode::from(failure.code()))
         }
         (result, _) => result,
     }
@@ -171,7 +171,12 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
         max_errors: if args.strict { Some(0) } else { args.max_errors },
     };
     if args.dry_run {
-        let checked = run::check(&found, &config, &options, stop)?;
+        let checked = match run::check(&found, &config, &options, stop) {
+            Err(error @ RunError::Interrupted) => {
+                return Err(Failure::interrupted(error.to_string()));
+            }
+            checked => checked?,
+        };
         if let Some(advice) = checked.advice() {
             meter.warning(advice);
         }
