@@ -75,10 +75,12 @@ pub fn require_store(name: &str, stop: &AtomicBool) -> Result<(), InputError> {
 
 /// A name without the query of a web address, which may hold a signature, or its user and password.
 pub fn shown(name: &str) -> String {
-    let is_web = name.get(..4).is_some_and(|scheme| scheme.eq_ignore_ascii_case("http"));
+    let is_web = name.split_once("://").is_some_and(|(scheme, _)| {
+        ["http", "https"].iter().any(|web| scheme.eq_ignore_ascii_case(web))
+    });
     match name.split(['?', '#']).next() {
-        Some(name) if is_web && name.contains('@') => "a web address".into(),
-        Some(name) if is_web => name.into(),
+        Some(address) if is_web && address.contains('@') => "a web address".into(),
+        Some(address) if is_web => address.into(),
         _ => name.into(),
     }
 }
@@ -101,6 +103,9 @@ mod tests {
         }
         for name in ["https://h/x.wav?secret", "http://me:secret@h/x.wav"] {
             assert!(!shown(name).contains("secret"), "{name}");
+        }
+        for name in ["http#1.wav", "https/a?b.wav", "s3://b/a?b#c.wav"] {
+            assert_eq!(shown(name), name);
         }
     }
 }
