@@ -6,6 +6,7 @@
 //! among the inputs, so that the folder gives back the table of the run.
 
 use std::collections::BTreeMap;
+use std::fs::DirEntry;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -19,6 +20,9 @@ use crate::table::{Table, TableError};
 pub const FILE: &str = "part.parquet";
 /// The value that stands for none, as Hive has it.
 const NONE: &str = "__HIVE_DEFAULT_PARTITION__";
+/// Files that file managers and engines put beside parts.
+const BESIDE: [&str; 6] =
+    [".DS_Store", "Thumbs.db", "desktop.ini", "_SUCCESS", "_metadata", "_common_metadata"];
 /// Most values of the label: each is a folder.
 pub const MOST: usize = 10_000;
 
@@ -70,14 +74,22 @@ fn encoded(text: &str) -> String {
     name
 }
 
+/// What is in a folder, but for [`BESIDE`].
+fn entries(path: &Path) -> io::Result<Vec<DirEntry>> {
+    let is_beside = |entry: &DirEntry| {
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        is_file && entry.file_name().to_str().is_some_and(|name| BESIDE.contains(&name))
+    };
+    path.read_dir()?.filter(|entry| !entry.as_ref().is_ok_and(is_beside)).collect()
+}
+
 /// The files of a folder, sorted by name, where it is a partitioned output and nothing else.
 fn files(path: &Path) -> io::Result<Option<Vec<PathBuf>>> {
     let mut files = Vec::new();
-    for entry in path.read_dir()? {
-        let entry = entry?;
+    for entry in entries(path)? {
         let file = entry.path().join(FILE);
         let is_part = entry.file_name().to_str().is_some_and(|name| name.contains('='));
-        if !is_part || !file.is_file() || entry.path().read_dir()?.count() != 1 {
+        if !is_part || !file.is_file() || entries(&entry.path())?.len() != 1 {
             return Ok(None);
         }
         files.push(file);
@@ -248,6 +260,10 @@ mod tests {
         std::fs::rename(path.join("type=rice"), path.join("type=water")).unwrap();
         assert!(open(&path).unwrap_err().to_string().contains("type=rice"));
         std::fs::rename(path.join("type=water"), path.join("type=rice")).unwrap();
+        for beside in [".DS_Store", "_SUCCESS", "type=rice/.DS_Store"] {
+            std::fs::write(path.join(beside), "").unwrap();
+        }
+        assert_eq!(open(&path).unwrap().0.table, table);
         std::fs::write(path.join("type=rice/notes.txt"), "mine").unwrap();
         assert!(!is_partitioned(&path), "files that are not ours");
         assert!(!is_partitioned(folder.path()) && !is_partitioned(&path.join("none")));
