@@ -52,7 +52,7 @@ def of_partitions(name: str) -> dict[str, Any]:
     first, label = parts[0], (read[0][1] or {}).get("label")
     places: list[tuple[int, int, int]] = []
     for number, (file, (found, of)) in enumerate(zip(files, read, strict=True)):
-        if of is None or len(of["places"]) != len(found["outcomes"]):
+        if not _is_part(of) or len(of["places"]) != len(found["outcomes"]):
             raise ParameterError(f"{file} is no part of an output of corsmal-feat")
         if file.parent.name != _folder(of["label"], of["value"]):
             raise ParameterError(f"{file} is the part {_folder(of['label'], of['value'])}")
@@ -61,7 +61,8 @@ def of_partitions(name: str) -> dict[str, Any]:
         places += [(place, number, at) for at, place in enumerate(of["places"])]
         found["labels"][label] = np.array([of["value"]] * len(found["ids"]), dtype=np.str_)
     places.sort()
-    if [place for place, _, _ in places] != list(range(read[0][1]["inputs"])):
+    whole = len(places) == read[0][1]["inputs"]
+    if not whole or any(place != i for i, (place, _, _) in enumerate(places)):
         raise ParameterError(f"{name}: a part of the output is missing")
     outcomes = [parts[number]["outcomes"][at] for _, number, at in places]
     rows = {i: row for row, i in enumerate(i for part in parts for i in part["ids"])}
@@ -89,6 +90,21 @@ def of_partitions(name: str) -> dict[str, Any]:
         "labels": {key: joined(key) for key in keys},
         "outcomes": outcomes,
     }
+
+
+def _is_part(of: Any) -> bool:
+    """Whether metadata say which part of a partitioned output a file is, in the kinds that it has."""
+
+    def is_count(value: Any) -> bool:
+        return type(value) is int and value >= 0
+
+    return (
+        isinstance(of, dict)
+        and all(isinstance(of.get(key), str) for key in ("label", "value"))
+        and all(is_count(of.get(key)) for key in ("column", "inputs"))
+        and isinstance(of.get("places"), list)
+        and all(is_count(place) for place in of["places"])
+    )
 
 
 def _folder(label: str, value: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import corsmal_feat as cf
@@ -11,6 +12,7 @@ from test_arrow import write
 
 pa = pytest.importorskip("pyarrow")
 dataset = pytest.importorskip("pyarrow.dataset")
+pq = pytest.importorskip("pyarrow.parquet")
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +93,40 @@ def test_folders_that_are_none_are_refused(listed: Path, tmp_path: Path):
         cf.extract(listed, preset="esc26", out=tmp_path / "x", partition_by="kind")
     with pytest.raises(cf.ParameterError, match="need out"):
         cf.extract(listed, partition_by="type")
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [[], {"label": 7}, {"inputs": -1}, {"inputs": "7"}, {"column": None}, {"places": [0, True]}],
+)
+def test_metadata_of_other_kinds_are_refused(
+    listed: Path, tmp_path: Path, wrong: list[int] | dict[str, object]
+):
+    out = tmp_path / "parts"
+    cf.extract(listed, preset="mfcc-zcr", out=out, partition_by="type")
+    part = out / "type=rice" / "part.parquet"
+    table = pq.ParquetFile(part).read()
+    metadata = dict(table.schema.metadata)
+    meta = json.loads(metadata[b"corsmal.meta"])
+    meta["part"] = meta["part"] | wrong if isinstance(wrong, dict) else wrong
+    metadata[b"corsmal.meta"] = json.dumps(meta).encode()
+    pq.write_table(table.replace_schema_metadata(metadata), part)
+    with pytest.raises(cf.ParameterError, match="is no part of an output"):
+        cf.load_features(out)
+
+
+def test_the_number_of_inputs_takes_no_memory(listed: Path, tmp_path: Path):
+    out = tmp_path / "parts"
+    cf.extract(listed, preset="mfcc-zcr", out=out, partition_by="type")
+    for part in out.glob("*/part.parquet"):
+        table = pq.ParquetFile(part).read()
+        metadata = dict(table.schema.metadata)
+        meta = json.loads(metadata[b"corsmal.meta"])
+        meta["part"]["inputs"] = 2**62
+        metadata[b"corsmal.meta"] = json.dumps(meta).encode()
+        pq.write_table(table.replace_schema_metadata(metadata), part)
+    with pytest.raises(cf.ParameterError, match="a part of the output is missing"):
+        cf.load_features(out)
 
 
 def test_the_last_part_is_missed_too(listed: Path, tmp_path: Path):
