@@ -61,7 +61,8 @@ def rows_of(batch: Any) -> list[Any]:
         for time in (starts[i], ends[i]):
             if time is not None and not 0 <= time < np.inf:
                 raise ParameterError(f"row {i}: {time} is not a time in seconds")
-        name = ids[i] if ids[i] is not None else (path or str(i))
+        # Without the query of a web address, which may be a signature.
+        name = ids[i] if ids[i] is not None else (_core.shown(path) or str(i))
         piece = None if firsts[i] is None else (firsts[i], lasts[i])
         if piece is not None and piece[1] is not None and piece[1] <= piece[0]:
             raise ParameterError(f"row {i}: a piece from sample {piece[0]} to {piece[1]} is empty")

@@ -44,7 +44,7 @@ def failed_batch(
     channels: int | None,
 ) -> Any:
     """The rows of recordings that are not read at all, as `extract_batch` would have them."""
-    job = Job.of(None, config, None, None, model, summary, channels)
+    job = Job.of(None, config, None, None, model, summary, None, channels)
     return job.failed(batch, status, reason)
 
 
@@ -66,11 +66,16 @@ class Job:
         projection: StrPath | None,
         model: StrPath | None,
         summary: str,
+        frames: str | None,
         channels: int | None,
     ) -> Job:
         """Checks what is asked for; keeps what takes long to make."""
         if summary not in ("columns", "list"):
             raise ParameterError(f'summary must be "columns" or "list", not {summary!r}')
+        if frames not in (None, "list"):
+            raise ParameterError(f'frames must be "list" or None, not {frames!r}')
+        if frames and not (projection is None and model is None):
+            raise ParameterError("projection and model take statistics: leave out frames")
         if channels is not None and not 1 <= channels <= 64:
             raise ParameterError(f"channels must be 1 to 64, not {channels}")
         trained = None if model is None else _model(model)
@@ -83,6 +88,9 @@ class Job:
             changes["projection.file"] = os.fspath(projection)
         chosen, overrides = configuration(preset, config, changes)
         computation = Computation.of(chosen, overrides)
+        if frames:
+            tree = json.loads(computation.config) | {"summary": None}
+            computation = Computation.of(*configuration(None, tree, None))
         if trained is not None and computation.config_hash != trained.header["feature_config_hash"]:
             raise ModelError(f"{model} was trained on features of another configuration")
         return cls(computation, trained, summary == "list", channels)

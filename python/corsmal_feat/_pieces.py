@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import math
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -21,8 +21,8 @@ RECORDING = "recording"
 _VALUES = 2**31 - 1
 #: Pieces of a recording above which it stays whole.
 _MOST = 100_000
-#: Shorter pieces, in seconds, would be mostly context.
-_SHORTEST = 0.1
+#: Bounds of a piece, in seconds: shorter ones would be mostly context, longer ones cut nothing.
+_SHORTEST, _LONGEST = 0.1, 3e8
 
 
 def cut(table: Any, longest: float) -> Any:
@@ -33,12 +33,17 @@ def cut(table: Any, longest: float) -> Any:
     of the recording.
     """
     pa = arrow()
-    if not math.isfinite(longest) or longest < _SHORTEST:
-        raise ParameterError(f"longest must be at least {_SHORTEST} seconds, not {longest}")
+    if not _SHORTEST <= longest <= _LONGEST:
+        raise ParameterError(
+            f"longest must be {_SHORTEST} to {_LONGEST:.0f} seconds, not {longest}"
+        )
     taken = [name for name in (RECORDING, *PIECE) if name in table.schema.names]
     if taken:
         raise ParameterError(f"the manifest has a column {taken[0]}, which pieces need: rename it")
     rows = rows_of(table)
+    twice = next((i for i, n in Counter(row[0] for row in rows).items() if n > 1), None)
+    if twice is not None:
+        raise ParameterError(f"the manifest has the id {twice!r} twice: pieces need their own")
     places: list[int] = []
     ids: list[str] = []
     samples: list[tuple[int | None, int | None]] = []
@@ -46,7 +51,7 @@ def cut(table: Any, longest: float) -> Any:
         bounds = [] if header is None else _bounds(*header, row[2], row[3], longest)
         for first, last in bounds:
             places.append(i)
-            ids.append(f"{row[0]}@{_seconds(first / header[0])}" if header else row[0])
+            ids.append(f"{row[0]}@{_place(*header, row[2], first)}" if header else row[0])
             samples.append((first, last))
         if not bounds:
             places.append(i)
@@ -67,12 +72,8 @@ def _bounds(
 ) -> list[tuple[int, int | None]]:
     """First and last sample of each piece, from the start of the stretch; none: it is not cut."""
 
-    def sample(seconds: float) -> int:
-        # As the engine has it: the last one that does not begin later.
-        return int(seconds * rate + 1e-3)
-
-    first = 0 if start is None else sample(start)
-    last = frames if end is None else sample(end)
+    first = _sample(start, rate)
+    last = frames if end is None else _sample(end, rate)
     length, step = last - first, max(1, round(longest * rate))
     if last > frames or length <= step or length // step > _MOST:
         return []
@@ -80,8 +81,14 @@ def _bounds(
     return [(a, b) for a, b in zip(firsts, [*firsts[1:], None], strict=True)]
 
 
-def _seconds(time: float) -> str:
-    return repr(round(time, 6))
+def _sample(time: float | None, rate: int) -> int:
+    """The last sample that does not begin later, as the engine has it."""
+    return int(min((time or 0) * rate, 2.0**63) + 1e-3)
+
+
+def _place(rate: int, start: float | None, first: int) -> str:
+    """Seconds from the start of the recording to a piece."""
+    return repr(round((_sample(start, rate) + first) / rate, 6))
 
 
 @refuses

@@ -27,6 +27,7 @@ def extract_batch(
     projection: StrPath | None = None,
     model: StrPath | None = None,
     summary: str = "columns",
+    frames: str | None = None,
     channels: int | None = None,
     jobs: int = 1,
 ) -> Any:
@@ -44,6 +45,7 @@ def extract_batch(
         gives probabilities, `p_<label>`
     summary : "columns" gives each statistic a column of its name; "list" gives one column
         `features` of lists of fixed size, and the names in the schema's metadata
+    frames : "list" leaves out the configuration's summary: frames instead of statistics
     channels : the channels that recordings must have, where the width of the table depends on it;
         others have the status mismatch. By default what most recordings of this batch have: batches
         of one table need the number
@@ -74,7 +76,7 @@ def extract_batch(
     >>> found["status"].to_pylist(), found["type"].to_pylist()
     (['ok', 'io'], ['a', 'b'])
     """
-    job = Job.of(preset, config, set, projection, model, summary, channels)
+    job = Job.of(preset, config, set, projection, model, summary, frames, channels)
     if not 1 <= jobs <= MOST_JOBS:
         raise ParameterError(f"jobs must be 1 to {MOST_JOBS}, not {jobs}")
     return job.extract(batch, jobs)

@@ -105,6 +105,7 @@ def extract(
     projection: StrPath | None = None,
     model: StrPath | None = None,
     summary: str = "columns",
+    frames: str | None = None,
     channels: int | None = None,
     longest: float | None = None,
     rows: int = 64,
@@ -121,7 +122,7 @@ def extract(
     ----------
     paths : what `manifest` takes, or a pyarrow.Table like those it returns
     out : folder that all nodes share
-    preset, config, set, projection, model, summary : see `corsmal_feat.arrow.extract_batch`
+    preset, config, set, projection, model, summary, frames : see `corsmal_feat.arrow.extract_batch`
     channels : as there; by default what most recordings have, for which this process reads their
         headers
     longest : seconds above which recordings are cut into pieces, see `manifest`
@@ -149,7 +150,7 @@ def extract(
     pa = pyarrow()
     if rows < 1:
         raise ParameterError(f"rows must be at least 1, not {rows}")
-    job = Job.of(preset, config, set, projection, model, summary, channels)
+    job = Job.of(preset, config, set, projection, model, summary, frames, channels)
     if longest is not None:
         job.require_pieces()
     if isinstance(paths, pa.Table):
@@ -311,6 +312,7 @@ def _main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--projection", help="file of fitted principal components")
     parser.add_argument("--model", help="file of a classifier: adds predictions")
     parser.add_argument("--summary", choices=("columns", "list"), default="columns")
+    parser.add_argument("--frames", choices=("list",), help="frames instead of statistics")
     parser.add_argument("--channels", type=int, help="channels that recordings must have")
     parser.add_argument(
         "--longest",

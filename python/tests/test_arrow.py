@@ -176,6 +176,10 @@ def test_frames_are_nested_lists(recordings: list[Path]):
             else:
                 assert row[feature] is None
     assert extract_batch(batch_of(recordings[4:5]), config=config).schema == found.schema
+    # The same of a configuration with a summary, which is left out.
+    summary = config | {"summary": {"stats": ["mean"]}}
+    frames = extract_batch(batch_of(recordings), config=summary, frames="list")
+    assert frames.equals(found) and frames.schema.equals(found.schema, check_metadata=True)
     with pytest.raises(cf.ParameterError, match="stft is complex"):
         extract_batch(batch_of(recordings), config={"features": {"stft": {"output": "complex"}}})
 
@@ -232,6 +236,9 @@ def test_jobs_that_cannot_be(recordings: list[Path]):
     refused("jobs must be", jobs=0)
     refused("channels must be", channels=0)
     refused("summary must be", summary="rows")
+    refused("frames must be", frames="rows")
+    refused("leave out frames", frames="list", model="none.model", preset=None)
+    refused("leave out frames", frames="list", projection="pca.npz")
     refused("needs a column path", batch.drop_columns(["path"]))
     refused("rename it", batch.append_column("status", batch["id"]))
     refused("a column twice", batch.append_column("id", batch["id"]))

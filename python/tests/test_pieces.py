@@ -10,6 +10,7 @@ from test_arrow import write
 
 pa = pytest.importorskip("pyarrow")
 
+from corsmal_feat import _pieces  # noqa: E402
 from corsmal_feat.arrow import extract_batch, join_pieces  # noqa: E402
 from corsmal_feat.ray import manifest  # noqa: E402
 
@@ -44,6 +45,8 @@ def test_pieces_put_together_are_the_recording(audio: Path):
         "beyond",
     ]
     assert cut["id"].to_pylist()[:3] == ["whole@0.0", "whole@1.0", "whole@2.0"]
+    # From the start of the recording, as those of `extract --window`.
+    assert cut["id"].to_pylist()[5:8] == ["part@0.25", "part@1.25", "part@2.25"]
     assert cut["end_sample"].to_pylist()[:5] == [16000, 32000, 48000, 64000, None]
     expected = extract_batch(whole, config=FRAMES)
     found = join_pieces(extract_batch(cut, config=FRAMES))
@@ -86,8 +89,8 @@ def test_pieces_that_are_not_all_there_are_not_put_together(audio: Path):
         join_pieces(found.take([0, 9, 1]))
     with pytest.raises(cf.ParameterError, match="nothing in it was cut"):
         join_pieces(extract_batch(manifest(audio / "list.csv"), config=FRAMES))
-    for longest in (0, 0.05, -1, float("nan"), float("inf")):
-        with pytest.raises(cf.ParameterError, match="longest must be at least"):
+    for longest in (0, 0.05, -1, 3.1e8, float("nan"), float("inf")):
+        with pytest.raises(cf.ParameterError, match="longest must be 0.1 to 300000000"):
             manifest(audio / "list.csv", longest=longest)
     taken = pa.table({"path": ["x.wav"], "recording": ["x"]})
     with pytest.raises(cf.ParameterError, match="recording, which pieces need"):
@@ -104,6 +107,16 @@ def test_recordings_without_a_frame_fail_as_they_do_uncut(audio: Path):
         found = join_pieces(extract_batch(cut, config=config))
         assert expected["status"].to_pylist() == found["status"].to_pylist() == [status]
         assert found.column(found.num_columns - 1).to_pylist() == [None]
+
+
+def test_ids_and_times_that_no_piece_can_have(audio: Path):
+    path = str(audio / "long.wav")
+    twice = pa.table({"path": [path, path], "id": ["a", "a"], "start": [0.0, 1.0]})
+    with pytest.raises(cf.ParameterError, match="the id 'a' twice"):
+        _pieces.cut(twice, 1.0)
+    far = pa.table({"path": [path, path], "start": [1e308, None], "end": [None, 1e308]})
+    ids = far.append_column("id", pa.array(["a", "b"]))
+    assert _pieces.cut(ids, 1.0)["id"].to_pylist() == ["a", "b"]
 
 
 def test_odd_headers_and_columns(audio: Path, tmp_path: Path):

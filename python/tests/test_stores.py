@@ -164,6 +164,9 @@ def test_signed_addresses_are_read_and_their_signatures_stand_nowhere(
     assert found["status"].to_pylist() == ["ok"], found["reason"].to_pylist()
     assert found["path"].to_pylist() == [address]
     assert "the-secret" not in str(found.to_pydict()) + str(found.schema.metadata)
+    # Without an id, a row is called by its path.
+    unnamed = extract_batch(pa.table({"path": [signed]}), preset="mfcc-zcr", channels=2)
+    assert unnamed["id"].to_pylist() == [address]
     options = {"config": {"features": {"rms": {}}}, "model": None, "channels": None}
     failed = failed_batch(table, "crashed", "x", summary="columns", **options)
     assert failed["path"].to_pylist() == [address]
