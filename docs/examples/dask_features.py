@@ -12,6 +12,7 @@ import sys
 import uuid
 from pathlib import Path
 
+import corsmal_feat
 import pyarrow as pa
 import pyarrow.parquet as pq
 from corsmal_feat.arrow import extract_batch
@@ -23,7 +24,7 @@ OPTIONS = {"preset": "mfcc-zcr", "channels": 2}
 
 def name(number: int, batch: pa.Table) -> str:
     """A file by its place, its recordings and the options: another job has other names."""
-    text = json.dumps([batch.to_pylist(), OPTIONS], default=str)
+    text = json.dumps([batch.to_pylist(), OPTIONS, corsmal_feat.__version__], default=str)
     return f"{number:08d}-{hashlib.blake2b(text.encode(), digest_size=8).hexdigest()}.parquet"
 
 
@@ -43,6 +44,9 @@ def main(manifest: str, out: str, scheduler: str | None = None) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     batches = [table.slice(at, ROWS) for at in range(0, table.num_rows, ROWS)]
     parts = {str(folder / name(i, batch)): batch for i, batch in enumerate(batches)}
+    others = {str(path) for path in folder.glob("*.parquet")} - {*parts}
+    if others:
+        sys.exit(f"{folder} holds parts of another job, such as {min(others)}")
     # Without a scheduler: processes of one thread on this machine.
     with Client(scheduler) if scheduler else Client(threads_per_worker=1) as client:
         open_parts = {path: rows for path, rows in parts.items() if not Path(path).exists()}
