@@ -20,8 +20,8 @@ Examples:
   corsmal-feat pca train.npz --n-components 128 --out pca.npz
   corsmal-feat extract --in test/ --out test.npz --preset spec9216-code --project pca.npz
 
-The file records the configuration of its features; features of any other are refused. Fit on
-training recordings only: extract never fits.")]
+The file records the configuration of its features, and features of any other configuration are
+refused. Fit on training recordings only: `extract` never fits.")]
 pub struct Args {
     /// Training features: an .npz or .parquet of `extract` with summaries.
     #[arg(value_name = "FEATURES", required_unless_present = "named")]

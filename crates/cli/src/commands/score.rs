@@ -22,11 +22,11 @@ Examples:
   corsmal-feat score held-out.csv --report report
   corsmal-feat score capacities.csv --labels labels.csv --target capacity
 
-Prediction files are those of `classify`, `cross-validate --predictions` and `fuse`. Accuracy, weighted
-and macro F1 with 95 % bootstrap intervals, scores of each class, confusion matrix, calibration (Brier
-score, ECE), areas under the ROC and precision-recall curves. Lines without a prediction count as wrong.
-A numeric target gives errors and the score of the CORSMAL challenge. CORSMAL submissions have their own
-rules: `corsmal-feat evaluate`.
+Prediction files come from `classify`, `cross-validate --predictions` and `fuse`. The scores are
+accuracy, weighted and macro F1 with 95 % bootstrap intervals, scores of each class, the confusion
+matrix, calibration (Brier score, ECE), and areas under the ROC and precision-recall curves. Lines
+without a prediction count as wrong. A numeric target gives errors and the score of the CORSMAL
+challenge. CORSMAL submissions have their own rules: `corsmal-feat evaluate`.
 
 Exit codes: 0 fine, 2 could not run.")]
 pub struct Args {

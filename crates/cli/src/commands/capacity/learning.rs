@@ -15,11 +15,12 @@ use crate::failure::FAILED_FILES;
 #[command(after_help = "\
 Examples:
   corsmal-feat capacity train --method fused --data ~/CCM --out fused.capacity
-  corsmal-feat capacity train --method m2 --data ~/CCM --set epochs=50 --checkpoints kept --out m2.safetensors
+  corsmal-feat capacity train --method m2 --data ~/CCM --set epochs=50 --checkpoints kept \\
+      --out m2.safetensors
 
-m2 trains its network (a build with the feature `nets`) by the published recipe: 500 epochs of Adam on a
-random 85 % of the regions; the score after each epoch is that of the other 15 %, of the same containers.
-A recording with damaged files is left out and named.
+m2 trains its network (in a build with the feature `nets`) with the published recipe: 500 epochs of
+Adam on a random 85 % of the regions; the score after each epoch is that of the other 15 %, of the
+same containers. A recording with damaged files is left out and named.
 
 Exit codes: 0 all fine, 1 some recordings have damaged files, 2 could not run, 130 interrupted.")]
 pub struct Args {
@@ -47,11 +48,11 @@ pub struct Args {
 /// Methods that learn.
 #[derive(Clone, Copy, ValueEnum)]
 pub(super) enum Learning {
-    /// A network on the nearest large thing in the third view's depth.
+    /// A network on the nearest large object in the third view's depth.
     M2,
     /// Gaussian processes on the sizes of detected regions.
     M3,
-    /// The same, and bias and spread of all methods.
+    /// M3's processes, and bias and spread of all methods.
     Fused,
 }
 

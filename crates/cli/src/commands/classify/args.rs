@@ -30,11 +30,11 @@ Examples:
 One line per recording: id, path, status, label columns of a manifest (the one that the model
 predicts is called true), predicted, and p_<label> for each class. Recordings that could not be
 read, or differ in sample rate or channels from those that the model was trained on, have a
-status other than ok and no prediction. With --window one line per window, with its start and
-end in seconds, written as soon as the window is complete; memory does not grow with the stream.
+status other than ok and no prediction. With --window there is one line per window, with its start
+and end in seconds, written as soon as the window is complete; memory does not grow with the stream.
 
-A network of `train --net` that takes windows, such as m4-type, has a line for each of them, or one
-decision with --vote; one trained on whole recordings does best without --window.
+A network of `train --net` that takes windows, such as m4-type, gives one line per window, or one
+decision with --vote; a network trained on whole recordings works best without --window.
 
 Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 interrupted.")]
 pub struct Args {
