@@ -30,7 +30,7 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
     /// Folder of tables of detections (SEQUENCE.csv or .json, by container or not); by default
-    /// `detections/` beside each recording's audio folder.
+    /// `detections/` next to each recording's audio folder.
     #[arg(long, value_name = "DIR")]
     detections: Option<PathBuf>,
     /// Folder to write to: new or empty.

@@ -63,8 +63,8 @@ pub struct Args {
     /// many models; with --net, the parts that would train again are left out.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
-    /// Repeat with N seeds, from --seed on: how much of a difference between two classifiers is
-    /// chance?
+    /// Repeat with N seeds, starting at --seed, to see how much of a difference between two
+    /// classifiers is chance.
     #[arg(long, value_name = "N", conflicts_with = "net", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     seeds: u32,
     /// Replace an existing prediction file, and the report in its folder.

@@ -29,8 +29,8 @@ pub struct Args {
     /// The same as the positional argument.
     #[arg(long = "features", value_name = "FILE", conflicts_with = "features")]
     named: Option<PathBuf>,
-    /// Components to keep, at most the rows and the features of the file; 128 by default, or as many
-    /// as there can be.
+    /// Components to keep, at most as many as the file has rows and features; 128 by default, or that
+    /// maximum if it is lower.
     #[arg(long, value_name = "N")]
     n_components: Option<usize>,
     /// Projection file to write (.npz).

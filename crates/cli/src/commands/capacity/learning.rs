@@ -32,7 +32,7 @@ pub struct Args {
     /// A value of m2's recipe, such as epochs=50; `corsmal-feat nets m2-capacity` lists them.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(super) parameters: Vec<String>,
-    /// Folder that keeps m2's training after each epoch; the next run continues from it.
+    /// Folder in which to save m2's training after each epoch; the next run continues from it.
     #[arg(long, value_name = "FOLDER")]
     pub(super) checkpoints: Option<PathBuf>,
     /// Model to write.

@@ -50,7 +50,7 @@ pub struct Args {
 
 #[derive(Subcommand)]
 enum Sub {
-    /// Learn what a method needs from the training recordings of a data set.
+    /// Train a method on the training recordings of a data set.
     Train(train::Args),
     /// Combine the estimates of several frames into one, as M5 does with its two.
     Combine(combine::Args),

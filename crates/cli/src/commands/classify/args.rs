@@ -38,7 +38,7 @@ decision with --vote; a network trained on whole recordings works best without -
 
 Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 interrupted.")]
 pub struct Args {
-    /// Model file of `corsmal-feat train`, or one of `corsmal-feat benchmark`.
+    /// Model file from `corsmal-feat train` or `corsmal-feat benchmark`.
     #[arg(long, short, value_name = "FILE")]
     pub(super) model: PathBuf,
     /// Recordings: files, folders, globs, manifests, or - for one WAV stream on standard input. For a
@@ -61,21 +61,21 @@ pub struct Args {
     /// trained on.
     #[arg(long)]
     pub(super) any_rate: bool,
-    /// Predictions with a highest probability below P are unknown.
+    /// Call predictions unknown if their highest probability is below P.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = crate::args::share)]
     pub(super) reject: f64,
     /// Predict windows of this many seconds instead of whole recordings.
     #[arg(long, value_name = "SECONDS")]
     pub(super) window: Option<f64>,
-    /// Seconds from one window to the next; default half a window.
+    /// Seconds from the start of one window to the start of the next; half a window by default.
     #[arg(long, value_name = "SECONDS", requires = "window")]
     pub(super) hop: Option<f64>,
     #[command(flatten)]
     pub(super) vote: VoteArgs,
-    /// File of predictions; - is standard output.
+    /// Prediction file to write; - is standard output.
     #[arg(long, short, value_name = "FILE", default_value = "-")]
     pub(super) out: PathBuf,
-    /// Form of the predictions.
+    /// Format of the predictions.
     #[arg(long, value_enum, default_value = "csv")]
     pub(super) format: Format,
     /// The same as --format jsonl: one JSON object per line.
@@ -94,7 +94,7 @@ pub struct Args {
 /// How lines are written.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub(super) enum Format {
-    /// A header, then a line each.
+    /// A header, then one line per prediction.
     Csv,
     /// One JSON object per line.
     #[value(alias = "json")]
