@@ -51,7 +51,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 fn print(findings: &Findings) {
     println!("{}", findings.root.display());
     if findings.synthetic {
-        println!("SYNTHETIC recordings: their scores mean nothing about the real data set");
+        println!("SYNTHETIC recordings: their scores say nothing about the real data set");
     }
     println!(
         "{} recordings, {} with a known filling, {:.1} min",

@@ -100,7 +100,7 @@ pub fn run(
             ],
         ),
         (
-            "Scores of its held-out predictions, with the capacities, by the paper's rules. SYNTHETIC data: they mean \
+            "Scores of its held-out predictions, with the capacities, by the paper's rules. SYNTHETIC data: they say \
              nothing about real recordings",
             vec![
                 "evaluate",

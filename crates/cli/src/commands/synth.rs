@@ -62,7 +62,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
             format!(
                 "{}: {recordings} synthetic recordings, {seconds:.0} s, 8 channels, {SAMPLE_RATE} Hz \
                  (seed {seed})\n\
-                 They are synthetic: scores on them mean nothing about the real data set.",
+                 They are synthetic: scores on them say nothing about the real data set.",
                 out.display()
             )
         },

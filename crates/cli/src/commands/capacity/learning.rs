@@ -57,7 +57,7 @@ pub(super) enum Learning {
 }
 
 /// Said of a model that learned from synthetic recordings.
-pub(super) const SYNTHETIC: &str = "SYNTHETIC data: scores mean nothing about real recordings";
+pub(super) const SYNTHETIC: &str = "SYNTHETIC data: scores say nothing about real recordings";
 
 /// Names the recordings that taught nothing; the exit code.
 pub(super) fn ended(failed: &[(RowKey, String)], recordings: usize) -> ExitCode {
@@ -67,6 +67,7 @@ pub(super) fn ended(failed: &[(RowKey, String)], recordings: usize) -> ExitCode 
     for (key, reason) in failed {
         eprintln!("{key}: {reason}");
     }
-    eprintln!("{} of {recordings} recordings have damaged files and taught nothing", failed.len());
+    eprintln!("{} of {recordings} recordings have damaged files and were not used for \
+               training", failed.len());
     ExitCode::from(FAILED_FILES)
 }
