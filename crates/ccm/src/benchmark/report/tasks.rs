@@ -69,7 +69,7 @@ pub(super) fn section(task: Task, rows: &Rows, methods: &[Method], seed: u64) ->
         name: task.name().into(),
         caption: format!(
             "{}: the paper's results and those of this run. Training: recordings not trained \
-                 on, a random 20 % (published) or whole containers (corrected)",
+             on, a random 20 % (published) or whole containers (corrected)",
             task.title()
         ),
         columns: ["Method", "Inputs", "Protocol", "Training", "Public", "Private", "Combined"]

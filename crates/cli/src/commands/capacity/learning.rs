@@ -67,7 +67,10 @@ pub(super) fn ended(failed: &[(RowKey, String)], recordings: usize) -> ExitCode 
     for (key, reason) in failed {
         eprintln!("{key}: {reason}");
     }
-    eprintln!("{} of {recordings} recordings have damaged files and were not used for \
-               training", failed.len());
+    eprintln!(
+        "{} of {recordings} recordings have damaged files and were not used for \
+         training",
+        failed.len()
+    );
     ExitCode::from(FAILED_FILES)
 }
