@@ -27,7 +27,7 @@ fn device(name: &str) -> Result<String, String> {
         "cpu" => Ok(name.into()),
         _ => Err(
             "no such device in this build: networks run on the cpu only, on every core (--jobs); \
-                  docs/networks.md says why"
+             docs/networks.md says why"
                 .into(),
         ),
     }

@@ -67,7 +67,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let output = match &config.summary {
         None => {
             "Output: for each recording and feature an array [channels, coefficients, frames], \
-                 and the times of its frames in seconds."
+             and the times of its frames in seconds."
                 .to_string()
         }
         Some(_) => format!("Output: one row per recording. {}", columns(&config)?),

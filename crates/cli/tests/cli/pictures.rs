@@ -150,7 +150,7 @@ fn crops_train_a_network_that_classifies_pictures() {
     let train = |net: &str, crops: &Path| {
         refused(&["train", "--net", net, "--crops", text(crops), "-o", text(&none)])
     };
-    assert!(train("resnet18-level", &empty).contains("holds no PNG or JPEG picture"));
+    assert!(train("resnet18-level", &empty).contains("has no PNG or JPEG picture"));
     assert!(train("m1", &crops).contains("not pictures"));
     refuse(&["classify", "-m", text(&model), text(&crops), "--window", "1"], "for recordings");
 }

@@ -85,8 +85,11 @@ impl FeatureKind for Cqt {
             ("n_bins", "Number of bins."),
             ("bins_per_octave", "Bins per octave."),
             ("tuning", "Deviation from A = 440 Hz in fractions of a bin."),
-            ("filter_scale", "Length of the filters; below 1 they are shorter, and resolve time \
-                              better."),
+            (
+                "filter_scale",
+                "Length of the filters; below 1 they are shorter, and resolve time \
+                 better.",
+            ),
             ("sparsity", "Share of the energy of a filter that may be left out."),
             ("window", "Window function of the filters, with scipy's name."),
         ],

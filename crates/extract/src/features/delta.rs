@@ -97,8 +97,11 @@ impl FeatureKind for Delta {
         feature named by `of`: the order-th derivative of the polynomial of that degree fitted to \
         `width` frames.";
     const KEYS: &'static [Keys] = &[&[
-        ("of", "Name of an earlier feature in this configuration, of which the derivative is \
-                taken."),
+        (
+            "of",
+            "Name of an earlier feature in this configuration, of which the derivative is \
+             taken.",
+        ),
         ("width", "Frames that the polynomial is fitted to: odd, at least 3."),
         ("order", "Order of the derivative, and degree of the polynomial."),
         (

@@ -129,8 +129,11 @@ impl FeatureKind for Pcen {
             ("eps", "Smallest level."),
             ("b", "Coefficient of the smoothing, 0 to 1; \"auto\": that of time_constant."),
             ("max_size", "Bands of a maximum filter before the smoothing; 1: no filter."),
-            ("factor", "Factor by which the bands are multiplied first: 2^31 by default; 1: no \
-                        change."),
+            (
+                "factor",
+                "Factor by which the bands are multiplied first: 2^31 by default; 1: no \
+                 change.",
+            ),
             (
                 "spectrum_power",
                 "Exponent of the magnitudes before the bands: 1 is magnitude, 2 power.",
