@@ -87,7 +87,7 @@ def test_folders_that_are_none_are_refused(listed: Path, tmp_path: Path):
         cf.load_features(out)
     (out / "type=7").rename(out / "type=rice")
     (out / "notes.txt").write_text("mine")
-    with pytest.raises(cf.RunError, match="no partitioned output"):
+    with pytest.raises(cf.RunError, match="not a partitioned output"):
         cf.extract(listed, preset="esc26", out=out, partition_by="type", overwrite=True)
     with pytest.raises(cf.RunError, match="labels of the inputs are type, take"):
         cf.extract(listed, preset="esc26", out=tmp_path / "x", partition_by="kind")

@@ -65,7 +65,7 @@ def test_what_has_no_pieces_is_refused(audio: Path):
     for options, reason in [
         ({"preset": "mfcc-zcr"}, "leave out"),
         ({"config": {"features": {"mfcc": {}}}}, "maximum of the whole recording"),
-        ({"config": {"features": {"cqt": {}}}}, "cqt is computed of the whole recording"),
+        ({"config": {"features": {"cqt": {}}}}, "cqt is computed from the whole recording"),
     ]:
         with pytest.raises(cf.ParameterError, match=reason):
             extract_batch(cut, **options)

@@ -56,7 +56,7 @@ pub fn nearest(config: &Value) -> (String, Vec<String>) {
     compared.min_by_key(|(_, lines)| lines.len()).unwrap_or_else(|| {
         let mut lines = Vec::new();
         compare("", config, &Value::Null, &mut lines);
-        ("nothing that this version knows".into(), lines)
+        ("no key that this version knows".into(), lines)
     })
 }
 
@@ -86,7 +86,7 @@ pub fn compare(key: &str, value: &Value, base: &Value, lines: &mut Vec<String>) 
     }
     for (name, there) in base.as_object().into_iter().flatten() {
         if !table.contains_key(name) {
-            lines.push(format!("{key}.{name} is not there  ({there})"));
+            lines.push(format!("{key}.{name} is missing  ({there})"));
         }
     }
 }

@@ -173,8 +173,8 @@ pub fn refuse_own(option: &str, path: &Path) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::new(format!(
-        "{option}: {} is a network that this tool trained, perhaps on recordings that are held out here; name \
-         weights that others trained",
+        "{option}: {} is a network that this tool trained, perhaps on recordings that are held \
+         out here; give weights from elsewhere",
         path.display()
     )))
 }

@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 pub enum LogFormat {
     /// For people.
     Text,
-    /// One JSON object a line.
+    /// One JSON object per line.
     Json,
 }
 

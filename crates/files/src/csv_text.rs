@@ -16,10 +16,10 @@ pub fn reader<R: BufRead>(mut text: R) -> io::Result<csv::Reader<R>> {
         return other("text in UTF-16, where CSV in UTF-8 is expected: save it as \"CSV UTF-8\"");
     }
     if start.starts_with(b"PK\x03\x04") {
-        return other("an .npz file or another ZIP archive, where a CSV table is expected");
+        return other("an .npz file or another ZIP archive, but a CSV table is expected");
     }
     if start.starts_with(b"PAR1") {
-        return other("a Parquet file, where a CSV table is expected");
+        return other("a Parquet file, but a CSV table is expected");
     }
     let marked = start.starts_with(b"\xef\xbb\xbf");
     let line = start.split(|&byte| byte == b'\n').next().unwrap_or_default();

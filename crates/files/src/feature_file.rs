@@ -26,8 +26,8 @@ pub enum FeatureFileError {
     },
     /// A folder, probably of recordings.
     #[error(
-        "{path} is a folder, where a feature file is expected: \
-         corsmal-feat extract {path} -o feats.npz makes one of the recordings in it"
+        "{path} is a folder, but a feature file is expected: corsmal-feat extract {path} -o \
+         feats.npz makes one from the recordings in it"
     )]
     Folder {
         /// The folder.
@@ -42,7 +42,7 @@ pub enum FeatureFileError {
         expected: &'static str,
     },
     /// Another program wrote it.
-    #[error("{path}: expected an output of `extract`, found a file of another program")]
+    #[error("{path}: expected an output of `extract`, found a file from another program")]
     Foreign {
         /// The file.
         path: PathBuf,

@@ -118,8 +118,8 @@ pub enum ModelError {
     },
     /// More different classes than [`crate::labels::MAX_CLASSES`].
     #[error(
-        "{classes} different classes: at most {} are learned and scored; is the column one of ids or \
-         numbers? `score --numeric` measures estimates of numbers",
+        "{classes} different classes, but at most {} are learned and scored; does the column have \
+         ids or numbers? `score --numeric` measures estimates of numbers",
         crate::labels::MAX_CLASSES
     )]
     TooManyClasses {

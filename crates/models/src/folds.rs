@@ -124,7 +124,9 @@ impl Folds {
             (CvPlan::Lists(lists), Some(g)) => splits::group_lists(g, lists)?,
             (CvPlan::K(k), None) => stratified(labels, y, *k, seed)?,
             _ => {
-                let reason = "the lists hold values of which column? Name it with --groups".into();
+                let reason = "which column are the values in the lists from? Name it with \
+                              --groups"
+                    .into();
                 return Err(ModelError::Folds { reason }.into());
             }
         };
@@ -145,8 +147,8 @@ impl Folds {
             && table.ids.len() > 1
             && table.column(RECORDING).is_ok_and(|values| Labels::of(&values).0.len() == 1);
         let warning = one.then(|| {
-            "all rows are parts of one recording, so training and test hold neighbours: scores are too \
-             good for other recordings"
+            "all rows are parts of one recording, so training and test rows are neighbours: the \
+             scores are better than they would be on other recordings"
                 .into()
         });
         let are_folds = matches!(plan, CvPlan::Fold(_)) && groups.is_none();

@@ -131,7 +131,8 @@ pub enum ModelFileError {
     },
     /// The model does not know the formats of the recordings that it was trained on.
     #[error(
-        "the model (of version {version}) does not record the sample rates and channels it was \
+        "the model (from version {version}) does not record the sample rates and channels that it \
+         was \
          trained on, so recordings of another format would be classified wrongly without a word: \
          train it again, or --any-rate takes every recording as it is"
     )]

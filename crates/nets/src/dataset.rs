@@ -105,7 +105,7 @@ impl Dataset {
                 };
                 if numbers != taken {
                     return Err(refuse(format!(
-                        "{x} has {numbers} numbers a row, {name} takes {taken}"
+                        "{x} has {numbers} numbers per row, {name} takes {taken}"
                     )));
                 }
                 Column { values, offsets: ends.into_iter().map(|e| e * numbers).collect() }

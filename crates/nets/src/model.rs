@@ -99,7 +99,7 @@ impl NetModel {
     /// A text when it is not a trained network of ours, or its parts do not fit.
     pub fn from_bytes(bytes: &[u8]) -> std::result::Result<Self, String> {
         let header: Header = weights::entry(bytes, ENTRY, FORMAT)?
-            .ok_or("weights alone: no network of corsmal-feat was trained into this file")?;
+            .ok_or("weights only: this file is not a network trained by corsmal-feat")?;
         header.recipe.check().map_err(|e| e.to_string())?;
         let definition = networks::classifier(&header.network).map_err(|e| e.to_string())?;
         // Before a network is made: a few labels too many would ask for any amount of numbers.

@@ -54,7 +54,7 @@ fn recordings(paths: &[String]) -> PyResult<Vec<Input>> {
     }
     let (found, named) = (found.len(), paths.len());
     Err(value_error(format!(
-        "{named} paths stand for {found} recordings: folders, globs and manifests have no labels here; \
+        "{named} paths mean {found} recordings: folders, globs and manifests have no labels here; \
          name each recording"
     )))
 }

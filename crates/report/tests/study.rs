@@ -119,7 +119,7 @@ fn errors_are_listed_from_the_most_confident_on() {
     let report = study().report().unwrap();
     let errors = report.sections.iter().find(|s| s.id == "errors").unwrap();
     assert!(errors.text[0].starts_with("2 of 4 rows are wrong"));
-    assert!(errors.text[0].ends_with("1 without an answer."));
+    assert!(errors.text[0].ends_with("1 without a prediction."));
     let table = &errors.tables[0];
     let cell = |row: usize| format!("{:?}", table.rows[row].cells[0]);
     assert!(cell(0).contains("\"sure\"") && cell(1).contains("unsure"));

@@ -53,7 +53,7 @@ pub fn upload(
     stop: &Arc<AtomicBool>,
 ) -> Result<(), StoreError> {
     if object.uri.scheme == Scheme::Web {
-        return Err(StoreError::Unsupported("a web server takes no outputs".into()));
+        return Err(StoreError::Unsupported("outputs cannot be written to a web server".into()));
     }
     let failed = |e: std::io::Error| StoreError::File(format!("{}: {e}", file.display()));
     let content = File::open(file).map_err(failed)?;

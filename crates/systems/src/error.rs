@@ -36,13 +36,13 @@ pub enum SystemError {
         takes: &'static str,
     },
     /// A folder without pictures.
-    #[error("{path}: holds no PNG or JPEG picture")]
+    #[error("{path}: has no PNG or JPEG picture")]
     NoPictures {
         /// the folder
         path: PathBuf,
     },
     /// A folder with more pictures than can be learned from.
-    #[error("{path}: holds more than {limit} pictures, the limit")]
+    #[error("{path}: has more than {limit} pictures, the limit")]
     TooManyPictures {
         /// the folder
         path: PathBuf,
@@ -51,7 +51,8 @@ pub enum SystemError {
     },
     /// More pictures than memory holds.
     #[error(
-        "{path}: {pictures} pictures take {:.1} GiB of memory as the network sees them; {:.1} GiB are free",
+        "{path}: {pictures} pictures take {:.1} GiB of memory as inputs of the network; {:.1} GiB \
+         are free",
         gib(*needed), gib(*available)
     )]
     TooMuchMemory {

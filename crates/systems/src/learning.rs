@@ -64,7 +64,7 @@ impl<'a> Learning<'a> {
         }
         if let Some(first) = damaged.first() {
             self.note(format!(
-                "{} damaged files count as nothing seen; the first, {first}.",
+                "{} damaged files count as if nothing was detected; the first, {first}.",
                 damaged.len()
             ));
         }
@@ -139,7 +139,7 @@ impl<'a> Learning<'a> {
         if let Some(epochs) = self.settings.epochs.filter(|&n| n != recipe.epochs) {
             let (name, published) = (definition.name, recipe.epochs);
             let times = if epochs == 1 { "1 epoch".into() } else { format!("{epochs} epochs") };
-            self.note(format!("{name} was trained for {times}, its recipe has {published}."));
+            self.note(format!("{name} was trained for {times}; its recipe has {published}."));
             recipe.epochs = epochs;
         }
         recipe
@@ -172,7 +172,7 @@ impl<'a> Learning<'a> {
         let mut net = definition.build(Some(outputs), recipe.seed).map_err(refuse)?;
         if let Some((_, weights)) = self.settings.weights.iter().find(|(name, _)| name == network) {
             weights.begin(&mut net).map_err(|e| self.fault(&e))?;
-            self.note(format!("{network} began with {}.", weights.path().display()));
+            self.note(format!("{network} started from {}.", weights.path().display()));
         }
         let task = Task { items, classes, train, watched: &[] };
         let told = |progress: fit::Progress<'_>| {

@@ -9,9 +9,10 @@ use crate::definition::{Definition, Settings};
 /// Challengers' system.
 pub(crate) const M1: Definition = Definition {
     name: "m1",
-    about: "M1 (Challengers): level and type by a perceptron each, from the sound",
+    about: "M1 (Challengers): one perceptron each for level and type, from the sound",
     networks: &["m1"],
-    limits: &["The paper names neither widths nor how frames become a vector: those are our choice."],
+    limits: &["The paper gives neither the widths nor how frames become a vector: those are our \
+               choice."],
     make: |settings| Box::new(Challengers(settings)),
 };
 

@@ -9,7 +9,7 @@ use crate::definition::{Definition, Settings};
 /// NTNU-ERC's system.
 pub(crate) const M2: Definition = Definition {
     name: "m2",
-    about: "M2 (NTNU-ERC): type by a convolutional network over MFCC",
+    about: "M2 (NTNU-ERC): type from a convolutional network on MFCC",
     networks: &["m2_type", "m2_capacity"],
     limits: &["Its capacity network needs the depth views: `corsmal-feat capacity train --method m2`, \
                then `benchmark --capacity m2=MODEL`."],

@@ -12,14 +12,17 @@ use crate::learning::{self, Learning, array};
 /// Concatenation's system.
 pub(crate) const M3: Definition = Definition {
     name: "m3",
-    about: "M3 (Concatenation): level and type by a perceptron each, over the end of the sound; detections in the \
-            four views vote for the category of container, which has perceptrons of its own",
+    about: "M3 (Concatenation): one perceptron each for level and type, on the end of the sound; \
+            detections in the four views vote for the category of container, and each category \
+            has its own perceptrons",
     networks: &["m3_mlp"],
-    limits: &["Detections (YOLOv4's in the paper) are read from tables beside the recordings, of any detector. The \
-               paper does not say how a spectrogram becomes 6,193 numbers, nor what counts where nothing is \
-               detected: those are our choice. Its capacity: `corsmal-feat capacity train --method m3`, then \
-               `benchmark --capacity m3=MODEL`. A category that no training recording has gets no answer; \
-               --weights m3-mlp=FILE is what all six perceptrons begin with."],
+    limits: &["Detections (YOLOv4's in the paper) are read from tables next to the recordings, \
+               from any detector. The paper does not say how a spectrogram becomes 6,193 numbers, \
+               nor what counts if nothing is detected: those are our \
+               choice. Its capacity: `corsmal-feat capacity train --method m3`, then \
+               `benchmark --capacity m3=MODEL`. A category without training recordings gets no \
+               prediction; --weights m3-mlp=FILE gives the weights from which all six perceptrons \
+               start."],
     make: |settings| Box::new(Concatenation(settings)),
 };
 
@@ -96,7 +99,8 @@ impl System for Concatenation {
         let told = known[..work.training].iter().zip(&voted).filter(|(known, _)| known.is_some());
         let right = told.clone().filter(|(known, voted)| known == voted).count();
         learning.note(format!(
-            "the vote tells the category of {right} of {} training recordings (paper: 92 % of cups, 73 % of \
+            "the vote finds the category of {right} of {} training recordings \
+             (paper: 92 % of cups, 73 % of \
              glasses, 88 % of boxes).",
             told.count()
         ));
@@ -128,7 +132,8 @@ impl Prepared for Ready<'_> {
             if taught.is_empty() {
                 let (name, asked) = (category.name(), asked.len());
                 self.learning.note(format!(
-                    "no training recording of a fold has a {name}: {asked} with that vote count as wrong."
+                    "a fold has no training recording of a {name}: {asked} with that vote count \
+                     as wrong."
                 ));
                 continue;
             }

@@ -10,7 +10,7 @@ use crate::definition::{Definition, Settings};
 /// HVRL's system.
 pub(crate) const M4: Definition = Definition {
     name: "m4",
-    about: "M4 (HVRL): type by a vote over windows of eight channels, level by LSTMs over them",
+    about: "M4 (HVRL): type from a vote over windows of eight channels, level from LSTMs over them",
     networks: &["m4_type", "m4_level"],
     limits: &["Its capacity needs views: `corsmal-feat capacity --method m4`."],
     make: |settings| Box::new(Hvrl(settings)),
@@ -48,7 +48,8 @@ impl System for Hvrl {
         let recordings = learning.items("m4_type")?;
         if learning.subjects()[..work.training].iter().any(|s| s.action.is_none()) {
             learning.note(
-                "recordings without an annotated action give all their windows their type.".into(),
+                "in recordings without an annotated action, all windows have the type of the \
+                 recording.".into(),
             );
         }
         let (mut types, mut ends) = (Vec::new(), vec![0]);

@@ -18,7 +18,7 @@ pub(crate) const M5: Definition = Definition {
     about: "M5 (Because It's Tactile): a forest over statistics of the sound, GRUs over VGGish and \
             R(2+1)D embeddings, averaged",
     networks: &["m5_vggish_level", "m5_vggish_type", "m5_r21d_level"],
-    limits: &["The embeddings come from `corsmal-feat embed` and are given with --embeddings; its \
+    limits: &["The embeddings come from `corsmal-feat embed`; give them with --embeddings; its \
                capacity needs views: `corsmal-feat capacity --method m5`."],
     make: |settings| Box::new(Tactile(settings)),
 };
@@ -69,8 +69,8 @@ impl System for Tactile {
             match embeddings(&learning, &self.0, name, level)? {
                 Some(items) => branches.push(Branch { level, kind, source, items }),
                 None => learning.note(format!(
-                    "{name} embeddings were not given (--embeddings {name}=FILE.npz): without that \
-                     branch."
+                    "{name} embeddings were not given (--embeddings {name}=FILE.npz), so that \
+                     branch is left out."
                 )),
             }
         }

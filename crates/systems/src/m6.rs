@@ -10,8 +10,8 @@ use crate::definition::{Definition, Settings};
 /// ACC's system.
 pub(crate) const M6: Definition = Definition {
     name: "m6",
-    about: "M6 (ACC): a network tells pouring from shaking from nothing, another one for each \
-            tells type and level together",
+    about: "M6 (ACC): one network distinguishes pouring, shaking and nothing; one more for each \
+            action predicts type and level together",
     networks: &["m6_action", "m6_pouring", "m6_shaking"],
     limits: &[],
     make: |settings| Box::new(Acc(settings)),

@@ -18,12 +18,12 @@ use crate::definition::{Definition, Settings};
 /// The paper's vision baseline.
 pub(crate) const MASK_RN: Definition = Definition {
     name: "mask-rn",
-    about: "Mask + RN (vision baseline): level and type by a network each, from the container in \
-            the last frame, each view alone",
+    about: "Mask + RN (vision baseline): one network each for level and type, on the container in \
+            the last frame, each view separately",
     networks: &["resnet18_level", "resnet18_type"],
-    limits: &["Detections (Mask R-CNN's in the paper) are read from tables beside the recordings. The \
-               paper names neither the size of the crops nor the training, nor what counts where nothing \
-               is detected: those are our choice."],
+    limits: &["Detections (Mask R-CNN's in the paper) are read from tables next to the \
+               recordings. The paper gives neither the size of the crops nor the training, nor \
+               what counts if nothing is detected: those are our choice."],
     make: |settings| Box::new(Baseline(settings)),
 };
 

@@ -69,7 +69,7 @@ pub fn cuboid(
         points = filtered(points, outliers, seed);
     }
     if points.is_empty() {
-        return Err(VisionError::Request("no depth lies on the mask".into()));
+        return Err(VisionError::Request("the mask has no pixel with depth".into()));
     }
     let [low, high] = [f64::min, f64::max].map(|pick: fn(f64, f64) -> f64| {
         points.iter().skip(1).fold(points[0], |a, p| std::array::from_fn(|i| pick(a[i], p[i])))

@@ -150,7 +150,7 @@ pub fn dimensions(views: [View<'_>; 2], variant: Variant) -> Result<Dimensions> 
         .ok_or_else(|| VisionError::Request("the two lines of sight do not meet".into()))?;
     let (width, accepted) = profile(views, centre, variant)?;
     let (Some(&(first, _)), Some(&(last, _))) = (accepted.first(), accepted.last()) else {
-        return Err(VisionError::Request("no circle lies on both masks".into()));
+        return Err(VisionError::Request("no circle fits both masks".into()));
     };
     let count = accepted.len() as f64;
     let radius = accepted.iter().map(|&(_, r)| RADII.get(r)).sum::<f64>() / count * 1000.0;

@@ -62,7 +62,8 @@ impl CapacityTable {
             .collect();
         (!trained.is_empty()).then(|| {
             format!(
-                "The model of {} learned from {}: its scores on them are too good. Those on the test parts are not affected.",
+                "The model of {} was trained on {}: its scores on them are too good. Those on the \
+                 test parts are not affected.",
                 self.name,
                 trained.join(", ")
             )

@@ -103,7 +103,7 @@ impl Run {
         let mut all = self.held_out.iter().map(|(_, e)| e).chain(self.tests.iter().flatten());
         let answers = |e: &Estimate| e.level.is_some() || e.kind.is_some();
         (!all.any(answers)).then(|| {
-            format!("{}: no answer for any recording, so the tables have no row", self.name)
+            format!("{}: no prediction for any recording, so the tables have no row", self.name)
         })
     }
 }

@@ -23,12 +23,12 @@ const NO_TARGETS: [&str; 5] = ["fold", "group", "container", "recording", "view"
 /// How to read a file that `extract` did not write.
 #[derive(clap::Args, Clone)]
 pub struct MemberArgs {
-    /// In an .npz of another program: the member with the features, rows x features. Its
-    /// one-dimensional members of that many rows are label columns.
+    /// In an .npz from another program: the member with the features, rows x features. Its
+    /// one-dimensional members with as many rows are label columns.
     #[arg(long, value_name = "MEMBER", default_value = "X")]
     x: String,
-    /// In a file of another program: the member or column with the ids; else the column id of a
-    /// Parquet table; else rows are numbered from 0.
+    /// In a file from another program: the member or column with the ids; by default the column id
+    /// of a Parquet table, else rows are numbered from 0.
     #[arg(long, value_name = "MEMBER")]
     ids: Option<String>,
 }
@@ -52,8 +52,8 @@ impl MemberArgs {
 /// Where labels come from.
 #[derive(clap::Args, Clone)]
 pub struct LabelArgs {
-    /// Labels: a CSV whose column id or path names the recordings, or `folders` where each recording
-    /// lies in a folder named like its class.
+    /// Labels: a CSV whose column id or path names the recordings, or `folders` if each recording is
+    /// in a folder named after its class.
     #[arg(long, value_name = "CSV|folders")]
     labels: Option<PathBuf>,
     /// Column of the label file that names the recordings by id, path or file name, such as `file`.
@@ -132,16 +132,16 @@ pub struct DatasetArgs {
     /// The same as the positional argument.
     #[arg(long, value_name = "FILE", conflicts_with = "table")]
     features: Option<PathBuf>,
-    /// The same for a folder of pictures, such as those of `corsmal-feat crops`, for networks that
-    /// take them. Its labels.csv gives the labels unless --labels does.
+    /// A folder of pictures instead, such as those of `corsmal-feat crops`, for networks that take
+    /// them. The labels come from its labels.csv unless --labels is given.
     #[arg(long, value_name = "DIR", requires = "net", conflicts_with_all = ["table", "features"])]
     pub crops: Option<PathBuf>,
     #[command(flatten)]
     pub members: MemberArgs,
     #[command(flatten)]
     labels: LabelArgs,
-    /// Label column to learn; may be left out if there is only one. `joint` is type and level
-    /// together where there is no such column.
+    /// Label column to learn; not needed if there is only one. `joint` is type and level together
+    /// if there is no such column.
     #[arg(long, visible_alias = "y", value_name = "COLUMN")]
     target: Option<String>,
     /// Label column of groups that must not be split between training and test. Without --cv,

@@ -5,7 +5,7 @@ use crate::failure::Failure;
 /// The number of worker threads.
 #[derive(clap::Args, Clone, Copy)]
 pub struct Jobs {
-    /// Worker threads; one for each core by default.
+    /// Worker threads; one per core by default.
     #[arg(long, short, value_name = "N", env = "CORSMAL_FEAT_JOBS")]
     #[arg(value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,

@@ -13,11 +13,11 @@ pub struct NetworkArgs {
     /// Where the network runs: cpu, the only device of this build.
     #[arg(long, value_name = "DEVICE", default_value = "cpu", requires = "net", value_parser = device)]
     pub device: String,
-    /// Begin with these weights instead of random numbers: .pth, .npz or .safetensors under the
+    /// Start from these weights instead of random numbers: .pth, .npz or .safetensors with the
     /// network's names, such as torchvision's for ResNet-18. The last layer may have had other classes.
     #[arg(long, value_name = "FILE", requires = "net")]
     pub weights: Option<PathBuf>,
-    /// Folder that keeps the training after each epoch; the next run continues from it.
+    /// Folder in which to save the training after each epoch; the next run continues from it.
     #[arg(long, value_name = "FOLDER", requires = "net")]
     pub checkpoints: Option<PathBuf>,
 }
@@ -27,7 +27,7 @@ fn device(name: &str) -> Result<String, String> {
         "cpu" => Ok(name.into()),
         _ => Err(
             "no such device in this build: networks run on the cpu only, on every core (--jobs); \
-                  docs/networks.md says why"
+             docs/networks.md says why"
                 .into(),
         ),
     }

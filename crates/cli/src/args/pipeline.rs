@@ -13,17 +13,17 @@ pub struct PipelineArgs {
     /// Classifier: knn, svm, tree, rf, et or logistic; `corsmal-feat classifiers` explains them.
     #[arg(long, value_name = "NAME", default_value = "rf")]
     classifier: String,
-    /// A parameter of the classifier, such as trees=500 or C=10. scikit-learn's names are understood.
+    /// A parameter of the classifier, such as trees=500 or C=10. scikit-learn's names work, too.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     parameters: Vec<String>,
     /// Scale every feature to zero mean and unit variance on the training rows.
     #[arg(long)]
     standardize: bool,
-    /// Principal components to keep: a number of them, or a part of the variance below 1.0.
+    /// Principal components to keep: how many, or a share of the variance below 1.0.
     #[arg(long, value_name = "N")]
     pca: Option<String>,
-    /// Try these values, such as C=0.1,1,10; repeat it to try every combination. The choice is made
-    /// on folds inside the training rows.
+    /// Try these values, such as C=0.1,1,10; repeat the option to try every combination. The choice
+    /// is made on folds inside the training rows.
     #[arg(long, value_name = "KEY=V1,V2")]
     tune: Vec<String>,
     /// Seed of the classifier or network and of shuffled folds; 0 by default.

@@ -9,20 +9,20 @@ use crate::failure::Failure;
 /// A way to decide.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum How {
-    /// The class that most windows have; `p_<label>` is the share of windows.
+    /// The class of most windows; `p_<label>` is the share of windows.
     Majority,
-    /// The class of the highest mean probability.
+    /// The class with the highest mean probability.
     Mean,
 }
 
 /// Arguments about windows.
 #[derive(clap::Args)]
 pub struct VoteArgs {
-    /// Write one line per recording, decided from its windows.
+    /// Write one line per recording, decided by its windows.
     #[arg(long, value_enum, value_name = "HOW")]
     vote: Option<How>,
-    /// Class of windows in which nothing happens: with --vote majority it wins only where no other
-    /// class has --least windows.
+    /// Class of windows in which nothing happens: with --vote majority it wins only if no other class
+    /// has --least windows.
     #[arg(long, value_name = "LABEL", requires = "vote")]
     background: Option<String>,
     /// Windows that a class other than --background needs.

@@ -24,7 +24,7 @@ use crate::paragraphs::wrapped;
                         --add M6=m6_acc.csv\n  corsmal-feat benchmark --data ~/CCM --out report \
                         --methods m1,m2,m4,m6 --epochs 5\n  corsmal-feat benchmark --data ~/CCM --out report \
                         --capacity m5 --capacity fused=fused.capacity --capacity M2=m2.csv\n\nSystems are trained on whole containers \
-                        held out in three folds, by their published recipes; `corsmal-feat nets` \
+                        held out in three folds, with their published recipes; `corsmal-feat nets` \
                         lists them.\n\nThe report is report/report.html; the same tables \
                         are in report/tables and report/report.json.")]
 pub struct Args {
@@ -34,37 +34,37 @@ pub struct Args {
     /// Folder for the report, tables, pictures, submissions, models and cached features.
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
-    /// Baselines to run, such as zcr-mfcc-knn or spectrogram-pca-rf; default all twelve, none with
-    /// --methods.
+    /// Baselines to run, such as zcr-mfcc-knn or spectrogram-pca-rf; by default all twelve, or none
+    /// with --methods.
     #[arg(long, num_args = 1.., value_delimiter = ',', value_parser = baseline, value_name = "NAME")]
     baselines: Vec<Baseline>,
     /// Systems of the paper to train and run: m1 to m6, mask-rn. They need a build with the feature
     /// `nets`.
     #[arg(long, num_args = 1.., value_delimiter = ',', value_name = "NAME")]
     methods: Vec<String>,
-    /// Epochs of every network of the systems; default those of its recipe.
+    /// Epochs of every network of the systems; by default those of its recipe.
     #[arg(long, value_name = "N", requires = "methods", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     epochs: Option<u32>,
-    /// Embeddings of the recordings that M5 takes, vggish or r21d, as an .npz with X, offsets and
-    /// ids; several files of a name are joined.
+    /// Embeddings of the recordings for M5, vggish or r21d, as an .npz with X, offsets and ids;
+    /// several files with the same name are joined.
     #[arg(long, value_parser = named_file, value_name = "NAME=NPZ", requires = "methods")]
     embeddings: Vec<(String, PathBuf)>,
-    /// Weights that a network of the systems begins with instead of random numbers, such as torchvision's
-    /// for resnet18-level and resnet18-type.
+    /// Weights from which a network of the systems starts instead of random numbers, such as
+    /// torchvision's for resnet18-level and resnet18-type.
     #[arg(long, value_parser = named_file, value_name = "NETWORK=FILE", requires = "methods")]
     weights: Vec<(String, PathBuf)>,
-    /// Predictions of another method that join the tables: a submission in an official format or
+    /// Predictions of another method to add to the tables: a submission in an official format, or
     /// capacity estimates by file name.
     #[arg(long, value_parser = named_file, value_name = "NAME=CSV")]
     add: Vec<(String, PathBuf)>,
-    /// Capacities that have their rows and complete the submissions of every baseline and system, so
-    /// that the filling mass has all three tasks: a table of `capacity` with its name, or a method to run on
-    /// the views of the data set first: m4, m5, or m2, m3 or
-    /// fused with the model of `capacity train`, m2 also with published weights.
+    /// Capacities to add: they get their own rows and complete the submissions of every baseline and
+    /// system, so the filling mass has all three tasks. Give a name and a table of `capacity`, or a
+    /// method to run first on the views of the data set: m4, m5, or m2, m3 or fused with a model of
+    /// `capacity train`, m2 also with published weights.
     #[arg(long, value_parser = capacity_source, value_name = "m4|m5|METHOD=MODEL|NAME=CSV")]
     capacity: Vec<CapacitySource>,
     /// Folder of tables of detections (SEQUENCE.csv or .json, by container or not), for m3, mask-rn
-    /// and --capacity; by default `detections/` beside each recording's audio folder.
+    /// and --capacity; by default `detections/` next to each recording's audio folder.
     #[arg(long, value_name = "DIR")]
     detections: Option<PathBuf>,
     /// Seed of the forests and of the pseudo-random estimates.

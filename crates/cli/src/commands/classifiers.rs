@@ -17,7 +17,7 @@ Examples:
   corsmal-feat classifiers rf
   corsmal-feat train feats.npz --target type --classifier rf --set trees=500 -o type.model")]
 pub struct Args {
-    /// A classifier to show with its parameters; without it all are listed.
+    /// A classifier to show with its parameters; without it, all classifiers are listed.
     name: Option<String>,
     /// Print as JSON.
     #[arg(long)]

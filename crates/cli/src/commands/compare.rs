@@ -22,14 +22,14 @@ Examples:
 
 Files may be outputs of `extract`, any .npz or .npy with numeric arrays, or a Parquet table.
 Arrays are paired by name, outputs of `extract` by recording (id, else file name) and feature,
-tables by id and column; the only array of each file needs no name. The last axis counts frames,
-the one before coefficients, the one before that channels (librosa's order). Two arrays are in
-memory at a time.
+tables by id and column; if each file has only one array, they need no name. The last axis is
+frames, the one before coefficients, the one before that channels (librosa's order). Only two
+arrays are in memory at a time.
 
 Likely causes are derived from the values, each with its evidence: offsets, factors, clamps,
 padding, order of axes and channels, and so on. docs/parity.md explains them.
 
-Exit codes: 0 all within the tolerance, 1 differences (also arrays in one file only), 2 could
+Exit codes: 0 all within the tolerance, 1 differences (or arrays in only one file), 2 could
 not run.")]
 pub struct Args {
     /// The first file.

@@ -19,16 +19,16 @@ Example:
   corsmal-feat compare-predictions svm.csv rf.csv
 
 McNemar's exact test looks at the recordings that only one of the two got right. The bootstrap
-draws recordings, and whole folds where all lines have one, with replacement and gives a 95 %
-interval of the difference of weighted F1. Recordings of one group resemble each other: where
-folds are groups, the interval over folds is the honest one, and with few folds it says little.
+draws recordings, and whole folds if all lines have one, with replacement, and gives a 95 %
+interval of the difference of weighted F1. Recordings of one group resemble each other, so if
+folds are groups, the interval over folds is the honest one; with few folds it says little.
 
 Exit codes: 0 fine, 2 could not run.")]
 pub struct Args {
     /// Predictions of the first classifier, with true classes.
     #[arg(value_name = "CSV")]
     first: PathBuf,
-    /// Those of the second, of the same recordings.
+    /// Predictions of the second classifier for the same recordings.
     #[arg(value_name = "CSV")]
     second: PathBuf,
     #[command(flatten)]
@@ -36,7 +36,7 @@ pub struct Args {
     /// Column of the true classes; `true` by default.
     #[arg(long, visible_alias = "y", value_name = "COLUMN")]
     target: Option<String>,
-    /// Draws of the bootstrap.
+    /// Number of bootstrap resamples.
     #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     resamples: u32,
     /// Seed of the bootstrap.

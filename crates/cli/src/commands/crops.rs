@@ -19,10 +19,10 @@ Examples:
   corsmal-feat train --net resnet18-level --crops crops -o level.safetensors
   corsmal-feat cross-validate --net resnet18-type --crops crops --weights resnet18.pth
 
-Writes a picture for each view of a labelled training recording whose last colour frame shows a cup or
-wine glass, and labels.csv with the columns id, container, view, level and type. Level and type are
-\"opaque\" where the container hides what it holds. docs/vision.md lists the files that the command reads.
-Labels are written last; an interrupted run leaves nothing behind.
+Writes a picture for each view of a labelled training recording whose last colour frame shows a cup
+or wine glass, and labels.csv with the columns id, container, view, level and type. Level and type
+are \"opaque\" if the container hides what it holds. docs/vision.md lists the files that the command
+reads. Labels are written last; an interrupted run leaves nothing behind.
 
 Exit codes: 0 all fine, 1 some recordings have damaged files, 2 could not run, 130 interrupted.")]
 pub struct Args {
@@ -30,7 +30,7 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
     /// Folder of tables of detections (SEQUENCE.csv or .json, by container or not); by default
-    /// `detections/` beside each recording's audio folder.
+    /// `detections/` next to each recording's audio folder.
     #[arg(long, value_name = "DIR")]
     detections: Option<PathBuf>,
     /// Folder to write to: new or empty.

@@ -30,12 +30,13 @@ Examples:
     --groups container --classifier rf --set trees=500
   corsmal-feat cross-validate feats.npz --labels folders --cv 5
   corsmal-feat cross-validate a34f_train.npz --target level --groups container \\
-    --cv lists=1,4,7/2,5,8/3,6,9 --classifier svm --standardize --tune C=1,10 --tune gamma=scale,0.01
-
+    --cv lists=1,4,7/2,5,8/3,6,9 --classifier svm --standardize \\
+    --tune C=1,10 --tune gamma=scale,0.01
   corsmal-feat cross-validate feats.npz --labels labels.csv --report report
 
-With --tune the parameters are chosen anew in every fold, on inner folds of its training rows.
-`score` reports more about the --predictions, `compare-predictions` tests whether those of two runs differ.
+With --tune the parameters are chosen separately in every fold, on inner folds of its training rows.
+`score` reports more about the --predictions; `compare-predictions` tests whether those of two runs
+differ.
 
 Exit codes: 0 fine, 2 could not run, 130 interrupted.")]
 pub struct Args {
@@ -46,27 +47,27 @@ pub struct Args {
     #[command(flatten)]
     network: NetworkArgs,
     /// What is held out: N or k=N folds (of whole groups with --groups, else stratified),
-    /// group=COLUMN (each group once), lists=1,4,7/2,5,8/3,6,9 of --groups, or fold=COLUMN. Default:
-    /// each group of --groups, or of a label column container or group, or 5 folds.
+    /// group=COLUMN (each group once), lists=1,4,7/2,5,8/3,6,9 of --groups, or fold=COLUMN. By
+    /// default each group of --groups or of a label column container or group, else 5 folds.
     #[arg(long, value_name = "PLAN")]
     cv: Option<CvPlan>,
     /// Print everything as JSON instead of tables.
     #[arg(long)]
     json: bool,
-    /// Write the predictions of the held-out rows, CSV.
+    /// Write the predictions of the held-out rows to this CSV.
     #[arg(long, short = 'o', value_name = "CSV")]
     predictions: Option<PathBuf>,
-    /// Write a report into this folder: report.html with scores, confusion matrix, curves, the errors
-    /// to listen to, what the recordings are like, which features matter and whether more rows would
-    /// help; tables as CSV and LaTeX, figures as SVG and PDF. Trains about six times as many
-    /// models; with --net, the parts that train again are left out.
+    /// Write a report into this folder: report.html with scores, confusion matrix, curves, errors
+    /// worth listening to, the health of the recordings, which features matter and whether more rows
+    /// would help; tables as CSV and LaTeX, figures as SVG and PDF. This trains about six times as
+    /// many models; with --net, the parts that would train again are left out.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
-    /// Repeat with N seeds, from --seed on: how much of a difference between two classifiers is
-    /// chance?
+    /// Repeat with N seeds, starting at --seed, to see how much of a difference between two
+    /// classifiers is chance.
     #[arg(long, value_name = "N", conflicts_with = "net", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     seeds: u32,
-    /// Replace an existing file of predictions, and the report in its folder.
+    /// Replace an existing prediction file, and the report in its folder.
     #[arg(long)]
     overwrite: bool,
     #[command(flatten)]

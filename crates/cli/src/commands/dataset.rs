@@ -23,9 +23,9 @@ pub struct Args {
 enum Action {
     /// Report what is present, missing and odd.
     ///
-    /// Known are the folder tree of 2020 (train/1/audio/s0_fi0_fu0_b0_l0_audio.wav) and the flat
-    /// release of 2021 (train/audio/000000.wav with its annotation file). Exit code 1 when
-    /// something is odd or a container is incomplete.
+    /// Two layouts are known: the folder tree of 2020 (train/1/audio/s0_fi0_fu0_b0_l0_audio.wav) and
+    /// the flat release of 2021 (train/audio/000000.wav with its annotation file). The exit code is 1
+    /// if something is odd or a container is incomplete.
     #[command(after_help = "Example:\n  corsmal-feat dataset check ~/CCM")]
     Check {
         /// Folder of the data set.
@@ -51,7 +51,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 fn print(findings: &Findings) {
     println!("{}", findings.root.display());
     if findings.synthetic {
-        println!("SYNTHETIC recordings: their scores mean nothing about the real data set");
+        println!("SYNTHETIC recordings: their scores say nothing about the real data set");
     }
     println!(
         "{} recordings, {} with a known filling, {:.1} min",

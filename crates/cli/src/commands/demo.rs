@@ -13,7 +13,7 @@ use crate::made::quoted;
 Example:
   corsmal-feat demo --out demo
 
-Everything that it shows is computed from synthetic recordings: scores on them say nothing about
+Everything in the demo is computed from synthetic recordings: scores on them say nothing about
 real data.")]
 pub struct Args {
     /// Folder for the output, new or from an earlier demo.
@@ -100,7 +100,7 @@ pub fn run(
             ],
         ),
         (
-            "Scores of its held-out predictions, with the capacities, by the paper's rules. SYNTHETIC data: they mean \
+            "Scores of its held-out predictions, with the capacities, by the paper's rules. SYNTHETIC data: they say \
              nothing about real recordings",
             vec![
                 "evaluate",

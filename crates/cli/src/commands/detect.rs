@@ -10,13 +10,14 @@ use crate::failure::Failure;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  corsmal-feat detect --data ~/CCM --model mask_rcnn.onnx --library libonnxruntime.so.1.32.0 --out detections
+  corsmal-feat detect --data ~/CCM --model mask_rcnn.onnx --library libonnxruntime.so.1.32.0 \\
+      --out detections
   corsmal-feat capacity --method m5 --data ~/CCM --detections detections --out capacity.csv
 
-A table CONTAINER/SEQUENCE.json for each recording with colour frames (images, or H.264 in MP4 in a build
-with the feature `video`), as `capacity` and `crops` read them: what the model sees with its confidence, and
-masks of containers. Existing tables are kept, so an interrupted run can be resumed; model.json says which
-model made them.
+Writes a table CONTAINER/SEQUENCE.json, which `capacity` and `crops` read, for each recording with
+colour frames (images, or H.264 in MP4 in a build with the feature `video`). It has the objects that
+the model found, with their confidence, and masks of containers. Existing tables are kept, so an
+interrupted run can be resumed; model.json says which model made them.
 
 Exit codes: 0 all fine, 1 some recordings have damaged files, 2 could not run, 130 interrupted.")]
 pub struct Args {
@@ -29,12 +30,11 @@ pub struct Args {
     /// Shared library of ONNX Runtime, such as libonnxruntime.so.1.32.0 of the PyPI package onnxruntime.
     #[arg(long, value_name = "FILE", env = "CORSMAL_ONNXRUNTIME")]
     library: PathBuf,
-    /// Folder of the tables.
+    /// Folder to write the tables to.
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
-    /// Frames to run the model on: ends (the first, the 20th from the end and the last, which m5 and the
-    /// vision baseline need), all (m3), or every=8 (m4: numbers that 8
-    /// divides), with the last.
+    /// Frames to run the model on: ends (the first, the 20th from the end and the last, for m5 and
+    /// the vision baseline), all (for m3), or every=8 (for m4: every eighth frame, and the last).
     #[arg(long, value_name = "WHICH", default_value = "ends", value_parser = frames)]
     frames: Frames,
     /// Views to run the model on.

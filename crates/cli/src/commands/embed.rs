@@ -13,18 +13,20 @@ Examples:
   corsmal-feat embed vggish audio/ --weights vggish.pth -o vggish.npz
   corsmal-feat train vggish.npz --net m5-vggish-level --target level -o level.safetensors
   corsmal-feat benchmark --data CCM --out report --methods m5 --embeddings vggish=vggish.npz
-  corsmal-feat embed r21d --data CCM --model r21d.onnx --library libonnxruntime.so.1.32.0 -o r21d.npz
+  corsmal-feat embed r21d --data CCM --model r21d.onnx --library libonnxruntime.so.1.32.0 \\
+      -o r21d.npz
 
-Bring your own weights, under the names of the usual PyTorch port (features.0.weight to
-embeddings.4.bias); a .pth is read without running it. The .npz has X, rows of 128 numbers for each
-.96 s of one recording after another, offsets, where each recording begins, and ids; label columns of
-a manifest are kept. r21d embeds windows of 16 colour frames of the four views of a data set, 512 numbers
-each, by an ONNX model (docs/vision.md); the member view says which view a sequence is. It needs every frame
-of a view, as images or, in a build with the feature `video`, as H.264 in MP4.
+Bring your own weights, with the names of the usual PyTorch port (features.0.weight to
+embeddings.4.bias); a .pth is read without running it. The .npz has X (a row of 128 numbers for each
+.96 s, one recording after another), offsets (where each recording begins) and ids; label columns
+of a manifest are kept. r21d embeds windows of 16 colour frames from the four views of a data set,
+512 numbers each, with an ONNX model (docs/vision.md); the member view says which view a sequence
+is. It needs every frame of a view, as images or, in a build with the feature `video`, as H.264 in
+MP4.
 
 Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 interrupted.")]
 pub struct Args {
-    /// The network that embeds: vggish, or r21d.
+    /// The network to use: vggish or r21d.
     #[arg(value_name = "NETWORK")]
     network: String,
     /// Recordings: files, folders, globs, manifests.

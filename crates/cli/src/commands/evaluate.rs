@@ -19,7 +19,7 @@ enum Rules {
     /// The official evaluator of October 2020.
     #[value(name = "toolkit-2020-10")]
     Toolkit202010,
-    /// The official evaluator of November 2021, which the toolkit's README table belongs to.
+    /// The official evaluator of November 2021, whose scores are in the toolkit's README table.
     #[value(name = "toolkit-2021-11")]
     Toolkit202111,
     /// The current official evaluator (s1 to s10, overall, JFLT, CMD).
@@ -42,7 +42,7 @@ pub struct Args {
     /// Submissions in the official 2020 or 2022 format.
     #[arg(value_name = "CSV", required_unless_present = "submission")]
     submissions: Vec<PathBuf>,
-    /// The same as the positional arguments; these follow the others.
+    /// The same as the positional arguments, and added after them.
     #[arg(long, num_args = 1.., value_name = "CSV")]
     submission: Vec<PathBuf>,
     /// Official annotation file.
@@ -56,7 +56,7 @@ pub struct Args {
     /// estimates for recordings that those files do not have.
     #[arg(long, value_name = "CSV")]
     baseline: Option<PathBuf>,
-    /// Use pseudo-random estimates of this seed instead.
+    /// Use pseudo-random estimates with this seed instead.
     #[arg(long, value_name = "N", conflicts_with = "baseline")]
     seed: Option<u64>,
     /// Score only the recordings of these containers, such as 1-9 or 3,6,9.

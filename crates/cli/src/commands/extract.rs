@@ -32,21 +32,21 @@ Examples:
 
 Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 interrupted.")]
 pub struct Args {
-    /// Recordings: files, folders (searched through), globs, manifests (.csv, .jsonl), or - for a
+    /// Recordings: files, folders (including subfolders), globs, manifests (.csv, .jsonl), or - for a
     /// WAV stream on standard input.
     #[arg(value_name = "PATH", required_unless_present = "named")]
     inputs: Vec<OsString>,
-    /// The same as the positional argument; these follow the others.
+    /// The same as the positional arguments, and added after them.
     #[arg(long = "in", short = 'i', value_name = "PATH", num_args = 1..)]
     named: Vec<OsString>,
-    /// Output: .npz or .parquet, a file or an object of a store (s3://bucket/feats.npz).
+    /// Output: .npz or .parquet, a file or an object in a store (s3://bucket/feats.npz).
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
-    /// Folder in which an output for a store is made, so that --resume can go on; the current one by
-    /// default.
+    /// Folder in which an output for a store is made, so that --resume can continue it; the current
+    /// folder by default.
     #[arg(long, value_name = "FOLDER")]
     work: Option<PathBuf>,
-    /// Write a folder of Parquet files, one for each value of a label: OUT/LABEL=VALUE/part.parquet.
+    /// Write a folder of Parquet files, one per value of a label: OUT/LABEL=VALUE/part.parquet.
     #[arg(long, value_name = "LABEL")]
     partition_by: Option<String>,
     #[command(flatten)]
@@ -54,19 +54,19 @@ pub struct Args {
     #[command(flatten)]
     jobs: Jobs,
     /// Cut recordings into windows of this many seconds: each gets a row or arrays, with the id
-    /// RECORDING@START, the labels, and the label `recording`.
+    /// RECORDING@START, the labels of its recording, and the label `recording`.
     #[arg(long, value_name = "SECONDS", value_parser = window_seconds)]
     window: Option<f64>,
-    /// Seconds from the start of one window to that of the next; half a window by default.
+    /// Seconds from the start of one window to the start of the next; half a window by default.
     #[arg(long, value_name = "SECONDS", value_parser = window_seconds, requires = "window")]
     hop: Option<f64>,
-    /// Only the i-th of n parts of the inputs, counted from 0; `merge` joins the outputs.
+    /// Process only the i-th of n parts of the inputs, counted from 0; `merge` joins the outputs.
     #[arg(long, value_name = "I/N", default_value = "0/1")]
     shard: Shard,
     /// Continue an interrupted run.
     #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
-    /// Replace an existing output, forget an interrupted run.
+    /// Replace an existing output and discard an interrupted run.
     #[arg(long)]
     overwrite: bool,
     /// Deflate the arrays of an .npz (smaller, much slower).
@@ -83,7 +83,7 @@ pub struct Args {
     dry_run: bool,
     #[command(flatten)]
     told: Told,
-    /// Form of messages on standard error.
+    /// Format of messages on standard error.
     #[arg(long, value_enum, default_value = "text")]
     log_format: LogFormat,
 }
@@ -98,14 +98,14 @@ pub struct ConfigArgs {
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
     /// Change one key, such as melspectrogram.n_mels=64 or signal.sample_rate=16000; librosa=0.8
-    /// sets everything that gives the numbers of librosa 0.8.
+    /// sets everything that is needed for the numbers of librosa 0.8.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
-    /// Add a feature with its defaults (see `corsmal-feat features`), under another name where one
+    /// Add a feature with its defaults (see `corsmal-feat features`), under another name if one
     /// is given.
     #[arg(long = "add", value_name = "[NAME=]FEATURE")]
     pub added: Vec<String>,
-    /// Project the statistics of each recording by a file of `corsmal-feat pca`.
+    /// Project the statistics of each recording with a file from `corsmal-feat pca`.
     #[arg(long, value_name = "FILE")]
     pub project: Option<PathBuf>,
 }

@@ -19,7 +19,7 @@ Examples:
   corsmal-feat features mfcc                 what it computes, every key with its default and meaning
   corsmal-feat features mfcc >> my.toml      the same as a part of a configuration file")]
 pub struct Args {
-    /// A feature to show with its parameters and their defaults; without it all are listed.
+    /// A feature to show with its parameters and their defaults; without it, all features are listed.
     name: Option<String>,
     /// Print everything as JSON.
     #[arg(long)]

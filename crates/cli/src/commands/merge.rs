@@ -20,15 +20,16 @@ Example:
   corsmal-feat merge part0.npz part1.npz --out feats.npz
 
 The result has the same bytes as one run over all inputs. Shards whose summaries differ in width
-(recordings with other channel counts) do not fit into one table and are refused.")]
+(because their recordings differ in channels) do not fit into one table and are refused.")]
 pub struct Args {
-    /// The outputs of all shards, in any order: files, or objects of a store.
+    /// The outputs of all shards, in any order: files, or objects in a store.
     #[arg(required = true)]
     shards: Vec<PathBuf>,
-    /// The merged output: a file, or an object of a store (s3://bucket/feats.npz).
+    /// The merged output: a file, or an object in a store (s3://bucket/feats.npz).
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
-    /// Folder in which what is in a store is copied or made; the current one by default.
+    /// Folder for copies of shards in a store, and for an output on its way to a store; the current
+    /// folder by default.
     #[arg(long, value_name = "FOLDER")]
     work: Option<PathBuf>,
     /// Replace an existing output.

@@ -66,7 +66,7 @@ enum Command {
     Presets(presets::Args),
     /// List the features that a configuration can name.
     Features(features::Args),
-    /// Show format and health of a recording, with a picture on request, or what another file holds.
+    /// Show format and health of a recording, with a picture on request, or the content of another file.
     Inspect(inspect::Args),
     /// Show how two feature files differ, and the likely causes.
     Compare(compare::Args),
@@ -78,7 +78,7 @@ enum Command {
     Pca(pca::Args),
     /// List the classifiers and explain their parameters.
     Classifiers(classifiers::Args),
-    /// Learn a classifier from features with labels and write it to a model file.
+    /// Train a classifier on features with labels and write it to a model file.
     Train(train::Args),
     /// Predict the classes of recordings, or of features, with a trained model.
     Classify(classify::Args),
@@ -88,23 +88,23 @@ enum Command {
     Score(score::Args),
     /// Test whether two classifiers differ on the same held-out recordings.
     ComparePredictions(compare_predictions::Args),
-    /// Make one prediction from several files, from windows, or from type and level.
+    /// Combine predictions of several files, of windows, or of type and level.
     Fuse(fuse::Args),
-    /// Make embeddings of recordings, such as VGGish's 128 numbers a second.
+    /// Compute embeddings of recordings, such as VGGish's 128 numbers per second.
     Embed(embed::Args),
     /// Run the paper's audio baselines and systems on a CCM data set and write the report.
     Benchmark(benchmark::Args),
     /// Estimate capacities of containers from the views of a CORSMAL data set.
     Capacity(capacity::Args),
-    /// Cut containers out of the last frames of a CORSMAL data set, as pictures with labels.
+    /// Crop the containers in the last frames of a CORSMAL data set, as pictures with labels.
     Crops(crops::Args),
-    /// Find objects in the frames of a CORSMAL data set by an ONNX model, as tables and masks.
+    /// Find objects in the frames of a CORSMAL data set with an ONNX model, as tables and masks.
     Detect(detect::Args),
     /// Print shell completions or the man page.
     Completions(completions::Args),
     /// Check a CORSMAL data set on disk.
     Dataset(dataset::Args),
-    /// Score CORSMAL submissions by the paper's or the official evaluators' rules.
+    /// Score CORSMAL submissions with the paper's or the official evaluators' rules.
     Evaluate(evaluate::Args),
     /// Make synthetic recordings in the layout of the CCM data set (demonstration and tests only).
     Synth(synth::Args),

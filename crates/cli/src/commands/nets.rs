@@ -14,11 +14,11 @@ Examples:
   corsmal-feat nets m4-type
   corsmal-feat nets m4
 
-Systems, m1 to m6, are what `corsmal-feat benchmark --methods` runs; networks are what they are made of
-and what `train --net` learns. Recipes are those of the published code with its defects corrected; docs/networks.md says where
-paper, code and this tool differ.")]
+`corsmal-feat benchmark --methods` runs systems, m1 to m6; `train --net` trains the networks that
+they consist of. Recipes are those of the published code with its defects corrected;
+docs/networks.md says where paper, code and this tool differ.")]
 pub struct Args {
-    /// Show the layers and the recipe of one network, or what one system is made of.
+    /// Show the layers and the recipe of one network, or the parts of one system.
     #[arg(value_name = "NAME")]
     name: Option<String>,
     /// Print everything as JSON.

@@ -20,8 +20,8 @@ Examples:
   corsmal-feat pca train.npz --n-components 128 --out pca.npz
   corsmal-feat extract --in test/ --out test.npz --preset spec9216-code --project pca.npz
 
-The file records the configuration of its features; features of any other are refused. Fit on
-training recordings only: extract never fits.")]
+The file records the configuration of its features, and features of any other configuration are
+refused. Fit on training recordings only: `extract` never fits.")]
 pub struct Args {
     /// Training features: an .npz or .parquet of `extract` with summaries.
     #[arg(value_name = "FEATURES", required_unless_present = "named")]
@@ -29,8 +29,8 @@ pub struct Args {
     /// The same as the positional argument.
     #[arg(long = "features", value_name = "FILE", conflicts_with = "features")]
     named: Option<PathBuf>,
-    /// Components to keep, at most the rows and the features of the file; 128 by default, or as many
-    /// as there can be.
+    /// Components to keep, at most as many as the file has rows and features; 128 by default, or that
+    /// maximum if it is lower.
     #[arg(long, value_name = "N")]
     n_components: Option<usize>,
     /// Projection file to write (.npz).

@@ -18,7 +18,7 @@ Examples:
   corsmal-feat presets esc26                 what each number of the output is
   corsmal-feat presets esc26 --toml > my.toml   a configuration file to start from")]
 pub struct Args {
-    /// A preset to explain; without it they are listed.
+    /// A preset to explain; without it, all presets are listed.
     name: Option<String>,
     /// Print the configuration file itself.
     #[arg(long, requires = "name")]
@@ -67,7 +67,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let output = match &config.summary {
         None => {
             "Output: for each recording and feature an array [channels, coefficients, frames], \
-                 and the times of its frames in seconds."
+             and the times of its frames in seconds."
                 .to_string()
         }
         Some(_) => format!("Output: one row per recording. {}", columns(&config)?),

@@ -22,11 +22,11 @@ Examples:
   corsmal-feat score held-out.csv --report report
   corsmal-feat score capacities.csv --labels labels.csv --target capacity
 
-Prediction files are those of `classify`, `cross-validate --predictions` and `fuse`. Accuracy, weighted
-and macro F1 with 95 % bootstrap intervals, scores of each class, confusion matrix, calibration (Brier
-score, ECE), areas under the ROC and precision-recall curves. Lines without a prediction count as wrong.
-A numeric target gives errors and the score of the CORSMAL challenge. CORSMAL submissions have their own
-rules: `corsmal-feat evaluate`.
+Prediction files come from `classify`, `cross-validate --predictions` and `fuse`. The scores are
+accuracy, weighted and macro F1 with 95 % bootstrap intervals, scores of each class, the confusion
+matrix, calibration (Brier score, ECE), and areas under the ROC and precision-recall curves. Lines
+without a prediction count as wrong. A numeric target gives errors and the score of the CORSMAL
+challenge. CORSMAL submissions have their own rules: `corsmal-feat evaluate`.
 
 Exit codes: 0 fine, 2 could not run.")]
 pub struct Args {
@@ -39,30 +39,30 @@ pub struct Args {
     #[arg(long, visible_alias = "y", value_name = "COLUMN")]
     target: Option<String>,
     /// Column of groups that the bootstrap draws together; by default group, container or recording
-    /// where there is one, else single lines are drawn.
+    /// if there is one, else single lines are drawn.
     #[arg(long, value_name = "COLUMN")]
     groups: Option<String>,
-    /// Predictions with a highest probability below P are unknown, and count as wrong.
+    /// Call predictions unknown if their highest probability is below P; they count as wrong.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = crate::args::share)]
     reject: f64,
-    /// Treat the target as a number although all its values are whole.
+    /// Treat the target as a number even if all its values are whole.
     #[arg(long)]
     numeric: bool,
-    /// Draws of the bootstrap.
+    /// Number of bootstrap resamples.
     #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     resamples: u32,
     /// Seed of the bootstrap.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Write a report into this folder: report.html with scores, confusion matrix, curves, the errors
-    /// to listen to and, where the recordings are at their paths, what they are like; tables as CSV
-    /// and LaTeX, figures as SVG and PDF.
+    /// Write a report into this folder: report.html with scores, confusion matrix, curves, errors worth
+    /// listening to and, if the recordings are still at their paths, their health; tables as CSV and
+    /// LaTeX, figures as SVG and PDF.
     #[arg(long, value_name = "DIR")]
     report: Option<PathBuf>,
-    /// Replace the report that is in this folder.
+    /// Replace the report in this folder.
     #[arg(long)]
     overwrite: bool,
-    /// Print everything as JSON, curves included.
+    /// Print everything as JSON, including the curves.
     #[arg(long)]
     json: bool,
 }

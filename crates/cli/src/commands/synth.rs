@@ -20,10 +20,10 @@ use crate::failure::Failure;
                   The same seed and size give the same bytes on any number of cores."
 )]
 pub struct Args {
-    /// Folder to write to: new, empty, or of an earlier run.
+    /// Folder to write to: new, empty, or from an earlier run.
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
-    /// Seed of everything random.
+    /// Seed for everything random.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Only the training containers in one setting (57 recordings instead of 133).
@@ -32,8 +32,8 @@ pub struct Args {
     /// All containers, scenarios, backgrounds and illuminations (1,140 recordings, about 1.4 GB).
     #[arg(long)]
     full: bool,
-    /// Views as well: colour and depth images of two frames in four views, calibrations, detections
-    /// (about 2 MB a recording).
+    /// Also make views: colour and depth images of two frames in four views, calibrations, detections
+    /// (about 2 MB per recording).
     #[arg(long)]
     vision: bool,
     #[command(flatten)]
@@ -62,7 +62,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
             format!(
                 "{}: {recordings} synthetic recordings, {seconds:.0} s, 8 channels, {SAMPLE_RATE} Hz \
                  (seed {seed})\n\
-                 They are synthetic: scores on them mean nothing about the real data set.",
+                 They are synthetic: scores on them say nothing about the real data set.",
                 out.display()
             )
         },

@@ -34,7 +34,7 @@ pub(super) fn add(study: &mut Study, sources: Vec<Source>, quiet: bool) {
             "warning: {gone} of {} recordings are no longer at their paths, such as {}{}",
             sources.len(),
             first.path.display(),
-            if gone == sources.len() { "; the report says nothing about their sound" } else { "" }
+            if gone == sources.len() { "; the report leaves out their sound" } else { "" }
         );
     }
     if gone == sources.len() {

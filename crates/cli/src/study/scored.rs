@@ -144,7 +144,7 @@ fn measures(scores: &ClassReport) -> Vec<(String, f64, String)> {
             _ => "mean squared distance of the probabilities from the truth, 0 to 2; 0 is perfect",
         };
         measures.push(("Brier score".into(), calibration.brier, brier.into()));
-        let ece = "mean gap between confidence and share of right answers; 0 is perfect";
+        let ece = "mean gap between confidence and share of right predictions; 0 is perfect";
         measures.push(("Expected calibration error".into(), calibration.ece, ece.into()));
     }
     let class_mean = "mean over the classes, each against all others; 1 is perfect";

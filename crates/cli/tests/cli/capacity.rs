@@ -144,7 +144,7 @@ fn m2_learns(dir: &Path, data: &str) {
     assert_eq!(without_time(&std::fs::read_to_string(&out).unwrap()), without_time(&learned));
     let weights = dir.join("m2.npz");
     let refusal = refused(&[&estimate[..], &["--model", text(&weights)]].concat());
-    assert!(refusal.contains("no model of M2's capacity network"), "{refusal}");
+    assert!(refusal.contains("not a model of M2's capacity network"), "{refusal}");
     let other = ["capacity", "train", "--method", "m3", "--data", data, "--out", "new.capacity"];
     assert!(refused(&[&other[..], &["--set", "epochs=2"]].concat()).contains("--method m2"));
     let seeds = ["--set", "seed=1"];

@@ -102,7 +102,7 @@ fn from_a_folder_to_a_report() {
     assert_eq!(run(&classify).status.code(), Some(1));
     assert_eq!(std::fs::read_to_string(&csv).unwrap().lines().count(), 1 + 25);
 
-    // The broken file lies in a class folder: it counts as a recording without an answer.
+    // The broken file lies in a class folder: it counts as a recording without a prediction.
     let scored = done(&["score", text(&csv), "--labels", "folders"]);
     for part in ["25 rows, 3 classes", "1 without a prediction counts as wrong", "Brier score"] {
         assert!(scored.contains(part), "{part}: {scored}");
@@ -191,7 +191,7 @@ fn predictions_and_estimates_have_reports_of_their_own() {
     let found = j.report("report");
     assert_eq!(sections(&found), ["scores", "confusion", "curves", "errors", "data", "examples"]);
     let errors = &found["sections"][3];
-    assert!(errors["text"][0].as_str().unwrap().ends_with("1 without an answer."));
+    assert!(errors["text"][0].as_str().unwrap().ends_with("1 without a prediction."));
     assert_eq!(errors["tables"][0]["rows"].as_array().unwrap().len(), 1);
     holds(&report.join("report.html"), &["was trained without these recordings"]);
 

@@ -144,7 +144,7 @@ fn what_a_network_cannot_learn_from_is_refused() {
         assert!(!model.exists());
     };
     refuse(&["--net", "m5-vggish-level", "--target", "weight"], "weight");
-    refuse(&["--net", "m5-r21d-type", "--target", "type"], "X has 128 numbers a row");
+    refuse(&["--net", "m5-r21d-type", "--target", "type"], "X has 128 numbers per row");
     refuse(&["--net", "m2-capacity", "--target", "type"], "numbers, not classes");
     let level = ["--net", "m5-vggish-level", "--target", "level"];
     refuse(&[&level[..], &["--set", "epoch=3"]].concat(), "epochs");

@@ -150,7 +150,7 @@ fn crops_train_a_network_that_classifies_pictures() {
     let train = |net: &str, crops: &Path| {
         refused(&["train", "--net", net, "--crops", text(crops), "-o", text(&none)])
     };
-    assert!(train("resnet18-level", &empty).contains("holds no PNG or JPEG picture"));
+    assert!(train("resnet18-level", &empty).contains("has no PNG or JPEG picture"));
     assert!(train("m1", &crops).contains("not pictures"));
     refuse(&["classify", "-m", text(&model), text(&crops), "--window", "1"], "for recordings");
 }
@@ -197,7 +197,7 @@ fn each_view_answers_alone_in_the_benchmark() {
     for note in [
         "view 1: no picture of a cup or wine glass in the last frame of 1 of 6 recordings",
         "view 2: no picture of a cup or wine glass in the last frame of 2 of 6 recordings",
-        "1 damaged files count as nothing seen; the first, ",
+        "1 damaged files count as if nothing was detected; the first, ",
         "c2/0003.png",
         "view 4: no picture of a cup or wine glass in the last frame of 6 of 6 recordings",
         "resnet18_level was trained for 1 epoch, its recipe has 30.",

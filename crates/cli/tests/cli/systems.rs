@@ -117,8 +117,8 @@ fn the_voted_category_chooses_the_perceptrons() {
     for note in [
         "1 training recordings have no table of detections",
         "1 training recordings show no container to the detector",
-        "1 damaged files count as nothing seen; the first, ",
-        &format!("the vote tells the category of {told} of 57 training recordings"),
+        "1 damaged files count as if nothing was detected; the first, ",
+        &format!("the vote finds the category of {told} of 57 training recordings"),
         "m3_mlp was trained for 1 epoch, its recipe has 100.",
     ] {
         assert!(report.contains(note), "{note}");

@@ -170,19 +170,23 @@ impl Plan {
     /// every frame depends on a bounded number of samples around it.
     pub fn piece_refusal(&self) -> Option<String> {
         if self.config.summary.is_some() {
-            return Some("statistics are those of the whole recording: leave out [summary]".into());
+            return Some(
+                "statistics are computed over the whole recording: leave out \
+                 [summary]"
+                    .into(),
+            );
         }
         if let Some(reason) = SignalChain::piece_refusal(&self.config.signal) {
             return Some(reason.into());
         }
         if let Some(whole) = self.whole.first() {
             let name = &self.features[whole.feature].name;
-            return Some(format!("{name} is computed of the whole recording at once"));
+            return Some(format!("{name} is computed from the whole recording at once"));
         }
         self.features.iter().find_map(|feature| {
             let name = &feature.name;
             if feature.derived.is_some() {
-                return Some(format!("{name} looks from frame to frame"));
+                return Some(format!("{name} depends on neighbouring frames"));
             }
             let refers = feature.finish.as_ref().is_some_and(|finish| finish.needs_peaks());
             refers.then(|| {

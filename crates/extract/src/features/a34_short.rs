@@ -43,13 +43,14 @@ impl WholeKernel for Frames {
 
 impl FeatureKind for A34Short {
     const KIND: &'static str = "a34_short";
-    const ABOUT: &'static str = "The 34 pyAudioAnalysis features of frames of window seconds every \
-        step seconds; deltas = true adds their differences from frame to frame, 68 in all. The \
-        recording is centred and divided by its peak first, hence held whole in memory.";
+    const ABOUT: &'static str = "The 34 pyAudioAnalysis features of frames of window seconds \
+                                 every step seconds; deltas = true adds their differences from \
+                                 frame to frame, 68 in all. The recording is first centred and \
+                                 divided by its peak, so it is held whole in memory.";
     const KEYS: &'static [Keys] = &[&[
         ("window", "Length of a frame in seconds."),
-        ("step", "Seconds from one frame to the next."),
-        ("deltas", "true: the differences from frame to frame as well, 68 values in all."),
+        ("step", "Seconds from the start of one frame to the next."),
+        ("deltas", "true: also the differences from frame to frame, 68 values in all."),
     ]];
     const PYTHON: &'static str = "corsmal.a34_short";
 

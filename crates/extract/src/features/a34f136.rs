@@ -32,12 +32,13 @@ impl WholeKernel for M5A34f136 {
 impl FeatureKind for A34f136 {
     const KIND: &'static str = "a34f136";
     const ABOUT: &'static str = "The 34 pyAudioAnalysis features of 50 ms frames and their deltas, \
-        mean and deviation over each second, mean over the seconds: one vector a channel. A \
+        mean and deviation over each second, mean over the seconds: one vector per channel. A \
         recording is divided by its peak, taken before centring as M5's pyAudioAnalysis did (peak = \
         raw) or after it as version 0.3.14 does (centred). Holds the whole recording in memory.";
     const KEYS: &'static [Keys] = &[&[(
         "peak",
-        "What a recording is divided by: raw (its peak before centring) or centred (after it).",
+        "What a recording is divided by: raw (its peak before centring) or centred (its peak \
+         after it).",
     )]];
     const PYTHON: &'static str = "corsmal.a34f136";
 

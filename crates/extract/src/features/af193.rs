@@ -29,8 +29,8 @@ impl WholeKernel for Vector {
 impl FeatureKind for Af193 {
     const KIND: &'static str = "af193";
     const ABOUT: &'static str = "193 means over frames: 40 MFCC, 12 chroma, 128 mel powers, 7 \
-        spectral contrast, 6 tonnetz of the harmonic part (defaults of librosa 0.11, or of 0.8). One vector a \
-        channel; holds the whole recording in memory.";
+        spectral contrast, 6 tonnetz of the harmonic part (defaults of librosa 0.11, or of 0.8). \
+        One vector per channel; holds the whole recording in memory.";
     const KEYS: &'static [Keys] = &[LIBROSA];
     const PYTHON: &'static str = "corsmal.af193";
 

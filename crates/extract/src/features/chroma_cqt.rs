@@ -114,16 +114,17 @@ impl ChromaCqt {
 
 impl FeatureKind for ChromaCqt {
     const KIND: &'static str = "chroma_cqt";
-    const ABOUT: &'static str = "Magnitude of a constant-Q transform in n_chroma pitch classes from C \
-        on, each frame divided by its maximum (librosa.feature.chroma_cqt), under the tuning of \
-        the channel or the one given. Holds the whole recording in memory.";
+    const ABOUT: &'static str = "Magnitude of a constant-Q transform in n_chroma pitch classes \
+                                 from C on, each frame divided by its maximum \
+                                 (librosa.feature.chroma_cqt), with the tuning of the channel or \
+                                 a given one. Holds the whole recording in memory.";
     const KEYS: &'static [Keys] = &[
         LIBROSA,
         &[
             ("hop_length", "Samples from one frame to the next."),
             ("n_chroma", "Number of pitch classes."),
             ("n_octaves", "Octaves of the constant-Q transform, from C1 on."),
-            ("bins_per_octave", "Bins of the constant-Q transform to the octave."),
+            ("bins_per_octave", "Bins of the constant-Q transform per octave."),
             (
                 "tuning",
                 "Deviation from A = 440 Hz in fractions of a bin; \"auto\": estimated from each channel.",

@@ -81,8 +81,9 @@ impl WholeKernel for Classes {
 impl FeatureKind for ChromaStft {
     const KIND: &'static str = "chroma_stft";
     const ABOUT: &'static str = "Power (power = 2) or magnitude (power = 1) in n_chroma pitch \
-        classes from C on, each frame divided by its maximum (librosa.feature.chroma_stft), under \
-        the tuning of the channel or the one given. Holds the whole recording in memory.";
+                                 classes from C on, each frame divided by its maximum \
+                                 (librosa.feature.chroma_stft), with the tuning of the channel or \
+                                 a given one. Holds the whole recording in memory.";
     const KEYS: &'static [Keys] = &[
         StftSpec::KEYS,
         &[

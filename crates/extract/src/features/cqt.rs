@@ -71,8 +71,9 @@ impl WholeKernel for Magnitudes {
 
 impl FeatureKind for Cqt {
     const KIND: &'static str = "cqt";
-    const ABOUT: &'static str = "Magnitudes of a constant-Q transform (|librosa.cqt|): n_bins bins, \
-        bins_per_octave of them to the octave, from fmin on; scale turns them into decibels. Holds \
+    const ABOUT: &'static str = "Magnitudes of a constant-Q transform (|librosa.cqt|): n_bins \
+                                 bins from fmin on, with bins_per_octave per \
+                                 octave; scale turns them into decibels. Holds \
         the whole recording in memory.";
     const KEYS: &'static [Keys] = &[
         LIBROSA,
@@ -82,11 +83,15 @@ impl FeatureKind for Cqt {
             ("hop_length", "Samples from one frame to the next."),
             ("fmin", "Frequency of the lowest bin in Hz; the default is C1."),
             ("n_bins", "Number of bins."),
-            ("bins_per_octave", "Bins to the octave."),
+            ("bins_per_octave", "Bins per octave."),
             ("tuning", "Deviation from A = 440 Hz in fractions of a bin."),
-            ("filter_scale", "Length of the filters; below 1 they are shorter, and times sharper."),
-            ("sparsity", "Part of the energy of a filter that may be left out."),
-            ("window", "Window function of the filters, by scipy's name."),
+            (
+                "filter_scale",
+                "Length of the filters; below 1 they are shorter, and resolve time \
+                 better.",
+            ),
+            ("sparsity", "Share of the energy of a filter that may be left out."),
+            ("window", "Window function of the filters, with scipy's name."),
         ],
     ];
     const PYTHON: &'static str = "cqt";

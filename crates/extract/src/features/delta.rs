@@ -97,12 +97,16 @@ impl FeatureKind for Delta {
         feature named by `of`: the order-th derivative of the polynomial of that degree fitted to \
         `width` frames.";
     const KEYS: &'static [Keys] = &[&[
-        ("of", "Name of the feature in this configuration that is derived; it comes earlier."),
-        ("width", "Frames of the fitted polynomial: odd, at least 3."),
+        (
+            "of",
+            "Name of an earlier feature in this configuration, of which the derivative is \
+             taken.",
+        ),
+        ("width", "Frames that the polynomial is fitted to: odd, at least 3."),
         ("order", "Order of the derivative, and degree of the polynomial."),
         (
             "mode",
-            "What lies beyond the ends: interp (the polynomial of the first or last frames), \
+            "Values beyond the ends: interp (the polynomial of the first or last frames), \
              nearest, mirror, constant (zeros) or wrap (holds all frames in memory).",
         ),
     ]];

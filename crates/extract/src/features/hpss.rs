@@ -95,8 +95,9 @@ impl WholeKernel for Magnitudes {
 
 impl FeatureKind for Hpss {
     const KIND: &'static str = "hpss";
-    const ABOUT: &'static str = "Magnitudes of the component (harmonic or percussive) of the sound, \
-        parted by medians over kernel_size frames and bins (librosa.decompose.hpss of |stft|): one \
+    const ABOUT: &'static str = "Magnitudes of the harmonic or percussive component of the sound, \
+                                 separated by medians over kernel_size frames and \
+                                 bins (librosa.decompose.hpss of |stft|): one \
         value per frequency bin. Holds the whole recording in memory.";
     const KEYS: &'static [Keys] = &[
         StftSpec::KEYS,

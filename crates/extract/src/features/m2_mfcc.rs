@@ -41,7 +41,7 @@ impl FeatureKind for M2Mfcc {
         over the recording, with zero frames up to 1501 (M2's input; resamples by itself). Holds \
         the whole recording in memory.";
     const KEYS: &'static [Keys] =
-        &[LIBROSA, &[("padded", "true: zero frames up to the 1501 of the network.")]];
+        &[LIBROSA, &[("padded", "true: zero frames up to the network's 1501.")]];
     const PYTHON: &'static str = "corsmal.m2_mfcc";
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {

@@ -39,7 +39,7 @@ impl FeatureKind for M3Spectrogram {
         input; resamples by itself); times count from the first of these samples. Holds the whole \
         recording in memory.";
     const KEYS: &'static [Keys] = &[&[
-        ("n_fft", "Samples of a frame that the transform sees."),
+        ("n_fft", "Samples per transform."),
         ("hop_length", "Samples from one frame to the next, at 16,600 Hz."),
     ]];
     const PYTHON: &'static str = "corsmal.m3_spectrogram";

@@ -53,7 +53,7 @@ impl FeatureKind for M6Spectrogram {
         input; resamples by itself). Holds the whole recording in memory.";
     const KEYS: &'static [Keys] = &[
         LIBROSA,
-        &[("begin", "Where the ten seconds begin: onset (the second detected one) or start.")],
+        &[("begin", "Where the ten seconds begin: onset (at the second detected onset) or start.")],
     ];
     const PYTHON: &'static str = "corsmal.m6_spectrogram";
 

@@ -162,7 +162,7 @@ impl FeatureKind for Mfcc {
         MelSpec::KEYS,
         DbSpec::KEYS,
         &[
-            ("n_mfcc", "Number of coefficients, from 0 (the level) on."),
+            ("n_mfcc", "Number of coefficients, starting with 0 (the level)."),
             ("dct_type", "Type of the cosine transform: 1, 2 or 3."),
             ("norm", "Norm of the cosine transform: ortho or none."),
             (

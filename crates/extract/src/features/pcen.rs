@@ -123,13 +123,17 @@ impl FeatureKind for Pcen {
         MelSpec::KEYS,
         &[
             ("gain", "Exponent of the gain control; 0: none, near 1: full."),
-            ("bias", "What is added before the compression."),
+            ("bias", "Value added before the compression."),
             ("power", "Exponent of the compression; 0: a logarithm."),
             ("time_constant", "Time constant of the smoothed level in seconds."),
             ("eps", "Smallest level."),
             ("b", "Coefficient of the smoothing, 0 to 1; \"auto\": that of time_constant."),
             ("max_size", "Bands of a maximum filter before the smoothing; 1: no filter."),
-            ("factor", "What the bands are multiplied by first: 2^31 by default; 1: nothing."),
+            (
+                "factor",
+                "Factor by which the bands are multiplied first: 2^31 by default; 1: no \
+                 change.",
+            ),
             (
                 "spectrum_power",
                 "Exponent of the magnitudes before the bands: 1 is magnitude, 2 power.",

@@ -34,13 +34,13 @@ impl WaveKernel for Level {
 
 impl FeatureKind for Rms {
     const KIND: &'static str = "rms";
-    const ABOUT: &'static str = "Root of the mean square of each frame (librosa.feature.rms), full \
-        scale being 1.";
+    const ABOUT: &'static str = "Root mean square of each frame (librosa.feature.rms); full scale \
+                                 is 1.";
     const KEYS: &'static [Keys] = &[
         FrameSpec::KEYS,
         &[(
             "pad_mode",
-            "What lies beyond the ends when centred: constant (zeros), edge, reflect or symmetric.",
+            "Padding beyond the ends when centred: constant (zeros), edge, reflect or symmetric.",
         )],
     ];
     const PYTHON: &'static str = "feature.rms";

@@ -42,8 +42,8 @@ impl FeatureKind for Spec9216 {
         divided by its RMS and cut or zero-padded to fixed_len samples, as an image of 96 x 96, row \
         by row from 0 Hz. Silence is refused; holds the whole recording in memory.";
     const KEYS: &'static [Keys] = &[&[
-        ("fixed_len", "Samples to cut or zero-pad to; 0: as long as the recording is."),
-        ("pad_mode", "What lies beyond the ends: constant (zeros), edge, reflect or symmetric."),
+        ("fixed_len", "Samples to cut or zero-pad to; 0: keep the length of the recording."),
+        ("pad_mode", "Padding beyond the ends: constant (zeros), edge, reflect or symmetric."),
     ]];
     const PYTHON: &'static str = "corsmal.spec9216";
 

@@ -86,15 +86,16 @@ impl SpectralContrast {
 
 impl FeatureKind for SpectralContrast {
     const KIND: &'static str = "spectral_contrast";
-    const ABOUT: &'static str = "Mean of the strongest less mean of the weakest bins in dB (linear = \
-        true: in magnitudes) of the band below fmin Hz and of n_bands octaves above \
+    const ABOUT: &'static str = "Mean of the strongest minus mean of the weakest bins in dB \
+                                 (linear = true: in magnitudes) of the band below fmin Hz and of \
+                                 n_bands octaves above it \
         (librosa.feature.spectral_contrast); the 80 dB range is that of each channel.";
     const KEYS: &'static [Keys] = &[
         StftSpec::KEYS,
         &[
             ("fmin", "Upper end of the lowest band in Hz; the others are octaves above it."),
             ("n_bands", "Octaves above the lowest band."),
-            ("quantile", "Fraction of the bins of a band that make its peak and its valley."),
+            ("quantile", "Fraction of the bins of a band that form its peak and its valley."),
             ("linear", "true: difference of magnitudes; false: of decibels."),
         ],
     ];
@@ -104,7 +105,7 @@ impl FeatureKind for SpectralContrast {
         let stft = self.stft.params()?;
         let contrast = Contrast::new(&fft_frequencies(sr, stft.n_fft)?, sr, &self.params())?;
         if contrast.lowest_is_empty() {
-            let allowed = "so high that at least two bins lie below it";
+            let allowed = "so high that at least two bins are below it";
             return Err(DspError::parameter("fmin", self.fmin, allowed));
         }
         let rows = contrast.rows();

@@ -39,7 +39,7 @@ impl FeatureKind for SpectralFlatness {
     const KEYS: &'static [Keys] = &[
         StftSpec::KEYS,
         &[
-            ("amin", "Smallest power told apart from zero."),
+            ("amin", "Smallest power distinguished from zero."),
             ("power", "Exponent of the magnitudes; 2 is power."),
         ],
     ];

@@ -92,8 +92,9 @@ impl InTime for Rising<'_> {
 
 impl FeatureKind for SpectralFlux {
     const KIND: &'static str = "spectral_flux";
-    const ABOUT: &'static str = "Rise over lag frames of each of n_mels mel bands in dB, 80 dB below \
-        the maximum of each channel, 0 where a band falls: what onset_strength averages \
+    const ABOUT: &'static str = "Rise over lag frames of each of n_mels mel bands in dB, 80 dB \
+                                 below the maximum of each channel, 0 where a band falls; \
+                                 onset_strength averages these values \
         (librosa.onset.onset_strength_multi with aggregate=False).";
     const KEYS: &'static [Keys] = RiseSpec::KEYS;
     const PYTHON: &'static str = "onset.onset_strength_multi";

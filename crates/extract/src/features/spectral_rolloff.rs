@@ -40,13 +40,14 @@ impl SlotKernel for Rolloff {
 
 impl FeatureKind for SpectralRolloff {
     const KIND: &'static str = "spectral_rolloff";
-    const ABOUT: &'static str = "Lowest bin frequency in Hz at or below which the fraction \
-        roll_percent of the magnitudes lies (librosa.feature.spectral_rolloff).";
+    const ABOUT: &'static str = "Lowest bin frequency in Hz such that the fraction roll_percent \
+                                 of the magnitudes is at or below \
+                                 it (librosa.feature.spectral_rolloff).";
     const KEYS: &'static [Keys] = &[
         StftSpec::KEYS,
         &[(
             "roll_percent",
-            "Fraction of the sum of magnitudes that lies at or below the result, between 0 and 1.",
+            "Fraction of the sum of magnitudes at or below the result, between 0 and 1.",
         )],
     ];
     const PYTHON: &'static str = "feature.spectral_rolloff";

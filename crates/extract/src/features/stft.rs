@@ -63,7 +63,7 @@ impl FeatureKind for Stft {
         StftSpec::KEYS,
         Scale::KEYS,
         DbSpec::KEYS,
-        &[("output", "What is kept of a complex bin: complex, magnitude or power.")],
+        &[("output", "Part of a complex bin to keep: complex, magnitude or power.")],
     ];
     const PYTHON: &'static str = "stft";
 

@@ -44,8 +44,9 @@ impl WholeKernel for Centroids {
 impl FeatureKind for Tonnetz {
     const KIND: &'static str = "tonnetz";
     const ABOUT: &'static str = "Six tonal centroids (fifths, minor and major thirds) of the \
-        constant-Q chroma (librosa.feature.tonnetz), with harmonic = true of the harmonic part of \
-        the sound. Holds the whole recording in memory.";
+                                 constant-Q chroma (librosa.feature.tonnetz); with harmonic = \
+                                 true, those of the harmonic part of the \
+                                 sound. Holds the whole recording in memory.";
     const KEYS: &'static [Keys] = &[
         ChromaCqt::KEYS[0],
         ChromaCqt::KEYS[1],

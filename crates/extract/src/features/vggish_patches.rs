@@ -34,7 +34,7 @@ impl WholeKernel for Patches {
 impl FeatureKind for VggishPatches {
     const KIND: &'static str = "vggish_patches";
     const ABOUT: &'static str = "64 log-mel bands at 16 kHz every 10 ms, ln(mel + 0.01) of magnitudes \
-        from 125 to 7500 Hz; every 96 frames are a patch of VGGish, a shorter rest is dropped \
+        from 125 to 7500 Hz; every 96 frames are a VGGish patch, a shorter rest is dropped \
         (resamples by itself). Holds the whole recording in memory.";
     const KEYS: &'static [Keys] = &[];
     const PYTHON: &'static str = "corsmal.m5_vggish_patches";

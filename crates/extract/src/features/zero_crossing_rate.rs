@@ -43,13 +43,13 @@ impl WaveKernel for Crossings {
 
 impl FeatureKind for ZeroCrossingRate {
     const KIND: &'static str = "zero_crossing_rate";
-    const ABOUT: &'static str = "Share of the samples of a frame at which the signal changes sign \
+    const ABOUT: &'static str = "Share of the samples of a frame where the signal changes sign \
         (librosa.feature.zero_crossing_rate), between 0 and 1.";
     const KEYS: &'static [Keys] = &[
         FrameSpec::KEYS,
         &[
             ("threshold", "Samples of at most this magnitude count as zero."),
-            ("zero_pos", "true: zero is positive; false: it has a sign of its own."),
+            ("zero_pos", "true: zero is positive; false: zero has its own sign."),
             ("pad", "true: the first sample of a frame counts as a crossing."),
         ],
     ];

@@ -220,8 +220,8 @@ pub(super) fn refusal(path: &Path) -> Option<InputError> {
 }
 
 fn compressed(path: &Path) -> InputError {
-    let reason = "is compressed as a whole, so that no member can be read where it lies; \
-                  decompress it to .tar (sound files hardly get smaller)";
+    let reason = "is compressed as a whole, so no member can be read in place; decompress it to \
+                  .tar (sound files hardly get smaller)";
     InputError::Archive { path: path.into(), reason: reason.into() }
 }
 

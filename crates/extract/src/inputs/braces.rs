@@ -56,7 +56,7 @@ fn choices(group: &str, pattern: &str) -> Result<Option<Vec<String>>, InputError
 }
 
 fn too_many(pattern: &str) -> InputError {
-    let reason = format!("stands for more than {MOST} names");
+    let reason = format!("expands to more than {MOST} names");
     InputError::Glob { pattern: pattern.into(), reason }
 }
 

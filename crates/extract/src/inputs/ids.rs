@@ -26,9 +26,9 @@ pub(super) fn refusal(id: &str) -> Option<String> {
         format!("must not be longer than {LONGEST} bytes")
     } else if id.starts_with('/') || id.split('/').any(|part| part == "..") {
         // What unpacks the archive would write elsewhere.
-        "must not be an absolute path or hold ..".to_string()
+        "must not be an absolute path or contain ..".to_string()
     } else if id.chars().any(char::is_control) {
-        "must not hold control characters".to_string()
+        "must not contain control characters".to_string()
     } else {
         return None;
     };

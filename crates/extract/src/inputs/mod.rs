@@ -77,8 +77,8 @@ impl Collected {
             several => format!("the columns {} are labels", several.join(", ")),
         };
         Some(format!(
-            "{columns}, and whole recordings are read: columns called `start` and `end`, in seconds, cut \
-             stretches"
+            "{columns}, so whole recordings are read: to read stretches, use columns called \
+             `start` and `end`, in seconds"
         ))
     }
 
@@ -282,7 +282,8 @@ impl<'a> Search<'a> {
                     }
                     Ok(_) if archive::is_archive(&entry.path) => {
                         return Err(wrong(format!(
-                            "{} is an archive of recordings: name it on its own, not in a manifest",
+                            "{} is an archive of recordings: give it as an input, not in a \
+                             manifest",
                             entry.path.display()
                         )));
                     }

@@ -180,7 +180,7 @@ pub(super) fn listed(
     let object = object(name)?;
     refuse_lists(&object)?;
     if archive::is_archive(Path::new(stored::key(&object))) {
-        let reason = "is an archive of recordings: name it on its own, not in a manifest";
+        let reason = "is an archive of recordings: give it as an input, not in a manifest";
         return Err(failed(&object, reason.into()));
     }
     if !stored::is_web(&object) && stores.insert(stored::root(&object).to_owned()) {
@@ -198,8 +198,8 @@ fn failed(object: &Object, reason: String) -> InputError {
 fn refuse_lists(object: &Object) -> Result<(), InputError> {
     let key = Path::new(stored::key(object));
     if has_extension(key, &manifest::EXTENSIONS) {
-        let reason =
-            "manifests are read from files: copy it here; what it names may stay in stores";
+        let reason = "manifests are read from files: copy it here; the recordings that it names may stay \
+             in stores";
         return Err(failed(object, reason.into()));
     }
     match archive::refusal(Path::new(&object.to_string())) {

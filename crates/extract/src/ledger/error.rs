@@ -25,8 +25,8 @@ pub enum LedgerError {
     },
     /// A file of the run is gone or another one.
     #[error(
-        "{path} was removed or replaced while the run was writing; nothing is published, start it \
-         again"
+        "{path} was removed or replaced while the run was writing; nothing was published, start \
+         the run again"
     )]
     Lost {
         /// The ledger or the partial output.
@@ -35,7 +35,7 @@ pub enum LedgerError {
     /// The ledger belongs to a different run.
     #[error(
         "{path}: the interrupted run had {field} {found}, this one has {expected}; \
-         finish it with the same settings or start anew"
+         finish it with the same settings or start again"
     )]
     Differs {
         /// The ledger.
@@ -48,7 +48,7 @@ pub enum LedgerError {
         expected: String,
     },
     /// The first line is not a ledger header.
-    #[error("{path}: not a ledger of this tool: {reason}; remove the file to start anew")]
+    #[error("{path}: not a ledger of this tool: {reason}; remove the file to start again")]
     Header {
         /// The ledger.
         path: PathBuf,

@@ -52,7 +52,7 @@ pub enum MergeError {
         actual: String,
     },
     /// A shard is no longer the file that was found first.
-    #[error("{path} was changed while it was merged; merge again once nothing writes it")]
+    #[error("{path} was changed while it was merged; merge again once nothing writes to it")]
     Changed {
         /// The shard.
         path: PathBuf,

@@ -44,7 +44,8 @@ impl Scale {
     /// What its key means.
     pub const KEYS: Keys = &[(
         "scale",
-        "Unit: linear (as computed), power_to_db (10 log10) or amplitude_to_db (20 log10); ref, amin and top_db count for decibels only.",
+        "Unit: linear (as computed), power_to_db (10 log10) or amplitude_to_db (20 log10); ref, \
+         amin and top_db apply only to decibels.",
     )];
 }
 
@@ -125,11 +126,13 @@ impl DbSpec {
         ("ref", "Value that becomes 0 dB; \"max\": the maximum of the recording."),
         (
             "amin",
-            "Smallest value told apart from zero, in the unit of the values; \"auto\": 1e-10 of a power, 1e-5 of an amplitude.",
+            "Smallest value distinguished from zero, in the unit of the values; \"auto\": 1e-10 \
+             for power, 1e-5 for amplitude.",
         ),
         (
             "top_db",
-            "Range kept below the maximum in dB; what lies lower is raised to it; \"none\": everything.",
+            "Range below the maximum in dB; lower values are raised to it; \"none\": keep all \
+             values.",
         ),
         (
             "joint",

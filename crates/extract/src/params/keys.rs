@@ -5,4 +5,4 @@ pub type Keys = &'static [(&'static str, &'static str)];
 
 /// The key of features whose definition changed with librosa.
 pub const LIBROSA: Keys =
-    &[("librosa", "The librosa whose conventions are followed: \"0.11\" or \"0.8\".")];
+    &[("librosa", "The librosa version whose conventions are followed: \"0.11\" or \"0.8\".")];

@@ -59,17 +59,18 @@ impl StftSpec {
 impl StftSpec {
     /// What its keys mean.
     pub const KEYS: Keys = &[
-        ("n_fft", "Samples of a frame that the transform sees."),
+        ("n_fft", "Samples per transform."),
         ("hop_length", "Samples from one frame to the next."),
-        ("win_length", "Samples of the window, in the middle of the frame; 0: as long as n_fft."),
-        ("window", "Window function, by scipy's name: hann, hamming, blackman, ones, ..."),
+        ("win_length", "Length of the window in samples, centred in the frame; 0: n_fft."),
+        ("window", "Window function, with scipy's name: hann, hamming, blackman, ones, ..."),
         (
             "center",
-            "true: frame t is centred on sample t * hop_length, with padding at the ends; false: it begins there.",
+            "true: frame t is centred on sample t * hop_length, with padding at the ends; false: \
+             it begins there.",
         ),
         (
             "pad_mode",
-            "What lies beyond the ends when centred: constant (zeros), edge, reflect or symmetric.",
+            "Padding beyond the ends when centred: constant (zeros), edge, reflect or symmetric.",
         ),
     ];
 }
@@ -113,7 +114,8 @@ impl FrameSpec {
         ("hop_length", "Samples from one frame to the next."),
         (
             "center",
-            "true: frame t is centred on sample t * hop_length, with padding at the ends; false: it begins there.",
+            "true: frame t is centred on sample t * hop_length, with padding at the ends; false: \
+             it begins there.",
         ),
     ];
 }

@@ -49,8 +49,8 @@ fn advice(inputs: usize, config: &Config, format: OutputFormat) -> Option<String
     let members = inputs.saturating_mul(2 * config.features.len());
     (frames && members > MANY_MEMBERS).then(|| {
         format!(
-            "the output will have {members} members, and archives of more than {MANY_MEMBERS} open \
-             slowly: --out x.parquet makes one table; --shard i/n makes several archives"
+            "the output will have {members} members, and archives of more than {MANY_MEMBERS} \
+             open slowly: --out x.parquet writes one table, --shard i/n writes several archives"
         )
     })
 }
@@ -138,7 +138,7 @@ fn check_output(
     let format = match partitioned {
         false => OutputFormat::of_name(out, options.compression)?,
         true if require_npz(out).is_ok() => {
-            let why = "is the name of an .npz; --partition-by makes a folder of Parquet files";
+            let why = "is the name of an .npz; --partition-by writes a folder of Parquet files";
             return refuse(why.into());
         }
         true => OutputFormat::Parquet,
@@ -158,7 +158,7 @@ fn check_output(
     if partitioned && out.exists() {
         // Not even --overwrite removes what is somebody else's.
         if !is_ours(out) {
-            return refuse("is there and is no partitioned output".into());
+            return refuse("exists and is not a partitioned output".into());
         }
     } else if out.exists() && !out.is_file() {
         return refuse("is not a regular file".into());

@@ -24,7 +24,7 @@ pub enum RunError {
     },
     /// An interrupted run is there.
     #[error(
-        "{path} was left by an interrupted run; --resume continues it, --overwrite starts anew"
+        "{path} was left by an interrupted run; --resume continues it, --overwrite starts again"
     )]
     Pending {
         /// Its ledger.

@@ -85,7 +85,7 @@ impl Member {
         let values = parquet::entries(&shape);
         (values > parquet::MAX_FRAMES).then(|| {
             format!(
-                "frames of {values} values, of which a row of Parquet takes {}: cut the recording \
+                "frames of {values} values; a row of Parquet takes at most {}: cut the recording \
                  in a manifest, or write .npz",
                 parquet::MAX_FRAMES
             )

@@ -125,7 +125,7 @@ impl<'a> PartitionBy<'a> {
                     // It may be another one than when the run began.
                     if !is_ours(&out) {
                         return Err(io::Error::other(
-                            "is there by now, and is no partitioned output",
+                            "exists by now and is not a partitioned output",
                         ));
                     }
                     fs::rename(&out, &replaced)?;

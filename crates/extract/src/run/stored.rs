@@ -52,7 +52,7 @@ impl StoredOutput {
         if stored::is_web(&object) {
             return Err(RunError::Store {
                 name: object.to_string(),
-                reason: "is on a web server, which takes no outputs".into(),
+                reason: "is on a web server, and outputs cannot be written there".into(),
             });
         }
         let (stem, extension) = (out.file_stem(), out.extension());

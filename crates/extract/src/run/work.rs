@@ -91,7 +91,7 @@ pub(super) fn piece(
     let resampled = planned.resample.is_some().then_some("the recording is resampled");
     let refusal = planned.plan.piece_refusal().or(resampled.map(String::from));
     if let Some(reason) = refusal {
-        let reason = format!("a piece of it has no frames of its own: {reason}");
+        let reason = format!("a piece of it has no frames: {reason}");
         return Err(Failed::new(Status::Unsupported, reason));
     }
     let mut recording = Recording::new(planned.plan.clone(), folder);

@@ -349,5 +349,5 @@ fn archives_in_manifests_are_refused_in_words() {
     let manifest = folder.path().join("m.csv");
     fs::write(&manifest, "path\ns.tar\n").unwrap();
     assert!(collect(&manifest).unwrap_err().contains("line 2: "));
-    assert!(collect(&manifest).unwrap_err().contains("name it on its own"));
+    assert!(collect(&manifest).unwrap_err().contains("give it as an input"));
 }

@@ -300,7 +300,7 @@ fn manifests_have_limits_that_are_named() {
         ("m.csv", format!("path,start\na.wav,{}\n", &long[..1 << 19]), "is not a time"),
         ("m.csv", format!("{}\na.wav\n", &long[..1 << 19]), "names no column `path`"),
         ("m.csv", format!("path,id\na.wav,__{}\n", &long[..1 << 19]), "must not begin with __"),
-        ("m.csv", "path,id\na.wav,\u{1b}[2J\n".into(), "must not hold control characters"),
+        ("m.csv", "path,id\na.wav,\u{1b}[2J\n".into(), "must not contain control characters"),
     ];
     for (name, content, message) in cases {
         let path = dir.path().join(name);
@@ -372,7 +372,7 @@ fn columns_that_look_like_times_are_told() {
     };
     let warning = told("path,start_time,class\na.wav,0.5,x\n").unwrap();
     assert!(
-        warning.starts_with("the column start_time is a label, and whole recordings are read"),
+        warning.starts_with("the column start_time is a label, so whole recordings are read"),
         "{warning}"
     );
     assert_eq!(told("path,start,onset\na.wav,0.5,1\n"), None);

@@ -91,8 +91,7 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
 }
 
 /// Why a column of a Parquet table is neither feature nor label.
-const UNREAD: &str =
-    "holds neither numbers nor text: dates, lists, decimals and bytes are not read";
+const UNREAD: &str = "has neither numbers nor text: dates, lists, decimals and bytes are not read";
 
 /// Columns of decimal numbers are features, all others label columns: so pandas and polars leave a
 /// table of ours. Where all values of a column are whole, they may make it one of integers: names

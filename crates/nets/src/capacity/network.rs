@@ -76,12 +76,17 @@ impl CapacityNetwork {
     fn from_bytes(bytes: &[u8]) -> std::result::Result<Self, String> {
         let no_model = |why: &str| {
             format!(
-                "no model of M2's capacity network ({why}); `capacity train --method m2` makes one"
+                "not a model of M2's capacity network ({why}); `capacity train --method m2` makes \
+                 one"
             )
         };
-        let header: Header = weights::entry(bytes, ENTRY, FORMAT)
-            .map_err(|e| no_model(&e))?
-            .ok_or_else(|| no_model("its recipe is missing; weights alone are for --weights"))?;
+        let header: Header =
+            weights::entry(bytes, ENTRY, FORMAT).map_err(|e| no_model(&e))?.ok_or_else(|| {
+                no_model(
+                    "its recipe is missing; use --weights for weights without a \
+                     recipe",
+                )
+            })?;
         header.recipe.check().map_err(|e| e.to_string())?;
         let network =
             loaded(&weights::from_safetensors(bytes)?).map_err(|e| no_model(&e.to_string()))?;

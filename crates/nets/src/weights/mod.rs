@@ -83,8 +83,8 @@ pub fn write(path: &Path, state: &State) -> Result<(), WeightsError> {
         }
         Some("pth" | "pt") => Err(WeightsError::Content {
             path: path.into(),
-            reason: "a pickle is read, not written: .safetensors and .npz hold the same, and \
-                     torch.load is not needed for them"
+            reason: "pickles can be read but not written: .safetensors and .npz hold the same, \
+                     and do not need torch.load"
                 .into(),
         }),
         _ => Err(WeightsError::Ending { path: path.into() }),

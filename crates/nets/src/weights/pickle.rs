@@ -338,8 +338,8 @@ fn global(module: &str, name: &str) -> Result<Global, String> {
         ("torch", "IntStorage") => Global::Storage(Kind::I32),
         _ => {
             return Err(format!(
-                "asks for {module}.{name}; only dictionaries of tensors are read, and nothing in a \
-                 pickle is run: save net.state_dict()"
+                "it needs {module}.{name}; only dictionaries of tensors are read, and nothing in \
+                 a pickle is run: save net.state_dict()"
             ));
         }
     })

@@ -37,7 +37,7 @@ pub(super) fn read(path: &Path) -> Result<State, String> {
         .file_names()
         .map(|name| name.map(|n| n.into_owned()).map_err(|e| e.to_string()))
         .collect::<Result<_, _>>()?;
-    let pickle = names.iter().find(|name| is_pickle(name)).ok_or("there is no data.pkl in it")?;
+    let pickle = names.iter().find(|name| is_pickle(name)).ok_or("it has no data.pkl")?;
     let root = pickle.strip_suffix("data.pkl").unwrap_or("").to_owned();
     if let Ok(order) = member(&mut archive, &format!("{root}byteorder"), 16)
         && order != b"little"

@@ -269,7 +269,7 @@ fn four_views_are_joined_to_recordings() {
     }
     let other = networks::named("m5_vggish_level").unwrap().build(None, 0).unwrap();
     let text = Dataset::read(&path, &other).unwrap_err().to_string();
-    assert!(text.contains("views.npz") && text.contains("512 numbers a row"), "{text}");
+    assert!(text.contains("views.npz") && text.contains("512 numbers per row"), "{text}");
 }
 
 #[test]

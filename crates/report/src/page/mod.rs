@@ -36,9 +36,9 @@ pub(crate) fn page(report: &Report) -> String {
     }
     let _ = write!(
         out,
-        "</main>\n<footer><p>Click the heading of a column to sort by it. The same tables are in \
-         <code>tables</code> as CSV and LaTeX and in <code>report.json</code>, the same figures in \
-         <code>figures</code> as SVG and PDF, beside this page.</p></footer>\n\
+        "</main>\n<footer><p>Click a column heading to sort by it. Next to this page, the same \
+         tables are in <code>tables</code> as CSV and LaTeX and in <code>report.json</code>, and \
+         the same figures in <code>figures</code> as SVG and PDF.</p></footer>\n\
          <script>{SCRIPT}</script>\n</body>\n</html>\n"
     );
     out

@@ -24,7 +24,8 @@ pub(super) fn section(study: &Study) -> Result<Option<Section>> {
     let total: f64 = seconds.iter().sum();
     let mut text = vec![format!(
         "{} recordings, {:.1} minutes in all. {} of them have notes: clipping, dead channels, \
-         offsets, channels that are copies of another, or no features, and so no place in the scores.",
+         offsets, channels that are copies of another, or no features, which leaves them out of \
+         the scores.",
         study.recordings.len(),
         total / 60.0,
         odd.len()

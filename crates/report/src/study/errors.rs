@@ -20,15 +20,15 @@ pub(super) fn section(study: &Study) -> Option<Section> {
     let confident = wrong.iter().any(|p| p.confidence.is_some());
     if confident {
         text.push_str(
-            " The most confident errors come first: they are either labelled wrongly or the most \
-             instructive to listen to.",
+            " The most confident errors come first: either their label is wrong, or they are the \
+             most instructive to listen to.",
         );
     }
     if wrong.len() > LISTED {
         text.push_str(&format!(" The first {LISTED} are shown."));
     }
     if unanswered > 0 {
-        text.push_str(&format!(" {unanswered} without an answer."));
+        text.push_str(&format!(" {unanswered} without a prediction."));
     }
     let time = |p: &Prediction| match p.stretch {
         Some((start, end)) => Cell::Number(start, format!("{start:.2} to {end:.2} s")),

@@ -71,7 +71,7 @@ impl Estimates {
             dots: true,
             joined: false,
         };
-        let caption = "Estimates on the dashed line are right.";
+        let caption = "Estimates on the dashed line are exact.";
         let row = |(name, value): &(String, String)| Row {
             source: Source::Ours,
             cells: vec![Cell::text(name), Cell::text(value)],

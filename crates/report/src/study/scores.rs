@@ -51,7 +51,7 @@ pub(super) fn section(study: &Study) -> Result<Option<Section>> {
         let plot = LinePlot {
             title: "Calibration".into(),
             x_label: "confidence of the prediction".into(),
-            y_label: "share that is right".into(),
+            y_label: "share of right predictions".into(),
             x_range: Some((0.0, 1.0)),
             y_range: Some((0.0, 1.0)),
             lines: vec![Line { name: "rows".into(), points, band: Vec::new() }],
@@ -167,7 +167,7 @@ pub(super) fn curves(study: &Study) -> Result<Option<Section>> {
         rows: study.curves.iter().map(row).collect(),
     };
     let shown = match study.curves.len() > CURVES {
-        true => format!(" The figure has the {CURVES} classes that are hardest to tell apart."),
+        true => format!(" The figure shows the {CURVES} classes that are hardest to distinguish."),
         false => String::new(),
     };
     Ok(Some(Section {
@@ -220,10 +220,10 @@ pub(super) fn importances(study: &Study) -> Result<Option<Section>> {
     };
     let section = Section {
         text: vec![
-            "The values of all features of a family are exchanged among the held-out rows, so that \
-             they say nothing about the class any more; the accuracy lost is what the models draw \
-             from that family alone. Families that say the same as another lose little, even where \
-             both together matter. Whiskers span folds and repetitions."
+            "The values of all features of a family are shuffled among the held-out rows, so they \
+             no longer say anything about the class; the accuracy lost is what the models get \
+             only from that family. Families that repeat the information of another lose little, \
+             even if the two together matter. Whiskers span folds and repetitions."
                 .into(),
         ],
         tables: vec![table],
@@ -271,7 +271,7 @@ pub(super) fn learning(study: &Study) -> Result<Option<Section>> {
     let section = Section {
         text: vec![
             "Models trained on growing parts of each fold's training rows, scored on its held-out \
-             rows. A curve that still rises at its end promises more from more recordings."
+             rows. If the curve still rises at its end, more recordings are likely to help."
                 .into(),
         ],
         tables: vec![table],

@@ -304,7 +304,7 @@ fn callable(module: &[u8], name: &[u8]) -> Result<Callable, String> {
         (b"numpy", b"ndarray") => Ok(Callable::NdArray),
         (b"numpy", b"dtype") => Ok(Callable::DType),
         _ => Err(format!(
-            "it names '{}.{}'; nothing but numpy arrays is made from a pickle",
+            "it names '{}.{}'; only numpy arrays are read from a pickle",
             String::from_utf8_lossy(&module[..module.len().min(40)]),
             String::from_utf8_lossy(&name[..name.len().min(40)])
         )),

@@ -16,7 +16,7 @@ const MAX_FRAME: u32 = 32 << 20;
 /// Said of a file whose frames are not all in its index.
 const FRAGMENTED: &str = "it is fragmented; `ffmpeg -i IN -c copy OUT.mp4` makes one that is not";
 /// Said of a file whose edit list leaves something out.
-const EDITED: &str = "`ffmpeg -i IN OUT.mp4` makes a file of what is shown";
+const EDITED: &str = "`ffmpeg -i IN OUT.mp4` makes a file with only what is shown";
 /// What comes before the boxes of a `VisualSampleEntry`.
 const VISUAL_ENTRY: usize = 78;
 
@@ -127,7 +127,7 @@ fn shown(table: &[u8], count: usize) -> Result<Vec<i64>, String> {
         }
     }
     if times.len() != count {
-        return Err(format!("its index tells when {} of {count} frames are shown", times.len()));
+        return Err(format!("its index says when {} of {count} frames are shown", times.len()));
     }
     if let Ok(later) = child(table, b"ctts") {
         let mut frame = 0;
@@ -176,7 +176,13 @@ fn track(table: &[u8], size: u64) -> Result<Track, String> {
     let descriptions = child(table, b"stsd")?.get(8..).unwrap_or_default();
     let (codec, entry) = match children(descriptions)?[..] {
         [only] => only,
-        ref all => return Err(format!("{} descriptions of its video; one is read", all.len())),
+        ref all => {
+            return Err(format!(
+                "{} descriptions of its video, but only one can be \
+                 read",
+                all.len()
+            ));
+        }
     };
     let setup = match codec == *b"avc1" || codec == *b"avc3" {
         true => Some(child(entry.get(VISUAL_ENTRY..).unwrap_or_default(), b"avcC")?.to_vec()),

@@ -48,8 +48,8 @@ pub(super) fn methods() -> Section {
     Section {
         text: vec![
             "The paper compares six submissions to the CORSMAL Challenge with its own baselines. \
-             Its short names stand for these teams; what each method does is summarised from the \
-             paper and, where it was published, from its code."
+             Its short names denote these teams; what each method does is summarised from the \
+             paper and, if it was published, from its code."
                 .into(),
         ],
         terms: citation::methods(),
@@ -79,8 +79,8 @@ pub(super) fn notes<'a>(
              80.84, and the combined filling mass of M3 (53.47) is not the mean of its public and \
              private figures (51.97). Figures on this page are those of the tables."
                 .into(),
-            "The near-random figures of the paper's PCA baselines go with principal components \
-             fitted anew on each test part, which the published protocol repeats in this run."
+            "The near-random scores of the paper's PCA baselines come with principal components \
+             fitted separately on each test part, which the published protocol repeats in this run."
                 .into(),
         ]
         .into_iter()

@@ -54,8 +54,8 @@ pub(super) fn section(rows: &Rows, methods: &[Method]) -> Result<Option<Section>
     groups.sort_by_key(|group| group.title == "Random");
     Ok(Some(Section {
         text: vec![
-            "Positive where a capacity is overestimated. Boxes hold the middle half of the \
-             recordings, whiskers the farthest values within 1.5 times the box's length, circles \
+            "Positive values are overestimates. Boxes hold the middle half of the recordings, \
+             whiskers reach the farthest values within 1.5 times the box's length, circles are \
              those beyond. Recordings without an estimate are left out."
                 .into(),
         ],

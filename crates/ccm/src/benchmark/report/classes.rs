@@ -31,9 +31,9 @@ pub(super) fn section(rows: &Rows, methods: &[Method], seed: u64) -> Result<Opti
     });
     let Some((best, best_part, _)) = scored.first() else { return Ok(None) };
     let text = format!(
-        "Held-out training containers, unless a heading says otherwise; {} is the best at the joint \
-         class ({best_part}). A cell's shade is its share of the true class. The folder figures has these \
-         pictures for every baseline, of both protocols, and for every system.",
+        "Held-out training containers, unless a heading says otherwise; {} is best at the joint \
+         class ({best_part}). A cell's shade is its share of the true class. The folder figures has \
+         these pictures for every baseline, under both protocols, and for every system.",
         best.name
     );
     let groups = scored.iter().map(|(method, part, scores)| {

@@ -51,9 +51,10 @@ pub(super) fn section(rows: &Rows, outcomes: &[BaselineResult], seed: u64) -> Re
     });
     Ok(Section {
         text: vec![
-            "The published code trains on a random 80 % of the recordings, so that every container \
-             is heard in training; it scales no feature and fits the principal components anew on \
-             every part. Its own validation figure covers all recordings, four fifths of which were \
+            "The published code trains on a random 80 % of the recordings, so every container is \
+             heard in training; it scales no feature and fits the principal components separately \
+             on every \
+             part. Its own validation figure covers all recordings, four fifths of which were \
              trained on. The corrected runs standardise features, fit everything on training data \
              only and hold out whole containers in three folds."
                 .into(),

@@ -55,9 +55,9 @@ pub(super) fn section(
                 "The best method of this run on held-out training containers, the paper's result \
                  for the same method on its test containers, and the paper's best method. Weighted F1 in percent. {comparable}"
             ),
-            "Intervals hold 95 % of 1,000 bootstrap resamples. Scores on the training part resample \
-             whole containers; scores on the test parts resample recordings, because their three \
-             containers are too few, and so say nothing about other containers."
+            "Intervals hold 95 % of 1,000 bootstrap resamples. Scores on the training part \
+             resample whole containers; scores on the test parts resample recordings, because \
+             their three containers are too few, and therefore say nothing about other containers."
                 .into(),
         ],
         figures: figures.into_iter().collect::<corsmal_report::Result<_>>()?,

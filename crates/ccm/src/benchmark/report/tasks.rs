@@ -61,15 +61,15 @@ pub(super) fn section(task: Task, rows: &Rows, methods: &[Method], seed: u64) ->
         }
         Task::Mass => {
             "Mean of exp(-error) in percent, multiplied by the share of the three tasks that a \
-             method addresses. Pseudo-random estimates stand in for the others. For the paper's \
-             rows, the inputs are the tasks addressed."
+             method addresses. Pseudo-random estimates replace the others. For the paper's rows, \
+             the inputs are the tasks addressed."
         }
     };
     let mut tables = vec![Table {
         name: task.name().into(),
         caption: format!(
             "{}: the paper's results and those of this run. Training: recordings not trained \
-                 on, a random 20 % (published) or whole containers (corrected)",
+             on, a random 20 % (published) or whole containers (corrected)",
             task.title()
         ),
         columns: ["Method", "Inputs", "Protocol", "Training", "Public", "Private", "Combined"]
@@ -102,8 +102,8 @@ fn weight(rows: &Rows, methods: &[Method], seed: u64) -> Option<Table> {
     }
     let table = Table {
         name: "weight".into(),
-        caption: "Mean absolute error in newtons of the weight of container and filling, the mass \
-                  of the empty container being known; recordings with an estimated filling mass"
+        caption: "Mean absolute error in newtons of the weight of container and filling, with the \
+                  mass of the empty container known; recordings with an estimated filling mass"
             .into(),
         columns: ["Method", "Protocol", "Training", "Public", "Private", "Combined"]
             .map(String::from)

@@ -18,7 +18,7 @@ Example, M5's combination of its two frames:
   corsmal-feat capacity combine --in capacity_estimation_1_public_test.csv \\
       capacity_estimation_20_public_test.csv --out combined.csv
 
-The estimate of a recording is the mean of its estimates in the files, or the prior where no
+The estimate of a recording is the mean of its estimates in the files, or the prior if no
 file has one. An estimate equal to the prior counts as none, as in the published program.")]
 pub struct Args {
     /// Tables with the columns fileName and `capacity[mL]`.
@@ -27,7 +27,7 @@ pub struct Args {
     /// Table to write.
     #[arg(long, short, value_name = "CSV")]
     out: PathBuf,
-    /// What stands where there is no estimate, in mL; -1 for none.
+    /// Value for recordings without an estimate, in mL; -1 for none.
     #[arg(long, value_name = "ML", default_value_t = PRIOR_ML, allow_negative_numbers = true)]
     prior: f64,
     /// Replace an existing output.

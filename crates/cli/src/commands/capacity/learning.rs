@@ -15,11 +15,12 @@ use crate::failure::FAILED_FILES;
 #[command(after_help = "\
 Examples:
   corsmal-feat capacity train --method fused --data ~/CCM --out fused.capacity
-  corsmal-feat capacity train --method m2 --data ~/CCM --set epochs=50 --checkpoints kept --out m2.safetensors
+  corsmal-feat capacity train --method m2 --data ~/CCM --set epochs=50 --checkpoints kept \\
+      --out m2.safetensors
 
-m2 trains its network (a build with the feature `nets`) by the published recipe: 500 epochs of Adam on a
-random 85 % of the regions; the score after each epoch is that of the other 15 %, of the same containers.
-A recording with damaged files is left out and named.
+m2 trains its network (in a build with the feature `nets`) with the published recipe: 500 epochs of
+Adam on a random 85 % of the regions; the score after each epoch is that of the other 15 %, of the
+same containers. A recording with damaged files is left out and named.
 
 Exit codes: 0 all fine, 1 some recordings have damaged files, 2 could not run, 130 interrupted.")]
 pub struct Args {
@@ -31,7 +32,7 @@ pub struct Args {
     /// A value of m2's recipe, such as epochs=50; `corsmal-feat nets m2-capacity` lists them.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub(super) parameters: Vec<String>,
-    /// Folder that keeps m2's training after each epoch; the next run continues from it.
+    /// Folder in which to save m2's training after each epoch; the next run continues from it.
     #[arg(long, value_name = "FOLDER")]
     pub(super) checkpoints: Option<PathBuf>,
     /// Model to write.
@@ -47,16 +48,16 @@ pub struct Args {
 /// Methods that learn.
 #[derive(Clone, Copy, ValueEnum)]
 pub(super) enum Learning {
-    /// A network on the nearest large thing in the third view's depth.
+    /// A network on the nearest large object in the third view's depth.
     M2,
     /// Gaussian processes on the sizes of detected regions.
     M3,
-    /// The same, and bias and spread of all methods.
+    /// M3's processes, and bias and spread of all methods.
     Fused,
 }
 
 /// Said of a model that learned from synthetic recordings.
-pub(super) const SYNTHETIC: &str = "SYNTHETIC data: scores mean nothing about real recordings";
+pub(super) const SYNTHETIC: &str = "SYNTHETIC data: scores say nothing about real recordings";
 
 /// Names the recordings that taught nothing; the exit code.
 pub(super) fn ended(failed: &[(RowKey, String)], recordings: usize) -> ExitCode {
@@ -66,6 +67,10 @@ pub(super) fn ended(failed: &[(RowKey, String)], recordings: usize) -> ExitCode 
     for (key, reason) in failed {
         eprintln!("{key}: {reason}");
     }
-    eprintln!("{} of {recordings} recordings have damaged files and taught nothing", failed.len());
+    eprintln!(
+        "{} of {recordings} recordings have damaged files and were not used for \
+         training",
+        failed.len()
+    );
     ExitCode::from(FAILED_FILES)
 }

@@ -36,8 +36,8 @@ Examples:
   corsmal-feat fuse --joint joint.csv --capacity capacity.csv --out submission.csv
 
 The output has one row per recording: estimate in mL (-1: none), uncertainty, sizes, frames
-used, status (ok, prior, none, failed) and the reason where there is no estimate. `fuse
---capacity` and `benchmark --add` read it. docs/vision.md lists the files that it looks for.
+used, status (ok, prior, none, failed) and the reason if there is no estimate. `fuse
+--capacity` and `benchmark --add` read it. docs/vision.md lists the files that are looked for.
 
 Exit codes: 0 all fine, 1 some recordings have damaged files, 2 could not run, 130 interrupted."
 )]
@@ -50,9 +50,9 @@ pub struct Args {
 
 #[derive(Subcommand)]
 enum Sub {
-    /// Learn what a method needs from the training recordings of a data set.
+    /// Train a method on the training recordings of a data set.
     Train(train::Args),
-    /// One estimate from those of several frames, as M5 combines its two.
+    /// Combine the estimates of several frames into one, as M5 does with its two.
     Combine(combine::Args),
 }
 
@@ -66,16 +66,16 @@ struct Estimate {
     method: MethodName,
     #[command(flatten)]
     source: Source,
-    /// How faithfully a published method is followed.
+    /// How closely to follow a published method.
     #[arg(long, value_enum, default_value = "corrected")]
     variant: VariantName,
-    /// How m4 drops outliers; by default as --variant says.
+    /// How m4 drops outliers; by default as in --variant.
     #[arg(long, value_enum)]
     outliers: Option<OutliersName>,
-    /// What `capacity train` learned, for m2, m3 and fused.
+    /// Model of `capacity train`, for m2, m3 and fused.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Published weights of its network, for m2: .pth, .npz or .safetensors under PyTorch's names.
+    /// Published weights of the network of m2: .pth, .npz or .safetensors with PyTorch's names.
     #[arg(long, value_name = "FILE", conflicts_with = "model")]
     weights: Option<PathBuf>,
     /// Table to write.
@@ -90,7 +90,7 @@ struct Estimate {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum MethodName {
-    /// A network on the nearest large thing in the third view's depth; needs --model or --weights.
+    /// A network on the nearest large object in the third view's depth; needs --model or --weights.
     M2,
     /// Gaussian processes on the sizes of detected regions in four views.
     M3,

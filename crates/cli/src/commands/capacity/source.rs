@@ -16,7 +16,7 @@ pub(super) struct Source {
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
     /// Folder of tables of detections (SEQUENCE.csv or .json, by container or not); by default
-    /// `detections/` beside each recording's audio folder.
+    /// `detections/` next to each recording's audio folder.
     #[arg(long, value_name = "DIR")]
     detections: Option<PathBuf>,
     /// Seed of votes, isolation forests and the training of m2's network.
@@ -28,7 +28,7 @@ pub(super) struct Source {
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum VariantName {
-    /// As the published program computes, its quirks included.
+    /// As the published program computes it, including its quirks.
     Published,
     /// Without its defects.
     Corrected,

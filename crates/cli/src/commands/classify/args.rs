@@ -30,15 +30,15 @@ Examples:
 One line per recording: id, path, status, label columns of a manifest (the one that the model
 predicts is called true), predicted, and p_<label> for each class. Recordings that could not be
 read, or differ in sample rate or channels from those that the model was trained on, have a
-status other than ok and no prediction. With --window one line per window, with its start and
-end in seconds, written as soon as the window is complete; memory does not grow with the stream.
+status other than ok and no prediction. With --window there is one line per window, with its start
+and end in seconds, written as soon as the window is complete; memory does not grow with the stream.
 
-A network of `train --net` that takes windows, such as m4-type, has a line for each of them, or one
-decision with --vote; one trained on whole recordings does best without --window.
+A network of `train --net` that takes windows, such as m4-type, gives one line per window, or one
+decision with --vote; a network trained on whole recordings works best without --window.
 
 Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 interrupted.")]
 pub struct Args {
-    /// Model file of `corsmal-feat train`, or one of `corsmal-feat benchmark`.
+    /// Model file from `corsmal-feat train` or `corsmal-feat benchmark`.
     #[arg(long, short, value_name = "FILE")]
     pub(super) model: PathBuf,
     /// Recordings: files, folders, globs, manifests, or - for one WAV stream on standard input. For a
@@ -61,21 +61,21 @@ pub struct Args {
     /// trained on.
     #[arg(long)]
     pub(super) any_rate: bool,
-    /// Predictions with a highest probability below P are unknown.
+    /// Call predictions unknown if their highest probability is below P.
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = crate::args::share)]
     pub(super) reject: f64,
     /// Predict windows of this many seconds instead of whole recordings.
     #[arg(long, value_name = "SECONDS")]
     pub(super) window: Option<f64>,
-    /// Seconds from one window to the next; default half a window.
+    /// Seconds from the start of one window to the start of the next; half a window by default.
     #[arg(long, value_name = "SECONDS", requires = "window")]
     pub(super) hop: Option<f64>,
     #[command(flatten)]
     pub(super) vote: VoteArgs,
-    /// File of predictions; - is standard output.
+    /// Prediction file to write; - is standard output.
     #[arg(long, short, value_name = "FILE", default_value = "-")]
     pub(super) out: PathBuf,
-    /// Form of the predictions.
+    /// Format of the predictions.
     #[arg(long, value_enum, default_value = "csv")]
     pub(super) format: Format,
     /// The same as --format jsonl: one JSON object per line.
@@ -94,7 +94,7 @@ pub struct Args {
 /// How lines are written.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub(super) enum Format {
-    /// A header, then a line each.
+    /// A header, then one line per prediction.
     Csv,
     /// One JSON object per line.
     #[value(alias = "json")]

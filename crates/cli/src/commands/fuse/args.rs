@@ -140,23 +140,23 @@ pub(super) struct SubmissionArgs {
     /// Official format of the submission; 2022 has class probabilities.
     #[arg(long, value_enum, default_value = "2020")]
     pub(super) format: Format,
-    /// Decide type and level together: the level is empty exactly where the type is none.
+    /// Decide type and level together: the level is empty if and only if the type is none.
     #[arg(long)]
     pub(super) feasible: bool,
     /// With --feasible: food boxes are never filled with water.
     #[arg(long, requires = "feasible")]
     pub(super) dry_boxes: bool,
     /// Capacity estimates: a table of `capacity`, whose sizes and times go into the format of 2022, or
-    /// any with fileName (id10_0000.png) and `capacity[mL]`.
+    /// any table with fileName (id10_0000.png) and `capacity[mL]`.
     #[arg(long, value_name = "CSV")]
     pub(super) capacity: Option<PathBuf>,
-    /// Write the median mass of the training containers, 15 g, as every container's (2022 only).
+    /// Write the median mass of the training containers, 15 g, for every container (2022 only).
     #[arg(long)]
     pub(super) mass_prior: bool,
     /// Official annotations, to name recordings by id (2022) or container and sequence (2020).
     #[arg(long, value_name = "CSV")]
     pub(super) annotations: Option<PathBuf>,
-    /// Refuse a submission unless it has exactly the recordings of this part; write them in the
+    /// Refuse a submission unless it has exactly the recordings of this part, and write them in the
     /// official order.
     #[arg(long, value_enum)]
     pub(super) part: Option<Part>,

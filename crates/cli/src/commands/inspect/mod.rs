@@ -37,15 +37,15 @@ use picture::{Picture, PictureArgs};
     corsmal-feat inspect feats.npz --picture feats.png --recording dog_01\n  \
     corsmal-feat inspect my.model\n  \
     corsmal-feat inspect level.safetensors\n\n\
-    Of a recording: format and health. Of folders and several recordings: a line for each. Of an output\n\
-    of `extract`: contents, configuration, outcomes; of any other .npz: its members. Of a model, network,\n\
-    checkpoint or capacity model: what it was trained on. Of predictions (CSV, JSON lines): how many of each\n\
-    class. Of submissions, capacities, detections, calibrations, depth images, masks, configurations and\n\
-    ledgers: what they hold.\n\n\
+    Shows format and health of a recording; one line each for folders and several recordings;\n\
+    contents, configuration and outcomes of an output of `extract`; the members of any other .npz;\n\
+    what a model, network, checkpoint or capacity model was trained on; how many predictions (CSV,\n\
+    JSON lines) there are of each class; and what submissions, capacities, detections, calibrations,\n\
+    depth images, masks, configurations and ledgers contain.\n\n\
     Clipping: at least three successive samples at the channel's own peak. Silence: share of 20 ms\n\
     blocks below -60 dBFS. Exit code 1: some content cannot be read.")]
 pub struct Args {
-    /// Files and folders; their content decides what they are, not their names.
+    /// Files and folders, recognised by their content, not by their names.
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
     #[command(flatten)]

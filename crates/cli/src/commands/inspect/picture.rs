@@ -14,13 +14,13 @@ use crate::publish;
 #[derive(clap::Args)]
 pub struct PictureArgs {
     /// Also draw a picture, as .png, .svg or .pdf: of a recording, the waveform and spectrogram of
-    /// each channel with what is wrong with it; of a feature file, the features of a recording.
+    /// each channel and what is wrong with it; of a feature file, the features of a recording.
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
     /// Replace an existing picture.
     #[arg(long, requires = "picture")]
     overwrite: bool,
-    /// Channels to draw, such as 0,3 or 0-3; default all.
+    /// Channels to draw, such as 0,3 or 0-3; all by default.
     #[arg(long, value_name = "LIST", requires = "picture", value_parser = channels)]
     channels: Option<Channels>,
     /// Start of the stretch to draw, in seconds.
@@ -32,20 +32,20 @@ pub struct PictureArgs {
     /// Frequency axis of a spectrogram.
     #[arg(long, value_enum, default_value = "mel", requires = "picture")]
     frequency_axis: Axis,
-    /// Highest frequency of a spectrogram, in Hz; default half the sample rate.
+    /// Highest frequency of a spectrogram, in Hz; half the sample rate by default.
     #[arg(long, value_name = "HZ", requires = "picture", value_parser = hertz)]
     fmax: Option<f64>,
-    /// Draw waveforms on one scale, or each channel on its own.
+    /// Draw all waveforms on one scale, or each channel on its own.
     #[arg(long, value_enum, default_value = "shared", requires = "picture")]
     wave_scale: Scale,
     /// Pixels per inch of a PNG; the picture is about 11 inches wide.
     #[arg(long, value_name = "N", default_value_t = DEFAULT_DPI, requires = "picture",
           value_parser = clap::value_parser!(u16).range(20..=1200))]
     dpi: u16,
-    /// Heading of the picture; default the name of the file or recording.
+    /// Heading of the picture; the name of the file or recording by default.
     #[arg(long, value_name = "TEXT", requires = "picture")]
     title: Option<String>,
-    /// Of a feature file: the recording to draw, by its id; default the first.
+    /// The recording of a feature file to draw, by its id; the first by default.
     #[arg(long, value_name = "ID", requires = "picture")]
     recording: Option<String>,
 }
@@ -62,7 +62,7 @@ enum Axis {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Scale {
-    /// One scale, so that levels can be compared.
+    /// One scale for all, to compare levels.
     Shared,
     /// Each channel fills its own height.
     Channel,

@@ -101,8 +101,8 @@ fn what_cannot_be_partitioned_is_refused_and_nothing_is_removed() {
         extract(&list, &at(out), &[&["--preset", "mfcc-zcr", "--overwrite"], more].concat())
     };
     for (out, label, reason) in [
-        ("mine", "type", "is no partitioned output"),
-        ("file", "type", "is no partitioned output"),
+        ("mine", "type", "is not a partitioned output"),
+        ("file", "type", "is not a partitioned output"),
         ("x.npz", "type", "the name of an .npz"),
         ("none/x", "type", "there is no folder"),
         ("x", "kind", "the labels of the inputs are type"),

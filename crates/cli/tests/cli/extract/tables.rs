@@ -181,7 +181,7 @@ fn what_there_is_is_explained_in_words() {
     let shown = done(&["features", "mfcc"]);
     for words in [
         "[features.mfcc]\n",
-        "# Samples of the window, in the middle of the frame; 0: as long as n_fft.\nwin_length = 0\n",
+        "# Length of the window in samples, centred in the frame; 0: n_fft.\nwin_length = 0\n",
         "# Highest frequency of the bands in Hz; 0: half the sample rate.\nfmax = 0.0\n",
         "# In Python: corsmal_feat.feature.mfcc\n",
     ] {

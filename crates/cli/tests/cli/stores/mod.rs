@@ -309,7 +309,7 @@ fn manifests_name_objects_files_and_web_addresses() {
     fs::write(twins.at("tar.csv"), "path\ns3://lab/s.tar\n").unwrap();
     let run = twins.stored(twins.at("tar.csv"), "x.npz", &[]).with(2);
     assert!(
-        run.stderr.contains("line 2") && run.stderr.contains("name it on its own"),
+        run.stderr.contains("line 2") && run.stderr.contains("give it as an input"),
         "{}",
         run.stderr
     );

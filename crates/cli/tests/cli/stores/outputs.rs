@@ -80,8 +80,8 @@ fn what_is_there_stays_unless_it_may_be_replaced() {
     for (out, reason) in [
         ("s3://lab/out/", "must end in .npz or .parquet"),
         ("s3://lab/x.csv", "must end in .npz or .parquet"),
-        ("https://host/x.npz?secret", "takes no outputs"),
-        ("https://host/x.npz", "takes no outputs"),
+        ("https://host/x.npz?secret", "outputs cannot be written"),
+        ("https://host/x.npz", "outputs cannot be written"),
         ("hdfs://n/x.npz", "must begin with one of"),
         ("s3://lab//x.npz", "begins with a slash"),
     ] {

@@ -41,8 +41,8 @@ impl Pin {
 }
 
 pub(super) fn parse(_: &str) -> Result<Object, String> {
-    Err("this build cannot read object stores: one with `--features cloud` can, and so can the Python \
-         package; or mount the bucket (s3fs, gcsfuse, rclone mount), or copy the files"
+    Err("this build cannot read object stores: a build with `--features cloud` can, and so can \
+         the Python package; or mount the bucket (s3fs, gcsfuse, rclone mount), or copy the files"
         .into())
 }
 

@@ -45,7 +45,7 @@ pub(super) fn train(
     if most.saturating_mul(most).saturating_mul(size_of::<f64>()) > MAX_KERNEL_BYTES {
         return Err(failed(format!(
             "the two largest classes have {most} rows, and solver = linfa keeps all their kernel \
-             values in memory: at most {} rows; use solver = own",
+             values in memory, so it takes at most {} rows; use solver = own",
             MAX_KERNEL_BYTES.div_euclid(size_of::<f64>()).isqrt()
         )));
     }
