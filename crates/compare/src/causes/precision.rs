@@ -40,7 +40,7 @@ pub(super) fn detect(pair: &Pair, dtypes: [&str; 2], noise: f64) -> Option<Cause
     }
     (most <= noise).then(|| {
         let evidence =
-            format!("largest difference {share:.1e} of the largest value, everywhere small");
+            format!("largest difference {share:.1e} of the largest value, small everywhere");
         let cause = "rounding of single precision in another order of operations (transform, sums)";
         Cause::new(CauseKind::Rounding, cause, evidence)
     })
