@@ -104,7 +104,7 @@ fn cause(a: &[Range], b: &[Range], noise: f64) -> String {
     match sides.into_iter().find(|(x, ..)| at_amin(x)) {
         Some((.., side, _)) => format!(
             "another lower limit: {side} ends at {AMIN} dB (only amin), the other is clamped \
-             otherwise (top_db, amin)"
+             differently (top_db, amin)"
         ),
         None => "another lower limit: top_db, amin, or a small constant in the logarithm".into(),
     }
