@@ -61,20 +61,21 @@ def load(
     dtype: npt.DTypeLike = np.float32,
     res_type: str = "soxr_hq",
 ) -> tuple[Floats, float]:
-    """Reads a recording (librosa.load): WAV, FLAC, Ogg Vorbis or MP3, by what it holds.
+    """Reads a recording (librosa.load): WAV, FLAC, Ogg, MP3 and others, recognised by their
+    content.
 
     Parameters
     ----------
     path : path, or binary file
         The recording.
     sr : float, optional
-        Sample rate wanted in Hz; None keeps that of the file.
+        Sample rate to resample to in Hz; None keeps that of the file.
     mono : bool
-        Mean of the channels.
+        Whether to average the channels.
     offset, duration : float
-        The part to read in seconds; to the end without `duration`.
+        The part to read in seconds; without `duration`, to the end.
     dtype : float32 or float64
-        Of the samples, which are decoded in single precision.
+        Type of the samples, which are decoded in single precision.
     res_type : str
         See `resample`.
 
@@ -129,17 +130,17 @@ def stream(
     path : path, or binary file
         The recording.
     block_length : int
-        Frames of a block.
+        Frames per block.
     frame_length, hop_length : int
-        Samples of a frame, and between frames, at most as many.
+        Samples per frame, and samples from one frame to the next (at most `frame_length`).
     mono, offset, duration, dtype
         See `load`.
     fill_value : float, optional
-        Fills up the last block, which is shorter without it.
+        Value that fills up the last block; without it, the last block is shorter.
 
     Yields
     ------
-    samples [shape=(n,) or (channels, n)], each block beginning with the end of the one before
+    samples [shape=(n,) or (channels, n)]; each block begins with the end of the previous one
 
     Examples
     --------
@@ -231,7 +232,7 @@ def get_duration(
     center: bool = True,
     path: Source | None = None,
 ) -> float:
-    """Duration of a signal, of what a spectrogram was made from, or of a recording
+    """Duration of a signal, of the signal of a spectrogram, or of a recording
     (librosa.get_duration).
 
     Parameters
@@ -241,7 +242,7 @@ def get_duration(
     S : [shape=(..., d, t)], optional
         A spectrogram, with the `n_fft`, `hop_length` and `center` of its transform.
     path : path, or binary file, optional
-        A recording; it goes before `y` and `S`.
+        A recording; it takes precedence over `y` and `S`.
 
     Returns
     -------

@@ -64,7 +64,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
         return result
 
     def fit(self, X: Any, y: Any) -> Self:
-        """Learns from `X` [shape=(rows, features)] and `y`, a label for each row."""
+        """Learns from `X` [shape=(rows, features)] and `y`, one label per row."""
         self._fit(X, y, None)
         return self
 
@@ -145,14 +145,14 @@ class Classifier(ClassifierMixin, BaseEstimator):
     def save(
         self, path: str | os.PathLike[str], *, features: Features | FeatureExtractor | None = None
     ) -> None:
-        """Writes the model file, whole or not at all.
+        """Writes the model file, completely or not at all.
 
         Parameters
         ----------
         path : path
             The file.
         features : Features or FeatureExtractor, optional
-            What made the rows that it was fitted on. The model then takes recordings:
+            What made the rows that the model was fitted on. The model then takes recordings:
             `load_model(path).predict(["a.wav"])`, `corsmal-feat classify`.
         """
         if not hasattr(self, "_model"):
@@ -161,7 +161,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Reads a model file of this very classifier (see `load_model` for any)."""
+        """Reads a model file of this classifier (`load_model` reads any)."""
         model = _core.TrainedModel.load(existing(path))
         header = json.loads(model.header())
         pipeline = header["pipeline"]
@@ -192,13 +192,13 @@ class Classifier(ClassifierMixin, BaseEstimator):
 
 
 class WeightedClassifier(Classifier):
-    """One to which some rows may count more than others."""
+    """A classifier that takes weights of rows."""
 
     def fit(self, X: Any, y: Any, sample_weight: Any = None) -> Self:
-        """Learns from `X` [shape=(rows, features)] and `y`, a label for each row.
+        """Learns from `X` [shape=(rows, features)] and `y`, one label per row.
 
-        `sample_weight` [shape=(rows,)], numbers of at least 0, says how much each row counts; one
-        of weight 0 is left out. By default all count alike.
+        `sample_weight` [shape=(rows,)], numbers of at least 0, says how much each row counts; a
+        row of weight 0 is left out. By default all rows count the same.
         """
         self._fit(X, y, sample_weight)
         return self

@@ -21,10 +21,10 @@ class Scores:
 
     Attributes
     ----------
-    values : by name the scores in percent (`s1` to `s10`, `overall`, `JFLT`, `CMD` of the toolkit;
+    values : the scores in percent, by name (`s1` to `s10`, `overall`, `JFLT`, `CMD` of the toolkit;
         `T1`, `T2`, `T3`, `mass` of the paper)
     rules : name of the rule set
-    recordings : recordings that were scored
+    recordings : number of recordings that were scored
     notes : what a reader of the scores should know
 
     Examples
@@ -67,7 +67,7 @@ def evaluate(
         Submission that replaces unaddressed tasks, in the filling mass only; by
         default the official random1.csv or random123.csv, which come with this package.
     seed : int, optional
-        Use pseudo-random estimates of this seed instead.
+        Use pseudo-random estimates with this seed instead.
     containers : iterable of int, optional
         Score only the recordings of these containers.
 

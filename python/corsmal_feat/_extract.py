@@ -49,19 +49,20 @@ def extract(
     ----------
     paths : files, folders, globs and manifests
     preset : name of a configuration that comes with the package; "logmel" by default
-    config : instead of a preset a TOML file, TOML text, or the tables as a dict
-    set : single keys to change, as {"mfcc.n_mels": 64, "signal.channels": "mean"}
-    jobs : worker threads; by default one for each core
-    out : where to keep the output, `.npz` or `.parquet`, a file or an object of a store
-        ("s3://bucket/features.npz"); by default in a temporary file, removed once it is loaded
-    work : folder in which an output for a store is made, so that `resume` can go on; by default the
-        current one
-    partition_by : label by whose values `out` is divided: a folder `out` with a file
-        `label=value/part.parquet` for each of them
+    config : instead of a preset, a TOML file, TOML text, or the tables as a dict
+    set : single keys to change, such as {"mfcc.n_mels": 64, "signal.channels": "mean"}
+    jobs : worker threads; by default one per core
+    out : where to write the output, `.npz` or `.parquet`, a file or an object in a store
+        ("s3://bucket/features.npz"); by default a temporary file, which is removed once it is
+        loaded
+    work : folder in which an output for a store is made, so that `resume` can continue it; by
+        default the current folder
+    partition_by : label by whose values to divide `out`, which is then a folder with a file
+        `label=value/part.parquet` for each value
     resume : continue an interrupted run to `out`
     overwrite : replace `out`
-    progress : True tells on the standard error stream how many recordings are done; a function is
-        called with that number and the number of all
+    progress : True shows on standard error how many recordings are done; a function is called with
+        that number and the total
 
     A bad recording raises no error: its row of `outcomes` says what is wrong. Ctrl-C stops the run,
     and `resume=True` continues it.
@@ -69,7 +70,7 @@ def extract(
     Returns
     -------
     Features
-        Of an output in a store all arrays are read back into memory; the command does not.
+        All arrays of an output in a store are read back into memory; the command does not do this.
 
     Examples
     --------
@@ -80,7 +81,7 @@ def extract(
     Raises
     ------
     ParameterError : the configuration is refused
-    RunError : no such recordings, or an output that cannot be written
+    RunError : the recordings do not exist, or the output cannot be written
     """
     chosen, overrides = configuration(preset, config, set)
     names = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
@@ -211,7 +212,7 @@ class SignalExtractor:
 
     @refuses
     def push(self, block: npt.ArrayLike) -> None:
-        """Takes the next samples, float [shape=(channels, n)], or [shape=(n,)] of one channel."""
+        """Takes the next samples, float [shape=(channels, n)], or [shape=(n,)] for one channel."""
         samples = interleaved(block)
         if samples.shape[1] != self._channels:
             raise ParameterError(

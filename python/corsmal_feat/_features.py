@@ -33,27 +33,27 @@ class Features:
     """What a run wrote (see `load_features`).
 
     `features[id]` gives the row of a summary, or the frames of a recording: an array
-    [shape=(channels, coefficients, frames)], or one for each feature by name where there are
-    several.
+    [shape=(channels, coefficients, frames)], or one array per feature, by name, if there are
+    several features.
 
     Attributes
     ----------
     ids : list of str
         Ids of the recordings that have features, in the order of the inputs.
     arrays : dict
-        By id the frames, and then by feature where there are several; empty for summaries.
+        The frames by id, and by feature if there are several; empty for summaries.
     times : dict
-        For each of them the time of every frame in seconds, arranged alike.
+        The time of every frame in seconds, arranged like `arrays`.
     summary : float32 [shape=(len(ids), len(names))], or None
         Statistics.
     names : list of str
         Name of each column of `summary`.
     labels : dict
-        By label column of the manifest the text of each of `ids`.
+        For each label column of the manifest, the text for each of `ids`.
     config, config_hash : dict, str
         The whole configuration and its hash.
     outcomes : list of dict
-        One row for each input, also for those without features: id, path, status, ...
+        One row per input, including those without features: id, path, status, ...
 
     Examples
     --------
@@ -78,7 +78,7 @@ class Features:
     @refuses
     def load(cls, path: StrPath) -> Self:
         """Reads an output of `extract` or of the command `corsmal-feat extract`; the frames of an
-        `.npz` when they are asked for.
+        `.npz` are read when you access them.
 
         Parameters
         ----------
@@ -148,10 +148,10 @@ class Features:
         return self.summary[self._rows[recording]]
 
     def to_frame(self) -> Any:
-        """The features as a pandas data frame with index (file, start, end), as opensmile's.
+        """The features as a pandas data frame with index (file, start, end), as in opensmile.
 
-        A summary has a row for each recording, frames have a row for each frame. Columns are the
-        names of a summary, or `feature[channel][coefficient]`; label columns follow.
+        A summary has one row per recording, frames have one row per frame. Columns are the names
+        of a summary, or `feature[channel][coefficient]`; label columns follow.
 
         Returns
         -------
@@ -268,14 +268,14 @@ _COLUMNS = ("id", "status", "reason", "sample_rate", "channels", "decoded_frames
 def load_features(path: StrPath) -> Features:
     """Reads an output of `extract` or of the command `corsmal-feat extract`.
 
-    The frames of a recording in an `.npz` are read when they are asked for, and then kept; the file
-    must stay as it is until then.
+    The frames of a recording in an `.npz` are read when you first access them, and then kept; the
+    file must not change until then.
 
     Parameters
     ----------
     path : path
         `.npz`, or `.parquet` (needs pyarrow; pandas and polars read such files, too); the folder
-        of a partitioned output; an object of a store, "s3://bucket/features.npz", which is copied
+        of a partitioned output; an object in a store, "s3://bucket/features.npz", which is copied
         into memory.
 
     Returns

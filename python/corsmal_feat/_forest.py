@@ -20,10 +20,10 @@ class GrownClassifier(WeightedClassifier):
     _importances: Matrix | None = None
 
     def fit(self, X: Any, y: Any, sample_weight: Any = None) -> Self:
-        """Learns from `X` [shape=(rows, features)] and `y`, a label for each row.
+        """Learns from `X` [shape=(rows, features)] and `y`, one label per row.
 
-        `sample_weight` [shape=(rows,)], numbers of at least 0, says how much each row counts; one
-        of weight 0 is left out. By default all count alike.
+        `sample_weight` [shape=(rows,)], numbers of at least 0, says how much each row counts; a
+        row of weight 0 is left out. By default all rows count the same.
         """
         super().fit(X, y, sample_weight)
         self._importances = self._model.feature_importances()
@@ -31,7 +31,7 @@ class GrownClassifier(WeightedClassifier):
 
     @property
     def feature_importances_(self) -> Matrix:
-        """How much impurity the splits on each feature took away, summing to one."""
+        """How much impurity the splits on each feature removed; the sum is one."""
         if not hasattr(self, "_model"):
             raise not_fitted(self)
         if self._importances is None:

@@ -31,7 +31,7 @@ class TrainedModel:
     classes_ : array
         Labels, in the order of `predict_proba`.
     n_features_in_ : int
-        Features of a row.
+        Number of features per row.
 
     Examples
     --------
@@ -198,7 +198,7 @@ class TrainedModel:
 
 @refuses
 def load_model(path: str | os.PathLike[str]) -> TrainedModel:
-    """Reads any model file, of `corsmal-feat train` or of `save`.
+    """Reads any model file, from `corsmal-feat train` or `save`.
 
     Parameters
     ----------

@@ -117,7 +117,7 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         return self._model.state()
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the model file, whole or not at all. It is a safetensors file."""
+        """Writes the model file, completely or not at all. It is a safetensors file."""
         if not hasattr(self, "_model"):
             raise not_fitted(self)
         self._model.save(place(path))

@@ -236,7 +236,7 @@ def blocks_to_frames(blocks: npt.ArrayLike, *, block_length: int) -> Any:
     blocks : number or [shape=(n,)]
         Block numbers.
     block_length : int
-        Frames of a block.
+        Frames per block.
 
     Returns
     -------

@@ -57,11 +57,11 @@ class TrainedNetwork:
         Parameters
         ----------
         recordings : paths
-            One for each recording.
+            One path per recording.
         any_rate : bool
             Take recordings of a sample rate or with channels that the network was not trained on.
         jobs : int, optional
-            Recordings that are read at a time; one for each core by default.
+            Recordings that are read at a time; one per core by default.
 
         Returns
         -------

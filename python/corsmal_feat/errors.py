@@ -1,4 +1,4 @@
-"""Exceptions: each is a `CorsmalFeatError`, and the built-in error of its kind as well."""
+"""Exceptions: each is a `CorsmalFeatError`, and also the built-in error of its kind."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ParameterError(CorsmalFeatError, ValueError):
 
 
 class DataTypeError(ParameterError, TypeError):
-    """Data are of a type that is not taken."""
+    """Data are of a type that is not accepted."""
 
 
 class ConfigError(ParameterError):
@@ -34,7 +34,7 @@ class ConfigError(ParameterError):
 
 
 class ModelError(ParameterError):
-    """A model file cannot be read or written, or holds another model."""
+    """A model file cannot be read or written, or has another model in it."""
 
 
 class NotFittedError(ParameterError, AttributeError):
@@ -42,18 +42,18 @@ class NotFittedError(ParameterError, AttributeError):
 
 
 class UnknownIdError(ParameterError, KeyError):
-    """No recording of that id has features."""
+    """No recording with that id has features."""
 
     # A KeyError shows the repr of its message.
     __str__ = Exception.__str__
 
 
 class RunError(CorsmalFeatError, RuntimeError):
-    """A run could not start or go on."""
+    """A run could not start or continue."""
 
 
 class DecodeError(RunError):
-    """A recording has no features where each needs them."""
+    """A recording has no features, but every recording needs them."""
 
 
 class FileError(RunError, OSError):
@@ -64,4 +64,4 @@ class FileError(RunError, OSError):
 
 
 class MissingFileError(FileError, DecodeError, FileNotFoundError):
-    """A file is not there."""
+    """A file does not exist."""

@@ -1,10 +1,10 @@
 """The networks of the paper: built, loaded, run and trained by the Rust side.
 
-`build(name)` gives a network as published, with PyTorch's parameter names and layouts in
+`build(name)` returns a network as published, with PyTorch's parameter names and layouts in
 `state_dict` and `load_state_dict`. `train` trains one on recordings, `load` reads a trained one,
-and both give a `TrainedNetwork`, which classifies recordings; `embed` gives the numbers that a
-network makes of them. What each network is and where the published code differs from the paper:
-docs/networks.md.
+and both return a `TrainedNetwork`, which classifies recordings; `embed` computes embeddings of
+recordings. docs/networks.md says what each network is and where the published code differs from
+the paper.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def names() -> dict[str, str]:
     Returns
     -------
     dict
-        By name a sentence about it.
+        A sentence about each network, by name.
 
     Examples
     --------
@@ -66,16 +66,16 @@ def names() -> dict[str, str]:
 
 @refuses
 def build(name: str, *, outputs: int | None = None, seed: int = 0) -> Network:
-    """The published network of this name; hyphen and underscore are equal.
+    """The published network with this name; a hyphen is the same as an underscore.
 
     Parameters
     ----------
     name : str
         One of `names()`.
     outputs : int, optional
-        Number of classes, where it is not the published one.
+        Number of classes, if not the published one.
     seed : int
-        Of the initial numbers.
+        Seed of the initial numbers.
 
     Returns
     -------
@@ -112,19 +112,20 @@ def train(
     name : str
         One of `names()` that takes recordings.
     recordings : paths
-        One for each recording.
+        One path per recording.
     y : array [shape=(recordings,)]
         Their labels.
     groups : array [shape=(recordings,)], optional
-        What must not be split where the recipe holds out a validation group.
+        Groups that must not be split if the recipe holds out a validation group.
     recipe : mapping, optional
-        Keys of the recipe that are not as published, such as {"epochs": 3, "seed": 1}.
+        Keys of the recipe to change from the published values, such as {"epochs": 3, "seed": 1}.
     checkpoints : path, optional
-        Folder that keeps the training after each epoch; the next training continues from there.
+        Folder in which to save the training after each epoch; the next training continues from
+        there.
     progress : function, optional
-        Called with epochs done, epochs in all, last loss, last score and seconds left.
+        Called with the epochs done, all epochs, the last loss, the last score and the seconds left.
     jobs : int, optional
-        Recordings that are read at a time; one for each core by default.
+        Recordings that are read at a time; one per core by default.
 
     Returns
     -------
@@ -167,12 +168,12 @@ def cross_validate(
     name, recordings, y, recipe, progress, jobs
         See `train`; epochs are those of each fold.
     groups : array [shape=(recordings,)], optional
-        What must not be split between training and test. Each is held out once, unless `cv` says
-        otherwise.
+        Groups that must not be split between training and test. Each is held out once, unless `cv`
+        says otherwise.
     cv : int or str, optional
         Number of folds, or a plan on the column `groups`, such as "lists=1,4,7/2,5,8".
     checkpoints : path, optional
-        Folder that keeps the training of each fold; the next validation continues from there.
+        Folder in which to save the training of each fold; the next validation continues from there.
 
     Returns
     -------
@@ -208,7 +209,7 @@ def cross_validate(
 
 @refuses
 def load(path: StrPath) -> TrainedNetwork:
-    """Reads a trained network, of `corsmal-feat train --net` or of `save`.
+    """Reads a trained network, from `corsmal-feat train --net` or `save`.
 
     Parameters
     ----------
@@ -235,9 +236,9 @@ def embed(
     *,
     jobs: int | None = None,
 ) -> dict[str, Singles]:
-    """The numbers that a network makes of recordings, as `corsmal-feat embed` does.
+    """Computes embeddings of recordings, as `corsmal-feat embed` does.
 
-    A recording that has none is left out with a warning.
+    A recording without an embedding is left out with a warning.
 
     Parameters
     ----------
@@ -248,13 +249,13 @@ def embed(
     weights : path
         Its weights, `.pth`, `.safetensors` or `.npz`.
     jobs : int, optional
-        Recordings that are read at a time; one for each core by default.
+        Recordings that are read at a time; one per core by default.
 
     Returns
     -------
     dict
-        By id the rows of a recording [shape=(rows, numbers)]; VGGish has a row of 128 numbers for
-        each .96 s.
+        The rows of each recording by id [shape=(rows, numbers)]; VGGish has a row of 128 numbers
+        for each .96 s.
 
     Examples
     --------
@@ -284,7 +285,7 @@ def read_weights(path: StrPath) -> dict[str, Singles]:
     Returns
     -------
     dict
-        By name the numbers.
+        The numbers by name.
 
     Examples
     --------
@@ -297,14 +298,14 @@ def read_weights(path: StrPath) -> dict[str, Singles]:
 
 @refuses
 def write_weights(path: StrPath, state: Mapping[str, npt.ArrayLike]) -> None:
-    """Writes weights, whole or not at all.
+    """Writes weights, completely or not at all.
 
     Parameters
     ----------
     path : path
         `.npz` or `.safetensors`.
     state : mapping
-        By name the numbers, such as a network's `state_dict()`.
+        The numbers by name, such as a network's `state_dict()`.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Extraction on a cluster of Ray, every recording accounted for.
+"""Extraction on a Ray cluster, with every recording accounted for.
 
 Needs Ray and pyarrow (`pip install 'corsmal-feat[ray]'`). The same as a command:
 `python -m corsmal_feat.ray --help`.
@@ -40,27 +40,27 @@ _SILENCE = 300.0
 
 @refuses
 def manifest(paths: StrPath | Iterable[StrPath], *, longest: float | None = None) -> Any:
-    """The recordings that names stand for, as the command `corsmal-feat extract` takes them.
+    """The recordings that the names mean, as in the command `corsmal-feat extract`.
 
     Parameters
     ----------
-    paths : folders, globs, files, manifests (`.csv`, `.jsonl`), tar shards as
+    paths : folders, globs, files, manifests (`.csv`, `.jsonl`), tar shards such as
         `shards/{000..999}.tar`; or one `.parquet` file with the columns of the table below
     longest : seconds; longer recordings of uncompressed audio (WAV, AIFF, ...) are cut into pieces,
-        each a row, whose frames put together by `corsmal_feat.arrow.join_pieces` are those of the
+        one row each. Joined by `corsmal_feat.arrow.join_pieces`, their frames are those of the
         whole recording, bit for bit. Statistics, and features that depend on the whole recording,
         have no pieces: `extract_batch` refuses them
 
     Returns
     -------
     pyarrow.Table
-        `id`, `path`, `start`, `end`, labels and, where recordings lie in tars, `archive`, `offset`,
+        `id`, `path`, `start`, `end`, labels and, if recordings are in tars, `archive`, `offset`,
         `size` and `fault`; with `longest` also `recording`, `first_sample` and `end_sample`. Web
-        addresses have their query, which may be a signature: treat the table as a secret then.
+        addresses keep their query, which may be a signature: then treat the table as a secret.
 
     Raises
     ------
-    RunError : nothing is there, or a manifest is wrong
+    RunError : there are no recordings, or a manifest is wrong
     """
     pa = pyarrow()
     names = [os.fspath(p) for p in ([paths] if isinstance(paths, str | os.PathLike) else paths)]
@@ -112,23 +112,24 @@ def extract(
     address: str | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Accounting:
-    """Extracts on a cluster into a folder of Parquet files, one row for each recording.
+    """Extracts on a cluster into a folder of Parquet files, one row per recording.
 
-    Each task has one core and computes `rows` recordings into one file, which appears when it is
-    whole. Call it again after a failure, of the driver too: finished files stay, open ones are
-    computed again. A recording that takes its process with it twice gets the status `crashed`.
+    Each task uses one core and computes `rows` recordings into one file, which appears when it is
+    complete. Call this again after a failure, even of the driver: finished files are kept, the
+    others are computed again. A recording that crashes its process twice gets the status `crashed`.
 
     Parameters
     ----------
     paths : what `manifest` takes, or a pyarrow.Table like those it returns
     out : folder that all nodes share
     preset, config, set, projection, model, summary, frames : see `corsmal_feat.arrow.extract_batch`
-    channels : as there; by default what most recordings have, for which this process reads their
-        headers
+    channels : as in `extract_batch`; by default the number that most recordings have, for which
+        this process reads their headers
     longest : seconds above which recordings are cut into pieces, see `manifest`
-    rows : recordings of a task, and of a file
-    address : of a running cluster; by default the one that Ray finds, or a new one on this machine
-    progress : called with the files done and all of them
+    rows : recordings per task, and per file
+    address : address of a running cluster; by default the one that Ray finds, or a new one on this
+        machine
+    progress : called with the number of files done and of all files
 
     Returns
     -------
@@ -136,8 +137,9 @@ def extract(
 
     Raises
     ------
-    ParameterError : configuration, model or manifest that cannot be used; two recordings of one id
-    RunError : `out` holds another job; or the ids of the files are not those of the manifest
+    ParameterError : configuration, model or manifest cannot be used; two recordings have the same
+        id
+    RunError : `out` has another job; or the ids of the files are not those of the manifest
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Capacity of a container from calibrated views: masks, depth images; M2 alone runs a network.
+"""Capacity of a container from calibrated views: masks, depth images; only M2 runs a network.
 
-Lengths are in mm and capacities in mL unless said otherwise. `docs/vision.md` says what is
-published, what is corrected and what is our reading.
+Lengths are in mm and capacities in mL unless stated otherwise. `docs/vision.md` says what is
+published, what is corrected and what is our interpretation.
 """
 
 from __future__ import annotations
@@ -102,14 +102,14 @@ def lode(
     calibrations : the two views' calibrations, or their files
     variant : {"corrected", "published"}
         "published" keeps the quirks of the published program: indices left of or above an image
-        wrap, a circle that reaches beyond it ends the estimate, gaps in the profile count as
-        height.
+        wrap, a circle that extends beyond the image ends the estimate, gaps in the profile count
+        as height.
 
     Returns
     -------
     dict
         `height` and largest `width` in mm, `capacity` in mL; `capacity_low` and `capacity_high`
-        with masks one pixel smaller and larger (None where nothing is left); `centre` [3] and
+        with masks one pixel smaller and larger (None if nothing is left); `centre` [3] and
         `profile` [circles, 2] (height above the world's origin and radius) in m.
 
     Raises
@@ -163,7 +163,7 @@ def cuboid(
     mask : path, or bool [shape=(height, width)]
         The object.
     calibration : Calibration, or path
-        Of the view.
+        Calibration of the view.
     outliers : {"corrected", "published", "kept"}
         Points are dropped by four isolation forests; the last has no effect as published.
     seed : int
@@ -206,7 +206,7 @@ def upright_box(
     Parameters
     ----------
     depths, masks, calibrations : sequences
-        One of each view, as those of `cuboid`.
+        One per view, as in `cuboid`.
 
     Returns
     -------
@@ -235,7 +235,7 @@ def upright_box(
 
 @refuses
 def region(depth: Depth) -> Region | None:
-    """M2's region of interest in a depth image; None where nothing near is large enough.
+    """M2's region of interest in a depth image; None if no near object is large enough.
 
     Parameters
     ----------
@@ -275,13 +275,13 @@ def m2_capacity(depth: Depth | Region, weights: StrPath) -> float | None:
     Returns
     -------
     float or None
-        None where nothing near is large enough. The network may give values that no container
-        holds, also below 0.
+        None if no near object is large enough. The network may give impossible values, even below
+        0.
 
     Raises
     ------
     ParameterError
-        The weights are another network's, or an image cannot be read.
+        The weights are for another network, or an image cannot be read.
 
     Examples
     --------

@@ -90,8 +90,8 @@ pub fn methods() -> Vec<Fact> {
         ),
         (
             "M6",
-            "ACC. Audio: convolutional networks on spectrograms; one tells pouring, shaking and \
-             neither apart, two others the filling of each; level and type.",
+            "ACC. Audio: convolutional networks on spectrograms; one distinguishes pouring, \
+             shaking and neither, two others predict the filling for each action; level and type.",
         ),
     ]
     .map(|(name, text)| Fact::new(name, text))

@@ -96,7 +96,7 @@ pub fn write(
     };
     if std::fs::read_dir(out).map_err(io)?.any(|entry| visible(&entry)) {
         return Err(CcmError::Request(format!(
-            "{}: holds files; choose a new or empty folder",
+            "{}: has files in it; choose a new or empty folder",
             out.display()
         )));
     }

@@ -57,7 +57,7 @@ pub enum CcmError {
     Rows {
         /// The file.
         path: PathBuf,
-        /// "missing rows", "rows that the annotations do not have", "more than one row".
+        /// "missing rows", "rows that the annotations lack", "more than one row".
         problem: &'static str,
         /// The first rows concerned and how many there are.
         rows: String,

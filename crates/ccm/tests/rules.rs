@@ -161,5 +161,5 @@ fn missing_and_extra_rows_are_refused() {
         evaluate(&with(n), &annotations, &with(4), RuleSet::Toolkit, None).unwrap_err().to_string()
     };
     assert!(run(3).contains("missing rows: id 3"));
-    assert!(run(5).contains("rows that the annotations do not have: id 4"));
+    assert!(run(5).contains("rows that the annotations lack: id 4"));
 }

@@ -133,8 +133,8 @@ pub enum ModelFileError {
     #[error(
         "the model (from version {version}) does not record the sample rates and channels that it \
          was \
-         trained on, so recordings of another format would be classified wrongly without a word: \
-         train it again, or --any-rate takes every recording as it is"
+         trained on, so recordings of another format would silently be classified wrongly: train \
+         it again, or use --any-rate to take every recording as it is"
     )]
     FormatUnknown {
         /// version of the program that wrote it
@@ -349,7 +349,7 @@ impl Model {
 /// A hash in words; features of other programs have none.
 fn configuration(hash: &str) -> String {
     match hash {
-        "" => "no configuration (of another program)".into(),
+        "" => "no configuration (from another program)".into(),
         hash => format!("configuration {hash}"),
     }
 }

@@ -113,7 +113,7 @@ fn canonical(
     for (word, value) in object {
         let key = key_of(table, word);
         if renamed.insert(key.to_string(), value.clone()).is_some() {
-            let remedy = format!("{word} is scikit-learn's name of it; keep one of them");
+            let remedy = format!("{word} is scikit-learn's name for it; keep one of them");
             return Err(ModelError::GivenTwice { owner, key: key.into(), remedy });
         }
     }

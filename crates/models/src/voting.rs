@@ -40,7 +40,7 @@ impl VotingRule {
             Self::Mean => {
                 let mean = votes.mean().ok_or(ModelError::NoProbability {
                     owner: "classifier",
-                    remedy: "a vote by mean needs them; vote by majority",
+                    remedy: "a vote by mean needs them; use a vote by majority",
                 })?;
                 Ok(Some((argmax(&mean), Some(mean))))
             }

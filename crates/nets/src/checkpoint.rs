@@ -123,8 +123,8 @@ pub(crate) fn resume(
     let text: Text = serde_json::from_str(&text).map_err(|e| content(e.to_string()))?;
     if text.key != key {
         return Err(content(
-            "the checkpoint of another training (recipe, items or rows differ); remove it, or give \
-             another file"
+            "the checkpoint is from another training run (recipe, items or rows differ); remove \
+             it, or give another file"
                 .into(),
         ));
     }

@@ -82,7 +82,8 @@ pub enum NetError {
     },
     /// A training that needs more memory than is free.
     #[error(
-        "the training needs about {:.1} GiB of memory, {:.1} GiB are free: a smaller batch or fewer items need less",
+        "the training needs about {:.1} GiB of memory, but {:.1} GiB are free: a smaller batch or \
+         fewer items need less",
         *needed as f64 / GIB, *available as f64 / GIB
     )]
     Memory {

@@ -43,7 +43,7 @@ pub enum OnnxError {
         expected: String,
     },
     /// A model that fails on an input.
-    #[error("{path}: the model fails on an input: {reason}")]
+    #[error("{path}: the model failed on an input: {reason}")]
     Run {
         /// The model.
         path: PathBuf,

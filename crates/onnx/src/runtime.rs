@@ -104,7 +104,7 @@ impl Detector {
     pub fn open(runtime: &Runtime, path: &Path) -> Result<Self> {
         let model = runtime.model(path)?;
         let shapes: [&[i64]; 2] = [&[3, -1, -1], &[1, 3, -1, -1]];
-        model.check_input(&shapes, "an image [3, height, width] of single precision")?;
+        model.check_input(&shapes, "an image [3, height, width] in single precision")?;
         let names: Vec<&str> = model.session.outputs().iter().map(|output| output.name()).collect();
         if let Some(missing) = OUTPUTS.iter().find(|name| !names.contains(name)) {
             let expected = format!("{missing} among them");
@@ -162,7 +162,7 @@ impl ClipEmbedder {
         let model = runtime.model(path)?;
         let (frames, side) = (FRAMES as i64, SIDE as i64);
         let shape = [-1, 3, frames, side, side];
-        model.check_input(&[&shape], "windows [items, 3, 16, 112, 112] of single precision")?;
+        model.check_input(&[&shape], "windows [items, 3, 16, 112, 112] in single precision")?;
         Ok(Self(model))
     }
 

@@ -111,7 +111,7 @@ pub(crate) fn fuse(
             let labels = Labels::new(labels.to_vec()).map_err(value_error)?;
             VotingRule::majority_over(label, least, &labels).map(Some).map_err(value_error)
         }
-        (Some("mean"), Some(_)) => Err(value_error("background goes with vote=\"majority\" only")),
+        (Some("mean"), Some(_)) => Err(value_error("background works only with vote=\"majority\"")),
         (Some(other), _) => {
             Err(value_error(format!("vote = {other:?}: expected \"majority\" or \"mean\"")))
         }

@@ -76,7 +76,7 @@ impl From<object_store::Error> for StoreError {
             }
             E::PermissionDenied { .. } | E::Unauthenticated { .. } => Self::Refused(words(&error)),
             E::NotSupported { .. } => Self::Unsupported(
-                "the server does not send parts of a file (HTTP ranges): download it".into(),
+                "the server does not support range requests: download the file".into(),
             ),
             _ if is_of_credentials(&error.to_string()) => Self::Setup(NO_CREDENTIALS.into()),
             _ => match words(&error) {

@@ -53,8 +53,8 @@ fn of(
         && let Some(way) = SIGN_IN.iter().find(|key| profile.contains_key(**key))
     {
         return Err(StoreError::Setup(format!(
-            "the profile {name} signs in by {way}, which this program cannot: \
-             eval \"$(aws configure export-credentials --profile {name} --format env)\" first"
+            "the profile {name} signs in by {way}, which this program cannot do: run eval \"$(aws \
+             configure export-credentials --profile {name} --format env)\" first"
         )));
     }
     Ok(profile)

@@ -87,7 +87,7 @@ impl Camera {
             ));
         }
         if !self.projection.iter().flatten().all(|p| p.abs() <= MAX_PX * MAX_DISTANCE * 4.0) {
-            return Err("'projMatrix' has numbers that no camera has".into());
+            return Err("'projMatrix' has numbers that are impossible for a camera".into());
         }
         Ok(())
     }
@@ -185,7 +185,8 @@ impl Calibration {
             Ok(Some(camera))
         };
         let rgb = camera("rgb")?.ok_or(
-            "no colour camera; expected an intrinsic and an extrinsic part with an entry 'rgb' each",
+            "no colour camera; expected an intrinsic and an extrinsic part, each with an entry \
+             'rgb'",
         )?;
         Ok(Self { rgb, ir1: camera("ir1")?, ir2: camera("ir2")? })
     }

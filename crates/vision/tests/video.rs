@@ -235,7 +235,7 @@ mod decoded {
         assert!(refuse(&[], &frames).contains("a damaged box avcC"));
         let other = muxed::mp4(b"mp4v", &setup, &frames);
         let said = pictures(&written(folder.path(), &other)).unwrap_err();
-        assert!(said.contains("its codec is mp4v; of videos H.264 (avc1) is read"), "{said}");
+        assert!(said.contains("its codec is mp4v; only H.264 (avc1) videos are read"), "{said}");
         // Noise in the frames: words or pictures, whichever, and no panic.
         let mut state = 1u32;
         for round in 0..200 {

@@ -96,7 +96,7 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn BlockSource>, AudioError>
     let free = free_size(shown).unwrap_or(0);
     if let Some(layer @ 1..=2) = Header::parse(shown).filter(|h| h.is_free).map(|h| h.layer) {
         let actual = format!("layer {layer} in free format");
-        return Err(AudioError::unsupported(at, actual, "layer 3 where the format is free"));
+        return Err(AudioError::unsupported(at, actual, "layer 3 if the format is free"));
     }
     let mut report = ReadReport::default();
     let no_frame = || AudioError::corrupt(at, "no whole frame of MPEG audio", EXPECTED);
@@ -233,7 +233,7 @@ impl MpegStream {
         if self.too_large > MOST_TOO_LARGE && self.too_large * 4 > self.frames.count {
             let rate = header.bit_rate / 1000;
             let actual = format!("free format of {rate} kbit/s");
-            return Err(AudioError::unsupported(at, actual, "as much data as 320 kbit/s hold"));
+            return Err(AudioError::unsupported(at, actual, "as much data as 320 kbit/s allow"));
         }
         self.frames.decoded(header.size);
         self.part.frames += 1;

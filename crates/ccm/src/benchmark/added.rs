@@ -126,7 +126,7 @@ impl Added {
             expected: format!("the {} {} recordings", part.targets.len(), part.subset.name()),
         };
         if !part.unknown.is_empty() && !part.targets.is_empty() {
-            return Err(fault("rows that the data set does not have", &part.unknown));
+            return Err(fault("rows that the data set lacks", &part.unknown));
         }
         if part.covered() > 0 && !part.is_whole() {
             let pairs = part.targets.iter().zip(&part.found);

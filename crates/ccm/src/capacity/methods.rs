@@ -212,7 +212,7 @@ pub(super) fn m2_region(views: &Views, variant: Variant) -> Result<Region, Probl
     let looked = frames.len() - first;
     Err(Problem::Missing(match looked {
         0 => "no depth image of view 3".into(),
-        n => format!("nothing near and large enough in the last {n} depth images of view 3"),
+        n => format!("no object is near and large enough in the last {n} depth images of view 3"),
     }))
 }
 

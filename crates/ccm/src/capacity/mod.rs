@@ -96,7 +96,10 @@ fn sound(estimate: Estimate) -> std::result::Result<Estimate, Problem> {
     if capacity.is_finite() && capacity > 0.0 {
         return Ok(estimate);
     }
-    Err(Problem::Missing(format!("an estimate of {capacity} mL, which no container holds")))
+    Err(Problem::Missing(format!(
+        "an estimate of {capacity} mL, which is impossible for a \
+         container"
+    )))
 }
 
 fn estimate(views: &Views, options: &CapacityOptions) -> std::result::Result<Estimate, Problem> {

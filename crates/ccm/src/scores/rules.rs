@@ -87,7 +87,7 @@ impl<'a> Truth<'a> {
             let Some(filling) = row.filling.filter(|_| row.capacity_ml > 0.0) else {
                 return refuse(format!(
                     "the labels of container {} are withheld, so rules '{}' cannot be applied; \
-                     choose containers whose labels are there",
+                     choose containers with published labels",
                     row.container,
                     rules.name()
                 ));

@@ -117,7 +117,7 @@ impl Submission {
         let known: HashSet<_> = keys_of(all)?.into_iter().collect();
         let extra: Vec<_> = self.keys.iter().filter(|k| !known.contains(k)).collect();
         if !extra.is_empty() {
-            return Err(self.rows_error("rows that the annotations do not have", &extra, all));
+            return Err(self.rows_error("rows that the annotations lack", &extra, all));
         }
         let rows: Vec<_> = wanted_keys.iter().map(|k| at[k]).collect();
         Ok(self.select(&rows))

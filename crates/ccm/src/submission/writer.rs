@@ -161,8 +161,8 @@ fn check<'a>(
                 Format::Y2022 => "id",
             };
             return Err(CcmError::Request(format!(
-                "{}: {} is not how this format names rows, which is by {by}; annotations tell one \
-                 from the other",
+                "{}: {} does not fit this format, which names rows by {by}; --annotations \
+                 translates between them",
                 path.display(),
                 p.key
             )));

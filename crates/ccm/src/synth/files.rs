@@ -19,7 +19,8 @@ pub const NOTICE: &str = "SYNTHETIC.txt";
 pub(super) fn write_notice(dir: &Path, size: Size, seed: u64, vision: bool) -> Result<()> {
     let text = format!(
         "SYNTHETIC RECORDINGS - NOT THE CORSMAL DATA SET\n\n\
-         Made by `corsmal-feat synth` (size {size:?}, seed {seed}) by simple physics, in the folder\n\
+         Made by `corsmal-feat synth` (size {size:?}, seed {seed}) with simple \
+         physics, in the folder\n\
          layout and naming of the CORSMAL Containers Manipulation data set, for demonstrations and\n\
          tests. No real recording is in here. Scores, features and models from these files mean\n\
          nothing about the real data set or about any method evaluated on it.\n\n\
@@ -34,7 +35,7 @@ pub(super) fn write_notice(dir: &Path, size: Size, seed: u64, vision: bool) -> R
     );
     let views = "\
         calib/, rgb/, depth/           beside audio/: four views of two frames, by ray casting\n\
-        detections/                    what a detector would say: boxes, labels, masks\n";
+        detections/                    what a detector would report: boxes, labels, masks\n";
     write(&dir.join(NOTICE), (text + if vision { views } else { "" }).as_bytes())
 }
 

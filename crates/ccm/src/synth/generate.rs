@@ -45,7 +45,7 @@ fn make(dir: &Path, size: Size, seed: u64, vision: bool) -> Result<Summary> {
         dir.exists() && std::fs::read_dir(dir).map_err(|e| CcmError::io(dir, e))?.next().is_some();
     if occupied && !dir.join(NOTICE).exists() {
         return Err(CcmError::Request(format!(
-            "{}: holds files that are not synthetic recordings; choose a new or empty folder",
+            "{}: has files that are not synthetic recordings; choose a new or empty folder",
             dir.display()
         )));
     }

@@ -101,7 +101,7 @@ fn strange(table: &LabelledTable) -> Option<String> {
     let (ours, others): (Vec<&str>, Vec<&str>) =
         table.feature_names.iter().map(String::as_str).partition(|name| name.contains(['[', '.']));
     (table.config.is_null() && !ours.is_empty() && !others.is_empty()).then(|| {
-        format!("{} of decimal numbers, taken as features: write labels as text", others.join(", "))
+        format!("{} of decimal numbers, used as features: write labels as text", others.join(", "))
     })
 }
 
@@ -171,7 +171,7 @@ impl DatasetArgs {
         }
         if let Some(&first) = constant.first() {
             eprintln!(
-                "warning: {}: {} of {} features have one value in all rows, the first is {}",
+                "warning: {}: {} of {} features have the same value in all rows, the first is {}",
                 self.path().display(),
                 constant.len(),
                 table.x.ncols(),

@@ -26,7 +26,7 @@ fn device(name: &str) -> Result<String, String> {
     match name {
         "cpu" => Ok(name.into()),
         _ => Err(
-            "no such device in this build: networks run on the cpu only, on every core (--jobs); \
+            "no such device in this build: networks run only on the cpu, on every core (--jobs); \
              docs/networks.md says why"
                 .into(),
         ),

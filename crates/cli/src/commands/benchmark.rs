@@ -119,8 +119,8 @@ fn capacity_source(text: &str) -> Result<CapacitySource, String> {
                 None => CapacitySource::Given(name, path),
             })
         }
-        _ => Err("expected m4, m5, m2=MODEL, m3=MODEL or fused=MODEL by `corsmal-feat capacity train`, or \
-                  NAME=FILE such as M2=m2.csv by `corsmal-feat capacity`"
+        _ => Err("expected m4, m5, m2=MODEL, m3=MODEL or fused=MODEL from `corsmal-feat capacity \
+                  train`, or NAME=FILE such as M2=m2.csv from `corsmal-feat capacity`"
             .into()),
     }
 }

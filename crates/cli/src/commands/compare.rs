@@ -115,7 +115,7 @@ fn text(report: &Comparison) -> String {
     lines.push(match (report.within, differing) {
         (true, _) => "\nequal within the tolerance".into(),
         (false, 0) => {
-            "\nwhat both files hold is equal within the tolerance; the rest is in one of them only"
+            "\nwhat both files have is equal within the tolerance; the rest is in only one of them"
                 .into()
         }
         (false, n) => {
@@ -206,7 +206,7 @@ fn details(feature: &FeatureReport, lines: &mut Vec<String>) {
         ));
     }
     if d.one_sided > 0 {
-        lines.push(format!("  {} values are finite, or a number, on one side only", d.one_sided));
+        lines.push(format!("  {} values are finite, or a number, on only one side", d.one_sided));
     }
     if feature.causes.is_empty() {
         lines.push("  cause unknown".into());

@@ -49,7 +49,7 @@ pub fn run(args: Args, mut command: Command) -> Result<ExitCode, Failure> {
         }
     };
     if let Some(name) = args.command {
-        return Err(Failure::new(format!("{name}: only `man` has a page for each command")));
+        return Err(Failure::new(format!("{name}: only `man` has a page per command")));
     }
     clap_complete::generate(shell, &mut command, "corsmal-feat", &mut text);
     print!("{}", String::from_utf8_lossy(&text));

@@ -1,4 +1,4 @@
-//! `corsmal-feat crops`: pictures of containers, cut out, for the networks of the vision baseline.
+//! `corsmal-feat crops`: cropped pictures of containers, for the networks of the vision baseline.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -53,17 +53,20 @@ pub fn run(
     let trained = match cfg!(feature = "nets") {
         true => {
             benchmark.extend(["--methods", "m1", "--epochs", "5"]);
-            "Sound and sight: three audio baselines and a network trained, held-out containers predicted, their \
-             capacity measured in two views (LoDE), and from both the filling mass; all scored"
+            "Sound and images: three audio baselines and a network trained, held-out containers \
+             predicted, their capacity measured in two views (LoDE), and the filling mass from \
+             both; all scored"
         }
         false => {
-            "Sound and sight: three audio baselines trained, held-out containers predicted, their capacity \
-             measured in two views (LoDE), and from both the filling mass; all scored"
+            "Sound and images: three audio baselines trained, held-out containers predicted, \
+             their capacity measured in two views (LoDE), and the filling mass from both; all \
+             scored"
         }
     };
     let steps: &[(&str, Vec<&str>)] = &[
         (
-            "Synthetic recordings, 8 channels, and what four cameras see, in the layout of the CCM data set",
+            "Synthetic recordings, 8 channels, and the views of four cameras, in the layout of \
+             the CCM data set",
             vec!["synth", "--out", &data, "--small", "--vision"],
         ),
         (
@@ -71,17 +74,18 @@ pub fn run(
             vec!["extract", "--in", &data, "--out", &logmel, "--overwrite"],
         ),
         (
-            "One row of statistics for each recording",
+            "One row of statistics per recording",
             vec!["extract", "--in", &data, "--out", &table, "--preset", "mfcc-zcr", "--overwrite"],
         ),
-        ("What that output holds", vec!["inspect", &table]),
+        ("What is in that output", vec!["inspect", &table]),
         (
             "A recording: format, health and picture",
             vec!["inspect", &recording, "--picture", &picture, "--overwrite"],
         ),
         (trained, benchmark),
         (
-            "The trained forest on recordings (it knows them: this shows the form, not the quality)",
+            "The trained forest on recordings (it was trained on them: this shows the form, not \
+             the quality)",
             vec![
                 "classify",
                 "--model",
@@ -94,7 +98,7 @@ pub fn run(
             ],
         ),
         (
-            "The forest window by window, as it would hear a live stream",
+            "The forest window by window, as on a live stream",
             vec![
                 "classify", "--model", &model, "--in", &recording, "--window", "1", "--hop", "0.5",
             ],
@@ -130,7 +134,7 @@ pub fn run(
         "\nDone in {:.1} s. Open {report}/report.html (SYNTHETIC data, it says so) and {picture};\n\
          predictions are in {predictions}. In Python:\n\
          \n  import numpy as np\n  feats = np.load(\"{logmel}\")\n  print(list(feats)[0], feats[list(feats)[0]].shape)  # [channels, mel bands, frames]\n\
-         \nThe same on your own recordings, where each class has a folder:\n\
+         \nThe same on your own recordings, with one folder per class:\n\
          \n  corsmal-feat extract YOUR_FOLDER -o table.npz --preset mfcc-zcr\n  \
          corsmal-feat cross-validate table.npz --labels folders --report report",
         started.elapsed().as_secs_f64(),

@@ -75,7 +75,8 @@ fn frames(text: &str) -> Result<Frames, String> {
 #[cfg(not(feature = "onnx"))]
 pub fn absent() -> Failure {
     Failure::new(
-        "this build runs no ONNX models; `cargo install --path crates/cli --features nets,onnx` makes one that does",
+        "this build cannot run ONNX models; `cargo install --path crates/cli --features \
+         nets,onnx` makes one that can",
     )
 }
 

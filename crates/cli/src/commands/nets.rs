@@ -141,6 +141,6 @@ pub fn run(_: Args) -> Result<ExitCode, Failure> {
 pub fn absent() -> Failure {
     Failure::new(
         "this build has no networks; `cargo install --path crates/cli --features nets` makes one \
-         that has them, and so has the Python package",
+         that has them; the Python package has them, too",
     )
 }

@@ -66,7 +66,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     }
     let output = match &config.summary {
         None => {
-            "Output: for each recording and feature an array [channels, coefficients, frames], \
+            "Output: for each recording and feature, an array [channels, coefficients, frames] \
              and the times of its frames in seconds."
                 .to_string()
         }
@@ -154,8 +154,8 @@ fn columns(config: &Arc<Config>) -> Result<String, Failure> {
     let names = plan(config, channels)?.summary_names();
     let (first, last) = (names.first(), names.last());
     Ok(format!(
-        "Of {CHANNELS} channels at {RATE} Hz, {} columns, {} to {}: feature by feature, in it statistic \
-         by statistic, in that channel by channel.",
+        "For {CHANNELS} channels at {RATE} Hz, {} columns, {} to {}: by feature, then by \
+         statistic, then by channel.",
         names.len(),
         first.map_or("", String::as_str),
         last.map_or("", String::as_str)

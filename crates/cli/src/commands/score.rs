@@ -151,9 +151,12 @@ pub fn print_overall(report: &ClassReport) {
         if report.drawn == "rows" { "rows".into() } else { format!("values of {}", report.drawn) };
     println!("bootstrap over {} {drawn}", report.units);
     if report.drawn == "rows" {
-        println!("rows of one person, place or device are not independent: name them by --groups");
+        println!(
+            "rows of one person, place or device are not independent: name them with \
+             --groups"
+        );
     } else if report.units < 10 {
-        println!("with so few of them the interval says little");
+        println!("with so few of them, the interval says little");
     }
     if let Some(calibration) = &report.calibration {
         println!(

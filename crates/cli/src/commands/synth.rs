@@ -15,7 +15,7 @@ use crate::failure::Failure;
     long_about = "Make synthetic recordings in the layout and naming of the CORSMAL Containers \
                   Manipulation data set: pouring and shaking of water, rice and pasta, heard by \
                   eight microphones, with annotation files.\n\nThey are for demonstration and \
-                  tests. Scores on them mean nothing about the real data set.",
+                  tests. Scores on them say nothing about the real data set.",
     after_help = "Example:\n  corsmal-feat synth --out synthetic --seed 7\n\n\
                   The same seed and size give the same bytes on any number of cores."
 )]

@@ -81,8 +81,8 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
     let mut choice = Value::Null;
     if candidates.len() == 1 && groups.is_some() {
         eprintln!(
-            "warning: --groups matters to --tune only, whose inner folds keep groups whole; all rows \
-             are trained on"
+            "warning: --groups affects only --tune, whose inner folds keep groups whole; all rows \
+             are used for training"
         );
     }
     if candidates.len() > 1 {

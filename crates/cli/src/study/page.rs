@@ -14,8 +14,8 @@ pub fn prepare(folder: &Path, overwrite: bool) -> Result<(), Failure> {
     if std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) {
         match folder.join("report.json").is_file() {
             true if overwrite => {}
-            true => return refuse("holds a report; --overwrite replaces it"),
-            false => return refuse("holds other files; name a new or an empty folder"),
+            true => return refuse("has a report already; --overwrite replaces it"),
+            false => return refuse("has other files; name a new or empty folder"),
         }
     }
     std::fs::create_dir_all(folder)

@@ -144,7 +144,7 @@ fn submissions_with_faults_are_refused_and_quirks_are_noted() {
     let (cut, extra) = (rows[1..].to_vec(), [&rows[..], &[row("999")]].concat());
     for (rows, message) in [
         (cut, format!("missing rows: id {}", ids[0])),
-        (extra, "rows that the annotations do not have: id 999".into()),
+        (extra, "rows that the annotations lack: id 999".into()),
         (changed(1, row(ids[0])), format!("more than one row: id {}", ids[0])),
         (
             changed(2, rows[2].replace(",100,", ",much,")),

@@ -106,7 +106,7 @@ fn submissions_are_checked_before_they_are_written() {
     assert!(lines[2].starts_with("1,-1,-1,-1,0.100000,0.200000,0.600000,0.100000,2,0.100000"));
     std::fs::remove_file(&out).unwrap();
     for (extra, message) in [
-        (&["--format", "2020"][..], "id 0 is not how this format names rows"),
+        (&["--format", "2020"][..], "id 0 does not fit this format"),
         (&["--format", "2022", "--part", "public"], "missing rows: id 2"),
         (&["--format", "2022", "--capacity", text(&kind)], "no column 'fileName'"),
         (&["--format", "2022", "--capacity", text(&parts)], "id 0 in several parts"),

@@ -135,7 +135,7 @@ fn every_kind_of_file_is_known() {
         ("[3]", "[0,16]", "tensor w: 3 numbers of type F32 are 12 bytes, not 16"),
         ("[4,4294967296,4294967296]", "[0,16]", "tensor w: shape"),
         ("[4]", "[16,0]", "tensor w: bytes 16 to 0"),
-        ("[3]", "[4,16]", "its tensors do not lie side by side"),
+        ("[3]", "[4,16]", "its tensors are not adjacent"),
     ] {
         let said = tensors(&format!(
             "{{\"w\":{{\"dtype\":\"F32\",\"shape\":{shape},\"data_offsets\":{offsets}}}}}"

@@ -162,7 +162,7 @@ fn windows_are_listened_to_where_they_are() {
     let again = [&validate[..], &["--report", text(&report), "-q"]].concat();
     let refused = run(&again);
     let message = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(message.contains("holds a report; --overwrite replaces it"), "{message}");
+    assert!(message.contains("has a report already; --overwrite replaces it"), "{message}");
     std::fs::write(report.join("tables/of-another.csv"), "a\n").unwrap();
     let moved = run(&[&again[..], &["--overwrite"]].concat());
     assert!(!report.join("tables/of-another.csv").exists());

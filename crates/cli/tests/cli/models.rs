@@ -214,7 +214,9 @@ fn what_cannot_be_learned_from_is_refused() {
     assert!(plain(&["--cv", "k=4"]).contains("class tea has 1 row, too few for 4"));
     small_table(&odd, |_, _| {});
     let found = plain(&["--groups", "group", "--cv", "k=9"]);
-    assert!(found.starts_with("warning: ") && found.contains("1 of 3 features have one value"));
+    assert!(
+        found.starts_with("warning: ") && found.contains("1 of 3 features have the same value")
+    );
     assert!(found.contains("4 groups are too few for 9 folds"), "{found}");
     let open = ["cross-validate", "--features", text(&odd), "--target", "type"];
     let by_group = done(&[&open[..], &["--classifier", "knn"]].concat());
@@ -225,7 +227,7 @@ fn what_cannot_be_learned_from_is_refused() {
     assert!(validate("mass", &[]).contains("is a decimal number"));
     small_table(&odd, |x, _| x.fill(1.0));
     let constant = plain(&["--standardize"]);
-    assert!(constant.contains("3 of 3 features have one value"), "{constant}");
+    assert!(constant.contains("3 of 3 features have the same value"), "{constant}");
     assert!(constant.contains("has the same value in all"), "{constant}");
     let train = ["train", "--features", text(&odd), "--target", "type", "--classifier", "svm"];
     refused(&[&train[..], &["--standardize", "--out", text(&out)]].concat());

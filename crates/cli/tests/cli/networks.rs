@@ -97,7 +97,7 @@ fn a_network_is_validated_trained_and_applied() {
         bytes[8 + header..].to_vec()
     };
     assert!(parameters(&std::fs::read(&model).unwrap()) == parameters(&first));
-    // From the checkpoint of a training that is over, and from nothing: the same bytes.
+    // From the checkpoint of a training run that is over, and from nothing: the same bytes.
     for again in [vec!["--checkpoints", text(&kept)], vec!["--jobs", "1"]] {
         done(&[&train[..], &["--overwrite"], &again[..]].concat());
         assert!(std::fs::read(&model).unwrap() == first, "{again:?}");
@@ -151,7 +151,7 @@ fn what_a_network_cannot_learn_from_is_refused() {
     refuse(&[&level[..], &["--set", "lr=-1"]].concat(), "above 0");
     refuse(&[&level[..], &["--set", "select=validation"]].concat(), "groups");
     refuse(&[&level[..], &["--set", "recipe=book"]].concat(), "code or paper");
-    refuse(&[&level[..], &["--device", "cuda"]].concat(), "cpu only");
+    refuse(&[&level[..], &["--device", "cuda"]].concat(), "only on the cpu");
     refuse(&[&level[..], &["--x", "OTHER"]].concat(), "no member OTHER");
     refuse(&[&level[..], &["--ids", "names"]].concat(), "no member names");
     refuse(&[&level[..], &["--seed", "1", "--set", "seed=1"]].concat(), "give one");

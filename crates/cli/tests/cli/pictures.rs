@@ -80,7 +80,7 @@ fn crops_train_a_network_that_classifies_pictures() {
     let shown: Value = serde_json::from_str(&shown).unwrap();
     assert_eq!(
         (&shown["kind"], &shown["header"]["steps"]),
-        (&"checkpoint of a training".into(), &1.into())
+        (&"checkpoint of a training run".into(), &1.into())
     );
 
     let output = run(&["classify", "-m", text(&model), text(&crops)]);

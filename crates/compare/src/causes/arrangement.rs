@@ -100,7 +100,7 @@ fn rolled(a: &Array3<f64>, b: &Array3<f64>, noise: f64) -> Option<Cause> {
                 percent(share)
             );
             let cause =
-                "the coefficients begin elsewhere and go round (pitch classes from C or from A)";
+                "the coefficients begin elsewhere and wrap around (pitch classes from C or from A)";
             Cause::new(CauseKind::Coefficients, cause, evidence)
         })
     })
@@ -248,12 +248,12 @@ fn channel_count(a: &Array3<f64>, b: &Array3<f64>, noise: f64) -> Option<Cause> 
     for (channel, values) in many.axis_iter(Axis(0)).enumerate() {
         if let Some(share) = same(values) {
             let cause =
-                format!("{one_side} holds channel {channel} of the {count} of {many_side} only");
+                format!("{one_side} has only channel {channel} of the {count} of {many_side}");
             return Some(Cause::new(CauseKind::ChannelCount, cause, percent(share)));
         }
     }
     let mean = many.mean_axis(Axis(0))?;
     let share = same(mean.view())?;
-    let cause = format!("{one_side} holds the mean over the {count} channels of {many_side}");
+    let cause = format!("{one_side} has the mean over the {count} channels of {many_side}");
     Some(Cause::new(CauseKind::ChannelCount, cause, percent(share)))
 }

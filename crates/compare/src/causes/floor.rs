@@ -46,7 +46,7 @@ pub(super) fn detect(pair: &Pair, noise: f64) -> Option<Cause> {
     let share = 100.0 * differing as f64 / pair.a.len() as f64;
     let [limits_a, limits_b] = [&a, &b].map(|ranges| describe(ranges));
     let evidence =
-        format!("the {share:.1} % that differ stand at a lower limit; a {limits_a}; b {limits_b}");
+        format!("the {share:.1} % that differ are at a lower limit; a {limits_a}; b {limits_b}");
     Some(Cause::new(CauseKind::Floor, cause(&a, &b, noise), evidence))
 }
 
@@ -92,7 +92,7 @@ fn cause(a: &[Range], b: &[Range], noise: f64) -> String {
         let (title, rest) = if separate(y, noise) {
             ("joint against separate top_db", "clamps below that of each".to_string())
         } else if at_amin(y) {
-            ("joint top_db", format!("ends at {AMIN} dB (amin alone)"))
+            ("joint top_db", format!("ends at {AMIN} dB (only amin)"))
         } else {
             ("joint top_db", "does not".to_string())
         };
@@ -103,8 +103,8 @@ fn cause(a: &[Range], b: &[Range], noise: f64) -> String {
     }
     match sides.into_iter().find(|(x, ..)| at_amin(x)) {
         Some((.., side, _)) => format!(
-            "another lower limit: {side} ends at {AMIN} dB (amin alone), the other is clamped \
-             otherwise (top_db, amin)"
+            "another lower limit: {side} ends at {AMIN} dB (only amin), the other is clamped \
+             differently (top_db, amin)"
         ),
         None => "another lower limit: top_db, amin, or a small constant in the logarithm".into(),
     }

@@ -37,8 +37,8 @@ pub(super) fn detect(pair: &Pair) -> Option<Cause> {
     let (a, b) = if htk_in_a { ("HTK's", "Slaney's") } else { ("Slaney's", "HTK's") };
     let cause = format!("a has {a} mel scale, b {b} (htk = true or false)");
     let evidence = format!(
-        "with the bands of a moved so (0 to {top} Hz fits best), the mean difference of levels falls \
-         from {before:.3} to {after:.3}"
+        "with the bands of a moved accordingly (0 to {top} Hz fits best), the mean difference of \
+         levels falls from {before:.3} to {after:.3}"
     );
     Some(Cause::new(CauseKind::MelScale, cause, evidence))
 }

@@ -130,7 +130,7 @@ fn bands(profile: &Profile, pair: &Pair) -> Option<Cause> {
                  sqrt(bands)); a reference, gain or scale of the samples",
                 offset / 128f64.sqrt()
             ),
-            None => format!("{word} 0 is something else: log energy in its place, or the DC bin"),
+            None => format!("{word} 0 is something else: log energy instead, or the DC bin"),
         };
         return Some(Cause::new(CauseKind::Bands, cause, evidence));
     } else if 2 * first >= coefficients && last + 2 >= coefficients {
@@ -142,7 +142,7 @@ fn bands(profile: &Profile, pair: &Pair) -> Option<Cause> {
     } else if 2 * touched > coefficients {
         return None;
     } else {
-        "some coefficients only: filters with other edges"
+        "only some coefficients: filters with other edges"
     };
     Some(Cause::new(CauseKind::Bands, cause, evidence))
 }
@@ -164,8 +164,8 @@ fn channels(profile: &Profile) -> Option<Cause> {
         return None;
     }
     let evidence = format!("only channels {} of {} differ", which.join(", "), touched.len());
-    let cause = "other signals in these channels, or a statistic over all channels (top_db below the \
-                 maximum of all) that shows in quiet ones";
+    let cause = "other signals in these channels, or a statistic over all channels (top_db below \
+                 the maximum of all) that affects quiet ones";
     Some(Cause::new(CauseKind::Channels, cause, evidence))
 }
 

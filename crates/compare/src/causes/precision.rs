@@ -33,14 +33,15 @@ pub(super) fn detect(pair: &Pair, dtypes: [&str; 2], noise: f64) -> Option<Cause
     let half = |dtype: &str| dtype.ends_with("f2");
     if (half(dtypes[0]) != half(dtypes[1])) && most_relative <= 1.01 * HALF {
         let evidence = format!(
-            "types {} and {}; largest relative difference {most_relative:.1e}, half a step of half precision being {HALF:.1e}",
+            "types {} and {}; largest relative difference {most_relative:.1e}; half a step of \
+             half precision is {HALF:.1e}",
             dtypes[0], dtypes[1]
         );
         return Some(Cause::new(CauseKind::Precision, "stored in half precision", evidence));
     }
     (most <= noise).then(|| {
         let evidence =
-            format!("largest difference {share:.1e} of the largest value, everywhere small");
+            format!("largest difference {share:.1e} of the largest value, small everywhere");
         let cause = "rounding of single precision in another order of operations (transform, sums)";
         Cause::new(CauseKind::Rounding, cause, evidence)
     })

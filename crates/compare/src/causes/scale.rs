@@ -162,7 +162,8 @@ fn offsets(pair: &Pair, group: Group, fit: &Fit) -> Cause {
             "mel filters are normalised otherwise (norm slaney against none), in decibels"
         }
         Group::Coefficient => {
-            "filters are normalised otherwise, in decibels, or a fixed equalisation (pre-emphasis)"
+            "filters are normalised differently, in decibels, or a fixed equalisation \
+             (pre-emphasis)"
         }
         Group::Channel => "each channel has its own reference: its maximum, or its gain",
         _ => "each frame has its own reference: its maximum, or its level",
@@ -213,7 +214,7 @@ fn coefficient_ratios(ratios: &[f64]) -> String {
     if bands_narrow(ratios) {
         return "mel filters are normalised otherwise (norm slaney against none)".into();
     }
-    "each coefficient has its own factor: filters normalised otherwise, or a fixed equalisation"
+    "each coefficient has its own factor: filters normalised differently, or a fixed equalisation"
         .into()
 }
 
@@ -263,7 +264,7 @@ fn frame_norm(pair: &Pair) -> String {
             }
         }
     }
-    "each frame has its own factor: frames are normalised otherwise".into()
+    "each frame has its own factor: frames are normalised differently".into()
 }
 
 fn extremes(values: &[f64]) -> (f64, f64) {

@@ -77,7 +77,7 @@ pub(super) fn require_work(work: f64, p: &CqtParams) -> Result<()> {
     }
     let allowed = format!(
         "larger or divisible by a higher power of two (or use fewer bins: n_bins = {} with \
-         bins_per_octave = {} takes more than {MOST_WORK} steps a sample)",
+         bins_per_octave = {} takes more than {MOST_WORK} steps per sample)",
         p.n_bins, p.bins_per_octave
     );
     Err(DspError::parameter("hop_length", p.hop_length, allowed))

@@ -152,7 +152,7 @@ macro_rules! built_in {
 
 built_in! {
     KNearest, "knn", KNearestParams => Fitted::of_neighbours, "k nearest neighbours";
-    Svm, "svm", SvmParams => Fitted::Svm, "support vector machine, one against one";
+    Svm, "svm", SvmParams => Fitted::Svm, "support vector machine, one-vs-one";
     DecisionTree, "tree", DecisionTreeParams => Fitted::of_tree, "decision tree (CART)";
     RandomForest, "rf", RandomForestParams => Fitted::RandomForest, "random forest";
     ExtraTrees, "et", ExtraTreesParams => Fitted::ExtraTrees, "extremely randomised trees";

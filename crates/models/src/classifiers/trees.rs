@@ -55,7 +55,7 @@ macro_rules! tree_parameters {
                 max_features: $crate::classifiers::MaxFeatures =
                     $crate::classifiers::MaxFeatures::Rule($rule),
                     "sqrt, log2, all, a whole number of at least 1, or a fraction up to 1.0",
-                    "features looked at in each split";
+                    "number of features considered in each split";
                 $($then)*
                 class_weight: $crate::params::ClassWeight = $crate::params::ClassWeight::Equal,
                     "null, balanced, or one positive number per class in label order",
@@ -115,7 +115,7 @@ macro_rules! forest {
                         "draw rows with replacement for each tree";
                     #[serde(skip_serializing_if = "std::ops::Not::not")]
                     oob_score: bool = false, "true or false (needs bootstrap=true)",
-                        "ask each tree about the rows that it has not seen (Python: oob_score_)";
+                        "score each tree on the rows that it has not seen (Python: oob_score_)";
                 }
                 last {}
             }

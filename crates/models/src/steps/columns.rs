@@ -9,7 +9,8 @@ use crate::params::{Parameters, parameters};
 parameters! {
     /// Parameters of the choice of features.
     ColumnsParams, "columns" {
-        keep: Vec<usize> = Vec::new(), "a list of feature numbers from 0", "features that go on, in this order";
+        keep: Vec<usize> = Vec::new(), "a list of feature numbers from 0", "features to keep, in \
+            this order";
     }
     check(this) {
         Self::require(!this.keep.is_empty(), "keep", "[]")

@@ -21,8 +21,8 @@ parameters! {
     /// Parameters of principal component analysis.
     PcaParams, "pca" {
         n_components: Option<Components> = None,
-            "a whole number up to min(rows, features), a part of the variance below 1.0, or null",
-            "components kept; null: min(rows, features)";
+            "a whole number up to min(rows, features), a share of the variance below 1.0, or null",
+            "components to keep; null: min(rows, features)";
     }
     check(this) {
         match this.n_components {

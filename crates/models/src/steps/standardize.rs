@@ -20,7 +20,8 @@ parameters! {
     /// Parameters of standardisation.
     StandardizeParams, "standardize" {
         constant: ConstantRule = ConstantRule::Keep, "keep or refuse",
-            "features without variation; if none varies it is an error in any case";
+            "what to do with features without variation; if no feature varies, it is an error in \
+             any case";
     }
     check(_this) {
         Ok(())

@@ -50,7 +50,7 @@ pub fn recipe(changes: &serde_json::Map<String, serde_json::Value>) -> Result<Re
     let value = changes.get(key).map(ToString::to_string).unwrap_or_default();
     let allowed = match key {
         "select" => "last or validation; M2 has no test fold".to_owned(),
-        _ => format!("its usual value only: {} has no use for it", definition.name),
+        _ => format!("only its usual value: {} does not use it", definition.name),
     };
     Err(NetError::Recipe { key: key.into(), value, allowed })
 }
@@ -130,7 +130,7 @@ fn refuse(examples: &[Example<'_>], train: usize, watched: usize, recipe: &Recip
     }
     if recipe.select != Select::Last && watched == 0 {
         return refuse(format!(
-            "{} regions: choosing an epoch needs 7, of which it watches 15 %",
+            "{} regions: choosing an epoch needs at least 7, of which 15 % are held out",
             examples.len()
         ));
     }

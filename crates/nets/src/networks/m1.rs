@@ -9,7 +9,7 @@ use crate::recipe::Recipe;
 /// Challengers' network.
 pub(super) const M1: Definition = Definition {
     name: "m1",
-    about: "M1 (Challengers), level or type: five dense layers over mean and deviation of the STFT",
+    about: "M1 (Challengers), level or type: five dense layers on mean and deviation of the STFT",
     outputs: 3,
     classifies: true,
     architecture,

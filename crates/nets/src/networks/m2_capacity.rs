@@ -8,7 +8,7 @@ use crate::recipe::Recipe;
 /// NTNU-ERC's network for the capacity.
 pub(super) const M2_CAPACITY: Definition = Definition {
     name: "m2_capacity",
-    about: "M2 (NTNU-ERC), capacity / 4000 mL: four convolutions over a depth image, and its box",
+    about: "M2 (NTNU-ERC), capacity / 4000 mL: four convolutions on a depth image, and its box",
     outputs: 1,
     classifies: false,
     architecture,

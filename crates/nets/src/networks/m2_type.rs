@@ -8,7 +8,7 @@ use crate::recipe::{OptimizerKind, Recipe};
 /// NTNU-ERC's network for the type.
 pub(super) const M2_TYPE: Definition = Definition {
     name: "m2_type",
-    about: "M2 (NTNU-ERC), type: two convolutions over 30 s of 40 normalised MFCC",
+    about: "M2 (NTNU-ERC), type: two convolutions on 30 s of 40 normalised MFCC",
     outputs: 4,
     classifies: true,
     architecture,

@@ -8,7 +8,7 @@ use crate::recipe::Recipe;
 /// Concatenation's perceptron for a category and a task.
 pub(super) const M3_MLP: Definition = Definition {
     name: "m3_mlp",
-    about: "M3 (Concatenation), level or type: perceptron over a spectrogram of 6193 values",
+    about: "M3 (Concatenation), level or type: a perceptron on a spectrogram of 6193 values",
     outputs: 3,
     classifies: true,
     architecture,

@@ -7,7 +7,7 @@ use crate::recipe::Recipe;
 /// HVRL's network for the level.
 pub(super) const M4_LEVEL: Definition = Definition {
     name: "m4_level",
-    about: "M4 (HVRL), level: three LSTM layers over the type network's features of windows",
+    about: "M4 (HVRL), level: three LSTM layers on the type network's features of windows",
     outputs: 3,
     classifies: true,
     architecture,

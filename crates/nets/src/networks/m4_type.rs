@@ -9,7 +9,7 @@ use crate::recipe::Recipe;
 /// HVRL's network for the type of a window.
 pub(super) const M4_TYPE: Definition = Definition {
     name: "m4_type",
-    about: "M4 (HVRL), type: thirteen convolutions over windows of 64 frames x 64 mel x 8 channels",
+    about: "M4 (HVRL), type: thirteen convolutions on windows of 64 frames x 64 mel x 8 channels",
     outputs: 4,
     classifies: true,
     architecture,

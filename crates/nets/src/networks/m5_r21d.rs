@@ -11,7 +11,7 @@ const XAVIER: Recipe =
 /// Because It's Tactile's network for the level from R(2+1)D features of four views.
 pub(super) const M5_R21D_LEVEL: Definition = Definition {
     name: "m5_r21d_level",
-    about: "M5 (Because It's Tactile), level: three GRU layers for each view over R(2+1)D features",
+    about: "M5 (Because It's Tactile), level: three GRU layers for each view on R(2+1)D features",
     outputs: 3,
     classifies: true,
     architecture: |outputs| architecture(outputs, 512, 3),
@@ -24,7 +24,7 @@ pub(super) const M5_R21D_LEVEL: Definition = Definition {
 /// The same for the type, smaller.
 pub(super) const M5_R21D_TYPE: Definition = Definition {
     name: "m5_r21d_type",
-    about: "M5 (Because It's Tactile), type: two GRU layers for each view over R(2+1)D features",
+    about: "M5 (Because It's Tactile), type: two GRU layers for each view on R(2+1)D features",
     outputs: 4,
     classifies: true,
     architecture: |outputs| architecture(outputs, 256, 2),

@@ -11,7 +11,7 @@ const XAVIER: Recipe =
 /// Because It's Tactile's network for the level from VGGish embeddings.
 pub(super) const M5_VGGISH_LEVEL: Definition = Definition {
     name: "m5_vggish_level",
-    about: "M5 (Because It's Tactile), level: five GRU layers over VGGish embeddings",
+    about: "M5 (Because It's Tactile), level: five GRU layers on VGGish embeddings",
     outputs: 3,
     classifies: true,
     architecture,
@@ -24,7 +24,7 @@ pub(super) const M5_VGGISH_LEVEL: Definition = Definition {
 /// The same for the type.
 pub(super) const M5_VGGISH_TYPE: Definition = Definition {
     name: "m5_vggish_type",
-    about: "M5 (Because It's Tactile), type: five GRU layers over VGGish embeddings",
+    about: "M5 (Because It's Tactile), type: five GRU layers on VGGish embeddings",
     outputs: 4,
     recipe: Recipe { epochs: 30, ..XAVIER },
     ..M5_VGGISH_LEVEL

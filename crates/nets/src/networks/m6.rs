@@ -13,7 +13,7 @@ const KERAS: Recipe = Recipe { initial: InitialKind::Glorot, ..Recipe::adam(1e-3
 /// ACC's network for the action.
 pub(super) const M6_ACTION: Definition = Definition {
     name: "m6_action",
-    about: "M6 (ACC), action (none, pouring, shaking): four convolutions over a 96 x 96 spectrogram",
+    about: "M6 (ACC), action (none, pouring, shaking): four convolutions on a 96 x 96 spectrogram",
     outputs: 3,
     classifies: true,
     architecture: |outputs| architecture(&[64, 128], &[512, 512], false, outputs),
@@ -26,7 +26,7 @@ pub(super) const M6_ACTION: Definition = Definition {
 /// ACC's network for what is poured.
 pub(super) const M6_POURING: Definition = Definition {
     name: "m6_pouring",
-    about: "M6 (ACC), type and level of what is poured: six convolutions over a spectrogram",
+    about: "M6 (ACC), type and level of what is poured: six convolutions on a spectrogram",
     outputs: 6,
     classifies: true,
     architecture: |outputs| architecture(&[64, 128, 256], &[512, 512], true, outputs),
@@ -39,7 +39,7 @@ pub(super) const M6_POURING: Definition = Definition {
 /// ACC's network for what is shaken.
 pub(super) const M6_SHAKING: Definition = Definition {
     name: "m6_shaking",
-    about: "M6 (ACC), type and level of what is shaken: four convolutions over a spectrogram",
+    about: "M6 (ACC), type and level of what is shaken: four convolutions on a spectrogram",
     outputs: 4,
     classifies: true,
     architecture: |outputs| architecture(&[64, 128], &[512], false, outputs),

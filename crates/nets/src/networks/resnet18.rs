@@ -21,7 +21,7 @@ pub(super) const RESNET18_TYPE: Definition = Definition {
     classifies: true,
     architecture,
     paper: &[],
-    takes: "pictures of containers, cut out",
+    takes: "cropped pictures of containers",
     front_end: None,
     // The paper names neither size nor training: both are our choice.
     recipe: Recipe::adam(1e-4, 32, 30),

@@ -9,7 +9,7 @@ use crate::recipe::Recipe;
 /// Google's embedding of .96 s of sound, whose outputs M5's networks take.
 pub(super) const VGGISH: Definition = Definition {
     name: "vggish",
-    about: "VGGish (M5's input): six convolutions over a log-mel patch, 128 numbers",
+    about: "VGGish (M5's input): six convolutions on a log-mel patch, 128 numbers",
     outputs: 128,
     classifies: false,
     architecture,

@@ -245,7 +245,7 @@ impl Source {
         let expected = answer.range.end - answer.range.start;
         let bytes = answer.bytes().await?;
         if bytes.len() as u64 != expected {
-            let reason = format!("{} of {expected} bytes came", bytes.len());
+            let reason = format!("{} of {expected} bytes arrived", bytes.len());
             return Err(StoreError::Failed(reason));
         }
         Ok(bytes)

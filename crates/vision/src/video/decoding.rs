@@ -42,8 +42,8 @@ impl<'v> Decoding<'v> {
         let setup = track.setup.as_deref().ok_or_else(|| {
             let codec = track.codec.escape_ascii();
             damaged(format!(
-                "its codec is {codec}; of videos H.264 (avc1) is read: extract the frames as PNG or JPEG \
-                 (docs/vision.md)"
+                "its codec is {codec}; only H.264 (avc1) videos are read: extract the frames as \
+                 PNG or JPEG (docs/vision.md)"
             ))
         })?;
         let setup = setup_of(setup).ok_or_else(|| damaged("a damaged box avcC".into()))?;

@@ -104,7 +104,7 @@ fn index(file: &mut (impl Read + Seek), size: u64) -> Result<Vec<u8>, String> {
             _ => at = end,
         }
     }
-    Err("it has no index (moov): perhaps its recording was broken off".into())
+    Err("it has no index (moov): perhaps its recording was interrupted".into())
 }
 
 /// Refuses pictures that are to be turned: frames that others extracted are.
@@ -112,7 +112,7 @@ fn upright(header: &[u8]) -> Result<(), String> {
     const UPRIGHT: [u32; 9] = [1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30];
     let at = if header.first() == Some(&1) { 52 } else { 40 };
     let same = (0..9).all(|i| u32_at(header, at + 4 * i) == Ok(UPRIGHT[i]));
-    if same { Ok(()) } else { Err("its pictures are to be turned (tkhd)".into()) }
+    if same { Ok(()) } else { Err("its pictures are rotated (tkhd)".into()) }
 }
 
 /// When each frame is shown, in units of the media.

@@ -43,8 +43,8 @@ pub(super) fn read(
         (None, Some(weights)) => (weights, CapacityNetwork::read(weights)?),
         _ => {
             return Err(Failure::new(
-                "--method m2 needs one of --model, made by `corsmal-feat capacity train --method m2`, and \
-                 --weights, the published file of its network (.pth, .npz or .safetensors)",
+                "--method m2 needs either --model, made by `corsmal-feat capacity train --method \
+                 m2`, or --weights, the published file of its network (.pth, .npz or .safetensors)",
             ));
         }
     };
@@ -84,8 +84,15 @@ pub(super) fn train(args: Args) -> Result<ExitCode, Failure> {
         let (depth, size) = (&region.image, region.size);
         examples.push(Example { depth, size, millilitres: *capacity });
     }
-    let progress =
-        |told: Progress<'_>| tell("m2_capacity", told, args.told.quiet, "score of those held out");
+    let progress = |told: Progress<'_>| {
+        tell(
+            "m2_capacity",
+            told,
+            args.told.quiet,
+            "score of held-out \
+            regions",
+        )
+    };
     let trained = pool.install(|| {
         network::train(&examples, &recipe, provenance, checkpoint.as_deref(), progress)
     });

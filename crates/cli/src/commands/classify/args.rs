@@ -121,7 +121,7 @@ impl Args {
     ) -> Result<Records, Failure> {
         if self.reject > 0.0 && labels.names().iter().any(|name| name == UNKNOWN) {
             return Err(Failure::new(format!(
-                "--reject calls what it rejects {UNKNOWN:?}, and the model has a class of that name"
+                "--reject calls predictions {UNKNOWN:?}, but the model has a class of that name"
             )));
         }
         let output = Output::open(&self.out)?;

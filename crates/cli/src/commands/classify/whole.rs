@@ -79,7 +79,7 @@ pub fn of_features(
     if model.check_configuration(&table.config_hash).is_err() {
         let wanted = &model.header().feature_config;
         let why = match wanted.is_null() || table.config.is_null() {
-            true => "made by another program, or the model's were".into(),
+            true => "from another program, or the model's were".into(),
             false => difference(wanted, &table.config),
         };
         return Err(Failure::new(format!("{place}: not the features of this model: {why}")));
@@ -199,7 +199,8 @@ fn check_features(model: &Model, table: &LabelledTable, meter: &Meter) -> Result
         let channels = table.outcomes.iter().find_map(|o| o.channels);
         let channels = channels.map_or(String::new(), |n| format!(", of {}", plural(n, "channel")));
         let reason = format!(
-            "gives {given} features{channels}; the model was trained on {known}, on recordings with another number of channels"
+            "gives {given} features{channels}; the model was trained on {known}, from recordings \
+             with another number of channels"
         );
         table.ids.iter().for_each(|id| refuse(meter, id, &reason));
         return Ok(false);

@@ -206,7 +206,8 @@ impl Predictor<'_> {
         let known = self.model.n_features();
         if row.len() != known {
             let reason = format!(
-                "gives {} features; the model was trained on {known}, on recordings with another number of channels",
+                "gives {} features; the model was trained on {known}, from recordings with \
+                 another number of channels",
                 row.len()
             );
             return refuse(Status::Mismatch, reason);

@@ -111,7 +111,8 @@ impl Args {
                 table = table.windows_by_recording();
                 if table.check_once_each().is_ok() {
                     eprintln!(
-                        "warning: {}: one line for each recording, so there is nothing to vote on",
+                        "warning: {}: it has one line per recording, so there is nothing to vote \
+                         on",
                         path.display()
                     );
                 }

@@ -17,7 +17,7 @@ use crate::failure::{FAILED_FILES, Failure};
 pub fn run(args: &Args) -> Result<ExitCode, Failure> {
     let options = &args.submission;
     if args.out.as_os_str() == "-" {
-        return Err(Failure::new("--out - cannot hold a submission: name a file"));
+        return Err(Failure::new("--out - is not possible for a submission: name a file"));
     }
     let fused = |paths: &[PathBuf], weights: &Option<Vec<f64>>| {
         let some = !paths.is_empty();
@@ -102,7 +102,7 @@ fn of_part(
         }
         if rows.insert(named.key, measured).is_some() {
             return Err(Failure::new(format!(
-                "{}: has {} in several parts of the data set: --part says which is meant",
+                "{}: has {} in several parts of the data set: choose one with --part",
                 path.display(),
                 named.key
             )));

@@ -121,7 +121,7 @@ pub fn draw_array(path: &Path, values: ArrayD<f32>, picture: &Picture) -> Result
 }
 
 fn nothing(path: &str) -> Failure {
-    Failure::new(format!("{path}: holds no array of features to draw"))
+    Failure::new(format!("{path}: has no array of features to draw"))
 }
 
 /// A panel for each channel of an array `[channels, coefficients, frames]`.
@@ -192,7 +192,9 @@ pub fn draw_table(
     let places = (0..ids.len()).step_by(step);
     let label = |i: usize| (i as f64, 1.0 - (i as f64 + 0.5) / rows);
     let panel = FeaturePanel {
-        label: "rows: recordings, columns: features, each in its standard deviations".into(),
+        label: "rows: recordings, columns: features, each in units of its standard \
+                deviation"
+            .into(),
         values: standard,
         rows: places.map(label).collect(),
         unit: "standard deviations".into(),

@@ -132,7 +132,7 @@ fn records(path: &Path) -> Result<(Counter, Option<Scored>), String> {
         let value: Value =
             serde_json::from_slice(text).map_err(|e| format!("line {number}: {e}"))?;
         let Value::Object(record) = value else {
-            return Err(format!("line {number} is no object"));
+            return Err(format!("line {number} is not an object"));
         };
         let cell = |column: &str| match record.get(column) {
             None | Some(Value::Null) => String::new(),

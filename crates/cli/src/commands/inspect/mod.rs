@@ -89,7 +89,7 @@ fn single(path: &Path, picture: Option<&Picture>, json: bool) -> Result<ExitCode
     let Some(kind) = kind::of(path)? else { return recording::inspect(path, picture, json) };
     if picture.is_some() {
         let path = path.display();
-        return Err(Failure::new(format!("--picture: {path} holds neither sound nor features")));
+        return Err(Failure::new(format!("--picture: {path} has neither sound nor features")));
     }
     match kind {
         Kind::Model => model::inspect(path, json),

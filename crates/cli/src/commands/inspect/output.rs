@@ -214,7 +214,7 @@ impl Run {
         }
         let (base, changes) = nearest(&self.config);
         lines.push(format!("\n  configuration {}", self.meta.config_hash));
-        let others = if changes.is_empty() { "" } else { ", but for (there in brackets)" };
+        let others = if changes.is_empty() { "" } else { ", except for (its values in brackets)" };
         lines.push(format!("  is {base}{others}"));
         lines.extend(changes.iter().map(|change| format!("    {change}")));
     }

@@ -54,7 +54,7 @@ pub fn inspect(paths: &[PathBuf], json: bool) -> Result<ExitCode, Failure> {
             }
             InputSource::Object(object) => {
                 return Err(Failure::new(format!(
-                    "{object}: inspect looks at files; extract and classify read objects of stores"
+                    "{object}: inspect looks at files; extract and classify read objects in stores"
                 )));
             }
             InputSource::Memory(_) | InputSource::Stdin => {}

@@ -72,7 +72,7 @@ fn read(path: &Path) -> Result<Contents, String> {
     let mut places = Vec::with_capacity(header.len());
     for (name, tensor) in header {
         let whole =
-            |value: &Value| value.as_u64().ok_or(format!("tensor {name}: {value} is no size"));
+            |value: &Value| value.as_u64().ok_or(format!("tensor {name}: {value} is not a size"));
         let sizes = tensor["shape"].as_array().into_iter().flatten();
         let shape = sizes.map(whole).collect::<Result<Vec<u64>, _>>()?;
         let count = shape.iter().try_fold(1u64, |n, &size| n.checked_mul(size));
@@ -99,21 +99,21 @@ fn read(path: &Path) -> Result<Contents, String> {
     for (from, to) in places {
         if from != end {
             return Err(format!(
-                "its tensors do not lie side by side: one ends at byte {end}, the next begins at {from}"
+                "its tensors are not adjacent: one ends at byte {end}, the next begins at {from}"
             ));
         }
         end = to;
     }
     if end != size - 8 - length {
         return Err(format!(
-            "its tensors end at byte {end} of {} behind the header",
+            "its tensors end at byte {end} of {} after the header",
             size - 8 - length
         ));
     }
     let kinds = [
         (NETWORK, "trained network"),
         (CAPACITY, "trained capacity network"),
-        (CHECKPOINT, "checkpoint of a training"),
+        (CHECKPOINT, "checkpoint of a training run"),
     ];
     let told = kinds.into_iter().find_map(|(entry, kind)| Some((texts[entry].as_str()?, kind)));
     let (header, kind) = match told {

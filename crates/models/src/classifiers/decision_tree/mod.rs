@@ -38,7 +38,7 @@ tree_parameters! {
         last {
             #[serde(skip_serializing_if = "TreeSolver::is_own")]
             solver: TreeSolver = TreeSolver::Own, "own or linfa",
-                "who grows the tree: this program, or linfa-trees (no probabilities)";
+                "this program's algorithm, or linfa-trees (no probabilities)";
         }
     }
     random_thresholds: false;

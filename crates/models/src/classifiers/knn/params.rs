@@ -36,7 +36,7 @@ parameters! {
         p: f64 = 2.0, "a number of at least 1", "exponent of the minkowski metric";
         #[serde(skip_serializing_if = "Search::is_brute")]
         algorithm: Search = Search::Brute, "brute or linfa",
-            "who finds the neighbours: this program, or linfa-nn";
+            "this program's search for neighbours, or linfa-nn";
     }
     check(this) {
         Self::require(this.k >= 1, "k", this.k)?;

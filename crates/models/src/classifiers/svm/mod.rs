@@ -83,13 +83,13 @@ parameters! {
             "null, balanced, or one positive number per class in label order",
             "factors of C by class";
         probability: bool = true, "true or false",
-            "fit class probabilities as well (five more fits per pair)";
+            "also fit class probabilities (five more fits per pair)";
         tol: f64 = 1e-3, "a positive number", "tolerance of the optimality conditions";
         cache_mb: usize = 200, "a whole number of at least 1", "memory for kernel values, MiB";
         seed: u64 = 0, "a whole number", "seed of the folds for the probabilities";
         #[serde(skip_serializing_if = "SvmSolver::is_own")]
         solver: SvmSolver = SvmSolver::Own, "own or linfa",
-            "who solves it: this program, or linfa-svm (no probabilities, smaller tables)";
+            "this program's solver, or linfa-svm (no probabilities, smaller tables)";
     }
     check(this) {
         let positive = |v: f64| v.is_finite() && v > 0.0;
