@@ -93,7 +93,7 @@ def of_partitions(name: str) -> dict[str, Any]:
 
 
 def _is_part(of: Any) -> bool:
-    """Whether metadata say which part of a partitioned output a file is, in the kinds that it has."""
+    """Whether metadata describe a part of a partitioned output, with values of the right kinds."""
 
     def is_count(value: Any) -> bool:
         return type(value) is int and value >= 0
