@@ -51,7 +51,7 @@ def cut(table: Any, longest: float) -> Any:
         bounds = [] if header is None else _bounds(*header, row[2], row[3], longest)
         for first, last in bounds:
             places.append(i)
-            ids.append(f"{row[0]}@{_place(*header, row[2], first)}" if header else row[0])
+            ids.append(f"{row[0]}@{_place(header[0], row[2], first)}" if header else row[0])
             samples.append((first, last))
         if not bounds:
             places.append(i)
