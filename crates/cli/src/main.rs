@@ -3,6 +3,7 @@
 #[macro_use]
 mod streams;
 
+mod allocator;
 mod args;
 mod commands;
 mod configuration;
@@ -24,6 +25,7 @@ mod text_table;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    allocator::keep_freed_memory();
     let cli = help::parse();
     match cli.run() {
         Ok(code) => code,

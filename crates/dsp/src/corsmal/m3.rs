@@ -4,7 +4,7 @@ use ndarray::{Array2, ArrayView2, Axis};
 
 use super::{check_expansion, mono};
 use crate::error::Result;
-use crate::resample::resample_last;
+use crate::resample::{before_last, resample_last};
 use crate::stft::{StftParams, spectrogram};
 
 const SR: f64 = 16_600.0;
@@ -30,6 +30,15 @@ impl Default for M3Spectrogram {
 }
 
 impl M3Spectrogram {
+    /// How many of the first of `frames` frames at `sr` Hz may be left out: the same bits come of the rest.
+    ///
+    /// # Errors
+    /// Impossible rates.
+    pub fn unread(&self, sr: f64, frames: u64) -> Result<u64> {
+        check_expansion(sr, SR)?;
+        before_last(sr, SR, frames, SAMPLES)
+    }
+
     /// `[n_fft / 2 + 1, frames]` (563 x 11) of `y [channels, samples]`.
     ///
     /// # Errors

@@ -1,13 +1,14 @@
 //! M4 (HVRL, Keio): a log-mel spectrogram of every channel.
 
 use ndarray::{Array3, Array4, ArrayView2, ArrayView3, s};
+use rayon::prelude::*;
 
 use super::Variant;
 use crate::error::{DspError, Result};
 use crate::frequency::require_rate;
-use crate::lanes::{DoubleRow, Lanes, Spectrum, decibel_double, weighted_sums};
+use crate::lanes::{DoubleRow, Lanes, Spectrum, decibel_double, gather_double, weighted_sums};
 use crate::mel::{hz_to_mel, mel_to_hz};
-use crate::real::require_all_finite;
+use crate::real::{all_finite, require_finite};
 use crate::simd::vectorized;
 use crate::window::{Window, get_window};
 
@@ -15,6 +16,8 @@ const BANDS: usize = 64;
 const PRE_EMPHASIS: f64 = 0.97;
 const WINDOW_FRAMES: usize = 64;
 const WINDOW_STEP: usize = 16;
+/// Frames computed together: their samples stay in the cache.
+const TOGETHER: usize = 8;
 /// Longest frame; bounds the memory that the rate of a file can take.
 const MAX_LENGTH: usize = 1 << 16;
 
@@ -35,8 +38,25 @@ impl M4LogMel {
     /// # Errors
     /// No or non-finite samples, a rate below 100 Hz or above 2.6 MHz.
     pub fn run(&self, y: ArrayView2<f32>, sr: f64) -> Result<Array3<f32>> {
+        let plan = self.plan(sr)?;
+        let (channels, n) = y.dim();
+        let shape = (plan.frames(n), BANDS, channels);
+        let frames = if channels == 1 {
+            plan.interleaved(&y.row(0).as_standard_layout().to_vec(), 1)?
+        } else {
+            let mut interleaved = Vec::with_capacity(y.len());
+            interleaved.extend(y.t().iter());
+            plan.interleaved(&interleaved, channels)?
+        };
+        Ok(Array3::from_shape_vec(shape, frames).expect("as many values"))
+    }
+
+    /// Window, filters and transform for one sample rate.
+    ///
+    /// # Errors
+    /// A rate below 100 Hz or above 2.6 MHz.
+    pub fn plan(&self, sr: f64) -> Result<M4Plan> {
         require_rate(sr)?;
-        require_all_finite("y", y)?;
         let length = (0.025 * sr).round_ties_even() as usize;
         let step = (0.01 * sr).round_ties_even() as usize;
         if step == 0 {
@@ -46,64 +66,133 @@ impl M4LogMel {
             let most = MAX_LENGTH as f64 / 0.025;
             return Err(DspError::parameter("sr", sr, format!("at most {most} Hz")));
         }
-        let (channels, n) = y.dim();
-        if n == 0 {
-            return Err(DspError::TooShort { name: "y", actual: 0, needed: 1 });
-        }
-        let (n_fft, decibels) = match self.variant {
-            Variant::Code => (512, 20.0),
-            Variant::Paper => (length.next_power_of_two(), 10.0),
+        let (n_fft, factor) = match self.variant {
+            Variant::Code => (512, 2.0),
+            Variant::Paper => (length.next_power_of_two(), 1.0),
         };
-        let frames = n.abs_diff(length).div_ceil(step);
         let mut window = get_window(&Window::Hamming, length, false)?;
-        window.resize(n_fft, 0.0);
-        let bank = triangles(sr, n_fft);
-        let spectrum = Spectrum::<DoubleRow>::new(n_fft)?;
-        let rows = |count| vec![DoubleRow::EMPTY; count];
-        let (mut work, mut power, mut energies) =
-            (rows(n_fft), rows(spectrum.n_bins()), rows(BANDS));
         // Behind the window there are zeros only.
-        let used = length.min(n_fft);
-        let mut values = [0.0; BANDS * DoubleRow::SLOTS];
-        let mut out = Array3::zeros((frames, BANDS, channels));
-        let mut emphasised = Vec::new();
-        for (c, signal) in y.outer_iter().enumerate() {
-            pre_emphasised(&signal.to_vec(), &mut emphasised);
-            // The zeros after the last sample are not pre-emphasised.
-            let needed = frames.next_multiple_of(DoubleRow::SLOTS) * step + n_fft;
-            emphasised.resize(n.max(needed), 0.0);
-            for first in (0..frames).step_by(DoubleRow::SLOTS) {
-                let samples = &emphasised[first * step..];
-                DoubleRow::gather(samples, step, &window[..used], &mut work[..used]);
-                work[used..].fill(DoubleRow::EMPTY);
-                spectrum.power(&mut work, &mut power);
-                weighted_sums(&bank, &power, &mut energies);
-                to_decibels(&energies, n_fft as f64, decibels / 10.0, &mut values);
-                let last = frames.min(first + DoubleRow::SLOTS);
-                let mut part = out.slice_mut(s![first..last, .., c]);
-                for (s, mut frame) in part.outer_iter_mut().enumerate() {
-                    let values = values.as_chunks::<{ DoubleRow::SLOTS }>().0;
-                    frame.iter_mut().zip(values).for_each(|(slot, x)| *slot = x[s] as f32);
-                }
-            }
-        }
-        Ok(out)
+        window.truncate(n_fft);
+        let (bank, spectrum) = (triangles(sr, n_fft), Spectrum::new(n_fft)?);
+        Ok(M4Plan { length, step, n_fft, factor, window, bank, spectrum })
     }
 }
 
-/// 16-bit counts of `signal`, each less a share of the one before.
-fn pre_emphasised(signal: &[f32], out: &mut Vec<f64>) {
-    let count = |x: f32| f64::from(x) * 32768.0;
-    out.clear();
-    out.resize(signal.len(), 0.0);
-    if let (Some(slot), Some(x)) = (out.first_mut(), signal.first()) {
-        *slot = count(*x);
+/// [`M4LogMel`] for one sample rate.
+pub struct M4Plan {
+    /// Samples of a frame, and from one to the next.
+    length: usize,
+    step: usize,
+    n_fft: usize,
+    /// Tens of decibels.
+    factor: f64,
+    /// As much of it as the transform sees.
+    window: Vec<f64>,
+    bank: Vec<(usize, Vec<f64>)>,
+    spectrum: Spectrum<DoubleRow>,
+}
+
+/// What one thread computes in.
+struct Work {
+    emphasised: Vec<f64>,
+    frames: Vec<DoubleRow>,
+    power: Vec<DoubleRow>,
+    energies: Vec<DoubleRow>,
+    values: Vec<f64>,
+}
+
+impl M4Plan {
+    /// Frames of `n` samples.
+    pub fn frames(&self, n: usize) -> usize {
+        n.abs_diff(self.length).div_ceil(self.step)
     }
+
+    /// `[frames][64][channels]` of interleaved samples.
+    ///
+    /// # Errors
+    /// No or non-finite samples.
+    pub fn interleaved(&self, samples: &[f32], channels: usize) -> Result<Vec<f32>> {
+        if samples.is_empty() || channels == 0 {
+            return Err(DspError::TooShort { name: "y", actual: 0, needed: 1 });
+        }
+        if !all_finite(samples) {
+            require_finite("y", samples)?;
+        }
+        let frames = self.frames(samples.len() / channels);
+        let mut out = vec![0.0; frames * BANDS * channels];
+        out.par_chunks_mut(TOGETHER * BANDS * channels).enumerate().with_min_len(8).for_each_init(
+            || self.work(),
+            |work, (i, out)| self.together(samples, channels, i * TOGETHER, work, out),
+        );
+        Ok(out)
+    }
+
+    fn work(&self) -> Work {
+        let rows = |count| vec![DoubleRow::EMPTY; count];
+        Work {
+            emphasised: Vec::new(),
+            frames: rows(self.n_fft),
+            power: rows(self.spectrum.n_bins()),
+            energies: rows(BANDS),
+            values: vec![0.0; BANDS * DoubleRow::SLOTS],
+        }
+    }
+
+    /// Up to [`TOGETHER`] frames from frame `first` on.
+    fn together(
+        &self,
+        samples: &[f32],
+        channels: usize,
+        first: usize,
+        work: &mut Work,
+        out: &mut [f32],
+    ) {
+        const SLOTS: usize = DoubleRow::SLOTS;
+        let Work { emphasised, frames, power, energies, values } = work;
+        let used = self.window.len();
+        emphasised.resize(((TOGETHER - 1) * self.step + used) * channels, 0.0);
+        pre_emphasised(samples, channels, first * self.step, emphasised);
+        let slots = out.len() / BANDS;
+        for slot in (0..slots).step_by(SLOTS) {
+            let (samples, window) = (&emphasised[..], &self.window);
+            gather_double(samples, self.step, window, (slot, channels), &mut frames[..used]);
+            frames[used..].fill(DoubleRow::EMPTY);
+            self.spectrum.power(frames, power);
+            weighted_sums(&self.bank, power, energies);
+            to_decibels(energies, self.n_fft as f64, self.factor, values);
+            if channels == SLOTS {
+                let out = &mut out[slot * BANDS..(slot + SLOTS) * BANDS];
+                out.iter_mut().zip(&*values).for_each(|(out, x)| *out = *x as f32);
+                continue;
+            }
+            for s in 0..SLOTS.min(slots - slot) {
+                let (frame, channel) = ((slot + s) / channels, (slot + s) % channels);
+                let out = out[frame * BANDS * channels + channel..].iter_mut().step_by(channels);
+                let values = values.as_chunks::<SLOTS>().0;
+                out.zip(values).for_each(|(out, x)| *out = x[s] as f32);
+            }
+        }
+    }
+}
+
+/// 16-bit counts of interleaved samples from `frame` on, each less a share of the one before in its
+/// channel; zeros behind the last.
+fn pre_emphasised(samples: &[f32], channels: usize, frame: usize, out: &mut [f64]) {
+    let count = |x: f32| f64::from(x) * 32768.0;
+    let from = (frame * channels).min(samples.len());
+    let (out, zeros) = out.split_at_mut(out.len().min(samples.len() - from));
+    zeros.fill(0.0);
+    // Nothing is before the first.
+    let alone = if from == 0 { channels.min(out.len()) } else { 0 };
+    let (first, rest) = out.split_at_mut(alone);
+    first.iter_mut().zip(samples).for_each(|(slot, x)| *slot = count(*x));
+    let current = &samples[from + alone..][..rest.len()];
+    let before = &samples[(from + alone).saturating_sub(channels)..][..rest.len()];
     vectorized(
         #[inline(always)]
         || {
-            for (slot, pair) in out.iter_mut().skip(1).zip(signal.windows(2)) {
-                *slot = count(pair[1]) - PRE_EMPHASIS * count(pair[0]);
+            for ((slot, x), before) in rest.iter_mut().zip(current).zip(before) {
+                *slot = count(*x) - PRE_EMPHASIS * count(*before);
             }
         },
     );
@@ -115,12 +204,14 @@ fn to_decibels(energies: &[DoubleRow], n_fft: f64, factor: f64, values: &mut [f6
     for (values, row) in values.chunks_exact_mut(DoubleRow::SLOTS).zip(energies) {
         values.copy_from_slice(&row.0);
     }
+    let scale = 1.0 / n_fft;
     // One long loop: rows of eight would be computed value by value.
     vectorized(
         #[inline(always)]
         || {
             for value in values {
-                let scaled = *value / n_fft;
+                // The length is a power of two: exact.
+                let scaled = *value * scale;
                 let normal = if scaled == 0.0 { f64::EPSILON } else { scaled };
                 let least = if normal < f64::MIN_POSITIVE { f64::MIN_POSITIVE } else { normal };
                 *value = factor * decibel_double(least);

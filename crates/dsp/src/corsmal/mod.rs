@@ -19,7 +19,7 @@ mod spec9216;
 pub use m1::M1Stft;
 pub use m2::M2Mfcc;
 pub use m3::M3Spectrogram;
-pub use m4::{M4LogMel, m4_windows};
+pub use m4::{M4LogMel, M4Plan, m4_windows};
 pub use m5::{M5A34f136, M5VggishPatches, downmix_71, downmix_71_weights};
 pub use m6::{M6Crop, M6Spectrogram};
 pub use spec9216::Spec9216;

@@ -74,28 +74,100 @@ pub(super) fn channel<T: Real>(signal: &[T], hop: usize, window: &[f32], rows: &
     }
 }
 
-/// [`Lanes::gather`], squares of samples and slots at a time, each turned about in registers.
+/// [`Lanes::gather`] into double-precision rows.
 pub(super) fn turned<T: Real>(signal: &[T], hop: usize, window: &[f64], rows: &mut [DoubleRow]) {
-    const SIDE: usize = DoubleRow::SLOTS;
     debug_assert_eq!(window.len(), rows.len());
-    let frames: [&[T]; SIDE] = std::array::from_fn(|s| &signal[s * hop..][..window.len()]);
-    let squares = frames.map(|frame| frame.as_chunks::<SIDE>().0);
-    vectorized(
-        #[inline(always)]
-        || {
-            let parts = rows.as_chunks_mut::<SIDE>().0.iter_mut();
-            for (n, (rows, window)) in parts.zip(window.as_chunks::<SIDE>().0).enumerate() {
-                let square: [[f64; SIDE]; SIDE] =
-                    std::array::from_fn(|s| squares[s][n].map(Real::wide));
-                for (k, (row, w)) in rows.iter_mut().zip(window).enumerate() {
-                    row.0 = std::array::from_fn(|s| w * square[s][k]);
+    Arch::new().dispatch(Turned { signal, hop, window, rows });
+}
+
+/// [`gather`] in double precision: slot `s` of a row is the `first + s`-th pair of frame and channel. Every
+/// slot has a frame.
+pub(crate) fn gather_double(
+    signal: &[f64],
+    hop: usize,
+    window: &[f64],
+    (first, channels): (usize, usize),
+    rows: &mut [DoubleRow],
+) {
+    const SLOTS: usize = DoubleRow::SLOTS;
+    match channels {
+        1 => turned(&signal[first * hop..], hop, window, rows),
+        SLOTS => {
+            let frame = signal[first * hop..].as_chunks::<SLOTS>().0;
+            vectorized(
+                #[inline(always)]
+                || {
+                    for ((row, w), frame) in rows.iter_mut().zip(window).zip(frame) {
+                        for (slot, x) in row.0.iter_mut().zip(frame) {
+                            *slot = w * x;
+                        }
+                    }
+                },
+            );
+        }
+        _ => {
+            for s in 0..SLOTS {
+                let (frame, channel) = ((first + s) / channels, (first + s) % channels);
+                let samples = signal[frame * hop * channels + channel..].iter().step_by(channels);
+                for ((row, w), x) in rows.iter_mut().zip(window).zip(samples) {
+                    row.0[s] = w * x;
                 }
             }
-        },
-    );
-    let whole = window.len() / SIDE * SIDE;
-    for n in whole..window.len() {
-        rows[n].0 = frames.map(|frame| window[n] * frame[n].wide());
+        }
+    }
+}
+
+/// Eight frames of one channel.
+struct Turned<'a, T> {
+    signal: &'a [T],
+    hop: usize,
+    window: &'a [f64],
+    rows: &'a mut [DoubleRow],
+}
+
+/// Samples of a frame that are read together, in double precision.
+const PAIR: usize = 2;
+
+impl<T: Real> WithSimd for Turned<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        const SLOTS: usize = DoubleRow::SLOTS;
+        let Self { signal, hop, window, rows } = self;
+        let wide = S::F64_LANES.is_multiple_of(PAIR);
+        let whole = if wide { rows.len() / PAIR * PAIR } else { 0 };
+        let (pairs, rest) = rows.split_at_mut(whole);
+        let frames = |f: usize| &signal[f * hop..][..window.len()];
+        // Slot `PAIR * g + j` is in group `g` of the register that frame set `j` fills.
+        let sets: [[&[[T; PAIR]]; SLOTS / PAIR]; PAIR] = std::array::from_fn(|j| {
+            std::array::from_fn(|g| frames(PAIR * g + j).as_chunks::<PAIR>().0)
+        });
+        let pairs = pairs.as_chunks_mut::<PAIR>().0.iter_mut();
+        for (n, (rows, w)) in pairs.zip(window.as_chunks::<PAIR>().0).enumerate() {
+            let mut x = [DoubleRow::EMPTY; PAIR];
+            for (row, set) in x.iter_mut().zip(&sets) {
+                for (group, frame) in row.0.as_chunks_mut::<PAIR>().0.iter_mut().zip(set) {
+                    for (slot, x) in group.iter_mut().zip(&frame[n]) {
+                        *slot = x.wide();
+                    }
+                }
+            }
+            for v in 0..DoubleRow::registers::<S>() {
+                // Transposes the square that each group of the two registers makes.
+                let x = [x[0].load::<S>(v), x[1].load::<S>(v)];
+                let x = simd.deinterleave_shfl_f64s(x);
+                for (row, (x, w)) in rows.iter_mut().zip(x.into_iter().zip(w)) {
+                    row.store::<S>(v, simd.mul_f64s(x, simd.splat_f64s(*w)));
+                }
+            }
+        }
+        for (n, row) in rest.iter_mut().enumerate() {
+            let n = whole + n;
+            for (s, slot) in row.0.iter_mut().enumerate() {
+                *slot = window[n] * frames(s)[n].wide();
+            }
+        }
     }
 }
 

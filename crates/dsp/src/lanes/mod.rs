@@ -18,6 +18,7 @@ mod weighted;
 pub(crate) use decibel::decibel_double;
 pub use decibel::power_to_decibel;
 pub use fft::LaneFft;
+pub(crate) use gather::gather_double;
 pub use gather::{Aligned, Frames, Slots, gather};
 pub use row::{DoubleRow, LANES, Lanes, Row};
 pub use spectrum::{Spectrum, square_roots};

@@ -101,6 +101,44 @@ pub(crate) fn resample_last(
     Ok(out)
 }
 
+/// How many of the first of `frames` frames [`resample_last`] of `count` may do without: with the rest alone
+/// it gives the same bits.
+///
+/// # Errors
+/// Impossible rates.
+pub(crate) fn before_last(orig_sr: f64, target_sr: f64, frames: u64, count: usize) -> Result<u64> {
+    /// Outputs after which places repeat, as far as filters hold all of them.
+    const MOST_OUTPUTS: u64 = 2048;
+    check_rates(orig_sr, target_sr)?;
+    let whole = |rate: f64| rate.fract() == 0.0 && rate < 2f64.powi(32);
+    if !whole(orig_sr) || !whole(target_sr) {
+        return Ok(0);
+    }
+    let (orig, target) = (orig_sr as u64, target_sr as u64);
+    let (mut common, mut rest) = (orig, target);
+    while rest > 0 {
+        (common, rest) = (rest, common % rest);
+    }
+    // The places of outputs between frames repeat.
+    let (inputs, outputs) = (orig / common, target / common);
+    if outputs > MOST_OUTPUTS {
+        return Ok(0);
+    }
+    let Converter::Soxr(plan) = Converter::shared(orig_sr, target_sr, ResType::SoxrHq)? else {
+        unreachable!("another converter was asked for")
+    };
+    let first = plan.output_len(frames).saturating_sub(count as u64);
+    let needed = plan.input_range(first..first + count as u64).start.max(0) as u64;
+    let periods = needed.min(frames) / inputs;
+    let left_out = periods * inputs;
+    // Lengths are rounded: one that came out otherwise would shift all.
+    let shifted = |len: fn(&ResamplePlan, u64) -> u64| {
+        len(&plan, frames) == len(&plan, frames - left_out) + periods * outputs
+    };
+    let same = shifted(ResamplePlan::output_len) && shifted(ResamplePlan::filtered_len);
+    Ok(if same { left_out } else { 0 })
+}
+
 /// `y` has contiguous channels.
 fn resample_hq<T: Real>(y: ArrayView2<T>, plan: &ResamplePlan) -> Array2<T> {
     let ((channels, n), span) = (y.dim(), plan.span());

@@ -28,7 +28,7 @@ use check::{check_interleaved, check_rates};
 use stage::{Frames, Stage};
 
 pub use array::resample;
-pub(crate) use array::resample_last;
+pub(crate) use array::{before_last, resample_last};
 pub use converter::{Converter, ConverterStream};
 pub(crate) use kaiser::halving;
 pub use sinc::{SincPlan, SincStream};

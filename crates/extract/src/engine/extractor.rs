@@ -52,8 +52,8 @@ pub struct Workspace {
     scratch: Scratch,
 }
 
-/// Largest buffer of samples that is handed on (8 MiB).
-const MAX_BUFFER: usize = 1 << 21;
+/// Largest buffer of samples that is handed on (16 MiB).
+const MAX_BUFFER: usize = 1 << 22;
 
 impl Extractor {
     /// An extractor of frames anchored (`t * hop_length`) in `span`, whose first pushed sample is
@@ -63,6 +63,15 @@ impl Extractor {
         let raw = vec![Vec::new(); plan.features.len()];
         let workspace = plan.take_workspace();
         Self { plan, cursors, raw, workspace, head: 0, first }
+    }
+
+    /// Makes room for a signal of `frames` frames that will be held whole, up to a few MiB.
+    pub fn reserve(&mut self, frames: u64) {
+        let values =
+            usize::try_from(frames).unwrap_or(usize::MAX).saturating_mul(self.plan.channels);
+        if self.plan.needs_whole() && values <= MAX_BUFFER {
+            self.workspace.buffer.reserve_exact(values);
+        }
     }
 
     /// Channels that are pushed.
@@ -126,6 +135,18 @@ impl Extractor {
         if !self.plan.needs_whole() {
             return Ok(());
         }
+        let mut apart_too = Vec::new();
+        for whole @ WholeFeature { feature, kernel } in &self.plan.whole {
+            match kernel.interleaved(&self.workspace.buffer, self.plan.channels) {
+                Some(values) => {
+                    self.raw[*feature] = values.map_err(|source| self.refused(*feature, source))?;
+                }
+                None => apart_too.push(whole),
+            }
+        }
+        if apart_too.is_empty() {
+            return Ok(());
+        }
         let owned = if self.plan.channels == 1 {
             Vec::new()
         } else {
@@ -140,13 +161,13 @@ impl Extractor {
             }
             owned.iter().map(Vec::as_slice).collect()
         };
-        for WholeFeature { feature, kernel } in &self.plan.whole {
-            let (planned, raw) = (&self.plan.features[*feature], &mut self.raw[*feature]);
+        for WholeFeature { feature, kernel } in apart_too {
             let each: Vec<Array2<f32>> = planes
                 .par_iter()
                 .map(|y| kernel.channel(y).map(|values| values.reversed_axes()))
                 .collect::<Result<_, _>>()
-                .map_err(|source| Refused { feature: planned.name.clone(), source })?;
+                .map_err(|source| self.refused(*feature, source))?;
+            let raw = &mut self.raw[*feature];
             // `[frames, rows]` of every channel, mostly contiguous.
             let each: Vec<_> = each.iter().map(Array2::as_standard_layout).collect();
             let each: Vec<&[f32]> = each.iter().filter_map(|values| values.as_slice()).collect();
@@ -160,6 +181,10 @@ impl Extractor {
             }
         }
         Ok(())
+    }
+
+    fn refused(&self, feature: usize, source: DspError) -> Refused {
+        Refused { feature: self.plan.features[feature].name.clone(), source }
     }
 
     fn advance(&mut self, total: Option<u64>) {

@@ -166,6 +166,14 @@ impl Plan {
         !self.whole.is_empty()
     }
 
+    /// How many of the first of a signal's `frames` frames may be left out: no value depends on them.
+    pub fn unread(&self, frames: u64) -> u64 {
+        match &self.whole[..] {
+            [whole] if self.streams.is_empty() => whole.kernel.unread(frames),
+            _ => 0,
+        }
+    }
+
     /// Why frames cannot be computed from a piece of a recording as they are of the whole; `None` where
     /// every frame depends on a bounded number of samples around it.
     pub fn piece_refusal(&self) -> Option<String> {

@@ -118,16 +118,23 @@ pub fn compute(
     // Padding by reflection may reach back twice the padding of a frame; one more is for what looks at the
     // sample before.
     let (before, after) = plan.context();
-    let first = span.start.saturating_sub(2 * before as u64 + 1);
+    let passed = unread(source, planned, crop, span);
+    let first = span.start.saturating_sub(2 * before as u64 + 1) + passed;
     let begin = crop.start.saturating_add(first);
+    *decoded += passed;
     let end = crop.end.min(crop.start.saturating_add(span.end.saturating_add(after as u64)));
     skip_to(source, begin)?;
     let own = crop.start.saturating_add(span.start)..crop.start.saturating_add(span.end);
     let checked = source.spec().encoding.may_be_non_finite();
     let mut extractor = Extractor::new(plan.clone(), span.clone(), first);
+    let rate = plan.sample_rate / f64::from(source.spec().sample_rate);
+    if let Some(most) = source.most_frames() {
+        // Rounding may add a frame, the end of the recording some of a block that is not filled.
+        let frames = most.min(end).saturating_sub(begin) as f64 * rate;
+        extractor.reserve(frames as u64 + 1 + (BLOCK / channels) as u64);
+    }
     let mut held = Held::of(plan);
     let mut hold = |frames: u64| held.as_mut().map_or(Ok(()), |held| held.reach(frames));
-    let rate = plan.sample_rate / f64::from(source.spec().sample_rate);
     let identity = front.is_identity();
     let (mut block, mut signal) = (Vec::new(), Vec::new());
     let step = planned.step(BLOCK / channels, source.spec().sample_rate);
@@ -198,6 +205,27 @@ pub fn compute(
     }
     each(extractor.finish(at_end)?)?;
     Ok(true)
+}
+
+/// Frames at the beginning of a crop that no feature depends on, and that can be passed without a look:
+/// integers, which are valid whatever they are, each of which has its place in the file.
+fn unread(
+    source: &dyn BlockSource,
+    planned: &Planned,
+    crop: &Range<u64>,
+    span: &Range<u64>,
+) -> u64 {
+    let signal = &planned.plan.config.signal;
+    let plain = source.seekable()
+        && source.byte_of(0).is_some()
+        && !source.spec().encoding.may_be_non_finite()
+        && SignalChain::is_local(signal, planned.resample.is_some())
+        && signal.preemphasis == 0.0
+        && *span == (0..u64::MAX);
+    match source.most_frames().filter(|_| plain) {
+        Some(most) => planned.plan.unread(most.min(crop.end).saturating_sub(crop.start)),
+        None => 0,
+    }
 }
 
 /// Goes to a frame, by reading where the source cannot seek.

@@ -53,6 +53,17 @@ pub trait WholeKernel: Send + Sync {
     /// A signal that the feature does not exist for.
     fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>>;
 
+    /// `[frames][coefficients][channels]` of interleaved samples, where all channels are computed at once;
+    /// `None` where each is by itself.
+    fn interleaved(&self, _: &[f32], _: usize) -> Option<corsmal_dsp::Result<Vec<f32>>> {
+        None
+    }
+
+    /// How many of the first of a signal's `frames` frames may be left out: the rest has the same values.
+    fn unread(&self, _frames: u64) -> u64 {
+        0
+    }
+
     /// Bytes that computing takes for each sample of a channel, measured on long recordings.
     fn bytes_per_sample(&self) -> u64 {
         12

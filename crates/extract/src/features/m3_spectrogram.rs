@@ -31,6 +31,10 @@ impl WholeKernel for Magnitudes {
     fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>> {
         self.0.run(ArrayView2::from_shape((1, y.len()), y).expect("one row"), self.1)
     }
+
+    fn unread(&self, frames: u64) -> u64 {
+        self.0.unread(self.1, frames).unwrap_or(0)
+    }
 }
 
 impl FeatureKind for M3Spectrogram {

@@ -1,8 +1,7 @@
 //! `m4_logmel`: the input of M4 (HVRL).
 
-use corsmal_dsp::DspError;
-use corsmal_dsp::corsmal::{M4LogMel as Plan, Variant};
-use ndarray::{Array2, ArrayView2, Axis};
+use corsmal_dsp::corsmal::{M4LogMel as Plan, M4Plan, Variant};
+use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
 use super::kernel::{Extent, Feature, WholeKernel};
@@ -17,12 +16,19 @@ pub struct M4LogMel {
     variant: Variant,
 }
 
-struct Bands(Plan, f64);
-
-impl WholeKernel for Bands {
+impl WholeKernel for M4Plan {
     fn channel(&self, y: &[f32]) -> corsmal_dsp::Result<Array2<f32>> {
-        let y = ArrayView2::from_shape((1, y.len()), y).expect("one row");
-        Ok(self.0.run(y, self.1)?.index_axis_move(Axis(2), 0).reversed_axes())
+        let bands = M4Plan::interleaved(self, y, 1)?;
+        let frames = Array2::from_shape_vec((self.frames(y.len()), 64), bands);
+        Ok(frames.expect("one channel").reversed_axes())
+    }
+
+    fn interleaved(
+        &self,
+        samples: &[f32],
+        channels: usize,
+    ) -> Option<corsmal_dsp::Result<Vec<f32>>> {
+        Some(M4Plan::interleaved(self, samples, channels))
     }
 }
 
@@ -39,10 +45,7 @@ impl FeatureKind for M4LogMel {
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let step = (0.01 * sr).round_ties_even();
-        if step < 1.0 {
-            return Err(DspError::parameter("sr", sr, "at least 100 Hz"));
-        }
-        let bands = Bands(Plan { variant: self.variant }, sr);
+        let bands = Plan { variant: self.variant }.plan(sr)?;
         Ok(Feature::whole(Extent::Frames(step), bands, indices(64)))
     }
 }
