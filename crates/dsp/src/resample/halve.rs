@@ -11,13 +11,17 @@ use crate::lanes::{LANES, LaneFft, Row, Slots, gather};
 use crate::pool::Pool;
 use crate::simd::vectorized;
 
+/// How much less than the length of a transform samples become, so that no sum is infinite whose
+/// result is not: a power of two, so that no bit changes.
+const HEADROOM: f32 = 64.0;
 /// Fewest taps that are worth transforms.
 const LEAST_TAPS: usize = 96;
 
 /// A symmetric filter of odd length that keeps every second output, by overlap-save.
 ///
 /// Outputs come in blocks that begin at multiples of [`Halve::block`], each from a transform of its
-/// own: how the input is cut changes no bits.
+/// own: how the input is cut changes no bits. Machines with and without fused multiply-add may differ
+/// in the last bits.
 #[derive(Clone)]
 pub(super) struct Halve(Arc<Tables>);
 
@@ -31,7 +35,7 @@ struct Tables {
     back: LaneFft,
     /// The real response of each bin, over the lengths of both transforms.
     response: Vec<f32>,
-    /// Ones.
+    /// A power of two that keeps the sums of transforms in range, however large the samples are.
     window: Vec<f32>,
     memory: Pool<Memory>,
 }
@@ -70,15 +74,15 @@ impl Halve {
             block: (n - 1 - before - reach) / 2 + 1,
             forward: LaneFft::new(n).ok()?,
             back: LaneFft::new(n / 2).ok()?,
-            response: bins.iter().map(|bin| (bin.re / n as f64) as f32).collect(),
-            window: vec![1.0; n],
+            response: bins.iter().map(|bin| bin.re as f32).collect(),
+            window: vec![1.0 / (n as f32 * HEADROOM); n],
             memory: Pool::default(),
         })))
     }
 
     /// Outputs of each channel that one pass over the lanes makes.
     pub fn pass(&self, channels: usize) -> u64 {
-        (LANES.div_ceil(channels) * self.0.block) as u64
+        ((LANES / channels).max(1) * self.0.block) as u64
     }
 
     /// [`Self::pass`] of one channel.
@@ -181,7 +185,7 @@ impl Halve {
                     let (bin, sign) = if n <= half / 2 { (n, -1.0) } else { (half - n, 1.0) };
                     let [re, im] = &bins[bin];
                     for s in 0..LANES {
-                        row.0[s] = re.0[s] + sign * im.0[s];
+                        row.0[s] = HEADROOM * (re.0[s] + sign * im.0[s]);
                     }
                 }
             },
@@ -229,6 +233,10 @@ mod tests {
                     }
                 }
             }
+        }
+        for channels in 1..=40 {
+            let slots = halve.pass(channels) as usize / halve.0.block * channels;
+            assert!(slots <= LANES.max(channels), "one pass of {channels} channels");
         }
         assert!(Halve::new(&taps[1..]).is_none());
         assert!(Halve::new(&taps[..31]).is_none());

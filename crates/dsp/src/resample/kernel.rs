@@ -1,7 +1,8 @@
 //! The inner loops, on whatever vector unit the machine has.
 //!
 //! Every output is `fma(tap, sample, sum)` over the taps in a fixed order, whatever the vector
-//! width: the results are the same bits on every machine, block size and channel layout.
+//! width: the results are the same bits on every machine, block size and channel layout. (Halving by
+//! transforms, in `halve.rs`, may differ between machines.)
 
 use pulp::{Arch, Simd, WithSimd};
 

@@ -57,7 +57,7 @@ impl Stage {
         }
     }
 
-    /// Outputs of so many channels that cost as much as one of them.
+    /// Outputs of each channel that one pass makes.
     pub fn pass(&self, channels: usize) -> u64 {
         match self {
             Self::Halve(halve) => halve.pass(channels),

@@ -63,7 +63,8 @@ impl ResampleStream {
         Ok(Self { plan, channels, buffers, pushed: 0, given: 0 })
     }
 
-    /// Takes whole interleaved frames, appends the outputs that are complete to `out`.
+    /// Takes whole interleaved frames of finite samples, appends the outputs that are complete to `out`. A
+    /// sample that is not finite spoils outputs around it, how many depends on the blocks.
     ///
     /// # Errors
     /// `input` is not whole frames.

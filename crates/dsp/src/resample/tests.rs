@@ -114,6 +114,39 @@ fn tones_pass() {
 }
 
 #[test]
+fn large_samples_stay_finite() {
+    for (from, to) in RATES {
+        for x in [1e34, 1e36, 1e37] {
+            let y = Array2::from_elem((1, 20_000), x as f32);
+            let out = resample(y.view(), from, to, ResType::SoxrHq, true, false).unwrap();
+            assert!(out.iter().all(|v| v.is_finite()), "{from} -> {to}, {x}");
+        }
+    }
+}
+
+#[test]
+fn passes_in_the_middle_of_a_stream() {
+    for (from, to) in [(44100.0, 22050.0), (44100.0, 5512.5), (44100.0, 25000.5)] {
+        let plan = Arc::new(ResamplePlan::new(from, to).unwrap());
+        for channels in [1, 3, 8] {
+            let frames = 120_000;
+            let input = noise(channels * frames, 8);
+            let all = 0..plan.filtered_len(frames as u64);
+            let want = plan.segment(channels, all, &input, 0).unwrap();
+            for block in [1777, 40_000, frames] {
+                let mut out = Vec::new();
+                let mut stream = ResampleStream::new(plan.clone(), channels).unwrap();
+                for block in input.chunks(block * channels) {
+                    stream.push(block, &mut out).unwrap();
+                }
+                stream.finish(&mut out);
+                assert!(out[..want.len()] == want[..], "{from} {to} {channels} {block}");
+            }
+        }
+    }
+}
+
+#[test]
 fn energy_scale() {
     let y = Array2::from_shape_vec((1, 1000), noise(1000, 3)).unwrap();
     let plain = resample(y.view(), 2.0, 1.0, ResType::SoxrHq, true, false).unwrap();

@@ -9,7 +9,8 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::plan::{Plan, WholeFeature};
-use super::stream::{Cursor, Scratch, Window};
+use super::stream::{Cursor, Window};
+use super::workspace::Workspace;
 
 /// What the features of one span of a recording, or of a part of it, have stored.
 #[derive(Debug, Default)]
@@ -43,25 +44,13 @@ pub struct Extractor {
     first: u64,
 }
 
-/// The memory that an extractor works in, handed on to the next one of its plan: made anew for each
-/// recording, it would leave a hole in the heap for each.
-#[derive(Default)]
-pub struct Workspace {
-    /// Interleaved samples; those before the extractor's `head` are done with.
-    buffer: Vec<f32>,
-    scratch: Scratch,
-}
-
-/// Largest buffer of samples that is handed on (16 MiB).
-const MAX_BUFFER: usize = 1 << 22;
-
 impl Extractor {
     /// An extractor of frames anchored (`t * hop_length`) in `span`, whose first pushed sample is
     /// number `first` of the signal. A whole recording is `0..u64::MAX` from 0.
     pub fn new(plan: Arc<Plan>, span: Range<u64>, first: u64) -> Self {
         let cursors = plan.streams.iter().map(|s| Cursor::new(&s.framing(), &span)).collect();
         let raw = vec![Vec::new(); plan.features.len()];
-        let workspace = plan.take_workspace();
+        let workspace = plan.workspaces.take();
         Self { plan, cursors, raw, workspace, head: 0, first }
     }
 
@@ -69,7 +58,7 @@ impl Extractor {
     pub fn reserve(&mut self, frames: u64) {
         let values =
             usize::try_from(frames).unwrap_or(usize::MAX).saturating_mul(self.plan.channels);
-        if self.plan.needs_whole() && values <= MAX_BUFFER {
+        if self.plan.needs_whole() && values <= Workspace::MOST_SAMPLES {
             self.workspace.buffer.reserve_exact(values);
         }
     }
@@ -155,8 +144,8 @@ impl Extractor {
         let planes: Vec<&[f32]> = if owned.is_empty() {
             vec![&self.workspace.buffer]
         } else {
-            // Long recordings are not held twice.
-            if self.workspace.buffer.capacity() > MAX_BUFFER {
+            // Long recordings are held twice only while their channels are taken apart.
+            if self.workspace.buffer.capacity() > Workspace::MOST_SAMPLES {
                 self.workspace.buffer = Vec::new();
             }
             owned.iter().map(Vec::as_slice).collect()
@@ -222,11 +211,7 @@ impl Extractor {
 
 impl Drop for Extractor {
     fn drop(&mut self) {
-        let mut workspace = std::mem::take(&mut self.workspace);
-        if workspace.buffer.capacity() <= MAX_BUFFER {
-            workspace.buffer.clear();
-            self.plan.give_workspace(workspace);
-        }
+        self.plan.workspaces.give(std::mem::take(&mut self.workspace));
     }
 }
 
@@ -263,15 +248,43 @@ mod tests {
         };
         let first = compute(8000);
         let place = |work: &Workspace| (work.buffer.as_ptr(), work.buffer.capacity());
-        let workspace = plan.take_workspace();
+        let workspace = plan.workspaces.take();
         let before = place(&workspace);
         assert!(before.1 >= 16_000 && !workspace.scratch.frames.is_empty());
-        plan.give_workspace(workspace);
+        plan.workspaces.give(workspace);
         assert_eq!(compute(8000), first);
-        assert_eq!(place(&plan.take_workspace()), before);
-        assert!(plan.take_workspace().buffer.capacity() == 0, "one was at work at a time");
+        assert_eq!(place(&plan.workspaces.take()), before);
+        assert!(plan.workspaces.take().buffer.capacity() == 0, "one was at work at a time");
 
-        compute(MAX_BUFFER);
-        assert!(plan.take_workspace().buffer.capacity() == 0, "long ones are given back");
+        compute(Workspace::MOST_SAMPLES);
+        assert!(plan.workspaces.take().buffer.capacity() == 0, "long buffers are freed");
+
+        // As many signals as may be open at once.
+        let open: Vec<Extractor> =
+            (0..1000).map(|_| Extractor::new(plan.clone(), 0..u64::MAX, 0)).collect();
+        drop(open);
+        assert!(plan.workspaces.idle() <= rayon::current_num_threads());
+    }
+
+    #[test]
+    fn a_recording_that_fails_leaves_nothing_behind() {
+        for preset in ["logmel", "mfcc-zcr", "m4-code", "esc26"] {
+            let config = Arc::new(Config::preset(preset).unwrap());
+            let plan = Arc::new(Plan::new(&config, 16_000.0, 2).unwrap());
+            let noise: Vec<f32> =
+                (0..40_000_u32).map(|i| (i * i % 997) as f32 / 997.0 - 0.5).collect();
+            let compute = || {
+                let mut extractor = Extractor::new(plan.clone(), 0..u64::MAX, 0);
+                noise.chunks(1500).for_each(|block| extractor.push(block));
+                extractor.finish(true).unwrap().raw
+            };
+            let first = compute();
+            let mut failed = Extractor::new(plan.clone(), 0..u64::MAX, 0);
+            failed.push(&vec![1e30; 30_000]);
+            // Read, found wanting, never committed.
+            failed.room(500).fill(f32::NAN);
+            drop(failed);
+            assert_eq!(compute(), first, "{preset}");
+        }
     }
 }

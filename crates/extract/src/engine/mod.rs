@@ -21,6 +21,7 @@ mod store;
 mod stream;
 mod watch;
 mod windows;
+mod workspace;
 
 pub use extractor::{Extractor, Refused, Span};
 pub use failed::{Failed, FinishError};

@@ -1,13 +1,13 @@
 //! A configuration planned for one sample rate and number of channels: transforms, windows, filter
 //! banks, all made once and shared by every worker.
 
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, OnceLock};
 
 use corsmal_dsp::DspError;
 
-use super::extractor::Workspace;
 use super::signal_chain::SignalChain;
 use super::stream::{ExactMember, Framing, SharedStreams, SpectrumMember, Stream};
+use super::workspace::Workspaces;
 use crate::config::Config;
 use crate::features::{Derived, Extent, Feature, Finish, Kernel, WholeKernel};
 
@@ -67,8 +67,8 @@ pub struct Plan {
     /// The configuration.
     pub config: Arc<Config>,
     warnings: Vec<String>,
-    /// What extractors of this plan have worked in.
-    workspaces: Mutex<Vec<Workspace>>,
+    /// What extractors have worked in.
+    pub(super) workspaces: Arc<Workspaces>,
     summary_names: OnceLock<Arc<[String]>>,
 }
 
@@ -146,7 +146,7 @@ impl Plan {
             });
         }
         let (streams, config) = (streams.into_streams(), config.clone());
-        let workspaces = Mutex::default();
+        let workspaces = Arc::default();
         let summary_names = OnceLock::new();
         Ok(Self {
             sample_rate,
@@ -159,6 +159,11 @@ impl Plan {
             workspaces,
             summary_names,
         })
+    }
+
+    /// The same plan, whose extractors work in memory that they share with those of other plans.
+    pub(super) fn sharing(self, workspaces: Arc<Workspaces>) -> Self {
+        Self { workspaces, ..self }
     }
 
     /// Whether a feature needs the whole recording, which can then not be cut into spans.
@@ -196,13 +201,10 @@ impl Plan {
             if feature.derived.is_some() {
                 return Some(format!("{name} depends on neighbouring frames"));
             }
-            let refers = feature.finish.as_ref().is_some_and(|finish| finish.needs_peaks());
-            refers.then(|| {
-                format!(
-                    "{name} depends on the maximum of the whole recording: set its top_db to \"none\" \
-                     and its ref to a number"
-                )
-            })
+            let finish = feature.finish.as_ref().filter(|finish| finish.needs_peaks())?;
+            let remedy = finish.without_peaks().map(|set| format!(": set its {set}"));
+            let remedy = remedy.unwrap_or_default();
+            Some(format!("{name} depends on the maximum of the whole recording{remedy}"))
         })
     }
 
@@ -212,16 +214,6 @@ impl Plan {
             Some(Extent::Frames(hop)) => hop,
             Some(Extent::Vector) | None => 0.0,
         }
-    }
-
-    /// Memory for an extractor to work in.
-    pub(super) fn take_workspace(&self) -> Workspace {
-        self.workspaces.lock().unwrap_or_else(|e| e.into_inner()).pop().unwrap_or_default()
-    }
-
-    /// Keeps the memory of an extractor for the next one.
-    pub(super) fn give_workspace(&self, workspace: Workspace) {
-        self.workspaces.lock().unwrap_or_else(|e| e.into_inner()).push(workspace);
     }
 
     /// What the user should know of parameters that are possible but odd.

@@ -9,6 +9,7 @@ use corsmal_dsp::resample::MAX_EXPANSION;
 
 use super::plan::Plan;
 use super::signal_chain::channels_out;
+use super::workspace::Workspaces;
 use crate::config::Config;
 
 /// What a recording is computed with.
@@ -36,6 +37,8 @@ pub struct Plans<'a> {
     config: Arc<Config>,
     warn: Box<dyn Fn(&str) + Send + Sync + 'a>,
     state: Mutex<State>,
+    /// One for all plans: a run may meet a thousand rates.
+    workspaces: Arc<Workspaces>,
 }
 
 #[derive(Default)]
@@ -48,7 +51,8 @@ struct State {
 impl<'a> Plans<'a> {
     /// No plans yet; what a plan warns of goes to `warn`.
     pub fn new(config: Arc<Config>, warn: impl Fn(&str) + Send + Sync + 'a) -> Self {
-        Self { config, warn: Box::new(warn), state: Mutex::default() }
+        let (state, workspaces) = (Mutex::default(), Arc::default());
+        Self { config, warn: Box::new(warn), state, workspaces }
     }
 
     /// The plan for recordings like this one.
@@ -90,6 +94,33 @@ impl<'a> Plans<'a> {
             .transpose()
             .map_err(|e| e.to_string())?;
         let plan = Plan::new(&self.config, rate, channels).map_err(|e| e.to_string())?;
-        Ok(Planned { plan: Arc::new(plan), resample })
+        Ok(Planned { plan: Arc::new(plan.sharing(self.workspaces.clone())), resample })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::extractor::Extractor;
+    use super::*;
+    use corsmal_audio::SampleEncoding;
+
+    #[test]
+    fn plans_share_what_extractors_work_in() {
+        let plans = Plans::new(Arc::new(Config::preset("m4-code").unwrap()), |_| {});
+        for rate in 44_100..44_120 {
+            let spec = AudioSpec {
+                sample_rate: rate,
+                channels: 2,
+                format: "memory".into(),
+                encoding: SampleEncoding::Float { bytes: 4 },
+                declared_frames: None,
+            };
+            let mut extractor = Extractor::new(plans.of(&spec).unwrap().plan, 0..u64::MAX, 0);
+            extractor.push(&vec![0.1; 100_000]);
+            extractor.finish(true).unwrap();
+        }
+        assert_eq!(plans.workspaces.idle(), 1);
+        let bytes = plans.workspaces.bytes();
+        assert!((400_000..4 << 20).contains(&bytes), "{bytes}");
     }
 }

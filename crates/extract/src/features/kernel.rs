@@ -80,6 +80,11 @@ pub trait Finish: Send + Sync {
         !self.peaks().is_empty()
     }
 
+    /// What to set so that they do not, where that can be.
+    fn without_peaks(&self) -> Option<&'static str> {
+        None
+    }
+
     /// One frame, `raw [rows][channels]` to `out [coefficients][channels]`; `peaks` is
     /// `[peaks][channels]`.
     fn frame(&self, raw: &[f32], peaks: &[f32], channels: usize, out: &mut [f32]);

@@ -84,6 +84,10 @@ impl Finish for DecibelFinish {
         vec![(0..self.rows, self.db.joint)]
     }
 
+    fn without_peaks(&self) -> Option<&'static str> {
+        Some(DbSpec::WITHOUT_PEAK)
+    }
+
     fn frame(&self, raw: &[f32], peaks: &[f32], channels: usize, out: &mut [f32]) {
         corsmal_dsp::simd::vectorized(
             #[inline(always)]

@@ -130,6 +130,10 @@ impl Finish for Cepstrum {
         self.db.needs_peak()
     }
 
+    fn without_peaks(&self) -> Option<&'static str> {
+        Some(DbSpec::WITHOUT_PEAK)
+    }
+
     fn frame(&self, raw: &[f32], peaks: &[f32], channels: usize, out: &mut [f32]) {
         let mut clamped = [0.0_f32; 1024];
         let mut heap = Vec::new();

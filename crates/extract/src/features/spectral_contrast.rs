@@ -63,6 +63,10 @@ impl Finish for Difference {
         vec![(0..self.rows, false), (self.rows..2 * self.rows, false)]
     }
 
+    fn without_peaks(&self) -> Option<&'static str> {
+        Some("linear to true")
+    }
+
     fn frame(&self, raw: &[f32], peaks: &[f32], channels: usize, out: &mut [f32]) {
         let range = match Decibel::default().top_db {
             Some(range) if !self.linear => range as f32,

@@ -320,7 +320,7 @@ mod tests {
         let (label, value) = ("type".into(), "rice".into());
         made.part = Some(Part { label, value, column: 0, inputs: 2, places: vec![1] });
         let mut table = Table::new(Vec::new()).unwrap();
-        table.push(Outcome::new("a".into(), "a.wav", Status::Corrupt, ""), &[], &[]).unwrap();
+        table.push(Outcome::new("a", "a.wav", Status::Corrupt, ""), &[], &[]).unwrap();
         parquet::write(&file, &table, &made).unwrap();
         let out = folder.path().join("out.parquet");
         let refused = merge(&[file], &out, Existing::Keep, &GO).unwrap_err().to_string();

@@ -104,6 +104,9 @@ impl DbSpec {
         Ok(Decibel { reference: power(reference), amin: power(amin), top_db })
     }
 
+    /// What to set so that values do not depend on the maximum of the recording.
+    pub const WITHOUT_PEAK: &'static str = "top_db to \"none\" and its ref to a number";
+
     /// Whether values depend on the maximum of the recording.
     pub fn needs_peak(&self) -> bool {
         self.reference == DbRef::Max || self.top_db != TopDb::None

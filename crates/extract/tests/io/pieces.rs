@@ -115,7 +115,8 @@ fn what_depends_on_the_whole_recording_has_no_pieces() {
             "[features.rms]\n[summary]\nstats = [\"mean\"]",
             "statistics are computed over the whole recording",
         ),
-        ("[features.mfcc]", "maximum of the whole recording"),
+        ("[features.mfcc]", "maximum of the whole recording: set its top_db to \"none\""),
+        ("[features.spectral_contrast]", "maximum of the whole recording: set its linear to true"),
         (
             "[features.melspectrogram]\n[features.delta]\nof = \"melspectrogram\"",
             "delta depends on neighbouring frames",
