@@ -92,6 +92,17 @@ pub enum NetError {
         /// bytes free
         available: u64,
     },
+    /// Items whose classification needs more memory than is free.
+    #[error(
+        "an item needs about {:.1} GiB of memory, {:.1} GiB are free: it is too long",
+        *needed as f64 / GIB, *available as f64 / GIB
+    )]
+    LargeItem {
+        /// bytes needed
+        needed: u64,
+        /// bytes free
+        available: u64,
+    },
     /// A number that is not finite among the inputs.
     #[error("input {input}, item {item}: {value} is not a finite number")]
     NonFinite {

@@ -5,18 +5,20 @@ use std::path::Path;
 use crate::course::Course;
 use crate::epochs;
 use crate::error::{NetError, Result};
-use crate::items::Items;
+use crate::items::{Items, TOGETHER};
 use crate::layers::softmax;
 use crate::loss::{Loss, Targets};
+use crate::memory;
 use crate::network::Network;
 use crate::random::Stream;
-use crate::recipe::{Recipe, Select};
+use crate::recipe::{Padding, Recipe, Select};
 
 pub use crate::history::{Epoch, History, Progress};
 pub use crate::task::Task;
 
-/// Items classified together where nothing asks for another number; M5's predictions depend on it.
-const TOGETHER: usize = 64;
+/// Bytes that items classified together may take; one item may take more. Where padding counts it has a say in the
+/// numbers, so that there only the number of items decides.
+const MOST: u64 = 1 << 30;
 
 /// Trains a network from initial values of the recipe's seed. `score` rates classes against
 /// predicted ones, more is better; `progress` is told before the first epoch, before each step and after
@@ -65,7 +67,9 @@ pub fn probabilities(
     recipe: &Recipe,
 ) -> Result<Vec<Vec<f64>>> {
     let mut all = Vec::with_capacity(rows.len());
-    for rows in rows.chunks(TOGETHER) {
+    let free = corsmal_files::memory::available();
+    for rows in together(network, items, rows, recipe) {
+        memory::require_for_items(memory::of_evaluation(network, items, rows, recipe), free)?;
         let chance = Stream::new(recipe.seed, "offset of predictions");
         let out = network.logits(&items.laid(network, rows, recipe, chance))?;
         let n = out.shape.len();
@@ -78,6 +82,28 @@ pub fn probabilities(
         all.extend(values.chunks_exact(n).map(|p| p.iter().map(|&v| f64::from(v)).collect()));
     }
     Ok(all)
+}
+
+/// The rows in parts that are classified together.
+fn together<'r>(
+    network: &Network,
+    items: &Items,
+    mut rows: &'r [usize],
+    recipe: &Recipe,
+) -> Vec<&'r [usize]> {
+    let mut parts = Vec::new();
+    while !rows.is_empty() {
+        let mut count = TOGETHER.min(rows.len());
+        let fits =
+            |count: usize| memory::of_evaluation(network, items, &rows[..count], recipe) <= MOST;
+        while recipe.padding == Padding::Masked && count > 1 && !fits(count) {
+            count = count.div_ceil(2);
+        }
+        let (part, rest) = rows.split_at(count);
+        parts.push(part);
+        rows = rest;
+    }
+    parts
 }
 
 /// The most probable classes; the lowest among equals.
@@ -124,4 +150,28 @@ fn class_weights(outputs: usize, task: Task<'_>, recipe: &Recipe) -> Vec<f32> {
     let inverse = |&n: &usize| if n == 0 { 0.0 } else { 1.0 / n as f64 };
     let sum: f64 = counts.iter().map(inverse).sum();
     counts.iter().map(|n| (inverse(n) / sum) as f32).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::items::Column;
+    use crate::networks;
+
+    #[test]
+    fn a_long_item_is_not_classified_with_many() {
+        let definition = networks::named("m5_vggish_level").unwrap();
+        let network = definition.build(None, 0).unwrap();
+        let long = vec![0.0; 128 * 60_000];
+        let mut column = Column::of([&long[..]]);
+        (0..70).for_each(|_| column.push(&[0.0; 128]));
+        let items = Items { columns: vec![column] };
+        let rows: Vec<usize> = (0..71).collect();
+        let sizes = |padding| -> Vec<usize> {
+            let recipe = Recipe { padding, ..definition.recipe };
+            together(&network, &items, &rows, &recipe).iter().map(|part| part.len()).collect()
+        };
+        assert_eq!(sizes(Padding::Masked), [8, 63]);
+        assert_eq!(sizes(Padding::Published), [64, 7]);
+    }
 }

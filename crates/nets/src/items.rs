@@ -6,6 +6,9 @@ use crate::network::Network;
 use crate::random::Stream;
 use crate::recipe::{Offset, Padding, Recipe};
 
+/// Items classified together where nothing asks for another number; M5's predictions depend on it.
+pub(crate) const TOGETHER: usize = 64;
+
 /// All items of one input, one after another, channels last.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Column {
@@ -165,9 +168,15 @@ impl Items {
         self.columns.iter().zip(shapes).map(one).collect()
     }
 
+    /// Numbers of an item in one of its inputs.
+    pub(crate) fn numbers(&self, column: usize, item: usize) -> usize {
+        let ends = &self.columns[column].offsets;
+        ends[item + 1] - ends[item]
+    }
+
     /// Sum of the steps of an item over its inputs, a measure of its work.
     pub(crate) fn work(&self, item: usize) -> usize {
-        self.columns.iter().map(|c| c.offsets[item + 1] - c.offsets[item]).sum()
+        (0..self.columns.len()).map(|column| self.numbers(column, item)).sum()
     }
 }
 

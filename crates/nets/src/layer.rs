@@ -31,6 +31,11 @@ pub trait Layer: Debug + Send + Sync {
         self.output(input).map_or(0, |output| 2 * output.len())
     }
 
+    /// Numbers that evaluation holds for each item while this layer works, roughly: what comes before and after it.
+    fn passing(&self, input: Shape) -> usize {
+        input.len() + self.output(input).map_or(0, Shape::len)
+    }
+
     /// Numbers after it. In training it leaves on the tape what [`Layer::backward`] needs.
     fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch;
 
@@ -50,6 +55,16 @@ pub(crate) fn kept_by(layers: &[Box<dyn Layer>], input: Shape) -> usize {
         shape = layer.output(shape).unwrap_or(shape);
     }
     sum
+}
+
+/// Numbers that evaluation holds for each item while the largest of these layers works; see [`Layer::passing`].
+pub(crate) fn passing_by(layers: &[Box<dyn Layer>], input: Shape) -> usize {
+    let (mut shape, mut most) = (input, 0);
+    for layer in layers {
+        most = most.max(layer.passing(shape));
+        shape = layer.output(shape).unwrap_or(shape);
+    }
+    most
 }
 
 /// A way through the network.

@@ -5,7 +5,7 @@
 
 use burn_backend::ops::FloatTensorOps;
 use burn_backend::{DType, TensorData};
-use burn_flex::{Flex, FlexTensor};
+use burn_flex::{Flex, FlexTensor, Layout};
 use burn_std::Shape;
 
 /// `[rows, cols]` single-precision numbers.
@@ -14,6 +14,19 @@ pub struct Matrix {
     tensor: FlexTensor,
     rows: usize,
     cols: usize,
+}
+
+/// Stretches of a matrix's numbers that may overlap, as the rows of another matrix.
+#[derive(Clone, Copy, Debug)]
+pub struct Stretches {
+    /// where the first begins among all numbers
+    pub first: usize,
+    /// numbers from one to the next
+    pub step: usize,
+    /// how many
+    pub rows: usize,
+    /// numbers of each
+    pub cols: usize,
 }
 
 impl Matrix {
@@ -91,8 +104,58 @@ impl Matrix {
         let rest = self.tensor.narrow(0, first, self.rows - first);
         product(rest.transpose(0, 1), other.tensor.clone(), self.cols, other.cols)
     }
+
+    /// The matrix of these stretches times `other^T`.
+    ///
+    /// # Panics
+    /// When a stretch leaves the matrix.
+    pub fn stretches_dot_t(&self, stretches: Stretches, other: &Self) -> Self {
+        let left = self.stretches(stretches);
+        product(left, other.tensor.transpose(0, 1), stretches.rows, other.rows)
+    }
+
+    /// `self^T` times the matrix of these stretches of another.
+    ///
+    /// # Panics
+    /// When a stretch leaves the other matrix.
+    pub fn t_dot_stretches(&self, other: &Self, stretches: Stretches) -> Self {
+        let left = self.tensor.transpose(0, 1);
+        product(left, other.stretches(stretches), self.cols, stretches.cols)
+    }
+
+    fn stretches(&self, Stretches { first, step, rows, cols }: Stretches) -> FlexTensor {
+        let end = first + rows.saturating_sub(1) * step + cols;
+        assert!(end <= self.rows * self.cols, "stretches to {end} of {}", self.rows * self.cols);
+        let strides = vec![step as isize, 1];
+        self.tensor.clone().with_layout(Layout::new(Shape::from([rows, cols]), strides, first))
+    }
 }
 
 fn product(left: FlexTensor, right: FlexTensor, rows: usize, cols: usize) -> Matrix {
     Matrix { tensor: Flex::float_matmul(left, right), rows, cols }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stretches_are_the_rows_of_a_product() {
+        let numbers = Matrix::new(2, 4, (0..8).map(|v| v as f32).collect());
+        let stretches = Stretches { first: 1, step: 2, rows: 3, cols: 3 };
+        let gathered = Matrix::new(3, 3, vec![1.0, 2.0, 3.0, 3.0, 4.0, 5.0, 5.0, 6.0, 7.0]);
+        let other = Matrix::new(2, 3, vec![1.0, 0.0, -1.0, 2.0, 0.5, 1.0]);
+        let found = numbers.stretches_dot_t(stretches, &other);
+        assert_eq!(found.values(), gathered.dot_t(&other).values());
+        let left = Matrix::new(3, 2, vec![1.0, 2.0, 0.0, 1.0, 3.0, -1.0]);
+        let found = left.t_dot_stretches(&numbers, stretches);
+        assert_eq!(found.values(), left.t_dot(&gathered).values());
+    }
+
+    #[test]
+    #[should_panic(expected = "stretches to 10 of 8")]
+    fn stretches_stay_within_the_numbers() {
+        let stretches = Stretches { first: 1, step: 2, rows: 4, cols: 3 };
+        Matrix::zeros(2, 4).stretches_dot_t(stretches, &Matrix::zeros(2, 3));
+    }
 }

@@ -1,10 +1,13 @@
-//! How much memory a training takes, told before it begins.
+//! How much memory a training or an evaluation takes, told before it begins.
+
+use std::cmp::Reverse;
 
 use crate::batch::Shape;
 use crate::course::Course;
 use crate::error::{NetError, Result};
+use crate::items::{Items, TOGETHER};
 use crate::network::Network;
-use crate::recipe::{Offset, OptimizerKind, Recipe, Select};
+use crate::recipe::{Offset, OptimizerKind, Padding, Recipe, Select};
 
 const FLOAT: u64 = 4;
 
@@ -18,30 +21,88 @@ pub(crate) fn of_training(network: &Network, course: &Course<'_>, recipe: &Recip
         (OptimizerKind::Sgd, Select::Last) => 3,
         (OptimizerKind::Sgd, _) => 4,
     };
-    let longest = |column: usize, numbers: usize| {
-        let ends = &course.items.columns[column].offsets;
-        let of = |&row: &usize| (ends[row + 1] - ends[row]) / numbers;
-        course.train.iter().chain(course.watched).map(of).max().unwrap_or(0)
-    };
-    let shapes = network.inputs().iter().enumerate().map(|(column, input)| match input.shape {
-        Shape::Sequence { numbers, .. } if recipe.offset == Offset::Random => {
-            Shape::Sequence { steps: Offset::STEPS, numbers }
-        }
-        Shape::Sequence { numbers, .. } => {
-            Shape::Sequence { steps: longest(column, numbers), numbers }
-        }
-        shape => shape,
-    });
-    let step = network.kept(&shapes.collect::<Vec<_>>()) as u64;
-    let batch = recipe.batch.min(course.train.len()) as u64;
     let numbers = items as u64 + copies * network.parameters().count() as u64;
-    FLOAT * numbers.saturating_add(batch.saturating_mul(step))
+    let step = |rows: &[usize], batch: usize, of: Numbers| {
+        Worst::of(network, course.items, rows, batch, recipe).numbers(network, of)
+    };
+    let training = step(course.train, recipe.batch, Network::kept);
+    let rating = step(course.watched, TOGETHER, Network::passing);
+    FLOAT.saturating_mul(numbers.saturating_add(training.max(rating)))
+}
+
+/// Bytes that the evaluation of these items together takes beyond the items and the network, roughly.
+pub(crate) fn of_evaluation(
+    network: &Network,
+    items: &Items,
+    rows: &[usize],
+    recipe: &Recipe,
+) -> u64 {
+    let worst = Worst::of(network, items, rows, rows.len(), recipe);
+    FLOAT.saturating_mul(worst.numbers(network, Network::passing))
+}
+
+/// Numbers for an item of these shapes.
+type Numbers = fn(&Network, &[Shape]) -> usize;
+
+/// The batch that takes the most memory.
+struct Worst {
+    items: u64,
+    /// numbers of the inputs, padding included
+    inputs: u64,
+    /// shapes of a mean item, without the padding where no work is done on it
+    shapes: Vec<Shape>,
+}
+
+impl Worst {
+    /// Of `batch` of these items.
+    fn of(network: &Network, items: &Items, rows: &[usize], batch: usize, recipe: &Recipe) -> Self {
+        let count = batch.min(rows.len());
+        let mut inputs = 0u64;
+        let shapes = network.inputs().iter().enumerate().map(|(column, input)| {
+            let Shape::Sequence { numbers, .. } = input.shape else {
+                inputs = inputs.saturating_add(count as u64 * input.shape.len() as u64);
+                return input.shape;
+            };
+            let (padded, worked) = match recipe.offset {
+                Offset::Random => (Offset::STEPS, Offset::STEPS),
+                Offset::Start => {
+                    let mut steps: Vec<usize> =
+                        rows.iter().map(|&row| items.numbers(column, row) / numbers).collect();
+                    steps.sort_unstable_by_key(|&n| Reverse(n));
+                    let longest = steps.first().copied().unwrap_or(0);
+                    let sum: usize = steps.iter().take(count).sum();
+                    match recipe.padding {
+                        Padding::Published => (longest, longest),
+                        Padding::Masked => (longest, sum.div_ceil(count.max(1))),
+                    }
+                }
+            };
+            let width = (count as u64).saturating_mul(numbers as u64);
+            inputs = inputs.saturating_add(width.saturating_mul(padded as u64));
+            Shape::Sequence { steps: worked, numbers }
+        });
+        let shapes = shapes.collect();
+        Self { items: count as u64, inputs, shapes }
+    }
+
+    fn numbers(&self, network: &Network, of: Numbers) -> u64 {
+        let each = of(network, &self.shapes) as u64;
+        self.inputs.saturating_add(self.items.saturating_mul(each))
+    }
 }
 
 /// Refuses a training that needs more memory than is free, where the system tells how much is.
 pub(crate) fn require(needed: u64, available: Option<u64>) -> Result<()> {
     match available {
         Some(available) if needed > available => Err(NetError::Memory { needed, available }),
+        _ => Ok(()),
+    }
+}
+
+/// The same for items that are only classified.
+pub(crate) fn require_for_items(needed: u64, available: Option<u64>) -> Result<()> {
+    match available {
+        Some(available) if needed > available => Err(NetError::LargeItem { needed, available }),
         _ => Ok(()),
     }
 }
@@ -77,6 +138,37 @@ mod tests {
         assert_eq!(of(10, 4), of(10, 64));
         // Five layers of 512 with three gates and a state each, four items of 100 steps.
         assert!(of(100, 4) > least + 4 * 4 * 100 * 5 * 512 * 4);
+    }
+
+    #[test]
+    fn a_long_item_counts_once_where_padding_is_left_out() {
+        let definition = networks::named("m5_vggish_level").unwrap();
+        let network = definition.build(None, 0).unwrap();
+        let (short, long) = (vec![0.0; 128], vec![0.0; 128 * 1000]);
+        let mut column = Column::of([&long[..]]);
+        (0..31).for_each(|_| column.push(&short));
+        let items = Items { columns: vec![column] };
+        let rows: Vec<usize> = (0..32).collect();
+        let course = Course {
+            items: &items,
+            targets: &Targets::Classes((0..32).map(|i| i % 3).collect()),
+            train: &rows,
+            watched: &[],
+            loss: Loss::CrossEntropy,
+            class_weights: Vec::new(),
+        };
+        let of = |padding, train: &[usize]| {
+            let course =
+                Course { train, loss: Loss::CrossEntropy, class_weights: Vec::new(), ..course };
+            of_training(&network, &course, &Recipe { padding, ..definition.recipe })
+        };
+        let (alone, together) = (of(Padding::Masked, &rows[..1]), of(Padding::Masked, &rows));
+        // Inputs are padded, states are not.
+        let inputs = 4 * 32 * 1000 * 128;
+        assert!(together - alone < inputs + (8 << 20), "{alone} {together}");
+        assert!(of(Padding::Published, &rows) > 8 * alone);
+        let evaluated = |rows: &[usize]| of_evaluation(&network, &items, rows, &definition.recipe);
+        assert!(evaluated(&rows) < 3 * evaluated(&rows[..1]) && evaluated(&rows[1..]) < 4 << 20);
     }
 
     #[test]

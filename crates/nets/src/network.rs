@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use crate::batch::{Batch, Shape};
 use crate::error::{NetError, Result};
-use crate::layer::{Backward, Chain, Layer, Pass, Training, kept_by};
+use crate::layer::{Backward, Chain, Layer, Pass, Training, kept_by, passing_by};
 use crate::loss::{Loss, Targets};
 use crate::matrix::Matrix;
 use crate::parameters::{Declared, Initial, Parameters};
@@ -159,7 +159,13 @@ impl Network {
     /// Numbers that a training step holds for an item of these input shapes, roughly.
     pub(crate) fn kept(&self, shapes: &[Shape]) -> usize {
         let chains = self.architecture.body.chains().iter().zip(shapes);
-        chains.map(|(chain, &input)| input.len() + kept_by(chain, input)).sum()
+        chains.map(|(chain, &input)| kept_by(chain, input)).sum()
+    }
+
+    /// Numbers that evaluation holds for an item of these input shapes, roughly, beside the inputs.
+    pub(crate) fn passing(&self, shapes: &[Shape]) -> usize {
+        let chains = self.architecture.body.chains().iter().zip(shapes);
+        chains.map(|(chain, &input)| passing_by(chain, input)).max().unwrap_or(0)
     }
 
     /// Refuses inputs of other shapes.

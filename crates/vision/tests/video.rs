@@ -111,9 +111,9 @@ fn the_way_to_pictures_is_said() {
 
 #[cfg(feature = "video")]
 mod decoded {
-    use openh264::encoder::Encoder;
+    use openh264::encoder::{Encoder, EncoderConfig, MatrixCoefficients, VuiConfig};
     use openh264::formats::{RgbSliceU8, YUVBuffer};
-    use openh264::nal_units;
+    use openh264::{OpenH264API, nal_units};
 
     use super::*;
 
@@ -124,13 +124,21 @@ mod decoded {
 
     /// Content of `avcC`, and frames with lengths of four bytes.
     fn encoded(count: usize) -> (Vec<u8>, Vec<Vec<u8>>) {
-        let mut encoder = Encoder::new().unwrap();
-        let (mut setup, mut frames) = (Vec::new(), Vec::new());
-        for k in 0..count {
+        let pictures = (0..count).map(|k| {
             let grey = shade(k);
             let pixel = |i: usize| if i % 32 < 16 { [grey, 0, 0] } else { [grey; 3] };
             let pixels: Vec<u8> = (0..32 * 24).flat_map(pixel).collect();
-            let picture = YUVBuffer::from_rgb8_source(RgbSliceU8::new(&pixels, (32, 24)));
+            YUVBuffer::from_rgb8_source(RgbSliceU8::new(&pixels, (32, 24)))
+        });
+        encoded_by(Encoder::new().unwrap(), pictures)
+    }
+
+    fn encoded_by(
+        mut encoder: Encoder,
+        pictures: impl Iterator<Item = YUVBuffer>,
+    ) -> (Vec<u8>, Vec<Vec<u8>>) {
+        let (mut setup, mut frames) = (Vec::new(), Vec::new());
+        for picture in pictures {
             let stream = encoder.encode(&picture).unwrap().to_vec();
             let (mut frame, mut sets) = (Vec::new(), [Vec::new(), Vec::new()]);
             for unit in nal_units(&stream) {
@@ -215,6 +223,68 @@ mod decoded {
                 .all(|(got, want)| (f64::from(*got) - want.clamp(0.0, 255.0)).abs() <= 4.0);
             assert!(near, "frame {k}: {got:?} not {want:?}");
         }
+    }
+
+    /// Brightness and differences of colour of a frame.
+    const YUV: [u8; 3] = [120, 105, 160];
+
+    /// A frame of one colour, under a declaration of the stream.
+    fn declaring(vui: Option<VuiConfig>) -> (Vec<u8>, Vec<Vec<u8>>) {
+        let config = EncoderConfig::new();
+        let config = if let Some(vui) = vui { config.vui(vui) } else { config };
+        let encoder = Encoder::with_api_config(OpenH264API::from_source(), config).unwrap();
+        let plane = |value: u8, count: usize| vec![value; count];
+        let planes = [plane(YUV[0], 32 * 24), plane(YUV[1], 16 * 12), plane(YUV[2], 16 * 12)];
+        encoded_by(encoder, std::iter::once(YUVBuffer::from_vec(planes.concat(), 32, 24)))
+    }
+
+    /// By the factors that ITU-R prints for limited range: light, red by Cr, green by Cb and by Cr, blue by Cb.
+    fn near(picture: &Rgb, [light, red, green_cb, green_cr, blue]: [f64; 5], floor: f64) {
+        let [y, cb, cr] =
+            [f64::from(YUV[0]) - floor, f64::from(YUV[1]) - 128.0, f64::from(YUV[2]) - 128.0];
+        let y = light * y;
+        let want = [y + red * cr, y - green_cb * cb - green_cr * cr, y + blue * cb];
+        let got = &picture.data[3 * (12 * 32 + 16)..][..3];
+        let same = got.iter().zip(want).all(|(got, want)| (f64::from(*got) - want).abs() <= 2.0);
+        assert!(same, "{got:?} not {want:?}");
+    }
+
+    #[test]
+    fn colours_are_those_that_are_declared() {
+        const BT601: [f64; 5] = [1.164_383, 1.596_027, 0.391_762, 0.812_968, 2.017_232];
+        const BT709: [f64; 5] = [1.164_384, 1.792_741, 0.213_249, 0.532_909, 2.112_402];
+        const BT2020: [f64; 5] = [1.164_384, 1.678_674, 0.187_326, 0.650_424, 2.141_772];
+        const BT709_FULL: [f64; 5] = [1.0, 1.5748, 0.187_324, 0.468_124, 1.8556];
+        let folder = tempfile::tempdir().unwrap();
+        let open = |file: &[u8]| pictures(&written(folder.path(), file));
+        let seen = |file: &[u8]| open(file).unwrap().remove(0).1;
+        for (vui, factors, floor) in [
+            (None, BT601, 16.0),
+            (Some(VuiConfig::bt601()), BT601, 16.0),
+            (Some(VuiConfig::bt709()), BT709, 16.0),
+            (Some(VuiConfig::bt709_full()), BT709_FULL, 0.0),
+            (Some(VuiConfig::bt2020()), BT2020, 16.0),
+        ] {
+            let (setup, frames) = declaring(vui);
+            near(&seen(&muxed::mp4(b"avc1", &setup, &frames)), factors, floor);
+        }
+        // What the file says counts where the stream says nothing.
+        let (silent, frames) = declaring(None);
+        let in_colr = |colr: &[u8], setup: &[u8], frames: &[Vec<u8>]| {
+            muxed::with_boxes(b"avc1", &[(b"avcC", setup), (b"colr", colr)], frames)
+        };
+        let full = b"nclx\0\x01\0\x01\0\x01\x80";
+        near(&seen(&in_colr(full, &silent, &frames)), BT709_FULL, 0.0);
+        near(&seen(&in_colr(b"nclc\0\x09\0\x0e\0\x09", &silent, &frames)), BT2020, 16.0);
+        near(&seen(&in_colr(b"prof\0\x09\0\x0e\0\x09", &silent, &frames)), BT601, 16.0);
+        near(&seen(&in_colr(b"ncl", &silent, &frames)), BT601, 16.0);
+        let (setup, frames) = declaring(Some(VuiConfig::bt709()));
+        near(&seen(&in_colr(full, &setup, &frames)), BT709, 16.0);
+        // Colours that no matrix gives are refused.
+        let odd = VuiConfig::bt709().matrix_coefficients(MatrixCoefficients::Ycgco);
+        let (setup, frames) = declaring(Some(odd));
+        let said = open(&muxed::mp4(b"avc1", &setup, &frames)).unwrap_err();
+        assert!(said.contains("matrix 8 of H.273"), "{said}");
     }
 
     #[test]

@@ -17,7 +17,7 @@ pub use dropout::Dropout;
 pub use linear::Linear;
 pub use pool::{AveragePool, MaxPool};
 pub use recurrent::Recurrent;
-pub use reshape::{Flatten, FlattenPixels, Join, LastStep};
+pub use reshape::{Flatten, FlattenPixels, Join};
 pub use residual::Residual;
 
 use crate::parameters::Initial;

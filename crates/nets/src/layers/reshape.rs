@@ -61,55 +61,6 @@ impl Layer for FlattenPixels {
     }
 }
 
-/// The last step of every sequence.
-#[derive(Clone, Copy, Debug)]
-pub struct LastStep;
-
-impl Layer for LastStep {
-    fn describe(&self) -> String {
-        "last step".into()
-    }
-
-    fn output(&self, input: Shape) -> Result<Shape> {
-        match input {
-            Shape::Sequence { numbers, .. } => Ok(Shape::Vector(numbers)),
-            _ => Err(NetError::layer(self.describe(), "a sequence", input)),
-        }
-    }
-
-    fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch {
-        let (steps, n) = (input.shape.places(), input.shape.numbers());
-        let items = input.items();
-        let values = input.values.values();
-        let mut last = Vec::with_capacity(items * n);
-        for i in 0..items {
-            let at = (i * steps + last_of(&input.lengths, i, steps)) * n;
-            last.extend_from_slice(&values[at..at + n]);
-        }
-        pass.save(|| Saved::Shape(input.shape, input.lengths));
-        Batch { values: Matrix::new(items, n, last), shape: Shape::Vector(n), lengths: None }
-    }
-
-    fn backward(&self, gradient: Batch, pass: &mut Backward<'_>) -> Batch {
-        let Saved::Shape(shape, lengths) = pass.saved() else {
-            unreachable!("last step saves its shape")
-        };
-        let (steps, n, items) = (shape.places(), shape.numbers(), gradient.items());
-        let mut values = Matrix::zeros(items * steps, n);
-        let all = values.values_mut();
-        for (i, row) in gradient.values.values().chunks_exact(n).enumerate() {
-            let at = (i * steps + last_of(&lengths, i, steps)) * n;
-            all[at..at + n].copy_from_slice(row);
-        }
-        Batch { values, shape, lengths }
-    }
-}
-
-/// Index of the last step of item `i`; of the last padded step when lengths are not known.
-fn last_of(lengths: &Option<Vec<usize>>, i: usize, steps: usize) -> usize {
-    lengths.as_ref().map_or(steps, |l| l[i]).max(1) - 1
-}
-
 /// Appends the numbers of another input of the network.
 #[derive(Clone, Copy, Debug)]
 pub struct Join {

@@ -1,6 +1,6 @@
 use super::definition::Definition;
 use crate::batch::Shape;
-use crate::layers::{Dropout, LastStep, Linear, Recurrent, Sigmoid};
+use crate::layers::{Dropout, Linear, Recurrent, Sigmoid};
 use crate::network::{Architecture, Body, Input};
 use crate::recipe::Recipe;
 
@@ -23,7 +23,6 @@ fn architecture(outputs: usize) -> Architecture {
         inputs: vec![Input::new("features", Shape::Sequence { steps: 0, numbers: 1024 })],
         body: Body::Chain(vec![
             Box::new(Recurrent::lstm("lstm", 1024, 256, 3).dropout(0.2)),
-            Box::new(LastStep),
             Box::new(Dropout(0.2)),
             Box::new(Linear::new("fc", 256, outputs)),
             Box::new(Sigmoid),

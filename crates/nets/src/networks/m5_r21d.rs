@@ -1,7 +1,7 @@
 use super::definition::Definition;
 use crate::batch::Shape;
 use crate::layer::Chain;
-use crate::layers::{LastStep, Linear, Recurrent, Relu};
+use crate::layers::{Linear, Recurrent, Relu};
 use crate::network::{Architecture, Body, Input};
 use crate::recipe::{InitialKind, Recipe};
 
@@ -39,7 +39,6 @@ fn architecture(outputs: usize, hidden: usize, layers: usize) -> Architecture {
     let view = |v: usize| -> Chain {
         vec![
             Box::new(Recurrent::gru(format!("c{v}.rnn"), 512, hidden, layers)),
-            Box::new(LastStep),
             Box::new(Relu),
             Box::new(Linear::new(format!("c{v}.fc"), hidden, outputs)),
         ]

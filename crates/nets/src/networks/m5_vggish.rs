@@ -1,6 +1,6 @@
 use super::definition::Definition;
 use crate::batch::Shape;
-use crate::layers::{LastStep, Linear, Recurrent, Relu};
+use crate::layers::{Linear, Recurrent, Relu};
 use crate::network::{Architecture, Body, Input};
 use crate::recipe::{InitialKind, Recipe};
 
@@ -35,7 +35,6 @@ fn architecture(outputs: usize) -> Architecture {
         inputs: vec![Input::new("vggish", Shape::Sequence { steps: 0, numbers: 128 })],
         body: Body::Chain(vec![
             Box::new(Recurrent::gru("rnn", 128, 512, 5)),
-            Box::new(LastStep),
             Box::new(Relu),
             Box::new(Linear::new("fc", 512, outputs)),
         ]),

@@ -3,8 +3,8 @@
 use corsmal_nets::batch::{Batch, Shape};
 use corsmal_nets::layer::Chain;
 use corsmal_nets::layers::{
-    AveragePool, BatchNorm, Conv2d, Dropout, FlattenPixels, LastStep, Linear, MaxPool, Recurrent,
-    Relu, Residual,
+    AveragePool, BatchNorm, Conv2d, Dropout, FlattenPixels, Linear, MaxPool, Recurrent, Relu,
+    Residual,
 };
 use corsmal_nets::loss::{Loss, Targets};
 use corsmal_nets::network::{Architecture, Body, Input, Network};
@@ -117,10 +117,8 @@ fn pixels_are_flattened_in_their_order_and_back() {
 fn recurrent_networks_have_right_gradients_with_lengths() {
     let shape = Shape::Sequence { steps: 0, numbers: 3 };
     for recurrent in [Recurrent::gru("r", 3, 5, 2), Recurrent::lstm("r", 3, 5, 2)] {
-        let mut network = network(
-            shape,
-            vec![Box::new(recurrent), Box::new(LastStep), Box::new(Linear::new("out", 5, 2))],
-        );
+        let mut network =
+            network(shape, vec![Box::new(recurrent), Box::new(Linear::new("out", 5, 2))]);
         let steps = Shape::Sequence { steps: 6, numbers: 3 };
         let mut x = Batch::new(noise(2, 4 * 6 * 3), steps);
         x.lengths = Some(vec![2, 6, 1, 4]);

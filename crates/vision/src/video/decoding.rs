@@ -10,6 +10,7 @@ use openh264::OpenH264API;
 use openh264::decoder::{DecodedYUV, Decoder, DecoderConfig, Flush};
 use openh264::formats::YUVSource;
 
+use super::colours::Colours;
 use super::mp4::Track;
 use crate::error::{Result, VisionError};
 use crate::image::{Rgb, check_size};
@@ -23,6 +24,8 @@ pub(super) struct Decoding<'v> {
     path: &'v Path,
     file: File,
     decoder: Decoder,
+    /// What is known of its colours.
+    colours: Colours,
     /// Bytes of the length before each unit of a frame.
     length: usize,
     /// Parameter sets at first; then what is decoded.
@@ -47,14 +50,16 @@ impl<'v> Decoding<'v> {
             ))
         })?;
         let setup = setup_of(setup).ok_or_else(|| damaged("a damaged box avcC".into()))?;
-        let Setup { prefix, length } = setup;
+        let Setup { units, length } = setup;
+        let (mut colours, mut stream) = (Colours::new(track.declared), Vec::new());
+        append(&units, &mut stream, &mut colours).map_err(damaged)?;
         // Frames come in the order in which they are shown only where none is asked for before its turn.
         let config = DecoderConfig::new().flush_after_decode(Flush::NoFlush);
         let decoder = Decoder::with_api_config(OpenH264API::from_source(), config);
         let decoder = decoder.map_err(|e| damaged(format!("no decoder: {e}")))?;
         let file = File::open(path).map_err(|e| VisionError::io(path, e))?;
-        let stream = prefix;
-        Ok(Self { track, path, file, decoder, length, stream, given: 0, shown: 0, last: None })
+        let (given, shown, last) = (0, 0, None);
+        Ok(Self { track, path, file, decoder, colours, length, stream, given, shown, last })
     }
 
     /// As [`super::Pictures::next`].
@@ -90,12 +95,14 @@ impl<'v> Decoding<'v> {
         let mut frame = Vec::new();
         self.file.seek(SeekFrom::Start(at)).map_err(io)?;
         self.file.by_ref().take(bytes.into()).read_to_end(&mut frame).map_err(io)?;
-        units(&frame, self.length, &mut self.stream)
+        let units = units(&frame, self.length)
             .ok_or_else(|| self.damaged(format!("frame {number} is damaged")))?;
+        append(&units, &mut self.stream, &mut self.colours)
+            .map_err(|reason| VisionError::file(path, reason))?;
         self.given += 1;
-        let Self { decoder, stream, shown, .. } = self;
+        let Self { decoder, colours, stream, shown, .. } = self;
         let found = guarded(|| match decoder.decode(stream) {
-            Ok(Some(yuv)) => Some(converted(&yuv, shown, wanted, path)).transpose(),
+            Ok(Some(yuv)) => Some(converted(&yuv, shown, wanted, (colours, path))).transpose(),
             Ok(None) => Ok(None),
             Err(error) => {
                 let reason = format!("frame {number} cannot be decoded: {error}");
@@ -108,12 +115,12 @@ impl<'v> Decoding<'v> {
 
     /// What the decoder still holds after the last frame.
     fn flush(&mut self, wanted: &dyn Fn(u32) -> bool) -> Result<VecDeque<(u32, Option<Rgb>)>> {
-        let Self { decoder, shown, path, .. } = self;
+        let Self { decoder, colours, shown, path, .. } = self;
         let left = guarded(|| {
             let left = decoder.flush_remaining().map_err(|e| {
                 VisionError::file(path, format!("its last frames cannot be decoded: {e}"))
             })?;
-            left.iter().map(|yuv| converted(yuv, shown, wanted, path)).collect()
+            left.iter().map(|yuv| converted(yuv, shown, wanted, (colours, path))).collect()
         });
         left.ok_or_else(|| self.damaged("the decoder failed on its last frames".into()))?
     }
@@ -128,11 +135,11 @@ fn converted(
     yuv: &DecodedYUV<'_>,
     shown: &mut u32,
     wanted: &dyn Fn(u32) -> bool,
-    path: &Path,
+    (colours, path): (&Colours, &Path),
 ) -> Result<(u32, Option<Rgb>)> {
     let number = *shown;
     *shown += 1;
-    Ok((number, if wanted(number) { Some(rgb(yuv, path)?) } else { None }))
+    Ok((number, if wanted(number) { Some(rgb(yuv, colours, path)?) } else { None }))
 }
 
 /// Runs foreign code; `None` where it panics.
@@ -141,44 +148,60 @@ fn guarded<T>(decode: impl FnOnce() -> T) -> Option<T> {
 }
 
 /// What a decoder must know first.
-struct Setup {
-    /// Parameter sets as a stream.
-    prefix: Vec<u8>,
+struct Setup<'a> {
+    /// Parameter sets.
+    units: Vec<&'a [u8]>,
     /// Bytes of the length before each unit of a frame.
     length: usize,
 }
 
-fn setup_of(bytes: &[u8]) -> Option<Setup> {
+fn setup_of(bytes: &[u8]) -> Option<Setup<'_>> {
     let length = usize::from(bytes.get(4)? & 3) + 1;
-    let (mut prefix, mut at) = (Vec::new(), 5);
+    let (mut units, mut at) = (Vec::new(), 5);
     for mask in [0x1f, 0xff] {
         let count = bytes.get(at)? & mask;
         at += 1;
         for _ in 0..count {
             let size = usize::from(u16::from_be_bytes(*bytes.get(at..)?.first_chunk()?));
-            prefix.extend(START);
-            prefix.extend(bytes.get(at + 2..)?.get(..size)?);
+            units.push(bytes.get(at + 2..)?.get(..size)?);
             at += 2 + size;
         }
     }
-    Some(Setup { prefix, length })
+    Some(Setup { units, length })
 }
 
-/// Adds the units of a frame to a stream.
-fn units(mut frame: &[u8], length: usize, stream: &mut Vec<u8>) -> Option<()> {
+/// The units of a frame.
+fn units(mut frame: &[u8], length: usize) -> Option<Vec<&[u8]>> {
+    let mut units = Vec::new();
     while !frame.is_empty() {
         let size = frame.get(..length)?.iter().fold(0, |size, &byte| size << 8 | usize::from(byte));
-        stream.extend(START);
-        stream.extend(frame[length..].get(..size)?);
+        units.push(frame[length..].get(..size)?);
         frame = &frame[length + size..];
     }
-    Some(())
+    Some(units)
 }
 
-fn rgb(yuv: &DecodedYUV<'_>, path: &Path) -> Result<Rgb> {
+/// Adds units to a stream, and what they say of colours.
+fn append(
+    units: &[&[u8]],
+    stream: &mut Vec<u8>,
+    colours: &mut Colours,
+) -> std::result::Result<(), String> {
+    for unit in units {
+        colours.read(unit)?;
+        stream.extend(START);
+        stream.extend(*unit);
+    }
+    Ok(())
+}
+
+fn rgb(yuv: &DecodedYUV<'_>, colours: &Colours, path: &Path) -> Result<Rgb> {
     let (width, height) = yuv.dimensions();
     check_size(width, height, path)?;
+    let conversion = colours.conversion().map_err(|reason| VisionError::file(path, reason))?;
     let mut data = vec![0; 3 * width * height];
-    yuv.write_rgb8(&mut data);
+    let strides = yuv.strides();
+    let planes = [(yuv.y(), strides.0), (yuv.u(), strides.1), (yuv.v(), strides.2)];
+    conversion.write(planes, width, &mut data);
     Ok(Rgb { width, height, data })
 }

@@ -2,6 +2,8 @@
 //! feature `video`.
 
 #[cfg(feature = "video")]
+mod colours;
+#[cfg(feature = "video")]
 mod decoding;
 mod mp4;
 
@@ -45,11 +47,11 @@ impl Video {
     /// Whether this program decodes videos.
     pub const DECODES: bool = cfg!(feature = "video");
 
-    /// Begins with its first frame. Colours are taken for BT.601 of limited range, as those of videos that say
-    /// nothing else.
+    /// Begins with its first frame. Colours are those that the stream declares, or else the file; where neither does,
+    /// BT.601 of limited range.
     ///
     /// # Errors
-    /// [`VisionError`] for another codec, and where this program was built without the feature.
+    /// [`VisionError`] for another codec, for colours that are none of the usual ones, and where this program was built without the feature.
     pub fn pictures(&self) -> Result<Pictures<'_>> {
         #[cfg(feature = "video")]
         return decoding::Decoding::begin(&self.track, &self.path).map(Pictures);

@@ -28,8 +28,19 @@ pub(super) struct Track {
     pub(super) codec: [u8; 4],
     /// Content of its `avcC` box; `None` for other codecs.
     pub(super) setup: Option<Vec<u8>>,
+    /// Its colours, as far as the file says.
+    pub(super) declared: Declared,
     /// First byte and number of bytes of each frame, in decoding order.
     pub(super) frames: Vec<(u64, u32)>,
+}
+
+/// What is said of colours.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Declared {
+    /// Number of the matrix in ITU-T H.273.
+    pub(super) matrix: Option<u16>,
+    /// Whether numbers take the full range of 8 bits.
+    pub(super) full: Option<bool>,
 }
 
 /// A box: what it is, and its content.
@@ -184,9 +195,10 @@ fn track(table: &[u8], size: u64) -> Result<Track, String> {
             ));
         }
     };
-    let setup = match codec == *b"avc1" || codec == *b"avc3" {
-        true => Some(child(entry.get(VISUAL_ENTRY..).unwrap_or_default(), b"avcC")?.to_vec()),
-        false => None,
+    let more = entry.get(VISUAL_ENTRY..).unwrap_or_default();
+    let (setup, declared) = match codec == *b"avc1" || codec == *b"avc3" {
+        true => (Some(child(more, b"avcC")?.to_vec()), colours(more)),
+        false => (None, Declared::default()),
     };
     let sizes = child(table, b"stsz")?;
     let (every, count) = (u32_at(sizes, 4)?, u32_at(sizes, 8)? as usize);
@@ -236,9 +248,22 @@ fn track(table: &[u8], size: u64) -> Result<Track, String> {
         }
     }
     match frames.len() == count {
-        true => Ok(Track { codec, setup, frames }),
+        true => Ok(Track { codec, setup, declared, frames }),
         false => Err(format!("its index locates {} of {count} frames", frames.len())),
     }
+}
+
+/// What the boxes of a description say of colours: numbers of primaries, transfer and matrix, and of ISO's kind the
+/// range.
+fn colours(description: &[u8]) -> Declared {
+    let Ok(said) = child(description, b"colr") else { return Declared::default() };
+    let kind = said.get(..4).unwrap_or_default();
+    if kind != b"nclx" && kind != b"nclc" {
+        return Declared::default();
+    }
+    let matrix = said.get(8..10).and_then(|two| two.first_chunk());
+    let full = said.get(10).filter(|_| kind == b"nclx").map(|byte| byte & 0x80 > 0);
+    Declared { matrix: matrix.map(|two| u16::from_be_bytes(*two)), full }
 }
 
 /// The entries of a table of `width` bytes each, behind version, flags and their number.

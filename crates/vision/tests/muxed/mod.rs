@@ -16,6 +16,11 @@ fn table(kind: &[u8; 4], width: usize, entries: &[u32]) -> Vec<u8> {
 
 /// A file with one video track: its codec, the content of `avcC`, and frames, of which three are a chunk.
 pub fn mp4(codec: &[u8; 4], setup: &[u8], frames: &[Vec<u8>]) -> Vec<u8> {
+    with_boxes(codec, &[(b"avcC", setup)], frames)
+}
+
+/// The same with these boxes in the description of the codec.
+pub fn with_boxes(codec: &[u8; 4], boxes: &[(&[u8; 4], &[u8])], frames: &[Vec<u8>]) -> Vec<u8> {
     let mut file = [boxed(b"ftyp", b"isom\0\0\0\0isom"), boxed(b"free", &[])].concat();
     let (mut sizes, mut chunks, mut at) = (vec![0, 0, frames.len() as u32], vec![], file.len() + 8);
     for (number, frame) in frames.iter().enumerate() {
@@ -33,7 +38,8 @@ pub fn mp4(codec: &[u8; 4], setup: &[u8], frames: &[Vec<u8>]) -> Vec<u8> {
     } else if rest > 0 {
         runs[1] = rest;
     }
-    let entry = [vec![0; 78], boxed(b"avcC", setup)].concat();
+    let boxes: Vec<u8> = boxes.iter().flat_map(|(kind, content)| boxed(kind, content)).collect();
+    let entry = [vec![0; 78], boxes].concat();
     let stbl = [
         boxed(b"stsd", &[numbers(&[0, 1]), boxed(codec, &entry)].concat()),
         table(b"stts", 2, &[frames.len() as u32, 1]),

@@ -2,7 +2,8 @@
 //!
 //! Sequences are packed: step after step, longest sequence first, so that no work is done on
 //! padding. All products by the input are one product for each layer; the gates of a step are one
-//! pass over the numbers.
+//! pass over the numbers. What comes after them is the output of the last step: those of other steps are not
+//! unpacked.
 
 mod cell;
 mod packing;
@@ -23,7 +24,7 @@ use trace::LayerTrace;
 
 pub use trace::Trace;
 
-/// GRU or LSTM layers, each over the outputs of the one before.
+/// GRU or LSTM layers, each over the outputs of the one before; the last step of the last counts.
 #[derive(Clone, Debug)]
 pub struct Recurrent {
     name: String,
@@ -129,8 +130,10 @@ impl Recurrent {
 impl Layer for Recurrent {
     fn describe(&self) -> String {
         let Self { name, inputs, hidden, layers, .. } = self;
-        let mut text =
-            format!("{name}: {layers} {} layers, {inputs} to {hidden}", self.cell.name());
+        let mut text = format!(
+            "{name}: {layers} {} layers, {inputs} to {hidden}, last step",
+            self.cell.name()
+        );
         if self.dropout > 0.0 {
             text += &format!(", dropout {} between", self.dropout);
         }
@@ -153,17 +156,18 @@ impl Layer for Recurrent {
 
     fn kept(&self, input: Shape) -> usize {
         // Gates and states of each layer, and the gradients by the gates.
-        let gates = match self.cell {
-            Cell::Gru => 3,
-            Cell::Lstm => 4,
-        };
-        input.places() * self.hidden * self.layers * (2 * gates + 2)
+        input.places() * self.hidden * self.layers * (2 * self.cell.gates() + 2)
+    }
+
+    fn passing(&self, input: Shape) -> usize {
+        // Gates and states of a layer, and the outputs of the one before.
+        input.len() + input.places() * self.hidden * (self.cell.gates() + 3)
     }
 
     fn output(&self, input: Shape) -> Result<Shape> {
         match input {
             Shape::Sequence { numbers, .. } if numbers == self.inputs => {
-                Ok(input.with_numbers(self.hidden))
+                Ok(Shape::Vector(self.hidden))
             }
             _ => Err(NetError::layer(
                 self.describe(),
@@ -194,16 +198,16 @@ impl Layer for Recurrent {
             }
             values = output;
         }
-        let out = packing.unpack(values.values(), self.hidden);
-        pass.save(|| Saved::Recurrent(Box::new(Trace { packing, layers })));
-        let shape = input.shape.with_numbers(self.hidden);
-        Batch { values: out, shape, lengths: input.lengths }
+        let last = packing.last(values.values(), self.hidden);
+        let Batch { shape, lengths, .. } = input;
+        pass.save(|| Saved::Recurrent(Box::new(Trace { packing, layers, shape, lengths })));
+        Batch { values: last, shape: Shape::Vector(self.hidden), lengths: None }
     }
 
     fn backward(&self, gradient: Batch, pass: &mut Backward<'_>) -> Batch {
         let Saved::Recurrent(trace) = pass.saved() else { unreachable!("saves its states") };
         let packing = &trace.packing;
-        let mut values = packing.pack(gradient.values.values(), self.hidden);
+        let mut values = packing.only_last(gradient.values.values(), self.hidden);
         for (layer, states) in trace.layers.iter().enumerate().rev() {
             values = self.backward_layer(layer, states, &values, packing, pass);
             if !states.kept.is_empty() {
@@ -213,8 +217,7 @@ impl Layer for Recurrent {
         if !pass.wanted {
             return gradient;
         }
-        let shape = gradient.shape.with_numbers(self.inputs);
         let values = packing.unpack(values.values(), self.inputs);
-        Batch { values, shape, lengths: gradient.lengths }
+        Batch { values, shape: trace.shape, lengths: trace.lengths }
     }
 }

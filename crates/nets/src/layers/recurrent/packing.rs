@@ -76,6 +76,35 @@ impl Packing {
         out
     }
 
+    /// The last step of every sequence, in the order of the items: `[items, n]`.
+    pub(super) fn last(&self, values: &[f32], n: usize) -> Matrix {
+        let mut out = Matrix::zeros(self.items(), n);
+        let all = out.values_mut();
+        self.ends(|row, item| {
+            all[item * n..(item + 1) * n].copy_from_slice(&values[row * n..(row + 1) * n]);
+        });
+        out
+    }
+
+    /// Packed rows that are zero but for the last step of every sequence.
+    pub(super) fn only_last(&self, values: &[f32], n: usize) -> Matrix {
+        let mut out = Matrix::zeros(self.total(), n);
+        let all = out.values_mut();
+        self.ends(|row, item| {
+            all[row * n..(row + 1) * n].copy_from_slice(&values[item * n..(item + 1) * n]);
+        });
+        out
+    }
+
+    /// For each item the row of its last step.
+    fn ends(&self, mut each: impl FnMut(usize, usize)) {
+        for step in 0..self.steps() {
+            let rows = self.rows(step);
+            let go_on = if step + 1 < self.steps() { self.rows(step + 1).len() } else { 0 };
+            (go_on..rows.len()).for_each(|place| each(rows.start + place, self.order[place]));
+        }
+    }
+
     /// For each row after the first step, the row of the step before; none where all sequences
     /// have one step.
     pub(super) fn states_before(&self, hidden: &[f32], n: usize) -> Option<Matrix> {
@@ -105,6 +134,9 @@ mod tests {
         assert_eq!(packed.values(), [4.0, 0.0, 8.0, 5.0, 1.0, 6.0, 7.0]);
         let expected = [0.0, 1.0, 0.0, 0.0, 4.0, 5.0, 6.0, 7.0, 8.0, 0.0, 0.0, 0.0];
         assert_eq!(packing.unpack(packed.values(), 1).values(), expected);
+        assert_eq!(packing.last(packed.values(), 1).values(), [1.0, 7.0, 8.0]);
+        let ends = packing.only_last(&[1.0, 2.0, 3.0], 1);
+        assert_eq!(ends.values(), [0.0, 0.0, 3.0, 0.0, 1.0, 0.0, 2.0]);
         let before = packing.states_before(packed.values(), 1).unwrap();
         assert_eq!(before.values(), [4.0, 0.0, 5.0, 6.0]);
         let short = Packing::new(2, 1, None);

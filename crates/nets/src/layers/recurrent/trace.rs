@@ -2,6 +2,7 @@
 
 use super::cell::States;
 use super::packing::Packing;
+use crate::batch::Shape;
 use crate::matrix::Matrix;
 
 /// What recurrent layers keep for the way back.
@@ -9,6 +10,8 @@ use crate::matrix::Matrix;
 pub struct Trace {
     pub(super) packing: Packing,
     pub(super) layers: Vec<LayerTrace>,
+    pub(super) shape: Shape,
+    pub(super) lengths: Option<Vec<usize>>,
 }
 
 #[derive(Debug)]

@@ -1,5 +1,7 @@
 //! Convolution over images, as matrix products over the pixels that each output sees.
 
+mod geometry;
+
 use rayon::prelude::*;
 
 use super::uniform_by;
@@ -10,9 +12,7 @@ use crate::layer::{Backward, Layer, Pass, Saved};
 use crate::layers::linear::column;
 use crate::matrix::Matrix;
 use crate::parameters::Declared;
-
-/// Rows that a product should have at least: images are taken together until there are as many.
-const ROWS: usize = 1024;
+use geometry::Geometry;
 
 /// 2-D convolution.
 #[derive(Clone, Debug)]
@@ -153,19 +153,22 @@ impl Layer for Conv2d {
         let (places, n) = (g.out_places(), self.outputs);
         let mut out = Matrix::zeros(input.items() * places, n);
         let group = g.group();
-        let values = input.values.values();
-        out.values_mut()
-            .par_chunks_mut(group * places * n)
-            .zip(values.par_chunks(group * g.input_len()))
-            .for_each_init(Vec::new, |buffer, (out, images)| {
-                let seen = g.seen(images, std::mem::take(buffer));
-                let product = seen.dot_t(&weight);
-                out.copy_from_slice(product.values());
-                if let Some(bias) = bias {
-                    kernels::add_to_rows(out, bias.values());
+        out.values_mut().par_chunks_mut(group * places * n).enumerate().for_each_init(
+            Vec::new,
+            |buffer, (number, out)| {
+                let mut left = out;
+                for tile in g.tiles(number * group, left.len() / (places * n)) {
+                    let seen = g.seen(&input.values, tile, buffer);
+                    let (to, rest) = left.split_at_mut(seen.rows() * n);
+                    to.copy_from_slice(seen.dot_t(&weight).values());
+                    if let Some(bias) = bias {
+                        kernels::add_to_rows(to, bias.values());
+                    }
+                    left = rest;
+                    seen.give_back(buffer);
                 }
-                *buffer = seen.into_values();
-            });
+            },
+        );
         let shape =
             Shape::Image { height: g.out_height, width: g.out_width, channels: self.outputs };
         pass.save(|| Saved::Batch(input));
@@ -187,17 +190,27 @@ impl Layer for Conv2d {
         slices.resize_with(input.items().div_ceil(group), Default::default);
         let parts: Vec<Matrix> = slices
             .into_par_iter()
-            .zip(input.values.values().par_chunks(group * g.input_len()))
             .zip(gradient.values.values().par_chunks(group * places * n))
-            .map_init(Vec::new, |buffer, ((by_input, images), gradient)| {
-                let gradient = Matrix::new(gradient.len() / n, n, gradient.to_vec());
-                let seen = g.seen(images, std::mem::take(buffer));
-                let by_weight = gradient.t_dot(&seen);
-                *buffer = seen.into_values();
-                if wanted {
-                    g.add_back(gradient.dot(&weight).values(), by_input);
+            .enumerate()
+            .map_init(Vec::new, |buffer, (number, (by_input, gradient))| {
+                let (mut left, mut sum) = (gradient, None::<Matrix>);
+                for tile in g.tiles(number * group, gradient.len() / (places * n)) {
+                    let seen = g.seen(&input.values, tile, buffer);
+                    let (own, rest) = left.split_at(seen.rows() * n);
+                    let own = Matrix::new(seen.rows(), n, own.to_vec());
+                    let by_weight = seen.t_dot(&own);
+                    match &mut sum {
+                        None => sum = Some(by_weight),
+                        Some(sum) => kernels::add(sum.values_mut(), by_weight.values()),
+                    }
+                    if wanted {
+                        g.add_back(own.dot(&weight).values(), tile, by_input);
+                    }
+                    left = rest;
+                    seen.give_back(buffer);
                 }
-                by_weight
+                let Some(sum) = sum else { unreachable!("groups are not empty") };
+                sum
             })
             .collect();
         let mut parts = parts.into_iter();
@@ -215,110 +228,6 @@ impl Layer for Conv2d {
         match by_input {
             Some(values) => Batch { values, shape: input.shape, lengths: None },
             None => gradient,
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Geometry {
-    height: usize,
-    width: usize,
-    channels: usize,
-    out_height: usize,
-    out_width: usize,
-    kernel: (usize, usize),
-    stride: usize,
-    padding: usize,
-}
-
-impl Geometry {
-    fn input_len(&self) -> usize {
-        self.height * self.width * self.channels
-    }
-
-    fn out_places(&self) -> usize {
-        self.out_height * self.out_width
-    }
-
-    /// Numbers that an output sees.
-    fn field(&self) -> usize {
-        self.kernel.0 * self.kernel.1 * self.channels
-    }
-
-    /// Images taken together.
-    fn group(&self) -> usize {
-        ROWS.div_ceil(self.out_places().max(1))
-    }
-
-    /// What each output sees: `[images * outputs, field]`.
-    fn seen(&self, images: &[f32], mut out: Vec<f32>) -> Matrix {
-        let rows = images.len() / self.input_len() * self.out_places();
-        // Every number is written below, padding included.
-        out.resize(rows * self.field(), 0.0);
-        let fields = self.out_places() * self.field();
-        for (image, out) in images.chunks_exact(self.input_len()).zip(out.chunks_exact_mut(fields))
-        {
-            self.runs(|place, kernel_row, run| {
-                let at = place * self.field() + kernel_row * self.kernel.1 * self.channels;
-                let to = &mut out[at..at + self.kernel.1 * self.channels];
-                let Some((from, before, len)) = run else { return to.fill(0.0) };
-                to[..before].fill(0.0);
-                to[before..before + len].copy_from_slice(&image[from..from + len]);
-                to[before + len..].fill(0.0);
-            });
-        }
-        Matrix::new(rows, self.field(), out)
-    }
-
-    /// Adds gradients by what outputs see to the gradient by the image.
-    fn add_back(&self, seen: &[f32], images: &mut [f32]) {
-        let fields = self.out_places() * self.field();
-        for (image, seen) in
-            images.chunks_exact_mut(self.input_len()).zip(seen.chunks_exact(fields))
-        {
-            kernels::vectorized(
-                #[inline(always)]
-                || {
-                    self.runs(
-                        #[inline(always)]
-                        |place, kernel_row, run| {
-                            let Some((from, before, len)) = run else { return };
-                            let at = place * self.field()
-                                + kernel_row * self.kernel.1 * self.channels
-                                + before;
-                            let to = &mut image[from..from + len];
-                            to.iter_mut().zip(&seen[at..at + len]).for_each(|(t, s)| *t += s);
-                        },
-                    );
-                },
-            );
-        }
-    }
-
-    /// For each output and row of the kernel: where the run of pixels begins in the image, how many
-    /// numbers of padding precede it, and its numbers. None: all padding.
-    #[inline(always)]
-    fn runs(&self, mut each: impl FnMut(usize, usize, Option<(usize, usize, usize)>)) {
-        let (kernel_height, kernel_width) = self.kernel;
-        let mut place = 0;
-        for y in 0..self.out_height {
-            for x in 0..self.out_width {
-                let left = x * self.stride;
-                // columns of the kernel inside the image
-                let first = self.padding.saturating_sub(left).min(kernel_width);
-                let end = (self.width + self.padding).saturating_sub(left).min(kernel_width);
-                for k in 0..kernel_height {
-                    let row = y * self.stride + k;
-                    let inside = row >= self.padding && row - self.padding < self.height;
-                    let run = (inside && end > first).then(|| {
-                        let column = left + first - self.padding;
-                        let from = ((row - self.padding) * self.width + column) * self.channels;
-                        (from, first * self.channels, (end - first) * self.channels)
-                    });
-                    each(place, k, run);
-                }
-                place += 1;
-            }
         }
     }
 }
