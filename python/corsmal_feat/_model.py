@@ -163,7 +163,7 @@ class TrainedModel:
             warnings.simplefilter("ignore")
             found = extract(different, config=self.feature_config)
         if len(found.outcomes) != len(different):
-            raise ParameterError("X holds folders, globs or manifests: name each recording")
+            raise ParameterError("X has folders, globs or manifests: name each recording")
         for path, outcome in zip(different, found.outcomes, strict=True):
             if outcome["status"] not in GOOD:
                 raise DecodeError(f"{path}: {outcome['status']}: {outcome['reason']}")

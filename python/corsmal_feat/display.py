@@ -108,7 +108,7 @@ def specshow(
     """
     left_out = [name for name in _LEFT_OUT if name in kwargs]
     if left_out:
-        raise ParameterError(f"{left_out[0]} is not here: use librosa.display.specshow for it")
+        raise ParameterError(f"{left_out[0]} is not available here: use librosa.display.specshow")
     values = np.asarray(data)
     if values.ndim != 2:
         raise ParameterError(f"data has {values.ndim} dimensions, expected 2")
