@@ -231,7 +231,7 @@ def __getattr__(name: str) -> Any:
     if name not in _LATER:
         raise AttributeError(
             f'module {__name__!r} has no attribute {name!r}; the page "Coming from librosa" lists'
-            " what is here, and librosa can be used beside it"
+            " what is here, and librosa can be used alongside"
         )
     module = _import_module(_LATER[name], __name__)
     return module if name == "classifiers" else getattr(module, name)

@@ -18,18 +18,18 @@ _ACCOUNTING = "accounting.json"
 
 @dataclass(frozen=True)
 class Accounting:
-    """What became of every recording of a manifest.
+    """The outcome of every recording of a manifest.
 
     Attributes
     ----------
     parts : list of str
         The Parquet files, in the order of the manifest.
     recordings : int
-        Rows of the manifest, and as many of the parts.
+        Number of rows of the manifest, and of the parts.
     statuses : dict
         How many recordings have each status.
     done_before : int
-        Parts that an earlier call had finished.
+        Number of parts that an earlier call had finished.
     """
 
     parts: list[str]

@@ -32,8 +32,8 @@ def af193(y: npt.ArrayLike, sr: float, *, librosa: str = "0.11") -> Floats:
     sr : float
         Its sample rate in Hz.
     librosa : {"0.11", "0.8"}
-        "0.8" gives the published numbers: reflect padding, the constant-Q transform and the end of
-        the harmonic part as they were then, in single precision whatever the input.
+        "0.8" gives the published numbers: reflect padding, with the constant-Q transform and the
+        end of the harmonic part as in that version, in single precision whatever the input.
 
     Returns
     -------

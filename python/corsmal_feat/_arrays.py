@@ -102,7 +102,7 @@ def audio(y: Any) -> Floats:
     flags = array.flags
     contiguous = flags.c_contiguous or flags.f_contiguous
     if not (_core.all_finite(array) if contiguous else np.isfinite(array).all()):
-        raise ParameterError("y holds NaN or infinite values")
+        raise ParameterError("y contains NaN or infinite values")
     return array
 
 

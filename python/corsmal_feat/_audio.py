@@ -98,7 +98,7 @@ def load(
         recording.skip(start)
     samples = recording.read(frames)
     if not len(samples) and frames != 0:
-        what = f"offset = {offset} s lies beyond its end" if start else "it holds no samples"
+        what = f"offset = {offset} s is beyond its end" if start else "it has no samples"
         raise DecodeError(f"{path}: {what}")
     _tell(recording, path)
     y: Floats = samples[:, 0] if samples.shape[1] == 1 else samples.T

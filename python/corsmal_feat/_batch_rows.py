@@ -24,7 +24,7 @@ def rows_of(batch: Any) -> list[Any]:
     """The rows of a batch as the extension takes them: id, source, start, end, piece."""
     pa = arrow()
     if not isinstance(batch, pa.RecordBatch | pa.Table):
-        raise ParameterError(f"batch must be a RecordBatch or Table of pyarrow, not {type(batch)}")
+        raise ParameterError(f"batch must be a pyarrow RecordBatch or Table, not {type(batch)}")
     names = batch.schema.names
     if len({*names}) != len(names):
         raise ParameterError(f"batch has a column twice: {', '.join(names)}")

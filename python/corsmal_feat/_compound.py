@@ -73,9 +73,9 @@ def a34_short(y: npt.ArrayLike, sr: float, window: int, step: int, deltas: bool 
     sr : float
         Sample rate in Hz.
     window, step : int
-        Samples of a frame, and between frames.
+        Samples per frame, and from one frame to the next.
     deltas : bool
-        Whether differences from the frame before follow the 34 values.
+        Whether differences from the previous frame follow the 34 values.
 
     Returns
     -------
@@ -108,9 +108,9 @@ def a34f136(
     sr : float
         Sample rate in Hz.
     mid_window, mid_step : int
-        Samples of a mid-term window, and between them.
+        Samples per mid-term window, and from one window to the next.
     window, step : int
-        Samples of a frame, and between frames.
+        Samples per frame, and from one frame to the next.
 
     Returns
     -------
@@ -147,9 +147,9 @@ def a34f136_mean(
     sr : float
         Sample rate in Hz.
     mid_window, mid_step : int
-        Samples of a mid-term window, and between them.
+        Samples per mid-term window, and from one window to the next.
     window, step : int
-        Samples of a frame, and between frames.
+        Samples per frame, and from one frame to the next.
 
     Returns
     -------
@@ -181,7 +181,7 @@ def sk_resize(
     shape : (int, int)
         Rows and columns wanted.
     mode : str
-        How it goes on beyond its edges: "reflect", "constant", "edge", "symmetric" or "wrap".
+        How to extend it beyond its edges: "reflect", "constant", "edge", "symmetric" or "wrap".
     anti_aliasing : bool, optional
         Gaussian smoothing first; by default if an axis shrinks.
 
@@ -234,10 +234,10 @@ def pca_fit(X: npt.ArrayLike, n_components: int) -> Doubles:
 
 @refuses
 def pca_fit_transform(X: npt.ArrayLike, n_components: int) -> Doubles:
-    """Coordinates of the very data that the components are fitted to.
+    """Coordinates of the data that the components are fitted to.
 
-    For other data project on the fitted components: fitting them again on test data gives
-    coordinates that have nothing to do with those of the training data.
+    Project other data on the fitted components: fitting again on test data gives coordinates that
+    are unrelated to those of the training data.
 
     Parameters
     ----------
@@ -311,8 +311,8 @@ def fit_projection(
     """Fits principal components to the summary in a file of `extract` (training recordings only)
     and writes them as an .npz with `components`, `mean` and `explained_variance`.
 
-    The configuration key `projection.file` applies the file to other recordings, of whose features
-    it accepts no other configuration.
+    The configuration key `projection.file` applies the file to other recordings; features of
+    another configuration are refused.
 
     Parameters
     ----------

@@ -81,7 +81,7 @@ def cqt(
     fmin : float, optional
         Lowest bin in Hz, C1 by default.
     n_bins, bins_per_octave : int
-        Bins in all, and of an octave.
+        Number of bins, and bins per octave.
     tuning : float, optional
         Deviation from A440 in fractions of a bin; None estimates one for all channels.
     filter_scale : float
@@ -95,7 +95,7 @@ def cqt(
     scale : bool
         Divide by the square roots of the filters' lengths.
     pad_mode : {"constant", "edge", "reflect", "symmetric"}
-        What lies beyond the ends.
+        Padding beyond the ends.
     res_type : str
         One of `resample`; whatever it is, the octaves are decimated by a filter equal to soxr's
         "HQ" to 1e-6.

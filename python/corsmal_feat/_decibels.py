@@ -1,4 +1,4 @@
-"""Decibels and magnitudes (librosa.power_to_db and its family)."""
+"""Decibels and magnitudes (librosa.power_to_db and related functions)."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ def power_to_db(
     Parameters
     ----------
     S : float32 or float64, any shape
-        Powers; of complex values the magnitude is taken, with a warning.
+        Powers; for complex values the magnitude is used, with a warning.
     ref : float or callable
         The power of 0 dB, or a function that finds it in `S`, such as `numpy.max`.
     amin : float
-        Smallest power that is told apart from zero.
+        Smallest power that is distinguished from zero.
     top_db : float, optional
         Range in dB below the maximum over the whole array, channels included; None keeps all.
 
@@ -75,7 +75,7 @@ def amplitude_to_db(
     S : float32 or float64, any shape
         Amplitudes.
     ref, amin, top_db
-        As in `power_to_db`, `ref` and `amin` being amplitudes.
+        As in `power_to_db`, but `ref` and `amin` are amplitudes.
 
     Returns
     -------

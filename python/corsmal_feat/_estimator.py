@@ -185,7 +185,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
             progress=self.progress,
         )
         if len(found.outcomes) != len(different):
-            raise ParameterError("X holds folders, globs or manifests: name each recording")
+            raise ParameterError("X has folders, globs or manifests: name each recording")
         rows = iter(found.summary if found.summary is not None else ())
         columns = found.names or self._names or []
         row_of: dict[str, Matrix] = {}
@@ -248,7 +248,7 @@ def _recordings(X: Any) -> list[Any]:
     if not recordings:
         raise ParameterError("Found array with 0 sample(s): at least one recording is needed")
     if len({_is_path(recording) for recording in recordings}) > 1:
-        raise ParameterError("X mixes paths and signals: give either of them")
+        raise ParameterError("X mixes paths and signals: give one or the other")
     return recordings
 
 

@@ -22,7 +22,7 @@ def of_npz(name: str) -> dict[str, Any]:
         archive = np.load(name, allow_pickle=False)
     except (ValueError, EOFError, zipfile.BadZipFile) as error:
         raise ParameterError(
-            f"{name} is not an output of corsmal-feat: no .npz archive; corsmal_feat.load reads"
+            f"{name} is not an output of corsmal-feat: not an .npz archive; corsmal_feat.load reads"
             " recordings"
         ) from error
     if not isinstance(archive, np.lib.npyio.NpzFile):

@@ -53,7 +53,7 @@ def of_partitions(name: str) -> dict[str, Any]:
     places: list[tuple[int, int, int]] = []
     for number, (file, (found, of)) in enumerate(zip(files, read, strict=True)):
         if not _is_part(of) or len(of["places"]) != len(found["outcomes"]):
-            raise ParameterError(f"{file} is no part of an output of corsmal-feat")
+            raise ParameterError(f"{file} is not a part of an output of corsmal-feat")
         if file.parent.name != _folder(of["label"], of["value"]):
             raise ParameterError(f"{file} is the part {_folder(of['label'], of['value'])}")
         if _run(read[number]) != _run(read[0]):

@@ -59,7 +59,7 @@ def window_spec(window: Window, length: int) -> WindowSpec:
     if len(values) != length:
         raise ParameterError(f"Window size mismatch: {len(values)} != {length}")
     if not np.isfinite(values).all():
-        raise ParameterError("window holds NaN or infinite values")
+        raise ParameterError("window contains NaN or infinite values")
     return values
 
 

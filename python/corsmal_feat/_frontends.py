@@ -116,7 +116,7 @@ def m1_stft(y: npt.ArrayLike, *, n_fft: int = 2048, hop_length: int = 512) -> Si
     y : [shape=(n,) or (channels, n)]
         One recording, float in -1..1.
     n_fft, hop_length : int
-        Samples of a frame, and between frames.
+        Samples per frame, and from one frame to the next.
 
     Returns
     -------
@@ -144,7 +144,7 @@ def m2_mfcc(y: npt.ArrayLike, sr: float, *, padded: bool = True, librosa: str = 
     padded : bool
         Whether a shorter recording is padded to 1501 frames.
     librosa : {"0.8", "0.11"}
-        Whose padding of frames.
+        The librosa version whose padding of frames is used.
 
     Returns
     -------
@@ -173,7 +173,7 @@ def m3_spectrogram(
     sr : float
         Its sample rate in Hz.
     n_fft, hop_length : int
-        Samples of a frame, and between frames.
+        Samples per frame, and from one frame to the next.
 
     Returns
     -------
@@ -306,7 +306,7 @@ def m6_spectrogram(
     start : float, optional
         Seconds at which the 10 s begin; at the second onset by default.
     librosa : {"0.8", "0.11"}
-        Whose onsets and padding.
+        The librosa version whose onsets and padding are used.
 
     Returns
     -------

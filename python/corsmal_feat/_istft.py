@@ -36,13 +36,13 @@ def istft(
     stft_matrix : complex64 or complex128 [shape=(..., 1 + n_fft // 2, t)]
         Spectrogram.
     hop_length, win_length, n_fft, window, center
-        As they were in `stft`.
+        As in `stft`.
     length : int, optional
         Samples of the result.
     dtype : float32 or float64, optional
-        Of the result; the precision of `stft_matrix` by default.
+        Type of the result; by default, the precision of `stft_matrix`.
     out : array, optional
-        Where to put the result.
+        Array for the result.
 
     Returns
     -------

@@ -51,7 +51,8 @@ def melspectrogram(
     n_mels, fmin, fmax, htk, norm
         See `filters.mel`.
     dtype : float32 or float64
-        Of the filter bank, which is computed as float32; with float64 the result has this type.
+        Type of the filter bank, which is computed as float32; with float64 the result has this
+        type.
 
     Returns
     -------
@@ -102,7 +103,7 @@ def mfcc(
     S : [shape=(..., n_mels, t)], optional
         A mel spectrogram in dB to use instead.
     n_mfcc : int
-        Coefficients, at most as many as mel bands.
+        Number of coefficients, at most that of mel bands.
     dct_type : {1, 2, 3}
         Type of the cosine transform.
     norm : {"ortho", None}
@@ -153,13 +154,13 @@ def delta(
     data : float32 or float64
         Features, frames along `axis`.
     width : int
-        Frames that the fit takes, an odd number, at least 3.
+        Frames per fit: an odd number, at least 3.
     order : int
         Order of the derivative and degree of the polynomial.
     mode : {"interp", "nearest", "mirror", "constant", "wrap"}
-        What happens at the ends.
+        How to handle the ends.
     **kwargs
-        `cval`, what lies beyond the ends with "constant", and `delta`, the time between frames, as
+        `cval`, the value beyond the ends with "constant", and `delta`, the time between frames, as
         in `scipy.signal.savgol_filter`.
 
     Returns

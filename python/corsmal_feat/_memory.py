@@ -1,4 +1,4 @@
-"""Features of frames beside each other (librosa.feature.stack_memory)."""
+"""Features of several frames together (librosa.feature.stack_memory)."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from .errors import ParameterError
 def stack_memory(
     data: npt.ArrayLike, *, n_steps: int = 2, delay: int = 1, **kwargs: Any
 ) -> npt.NDArray[Any]:
-    """Each frame with those before it (librosa.feature.stack_memory).
+    """Each frame together with earlier ones (librosa.feature.stack_memory).
 
     Parameters
     ----------
     data : [shape=(..., d, t)]
         Features.
     n_steps : int
-        Frames together.
+        Number of frames to stack.
     delay : int
-        Frames between them; below 0 for those that follow.
+        Frames from one to the next; negative for later frames.
     **kwargs
-        Of `numpy.pad` for what lies beyond the ends; zeros by default.
+        Arguments of `numpy.pad` for values beyond the ends; zeros by default.
 
     Returns
     -------

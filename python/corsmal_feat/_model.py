@@ -76,7 +76,7 @@ class TrainedModel:
         X : array [shape=(rows, features)], path, or list of paths
             Rows of features or, for a model that knows its features, recordings.
         any_rate : bool
-            Take recordings of a sample rate or with channels that the model was not trained on.
+            Accept recordings with a sample rate or channels that the model was not trained on.
 
         Returns
         -------
@@ -84,8 +84,8 @@ class TrainedModel:
 
         Raises
         ------
-        DecodeError : a recording that has no features
-        ParameterError : rows or recordings that are not like those of the training
+        DecodeError : a recording has no features
+        ParameterError : rows or recordings differ from those in training
         """
         return self.classes_[self._model.predict(self._rows(X, any_rate))]
 
@@ -105,7 +105,7 @@ class TrainedModel:
         return self._model.predict_proba(self._rows(X, any_rate))
 
     def has_probabilities(self) -> bool:
-        """Whether `predict_proba` has an answer."""
+        """Whether `predict_proba` is available."""
         try:
             self._model.predict_proba(np.zeros((1, self.n_features_in_)))
         except ParameterError:
@@ -113,7 +113,7 @@ class TrainedModel:
         return True
 
     def refusal(self, sample_rate: int | None, channels: int | None) -> str | None:
-        """Why a recording of this format is none that the model takes; None where it is one."""
+        """Why the model refuses a recording of this format; None if it accepts it."""
         try:
             rates, known_channels = self._model.format_rule()
         except ModelError as error:
@@ -163,7 +163,7 @@ class TrainedModel:
             warnings.simplefilter("ignore")
             found = extract(different, config=self.feature_config)
         if len(found.outcomes) != len(different):
-            raise ParameterError("X holds folders, globs or manifests: name each recording")
+            raise ParameterError("X has folders, globs or manifests: name each recording")
         for path, outcome in zip(different, found.outcomes, strict=True):
             if outcome["status"] not in GOOD:
                 raise DecodeError(f"{path}: {outcome['status']}: {outcome['reason']}")

@@ -60,15 +60,15 @@ class Network:
         return self._network.layers()
 
     def state_dict(self) -> dict[str, Singles]:
-        """All numbers under PyTorch's names, running statistics included."""
+        """All numbers with PyTorch's names, including running statistics."""
         return self._network.state()
 
     @refuses
     def load_state_dict(self, state: Mapping[str, npt.ArrayLike]) -> None:
         """Replaces all numbers.
 
-        `num_batches_tracked` may be there. Every other name and shape must be this network's: a
-        `ParameterError` lists all that are not, and changes nothing.
+        `num_batches_tracked` may be present. Every other name and shape must be this network's: a
+        `ParameterError` lists all that differ, and nothing is changed.
         """
         self._network.load_state(
             [(str(name), single(value)) for name, value in state.items()],
@@ -82,8 +82,8 @@ class Network:
         ----------
         inputs : arrays in PyTorch's layouts: [items, channels, height, width], [items, steps,
             numbers] or [items, numbers]; four views as one array [items, 4, steps, numbers]
-        lengths : steps of each item, where items were padded; without it the network runs through
-            the padding, as PyTorch's does on a padded batch
+        lengths : steps of each item, if items were padded; without it the network runs through the
+            padding, as in PyTorch on a padded batch
         """
         return self._network.forward([single(x) for x in inputs], _lengths(lengths))
 
@@ -108,13 +108,13 @@ class Network:
 
         Parameters
         ----------
-        inputs : as those of `forward`, in a list
-        y : a class for each item (whole numbers), or numbers for a network that estimates
-        steps : how many
-        recipe : "optimizer" ("adam" or "sgd"), "lr", and where needed "momentum", "weight_decay",
+        inputs : as in `forward`, in a list
+        y : a class for each item (whole numbers), or numbers for a network that estimates numbers
+        steps : number of steps
+        recipe : "optimizer" ("adam" or "sgd"), "lr", and, if needed, "momentum", "weight_decay",
             "clip_grad_norm", "class_weights", "loss" ("cross_entropy" or "mse")
-        dropout : whether dropout works
-        seed : of dropout
+        dropout : whether dropout is active
+        seed : seed of dropout
         lengths : steps of each item
 
         Returns

@@ -22,7 +22,7 @@ _Column = tuple[npt.NDArray[np.float32], list[int]]
 
 
 class NetworkClassifier(ClassifierMixin, BaseEstimator):
-    """A network of the paper, trained by its published recipe.
+    """A network of the paper, trained with its published recipe.
 
     `X` is an array [items, ...] in the layout of `nets.build(network).forward`, or a list with an
     array for each item, whose lengths may differ: [steps, numbers] for recurrent networks, and a
@@ -31,10 +31,11 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
     Parameters
     ----------
     network : a name of `nets.names()`
-    recipe : keys of the recipe that are not as published, such as {"epochs": 3, "batch": 8}
+    recipe : keys of the recipe to change from the published values, such as {"epochs": 3, "batch":
+        8}
     random_state : seed; the recipe's own if None
-    checkpoint : file in which the training is kept after each epoch, and from which it goes on
-    progress : called with epochs done, epochs in all, last loss, last score and seconds left
+    checkpoint : file in which the training is saved after each epoch, and from which it continues
+    progress : called with the epochs done, all epochs, the last loss, last score and seconds left
 
     Examples
     --------
@@ -67,10 +68,10 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         return hasattr(self, "_model")
 
     def fit(self, X: Any, y: Any, *, watched: Sequence[int] | None = None) -> Self:
-        """Trains on `X` and `y`, a label for each item.
+        """Trains on `X` and `y`, one label per item.
 
-        `watched` are indices of items that are not trained on: their score after each epoch is in
-        `history_`, and with the recipe's `select` it chooses the epoch that is kept.
+        `watched` are indices of items that are not used for training: their score after each epoch
+        is in `history_`, and with the recipe's `select` it chooses the epoch to keep.
         """
         columns = self._columns(X)
         count = len(columns[0][1]) - 1
@@ -111,7 +112,7 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         return labels
 
     def state_dict(self) -> dict[str, npt.NDArray[np.float32]]:
-        """The trained numbers under PyTorch's names."""
+        """The trained numbers with PyTorch's names."""
         if not hasattr(self, "_model"):
             raise not_fitted(self)
         return self._model.state()

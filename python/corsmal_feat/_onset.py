@@ -61,11 +61,11 @@ def onset_strength(
     lag, max_size : int
         Frames to look back, and bands of the maximum filter.
     ref : [shape of S], optional
-        What to compare with instead of the filtered S.
+        Spectrogram to compare with instead of the filtered S.
     detrend, center : bool
-        Remove the slow part; align frames with their centres.
+        Whether to remove the slow part; whether to align frames with their centres.
     feature, aggregate : callable
-        Instead of `melspectrogram` and the mean over bands.
+        Functions to use instead of `melspectrogram` and the mean over bands.
     n_fft, hop_length : int
         See `stft`.
     **kwargs
@@ -129,7 +129,7 @@ def onset_strength_multi(
     channels : list of int or of slice, optional
         Bands where groups begin and end, or the groups themselves; one group by default.
     aggregate : callable or False
-        Instead of the mean over the bands of a group; False keeps every band.
+        Function to use instead of the mean over the bands of a group; False keeps every band.
 
     Returns
     -------
@@ -235,11 +235,11 @@ def onset_detect(
     backtrack : bool
         Move each onset to the minimum of `energy` (the envelope by default) before it.
     units : {"frames", "samples", "time"}
-        What onsets are given in.
+        Units of the onsets.
     normalize : bool
-        Bring the envelope to 0..1 first.
+        Scale the envelope to 0..1 first.
     sparse : bool
-        Onsets, or a mask of all frames.
+        Whether to return onsets, or else a mask of all frames.
     pre_max, post_max, pre_avg, post_avg, delta, wait : float, optional
         Conditions of a peak; librosa's defaults for the sample rate and hop.
 

@@ -237,7 +237,7 @@ def _joined(column: Any, groups: list[range], bad: list[int | None]) -> list[Sin
     values = sum(row.size for row in rows if row is not None)
     if values > _VALUES:
         raise ParameterError(
-            f"{values} values are more than the {_VALUES} that a column of Arrow holds: join fewer"
+            f"{values} values are more than the {_VALUES} that an Arrow column holds: join fewer"
             " recordings at a time"
         )
     return rows

@@ -22,10 +22,11 @@ class Predictions:
 
     Attributes
     ----------
-    columns : text of the columns beside prediction and probabilities, such as `id`, `fold`, `true`
-    predicted : name of each class predicted; "" without a prediction, "unknown" where rejected
+    columns : text of the columns other than prediction and probabilities, such as `id`, `fold`,
+        `true`
+    predicted : name of each predicted class; "" without a prediction, "unknown" if rejected
     labels : names of the classes
-    proba : probabilities [shape=(rows, classes)]; NaN where there are none
+    proba : probabilities [shape=(rows, classes)]; NaN if there are none
 
     Examples
     --------
@@ -44,7 +45,7 @@ class Predictions:
 
     @property
     def ids(self) -> list[str]:
-        """What names each recording."""
+        """The name of each recording."""
         return next(iter(self.columns.values()))
 
     def __len__(self) -> int:
@@ -57,7 +58,7 @@ class Predictions:
 
 
 def parse(text: str) -> Predictions:
-    """Predictions of the text of a prediction file."""
+    """Predictions from the text of a prediction file."""
     header, *rows = csv.reader(io.StringIO(text))
     at = header.index("predicted")
     labels = [name.removeprefix("p_") for name in header[at + 1 :]]

@@ -31,7 +31,7 @@ FOLDERS = "folders"
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """Scores on rows that were not trained on.
+    """Scores on held-out rows.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Comparison:
 
     Attributes
     ----------
-    only_first, only_second : recordings that only the one got right
+    only_first, only_second : recordings that only one of the two got right
     p_value : of McNemar's exact test
     difference, low, high : weighted F1 of the second minus that of the first, with its 95 %
         bootstrap interval over recordings
@@ -90,8 +90,8 @@ class ScoreReport:
     Attributes
     ----------
     kind : "classes" or "numbers"
-    values : by name the scores over all rows: `accuracy`, `weighted_f1`, `macro_f1`, and where
-        there are probabilities `brier`, `ece`, `roc_auc`, `average_precision`; of numbers
+    values : the scores over all rows, by name: `accuracy`, `weighted_f1`, `macro_f1`, and if there
+        are probabilities `brier`, `ece`, `roc_auc`, `average_precision`; of numbers
         `mean_absolute_error`, `root_mean_squared_error`, `mean_relative_error`, `r2`, `score`
     report : everything, as `corsmal-feat score --json` prints it: classes, confusion, intervals,
         curves
@@ -136,20 +136,20 @@ def cross_validate(
     target : str
         Label column to learn.
     labels : path or "folders", optional
-        CSV with labels, or the folders of the recordings as their classes; else the label columns
-        of the feature file.
+        CSV with labels, or "folders" if the folders of the recordings are their classes; by
+        default the label columns of the feature file.
     id_column : str, optional
         Column of the label file that names the recordings by id, path or file name.
     groups : str, optional
-        Label column of groups that are not split between training and test.
+        Label column of groups that must not be split between training and test.
     cv : int or str, optional
         Number of folds, or a plan: "group=COLUMN", "fold=COLUMN", "lists=1,4,7/2,5,8".
     classifier : str
         "knn", "svm", "tree", "rf", "et" or "logistic".
     parameters : mapping, optional
-        Parameters of the classifier; scikit-learn's names are understood.
+        Parameters of the classifier; scikit-learn's names work, too.
     standardize, pca : bool, int or float
-        Steps before it, fitted on training rows only.
+        Steps before the classifier, fitted on training rows only.
     tune : mapping, optional
         Values to try by parameter; the choice is made on folds inside the training rows.
     seed : int
@@ -210,18 +210,18 @@ def fuse(
     background: str | None = None,
     least: int = 1,
 ) -> Predictions:
-    """Makes one prediction from several files, or from windows, as `corsmal-feat fuse` does.
+    """Combines predictions of several files, or of windows, as `corsmal-feat fuse` does.
 
     Parameters
     ----------
     predictions : path or paths
         Prediction files of the same recordings and classes. They are averaged.
     weights : iterable of float, optional
-        One positive number for each file.
+        One positive number per file.
     vote : {"majority", "mean"}, optional
-        Makes the windows of each recording one decision first.
+        First combine the windows of each recording into one decision.
     background : str, optional
-        With a majority: this class wins only where no other has `least` windows.
+        With a majority: this class wins only if no other class has `least` windows.
 
     Returns
     -------
@@ -230,7 +230,7 @@ def fuse(
     Raises
     ------
     ParameterError
-        Files of other recordings or classes, weights that are not one positive number per file.
+        Files have other recordings or classes, or weights are not one positive number per file.
 
     Examples
     --------
@@ -266,7 +266,7 @@ def compare_predictions(
     target : str, optional
         Column of the true classes; `true` by default.
     resamples, seed : int
-        Draws of the bootstrap, and its seed.
+        Number of bootstrap resamples, and the seed.
 
     Returns
     -------
@@ -275,7 +275,7 @@ def compare_predictions(
     Raises
     ------
     ParameterError
-        Recordings that only one file has, other true classes, missing columns.
+        Recordings are in only one file, true classes differ, or columns are missing.
 
     Examples
     --------
@@ -327,13 +327,13 @@ def score(
         Column of the true classes; `true` by default.
     groups : str, optional
         Column of groups that the bootstrap draws together; by default `group`, `container` or
-        `fold` where there is one.
+        `recording` if there is one.
     reject : float
-        Predictions with a highest probability below it are unknown and count as wrong.
+        Predictions whose highest probability is below this are unknown and count as wrong.
     numeric : bool
-        The target is a number although all its values are whole.
+        Whether the target is a number even if all its values are whole.
     resamples, seed : int
-        Draws of the bootstrap, and its seed.
+        Number of bootstrap resamples, and the seed.
 
     Returns
     -------
@@ -342,7 +342,7 @@ def score(
     Raises
     ------
     ParameterError
-        Missing columns, recordings without labels, labels without recordings.
+        Columns are missing, or recordings lack labels, or labels lack recordings.
 
     Examples
     --------

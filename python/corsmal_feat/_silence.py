@@ -53,13 +53,13 @@ def trim(
     y : float32 or float64 [shape=(..., n)]
         Signal.
     top_db : float
-        Frames that lie further below the reference are silent.
+        Frames further below the reference are silent.
     ref : float or callable
         The level of 0 dB, or a function that finds it in the levels of the frames.
     frame_length, hop_length : int
-        Samples of a frame, and between frames.
+        Samples per frame, and from one frame to the next.
     aggregate : callable
-        Makes one level of those of all channels.
+        Combines the levels of all channels into one.
 
     Returns
     -------
@@ -148,14 +148,14 @@ def preemphasis(
     coef : float
         The coefficient.
     zi : [shape=(..., 1)], optional
-        What is added to the first sample: the state after the block before. Without it, the
-        signal is continued as a straight line.
+        Value to add to the first sample: the state after the previous block. Without it, the
+        signal is extended as a straight line.
     return_zf : bool
         Whether to return the state for the next block.
 
     Returns
     -------
-    in the shape of `y`, and the state [shape=(..., 1)] if it is asked for
+    in the shape of `y`, and the state [shape=(..., 1)] if requested
 
     Examples
     --------

@@ -223,7 +223,7 @@ def spectral_flatness(
     amin : float
         Floor of the powers, above 0.
     power : float
-        Exponent that makes powers of magnitudes.
+        Exponent that turns magnitudes into powers.
 
     Returns
     -------
@@ -278,9 +278,9 @@ def spectral_contrast(
     n_bands : int
         Octaves above it.
     quantile : float
-        Fraction of the bins of a band that makes its peak and its valley.
+        Fraction of the bins of a band that form its peak and its valley.
     linear : bool
-        The difference of magnitudes, not of dB.
+        Whether to take the difference of magnitudes instead of dB.
 
     Returns
     -------

@@ -72,7 +72,7 @@ def stft(
     dtype : complex dtype, optional
         Of the result; by default that of the precision of `y`.
     out : complex [shape=(..., 1 + n_fft // 2, at least t)], optional
-        Where to put the result.
+        Array for the result.
 
     Returns
     -------

@@ -39,7 +39,7 @@ def zero_crossing_rate(
     pad: bool = False,
     zero_pos: bool = True,
 ) -> Doubles:
-    """Share of the samples of a frame at which the sign changes
+    """Share of the samples of a frame where the sign changes
     (librosa.feature.zero_crossing_rate).
 
     Parameters
@@ -47,17 +47,17 @@ def zero_crossing_rate(
     y : float32 or float64 [shape=(..., n)]
         Signal.
     frame_length, hop_length : int
-        Samples of a frame, and between frames.
+        Samples per frame, and from one frame to the next.
     center : bool
-        Frames are centred, the first and the last sample repeated.
+        Whether frames are centred, with the first and the last sample repeated.
     threshold : float
         Values of at most this magnitude count as zero.
     ref_magnitude : float or callable, optional
-        What `threshold` is a multiple of, such as `numpy.max` of the magnitudes.
+        Value of which `threshold` is a multiple, such as `numpy.max` of the magnitudes.
     pad : bool
-        The first sample of a frame counts as a crossing.
+        Whether the first sample of a frame counts as a crossing.
     zero_pos : bool
-        Zero is positive (or a sign of its own).
+        Whether zero is positive (or has its own sign).
 
     Returns
     -------
@@ -101,7 +101,7 @@ def rms(
     S : [shape=(..., 1 + frame_length // 2, t)], optional
         A magnitude spectrogram to use instead.
     frame_length, hop_length : int
-        Samples of a frame, and between frames.
+        Samples per frame, and from one frame to the next.
     center, pad_mode
         See `stft`.
     dtype : float32 or float64

@@ -19,7 +19,7 @@ from .errors import DecodeError, ParameterError
 
 
 class TrainedNetwork:
-    """A trained network that classifies recordings. `train` and `load` give one.
+    """A trained network that classifies recordings. `train` and `load` return one.
 
     Attributes
     ----------
@@ -52,14 +52,14 @@ class TrainedNetwork:
         any_rate: bool = False,
         jobs: int | None = None,
     ) -> npt.NDArray[np.float64]:
-        """Probabilities of recordings; the mean of their windows, where the network takes windows.
+        """Probabilities of recordings; the mean over their windows if the network takes windows.
 
         Parameters
         ----------
         recordings : paths
             One path per recording.
         any_rate : bool
-            Take recordings of a sample rate or with channels that the network was not trained on.
+            Accept recordings with a sample rate or channels that the network was not trained on.
         jobs : int, optional
             Recordings that are read at a time; one per core by default.
 
@@ -69,7 +69,7 @@ class TrainedNetwork:
 
         Raises
         ------
-        DecodeError : a recording that the network cannot classify
+        DecodeError : the network cannot classify a recording
         """
         paths = paths_of(recordings)
         proba, failed = _core.hear_recordings(self._network, paths, any_rate, jobs_of(jobs))
@@ -102,7 +102,7 @@ class TrainedNetwork:
 
     @refuses
     def save(self, path: StrPath) -> None:
-        """Writes the model file, whole or not at all; `corsmal-feat classify` takes it."""
+        """Writes the model file, completely or not at all; `corsmal-feat classify` takes it."""
         self._network.save(place(path))
 
     def __reduce__(self) -> tuple[Callable[[bytes], TrainedNetwork], tuple[bytes]]:

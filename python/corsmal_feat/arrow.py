@@ -1,4 +1,4 @@
-"""Features of the rows of Arrow tables: one function that Ray, Dask, Spark and others can call.
+"""Features for the rows of Arrow tables: one function that Ray, Dask, Spark and others can call.
 
 Needs pyarrow (`pip install pyarrow`).
 """
@@ -31,40 +31,40 @@ def extract_batch(
     channels: int | None = None,
     jobs: int = 1,
 ) -> Any:
-    """Features of the recordings that a batch names, a row for each row, in the same order.
+    """Features of the recordings that a batch names, one row for each row, in the same order.
 
     Parameters
     ----------
     batch : pyarrow.RecordBatch or Table
         Columns: `path` (a path or `file://` URI) or `bytes` (the file's content); optionally `id`,
         `start` and `end` in seconds; `archive`, `offset` and `size` of a member of a tar. All
-        others are labels, which travel to the output as they are.
+        others are labels, which are copied to the output unchanged.
     preset, config, set : see `corsmal_feat.extract`; by default the configuration of `model`
-    projection : file of `corsmal_feat.corsmal.fit_projection` that statistics go through
-    model : file of a classifier that knows its features: adds `predicted` and, where the classifier
-        gives probabilities, `p_<label>`
-    summary : "columns" gives each statistic a column of its name; "list" gives one column
-        `features` of lists of fixed size, and the names in the schema's metadata
+    projection : file from `corsmal_feat.corsmal.fit_projection` with which statistics are projected
+    model : file of a classifier with its feature configuration: adds `predicted` and, if the
+        classifier gives probabilities, `p_<label>`
+    summary : "columns" gives each statistic a column with its name; "list" gives one column
+        `features` of lists of fixed size, with the names in the schema's metadata
     frames : "list" leaves out the configuration's summary: frames instead of statistics
-    channels : the channels that recordings must have, where the width of the table depends on it;
-        others have the status mismatch. By default what most recordings of this batch have: batches
-        of one table need the number
-    jobs : threads
+    channels : number of channels that recordings must have, if the width of the table depends on
+        it; others have the status mismatch. By default the number that most recordings of this
+        batch have; for batches of one table, set it
+    jobs : number of threads
 
     A bad recording raises no error: its row says what is wrong, and its features are null.
-    Transforms and filter banks are made once in a process and kept.
+    Transforms and filter banks are made once per process and kept.
 
     Returns
     -------
     pyarrow.RecordBatch or Table
-        `id`, `start` and `end` where given, labels, the outcome as in the ledger (`path`, `status`,
+        `id`, `start` and `end` if given, labels, the outcome as in the ledger (`path`, `status`,
         `reason`, ...), then the features: statistics, or for a configuration without a summary a
         column for each feature of lists [channels][coefficients][frames]. The schema's metadata has
         the configuration, its hash and the version of this package.
 
     Raises
     ------
-    ParameterError : columns, configuration or model that cannot be used
+    ParameterError : columns, configuration or model cannot be used
     RunError : a temporary file failed
 
     Examples

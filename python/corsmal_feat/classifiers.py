@@ -1,8 +1,8 @@
-"""Classifiers: scikit-learn estimators, trained and kept by the Rust side.
+"""Classifiers: scikit-learn estimators, trained and stored by the Rust side.
 
 `save` writes the model file that `corsmal-feat classify` reads, `load_model` reads what
-`corsmal-feat train` wrote. They also work without scikit-learn; docs/classifiers.md tells how each
-differs from its own.
+`corsmal-feat train` wrote. They also work without scikit-learn; docs/classifiers.md says how each
+differs from scikit-learn's.
 """
 
 from __future__ import annotations
@@ -98,9 +98,9 @@ class KNN(Classifier):
         X : array [shape=(rows, features)], optional
             Without it, the neighbours of each training row among the others.
         n_neighbors : int, optional
-            How many of them; as many as vote, by default.
+            Number of neighbours; by default, as many as vote.
         return_distance : bool
-            Whether distances are wanted, too.
+            Whether to return the distances, too.
 
         Returns
         -------
@@ -119,7 +119,7 @@ class KNN(Classifier):
 
 
 class SVC(WeightedClassifier):
-    """Support vector machine, one against one, as `sklearn.svm.SVC`.
+    """Support vector machine, one-vs-one, as `sklearn.svm.SVC`.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class SVC(WeightedClassifier):
     class_weight : dict or str, optional
         "balanced", or a weight by label.
     probability : bool
-        Whether `predict_proba` will be asked for.
+        Whether to make `predict_proba` available.
     tol : float
         Tolerance of the optimality conditions.
     cache_size : int
@@ -176,15 +176,15 @@ class SVC(WeightedClassifier):
         self.solver = solver
 
     def decision_function(self, X: Any) -> Matrix:
-        """Of two classes [shape=(rows,)], positive for the second; of more [shape=(rows, classes)],
-        the votes of the pairs with their decision values between them (scikit-learn's
+        """For two classes [shape=(rows,)], positive for the second; for more [shape=(rows,
+        classes)], the votes of the pairs with their decision values between them (scikit-learn's
         `decision_function_shape="ovr"`)."""
         return self._decision_function(X)
 
     @property
     def predict_proba(self) -> Any:
-        """As of the other classifiers; absent without `probability`, so that scikit-learn's tools
-        do not ask for it."""
+        """As in the other classifiers; absent without `probability`, so that scikit-learn's tools
+        do not use it."""
         if not self.probability:
             raise AttributeError("predict_proba needs SVC(probability=True)")
         return super().predict_proba
@@ -198,9 +198,9 @@ class DecisionTree(GrownClassifier):
     criterion : str
         "gini" or "entropy".
     max_depth : int, optional
-        Deepest level.
+        Maximum depth.
     min_samples_split, min_samples_leaf : int
-        Fewest rows to split, and in a leaf.
+        Minimum number of rows to split, and in a leaf.
     max_features : str, int or float, optional
         "sqrt", "log2", a whole number, or a fraction up to 1.0; by default all.
     class_weight : dict or str, optional
@@ -257,11 +257,12 @@ class RandomForest(Forest):
     criterion, max_depth, min_samples_split, min_samples_leaf
         See `DecisionTree`.
     max_features : str, int or float, optional
-        Features looked at in each split: "sqrt", "log2", a number or a fraction; None for all.
+        Number of features considered in each split: "sqrt", "log2", a number or a fraction; None
+        for all.
     bootstrap : bool
         Draw rows with replacement for each tree.
     oob_score : bool
-        Ask each tree about the rows that it has not seen; needs `bootstrap`.
+        Whether to score each tree on the rows that it has not seen; needs `bootstrap`.
     class_weight : dict or str, optional
         "balanced", or a weight by label.
     random_state : int, RandomState, optional
@@ -270,12 +271,13 @@ class RandomForest(Forest):
     Attributes
     ----------
     feature_importances_ : float64 [shape=(features,)]
-        How much impurity the splits on each feature took away, the mean of the trees, summing to
-        one. Known after `fit`; model files do not hold it.
+        How much impurity the splits on each feature removed, as the mean over the trees; the sum
+        is one. Available after `fit`, but not stored in model files.
     oob_score_ : float
-        With `oob_score`: part of the rows whose label the trees that have not seen them give.
+        With `oob_score`: share of rows whose label is predicted by the trees that have not seen
+        them.
     oob_decision_function_ : float64 [shape=(rows, classes)]
-        With `oob_score`: class fractions by those trees; NaN for a row that every tree has seen.
+        With `oob_score`: class fractions from those trees; NaN for a row that every tree has seen.
 
     Examples
     --------
@@ -369,9 +371,9 @@ class LogisticRegression(WeightedClassifier):
     class_weight : dict or str, optional
         "balanced", or a weight by label.
     tol : float
-        Largest slope of the mean loss at the end.
+        Maximum slope of the mean loss at the end.
     max_iter : int
-        Most steps.
+        Maximum number of steps.
 
     Examples
     --------
@@ -396,6 +398,6 @@ class LogisticRegression(WeightedClassifier):
         self.max_iter = max_iter
 
     def decision_function(self, X: Any) -> Matrix:
-        """Scores: of two classes [shape=(rows,)], positive for the second; of more [shape=(rows,
+        """Scores: for two classes [shape=(rows,)], positive for the second; for more [shape=(rows,
         classes)]."""
         return self._decision_function(X)

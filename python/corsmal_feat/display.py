@@ -71,7 +71,7 @@ def specshow(
     Parameters
     ----------
     data : [shape=(d, t)]
-        What is drawn; of complex values the magnitude.
+        Data to draw; for complex values, their magnitude.
     x_coords, y_coords : [shape=(t,)] and [shape=(d,)], optional
         Positions instead of those of the axes.
     x_axis, y_axis : str, optional
@@ -88,7 +88,7 @@ def specshow(
     bins_per_octave : int
         Of a constant-Q transform, or of a chromagram.
     auto_aspect : bool
-        Draw squares where both axes are of one kind and have the same limits.
+        Draw squares if both axes are of the same kind and have the same limits.
     htk : bool
         Scale of the mel bands.
     ax : matplotlib axes, optional
@@ -108,7 +108,7 @@ def specshow(
     """
     left_out = [name for name in _LEFT_OUT if name in kwargs]
     if left_out:
-        raise ParameterError(f"{left_out[0]} is not here: use librosa.display.specshow for it")
+        raise ParameterError(f"{left_out[0]} is not available here: use librosa.display.specshow")
     values = np.asarray(data)
     if values.ndim != 2:
         raise ParameterError(f"data has {values.ndim} dimensions, expected 2")
@@ -221,29 +221,29 @@ def waveshow(
     ax: Any = None,
     **kwargs: Any,
 ) -> Any:
-    """Draws a waveform: its samples, or the range of each piece where they are too many
+    """Draws a waveform: its samples, or the range of each piece if there are too many
     (librosa.display.waveshow).
 
     Parameters
     ----------
     y : [shape=(n,) or (channels, n)]
-        Signal; of two or more channels the largest magnitudes.
+        Signal; for two or more channels, the largest magnitudes.
     sr : float
         Sample rate in Hz.
     max_points : int
-        Most points that are drawn.
+        Maximum number of points to draw.
     axis : {"time", "s", "ms", "frames", "off", None}
         Label of the horizontal axis.
     offset : float
         Seconds at the first sample.
     marker : matplotlib marker
-        Of the samples, where these are drawn.
+        Marker of the samples, if these are drawn.
     where : {"post", "pre", "mid"}
-        Where a value begins or ends.
+        Where a value's step begins or ends.
     label : str, optional
-        For the legend.
+        Label for the legend.
     transpose : bool
-        Time goes upwards.
+        Whether time goes upwards.
     ax : matplotlib axes, optional
         Where to draw; the current ones by default.
     **kwargs

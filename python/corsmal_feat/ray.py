@@ -121,7 +121,7 @@ def extract(
     Parameters
     ----------
     paths : what `manifest` takes, or a pyarrow.Table like those it returns
-    out : folder that all nodes share
+    out : output folder, shared by all nodes
     preset, config, set, projection, model, summary, frames : see `corsmal_feat.arrow.extract_batch`
     channels : as in `extract_batch`; by default the number that most recordings have, for which
         this process reads their headers
@@ -184,7 +184,7 @@ def extract(
     done = {path.name for path in (folder / PARTS).glob("*.parquet")}
     strange = sorted(done - parts.keys())
     if strange:
-        raise RunError(f"{folder / PARTS}: {strange[0]} is no part of this job")
+        raise RunError(f"{folder / PARTS}: {strange[0]} is not a part of this job")
     left = {name: part for name, part in parts.items() if name not in done}
     if left:
         _compute(left, folder, options, address, (len(done), progress))
@@ -193,7 +193,7 @@ def extract(
 
 def _require_paths(table: Any) -> None:
     if "bytes" in table.schema.names:
-        raise ParameterError("a manifest has paths, no bytes: workers read them where they lie")
+        raise ParameterError("a manifest has paths, not bytes: workers read the files in place")
 
 
 def _claim(folder: Path, job: Job, table: Any, channels: int | None, rows: int) -> None:
@@ -275,7 +275,7 @@ def _compute(
             running[task.remote(part, str(folder), name, options)] = (name, part)
         finished, _ = ray.wait(list(running), num_returns=1, timeout=_SILENCE)
         if not finished:
-            warn(f"no part was finished in {_SILENCE:.0f} s: `ray status` says what the cores do")
+            warn(f"no part was finished in {_SILENCE:.0f} s: `ray status` shows the use of cores")
             continue
         ready = finished[0]
         name, part = running.pop(ready)
@@ -303,26 +303,26 @@ def _main(arguments: list[str] | None = None) -> int:
     """The command: 0 fine, 1 recordings without features, 2 could not run, 130 interrupted."""
     parser = argparse.ArgumentParser(
         prog="python -m corsmal_feat.ray",
-        description="Extracts on a cluster of Ray into a folder of Parquet files.",
+        description="Extracts on a Ray cluster into a folder of Parquet files.",
     )
     parser.add_argument(
         "paths", nargs="+", help="recordings, folders, globs, manifests, tar shards"
     )
-    parser.add_argument("--out", required=True, help="folder that all nodes share")
+    parser.add_argument("--out", required=True, help="output folder, shared by all nodes")
     parser.add_argument("--preset", help="configuration that comes with the package")
     parser.add_argument("--config", help="TOML file with a configuration")
     parser.add_argument("--projection", help="file of fitted principal components")
-    parser.add_argument("--model", help="file of a classifier: adds predictions")
+    parser.add_argument("--model", help="classifier file: adds predictions")
     parser.add_argument("--summary", choices=("columns", "list"), default="columns")
     parser.add_argument("--frames", choices=("list",), help="frames instead of statistics")
-    parser.add_argument("--channels", type=int, help="channels that recordings must have")
+    parser.add_argument("--channels", type=int, help="number of channels that recordings must have")
     parser.add_argument(
         "--longest",
         type=float,
-        help="cut longer recordings into pieces of so many seconds (frames only)",
+        help="cut longer recordings into pieces of this many seconds (frames only)",
     )
-    parser.add_argument("--rows", type=int, default=64, help="recordings of a task (64)")
-    parser.add_argument("--address", help="of a running cluster, such as auto")
+    parser.add_argument("--rows", type=int, default=64, help="recordings per task (64)")
+    parser.add_argument("--address", help="address of a running cluster, such as auto")
     given = vars(parser.parse_args(arguments))
 
     def tell(done: int, total: int) -> None:

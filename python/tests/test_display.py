@@ -91,7 +91,7 @@ def test_another_n_fft_is_refused() -> None:
         corsmal_feat.ParameterError, match="n_fft = 4000 has 2001 bins, data has 129"
     ):
         drawn(corsmal_feat.display, np.zeros((129, 3)), y_axis="linear", n_fft=4000)
-    with pytest.raises(corsmal_feat.ParameterError, match="key is not here"):
+    with pytest.raises(corsmal_feat.ParameterError, match="key is not available here"):
         drawn(corsmal_feat.display, np.zeros((12, 3)), y_axis="chroma", key="D:min")
 
 

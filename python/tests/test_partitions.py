@@ -111,7 +111,7 @@ def test_metadata_of_other_kinds_are_refused(
     meta["part"] = meta["part"] | wrong if isinstance(wrong, dict) else wrong
     metadata[b"corsmal.meta"] = json.dumps(meta).encode()
     pq.write_table(table.replace_schema_metadata(metadata), part)
-    with pytest.raises(cf.ParameterError, match="is no part of an output"):
+    with pytest.raises(cf.ParameterError, match="is not a part of an output"):
         cf.load_features(out)
 
 
