@@ -49,7 +49,6 @@ def of_partitions(name: str) -> dict[str, Any]:
         raise ParameterError(f"{name} is a folder without parts (label=value/part.parquet)")
     read = [_read(os.fspath(file)) for file in files]
     parts = [found for found, _ in read]
-    first, label = parts[0], (read[0][1] or {}).get("label")
     places: list[tuple[int, int, int]] = []
     for number, (file, (found, of)) in enumerate(zip(files, read, strict=True)):
         if not _is_part(of) or len(of["places"]) != len(found["outcomes"]):
@@ -59,7 +58,8 @@ def of_partitions(name: str) -> dict[str, Any]:
         if _run(read[number]) != _run(read[0]):
             raise ParameterError(f"{file} is a part of another output than {files[0]}")
         places += [(place, number, at) for at, place in enumerate(of["places"])]
-        found["labels"][label] = np.array([of["value"]] * len(found["ids"]), dtype=np.str_)
+        found["labels"][of["label"]] = np.array([of["value"]] * len(found["ids"]), dtype=np.str_)
+    first, label = parts[0], read[0][1]["label"]
     places.sort()
     whole = len(places) == read[0][1]["inputs"]
     if not whole or any(place != i for i, (place, _, _) in enumerate(places)):
@@ -179,7 +179,7 @@ def _read(name: str) -> tuple[dict[str, Any], Any]:
         "outcomes": [json.loads(line) for line in outcomes if line],
     }
     part = meta.pop("part", None)
-    return fields, None if part is None else part | {"run": meta}
+    return fields, part | {"run": meta} if isinstance(part, dict) else part
 
 
 def _holds_frames(schema: Any, feature: str) -> bool:

@@ -97,7 +97,15 @@ def test_folders_that_are_none_are_refused(listed: Path, tmp_path: Path):
 
 @pytest.mark.parametrize(
     "wrong",
-    [[], {"label": 7}, {"inputs": -1}, {"inputs": "7"}, {"column": None}, {"places": [0, True]}],
+    [
+        [],
+        [1],
+        {"label": 7},
+        {"inputs": -1},
+        {"inputs": "7"},
+        {"column": None},
+        {"places": [0, True]},
+    ],
 )
 def test_metadata_of_other_kinds_are_refused(
     listed: Path, tmp_path: Path, wrong: list[int] | dict[str, object]

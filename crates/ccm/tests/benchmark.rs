@@ -338,7 +338,7 @@ fn added_files_cover_a_part_or_are_refused() {
     lines.push(removed);
     lines.push("1,9999,1,1,-1".into());
     let error = adding.refusal(&lines);
-    assert!(error.contains("does not have: container 1 sequence 9999"), "{error}");
+    assert!(error.contains("the data set lacks: container 1 sequence 9999"), "{error}");
 }
 
 #[test]

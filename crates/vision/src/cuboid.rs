@@ -249,7 +249,7 @@ mod tests {
             cuboid(d, m, &camera(), Outliers::Kept, 1).unwrap_err().to_string()
         };
         assert!(reason(&depth, &Mask::empty(2, 2)).contains("must be equal"));
-        assert!(reason(&depth, &Mask::empty(640, 480)).contains("no depth"));
+        assert!(reason(&depth, &Mask::empty(640, 480)).contains("no pixel with depth"));
         let mut wide = Depth { data: vec![u16::MAX; 640 * 480], ..depth };
         wide.data[0] = 1;
         let all = Mask { data: vec![true; 640 * 480], ..mask };

@@ -69,7 +69,7 @@ fn damaged_files_are_refused() {
     // Frames that players do not show, or turn.
     assert!(changed(place(b"elst") + 19, &[2]).contains("edit list leaves out 2 of 4 frames"));
     assert!(changed(place(b"elst") + 12, &[0, 0, 3, 232]).contains("leaves out 3 of 4 frames"));
-    assert!(changed(place(b"tkhd") + 44, &[0; 4]).contains("to be turned"));
+    assert!(changed(place(b"tkhd") + 44, &[0; 4]).contains("rotated"));
     assert!(changed(place(b"stco") + 12, &most).contains("it ends before frame 0"));
     assert!(changed(place(b"avcC") - 4, &[0; 4]).contains("box avcC has 0 bytes"));
     assert!(changed(place(b"trak") - 4, &most).contains("box trak has 4294967295 bytes"));

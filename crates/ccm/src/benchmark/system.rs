@@ -221,7 +221,7 @@ mod tests {
             held_out: vec![(0, Estimate::default()), (1, Estimate::default())],
             tests: vec![vec![Estimate::default()]],
         };
-        assert!(run.silent().unwrap().starts_with("Mask + RN: no answer"));
+        assert!(run.silent().unwrap().starts_with("Mask + RN: no prediction"));
         run.tests[0][0].level = Some(0);
         assert_eq!(run.silent(), None);
     }

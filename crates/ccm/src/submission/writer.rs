@@ -259,7 +259,7 @@ mod tests {
             (vec![example(b)], vec![a], "unexpected or doubled row: id 1"),
             (vec![bad], vec![a], "probabilities"),
             (vec![nan], vec![a], "NaN is not a size"),
-            (vec![example(RowKey::Sequence(1, 0))], vec![a], "not how this format names rows"),
+            (vec![example(RowKey::Sequence(1, 0))], vec![a], "does not fit this format"),
         ];
         for (predictions, expected, message) in cases {
             let error = Submission::write(&path, Format::Y2022, &predictions, &expected);

@@ -173,7 +173,7 @@ fn benchmark_runs_what_learned(dir: &Path, m2: &Path) {
         assert_eq!(rows(&file).len(), 57);
     }
     let page = std::fs::read_to_string(report.join("report.html")).unwrap();
-    assert!(page.contains("The model of Fused learned from C1, C2"), "no caution");
+    assert!(page.contains("The model of Fused was trained on C1, C2"), "no caution");
     let wrong = of("m2", &fused);
     let refusal =
         refused(&["benchmark", "-q", "--data", data, "--out", "no-report", "--capacity", &wrong]);

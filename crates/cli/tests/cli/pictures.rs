@@ -200,7 +200,7 @@ fn each_view_answers_alone_in_the_benchmark() {
         "1 damaged files count as if nothing was detected; the first, ",
         "c2/0003.png",
         "view 4: no picture of a cup or wine glass in the last frame of 6 of 6 recordings",
-        "resnet18_level was trained for 1 epoch, its recipe has 30.",
+        "resnet18_level was trained for 1 epoch; its recipe has 30.",
     ] {
         assert!(report.contains(note), "{note}");
     }

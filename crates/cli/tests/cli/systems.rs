@@ -36,7 +36,7 @@ fn systems_of_the_paper_join_the_benchmark() {
     let report: Value = serde_json::from_str(&read("report.json")).unwrap();
     let report = report.to_string();
     for note in [
-        "m2_type was trained for 1 epoch, its recipe has 500.",
+        "m2_type was trained for 1 epoch; its recipe has 500.",
         "type only; its capacity needs the depth views.",
         "vggish embeddings were not given",
     ] {
@@ -119,7 +119,7 @@ fn the_voted_category_chooses_the_perceptrons() {
         "1 training recordings show no container to the detector",
         "1 damaged files count as if nothing was detected; the first, ",
         &format!("the vote finds the category of {told} of 57 training recordings"),
-        "m3_mlp was trained for 1 epoch, its recipe has 100.",
+        "m3_mlp was trained for 1 epoch; its recipe has 100.",
     ] {
         assert!(report.contains(note), "{note}");
     }

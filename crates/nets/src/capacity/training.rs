@@ -209,7 +209,7 @@ mod tests {
         let full = with(json!({"drop_last": true, "batch": 16})).unwrap();
         assert!(refusal(&all, &full).contains("drop_last"));
         let choosing = with(json!({"select": "validation"})).unwrap();
-        assert!(refusal(&all[..6], &choosing).contains("needs 7"));
+        assert!(refusal(&all[..6], &choosing).contains("at least 7"));
         for useless in [json!({"dropout": false}), json!({"select": "published"})] {
             let message = with(useless.clone()).unwrap_err().to_string();
             let key = useless.as_object().unwrap().keys().next().unwrap();

@@ -233,7 +233,7 @@ fn a_model_file_gives_back_the_network() {
     }
     let plain = corsmal_nets::weights::to_safetensors(&Vec::new(), None).unwrap();
     let text = NetModel::from_bytes(&plain).unwrap_err();
-    assert!(text.contains("weights alone"), "{text}");
+    assert!(text.contains("weights only"), "{text}");
 }
 
 #[test]

@@ -228,7 +228,7 @@ fn moved_values() {
         &a,
         &a.select(Axis(0), &[1]),
         "channel_count",
-        &["b holds channel 1 of the 3 of a only"],
+        &["b has only channel 1 of the 3 of a"],
     );
     let mean = a.mean_axis(Axis(0)).unwrap().insert_axis(Axis(0));
     expect(&a, &mean, "channel_count", &["mean over the 3 channels of a"]);

@@ -56,7 +56,7 @@ fn what_cannot_be_fitted_or_applied_is_refused_and_leaves_nothing() {
         ("train.npz", "5", "new.npz", "1 to 4, the smaller side of X, not 5"),
         ("train.npz", "0", "new.npz", "the smaller side of X, not 0"),
         ("frames.npz", "2", "new.npz", "no statistics"),
-        ("pca.npz", "2", "new.npz", "file of another program"),
+        ("pca.npz", "2", "new.npz", "file from another program"),
         ("projected.npz", "1", "new.npz", "already projected"),
         ("absent.npz", "2", "new.npz", "absent.npz"),
     ] {
