@@ -224,12 +224,7 @@ fn moved_values() {
     expect(&a, &frames(2, 58), "frames", &["frame k + 2 of a; a has 60, b 56", "center"]);
     expect(&frames(0, 59), &a, "frames", &["b has more frames at the end"]);
     expect(&frames(0, 50), &frames(3, 53), "frames", &["b begins at frame 3 of the other"]);
-    expect(
-        &a,
-        &a.select(Axis(0), &[1]),
-        "channel_count",
-        &["b has only channel 1 of the 3 of a"],
-    );
+    expect(&a, &a.select(Axis(0), &[1]), "channel_count", &["b has only channel 1 of the 3 of a"]);
     let mean = a.mean_axis(Axis(0)).unwrap().insert_axis(Axis(0));
     expect(&a, &mean, "channel_count", &["mean over the 3 channels of a"]);
 }
