@@ -41,7 +41,7 @@ impl Submission {
         } else {
             return Err(CcmError::Column {
                 path: table.path().to_path_buf(),
-                column: "Configuration ID' (2022 format) or 'Container ID' (2020 format)".into(),
+                column: "Configuration ID' (2022 format) or 'Container ID".into(),
                 header: table.header().join(", "),
             });
         };
