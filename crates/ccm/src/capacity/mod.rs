@@ -97,8 +97,7 @@ fn sound(estimate: Estimate) -> std::result::Result<Estimate, Problem> {
         return Ok(estimate);
     }
     Err(Problem::Missing(format!(
-        "an estimate of {capacity} mL, which is impossible for a \
-         container"
+        "an estimate of {capacity} mL, which is impossible for a container"
     )))
 }
 

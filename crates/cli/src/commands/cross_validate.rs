@@ -238,10 +238,9 @@ fn print(args: &Args, table: &LabelledTable, validation: &Validation, seeds: Opt
         (None, Some(path)) => {
             println!("\nnext: corsmal-feat score {} --report DIR", path.display());
         }
-        (None, None) => println!(
-            "\nnext: the same command with --report DIR writes a report to \
-             look at"
-        ),
+        (None, None) => {
+            println!("\nnext: the same command with --report DIR writes a report to look at")
+        }
     }
 }
 

@@ -152,8 +152,7 @@ pub fn print_overall(report: &ClassReport) {
     println!("bootstrap over {} {drawn}", report.units);
     if report.drawn == "rows" {
         println!(
-            "rows of one person, place or device are not independent: name them with \
-             --groups"
+            "rows of one person, place or device are not independent: name them with --groups"
         );
     } else if report.units < 10 {
         println!("with so few of them, the interval says little");

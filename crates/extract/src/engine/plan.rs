@@ -184,9 +184,7 @@ impl Plan {
     pub fn piece_refusal(&self) -> Option<String> {
         if self.config.summary.is_some() {
             return Some(
-                "statistics are computed over the whole recording: leave out \
-                 [summary]"
-                    .into(),
+                "statistics are computed over the whole recording: leave out [summary]".into(),
             );
         }
         if let Some(reason) = SignalChain::piece_refusal(&self.config.signal) {

@@ -87,8 +87,7 @@ impl FeatureKind for Cqt {
             ("tuning", "Deviation from A = 440 Hz in fractions of a bin."),
             (
                 "filter_scale",
-                "Length of the filters; below 1 they are shorter, and resolve time \
-                 better.",
+                "Length of the filters; below 1 they are shorter, and resolve time better.",
             ),
             ("sparsity", "Share of the energy of a filter that may be left out."),
             ("window", "Window function of the filters, with scipy's name."),

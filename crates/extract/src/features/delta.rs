@@ -99,8 +99,7 @@ impl FeatureKind for Delta {
     const KEYS: &'static [Keys] = &[&[
         (
             "of",
-            "Name of an earlier feature in this configuration, of which the derivative is \
-             taken.",
+            "Name of an earlier feature in this configuration, of which the derivative is taken.",
         ),
         ("width", "Frames that the polynomial is fitted to: odd, at least 3."),
         ("order", "Order of the derivative, and degree of the polynomial."),

@@ -131,8 +131,7 @@ impl FeatureKind for Pcen {
             ("max_size", "Bands of a maximum filter before the smoothing; 1: no filter."),
             (
                 "factor",
-                "Factor by which the bands are multiplied first: 2^31 by default; 1: no \
-                 change.",
+                "Factor by which the bands are multiplied first: 2^31 by default; 1: no change.",
             ),
             (
                 "spectrum_power",

@@ -82,10 +82,7 @@ impl CapacityNetwork {
         };
         let header: Header =
             weights::entry(bytes, ENTRY, FORMAT).map_err(|e| no_model(&e))?.ok_or_else(|| {
-                no_model(
-                    "its recipe is missing; use --weights for weights without a \
-                     recipe",
-                )
+                no_model("its recipe is missing; use --weights for weights without a recipe")
             })?;
         header.recipe.check().map_err(|e| e.to_string())?;
         let network =

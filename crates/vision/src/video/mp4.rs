@@ -189,8 +189,7 @@ fn track(table: &[u8], size: u64) -> Result<Track, String> {
         [only] => only,
         ref all => {
             return Err(format!(
-                "{} descriptions of its video, but only one can be \
-                 read",
+                "{} descriptions of its video, but only one can be read",
                 all.len()
             ));
         }

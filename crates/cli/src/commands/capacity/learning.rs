@@ -68,8 +68,7 @@ pub(super) fn ended(failed: &[(RowKey, String)], recordings: usize) -> ExitCode 
         eprintln!("{key}: {reason}");
     }
     eprintln!(
-        "{} of {recordings} recordings have damaged files and were not used for \
-         training",
+        "{} of {recordings} recordings have damaged files and were not used for training",
         failed.len()
     );
     ExitCode::from(FAILED_FILES)

@@ -85,13 +85,7 @@ pub(super) fn train(args: Args) -> Result<ExitCode, Failure> {
         examples.push(Example { depth, size, millilitres: *capacity });
     }
     let progress = |told: Progress<'_>| {
-        tell(
-            "m2_capacity",
-            told,
-            args.told.quiet,
-            "score of held-out \
-            regions",
-        )
+        tell("m2_capacity", told, args.told.quiet, "score of held-out regions")
     };
     let trained = pool.install(|| {
         network::train(&examples, &recipe, provenance, checkpoint.as_deref(), progress)

@@ -68,8 +68,7 @@ fn network(_: Args) -> Result<ExitCode, Failure> {
 /// Scores on held-out containers, in percent.
 fn print_scores(held_out: &HeldOut) {
     println!(
-        "mean score in percent, each container estimated from what was learned on the \
-         others:"
+        "mean score in percent, each container estimated from what was learned on the others:"
     );
     for (category, methods) in held_out {
         let scores = methods.iter().map(|(method, score)| format!("{method} {:.1}", score * 100.0));

@@ -192,8 +192,7 @@ pub fn draw_table(
     let places = (0..ids.len()).step_by(step);
     let label = |i: usize| (i as f64, 1.0 - (i as f64 + 0.5) / rows);
     let panel = FeaturePanel {
-        label: "rows: recordings, columns: features, each in units of its standard \
-                deviation"
+        label: "rows: recordings, columns: features, each in units of its standard deviation"
             .into(),
         values: standard,
         rows: places.map(label).collect(),
