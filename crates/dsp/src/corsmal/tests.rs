@@ -1,4 +1,4 @@
-use ndarray::Array2;
+use ndarray::{Array2, Axis, s};
 
 use super::*;
 use crate::librosa::LibrosaVersion;
@@ -65,4 +65,37 @@ fn m6_begins_at_the_given_time() {
         plan.run(y.view(), 44_100.0).unwrap()
     };
     assert_ne!(from(M6Crop::At(0.0)), from(M6Crop::At(1.0)));
+}
+
+#[test]
+fn m4_has_the_same_bits_whatever_shares_its_lanes() {
+    let y = recording(20_000);
+    for variant in [Variant::Code, Variant::Paper] {
+        let plan = M4LogMel { variant };
+        let alone: Vec<_> =
+            (0..8).map(|c| plan.run(y.slice(s![c..=c, ..]), 44_100.0).unwrap()).collect();
+        for channels in [2, 3, 8] {
+            let together = plan.run(y.slice(s![..channels, ..]), 44_100.0).unwrap();
+            for (c, alone) in alone.iter().enumerate().take(channels) {
+                assert_eq!(together.index_axis(Axis(2), c), alone.index_axis(Axis(2), 0));
+            }
+        }
+    }
+}
+
+#[test]
+fn m3_has_the_same_bits_without_what_it_does_not_read() {
+    let plan = M3Spectrogram::default();
+    for (sr, n) in
+        [(44_100.0, 150_000), (44_100.0, 441 * 400), (48_000.0, 140_001), (8000.0, 20_000)]
+    {
+        let y = recording(n);
+        let unread = plan.unread(sr, n as u64).unwrap() as usize;
+        assert_eq!(unread > 0, n as f64 / sr > 2.5, "{sr} {n}");
+        let part = plan.run(y.slice(s![.., unread..]), sr).unwrap();
+        assert_eq!(part, plan.run(y.view(), sr).unwrap());
+    }
+    // Places of outputs that do not repeat; and no whole rates.
+    assert_eq!(plan.unread(44_101.0, 1 << 20).unwrap(), 0);
+    assert_eq!(plan.unread(44_100.5, 1 << 20).unwrap(), 0);
 }
