@@ -107,26 +107,11 @@ pub(crate) fn resample_last(
 /// # Errors
 /// Impossible rates.
 pub(crate) fn before_last(orig_sr: f64, target_sr: f64, frames: u64, count: usize) -> Result<u64> {
-    /// Outputs after which places repeat, as far as filters hold all of them.
-    const MOST_OUTPUTS: u64 = 2048;
     check_rates(orig_sr, target_sr)?;
-    let whole = |rate: f64| rate.fract() == 0.0 && rate < 2f64.powi(32);
-    if !whole(orig_sr) || !whole(target_sr) {
-        return Ok(0);
-    }
-    let (orig, target) = (orig_sr as u64, target_sr as u64);
-    let (mut common, mut rest) = (orig, target);
-    while rest > 0 {
-        (common, rest) = (rest, common % rest);
-    }
-    // The places of outputs between frames repeat.
-    let (inputs, outputs) = (orig / common, target / common);
-    if outputs > MOST_OUTPUTS {
-        return Ok(0);
-    }
     let Converter::Soxr(plan) = Converter::shared(orig_sr, target_sr, ResType::SoxrHq)? else {
         unreachable!("another converter was asked for")
     };
+    let Some((inputs, outputs)) = plan.repeats() else { return Ok(0) };
     let first = plan.output_len(frames).saturating_sub(count as u64);
     let needed = plan.input_range(first..first + count as u64).start.max(0) as u64;
     let periods = needed.min(frames) / inputs;

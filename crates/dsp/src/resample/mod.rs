@@ -10,10 +10,10 @@ mod check;
 mod converter;
 mod design;
 mod dot;
-mod halve;
 mod kaiser;
 mod kernel;
 mod low_pass;
+mod overlap_save;
 mod sinc;
 mod stage;
 mod stream;
@@ -79,7 +79,9 @@ impl ResamplePlan {
         check_rates(orig_sr, target_sr)?;
         let chain =
             if orig_sr == target_sr { Vec::new() } else { design::chain(orig_sr / target_sr) };
-        Ok(Self { orig_sr, target_sr, stages: chain.iter().map(Stage::new).collect() })
+        let grain = period(orig_sr, target_sr).map_or(1, |(inputs, _)| inputs as usize);
+        let stages = chain.iter().map(|design| Stage::new(design, grain)).collect();
+        Ok(Self { orig_sr, target_sr, stages })
     }
 
     /// Input rate in hertz.
@@ -90,6 +92,26 @@ impl ResamplePlan {
     /// Output rate in hertz.
     pub fn target_sr(&self) -> f64 {
         self.target_sr
+    }
+
+    /// The fewest input frames that can be left out at the beginning, so that all later outputs keep their
+    /// bits, and the outputs that go with them. `None` where places of outputs do not repeat.
+    fn repeats(&self) -> Option<(u64, u64)> {
+        let (inputs, outputs) = period(self.orig_sr, self.target_sr)?;
+        // `times * inputs` frames at the beginning are `times * up / down` of the stage.
+        let (mut times, mut up, mut down) = (1, u128::from(inputs), 1);
+        for stage in &self.stages {
+            let (step, stage_up, stage_down) = stage.repeats()?;
+            let needed = down * u128::from(step);
+            times *= needed / common(times * up, needed);
+            (up, down) = (up * u128::from(stage_up), down * u128::from(stage_down));
+            let both = common(up, down);
+            (up, down) = (up / both, down / both);
+            if times >= 1 << 40 || up >= 1 << 40 || down >= 1 << 40 {
+                return None;
+            }
+        }
+        Some((u64::try_from(times).ok()? * inputs, u64::try_from(times).ok()? * outputs))
     }
 
     /// Outputs of a channel that one thread should make at a time.
@@ -153,6 +175,25 @@ impl ResamplePlan {
         }
         Ok(data)
     }
+}
+
+/// After so many inputs and so many outputs their places repeat, for rates of whole hertz.
+fn period(orig_sr: f64, target_sr: f64) -> Option<(u64, u64)> {
+    let whole = |rate: f64| rate.fract() == 0.0 && rate < 2f64.powi(32);
+    if !whole(orig_sr) || !whole(target_sr) {
+        return None;
+    }
+    let (orig, target) = (orig_sr as u64, target_sr as u64);
+    let both = common(orig.into(), target.into()) as u64;
+    Some((orig / both, target / both))
+}
+
+/// The largest common divisor.
+fn common(mut a: u128, mut b: u128) -> u128 {
+    while b > 0 {
+        (a, b) = (b, a % b);
+    }
+    a
 }
 
 /// The part of a range of positions that exists: a stage gives nothing before its output 0.

@@ -188,8 +188,10 @@ fn phases(orig_sr: f64, target_sr: f64) -> Option<usize> {
     usize::try_from(target / a).ok()
 }
 
-/// Outputs that are summed side by side.
+/// Most outputs that are summed side by side.
 const SIDE: usize = 64;
+/// Where registers hold four numbers, their sixteen hold no more sums than these beside the rest.
+const HALF_SIDE: usize = 32;
 /// Outputs whose samples are laid out at a time: they stay in the nearest cache.
 const PART: usize = 16 * SIDE;
 
@@ -220,28 +222,46 @@ fn decimate<T: Real>(samples: &[T], taps: &[f64], before: usize, down: usize, ou
 }
 
 /// For every output the sum of `weight * planes[at + output]`, `round`ed at every step.
-#[inline(always)]
 fn sum_rounded<T: Real>(
     planes: &[f64],
     weighed: &[(f64, usize)],
     out: &mut [T],
     round: impl Fn(f64) -> f64,
 ) {
-    vectorized(
-        #[inline(always)]
-        || {
-            for (i, out) in out.chunks_mut(SIDE).enumerate() {
-                let mut sums = [0.0; SIDE];
-                for &(weight, at) in weighed {
-                    let samples = &planes[i * SIDE + at..][..SIDE];
-                    for (sum, x) in sums.iter_mut().zip(samples) {
-                        *sum = round(*sum + weight * x);
-                    }
+    Arch::new().dispatch(SumRounded { planes, weighed, out, round });
+}
+
+struct SumRounded<'a, T, F> {
+    planes: &'a [f64],
+    weighed: &'a [(f64, usize)],
+    out: &'a mut [T],
+    round: F,
+}
+
+impl<T: Real, F: Fn(f64) -> f64> WithSimd for SumRounded<'_, T, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        if S::F64_LANES > 4 { self.by::<SIDE>() } else { self.by::<HALF_SIDE>() }
+    }
+}
+
+impl<T: Real, F: Fn(f64) -> f64> SumRounded<'_, T, F> {
+    #[inline(always)]
+    fn by<const SIDE: usize>(self) {
+        let Self { planes, weighed, out, round } = self;
+        for (i, out) in out.chunks_mut(SIDE).enumerate() {
+            let mut sums = [0.0; SIDE];
+            for &(weight, at) in weighed {
+                let samples = &planes[i * SIDE + at..][..SIDE];
+                for (sum, x) in sums.iter_mut().zip(samples) {
+                    *sum = round(*sum + weight * x);
                 }
-                out.iter_mut().zip(&sums).for_each(|(slot, sum)| *slot = T::of(*sum));
             }
-        },
-    );
+            out.iter_mut().zip(&sums).for_each(|(slot, sum)| *slot = T::of(*sum));
+        }
+    }
 }
 
 /// `x` rounded to single precision and back, where that is zero or normal: adding 1.5 times the

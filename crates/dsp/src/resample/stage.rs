@@ -5,10 +5,11 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
+use super::common;
 use super::design::{Design, PolyDesign};
 use super::dot::{BLOCK, dot};
-use super::halve::Halve;
 use super::kernel::{Correlate, Plane, SPAN, dispatch};
+use super::overlap_save::OverlapSave;
 use super::strided::strided;
 
 /// A filter with single-precision coefficients. Outputs are numbered from 0 at input sample 0.
@@ -16,8 +17,8 @@ use super::strided::strided;
 pub(super) enum Stage {
     /// Rational rate change.
     Fir(Fir),
-    /// Half the rate, by a long filter.
-    Halve(Halve),
+    /// The same rate or half of it, by a long filter.
+    Long(OverlapSave),
     /// Tabulated interpolator.
     Poly(Poly),
 }
@@ -30,11 +31,12 @@ pub(super) struct Frames<'a> {
 }
 
 impl Stage {
-    pub fn new(design: &Design) -> Self {
+    /// Long filters take blocks of a multiple of `grain` frames, where they can.
+    pub fn new(design: &Design, grain: usize) -> Self {
         match design {
             Design::Fir { up, down, taps } => {
-                let halve = (*up == 1 && *down == 2).then(|| Halve::new(taps)).flatten();
-                halve.map_or_else(|| Self::Fir(Fir::new(*up, *down, taps)), Self::Halve)
+                let long = (*up == 1).then(|| OverlapSave::new(taps, *down, grain)).flatten();
+                long.map_or_else(|| Self::Fir(Fir::new(*up, *down, taps)), Self::Long)
             }
             Design::Poly(design) => Self::Poly(Poly::new(design)),
         }
@@ -48,7 +50,7 @@ impl Stage {
         // Ends never fall as outputs rise; before them lies the longest reach of any.
         let last = out.end - 1;
         match self {
-            Self::Halve(halve) => halve.input_range(out),
+            Self::Long(long) => long.input_range(out),
             Self::Fir(f) => {
                 let reach = f.residues.iter().map(|r| r.len).max().unwrap_or(0);
                 f.end(out.start) - reach as i64..f.end(last)
@@ -60,7 +62,7 @@ impl Stage {
     /// Outputs of each channel that one pass makes.
     pub fn pass(&self, channels: usize) -> u64 {
         match self {
-            Self::Halve(halve) => halve.pass(channels),
+            Self::Long(long) => long.pass(channels),
             Self::Fir(_) | Self::Poly(_) => 1,
         }
     }
@@ -68,9 +70,23 @@ impl Stage {
     /// Outputs of a channel that one thread should make at a time.
     pub fn span(&self) -> usize {
         match self {
-            Self::Halve(halve) => halve.span(),
+            Self::Long(long) => long.span(),
             Self::Fir(_) | Self::Poly(_) => SPAN,
         }
+    }
+
+    /// What must divide the number of frames that are left out before the input, so that outputs keep their
+    /// bits, and the change of rate as a fraction. `None` where places of outputs do not repeat.
+    pub fn repeats(&self) -> Option<(u64, u64, u64)> {
+        Some(match self {
+            Self::Long(long) => (long.step() as u64, 1, long.down() as u64),
+            Self::Fir(f) => (f.down as u64, f.up as u64, f.down as u64),
+            Self::Poly(p) if p.order == 0 => {
+                let both = common(p.unit.into(), p.step.into()) as u64;
+                (p.step / both, p.unit / both, p.step / both)
+            }
+            Self::Poly(_) => return None,
+        })
     }
 
     /// Outputs that can be computed when inputs before `end` are known.
@@ -78,7 +94,7 @@ impl Stage {
         // Outputs at `first + o * step` before `limit`, all in fractions of a frame.
         let end = i128::from(end);
         let (limit, first, step) = match self {
-            Self::Halve(halve) => return halve.available(end as i64),
+            Self::Long(long) => return long.available(end as i64),
             Self::Fir(f) => (end * f.up as i128, f.centre as i128, f.down as i128),
             Self::Poly(p) => {
                 let limit = (end - (p.taps / 2) as i128) * i128::from(p.unit);
@@ -93,7 +109,7 @@ impl Stage {
     pub fn run(&self, channels: usize, out: Range<u64>, input: Frames, to: &mut Vec<f32>) {
         match self {
             Self::Fir(f) => f.run(channels, out, input, to),
-            Self::Halve(halve) => halve.run(channels, out, input, to),
+            Self::Long(long) => long.run(channels, out, input, to),
             Self::Poly(p) => {
                 let base = to.len();
                 to.resize(base + (out.end - out.start) as usize * channels, 0.0);

@@ -9,8 +9,8 @@ use super::stage::Frames;
 use crate::error::Result;
 
 /// Converts interleaved frames as they come; the outputs do not depend on how the input is cut into
-/// blocks. Output lags by the filters' reach, where the rate is halved by a pass of transforms
-/// (26,948 input frames of one channel at 2:1, 3,708 of eight).
+/// blocks. Output lags by the filters' reach, where a filter is long by a pass of transforms: 16 blocks of
+/// one channel, 2 of eight, of up to eight times the filter's length.
 ///
 /// ```
 /// use std::sync::Arc;

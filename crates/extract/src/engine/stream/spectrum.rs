@@ -1,6 +1,7 @@
 //! Spectra of sixteen (frame, channel) slots at a time, shared by the features that read them.
 
 use corsmal_dsp::lanes::{LANES, Row, Slots, Spectrum, gather, square_roots};
+use corsmal_dsp::simd::vectorized;
 use corsmal_dsp::stft::StftParams;
 
 use super::framing::{Frames, Framing, Scratch, Stream};
@@ -128,14 +129,30 @@ fn scatter(rows: &[Row], slots: Slots, out: &mut [f32]) {
         }
         return;
     }
-    for s in 0..slots.len {
-        let (frame, channel) = slots.pair(s);
-        let out = &mut out[frame * n_rows * channels..(frame + 1) * n_rows * channels];
-        for (row, out) in rows.iter().zip(out[channel..].iter_mut().step_by(channels)) {
-            *out = row.0[s];
-        }
-    }
+    vectorized(
+        #[inline(always)]
+        || {
+            // So few rows at a time that they stay in the nearest cache for all slots.
+            for (i, rows) in rows.chunks(TILE).enumerate() {
+                for s in 0..slots.len {
+                    let (frame, channel) = slots.pair(s);
+                    let start = (frame * n_rows + i * TILE) * channels;
+                    let out = &mut out[start..start + rows.len() * channels];
+                    if channels == 1 {
+                        out.iter_mut().zip(rows).for_each(|(out, row)| *out = row.0[s]);
+                        continue;
+                    }
+                    for (row, out) in rows.iter().zip(out[channel..].iter_mut().step_by(channels)) {
+                        *out = row.0[s];
+                    }
+                }
+            }
+        },
+    );
 }
+
+/// Rows that [`scatter`] takes at a time.
+const TILE: usize = 64;
 
 /// Pairs of rows (real, imaginary) to `[frames][rows / 2][channels][2]`.
 fn scatter_complex(rows: &[Row], slots: Slots, out: &mut [f32]) {

@@ -1,4 +1,4 @@
-//! Halving of the rate by a long symmetric filter, by fast transforms of sixteen blocks at once.
+//! A long symmetric filter by fast transforms of sixteen blocks at once, at the rate or half of it.
 
 use std::fmt;
 use std::ops::Range;
@@ -17,21 +17,23 @@ const HEADROOM: f32 = 64.0;
 /// Fewest taps that are worth transforms.
 const LEAST_TAPS: usize = 96;
 
-/// A symmetric filter of odd length that keeps every second output, by overlap-save.
+/// A symmetric filter of odd length that keeps every output or every second, by overlap-save.
 ///
-/// Outputs come in blocks that begin at multiples of [`Halve::block`], each from a transform of its
+/// Outputs come in blocks that begin at multiples of the length of one, each from a transform of its
 /// own: how the input is cut changes no bits. Machines with and without fused multiply-add may differ
 /// in the last bits.
 #[derive(Clone)]
-pub(super) struct Halve(Arc<Tables>);
+pub(super) struct OverlapSave(Arc<Tables>);
 
 struct Tables {
+    /// 1, or 2 where every second output is kept.
+    down: usize,
     /// Frames of a block before that of its first output: the reach of the filter, or one more.
     before: usize,
     /// Outputs of a block.
     block: usize,
     forward: LaneFft,
-    /// Back to time, of half as many points.
+    /// Back to time, of as many points for each output that is kept.
     back: LaneFft,
     /// The real response of each bin, over the lengths of both transforms.
     response: Vec<f32>,
@@ -46,16 +48,17 @@ struct Memory {
     spectrum: Vec<Row>,
 }
 
-impl fmt::Debug for Halve {
+impl fmt::Debug for OverlapSave {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Halve").field("block", &self.0.block).finish_non_exhaustive()
+        f.debug_struct("OverlapSave").field("block", &self.0.block).finish_non_exhaustive()
     }
 }
 
-impl Halve {
-    /// `None` where the filter is too short for transforms.
-    pub fn new(taps: &[f64]) -> Option<Self> {
-        if taps.len() < LEAST_TAPS || taps.len().is_multiple_of(2) {
+impl OverlapSave {
+    /// `down` is 1 or 2; blocks are a multiple of `grain` inputs, where one has so many. `None` where the
+    /// filter is too short for transforms.
+    pub fn new(taps: &[f64], down: usize, grain: usize) -> Option<Self> {
+        if taps.len() < LEAST_TAPS || taps.len().is_multiple_of(2) || !(1..=2).contains(&down) {
             return None;
         }
         let reach = taps.len() / 2;
@@ -69,11 +72,15 @@ impl Halve {
         let fft = RealFftPlanner::<f64>::new().plan_fft_forward(n);
         let mut bins = fft.make_output_vec();
         fft.process(&mut circle, &mut bins).ok()?;
+        let block = (n - 1 - before - reach) / down + 1;
+        let grain = if grain.is_multiple_of(down) { grain / down } else { grain };
+        let block = if grain <= block { block / grain * grain } else { block };
         Some(Self(Arc::new(Tables {
+            down,
             before,
-            block: (n - 1 - before - reach) / 2 + 1,
+            block,
             forward: LaneFft::new(n).ok()?,
-            back: LaneFft::new(n / 2).ok()?,
+            back: LaneFft::new(n / down).ok()?,
             response: bins.iter().map(|bin| bin.re as f32).collect(),
             window: vec![1.0 / (n as f32 * HEADROOM); n],
             memory: Pool::default(),
@@ -90,18 +97,28 @@ impl Halve {
         LANES * self.0.block
     }
 
+    /// Inputs from one block to the next.
+    pub fn step(&self) -> usize {
+        self.0.down * self.0.block
+    }
+
+    /// Outputs for one of which there are so many inputs.
+    pub fn down(&self) -> usize {
+        self.0.down
+    }
+
     /// Input frames that cover the blocks of outputs `out`.
     pub fn input_range(&self, out: &Range<u64>) -> Range<i64> {
         let blocks = self.blocks(out);
         let (first, last) = (blocks.start as i64, blocks.end as i64 - 1);
-        let start = |block: i64| block * 2 * self.0.block as i64 - self.0.before as i64;
+        let start = |block: i64| block * self.step() as i64 - self.0.before as i64;
         start(first)..start(last) + self.0.forward.n_fft() as i64
     }
 
     /// Outputs whose blocks are complete when inputs before `end` are known.
     pub fn available(&self, end: i64) -> u64 {
         let past = end + self.0.before as i64 - self.0.forward.n_fft() as i64;
-        let step = 2 * self.0.block as i64;
+        let step = self.step() as i64;
         if past < 0 { 0 } else { (past / step + 1) as u64 * self.0.block as u64 }
     }
 
@@ -125,8 +142,8 @@ impl Halve {
         memory.frames.resize(window.len(), Row::ZERO);
         memory.spectrum.resize(window.len() + 2, Row::ZERO);
         for slots in Slots::blocks((blocks.end - blocks.start) as usize, channels) {
-            gather(signal, 2 * block, window, slots, &mut memory.frames);
-            self.halve(&mut memory);
+            gather(signal, self.step(), window, slots, &mut memory.frames);
+            self.filter(&mut memory);
             for s in 0..slots.len {
                 let (at, channel) = slots.pair(s);
                 let first = (blocks.start + at as u64) * *block as u64;
@@ -146,27 +163,34 @@ impl Halve {
     }
 
     /// Blocks of samples to blocks of outputs, at the start of `frames`.
-    fn halve(&self, Memory { frames, spectrum }: &mut Memory) {
-        let Tables { before, block, forward, back, response, .. } = &*self.0;
-        let half = back.n_fft();
+    fn filter(&self, Memory { frames, spectrum }: &mut Memory) {
+        let Tables { down, before, block, forward, back, response, .. } = &*self.0;
+        let n = back.n_fft();
         forward.complex(frames, spectrum);
         let bins = spectrum.as_chunks::<2>().0;
         vectorized(
             #[inline(always)]
             || {
-                // Bins above half of those that remain fold down onto them. The spectrum of a real
-                // signal then becomes a real sequence, whose transform is that signal, mirrored
-                // halves added and subtracted (Hartley's transform).
-                for k in 0..=half / 2 {
-                    let mirrored = half - k;
-                    let (w, v) = (response[k], response[mirrored]);
-                    let ([re, im], [high_re, high_im]) = (&bins[k], &bins[mirrored]);
+                // The spectrum of a real signal becomes a real sequence, whose transform is that signal,
+                // mirrored halves added and subtracted (Hartley's transform). Where every second
+                // output is kept, bins above half of those that remain fold down onto them.
+                for k in 0..=n / 2 {
+                    let mirrored = n - k;
+                    let (w, [re, im]) = (response[k], &bins[k]);
                     let (mut sum, mut difference) = (Row::ZERO, Row::ZERO);
-                    for s in 0..LANES {
-                        let real = w * re.0[s] + v * high_re.0[s];
-                        let imaginary = w * im.0[s] - v * high_im.0[s];
-                        difference.0[s] = real - imaginary;
-                        sum.0[s] = real + imaginary;
+                    if *down == 1 {
+                        for s in 0..LANES {
+                            difference.0[s] = w * re.0[s] - w * im.0[s];
+                            sum.0[s] = w * re.0[s] + w * im.0[s];
+                        }
+                    } else {
+                        let (v, [high_re, high_im]) = (response[mirrored], &bins[mirrored]);
+                        for s in 0..LANES {
+                            let real = w * re.0[s] + v * high_re.0[s];
+                            let imaginary = w * im.0[s] - v * high_im.0[s];
+                            difference.0[s] = real - imaginary;
+                            sum.0[s] = real + imaginary;
+                        }
                     }
                     frames[k] = difference;
                     if k > 0 {
@@ -175,14 +199,14 @@ impl Halve {
                 }
             },
         );
-        let spectrum = &mut spectrum[..half + 2];
-        back.complex(&mut frames[..half], spectrum);
+        let spectrum = &mut spectrum[..n + 2];
+        back.complex(&mut frames[..n], spectrum);
         let bins = spectrum.as_chunks::<2>().0;
         vectorized(
             #[inline(always)]
             || {
-                for (n, row) in (before / 2..).zip(&mut frames[..*block]) {
-                    let (bin, sign) = if n <= half / 2 { (n, -1.0) } else { (half - n, 1.0) };
+                for (at, row) in (before / down..).zip(&mut frames[..*block]) {
+                    let (bin, sign) = if at <= n / 2 { (at, -1.0) } else { (n - at, 1.0) };
                     let [re, im] = &bins[bin];
                     for s in 0..LANES {
                         row.0[s] = HEADROOM * (re.0[s] + sign * im.0[s]);
@@ -203,42 +227,46 @@ mod tests {
             .map(|i| (f64::from(i) - 48.0) * 0.8)
             .map(|x| if x == 0.0 { 0.3 } else { 0.3 * x.sin() / x })
             .collect();
-        let halve = Halve::new(&taps).unwrap();
-        let x = |frame: i64, channel: usize| {
-            let n = (frame.rem_euclid(1 << 20)) as usize * 7 + channel * 13;
-            ((n * n) % 199) as f32 / 199.0 - 0.5
-        };
-        for channels in [1, 2, 3, 8] {
-            for out in [0..1, 5..4000, 100..101, 3000..12_000] {
-                let needed = halve.input_range(&out);
-                assert!(halve.available(needed.end) >= out.end);
-                assert!(
-                    halve.available(needed.end - 1)
-                        < out.end.next_multiple_of(halve.0.block as u64)
-                );
-                let start = needed.start - 3;
-                let data: Vec<f32> = (start..needed.end)
-                    .flat_map(|frame| (0..channels).map(move |c| x(frame, c)))
-                    .collect();
-                let mut got = Vec::new();
-                halve.run(channels, out.clone(), Frames { data: &data, start }, &mut got);
-                assert_eq!(got.len(), (out.end - out.start) as usize * channels);
-                let frames = out.clone().zip(got.chunks_exact(channels));
-                for (o, frame) in frames.step_by(7) {
-                    for (c, y) in frame.iter().enumerate() {
-                        let first = 2 * o as i64 - 48;
-                        let want: f64 =
-                            (first..).zip(&taps).map(|(i, w)| w * f64::from(x(i, c))).sum();
-                        assert!((f64::from(*y) - want).abs() < 1e-6, "{o} {c}: {y} for {want}");
+        for (down, grain) in [(1, 1), (1, 30), (2, 1), (2, 12)] {
+            let filter = OverlapSave::new(&taps, down, grain).unwrap();
+            assert!(filter.step().is_multiple_of(grain), "{down} {grain}");
+            let x = |frame: i64, channel: usize| {
+                let n = (frame.rem_euclid(1 << 20)) as usize * 7 + channel * 13;
+                ((n * n) % 199) as f32 / 199.0 - 0.5
+            };
+            for channels in [1, 2, 3, 8] {
+                for out in [0..1, 5..4000, 100..101, 3000..12_000] {
+                    let needed = filter.input_range(&out);
+                    assert!(filter.available(needed.end) >= out.end);
+                    assert!(
+                        filter.available(needed.end - 1)
+                            < out.end.next_multiple_of(filter.0.block as u64)
+                    );
+                    let start = needed.start - 3;
+                    let data: Vec<f32> = (start..needed.end)
+                        .flat_map(|frame| (0..channels).map(move |c| x(frame, c)))
+                        .collect();
+                    let mut got = Vec::new();
+                    filter.run(channels, out.clone(), Frames { data: &data, start }, &mut got);
+                    assert_eq!(got.len(), (out.end - out.start) as usize * channels);
+                    let frames = out.clone().zip(got.chunks_exact(channels));
+                    for (o, frame) in frames.step_by(7) {
+                        for (c, y) in frame.iter().enumerate() {
+                            let first = down as i64 * o as i64 - 48;
+                            let want: f64 =
+                                (first..).zip(&taps).map(|(i, w)| w * f64::from(x(i, c))).sum();
+                            assert!((f64::from(*y) - want).abs() < 1e-6, "{o} {c}: {y} for {want}");
+                        }
                     }
                 }
             }
         }
+        let filter = OverlapSave::new(&taps, 2, 1).unwrap();
         for channels in 1..=40 {
-            let slots = halve.pass(channels) as usize / halve.0.block * channels;
+            let slots = filter.pass(channels) as usize / filter.0.block * channels;
             assert!(slots <= LANES.max(channels), "one pass of {channels} channels");
         }
-        assert!(Halve::new(&taps[1..]).is_none());
-        assert!(Halve::new(&taps[..31]).is_none());
+        assert!(OverlapSave::new(&taps[1..], 2, 1).is_none());
+        assert!(OverlapSave::new(&taps[..31], 2, 1).is_none());
     }
 }
