@@ -14,6 +14,7 @@ mod kaiser;
 mod kernel;
 mod low_pass;
 mod overlap_save;
+mod rounded;
 mod sinc;
 mod stage;
 mod stream;
