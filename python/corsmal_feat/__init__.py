@@ -230,8 +230,8 @@ _LATER = {"FeatureExtractor": "._estimator", "classifiers": ".classifiers"} | di
 def __getattr__(name: str) -> Any:
     if name not in _LATER:
         raise AttributeError(
-            f'module {__name__!r} has no attribute {name!r}; the page "Coming from librosa" lists'
-            " what is here, and librosa can be used alongside"
+            f'module {__name__!r} has no attribute {name!r}; "Coming from librosa" in the'
+            " documentation lists what is available, and librosa works alongside"
         )
     module = _import_module(_LATER[name], __name__)
     return module if name == "classifiers" else getattr(module, name)

@@ -58,16 +58,22 @@ def account(folder: Path, parts: list[str], ids: list[str], done_before: int) ->
         try:
             found = read(path, columns=["id", "status"])
         except (OSError, arrow().ArrowInvalid) as error:
-            raise RunError(f"{path}: {error}; remove it and run again") from error
+            raise RunError(f"{path} cannot be read: {error}; remove it and run again") from error
         there = found["id"].to_pylist()
         wanted = ids[at : at + len(there)]
         if there != wanted:
             missing = sorted({*wanted} - {*there})[:3]
-            raise RunError(f"{path} has other recordings than the manifest; missing {missing}")
+            raise RunError(
+                f"{path} does not hold the recordings of the manifest (missing: {missing}); remove"
+                " it and run again"
+            )
         at += len(there)
         statuses.update(found["status"].to_pylist())
     if at != len(ids):
-        raise RunError(f"{folder}: {at} recordings of {len(ids)}")
+        raise RunError(
+            f"{folder} holds {at} of the {len(ids)} recordings of the manifest; remove the last"
+            " part and run again"
+        )
     accounting = Accounting(
         [str(folder / PARTS / name) for name in parts], at, dict(statuses), done_before
     )

@@ -65,7 +65,7 @@ def room(what: str, *shape: int) -> None:
     except MemoryError:
         pass
     sizes = " x ".join(map(str, shape))
-    raise ParameterError(f"there is no memory for {what} of {sizes} values")
+    raise ParameterError(f"not enough memory for {what} of {sizes} values")
 
 
 def floats(name: str, value: Any, min_ndim: int = 1) -> Floats:
@@ -77,13 +77,14 @@ def floats(name: str, value: Any, min_ndim: int = 1) -> Floats:
         hint = ""
         if array.dtype.kind in "iu" and name == "y":
             bits = 8 * array.dtype.itemsize
-            hint = f"; divide {array.dtype} samples by 2**{bits - 1} and cast to float32 first"
+            hint = f"; divide {array.dtype} samples by 2**{bits - 1} and cast them to float32 first"
             if bits > 16:
                 hint = (
-                    "; divide them by their full scale (16 bits: 2**15) and cast to float32 first"
+                    "; divide the samples by their full scale (2**15 for 16 bits) and cast them to"
+                    " float32 first"
                 )
         elif array.dtype.kind in "iuf":
-            hint = "; cast it first, as by .astype(numpy.float32)"
+            hint = "; cast it first, for example with .astype(numpy.float32)"
         raise ParameterError(f"{name} has dtype {array.dtype}, expected float32 or float64{hint}")
     if array.ndim < min_ndim:
         raise ParameterError(f"{name} has {array.ndim} dimensions, expected at least {min_ndim}")

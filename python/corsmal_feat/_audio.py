@@ -35,13 +35,13 @@ def _open(path: Source) -> _core.Recording:
         content = path.read()
         if isinstance(content, bytes):
             return _core.Recording.from_bytes(content)
-    raise ParameterError(f"path must be a path or a file opened as binary, not {path!r}")
+    raise ParameterError(f"path must be a path or a file opened in binary mode, not {path!r}")
 
 
 def _seconds(name: str, value: float, rate: int) -> int:
     """Seconds as frames, cut as librosa does."""
     if not 0 <= value * rate <= 2**53:
-        raise ParameterError(f"{name} must be 0 or more seconds, not {value}")
+        raise ParameterError(f"{name} must be at least 0 seconds, not {value}")
     return int(value * rate)
 
 
@@ -98,8 +98,8 @@ def load(
         recording.skip(start)
     samples = recording.read(frames)
     if not len(samples) and frames != 0:
-        what = f"offset = {offset} s is beyond its end" if start else "it has no samples"
-        raise DecodeError(f"{path}: {what}")
+        what = f"ends before offset = {offset} s" if start else "has no samples"
+        raise DecodeError(f"{path} {what}")
     _tell(recording, path)
     y: Floats = samples[:, 0] if samples.shape[1] == 1 else samples.T
     y = y.astype(kind, copy=False)
@@ -156,7 +156,7 @@ def stream(
     sizes = {"block_length": block_length, "frame_length": frame_length, "hop_length": hop_length}
     for name, value in sizes.items():
         if not isinstance(value, (int, np.integer)) or value < 1:
-            raise ParameterError(f"{name}={value} must be a positive integer")
+            raise ParameterError(f"{name} must be a whole number of at least 1, not {value!r}")
         size(name, value)
     if fill_value is not None:
         number("fill_value", fill_value)
@@ -260,7 +260,7 @@ def get_duration(
     if not sr > 0:
         raise ParameterError(f"sr must be a positive sample rate in Hz, not {sr}")
     if y is None and S is None:
-        raise ParameterError("At least one of (y, sr), S, or path must be provided")
+        raise ParameterError("y, S or path must be given")
     given = np.asarray(S if y is None else y)
     if given.ndim == 0:
         raise ParameterError(f"{'S' if y is None else 'y'} has 0 dimensions, expected at least 1")

@@ -27,9 +27,9 @@ def rows_of(batch: Any) -> list[Any]:
         raise ParameterError(f"batch must be a pyarrow RecordBatch or Table, not {type(batch)}")
     names = batch.schema.names
     if len({*names}) != len(names):
-        raise ParameterError(f"batch has a column twice: {', '.join(names)}")
+        raise ParameterError(f"batch has two columns with the same name: {', '.join(names)}")
     if PATH not in names and BYTES not in names:
-        raise ParameterError(f"batch needs a column path or bytes, it has {', '.join(names)}")
+        raise ParameterError(f"batch needs a column path or bytes, but has only {', '.join(names)}")
 
     def column(name: str, kind: Any) -> list[Any]:
         if name not in names:
@@ -60,12 +60,16 @@ def rows_of(batch: Any) -> list[Any]:
             source = (path, archives[i], offsets[i] or 0, sizes[i] or 0, faults[i])
         for time in (starts[i], ends[i]):
             if time is not None and not 0 <= time < np.inf:
-                raise ParameterError(f"row {i}: {time} is not a time in seconds")
+                raise ParameterError(
+                    f"row {i}: start and end must be finite and at least 0 seconds, not {time}"
+                )
         # Without the query of a web address, which may be a signature.
         name = ids[i] if ids[i] is not None else (_core.shown(path) or str(i))
         piece = None if firsts[i] is None else (firsts[i], lasts[i])
         if piece is not None and piece[1] is not None and piece[1] <= piece[0]:
-            raise ParameterError(f"row {i}: a piece from sample {piece[0]} to {piece[1]} is empty")
+            raise ParameterError(
+                f"row {i}: end_sample must be above first_sample ({piece[0]}), not {piece[1]}"
+            )
         rows.append((name, source, starts[i], ends[i], piece))
     return rows
 
@@ -94,7 +98,7 @@ def _local(path: str) -> str:
         return path
     parts = urlsplit(path)
     if parts.netloc not in ("", "localhost"):
-        raise ParameterError(f"{path}: a URI of a file must name no other machine")
+        raise ParameterError(f"{path}: a file:// URI must not name another machine")
     return unquote(parts.path)
 
 

@@ -71,17 +71,20 @@ class Job:
     ) -> Job:
         """Checks what is asked for; keeps what takes long to make."""
         if summary not in ("columns", "list"):
-            raise ParameterError(f'summary must be "columns" or "list", not {summary!r}')
+            raise ParameterError(f"summary must be 'columns' or 'list', not {summary!r}")
         if frames not in (None, "list"):
-            raise ParameterError(f'frames must be "list" or None, not {frames!r}')
+            raise ParameterError(f"frames must be 'list' or None, not {frames!r}")
         if frames and not (projection is None and model is None):
-            raise ParameterError("projection and model take statistics: leave out frames")
+            raise ParameterError("projection and model need statistics: leave out frames")
         if channels is not None and not 1 <= channels <= 64:
             raise ParameterError(f"channels must be 1 to 64, not {channels}")
         trained = None if model is None else _model(model)
         if trained is not None and preset is None and config is None:
             if not trained.feature_config:
-                raise ModelError(f"{model} does not say which features of a recording it takes")
+                raise ModelError(
+                    f"{model} holds no feature configuration, so it cannot predict recordings: save"
+                    " it with save(path, features=...)"
+                )
             config = trained.feature_config
         changes = dict(set or {})
         if projection is not None:
@@ -92,7 +95,10 @@ class Job:
             tree = json.loads(computation.config) | {"summary": None}
             computation = Computation.of(*configuration(None, tree, None))
         if trained is not None and computation.config_hash != trained.header["feature_config_hash"]:
-            raise ModelError(f"{model} was trained on features of another configuration")
+            raise ModelError(
+                f"{model} was trained on features of another configuration: leave out preset,"
+                " config and set to use its own"
+            )
         return cls(computation, trained, summary == "list", channels)
 
     def extract(self, batch: Any, jobs: int) -> Any:
@@ -155,7 +161,7 @@ class Job:
         taken = [name for name in new if name in columns]
         if taken:
             raise ParameterError(
-                f"the label column {taken[0]!r} has the name of a column of the output: rename it"
+                f"the label column {taken[0]!r} has the same name as an output column: rename it"
             )
         config_hash = self.computation.config_hash
         meta = {"tool_version": _core.__version__, "config_hash": config_hash}
@@ -184,7 +190,7 @@ class Job:
         for i, row in enumerate(good):
             reason = model.refusal(row["sample_rate"], row["channels"])
             if reason is None and len(names) != len(known):
-                reason = f"gives {len(names)} features, the model was trained on {len(known)}"
+                reason = f"gives {len(names)} features; the model was trained on {len(known)}"
             if reason is None and not np.isfinite(values[i]).all():
                 row |= {"status": "non_finite", "reason": "features that are not finite"}
             elif reason is not None:

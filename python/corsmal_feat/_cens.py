@@ -70,7 +70,9 @@ def chroma_cens(
     if smooth is not None and not (
         isinstance(smooth, (int, np.integer)) and 0 < smooth <= _LONGEST
     ):
-        raise ParameterError(f"win_len_smooth={smooth} must be a positive integer or None")
+        raise ParameterError(
+            f"win_len_smooth must be a whole number of at least 1, or None, not {smooth}"
+        )
     chroma: Any = chroma_cqt(
         y=y,
         C=C,

@@ -83,7 +83,7 @@ def chroma_cqt(
         c = floats("C", C, 2)
         return _promoted(unrows(_core.chroma_of_cqt(rows(c, 2), chroma), c, 2), weights)
     if y is None:
-        raise ParameterError("y or C is needed")
+        raise ParameterError("y or C must be given")
     y = audio(y)
     if tuning is None:
         tuning = estimate_tuning(y=y, sr=sr, bins_per_octave=bins_per_octave)

@@ -77,14 +77,12 @@ class Classifier(ClassifierMixin, BaseEstimator):
         try:
             spec = _core.classifier_parameters(self._name, json.dumps(self._parameters(classes)))
         except TypeError as error:
-            raise ParameterError(
-                f"{owner}: a parameter is of an impossible type: {error}"
-            ) from error
+            raise ParameterError(f"{owner}: a parameter has the wrong type: {error}") from error
         pipeline = {"classifier": {"name": self._name, "parameters": json.loads(spec)}}
         counts = np.bincount(positions).tolist()
         if len(classes) < 2 and self._name in ("svm", "logistic"):
             raise ParameterError(
-                f"{owner} needs at least 2 classes in y: there is only one class, {classes[0]!r}"
+                f"{owner} needs at least 2 classes, but y has only one class, {classes[0]!r}"
             )
         provenance = {"rows": len(x), "rows_per_class": counts, "label_kind": classes.dtype.kind}
         try:
@@ -116,8 +114,8 @@ class Classifier(ClassifierMixin, BaseEstimator):
         known = getattr(self, "feature_names_in_", None)
         if names is not None and known is not None and names.tolist() != known.tolist():
             raise ParameterError(
-                "The feature names should match those that were passed during fit: "
-                f"{list(names)} where {list(known)} are known"
+                "The feature names should match those that were passed during fit: expected "
+                f"{list(known)}, not {list(names)}"
             )
         x = features(X, type(self).__name__)
         if x.shape[1] != self.n_features_in_:

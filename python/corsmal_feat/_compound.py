@@ -196,7 +196,9 @@ def sk_resize(
     """
     s = floats("S", S, 2)
     if s.ndim != 2 or len(shape) != 2:
-        raise ParameterError(f"S has {s.ndim} dimensions and shape {len(shape)}, expected 2 and 2")
+        raise ParameterError(
+            f"S has {s.ndim} dimensions and shape has {len(shape)} values, expected 2 of each"
+        )
     height, width = size("shape", shape[0]), size("shape", shape[1])
     room("an image", 4, height + s.shape[0], width + s.shape[1])
     return _core.sk_resize(
@@ -293,7 +295,7 @@ def pca_project(
     [[2.0]]
     """
     if whiten and variance is None:
-        raise ParameterError("variance is needed with whiten=True")
+        raise ParameterError("whiten=True needs variance")
     x = np.ascontiguousarray(_doubles("X", X, 2))
     components = np.ascontiguousarray(_doubles("components", components, 2))
     scale = _doubles("variance", variance, 1).ravel().tolist() if whiten else None
@@ -332,7 +334,7 @@ def fit_projection(
     (4, 26)
     """
     if not overwrite and os.path.exists(out):
-        raise ParameterError(f"out = {os.fspath(out)!r} exists: overwrite=True replaces it")
+        raise ParameterError(f"out = {os.fspath(out)!r} already exists: overwrite=True replaces it")
     _core.fit_projection(features, None if n_components is None else int(n_components), out)
 
 

@@ -115,7 +115,7 @@ def cqt(
     y = audio(y)
     if res_type is None:
         warn(
-            "Support for VQT with res_type=None is deprecated: it stands for 'soxr_hq'",
+            "Support for VQT with res_type=None is deprecated: it means 'soxr_hq'",
             FutureWarning,
         )
     elif res_type not in CONVERTERS:

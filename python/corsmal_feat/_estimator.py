@@ -113,8 +113,8 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         names, matrix = self._compute(_recordings(X))
         if self._names is not None and names != self._names:
             raise ParameterError(
-                f"X gives {len(names)} values for each recording, fit has seen "
-                f"{len(self._names)}: another number of channels or configuration"
+                f"X gives {len(names)} values per recording, but fit saw {len(self._names)}: the "
+                "number of channels or the configuration differs"
             )
         return matrix
 
@@ -154,7 +154,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         effective, _ = _core.effective_config(config, overrides)
         if json.loads(effective)["summary"] is None:
             raise ParameterError(
-                "FeatureExtractor gives one row for each recording, which needs a summary; "
+                "FeatureExtractor computes one row per recording, so it needs a summary: "
                 'set={"summary.stats": ["mean", "std"]} adds one'
             )
         return config, overrides
@@ -185,7 +185,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
             progress=self.progress,
         )
         if len(found.outcomes) != len(different):
-            raise ParameterError("X has folders, globs or manifests: name each recording")
+            raise ParameterError("X holds folders, globs or manifests: name each recording")
         rows = iter(found.summary if found.summary is not None else ())
         columns = found.names or self._names or []
         row_of: dict[str, Matrix] = {}
@@ -196,7 +196,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
             reason = f"{name}: {outcome['status']}: {outcome['reason']}"
             if self.errors == "raise" or not columns:
                 raise DecodeError(reason)
-            warn(f"a row of NaN for {reason}")
+            warn(f"the row is NaN: {reason}")
             row_of[name] = np.full(len(columns), np.nan, dtype=np.float32)
         return columns, np.stack([row_of[name] for name in names])
 
@@ -205,9 +205,9 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         there = [name for name in names if name not in absent]
         columns, found = self._of_files(there) if there else (self._names or [], np.zeros((0, 0)))
         if not columns:
-            raise DecodeError(f"{absent[0]}: no such file, nor any other of X")
+            raise DecodeError(f"{absent[0]}: no such file; no other file of X exists either")
         for name in absent:
-            warn(f"a row of NaN for {name}: no such file")
+            warn(f"the row is NaN: {name}: no such file")
         rows = iter(found)
         empty = np.full(len(columns), np.nan, dtype=np.float32)
         return columns, np.stack([empty if name in absent else next(rows) for name in names])
@@ -233,8 +233,8 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         for position, (others, _) in enumerate(computed):
             if others != names:
                 raise ParameterError(
-                    f"recording {position} gives {len(others)} values where the first one gives "
-                    f"{len(names)}: another number of channels"
+                    f"recording {position} gives {len(others)} values, but the first one gives "
+                    f"{len(names)}: the number of channels differs"
                 )
         return names, np.stack([values for _, values in computed])
 

@@ -161,13 +161,13 @@ def _exists(text: str) -> bool:
 def _plain(value: Any) -> Any:
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
-    raise TypeError(f"expected numbers, text, booleans, lists or tables, not {value!r}")
+    raise TypeError(f"expected numbers, strings, booleans, lists or mappings, not {value!r}")
 
 
 def _toml(key: str, value: Any) -> str:
     """A value as TOML: for what is allowed here its JSON is the same."""
     if value is None or isinstance(value, Mapping):
-        raise ParameterError(f"{key} must be a number, text, boolean or list, not {value!r}")
+        raise ParameterError(f"{key} must be a number, string, boolean or list, not {value!r}")
     try:
         return json.dumps(value, default=_plain)
     except TypeError as error:
@@ -235,7 +235,7 @@ class SignalExtractor:
 def whole_rate(sr: Any) -> int:
     """A sample rate as files have it."""
     if sr is None or not 1 <= sr < 2**32 or int(sr) != sr:
-        raise ParameterError(f"sr must be a whole number of Hz of at least 1, not {sr}")
+        raise ParameterError(f"sr must be a whole number of at least 1 Hz, not {sr}")
     return int(sr)
 
 

@@ -141,7 +141,7 @@ class Features:
             near = isinstance(recording, str)
             close = [i for i in self.ids if near and (recording in i or i in recording)][:3]
             hint = f"; did you mean {', '.join(map(repr, close))}?" if close else ""
-            raise UnknownIdError(f"no recording {recording!r} among {len(self.ids)}{hint}")
+            raise UnknownIdError(f"no recording of {len(self.ids)} has the id {recording!r}{hint}")
         if self.summary is None:
             # A recording may be too short for any frame.
             return {} if len(self.config["features"]) > 1 else np.empty((0, 0, 0), np.float32)
@@ -192,17 +192,17 @@ class Features:
     def _made_of(self) -> dict[str, Any]:
         """What a model file says about features."""
         if self.summary is None:
-            raise ParameterError("features has frames: a model is fitted on rows of a summary")
+            raise ParameterError("features holds frames, but a model needs rows of a summary")
         if not self.config:
             raise ParameterError(
-                "features does not say how it was made, since another program wrote the table anew:"
-                " give what corsmal_feat wrote"
+                "features has no configuration, because another program rewrote the table: pass the"
+                " table that corsmal_feat wrote"
             )
         if (wanted := self._names_of_recordings()) not in (None, self.names):
             raise ParameterError(
-                f"features has {len(self.names)} columns, not the {len(wanted or ())} that its"
-                " configuration gives, in that order: a model of them could not predict recordings;"
-                " fit on all columns as corsmal_feat wrote them"
+                f"features has {len(self.names)} columns, expected the {len(wanted or ())} that its"
+                " configuration gives, in that order: otherwise the model cannot predict"
+                " recordings; fit on all columns as corsmal_feat wrote them"
             )
         return {
             "feature_names": self.names,
@@ -244,8 +244,8 @@ class Features:
         for feature, values in arrays.items():
             if values.shape[-1] != len(shared):
                 raise ParameterError(
-                    f"{recording}: {feature} has {values.shape[-1]} frames where the first feature"
-                    f" has {len(shared)}: to_frame needs features of one hop"
+                    f"{recording}: {feature} has {values.shape[-1]} frames, but the first feature"
+                    f" has {len(shared)}: to_frame needs features with the same hop"
                 )
             for c, k in np.ndindex(values.shape[:2]):
                 columns[f"{feature}[{c}][{k}]"] = values[c, k]

@@ -22,11 +22,11 @@ def of_npz(name: str) -> dict[str, Any]:
         archive = np.load(name, allow_pickle=False)
     except (ValueError, EOFError, zipfile.BadZipFile) as error:
         raise ParameterError(
-            f"{name} is not an output of corsmal-feat: not an .npz archive; corsmal_feat.load reads"
-            " recordings"
+            f"{name} is not an output of corsmal-feat: it is not an .npz archive; corsmal_feat.load"
+            " reads recordings"
         ) from error
     if not isinstance(archive, np.lib.npyio.NpzFile):
-        raise ParameterError(f"{name} is not an output of corsmal-feat: a single array")
+        raise ParameterError(f"{name} is not an output of corsmal-feat: it is a single array")
     try:
         return _fields(archive, name)
     except BaseException:

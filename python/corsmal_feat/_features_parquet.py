@@ -54,9 +54,11 @@ def of_partitions(name: str) -> dict[str, Any]:
         if not _is_part(of) or len(of["places"]) != len(found["outcomes"]):
             raise ParameterError(f"{file} is not a part of an output of corsmal-feat")
         if file.parent.name != _folder(of["label"], of["value"]):
-            raise ParameterError(f"{file} is the part {_folder(of['label'], of['value'])}")
+            raise ParameterError(
+                f"{file} holds the part {_folder(of['label'], of['value'])}: rename its folder"
+            )
         if _run(read[number]) != _run(read[0]):
-            raise ParameterError(f"{file} is a part of another output than {files[0]}")
+            raise ParameterError(f"{file} and {files[0]} are parts of different outputs")
         places += [(place, number, at) for at, place in enumerate(of["places"])]
         found["labels"][of["label"]] = np.array([of["value"]] * len(found["ids"]), dtype=np.str_)
     first, label = parts[0], read[0][1]["label"]
@@ -133,7 +135,7 @@ def _read(name: str) -> tuple[dict[str, Any], Any]:
     except ImportError as error:
         raise ImportError(
             f"{name}: reading Parquet needs pyarrow (pip install pyarrow); "
-            "pandas.read_parquet and polars.read_parquet give the table, too"
+            "pandas.read_parquet and polars.read_parquet read the table, too"
         ) from error
     try:
         # Of one file: its folder, `label=value`, says nothing here.
@@ -206,7 +208,7 @@ def _lists(file: str, table: Any, ids: list[str], columns: dict[str, str]) -> di
             lengths = [n // max(outer, 1) for outer, n in zip([1, *shape], counts, strict=True)]
             if not even or math.prod(lengths) != len(lists) or lists.null_count:
                 raise ParameterError(
-                    f"{file}: the lists of {name} are not of one length in the row of {recording!r}"
+                    f"{file}: the lists of {name} differ in length in the row of {recording!r}"
                 )
             values = np.array(lists).reshape(lengths)
             if len(columns) > 1:

@@ -45,7 +45,7 @@ def window_spec(window: Window, length: int) -> WindowSpec:
         window = np.asarray(window(length))
     try:
         if np.iscomplexobj(np.asarray(window)):
-            raise ParameterError("window must be real: it has complex values")
+            raise ParameterError("window must be real, not complex")
         values = np.ascontiguousarray(window, dtype=np.float64)
     except ParameterError:
         raise
@@ -54,10 +54,10 @@ def window_spec(window: Window, length: int) -> WindowSpec:
     if values.ndim != 1:
         raise ParameterError(
             "window must be a name, a tuple of a name and parameters, a number (the beta of a"
-            f" Kaiser window), values, or a function of the length, not {window!r}"
+            f" Kaiser window), an array, or a function of the length, not {window!r}"
         )
     if len(values) != length:
-        raise ParameterError(f"Window size mismatch: {len(values)} != {length}")
+        raise ParameterError(f"window has {len(values)} points, expected {length}")
     if not np.isfinite(values).all():
         raise ParameterError("window contains NaN or infinite values")
     return values
@@ -178,7 +178,7 @@ def mel(
 
 def warn_empty() -> None:
     """What librosa warns of: bands too narrow to hold a bin."""
-    warn("Empty filters detected in the mel bank: fewer n_mels or a longer n_fft avoid them")
+    warn("Empty filters detected in the mel filter bank: use fewer n_mels or a longer n_fft")
 
 
 def chroma_params(

@@ -36,8 +36,8 @@ class GrownClassifier(WeightedClassifier):
             raise not_fitted(self)
         if self._importances is None:
             raise NotFittedError(
-                "feature_importances_ are known after fit (not with solver='linfa'); model files "
-                "do not hold them"
+                "feature_importances_ is available only after fit, and not with solver='linfa': "
+                "model files do not hold it"
             )
         return self._importances
 
@@ -70,8 +70,8 @@ class Forest(GrownClassifier):
         asked = ~np.isnan(fractions).any(axis=1)
         if (used & ~asked).any():
             warn(
-                "Some inputs do not have OOB scores: too few trees, so that every one has seen "
-                f"{(used & ~asked).sum()} of {rows} rows"
+                "Some inputs do not have OOB scores: every tree has seen "
+                f"{(used & ~asked).sum()} of {rows} rows; use more trees"
             )
         right = fractions[asked].argmax(axis=1) == learned.positions[asked]
         self.oob_decision_function_ = fractions

@@ -21,7 +21,9 @@ def _pair(value: Any) -> tuple[Any, Any]:
     """A value for the harmonic and one for the percussive side."""
     if isinstance(value, tuple | list):
         if len(value) < 2:
-            raise ParameterError(f"expected a number or a pair, not {value!r}")
+            raise ParameterError(
+                f"kernel_size and margin must be a number or a pair, not {value!r}"
+            )
         return value[0], value[1]
     return value, value
 

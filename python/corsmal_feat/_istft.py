@@ -58,7 +58,7 @@ def istft(
     if d.ndim < 2:
         raise ParameterError(f"stft_matrix has {d.ndim} dimensions, expected at least 2")
     if d.shape[-1] == 0:
-        raise ParameterError("stft_matrix has no frames; the inverse needs at least 1")
+        raise ParameterError("stft_matrix has 0 frames, expected at least 1")
     if d.dtype not in (np.complex64, np.complex128):
         d = d.astype(np.complex64 if d.dtype == np.float32 else np.complex128)
     if n_fft is None:

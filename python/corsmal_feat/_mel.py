@@ -179,13 +179,13 @@ def delta(
     step, beyond = number("delta", kwargs.pop("delta", 1.0)), kwargs.pop("cval", 0.0)
     kwargs.pop("deriv", None)  # as librosa, which sets it to `order`
     if kwargs.pop("polyorder", order) != order:
-        raise ParameterError("polyorder is always order here: leave it out")
+        raise ParameterError("polyorder must equal order: leave it out")
     if kwargs:
         raise ParameterError(f"delta does not take {', '.join(map(repr, kwargs))}")
     array = floats("data", data)
     kind = array.dtype
     if not np.isfinite(step) or step == 0:
-        raise ParameterError(f"delta must be a finite number that is not 0, not {step}")
+        raise ParameterError(f"delta must be a finite, non-zero number, not {step}")
     if mode == "constant" and beyond != 0:
         # The derivative of a constant is 0: the ends are zeros after a shift.
         array = array.astype(np.float64) - number("cval", beyond)

@@ -30,7 +30,7 @@ def read_member(archive: Any, name: str, member: str) -> Values:
             values: Values = np.lib.format.read_array(file, allow_pickle=False)
     except (ValueError, EOFError, zipfile.BadZipFile, MemoryError) as error:
         what = "holds Python objects" if "pickle" in str(error) else f"cannot be read: {error}"
-        raise ParameterError(f"{name}: {member} {what}") from error
+        raise ParameterError(f"{name}: member {member} {what}") from error
     return values
 
 

@@ -40,19 +40,17 @@ def stack_memory(
            [0, 1, 2]])
     """
     if n_steps < 1:
-        raise ParameterError(f"n_steps = {n_steps} must be a positive integer")
+        raise ParameterError(f"n_steps must be a whole number of at least 1, not {n_steps}")
     if delay == 0:
-        raise ParameterError("delay must be a non-zero integer")
+        raise ParameterError("delay must be a whole number other than 0, not 0")
     array = np.atleast_2d(np.asarray(data))
     frames = array.shape[-1]
     if frames < 1:
-        raise ParameterError(
-            f"Cannot stack memory when input data has no columns. Given data.shape={array.shape}"
-        )
+        raise ParameterError(f"data has 0 frames (its shape is {array.shape}), expected at least 1")
     reach = (int(n_steps) - 1) * abs(int(delay))
     if array.size * int(n_steps) > MOST or reach > MOST:
         raise ParameterError(
-            f"n_steps and delay must give at most {MOST} values, not {n_steps} and {delay}"
+            f"n_steps = {n_steps} and delay = {delay} give more than {MOST} values"
         )
     kwargs.setdefault("mode", "constant")
     widths = [(0, 0)] * array.ndim
@@ -62,4 +60,6 @@ def stack_memory(
         starts = [(reach if delay > 0 else 0) - step * int(delay) for step in range(n_steps)]
         return np.concatenate([padded[..., s : s + frames] for s in starts], axis=-2)
     except MemoryError as error:
-        raise ParameterError(f"no memory for n_steps = {n_steps}, delay = {delay}") from error
+        raise ParameterError(
+            f"not enough memory for n_steps = {n_steps} and delay = {delay}"
+        ) from error

@@ -119,7 +119,7 @@ class TrainedModel:
         except ModelError as error:
             raise ModelError(
                 f"{self.path} does not say which sample rates and channels it was trained on:"
-                " train it again, or any_rate=True takes every recording as it is"
+                " train it again, or pass any_rate=True to accept all recordings"
             ) from error
         for found, known, what in (
             (sample_rate, rates, "Hz"),
@@ -127,7 +127,7 @@ class TrainedModel:
         ):
             if found is not None and known is not None and found not in known:
                 trained = ", ".join(map(str, known))
-                return f"{found} {what} where {self.path} was trained on {trained}"
+                return f"{found} {what}, but {self.path} was trained on {trained}"
         return None
 
     def _rows(self, X: Any, any_rate: bool) -> Matrix:
@@ -153,8 +153,8 @@ class TrainedModel:
     def _of_recordings(self, paths: list[str], any_rate: bool) -> Matrix:
         if not self.feature_config:
             raise ModelError(
-                f"{self.path} was trained on rows of numbers: it does not say which features of a"
-                " recording they are; save(path, features=...) keeps it"
+                f"{self.path} holds no feature configuration, so it cannot predict recordings: save"
+                " it with save(path, features=...)"
             )
         # The same file may be in X twice.
         different = list(dict.fromkeys(paths))
@@ -163,7 +163,7 @@ class TrainedModel:
             warnings.simplefilter("ignore")
             found = extract(different, config=self.feature_config)
         if len(found.outcomes) != len(different):
-            raise ParameterError("X has folders, globs or manifests: name each recording")
+            raise ParameterError("X holds folders, globs or manifests: name each recording")
         for path, outcome in zip(different, found.outcomes, strict=True):
             if outcome["status"] not in GOOD:
                 raise DecodeError(f"{path}: {outcome['status']}: {outcome['reason']}")
@@ -171,19 +171,18 @@ class TrainedModel:
             self._check_formats(found.outcomes)
         if found.summary is None or len(found.names) != self.n_features_in_:
             raise ParameterError(
-                f"X gives {len(found.names)} values for each recording where {self.path} was"
-                f" trained on {self.n_features_in_}: another number of channels?"
+                f"X gives {len(found.names)} values per recording, but {self.path} was trained on"
+                f" {self.n_features_in_}: does the number of channels differ?"
             )
         if self.header["feature_names"] not in ([], found.names):
             raise ModelError(
-                f"{self.path} was trained on features of other names, or in another order, than"
-                " recordings are given: train it on all columns as corsmal_feat wrote them"
+                f"{self.path} was trained on features with other names, or in another order, than"
+                " those of a recording: train it on all columns as corsmal_feat wrote them"
             )
         if found.config_hash != self.header["feature_config_hash"]:
             raise ModelError(
-                f"{self.path}: its feature configuration was written by version"
-                f" {self.header['tool_version']}; this version computes other features from it:"
-                " extract and train again"
+                f"{self.path} was trained with version {self.header['tool_version']}, and this"
+                " version computes other features from its configuration: extract and train again"
             )
         row_of = dict(zip(different, found.summary.astype(np.float64), strict=True))
         return np.stack([row_of[path] for path in paths])
@@ -193,7 +192,7 @@ class TrainedModel:
         for row in outcomes:
             reason = self.refusal(row.get("sample_rate"), row.get("channels"))
             if reason is not None:
-                raise ParameterError(f"{row['path']}: {reason}: any_rate=True takes it as it is")
+                raise ParameterError(f"{row['path']}: {reason}; any_rate=True accepts it as it is")
 
 
 @refuses

@@ -126,7 +126,7 @@ class Network:
         classes = numbers = None
         if targets.dtype.kind in "iub":
             if targets.ndim != 1 or (targets.size and targets.min() < 0):
-                raise ParameterError("y: classes are one whole number from 0 for each item")
+                raise ParameterError("y must hold one class per item, a whole number of at least 0")
             classes = targets.tolist()
         else:
             numbers = targets.astype(np.float32).ravel().tolist()
@@ -151,7 +151,7 @@ def single(value: Any) -> Singles:
     """A contiguous array in single precision, of finite numbers."""
     array = np.ascontiguousarray(value, dtype=np.float32)
     if not np.isfinite(array).all():
-        raise ParameterError("inputs and weights must be finite numbers")
+        raise ParameterError("inputs and weights must be finite")
     return array
 
 
@@ -161,11 +161,11 @@ def _lengths(lengths: Sequence[int] | None) -> list[int] | None:
 
 def seed_of(seed: int) -> int:
     if not 0 <= seed < 1 << 64:
-        raise ParameterError(f"seed must be 0 to 2**64 - 1, not {seed}")
+        raise ParameterError(f"seed must be a whole number from 0 to 2**64 - 1, not {seed}")
     return int(seed)
 
 
 def plain(value: Any) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    raise ParameterError(f"a recipe cannot hold a {type(value).__name__}")
+    raise ParameterError(f"recipe must hold plain values, not {type(value).__name__}")

@@ -138,12 +138,12 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         inputs = _core.classifier_inputs(self.network)
         items = list(X)
         if not items:
-            raise ParameterError("X has no items")
+            raise ParameterError("X is empty: at least one item is needed")
         if len(inputs) == 1:
             return [_column(items, self.network, inputs[0][1])]
         if any(len(item) != len(inputs) for item in items):
             raise ParameterError(
-                f"{self.network}: each item of X is {len(inputs)} arrays, one for each input"
+                f"{self.network}: each item of X must be {len(inputs)} arrays, one per input"
             )
         return [
             _column([item[k] for item in items], f"{self.network}, {name}", shape)

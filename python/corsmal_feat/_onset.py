@@ -21,7 +21,7 @@ from .util import fix_frames
 
 def _count(name: str, value: Any) -> int:
     if not isinstance(value, (int, np.integer)) or value < 1:
-        raise ParameterError(f"{name} must be an integer of at least 1, not {value}")
+        raise ParameterError(f"{name} must be a whole number of at least 1, not {value}")
     return int(value)
 
 
@@ -82,7 +82,7 @@ def onset_strength(
     """
     if aggregate is False:
         raise ParameterError(
-            "aggregate must be a function or None, not False; onset_strength_multi gives every band"
+            "aggregate must be a function or None, not False; onset_strength_multi keeps every band"
         )
     lag, max_size = _count("lag", lag), _count("max_size", max_size)
     n_fft, hop_length = _count("n_fft", n_fft), _count("hop_length", hop_length)
@@ -199,7 +199,7 @@ def _groups(channels: Sequence[int] | Sequence[slice] | None) -> list[slice]:
         edges = sorted({int(channel) for channel in channels if not isinstance(channel, slice)})
         groups = [slice(a, b) for a, b in pairwise(edges)]
     if not groups:
-        raise ParameterError(f"channels must be two bands or one slice, not {channels!r}")
+        raise ParameterError(f"channels must be two bands or more, or slices, not {channels!r}")
     return groups
 
 
@@ -263,10 +263,10 @@ def onset_detect(
         onset_envelope = onset_strength(y=y, sr=sr, hop_length=hop_length)
     envelope = floats("onset_envelope", onset_envelope)
     if envelope.shape[-1] == 0:
-        raise ParameterError("onset_envelope is empty")
+        raise ParameterError("onset_envelope has 0 frames, expected at least 1")
     if sparse and envelope.ndim != 1:
         raise ParameterError(
-            f"onset_envelope has {envelope.ndim} dimensions: sparse=True allows only one"
+            f"onset_envelope has {envelope.ndim} dimensions, expected 1 with sparse=True"
         )
     if backtrack and not sparse:
         raise ParameterError("backtrack=True needs sparse=True")
@@ -335,5 +335,5 @@ def onset_backtrack(events: npt.ArrayLike, energy: npt.ArrayLike) -> npt.NDArray
     if events.ndim != 1:
         raise ParameterError(f"events has {events.ndim} dimensions, expected 1")
     if events.size and (events.min() < 0 or events.max() >= array.size):
-        raise ParameterError(f"events reach beyond the {array.size} frames of energy")
+        raise ParameterError(f"events must lie within the {array.size} frames of energy")
     return np.asarray(_core.onset_backtrack(events.tolist(), array), dtype=np.int64)

@@ -66,7 +66,7 @@ def pcen(
     (128, 44)
     """
     if np.iscomplexobj(S):
-        warn("pcen uses the magnitudes of a complex S")
+        warn("pcen was called on complex input: phase is discarded")
         S = np.abs(np.asarray(S))
     s: Any = spectrum(S, 1)
     time = axis % s.ndim if -s.ndim <= axis < s.ndim else None
@@ -78,12 +78,12 @@ def pcen(
     places = [time]
     if max_size > 1 and ref is None:
         if s.ndim == 1:
-            raise ParameterError("max_size must be 1 for S of one dimension")
+            raise ParameterError(f"max_size must be 1 where S has one dimension, not {max_size}")
         if max_axis is None and s.ndim != 2:
-            raise ParameterError(f"S has {s.ndim} dimensions: give max_axis, the axis of bands")
+            raise ParameterError(f"max_axis must be given, since S has {s.ndim} dimensions")
         bands = (1 - time) % 2 if max_axis is None else max_axis % s.ndim
         if bands == time:
-            raise ParameterError(f"max_axis = {max_axis} is the axis of time")
+            raise ParameterError(f"max_axis must not be the axis of time, {max_axis}")
         places = [bands, time]
 
     def in_order(array: Any) -> Any:

@@ -39,11 +39,15 @@ def cut(table: Any, longest: float) -> Any:
         )
     taken = [name for name in (RECORDING, *PIECE) if name in table.schema.names]
     if taken:
-        raise ParameterError(f"the manifest has a column {taken[0]}, which pieces need: rename it")
+        raise ParameterError(
+            f"the manifest has a column {taken[0]}, but pieces need that name: rename it"
+        )
     rows = rows_of(table)
     twice = next((i for i, n in Counter(row[0] for row in rows).items() if n > 1), None)
     if twice is not None:
-        raise ParameterError(f"the manifest has the id {twice!r} twice: pieces need their own")
+        raise ParameterError(
+            f"the manifest has the id {twice!r} more than once: pieces need unique ids"
+        )
     places: list[int] = []
     ids: list[str] = []
     samples: list[tuple[int | None, int | None]] = []
@@ -127,12 +131,12 @@ def join_pieces(found: Any) -> Any:
         raise ParameterError(f"found must be a pyarrow.Table, not {type(found)}")
     for name in (RECORDING, *PIECE):
         if name not in found.schema.names:
-            raise ParameterError(f"found has no column {name}: nothing in it was cut")
+            raise ParameterError(f"found has no column {name}: none of its recordings was cut")
     recordings = found[RECORDING].to_pylist()
     starts = [i for i, name in enumerate(recordings) if i == 0 or recordings[i - 1] != name]
     groups = [range(a, b) for a, b in zip(starts, [*starts[1:], len(recordings)], strict=True)]
     if len({recordings[group[0]] for group in groups}) != len(groups):
-        raise ParameterError("the pieces of a recording must follow each other: sort the table")
+        raise ParameterError("the pieces of a recording must be consecutive rows: sort the table")
     config = json.loads((found.schema.metadata or {}).get(b"corsmal.config", b"{}"))
     features = {name for name in config.get("features", ()) if _is_nested(found, name)}
     columns: dict[str, Any] = {}
@@ -216,9 +220,7 @@ def _require_whole(found: Any, groups: list[range], recordings: list[str]) -> No
         else:
             if reached is None:
                 continue
-        raise ParameterError(
-            f"pieces of {recordings[group[0]]!r} are missing, or not in their order"
-        )
+        raise ParameterError(f"pieces of {recordings[group[0]]!r} are missing or out of order")
 
 
 def _is_nested(table: Any, name: str) -> bool:
@@ -237,8 +239,8 @@ def _joined(column: Any, groups: list[range], bad: list[int | None]) -> list[Sin
     values = sum(row.size for row in rows if row is not None)
     if values > _VALUES:
         raise ParameterError(
-            f"{values} values are more than the {_VALUES} that an Arrow column holds: join fewer"
-            " recordings at a time"
+            f"the frames have {values} values, but an Arrow column holds at most {_VALUES}: join"
+            " fewer recordings at a time"
         )
     return rows
 

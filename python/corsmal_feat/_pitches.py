@@ -299,7 +299,7 @@ def note_to_midi(note: str | Names, *, round_midi: bool = True) -> Any:
     """
     if not isinstance(note, str):
         if np.ndim(note) == 0:
-            raise ParameterError(f"note must be text or several of them, not {note!r}")
+            raise ParameterError(f"note must be a string or a sequence of strings, not {note!r}")
         return np.array([note_to_midi(one, round_midi=round_midi) for one in note])
     found = _NOTE.match(note)
     if found is None:

@@ -242,7 +242,7 @@ _NAMES: dict[Any, str] = {
     np.ndarray: "an array of numbers",
     npt.NDArray: "an array of numbers",
     bool: "True or False",
-    str: "text",
+    str: "a string",
     types.NoneType: "None",
     os.PathLike: "a path",
     Mapping: "a mapping",

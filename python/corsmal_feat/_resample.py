@@ -86,7 +86,7 @@ def resample(
             f"orig_sr and target_sr must be positive rates in Hz, not {orig_sr} and {target_sr}"
         )
     if y.shape[axis] * (target_sr / orig_sr) > MOST:
-        raise ParameterError(f"target_sr must give at most {MOST} samples, not {target_sr}")
+        raise ParameterError(f"target_sr = {target_sr} gives more than {MOST} samples")
     if orig_sr == target_sr:
         return y
     moved = np.moveaxis(y, axis, -1)
@@ -110,7 +110,7 @@ def _by_whole_signal(y: Floats, orig_sr: float, target_sr: float, name: str) -> 
     ratio = target_sr / orig_sr
     samples = int(np.ceil(y.shape[-1] * ratio))
     if samples < 1:
-        raise ParameterError(f"y of {y.shape[-1]} samples gives none at {target_sr} Hz")
+        raise ParameterError(f"y has {y.shape[-1]} samples, too few for one at {target_sr} Hz")
     try:
         if name in ("fft", "scipy"):
             return _fourier(y, samples)
@@ -118,7 +118,7 @@ def _by_whole_signal(y: Floats, orig_sr: float, target_sr: float, name: str) -> 
             return _polyphase(y, orig_sr, target_sr)
         return _interpolated(y, samples, ratio, name == "linear")
     except MemoryError as error:
-        raise ParameterError(f"no memory for {samples} samples") from error
+        raise ParameterError(f"not enough memory for {samples} samples") from error
 
 
 def _fourier(y: Floats, samples: int) -> Any:
@@ -138,7 +138,7 @@ def _polyphase(y: Floats, orig_sr: float, target_sr: float) -> Any:
     """A windowed sinc of the rates' ratio in whole numbers (scipy.signal.resample_poly)."""
     if int(orig_sr) != orig_sr or int(target_sr) != target_sr:
         raise ParameterError(
-            "orig_sr and target_sr must be whole numbers of Hz with polyphase,"
+            "orig_sr and target_sr must be whole numbers of Hz for polyphase,"
             f" not {orig_sr} and {target_sr}"
         )
     common = gcd(int(orig_sr), int(target_sr))
@@ -146,8 +146,8 @@ def _polyphase(y: Floats, orig_sr: float, target_sr: float) -> Any:
     widest = max(up, down)
     if widest > _MOST_PHASES:
         raise ParameterError(
-            f"polyphase takes ratios with terms up to {_MOST_PHASES}, not {up} / {down};"
-            " soxr_hq takes any ratio"
+            f"polyphase accepts ratios with terms up to {_MOST_PHASES}, not {up} / {down};"
+            " soxr_hq accepts any ratio"
         )
     half = 10 * widest
     taps = np.sinc(np.arange(-half, half + 1) / widest) * np.kaiser(2 * half + 1, 5.0)

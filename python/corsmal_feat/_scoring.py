@@ -242,7 +242,7 @@ def fuse(
         predictions = [predictions]
     paths = [existing(path) for path in predictions]
     if not paths:
-        raise ParameterError("fuse needs at least one prediction file")
+        raise ParameterError("predictions must name at least one file")
     chosen = None if weights is None else [float(weight) for weight in weights]
     least = _whole("least", least, 2**32)
     return parse(_core.fuse(paths, chosen, vote, background, least))
@@ -396,5 +396,5 @@ def _value(value: Any) -> str:
 
 def _whole(name: str, value: int, limit: int) -> int:
     if not 0 <= int(value) < limit:
-        raise ParameterError(f"{name} must be a whole number below {limit}, not {value}")
+        raise ParameterError(f"{name} must be a whole number from 0 to {limit - 1}, not {value}")
     return int(value)

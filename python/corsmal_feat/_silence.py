@@ -164,7 +164,7 @@ def preemphasis(
     """
     signal = audio(y)
     if signal.shape[-1] < (2 if zi is None else 1):
-        raise ParameterError(f"y has {signal.shape[-1]} samples: at least 2 are needed without zi")
+        raise ParameterError(f"y has {signal.shape[-1]} samples, expected at least 2 (1 with zi)")
     factor = signal.dtype.type(coef)
     state: Any = 2 * signal[..., :1] - signal[..., 1:2] if zi is None else np.atleast_1d(zi)
     state = np.asarray(state, dtype=signal.dtype)

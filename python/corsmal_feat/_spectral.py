@@ -295,11 +295,11 @@ def spectral_contrast(
     framing = (hop_length, win_length, window, center, pad_mode)
     s = _spectra(y, S, n_fft, framing)
     if not isinstance(n_bands, (int, np.integer)) or n_bands < 1:
-        raise ParameterError(f"n_bands must be an integer of at least 1, not {n_bands}")
+        raise ParameterError(f"n_bands must be a whole number of at least 1, not {n_bands}")
     room("a contrast", n_bands)
     at = np.atleast_1d(_frequencies(freq, sr, s))
     if at.ndim != 1:
-        raise ParameterError(f"freq has shape {at.shape}, expected one frequency for each bin")
+        raise ParameterError(f"freq has shape {at.shape}, expected one frequency per bin")
     result, empty = _core.spectral_contrast(
         s.source,
         at,
@@ -311,8 +311,8 @@ def spectral_contrast(
     )
     if empty:
         warn(
-            f"no bin lies in the lowest band (0 to {fmin} Hz): its contrast is NaN, and in dB"
-            " so is all of it; a longer n_fft or a higher fmin avoids this",
+            f"no bin lies in the lowest band (0 to {fmin} Hz): its contrast is NaN and, in dB, so"
+            " is every other; use a longer n_fft or a higher fmin",
             RuntimeWarning,
         )
     return s.restored(result)

@@ -100,12 +100,9 @@ def _put(result: Any, out: npt.NDArray[Any]) -> Any:
     """`result` in the first frames of `out`."""
     frames = result.shape[-1]
     if out.shape[:-1] != result.shape[:-1] or out.shape[-1] < frames:
-        raise ParameterError(
-            f"Shape mismatch for provided output array out.shape={out.shape} and target "
-            f"shape={result.shape}"
-        )
+        raise ParameterError(f"out has shape {out.shape}, expected {result.shape}, or more frames")
     if not np.iscomplexobj(out):
-        raise ParameterError(f"output with dtype={out.dtype} is not of complex type")
+        raise ParameterError(f"out has dtype {out.dtype}, expected a complex type")
     part = out if out.shape[-1] == frames else out[..., :frames]
     part[...] = result
     return part

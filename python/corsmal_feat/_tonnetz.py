@@ -43,7 +43,7 @@ def tonnetz(
     """
     if chroma is None:
         if y is None:
-            raise ParameterError("y or chroma is needed")
+            raise ParameterError("y or chroma must be given")
         chroma = chroma_cqt(y=y, sr=sr, **kwargs)
     c = floats("chroma", chroma, 2)
     return unrows(_core.tonnetz(rows(c, 2)), c, 2)

@@ -71,7 +71,7 @@ def labels_of(y: Any, rows: int, owner: str) -> tuple[npt.NDArray[Any], npt.NDAr
             f"y should be a 1d array, got an array of shape {labels.shape} instead."
         )
     if len(labels) != rows:
-        raise ParameterError(f"X has {rows} rows and y has {len(labels)} labels")
+        raise ParameterError(f"X has {rows} rows, but y has {len(labels)} labels")
     if labels.dtype.kind == "f":
         if not np.isfinite(labels).all():
             raise ParameterError("Input y contains NaN or infinity.")
@@ -82,7 +82,7 @@ def labels_of(y: Any, rows: int, owner: str) -> tuple[npt.NDArray[Any], npt.NDAr
     if labels.dtype.kind == "S" or (
         labels.dtype == object and any(isinstance(label, bytes) for label in labels)
     ):
-        raise ParameterError(f"{owner}: y holds bytes, labels are text: decode them first")
+        raise ParameterError(f"{owner}: y holds bytes, expected strings: decode them first")
     if labels.dtype == object:
         missing = [row for row, label in enumerate(labels) if _is_missing(label)]
         if missing:

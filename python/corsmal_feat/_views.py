@@ -154,7 +154,7 @@ def camera_numbers(calibration: Calibration | StrPath) -> list[float]:
     numbers = np.concatenate([np.asarray(part, dtype=np.float64).ravel() for part in parts])
     if numbers.size != 33:
         raise ParameterError(
-            f"a camera of {numbers.size} numbers; expected matrices of 3 by 3, 3 by 3, 3, 3 by 4"
+            f"calibration has {numbers.size} numbers, expected 33 (3 x 3, 3 x 3, 3 and 3 x 4)"
         )
     return [float(n) for n in numbers]
 
@@ -164,7 +164,7 @@ def mask_pixels(mask: Mask) -> npt.NDArray[np.bool_]:
     if isinstance(mask, np.ndarray):
         if mask.dtype != np.bool_ or mask.ndim != 2:
             raise ParameterError(
-                f"a mask of {mask.dtype} with shape {mask.shape}; expected booleans [height, width]"
+                f"mask has dtype {mask.dtype} and shape {mask.shape}, expected bool [height, width]"
             )
         return mask
     return load_mask(mask)
@@ -175,7 +175,7 @@ def depth_pixels(depth: Depth) -> npt.NDArray[np.uint16]:
     if isinstance(depth, np.ndarray):
         if depth.dtype != np.uint16 or depth.ndim != 2:
             raise ParameterError(
-                f"a depth image of {depth.dtype} with shape {depth.shape}; expected uint16 "
+                f"depth has dtype {depth.dtype} and shape {depth.shape}, expected uint16 "
                 "[height, width] in mm"
             )
         return depth

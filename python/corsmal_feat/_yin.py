@@ -66,7 +66,7 @@ def yin(
     np.float64(220.0)
     """
     if fmin is None or fmax is None:
-        raise ParameterError('both "fmin" and "fmax" must be provided')
+        raise ParameterError("fmin and fmax must be given")
     if win_length is not _NOT_GIVEN:
         warn("win_length is deprecated in librosa 0.11 and has no effect", category=FutureWarning)
     sr, fmin, fmax = number("sr", sr), number("fmin", fmin), number("fmax", fmax)
@@ -97,21 +97,21 @@ def _check(sr: float, fmin: float, fmax: float, frame_length: int) -> None:
     if not 1 <= frame_length <= 1 << 24:
         raise ParameterError(f"frame_length must be 1 to {1 << 24}, not {frame_length}")
     if fmax > sr / 2:
-        raise ParameterError(f"fmax={fmax:.3f} cannot exceed Nyquist frequency {sr / 2}")
+        raise ParameterError(f"fmax must be at most sr / 2 ({sr / 2} Hz), not {fmax:.3f}")
     if fmin >= fmax:
-        raise ParameterError(f"fmin={fmin:.3f} must be less than fmax={fmax:.3f}")
+        raise ParameterError(f"fmin must be below fmax ({fmax:.3f} Hz), not {fmin:.3f}")
     if fmin <= 0:
-        raise ParameterError(f"fmin={fmin:.3f} must be strictly positive")
+        raise ParameterError(f"fmin must be above 0 Hz, not {fmin:.3f}")
     if sr / fmin >= frame_length - 1:
         raise ParameterError(
-            f"fmin={fmin:.3f} is too small for frame_length={frame_length} and sr={sr}. "
-            f"Either increase to fmin={sr / (frame_length - 1):.3f} or "
+            f"fmin={fmin:.3f} is too low for frame_length={frame_length} and sr={sr}. "
+            f"Increase to fmin={sr / (frame_length - 1):.3f} or "
             f"frame_length={int(np.ceil(sr / fmin) + 1)}"
         )
     if sr / fmin >= frame_length // 2:
         warn(
             f"With fmin={fmin:.3f}, sr={sr} and frame_length={frame_length}, less than two "
-            "periods of fmin fit into the frame, which can cause inaccurate pitch detection. "
+            "periods of fmin fit into the frame, which can make the pitch inaccurate. "
             f"Consider increasing to fmin={sr / (frame_length / 2):.3f} or "
             f"frame_length={int(np.ceil(sr / fmin) * 2 + 1)}."
         )

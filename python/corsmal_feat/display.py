@@ -41,7 +41,7 @@ def _pyplot() -> Any:
         return import_module("matplotlib.pyplot")
     except ImportError as error:
         raise ImportError(
-            "corsmal_feat.display needs matplotlib: pip install 'corsmal-feat[plot]'"
+            "corsmal_feat.display needs matplotlib (pip install 'corsmal-feat[plot]')"
         ) from error
 
 
@@ -124,7 +124,9 @@ def specshow(
         if given is not None:
             found = np.asarray(given)
             if found.shape not in ((count,), (count + 1,)):
-                raise ParameterError(f"coordinates of shape {found.shape}, expected ({count},)")
+                raise ParameterError(
+                    f"x_coords or y_coords has shape {found.shape}, expected ({count},)"
+                )
             return found
         if axis in _TIMES:
             return times_like(count, sr=sr, hop_length=hop_length)
@@ -133,8 +135,8 @@ def specshow(
             bins = fft_frequencies(sr=sr, n_fft=length)
             if len(bins) != count:
                 raise ParameterError(
-                    f"n_fft = {length} has {len(bins)} bins, data has {count}: give the n_fft of"
-                    " the transform"
+                    f"n_fft = {length} gives {len(bins)} bins, but data has {count}: give the n_fft"
+                    " of the transform"
                 )
             return bins
         if axis == "mel":
@@ -154,7 +156,7 @@ def specshow(
         if axis in _PLAIN or axis in _CLASSES:
             return np.arange(count)
         names = ", ".join(str(name) for name in (*_TIMES, *_HERTZ, *_CLASSES, *_PLAIN))
-        raise ParameterError(f"axis must be one of {names}, not {axis!r}")
+        raise ParameterError(f"x_axis and y_axis must be one of {names}, not {axis!r}")
 
     x = positions(x_axis, values.shape[1], x_coords)
     y = positions(y_axis, values.shape[0], y_coords)

@@ -325,8 +325,8 @@ def _rows(
     for what, values in (("y", labels), ("groups", of_group)):
         if values is not None and values.shape != (len(paths),):
             raise ParameterError(
-                f"{what} must have a value for each of the {len(paths)} recordings,"
-                f" not shape {values.shape}"
+                f"{what} has shape {values.shape}, expected one value for each of the"
+                f" {len(paths)} recordings"
             )
     names = [str(label) for label in labels.tolist()]
     parts = [None] * len(paths) if of_group is None else [str(g) for g in of_group.tolist()]

@@ -165,7 +165,7 @@ def extract(
     ids = [row[0] for row in known]
     twice = [name for name, count in Counter(ids).items() if count > 1]
     if twice:
-        raise ParameterError(f"{len(twice)} ids are there more than once, such as {twice[0]!r}")
+        raise ParameterError(f"{len(twice)} ids occur more than once, such as {twice[0]!r}")
     table = table.select([name for name in table.schema.names if name != "id"])
     table = table.add_column(0, "id", pa.array(ids, pa.string())).combine_chunks()
     # Workers have other current folders, and files there may be others.
@@ -193,7 +193,7 @@ def extract(
 
 def _require_paths(table: Any) -> None:
     if "bytes" in table.schema.names:
-        raise ParameterError("a manifest has paths, not bytes: workers read the files in place")
+        raise ParameterError("a manifest must have paths, not bytes: workers read files in place")
 
 
 def _claim(folder: Path, job: Job, table: Any, channels: int | None, rows: int) -> None:
@@ -225,8 +225,8 @@ def _claim(folder: Path, job: Job, table: Any, channels: int | None, rows: int) 
     other = [key for key in this if that.get(key) != this[key]]
     if other:
         raise RunError(
-            f"{folder} holds another job: {other[0]} is {that.get(other[0])!r} there, here"
-            f" {this[other[0]]!r}; give another folder or empty it"
+            f"{folder} holds another job: {other[0]} is {that.get(other[0])!r} there, but"
+            f" {this[other[0]]!r} here; choose another folder, or empty this one"
         )
 
 
@@ -275,7 +275,7 @@ def _compute(
             running[task.remote(part, str(folder), name, options)] = (name, part)
         finished, _ = ray.wait(list(running), num_returns=1, timeout=_SILENCE)
         if not finished:
-            warn(f"no part was finished in {_SILENCE:.0f} s: `ray status` shows the use of cores")
+            warn(f"no part was finished in {_SILENCE:.0f} s: `ray status` shows what the cores do")
             continue
         ready = finished[0]
         name, part = running.pop(ready)
@@ -291,7 +291,7 @@ def _compute(
             # The process died, or its node. Each of its recordings can do that so many times.
             tries[name] += 1
             if tries[name] > DEATHS * part.num_rows + DEATHS:
-                raise RunError(f"{name}: given up after {tries[name]} tries: {error}") from error
+                raise RunError(f"{name}: gave up after {tries[name]} tries: {error}") from error
             waiting.append((name, part))
         else:
             done += 1

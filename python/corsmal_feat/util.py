@@ -68,11 +68,10 @@ def frame(
     length = _along(array, axis, "x")
     if frame_length < 1 or length < frame_length:
         raise ParameterError(
-            f"Input is too short (n={length}) for frame_length={frame_length}:"
-            f" frame_length must be 1 to {length}"
+            f"frame_length must be 1 to {length}, the length of the input, not {frame_length}"
         )
     if hop_length < 1:
-        raise ParameterError(f"Invalid hop_length: {hop_length}; it must be at least 1")
+        raise ParameterError(f"hop_length must be at least 1, not {hop_length}")
     windows = np.lib.stride_tricks.sliding_window_view(
         array, int(frame_length), axis, subok=subok, writeable=writeable
     )
@@ -125,7 +124,7 @@ def _padded(array: Array, widths: list[tuple[int, int]], kwargs: dict[str, Any])
     try:
         padded: Array = np.pad(array, widths, **kwargs)
     except MemoryError as error:
-        raise ParameterError(f"no memory for padding of {widths}: {error}") from error
+        raise ParameterError(f"not enough memory for padding of {widths}: {error}") from error
     return padded
 
 
@@ -156,7 +155,7 @@ def pad_center(data: npt.ArrayLike, *, size: int, axis: int = -1, **kwargs: Any)
     array = np.asarray(data)
     length = _along(array, axis)
     if size < length:
-        raise ParameterError(f"Target size ({size}) must be at least input size ({length})")
+        raise ParameterError(f"size must be at least {length}, the length of data, not {size}")
     before = (whole("size", size, 0) - length) // 2
     widths = [(0, 0)] * array.ndim
     widths[axis] = (before, int(size - length - before))
@@ -189,7 +188,7 @@ def fix_frames(
     """
     values = np.asarray(frames)
     if np.any(values < 0):
-        raise ParameterError("Negative frame index detected: frames count from 0")
+        raise ParameterError("frames must be at least 0, but some are negative")
     limits = [limit for limit in (x_min, x_max) if limit is not None]
     if pad and limits:
         values = np.concatenate([limits, np.clip(values, x_min, x_max)])
@@ -291,11 +290,11 @@ def normalize(
     if threshold is None:
         threshold = float(tiny(array))
     elif not threshold > 0:
-        raise ParameterError(f"threshold={threshold} must be strictly positive")
+        raise ParameterError(f"threshold must be above 0, not {threshold}")
     if fill not in (None, False, True):
-        raise ParameterError(f"fill={fill} must be None or boolean")
+        raise ParameterError(f"fill must be True, False or None, not {fill!r}")
     if not np.isfinite(array).all():
-        raise ParameterError("Input must be finite")
+        raise ParameterError("S contains NaN or infinite values")
     if norm is None:
         return array
     if axis is not None:
@@ -309,14 +308,14 @@ def normalize(
         length = magnitude.min(axis=axis, keepdims=True)
     elif norm == 0:
         if fill:
-            raise ParameterError("Cannot normalize with norm=0 and fill=True")
+            raise ParameterError("fill=True does not work with norm=0")
         length = np.sum(magnitude > 0, axis=axis, keepdims=True, dtype=np.float64)
     elif isinstance(norm, (int, float, np.number)) and norm > 0:
         length = np.sum(magnitude**norm, axis=axis, keepdims=True) ** (1.0 / norm)
         count = magnitude.size if axis is None else magnitude.shape[axis]
         constant = float(count) ** (-1.0 / norm)
     else:
-        raise ParameterError(f"Unsupported norm: {norm!r}; inf, -inf, 0, a positive number or None")
+        raise ParameterError(f"norm must be inf, -inf, 0, a positive number or None, not {norm!r}")
     small = length < threshold
     length = np.where(small, np.inf if fill is False else 1.0, length)
     result = np.empty_like(array)

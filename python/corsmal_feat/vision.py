@@ -127,7 +127,7 @@ def lode(
         raise ParameterError(f"variant must be 'published' or 'corrected', not {variant!r}")
     if len(masks) != 2 or len(calibrations) != 2:
         raise ParameterError(
-            f"{len(masks)} masks and {len(calibrations)} calibrations: lode takes two of each"
+            f"lode needs two masks and two calibrations, not {len(masks)} and {len(calibrations)}"
         )
     first, second = (mask_pixels(m) for m in masks)
     left, right = (camera_numbers(c) for c in calibrations)
@@ -222,8 +222,8 @@ def upright_box(
     """
     if not len(depths) == len(masks) == len(calibrations):
         raise ParameterError(
-            f"{len(depths)} depth images, {len(masks)} masks, {len(calibrations)} calibrations: "
-            "each view has one of each"
+            "depths, masks and calibrations must have one element per view each, not "
+            f"{len(depths)}, {len(masks)} and {len(calibrations)}"
         )
     views = [
         (depth_pixels(d), mask_pixels(m), camera_numbers(c))
@@ -294,12 +294,12 @@ def m2_capacity(depth: Depth | Region, weights: StrPath) -> float | None:
     True
     """
     if isinstance(depth, dict) and not depth.keys() >= Region.__required_keys__:
-        raise ParameterError("depth must be a path, an array, or what region found")
+        raise ParameterError("depth must be a path, an array, or a result of region")
     found = depth if isinstance(depth, dict) else region(depth)
     if found is None:
         return None
     image = np.asarray(found["image"], dtype=np.float32)
     if image.ndim != 2:
-        raise ParameterError(f"a region's image with shape {image.shape}; expected [112, 112]")
+        raise ParameterError(f"the image of a region has shape {image.shape}, expected (112, 112)")
     height, width = found["size"]
     return _core.m2_capacity(image, (float(height), float(width)), os.fspath(weights))

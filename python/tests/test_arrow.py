@@ -241,9 +241,11 @@ def test_jobs_that_cannot_be(recordings: list[Path]):
     refused("leave out frames", frames="list", projection="pca.npz")
     refused("needs a column path", batch.drop_columns(["path"]))
     refused("rename it", batch.append_column("status", batch["id"]))
-    refused("a column twice", batch.append_column("id", batch["id"]))
+    refused("two columns with the same name", batch.append_column("id", batch["id"]))
     refused("must begin with one of s3://", pa.RecordBatch.from_pydict({"path": ["ftp://b/x.wav"]}))
-    refused("not a time", pa.RecordBatch.from_pydict({"path": ["x"], "start": [-1.0]}))
+    refused(
+        "at least 0 seconds, not -1", pa.RecordBatch.from_pydict({"path": ["x"], "start": [-1.0]})
+    )
     refused("the column start", pa.RecordBatch.from_pydict({"path": ["x"], "start": ["soon"]}))
     refused("none.model", model="none.model", preset=None)
     with pytest.raises(cf.ParameterError, match="RecordBatch or Table"):

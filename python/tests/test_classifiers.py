@@ -121,7 +121,7 @@ def test_no_scikit_learn_is_imported():
 def test_bytes_are_no_labels() -> None:
     x, _ = clouds(4)
     for y in (np.array([b"a", b"b"] * 2), np.array([b"a", b"b"] * 2, dtype=object)):
-        with pytest.raises(ParameterError, match="y holds bytes, labels are text"):
+        with pytest.raises(ParameterError, match="y holds bytes, expected strings"):
             classifiers.KNN(1).fit(x, y)
 
 

@@ -88,7 +88,7 @@ def test_frequencies_beyond_the_rate_are_told() -> None:
 
 def test_another_n_fft_is_refused() -> None:
     with pytest.raises(
-        corsmal_feat.ParameterError, match="n_fft = 4000 has 2001 bins, data has 129"
+        corsmal_feat.ParameterError, match="n_fft = 4000 gives 2001 bins, but data has 129"
     ):
         drawn(corsmal_feat.display, np.zeros((129, 3)), y_axis="linear", n_fft=4000)
     with pytest.raises(corsmal_feat.ParameterError, match="key is not available here"):

@@ -177,7 +177,7 @@ def test_what_is_known_after_fit_only(tmp_path: Path) -> None:
     forest.set_params(oob_score=True).fit(x, y).save(tmp_path / "model")
     back = RandomForest.load(tmp_path / "model")
     assert back.oob_score is True and not hasattr(back, "oob_score_")
-    with pytest.raises(AttributeError, match="model files do not hold them"):
+    with pytest.raises(AttributeError, match="model files do not hold it"):
         _ = back.feature_importances_
     with pytest.warns(UserWarning, match="do not have OOB scores"):
         one = RandomForest(1, oob_score=True).fit(x, y)

@@ -149,7 +149,7 @@ def test_no_samples_of_several_channels(recordings: dict[str, Path], name: str) 
 
 def test_impossible_parts_are_refused(recordings: dict[str, Path], tmp_path: Path) -> None:
     path = recordings["mono.wav"]
-    with pytest.raises(cf.DecodeError, match="beyond its end"):
+    with pytest.raises(cf.DecodeError, match="ends before offset"):
         cf.load(path, offset=100.0)
     for read in (cf.load, cf.get_samplerate, cf.load_features):
         with pytest.raises(cf.MissingFileError, match=r"nothing\.wav") as caught:
@@ -172,7 +172,7 @@ def test_impossible_parts_are_refused(recordings: dict[str, Path], tmp_path: Pat
     for refused in refusals:
         with pytest.raises(cf.ParameterError):
             cf.load(path, **refused)
-    with pytest.raises(cf.ParameterError, match="positive integer"):
+    with pytest.raises(cf.ParameterError, match="whole number of at least 1"):
         cf.stream(path, block_length=0, frame_length=10, hop_length=5)
     with pytest.raises(cf.ParameterError, match="hop_length"):
         cf.stream(path, block_length=2, frame_length=10, hop_length=11)

@@ -58,7 +58,7 @@ def test_a_model_with_its_features_takes_recordings(
         assert model.header["trained_on"] == {"sample_rates": [RATE], "channels": [1]}
         assert model.header["feature_names"] == features.names
     other = record(tmp_path / "other.wav", 300, 5, rate=44100)
-    with pytest.raises(cf.ParameterError, match=r"44100 Hz where .* was trained on 16000"):
+    with pytest.raises(cf.ParameterError, match=r"44100 Hz, but .* was trained on 16000"):
         model.predict([paths[0], other])
     assert len(model.predict([paths[0], other], any_rate=True)) == 2
     stereo = record(tmp_path / "stereo.wav", 300, 5, channels=2)

@@ -83,7 +83,7 @@ def test_folders_that_are_none_are_refused(listed: Path, tmp_path: Path):
         cf.load_features(out)
     (out / "type=7").rmdir()
     (out / "type=rice").rename(out / "type=7")
-    with pytest.raises(cf.ParameterError, match="is the part type=rice"):
+    with pytest.raises(cf.ParameterError, match="holds the part type=rice"):
         cf.load_features(out)
     (out / "type=7").rename(out / "type=rice")
     (out / "notes.txt").write_text("mine")

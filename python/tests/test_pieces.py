@@ -83,17 +83,17 @@ def test_what_has_no_pieces_is_refused(audio: Path):
 def test_pieces_that_are_not_all_there_are_not_put_together(audio: Path):
     found = extract_batch(manifest(audio / "list.csv", longest=1), config=FRAMES)
     for wrong in [found.slice(1), found.slice(0, 4), found.take([0, 2, 1, 3, 4])]:
-        with pytest.raises(cf.ParameterError, match="missing, or not in their order"):
+        with pytest.raises(cf.ParameterError, match="missing or out of order"):
             join_pieces(wrong)
-    with pytest.raises(cf.ParameterError, match="follow each other"):
+    with pytest.raises(cf.ParameterError, match="consecutive rows"):
         join_pieces(found.take([0, 9, 1]))
-    with pytest.raises(cf.ParameterError, match="nothing in it was cut"):
+    with pytest.raises(cf.ParameterError, match="none of its recordings was cut"):
         join_pieces(extract_batch(manifest(audio / "list.csv"), config=FRAMES))
     for longest in (0, 0.05, -1, 3.1e8, float("nan"), float("inf")):
         with pytest.raises(cf.ParameterError, match=r"longest must be 0\.1 to 300000000"):
             manifest(audio / "list.csv", longest=longest)
     taken = pa.table({"path": ["x.wav"], "recording": ["x"]})
-    with pytest.raises(cf.ParameterError, match="recording, which pieces need"):
+    with pytest.raises(cf.ParameterError, match="recording, but pieces need"):
         cf.ray.extract(taken, audio / "out", config=FRAMES, longest=1)
 
 
@@ -112,7 +112,7 @@ def test_recordings_without_a_frame_fail_as_they_do_uncut(audio: Path):
 def test_ids_and_times_that_no_piece_can_have(audio: Path):
     path = str(audio / "long.wav")
     twice = pa.table({"path": [path, path], "id": ["a", "a"], "start": [0.0, 1.0]})
-    with pytest.raises(cf.ParameterError, match="the id 'a' twice"):
+    with pytest.raises(cf.ParameterError, match="the id 'a' more than once"):
         _pieces.cut(twice, 1.0)
     far = pa.table({"path": [path, path], "start": [1e308, None], "end": [None, 1e308]})
     ids = far.append_column("id", pa.array(["a", "b"]))

@@ -244,7 +244,7 @@ def test_a_folder_is_one_job_and_stays_whole(audio: Path, tmp_path: Path, cluste
     part = Path(found.parts[1])
     table = pq.read_table(part)
     pq.write_table(table.slice(1), part)
-    with pytest.raises(cf.RunError, match="other recordings"):
+    with pytest.raises(cf.RunError, match="does not hold the recordings"):
         cf.ray.extract(some, out, preset="esc26", rows=4)
     part.write_bytes(b"cut")
     with pytest.raises(cf.RunError, match="remove it and run again"):
