@@ -146,7 +146,8 @@ fn frames_of<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     if feature.complex {
         let name = feature.name;
-        let reason = format!("{name} is complex, which Arrow has no type for: output = magnitude");
+        let reason =
+            format!("{name} is complex, but Arrow has no complex type: set output = magnitude");
         return Err(value_error(reason));
     }
     let shape = (feature.frames, feature.coefficients, plan.channels);

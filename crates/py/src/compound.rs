@@ -127,7 +127,7 @@ pub(crate) fn pca_project<'py>(
     let variance = variance.unwrap_or_else(|| vec![1.0; k]);
     if mean.len() != components.ncols() || variance.len() != k {
         return Err(value_error(format!(
-            "mean has {} and variance {} values, expected {} and {k} for these components",
+            "mean has {} values and variance {}, expected {} and {k} for these components",
             mean.len(),
             variance.len(),
             components.ncols()

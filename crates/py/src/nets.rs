@@ -59,11 +59,11 @@ impl StepRecipe {
             numbers.into_iter().chain(self.clip_grad_norm.map(|c| ("clip_grad_norm", c)))
         {
             if !(value.is_finite() && value >= 0.0) {
-                return refuse(key, &value.to_string(), "a finite number, at least 0");
+                return refuse(key, &value.to_string(), "a finite number of at least 0");
             }
         }
         if let Some(bad) = self.class_weights.iter().find(|w| !(w.is_finite() && **w >= 0.0)) {
-            return refuse("class_weights", &bad.to_string(), "finite numbers, at least 0");
+            return refuse("class_weights", &bad.to_string(), "finite numbers of at least 0");
         }
         let optimiser = match self.optimizer.as_str() {
             "sgd" => OptimiserSpec::Sgd { lr, momentum, weight_decay },

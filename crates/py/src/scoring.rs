@@ -111,10 +111,8 @@ pub(crate) fn fuse(
             let labels = Labels::new(labels.to_vec()).map_err(value_error)?;
             VotingRule::majority_over(label, least, &labels).map(Some).map_err(value_error)
         }
-        (Some("mean"), Some(_)) => Err(value_error("background works only with vote=\"majority\"")),
-        (Some(other), _) => {
-            Err(value_error(format!("vote = {other:?}: expected \"majority\" or \"mean\"")))
-        }
+        (Some("mean"), Some(_)) => Err(value_error("background needs vote = majority")),
+        (Some(other), _) => Err(value_error(format!("vote must be majority or mean, not {other}"))),
     };
     let mut tables = Vec::with_capacity(paths.len());
     for path in &paths {

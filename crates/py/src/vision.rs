@@ -43,7 +43,7 @@ fn mask(array: &PyReadonlyArray2<'_, bool>) -> PyResult<Mask> {
     let array = array.as_array();
     let (height, width) = array.dim();
     if array.is_empty() {
-        return Err(value_error("a mask without pixels"));
+        return Err(value_error("mask has no pixels"));
     }
     Ok(Mask { width, height, data: array.iter().copied().collect() })
 }
@@ -52,7 +52,7 @@ fn depth(array: &PyReadonlyArray2<'_, u16>) -> PyResult<Depth> {
     let array = array.as_array();
     let (height, width) = array.dim();
     if array.is_empty() {
-        return Err(value_error("a depth image without pixels"));
+        return Err(value_error("depth has no pixels"));
     }
     Ok(Depth { width, height, data: array.iter().copied().collect() })
 }
