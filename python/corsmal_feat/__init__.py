@@ -1,4 +1,4 @@
-"""Acoustic features in librosa's vocabulary, computed in Rust; classifiers; CORSMAL benchmark."""
+"""Audio features with librosa's names, computed in Rust; classifiers; the CORSMAL benchmark."""
 
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING, Any
@@ -211,8 +211,8 @@ __all__ = [
     "yin",
 ]
 
-# Estimators are scikit-learn's where it is installed, and importing that takes a second: they come
-# when they are asked for.
+# The estimators import scikit-learn where it is installed, which takes a second: they are imported
+# when they are first used.
 _LATER = {"FeatureExtractor": "._estimator", "classifiers": ".classifiers"} | dict.fromkeys(
     (
         "KNN",

@@ -1,4 +1,4 @@
-"""Every recording of a manifest has one row."""
+"""Checks that every recording of a manifest has one row."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class Accounting:
     parts : list of str
         The Parquet files, in the order of the manifest.
     recordings : int
-        Number of rows of the manifest, and of the parts.
+        Number of recordings: rows of the manifest, and of all parts together.
     statuses : dict
-        How many recordings have each status.
+        Number of recordings with each status.
     done_before : int
         Number of parts that an earlier call had finished.
     """
@@ -39,7 +39,7 @@ class Accounting:
 
     @property
     def failed(self) -> int:
-        """Recordings without features."""
+        """Number of recordings without features."""
         return sum(n for status, n in self.statuses.items() if status not in GOOD)
 
 
@@ -48,7 +48,7 @@ def account(folder: Path, parts: list[str], ids: list[str], done_before: int) ->
 
     Raises
     ------
-    RunError : they differ
+    RunError : the ids differ
     """
     read = import_module("pyarrow.parquet").read_table
     statuses: Counter[str] = Counter()

@@ -20,20 +20,20 @@ from ._tonnetz import tonnetz
 
 @refuses
 def af193(y: npt.ArrayLike, sr: float, *, librosa: str = "0.11") -> Floats:
-    """The baseline's vector: means over time of 40 MFCC, 12 chroma, 128 mel, 7 spectral contrast
-    and 6 tonnetz rows; leading axes are independent.
+    """The vector of the baseline: means over time of 40 MFCC, 12 chroma, 128 mel, 7 spectral
+    contrast and 6 tonnetz rows. Leading axes are independent.
 
-    Chroma and contrast take magnitudes (not powers), tonnetz the harmonic part of the signal.
+    Chroma and contrast use magnitudes (not powers); tonnetz uses the harmonic part of the signal.
 
     Parameters
     ----------
     y : [shape=(..., n)]
-        A signal.
+        Signal.
     sr : float
         Its sample rate in Hz.
     librosa : {"0.11", "0.8"}
-        "0.8" gives the published numbers: reflect padding, with the constant-Q transform and the
-        end of the harmonic part as in that version, in single precision whatever the input.
+        "0.8" reproduces the published numbers: reflect padding, and the constant-Q transform and
+        the end of the harmonic part as in that version, always in single precision.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def af193(y: npt.ArrayLike, sr: float, *, librosa: str = "0.11") -> Floats:
 
 
 def _af193_composed(y: Any, sr: float) -> Any:
-    """The vector of one channel out of the features that it consists of, in double precision."""
+    """The vector of one channel, composed of its features in double precision."""
     s = np.abs(stft(y))
     parts = [
         mfcc(y=y, sr=sr, n_mfcc=40),

@@ -19,12 +19,12 @@ Complexes = npt.NDArray[np.complex64] | npt.NDArray[np.complex128]
 Same = TypeVar("Same", Singles, Doubles, Floats, Complexes)
 
 
-#: Largest number that is taken as a size; what memory has room for is checked where it is taken.
+#: Largest number accepted as a size; whether memory has room is checked where it is allocated.
 MOST = 1 << 40
 
 
 def size(name: str, value: Any, least: int = 1) -> int:
-    """A number from outside that becomes a size."""
+    """A whole number from the caller that is used as a size."""
     if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
         raise ParameterError(f"{name} must be a whole number, not {value!r}")
     if not least <= value <= MOST:
@@ -35,7 +35,7 @@ def size(name: str, value: Any, least: int = 1) -> int:
 
 
 def number(name: str, value: Any) -> float:
-    """A number from outside."""
+    """A number from the caller."""
     if not isinstance(value, str | bytes):
         try:
             return float(value)
@@ -53,8 +53,8 @@ def precision(dtype: npt.DTypeLike) -> np.dtype[Any]:
 
 
 def room(what: str, *shape: int) -> None:
-    """Refuses an array of doubles for which there is no memory, before anything is computed: the
-    Rust side would end the process."""
+    """Refuses an array of doubles that does not fit in memory, before anything is computed: the
+    Rust side would abort the process."""
     count = prod(shape)
     if count < 1 << 17:
         return
@@ -118,7 +118,7 @@ def _flattened(shape: tuple[int, ...], keep: int) -> Any:
 
 
 def channels(y: Same) -> Same:
-    """A signal as [shape=(channels, n)], planar or, where it already is, interleaved."""
+    """A signal as [shape=(channels, n)]: planar, or interleaved where it already is."""
     return y if y.ndim == 2 and y.flags.f_contiguous else rows(y, 1)
 
 

@@ -61,19 +61,18 @@ def load(
     dtype: npt.DTypeLike = np.float32,
     res_type: str = "soxr_hq",
 ) -> tuple[Floats, float]:
-    """Reads a recording (librosa.load): WAV, FLAC, Ogg, MP3 and others, recognised by their
-    content.
+    """Reads a recording (librosa.load): WAV, FLAC, Ogg, MP3 and others, recognised by content.
 
     Parameters
     ----------
     path : path, or binary file
         The recording.
     sr : float, optional
-        Sample rate to resample to in Hz; None keeps that of the file.
+        Sample rate in Hz to resample to; None keeps that of the file.
     mono : bool
         Whether to average the channels.
     offset, duration : float
-        The part to read in seconds; without `duration`, to the end.
+        Start and length in seconds of the part to read; without `duration`, up to the end.
     dtype : float32 or float64
         Type of the samples, which are decoded in single precision.
     res_type : str
@@ -123,7 +122,8 @@ def stream(
     fill_value: float | None = None,
     dtype: npt.DTypeLike = np.float32,
 ) -> Iterator[Floats]:
-    """Blocks of a recording at its own rate, for frames that are not centred (librosa.stream).
+    """Blocks of a recording at its own sample rate, for frames that are not centred
+    (librosa.stream).
 
     Parameters
     ----------
@@ -132,11 +132,11 @@ def stream(
     block_length : int
         Frames per block.
     frame_length, hop_length : int
-        Samples per frame, and samples from one frame to the next (at most `frame_length`).
+        Samples per frame, and from one frame to the next (at most `frame_length`).
     mono, offset, duration, dtype
         See `load`.
     fill_value : float, optional
-        Value that fills up the last block; without it, the last block is shorter.
+        Value to pad the last block with; without it, the last block is shorter.
 
     Yields
     ------
@@ -232,7 +232,7 @@ def get_duration(
     center: bool = True,
     path: Source | None = None,
 ) -> float:
-    """Duration of a signal, of the signal of a spectrogram, or of a recording
+    """Duration of a signal, of a recording, or of the signal behind a spectrogram
     (librosa.get_duration).
 
     Parameters
@@ -240,9 +240,9 @@ def get_duration(
     y : [shape=(..., n)], optional
         Signal at the sample rate `sr` in Hz.
     S : [shape=(..., d, t)], optional
-        A spectrogram, with the `n_fft`, `hop_length` and `center` of its transform.
+        Spectrogram, made with `n_fft`, `hop_length` and `center`.
     path : path, or binary file, optional
-        A recording; it takes precedence over `y` and `S`.
+        Recording; takes precedence over `y` and `S`.
 
     Returns
     -------

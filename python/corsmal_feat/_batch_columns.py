@@ -1,4 +1,4 @@
-"""Columns of Arrow from arrays."""
+"""Arrow columns from arrays."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def arrow() -> Any:
 
 
 def scalars(values: Singles, rows: Flags) -> list[Any]:
-    """A column for each column of `values`, which are those of `rows`."""
+    """One column for each column of `values`; `rows` says which rows have values."""
     pa = arrow()
     if rows.all():
         # Views of one array: nothing is copied but to lay columns out one behind the other.

@@ -1,4 +1,4 @@
-"""What the rows of a batch of Arrow say is to be read."""
+"""What to read for each row of an Arrow batch."""
 
 from __future__ import annotations
 
@@ -79,9 +79,9 @@ _asked: set[str] = set()
 
 
 def require_stores(rows: list[Any]) -> None:
-    """Refuses rows of stores that this process has no way to ask, such as credentials.
+    """Refuses rows of stores that this process cannot access, for example without credentials.
 
-    That is a fault of the job: each recording alone would take seconds to fail by it.
+    That is a fault of the job; otherwise each recording would take seconds to fail.
     """
     for _, source, *_ in rows:
         name = source[1] if isinstance(source, tuple) else source
@@ -93,7 +93,7 @@ def require_stores(rows: list[Any]) -> None:
 
 
 def _local(path: str) -> str:
-    """The path that a `file://` URI names; objects of stores stay URIs."""
+    """The path in a `file://` URI; URIs of objects in stores stay as they are."""
     if "://" not in path or _core.is_stored(path):
         return path
     parts = urlsplit(path)
@@ -103,6 +103,6 @@ def _local(path: str) -> str:
 
 
 def absolute(path: str | os.PathLike[str]) -> str:
-    """A path that workers with another current folder find, too; URIs of objects stay."""
+    """An absolute path, for workers in another current folder; URIs of objects stay as they are."""
     name = os.fspath(path)
     return name if _core.is_stored(name) else os.path.abspath(name)

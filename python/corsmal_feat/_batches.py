@@ -1,4 +1,4 @@
-"""What is computed of the rows of Arrow tables, and how it is written down."""
+"""Features of the rows of Arrow tables, as columns."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ def failed_batch(
     summary: str,
     channels: int | None,
 ) -> Any:
-    """The rows of recordings that are not read at all, as `extract_batch` would have them."""
+    """Rows for recordings that are not read at all, as `extract_batch` would return them."""
     job = Job.of(None, config, None, None, model, summary, None, channels)
     return job.failed(batch, status, reason)
 
 
 @dataclass(frozen=True)
 class Job:
-    """What is computed of every row, and how it is written down."""
+    """What is computed for every row, and in which columns."""
 
     computation: Computation
     model: TrainedModel | None
@@ -69,7 +69,7 @@ class Job:
         frames: str | None,
         channels: int | None,
     ) -> Job:
-        """Checks what is asked for; keeps what takes long to make."""
+        """Checks the arguments; keeps what takes long to make."""
         if summary not in ("columns", "list"):
             raise ParameterError(f"summary must be 'columns' or 'list', not {summary!r}")
         if frames not in (None, "list"):
@@ -112,13 +112,13 @@ class Job:
         return self._assemble(batch, outcomes, names, values, frames)
 
     def require_pieces(self) -> None:
-        """Refuses configurations that have no frames of pieces of recordings."""
+        """Refuses configurations that cannot be computed on pieces of recordings."""
         reason = self.computation.recordings.piece_refusal()
         if reason is not None:
             raise ParameterError(f"recordings cannot be cut into pieces: {reason}")
 
     def failed(self, batch: Any, status: str, reason: str) -> Any:
-        """The rows of recordings that are not read at all."""
+        """Rows for recordings that are not read at all."""
         _, names, values, _ = self.computation.recordings.extract([], self.channels, 1)
         outcomes: list[dict[str, Any]] = [
             {"id": row[0], "status": status, "reason": reason, "repairs": []}
@@ -176,8 +176,8 @@ class Job:
     def _predictions(
         self, outcomes: list[dict[str, Any]], names: list[str], values: Singles
     ) -> tuple[Flags, dict[str, Any]] | None:
-        """Which rows of `values` the model takes, and the columns of its predictions. Outcomes of
-        rows that it does not take become mismatches."""
+        """Which rows of `values` the model accepts, and the columns of its predictions. The outcome
+        of a row that it does not accept becomes a mismatch."""
         if self.model is None:
             return None
         pa, model = arrow(), self.model
@@ -218,7 +218,7 @@ _models: dict[str, tuple[tuple[int, int], TrainedModel]] = {}
 
 
 def _model(path: StrPath) -> TrainedModel:
-    """A model file, read once as long as it stays as it is."""
+    """A model file, read again only if it has changed."""
     name = os.fspath(path)
     stamp = stamp_of(name)
     if stamp is None:
@@ -229,8 +229,8 @@ def _model(path: StrPath) -> TrainedModel:
 
 
 def _keep_paths(batch: Any, outcomes: list[dict[str, Any]]) -> None:
-    """Outcomes have the paths as given, but for the query of a web address, which may be a
-    signature; content in memory has none."""
+    """Gives outcomes the paths as given, but without the query of a web address, which may be a
+    signature. Content in memory has no path."""
     given = [None] * len(outcomes)
     if PATH in batch.schema.names:
         given = batch.column(PATH).to_pylist()

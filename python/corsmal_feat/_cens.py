@@ -38,7 +38,7 @@ def chroma_cens(
     win_len_smooth: int | None = 41,
     smoothing_window: Window = "hann",
 ) -> Floats:
-    """Chromagram that keeps the course of the harmony and not its loudness
+    """Chromagram that follows the harmony and ignores the loudness
     (librosa.feature.chroma_cens; Müller and Ewert 2011).
 
     Parameters
@@ -46,13 +46,13 @@ def chroma_cens(
     y : float32 or float64 [shape=(..., n)], optional
         Signal at the sample rate `sr` in Hz.
     C : [shape=(..., d, t)], optional
-        Constant-Q magnitudes to use instead.
+        Constant-Q magnitudes to use instead of `y`.
     hop_length, fmin, tuning, n_chroma, n_octaves, bins_per_octave, cqt_mode, window
         See `chroma_cqt`.
     norm : float, optional
-        Norm that each frame is divided by, None for none.
+        Norm by which each frame is divided; None for none.
     win_len_smooth : int, optional
-        Frames that are smoothed together, None for none.
+        Number of frames to smooth over; None for none.
     smoothing_window : str, tuple, float, array or callable
         See `filters.get_window`.
 

@@ -33,21 +33,20 @@ def chroma_stft(
     base_c: bool = True,
     dtype: npt.DTypeLike = np.float32,
 ) -> Floats:
-    """Chromagram [shape=(..., n_chroma, t)] of the power spectrogram, or of S whatever it is
-    (librosa.feature.chroma_stft).
+    """Chromagram of the power spectrogram of `y`, or of `S` as it is (librosa.feature.chroma_stft).
 
-    Without `tuning` one is estimated on the same spectrogram over all channels and frames; it can
-    change abruptly with small changes of the input, so give `tuning=0` where frames are to be
-    compared between recordings. `dtype` is that of the filter bank.
+    Without `tuning`, one value is estimated from the same spectrogram over all channels and frames.
+    It can jump with small changes of the input: pass `tuning=0` to compare frames of different
+    recordings. `dtype` is the type of the filter bank.
 
     Parameters
     ----------
     y : float32 or float64 [shape=(..., n)]
         Signal at the sample rate `sr` in Hz.
     S : [shape=(..., 1 + n_fft // 2, t)], optional
-        A spectrogram to use instead, as it is.
+        Spectrogram to use instead of `y`, as it is.
     norm : float, optional
-        Norm that each frame is divided by (`numpy.inf`: its maximum), None for none.
+        Norm by which each frame is divided (`numpy.inf`: its maximum); None for none.
     n_fft, hop_length, win_length, window, center, pad_mode
         See `stft`; hop_length is 512 here.
     tuning : float, optional

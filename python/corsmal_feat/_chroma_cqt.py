@@ -40,19 +40,19 @@ def chroma_cqt(
     y : float32 or float64 [shape=(..., n)], optional
         Signal at the sample rate `sr` in Hz.
     C : [shape=(..., d, t)], optional
-        Constant-Q magnitudes to use instead.
+        Constant-Q magnitudes to use instead of `y`.
     hop_length, fmin, tuning
-        See `cqt`; the tuning is estimated by default.
+        See `cqt`; by default, the tuning is estimated.
     norm : float, optional
-        Norm that each frame is divided by, None for none.
+        Norm by which each frame is divided; None for none.
     threshold : float, optional
-        Smaller values become zero.
+        Smaller values are set to zero.
     n_chroma, n_octaves, bins_per_octave : int
-        Classes, octaves, and bins of an octave (`n_chroma` by default).
+        Number of pitch classes and of octaves, and bins per octave (None: `n_chroma`).
     window : [shape=(any,)], optional
         Weights of neighbouring bins.
     cqt_mode : {"full"}
-        The other modes of librosa do not exist here.
+        librosa's other modes are not available.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def chroma_cqt(
 
 
 def _promoted(chroma: Floats, weights: Any) -> Floats:
-    """A double-precision window makes librosa's folding matrix double, and with it the result."""
+    """The result in double precision if the window is, as librosa's folding matrix is then."""
     if weights is None:
         return chroma
     promoted: Floats = chroma.astype(np.result_type(chroma, weights.dtype), copy=False)

@@ -64,7 +64,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
         return result
 
     def fit(self, X: Any, y: Any) -> Self:
-        """Learns from `X` [shape=(rows, features)] and `y`, one label per row."""
+        """Trains on `X` [shape=(rows, features)] and `y`, one label per row."""
         self._fit(X, y, None)
         return self
 
@@ -150,8 +150,8 @@ class Classifier(ClassifierMixin, BaseEstimator):
         path : path
             The file.
         features : Features or FeatureExtractor, optional
-            What made the rows that the model was fitted on. The model then takes recordings:
-            `load_model(path).predict(["a.wav"])`, `corsmal-feat classify`.
+            Where the rows come from that the model was fitted on. With it, the model also takes
+            recordings: `load_model(path).predict(["a.wav"])`, `corsmal-feat classify`.
         """
         if not hasattr(self, "_model"):
             raise not_fitted(self)
@@ -159,7 +159,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Reads a model file of this classifier (`load_model` reads any)."""
+        """Reads a model file of this kind of classifier (`load_model` reads any)."""
         model = _core.TrainedModel.load(existing(path))
         header = json.loads(model.header())
         pipeline = header["pipeline"]
@@ -190,13 +190,13 @@ class Classifier(ClassifierMixin, BaseEstimator):
 
 
 class WeightedClassifier(Classifier):
-    """A classifier that takes weights of rows."""
+    """A classifier that accepts weights of rows."""
 
     def fit(self, X: Any, y: Any, sample_weight: Any = None) -> Self:
-        """Learns from `X` [shape=(rows, features)] and `y`, one label per row.
+        """Trains on `X` [shape=(rows, features)] and `y`, one label per row.
 
-        `sample_weight` [shape=(rows,)], numbers of at least 0, says how much each row counts; a
-        row of weight 0 is left out. By default all rows count the same.
+        `sample_weight` [shape=(rows,)] gives each row a weight of at least 0; a row of weight 0 is
+        left out. By default, all rows weigh the same.
         """
         self._fit(X, y, sample_weight)
         return self
@@ -223,7 +223,7 @@ def _seed(value: Any) -> int:
 
 
 def class_labels(header: dict[str, Any]) -> npt.NDArray[Any]:
-    """Label names in the type they had in training."""
+    """Labels in the type that they had in training."""
     names = np.asarray(header["labels"], dtype=object)
     provenance = header["provenance"]
     kind = provenance.get("label_kind", "") if isinstance(provenance, dict) else ""

@@ -46,7 +46,7 @@ def paa_fbank(sr: float, num_fft: int) -> Doubles:
     sr : float
         Sample rate in Hz.
     num_fft : int
-        Bins of a spectrum.
+        Number of bins of a spectrum.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def a34_short(y: npt.ArrayLike, sr: float, window: int, step: int, deltas: bool 
     window, step : int
         Samples per frame, and from one frame to the next.
     deltas : bool
-        Whether differences from the previous frame follow the 34 values.
+        Whether to append the differences from the previous frame to the 34 values.
 
     Returns
     -------
@@ -97,8 +97,8 @@ def a34_short(y: npt.ArrayLike, sr: float, window: int, step: int, deltas: bool 
 def a34f136(
     y: npt.ArrayLike, sr: float, mid_window: int, mid_step: int, window: int, step: int
 ) -> Doubles:
-    """Means, then standard deviations of the 68 short-term features over mid-term windows
-    (pyAudioAnalysis `mid_feature_extraction`).
+    """Means, then standard deviations, of the 68 short-term features over mid-term windows
+    (pyAudioAnalysis' `mid_feature_extraction`).
 
     Parameters
     ----------
@@ -172,18 +172,18 @@ def sk_resize(
     mode: str = "reflect",
     anti_aliasing: bool | None = None,
 ) -> Floats:
-    """A matrix at another size, as scikit-image's `transform.resize` with linear interpolation.
+    """Resizes a matrix, like scikit-image's `transform.resize` with linear interpolation.
 
     Parameters
     ----------
     S : [shape=(rows, columns)]
         The matrix.
     shape : (int, int)
-        Rows and columns wanted.
+        Rows and columns of the result.
     mode : str
-        How to extend it beyond its edges: "reflect", "constant", "edge", "symmetric" or "wrap".
+        How to extend the matrix at its edges: "reflect", "constant", "edge", "symmetric" or "wrap".
     anti_aliasing : bool, optional
-        Gaussian smoothing first; by default if an axis shrinks.
+        Whether to smooth with a Gaussian first; by default, if an axis shrinks.
 
     Returns
     -------
@@ -208,15 +208,15 @@ def sk_resize(
 
 @refuses
 def pca_fit(X: npt.ArrayLike, n_components: int) -> Doubles:
-    """Principal components in one matrix: the components, the column means, the explained variances
-    (padded with zeros). The largest entry of each component is positive.
+    """Fits principal components. The rows of the result are the components, the column means and
+    the explained variances (padded with zeros). The largest entry of each component is positive.
 
     Parameters
     ----------
     X : [shape=(rows, columns)]
         The data.
     n_components : int
-        How many.
+        Number of components.
 
     Returns
     -------
@@ -236,17 +236,17 @@ def pca_fit(X: npt.ArrayLike, n_components: int) -> Doubles:
 
 @refuses
 def pca_fit_transform(X: npt.ArrayLike, n_components: int) -> Doubles:
-    """Coordinates of the data that the components are fitted to.
+    """Fits principal components and returns the coordinates of the same data.
 
-    Project other data on the fitted components: fitting again on test data gives coordinates that
-    are unrelated to those of the training data.
+    To project other data, use `pca_fit` and `pca_project`: fitting again on test data gives
+    coordinates that are unrelated to those of the training data.
 
     Parameters
     ----------
     X : [shape=(rows, columns)]
         The data.
     n_components : int
-        How many.
+        Number of components.
 
     Returns
     -------
@@ -270,7 +270,7 @@ def pca_project(
     variance: npt.ArrayLike | None = None,
     whiten: bool = False,
 ) -> Doubles:
-    """Data on fitted components.
+    """Projects data on fitted principal components.
 
     Parameters
     ----------
@@ -279,11 +279,11 @@ def pca_project(
     components : [shape=(k, columns)]
         Directions of unit length.
     mean : [shape=(columns,)]
-        Subtracted first.
+        Column means, which are subtracted first.
     variance : [shape=(k,)], optional
-        Along each component; needed to whiten.
+        Variance along each component; needed with `whiten=True`.
     whiten : bool
-        Whether each coordinate is divided by its standard deviation.
+        Whether to divide each coordinate by its standard deviation.
 
     Returns
     -------
@@ -323,9 +323,9 @@ def fit_projection(
     out : path
         The file to write.
     n_components : int, optional
-        How many; 128 by default, or as many as the rows and features allow.
+        Number of components; by default 128, or as many as the rows and features allow.
     overwrite : bool
-        Whether `out` may be replaced.
+        Whether to replace `out` if it exists.
 
     Examples
     --------

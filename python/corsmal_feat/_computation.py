@@ -1,4 +1,4 @@
-"""Configurations and what is made for them once in a process."""
+"""Configurations and their plans, which a process makes once."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ KEPT = 8
 
 @dataclass(frozen=True)
 class Computation:
-    """A configuration and what is made for it once."""
+    """A configuration and its plan, which is made once."""
 
     recordings: _core.Recordings
     #: The effective configuration as JSON, and its hash.
@@ -26,7 +26,7 @@ class Computation:
 
     @classmethod
     def of(cls, chosen: tuple[str, str], overrides: list[str]) -> Computation:
-        """That of a configuration, kept as long as the files are the same that it is read from."""
+        """The computation of a configuration, kept as long as its file does not change."""
         stamp = stamp_of(chosen[1]) if chosen[0] == "path" else None
         key = (os.getpid(), chosen, tuple(overrides), stamp)
         if key in computations:
@@ -47,7 +47,7 @@ computations: dict[Any, Computation] = {}
 
 
 def stamp_of(path: str) -> tuple[int, int] | None:
-    """What changes with a file; None where there is none, which its reader will say."""
+    """What changes when a file changes; None if it does not exist, which its reader reports."""
     try:
         found = os.stat(path)
     except OSError:

@@ -17,7 +17,7 @@ from ._resample import CONVERTERS
 from ._warnings import warn
 from .errors import ParameterError
 
-#: Lowest frequency by default, in Hz.
+#: Default lowest frequency in Hz.
 C1 = 440.0 * 2.0 ** ((24.0 - 69.0) / 12.0)
 
 
@@ -83,24 +83,24 @@ def cqt(
     n_bins, bins_per_octave : int
         Number of bins, and bins per octave.
     tuning : float, optional
-        Deviation from A440 in fractions of a bin; None estimates one for all channels.
+        Deviation from A440 in fractions of a bin; None estimates one value for all channels.
     filter_scale : float
-        Factor of the filters' lengths.
+        Factor for the lengths of the filters.
     norm : float, optional
         Norm of the filters.
     sparsity : float
-        Share of each filter's energy that is left out.
+        Share of each filter's energy to drop.
     window : str, tuple or float
         See `filters.get_window`.
     scale : bool
-        Divide by the square roots of the filters' lengths.
+        Whether to divide by the square roots of the filters' lengths.
     pad_mode : {"constant", "edge", "reflect", "symmetric"}
-        Padding beyond the ends.
+        How to pad the signal at both ends.
     res_type : str
-        One of `resample`; whatever it is, the octaves are decimated by a filter equal to soxr's
-        "HQ" to 1e-6.
+        A type that `resample` accepts. It has no effect: octaves are always decimated by a filter
+        that equals soxr's "HQ" within 1e-6.
     dtype : complex dtype, optional
-        Of the result.
+        Type of the result.
 
     Returns
     -------
@@ -140,7 +140,7 @@ def abs_cqt(y: npt.ArrayLike, **kwargs: Any) -> Floats:
     Parameters
     ----------
     y : [shape=(..., n)]
-        A signal.
+        Signal.
     **kwargs
         See `cqt`.
 

@@ -32,7 +32,7 @@ def power_to_db(
     ref : float or callable
         The power of 0 dB, or a function that finds it in `S`, such as `numpy.max`.
     amin : float
-        Smallest power that is distinguished from zero.
+        Smallest power; smaller values are raised to it.
     top_db : float, optional
         Range in dB below the maximum over the whole array, channels included; None keeps all.
 
@@ -104,7 +104,7 @@ def db_to_power(S_db: npt.ArrayLike, *, ref: float = 1.0) -> Floats:
     Parameters
     ----------
     S_db : number or array
-        dB.
+        Values in dB.
     ref : float
         The power of 0 dB.
 
@@ -128,7 +128,7 @@ def db_to_amplitude(S_db: npt.ArrayLike, *, ref: float = 1.0) -> Floats:
     Parameters
     ----------
     S_db : number or array
-        dB.
+        Values in dB.
     ref : float
         The amplitude of 0 dB.
 

@@ -27,17 +27,17 @@ Matrix = npt.NDArray[np.float32]
 class FeatureExtractor(TransformerMixin, BaseEstimator):
     """Turns recordings into rows of features: the first step of a scikit-learn `Pipeline`.
 
-    The rows are the summary of the configuration, so it needs one (`preset="esc26"`, "esc28",
-    "mfcc-zcr", or your own [summary]). It also works without scikit-learn.
+    Each row is the summary of a recording, so the configuration needs one (`preset="esc26"`,
+    "esc28", "mfcc-zcr", or your own [summary]). It also works without scikit-learn.
 
     Parameters
     ----------
     preset, config, set : see `corsmal_feat.extract`; preset is "esc26" if no config is given
-    sr : sample rate in Hz of signals in memory; not used for files
+    sr : sample rate of signals in memory in Hz; not used for files
     jobs : worker threads; by default one per core
     errors : what to do with a file without features: "raise" a `DecodeError`, or "nan" for a row
         of NaN and a warning
-    progress : show on standard error how many files are done
+    progress : whether to show on standard error how many files are done
 
     Rows to transform are paths, or signals in memory: a list of float arrays, each [shape=(n,) or
     (channels, n)], or one array [shape=(recordings, n) or (recordings, channels, n)].
@@ -85,7 +85,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
 
     @refuses
     def fit(self, X: Any, y: Any = None) -> Self:
-        """Learns the names of the columns, which include the channels, from the first of `X`."""
+        """Learns the names of the columns, including channels, from the first recording of `X`."""
         recordings = _recordings(X)
         for position, recording in enumerate(recordings):
             if not _is_path(recording):
@@ -108,7 +108,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
 
         Raises
         ------
-        DecodeError : a recording has no features; its row cannot be left out here
+        DecodeError : a recording has no features, unless `errors="nan"` makes its row NaN
         """
         names, matrix = self._compute(_recordings(X))
         if self._names is not None and names != self._names:

@@ -17,7 +17,7 @@ StrPath = str | os.PathLike[str]
 
 @dataclass(frozen=True)
 class Scores:
-    """What a submission scores under a rule set.
+    """Scores of a submission under a rule set.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class Scores:
         `T1`, `T2`, `T3`, `mass` of the paper)
     rules : name of the rule set
     recordings : number of recordings that were scored
-    notes : what a reader of the scores should know
+    notes : remarks that a reader of the scores should know
 
     Examples
     --------
@@ -64,10 +64,10 @@ def evaluate(
     rules : {"paper", "toolkit-2020-10", "toolkit-2021-11", "toolkit"}
         Rule set; docs/ccm.md describes each with its quirks.
     baseline : path, optional
-        Submission that replaces unaddressed tasks, in the filling mass only; by
-        default the official random1.csv or random123.csv, which come with this package.
+        Submission that fills in unaddressed tasks, in the filling mass only; by default the
+        official random1.csv or random123.csv, which come with this package.
     seed : int, optional
-        Use pseudo-random estimates with this seed instead.
+        Seed of pseudo-random estimates to use instead of `baseline`.
     containers : iterable of int, optional
         Score only the recordings of these containers.
 

@@ -57,12 +57,12 @@ def extract(
         loaded
     work : folder in which an output for a store is made, so that `resume` can continue it; by
         default the current folder
-    partition_by : label by whose values to divide `out`, which is then a folder with a file
-        `label=value/part.parquet` for each value
+    partition_by : label that divides `out`, which is then a folder with a file
+        `label=value/part.parquet` for each value of the label
     resume : continue an interrupted run to `out`
     overwrite : replace `out`
     progress : True shows on standard error how many recordings are done; a function is called with
-        that number and the total
+        this number and the total
 
     A bad recording raises no error: its row of `outcomes` says what is wrong. Ctrl-C stops the run,
     and `resume=True` continues it.
@@ -70,7 +70,7 @@ def extract(
     Returns
     -------
     Features
-        All arrays of an output in a store are read back into memory; the command does not do this.
+        The arrays of an output in a store are all read into memory, unlike with the command.
 
     Examples
     --------
@@ -80,7 +80,7 @@ def extract(
 
     Raises
     ------
-    ParameterError : the configuration is refused
+    ParameterError : the configuration or a parameter is wrong
     RunError : the recordings do not exist, or the output cannot be written
     """
     chosen, overrides = configuration(preset, config, set)
@@ -137,7 +137,7 @@ def _to_stderr(done: int, total: int) -> None:
 def configuration(
     preset: str | None, config: Config | None, set: Mapping[str, Any] | None
 ) -> tuple[tuple[str, str], list[str]]:
-    """A configuration and its overrides as the Rust side takes them."""
+    """A configuration and its overrides in the form that the Rust side takes."""
     if preset is not None and config is not None:
         raise ParameterError("give either preset or config, not both")
     overrides = [f"{key}={_toml(key, value)}" for key, value in (set or {}).items()]
@@ -165,7 +165,7 @@ def _plain(value: Any) -> Any:
 
 
 def _toml(key: str, value: Any) -> str:
-    """A value as TOML: for what is allowed here its JSON is the same."""
+    """A value as TOML, which for the types allowed here is the same as JSON."""
     if value is None or isinstance(value, Mapping):
         raise ParameterError(f"{key} must be a number, string, boolean or list, not {value!r}")
     try:
@@ -175,12 +175,12 @@ def _toml(key: str, value: Any) -> str:
 
 
 class SignalExtractor:
-    """Features of one signal that arrives in blocks; any split gives the same bits.
+    """Features of one signal that arrives in blocks; however it is split, the bits are the same.
 
     Parameters
     ----------
     sr : sample rate in Hz, a whole number
-    channels : channels of every block
+    channels : number of channels of every block
     preset, config, set : see `extract`
 
     Examples
@@ -221,7 +221,7 @@ class SignalExtractor:
         self._signal.push(samples)
 
     def finish(self) -> npt.NDArray[np.float32] | dict[str, npt.NDArray[Any]]:
-        """The summary [shape=(len(names),)], or by feature its frames
+        """The summary [shape=(len(names),)], or a dict of the frames of each feature
         [shape=(channels, coefficients, frames)]."""
         summary, features = self._signal.finish()
         if summary is not None:
@@ -233,7 +233,7 @@ class SignalExtractor:
 
 
 def whole_rate(sr: Any) -> int:
-    """A sample rate as files have it."""
+    """A sample rate as files store it."""
     if sr is None or not 1 <= sr < 2**32 or int(sr) != sr:
         raise ParameterError(f"sr must be a whole number of at least 1 Hz, not {sr}")
     return int(sr)

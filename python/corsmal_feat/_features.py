@@ -1,4 +1,4 @@
-"""What a run wrote."""
+"""The output of a run."""
 
 from __future__ import annotations
 
@@ -30,28 +30,28 @@ GOOD = ("ok", "truncated")
 
 @dataclass(repr=False)
 class Features:
-    """What a run wrote (see `load_features`).
+    """The output of a run (see `load_features`).
 
     `features[id]` gives the row of a summary, or the frames of a recording: an array
-    [shape=(channels, coefficients, frames)], or one array per feature, by name, if there are
-    several features.
+    [shape=(channels, coefficients, frames)] or, if there are several features, a dict of one array
+    per feature.
 
     Attributes
     ----------
     ids : list of str
         Ids of the recordings that have features, in the order of the inputs.
     arrays : dict
-        The frames by id, and by feature if there are several; empty for summaries.
+        Frames by id, and then by feature if there are several; empty for summaries.
     times : dict
-        The time of every frame in seconds, arranged like `arrays`.
+        Time of every frame in seconds, arranged like `arrays`.
     summary : float32 [shape=(len(ids), len(names))], or None
-        Statistics.
+        Statistics of each recording.
     names : list of str
         Name of each column of `summary`.
     labels : dict
-        For each label column of the manifest, the text for each of `ids`.
+        Values of each label column of the manifest, in the order of `ids`.
     config, config_hash : dict, str
-        The whole configuration and its hash.
+        Full configuration and its hash.
     outcomes : list of dict
         One row per input, including those without features: id, path, status, ...
 
@@ -109,7 +109,7 @@ class Features:
         return f"summary of {len(self.names)} values"
 
     def _repr_html_(self) -> str:
-        """The outcomes as a table, for notebooks; the first ones of many."""
+        """The outcomes as a table, for notebooks; if there are many, the first ones."""
         shown = self.outcomes[:20]
         rows = "".join(
             "<tr>" + "".join(f"<td>{escape(str(row.get(k, '')))}</td>" for k in _COLUMNS) + "</tr>"
@@ -131,7 +131,7 @@ class Features:
 
     @cached_property
     def _rows(self) -> dict[object, int]:
-        """The place of each id."""
+        """The position of each id."""
         return {recording: row for row, recording in enumerate(self.ids)}
 
     def __getitem__(self, recording: str) -> Any:
@@ -150,8 +150,8 @@ class Features:
     def to_frame(self) -> Any:
         """The features as a pandas data frame with index (file, start, end), as in opensmile.
 
-        A summary has one row per recording, frames have one row per frame. Columns are the names
-        of a summary, or `feature[channel][coefficient]`; label columns follow.
+        A summary has one row per recording; frames have one row per frame. Columns have the names
+        of the summary, or are called `feature[channel][coefficient]`; label columns follow.
 
         Returns
         -------
@@ -216,7 +216,7 @@ class Features:
         }
 
     def _names_of_recordings(self) -> list[str] | None:
-        """The names of the values that recordings like these are given, if one is known."""
+        """The names of the columns for recordings like these, if the format of one is known."""
         row = next((row for row in self.outcomes if row["status"] in GOOD), None)
         if row is None or not row.get("sample_rate"):
             return None
@@ -234,8 +234,8 @@ class Features:
         return np.array([seconds(i) for i in self.ids], dtype=np.float64)
 
     def _columns(self, recording: str) -> tuple[Values, dict[str, Values]]:
-        """Times and named columns of the frames of a recording; features with other frames than
-        the first one cannot share its rows."""
+        """Times and named columns of the frames of a recording; a feature with another number of
+        frames than the first one cannot share its rows."""
         arrays, times = self[recording], self.times.get(recording, np.zeros(0))
         if not isinstance(arrays, dict):
             arrays, times = {next(iter(self.config["features"])): arrays}, {None: times}
@@ -257,7 +257,7 @@ def _missing(count: int) -> Values:
 
 
 def _next(times: Values) -> Values:
-    """Where the frame after the last one would begin."""
+    """The time at which the frame after the last one would begin."""
     return times[-1:] + (times[-1:] - times[-2:-1] if len(times) > 1 else 0)
 
 
@@ -268,14 +268,14 @@ _COLUMNS = ("id", "status", "reason", "sample_rate", "channels", "decoded_frames
 def load_features(path: StrPath) -> Features:
     """Reads an output of `extract` or of the command `corsmal-feat extract`.
 
-    The frames of a recording in an `.npz` are read when you first access them, and then kept; the
-    file must not change until then.
+    The frames of a recording in an `.npz` are read when you first access them, and then kept: do
+    not change the file before.
 
     Parameters
     ----------
     path : path
         `.npz`, or `.parquet` (needs pyarrow; pandas and polars read such files, too); the folder
-        of a partitioned output; an object in a store, "s3://bucket/features.npz", which is copied
+        of a partitioned output; or an object in a store, "s3://bucket/features.npz", which is read
         into memory.
 
     Returns

@@ -16,8 +16,7 @@ _LABELS = "__labels__/"
 
 
 def of_npz(name: str) -> dict[str, Any]:
-    """The fields of `Features` of an archive. Arrays of frames are read when they are
-    asked for."""
+    """The fields of `Features` from an archive. Arrays of frames are read on first access."""
     try:
         archive = np.load(name, allow_pickle=False)
     except (ValueError, EOFError, zipfile.BadZipFile) as error:
@@ -72,7 +71,7 @@ def _fields(archive: Any, name: str) -> dict[str, Any]:
 
 
 def _holds_objects(archive: Any, member: str) -> bool:
-    """Whether the head of a member says so; its values are not read."""
+    """Whether the header of a member says so; its values are not read."""
     try:
         with archive.zip.open(f"{member}.npy") as file:
             return b"'|O'" in file.read(256)

@@ -25,7 +25,7 @@ def _is_text(types: Any, kind: Any) -> bool:
 
 
 def _is_statistic(column: str) -> bool:
-    """Whether a column is called as values of a summary are: `mfcc[0].mean`, `rms.std`."""
+    """Whether a column is named like a value of a summary: `mfcc[0].mean`, `rms.std`."""
     return "[" in column or "." in column
 
 
@@ -43,7 +43,7 @@ def _ids(name: str, column: list[Any]) -> list[str]:
 
 
 def of_partitions(name: str) -> dict[str, Any]:
-    """The fields of `Features` of a partitioned output, in the order of its inputs."""
+    """The fields of `Features` from a partitioned output, in the order of its inputs."""
     files = sorted(Path(name).glob("*=*/part.parquet"))
     if not files:
         raise ParameterError(f"{name} is a folder without parts (label=value/part.parquet)")
@@ -95,7 +95,7 @@ def of_partitions(name: str) -> dict[str, Any]:
 
 
 def _is_part(of: Any) -> bool:
-    """Whether metadata describe a part of a partitioned output, with values of the right kinds."""
+    """Whether metadata describe a part of a partitioned output, with values of the right types."""
 
     def is_count(value: Any) -> bool:
         return type(value) is int and value >= 0
@@ -110,7 +110,7 @@ def _is_part(of: Any) -> bool:
 
 
 def _folder(label: str, value: str) -> str:
-    """The folder of a part, as Hive has it."""
+    """The folder of a part, named as in Hive."""
     none = "__HIVE_DEFAULT_PARTITION__"
     return f"{quote(label, safe='')}={quote(value, safe='') if value else none}"
 
@@ -122,13 +122,13 @@ def _run(read: tuple[dict[str, Any], dict[str, Any]]) -> tuple[Any, ...]:
 
 
 def of_parquet(name: str) -> dict[str, Any]:
-    """The fields of `Features` of a Parquet file."""
+    """The fields of `Features` from a Parquet file."""
     return _read(name)[0]
 
 
 def _read(name: str) -> tuple[dict[str, Any], Any]:
-    """The fields of `Features` of a file, and which part of a partitioned output it is: what its
-    metadata say, and the run that wrote it."""
+    """The fields of `Features` from a file, and which part of a partitioned output it is, from its
+    metadata, with the run that wrote it."""
     try:
         parquet = import_module("pyarrow.parquet")
         failed = import_module("pyarrow").ArrowInvalid
@@ -190,7 +190,7 @@ def _holds_frames(schema: Any, feature: str) -> bool:
 
 
 def _lists(file: str, table: Any, ids: list[str], columns: dict[str, str]) -> dict[str, Any]:
-    """Arrays by id, and then by feature where there are several, of columns of nested lists."""
+    """Arrays from columns of nested lists, by id and then by feature if there are several."""
     found: dict[str, Any] = {}
     for feature, name in columns.items():
         rows = (row for chunk in table.column(name).chunks for row in chunk)

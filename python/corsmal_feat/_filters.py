@@ -15,7 +15,7 @@ from ._refusals import refuses
 from ._warnings import warn
 from .errors import ParameterError
 
-#: a window by name, as ("kaiser", 8.6), as the beta of a Kaiser window, as values, as a function
+#: a name, ("kaiser", 8.6), the beta of a Kaiser window, an array, or a function
 Window = (
     str
     | tuple[Any, ...]
@@ -24,15 +24,15 @@ Window = (
     | npt.NDArray[Any]
     | Callable[[int], npt.ArrayLike]
 )
-#: how the bands of a mel filter bank are scaled
+#: scaling of the bands of a mel filter bank
 Norm = Literal["slaney"] | float | None
 
-#: Longest window of a function; bounds the memory that a number from outside can take.
+#: Longest window; bounds the memory that a number from the caller can take.
 _LONGEST = 1 << 26
 
 
 def window_spec(window: Window, length: int) -> WindowSpec:
-    """A window of `length` points as the Rust side takes it."""
+    """A window of `length` points in the form that the Rust side takes."""
     if isinstance(window, str):
         return window
     if isinstance(window, (int, float, np.number)) and not isinstance(window, bool):
@@ -64,7 +64,7 @@ def window_spec(window: Window, length: int) -> WindowSpec:
 
 
 def wavelet_window(window: Window) -> WindowSpec:
-    """A window for filters of many lengths, which only a formula has."""
+    """A window for filters of many lengths, which only a formula can give."""
     if callable(window) or not isinstance(window, (str, tuple, int, float, np.number)):
         raise ParameterError(
             "window must be a name, a tuple of a name and parameters, or a number, since the"
@@ -74,7 +74,7 @@ def wavelet_window(window: Window) -> WindowSpec:
 
 
 def _parameters(window: tuple[Any, ...]) -> list[str]:
-    """The parameters of a window in words."""
+    """The parameters of a window as text."""
     words = []
     for value in window[1:]:
         several = np.ravel(value) if isinstance(value, (list, tuple, np.ndarray)) else [value]
@@ -92,12 +92,12 @@ def get_window(window: Window, Nx: int, *, fftbins: bool = True) -> npt.NDArray[
     Parameters
     ----------
     window : str, tuple, float, array or callable
-        A name of scipy's; a tuple of a name and its parameters; the beta of a Kaiser window; `Nx`
-        values; or a function of `Nx` that gives them.
+        A name of scipy's; a tuple of a name and its parameters; the beta of a Kaiser window; an
+        array of `Nx` values; or a function of `Nx` that returns one.
     Nx : int
-        Points.
+        Number of points.
     fftbins : bool
-        Periodic, as transforms need it, or symmetric.
+        Whether the window is periodic, as transforms need, or symmetric.
 
     Returns
     -------
@@ -122,7 +122,7 @@ def mel_params(
     htk: bool,
     norm: Norm,
 ) -> MelParams:
-    """Filter bank parameters as the Rust side takes them."""
+    """Parameters of a filter bank in the form that the Rust side takes."""
     n_fft, n_mels = size("n_fft", n_fft), size("n_mels", n_mels)
     room("a filter bank", 2, n_mels, n_fft // 2 + 1)
     name = "none" if norm is None else norm if isinstance(norm, str) else repr(number("norm", norm))
@@ -144,22 +144,23 @@ def mel(
     norm: Norm = "slaney",
     dtype: npt.DTypeLike = np.float32,
 ) -> npt.NDArray[Any]:
-    """Mel filter bank [shape=(n_mels, 1 + n_fft/2)], float32 (librosa.filters.mel).
+    """Mel filter bank (librosa.filters.mel).
 
     Parameters
     ----------
     sr : float
         Sample rate in Hz.
     n_fft, n_mels : int
-        Length of the transform, bands.
+        Length of the transform, and number of bands.
     fmin, fmax : float
-        Range in Hz; fmax is `sr / 2` by default.
+        Lowest and highest frequency in Hz; by default, `fmax` is `sr / 2`.
     htk : bool
-        HTK's scale, or Slaney's.
+        Whether to use HTK's mel scale instead of Slaney's.
     norm : {"slaney", None} or float
-        Bands of equal area, of height 1, or of a norm of 1.
+        "slaney" gives bands of equal area, None bands of height 1, a number bands whose norm of
+        that order is 1.
     dtype : dtype
-        Of the result; computed as float32.
+        Type of the result, which is computed as float32.
 
     Returns
     -------
@@ -177,7 +178,7 @@ def mel(
 
 
 def warn_empty() -> None:
-    """What librosa warns of: bands too narrow to hold a bin."""
+    """librosa's warning about bands too narrow to hold a bin."""
     warn("Empty filters detected in the mel filter bank: use fewer n_mels or a longer n_fft")
 
 
@@ -191,7 +192,7 @@ def chroma_params(
     norm: float | None,
     base_c: bool,
 ) -> ChromaParams:
-    """Filter bank parameters as the Rust side takes them."""
+    """Parameters of a filter bank in the form that the Rust side takes."""
     n_fft, n_chroma = size("n_fft", n_fft), size("n_chroma", n_chroma)
     room("a filter bank", 4, n_chroma, n_fft // 2 + 1)
     width = None if octwidth is None else number("octwidth", octwidth)
@@ -221,24 +222,24 @@ def chroma(
     base_c: bool = True,
     dtype: npt.DTypeLike = np.float32,
 ) -> npt.NDArray[Any]:
-    """Chroma filter bank [shape=(n_chroma, 1 + n_fft/2)] (librosa.filters.chroma).
+    """Chroma filter bank (librosa.filters.chroma).
 
     Parameters
     ----------
     sr : float
         Sample rate in Hz.
     n_fft, n_chroma : int
-        Length of the transform, bins of the octave.
+        Length of the transform, and bins per octave.
     tuning : float
         Deviation from A440 in fractions of a bin.
     ctroct, octwidth : float
-        Centre and width in octaves of the dominance window; width None for none.
+        Centre and width of the dominance window in octaves; None as width for no window.
     norm : float, optional
         Norm of each column.
     base_c : bool
-        Begin with C, not A.
+        Whether the first bin is C instead of A.
     dtype : dtype
-        Of the result.
+        Type of the result.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What trees and forests know after training."""
+"""Trees and forests: importances, and scores on rows that trees have not seen."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from .errors import NotFittedError
 
 
 class GrownClassifier(WeightedClassifier):
-    """A tree or many."""
+    """A tree or a forest."""
 
     _importances: Matrix | None = None
 
     def fit(self, X: Any, y: Any, sample_weight: Any = None) -> Self:
-        """Learns from `X` [shape=(rows, features)] and `y`, one label per row.
+        """Trains on `X` [shape=(rows, features)] and `y`, one label per row.
 
-        `sample_weight` [shape=(rows,)], numbers of at least 0, says how much each row counts; a
-        row of weight 0 is left out. By default all rows count the same.
+        `sample_weight` [shape=(rows,)] gives each row a weight of at least 0; a row of weight 0 is
+        left out. By default, all rows weigh the same.
         """
         super().fit(X, y, sample_weight)
         self._importances = self._model.feature_importances()
@@ -31,7 +31,7 @@ class GrownClassifier(WeightedClassifier):
 
     @property
     def feature_importances_(self) -> Matrix:
-        """How much impurity the splits on each feature removed; the sum is one."""
+        """Impurity that the splits on each feature removed; the sum is 1."""
         if not hasattr(self, "_model"):
             raise not_fitted(self)
         if self._importances is None:
@@ -43,7 +43,7 @@ class GrownClassifier(WeightedClassifier):
 
 
 class Forest(GrownClassifier):
-    """Many trees."""
+    """A forest."""
 
     _renamed: ClassVar = {"n_estimators": "trees", "random_state": "seed"}
     oob_score: bool

@@ -1,4 +1,4 @@
-"""Tables of frequencies: of the bins of transforms, mel bands and tempograms."""
+"""Frequencies of the bins of transforms, mel bands and tempograms."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ._refusals import refuses
 from ._times import Doubles
 from .errors import ParameterError
 
-#: Longest table of frequencies; bounds the memory that a number from outside can take.
+#: Longest table of frequencies; bounds the memory that a number from the caller can take.
 _MOST_BINS = 1 << 26
 
 
@@ -50,16 +50,16 @@ def fft_frequencies(*, sr: float = 22050, n_fft: int = 2048) -> Doubles:
 def cqt_frequencies(
     n_bins: int, *, fmin: float, bins_per_octave: int = 12, tuning: float = 0.0
 ) -> Doubles:
-    """Centres of the bins of `cqt` (librosa.cqt_frequencies).
+    """Centre frequencies of the bins of `cqt` (librosa.cqt_frequencies).
 
     Parameters
     ----------
     n_bins : int
-        Bins.
+        Number of bins.
     fmin : float
-        Lowest one in Hz.
+        Frequency of the lowest bin in Hz.
     bins_per_octave : int
-        Bins of an octave.
+        Bins per octave.
     tuning : float
         Deviation from A440 in fractions of a bin.
 
@@ -81,16 +81,16 @@ def cqt_frequencies(
 def mel_frequencies(
     n_mels: int = 128, *, fmin: float = 0.0, fmax: float = 11025.0, htk: bool = False
 ) -> Doubles:
-    """Frequencies that lie evenly on the mel scale (librosa.mel_frequencies).
+    """Frequencies that are evenly spaced on the mel scale (librosa.mel_frequencies).
 
     Parameters
     ----------
     n_mels : int
-        How many.
+        Number of frequencies.
     fmin, fmax : float
-        First and last one in Hz.
+        Lowest and highest frequency in Hz.
     htk : bool
-        HTK's scale, or Slaney's.
+        Whether to use HTK's mel scale instead of Slaney's.
 
     Returns
     -------
@@ -107,12 +107,12 @@ def mel_frequencies(
 
 @refuses
 def tempo_frequencies(n_bins: int, *, hop_length: int = 512, sr: float = 22050) -> Doubles:
-    """Tempi of the rows of a tempogram in beats per minute (librosa.tempo_frequencies).
+    """Tempi of the rows of a tempogram (librosa.tempo_frequencies).
 
     Parameters
     ----------
     n_bins : int
-        Rows.
+        Number of rows.
     hop_length : int
         Samples between frames.
     sr : float
@@ -120,7 +120,7 @@ def tempo_frequencies(n_bins: int, *, hop_length: int = 512, sr: float = 22050) 
 
     Returns
     -------
-    float64 [shape=(n_bins,)], the first one infinite
+    beats per minute, float64 [shape=(n_bins,)]; the first one is infinite
 
     Examples
     --------
@@ -145,13 +145,13 @@ def fourier_tempo_frequencies(
     sr : float
         Sample rate in Hz.
     win_length : int
-        Frames of the analysis window.
+        Length of the analysis window in frames.
     hop_length : int
         Samples between frames.
 
     Returns
     -------
-    float64 [shape=(win_length // 2 + 1,)]
+    beats per minute, float64 [shape=(win_length // 2 + 1,)]
 
     Examples
     --------

@@ -1,6 +1,6 @@
 """Inputs of the systems compared in the CORSMAL benchmark (M1 to M6) and of its baselines.
 
-`y` is one recording in -1..1 [shape=(n,) or (channels, n)] at rate `sr`.
+`y` is one recording in -1..1 [shape=(n,) or (channels, n)] at the sample rate `sr`.
 """
 
 from __future__ import annotations
@@ -43,17 +43,17 @@ def _recording(y: Any) -> Singles:
 def spec9216(
     y: npt.ArrayLike, sr: float, fixed_len: int | None = None, *, librosa: str = "0.11"
 ) -> Floats:
-    """An image of one channel: divided by its RMS, |STFT| (512, hop 128) in dB, resized to 96 x 96.
+    """Image of one channel: divided by its RMS, |STFT| (n_fft 512, hop 128) in dB, resized to 96 x 96.
 
     Parameters
     ----------
     y : [shape=(n,)]
         One channel, float in -1..1.
     sr : float
-        Its sample rate in Hz; not used.
+        Its sample rate in Hz; has no effect.
     fixed_len : int, optional
-        Samples to cut to, or to pad to with zeros; padding makes the result float64, as it does in
-        the baselines.
+        Number of samples to cut the signal to, or to pad it to with zeros; padding makes the result
+        float64, as in the baselines.
     librosa : {"0.11", "0.8"}
         "0.8" pads frames as the published baselines did.
 
@@ -79,8 +79,8 @@ def spec9216(
 
 @refuses
 def esc26(y: npt.ArrayLike, sr: float) -> Doubles:
-    """The baseline's vector: means, then standard deviations over frames of MFCC 1 to 12, then mean
-    and standard deviation of the zero-crossing rate, of the mean channel.
+    """The vector of the baseline, from the mean channel: means, then standard deviations of MFCC 1 to
+    12 over frames, then mean and standard deviation of the zero-crossing rate.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def m2_mfcc(y: npt.ArrayLike, sr: float, *, padded: bool = True, librosa: str = 
     sr : float
         Its sample rate in Hz.
     padded : bool
-        Whether a shorter recording is padded to 1501 frames.
+        Whether to pad a shorter recording to 1501 frames.
     librosa : {"0.8", "0.11"}
         The librosa version whose padding of frames is used.
 
@@ -163,8 +163,8 @@ def m2_mfcc(y: npt.ArrayLike, sr: float, *, padded: bool = True, librosa: str = 
 def m3_spectrogram(
     y: npt.ArrayLike, sr: float, *, n_fft: int = 1124, hop_length: int = 3087
 ) -> Singles:
-    """M3's input: magnitudes of the last 32,000 samples at 16,600 Hz. Window and hop are our
-    choice, the paper gives none.
+    """M3's input: magnitudes of the last 32,000 samples at 16,600 Hz. Window and hop are our choice:
+    the paper gives neither.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def m4_logmel(y: npt.ArrayLike, sr: float, *, variant: str = "code") -> Singles:
     sr : float
         Its sample rate in Hz.
     variant : {"code", "paper"}
-        "code" cuts each frame to 512 samples and doubles the decibels as the code does, "paper"
+        "code" cuts each frame to 512 samples and doubles the decibels, as the code does; "paper"
         does neither.
 
     Returns
@@ -219,7 +219,7 @@ def m4_logmel(y: npt.ArrayLike, sr: float, *, variant: str = "code") -> Singles:
 
 @refuses
 def m4_windows(features: npt.ArrayLike) -> Singles:
-    """M4's windows of 64 frames with 75 % overlap.
+    """M4's input: windows of 64 frames with 75 % overlap.
 
     Parameters
     ----------
@@ -276,7 +276,7 @@ def m5_vggish_patches(y: npt.ArrayLike, sr: float, *, res_type: str = "kaiser_be
     sr : float
         Its sample rate in Hz.
     res_type : str
-        Resampler to 16 kHz.
+        How to resample to 16 kHz, see `resample`.
 
     Returns
     -------
@@ -304,7 +304,7 @@ def m6_spectrogram(
     sr : float
         Its sample rate in Hz.
     start : float, optional
-        Seconds at which the 10 s begin; at the second onset by default.
+        Start of the 10 s in seconds; by default, the second onset.
     librosa : {"0.8", "0.11"}
         The librosa version whose onsets and padding are used.
 

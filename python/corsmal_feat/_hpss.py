@@ -48,24 +48,24 @@ def hpss(
     mask: bool = False,
     margin: float | Sequence[float] = 1.0,
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Harmonic and percussive part of a spectrogram by median filtering (librosa.decompose.hpss).
+    """Harmonic and percussive parts of a spectrogram by median filtering (librosa.decompose.hpss).
 
     Parameters
     ----------
     S : float or complex [shape=(..., d, t)]
         Spectrogram.
     kernel_size : int or pair of int
-        Frames, and bins, of the median filters.
+        Length of the median filters: in frames for the harmonic part, in bins for the percussive.
     power : float
-        Exponent of the soft masks, infinite for binary ones.
+        Exponent of the soft masks; infinity for binary masks.
     mask : bool
-        The masks instead of the parts.
+        Whether to return the masks instead of the parts.
     margin : float or pair of float
-        Factors by which one part must exceed the other, at least 1.
+        Factor, at least 1, by which one part must exceed the other.
 
     Returns
     -------
-    harmonic and percussive part, or mask, each in the shape of `S`
+    harmonic and percussive parts, or masks, each in the shape of `S`
 
     Examples
     --------
@@ -98,7 +98,7 @@ def _separate(
     pad_mode: str,
     parts: tuple[bool, bool],
 ) -> list[Floats]:
-    """The asked ones of the harmonic and the percussive part."""
+    """The requested ones of the harmonic and percussive parts."""
     y = audio(y)
     stft_tuple = stft_params(n_fft, hop_length, win_length, "hann", center, pad_mode)
     params = _hpss_params(kernel_size, power, margin)
@@ -122,7 +122,7 @@ def effects_hpss(
     center: bool = True,
     pad_mode: str = "constant",
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Harmonic and percussive part of a signal (librosa.effects.hpss).
+    """Harmonic and percussive parts of a signal (librosa.effects.hpss).
 
     Parameters
     ----------
@@ -133,11 +133,11 @@ def effects_hpss(
     n_fft, hop_length, win_length, center, pad_mode
         See `stft`.
     window : str
-        Without effect, as in librosa.
+        Has no effect, as in librosa.
 
     Returns
     -------
-    harmonic and percussive part, each in the shape of `y`
+    harmonic and percussive parts, each in the shape of `y`
 
     Examples
     --------
@@ -179,11 +179,11 @@ def harmonic(
     n_fft, hop_length, win_length, center, pad_mode
         See `stft`.
     window : str
-        Without effect, as in librosa.
+        Has no effect, as in librosa.
 
     Returns
     -------
-    in the shape of `y`
+    harmonic part, in the shape of `y`
 
     Examples
     --------
@@ -223,11 +223,11 @@ def percussive(
     n_fft, hop_length, win_length, center, pad_mode
         See `stft`.
     window : str
-        Without effect, as in librosa.
+        Has no effect, as in librosa.
 
     Returns
     -------
-    in the shape of `y`
+    percussive part, in the shape of `y`
 
     Examples
     --------
@@ -243,12 +243,12 @@ def percussive(
 
 @refuses
 def hpss_masks(S: npt.ArrayLike, **kwargs: Any) -> Floats:
-    """Harmonic and percussive mask, stacked.
+    """Harmonic and percussive masks, stacked.
 
     Parameters
     ----------
     S : [shape=(..., bins, frames)]
-        A spectrogram.
+        Spectrogram.
     **kwargs
         See `decompose.hpss`.
 
@@ -266,12 +266,12 @@ def hpss_masks(S: npt.ArrayLike, **kwargs: Any) -> Floats:
 
 @refuses
 def hpss_mags(S: npt.ArrayLike, **kwargs: Any) -> Floats:
-    """Harmonic and percussive part of a spectrogram, stacked.
+    """Harmonic and percussive parts of a spectrogram, stacked.
 
     Parameters
     ----------
     S : [shape=(..., bins, frames)]
-        A spectrogram.
+        Spectrogram.
     **kwargs
         See `decompose.hpss`.
 
@@ -289,12 +289,12 @@ def hpss_mags(S: npt.ArrayLike, **kwargs: Any) -> Floats:
 
 @refuses
 def hpss_audio(y: npt.ArrayLike, **kwargs: Any) -> Floats:
-    """Harmonic and percussive part of a signal, stacked.
+    """Harmonic and percussive parts of a signal, stacked.
 
     Parameters
     ----------
     y : [shape=(..., n)]
-        A signal.
+        Signal.
     **kwargs
         See `effects.hpss`.
 

@@ -28,8 +28,7 @@ def istft(
     length: int | None = None,
     out: Floats | None = None,
 ) -> Floats:
-    """Signal [shape=(..., n)] of a spectrogram [shape=(..., 1 + n_fft/2, frames)]
-    (librosa.istft).
+    """Inverse short-time Fourier transform: the signal of a spectrogram (librosa.istft).
 
     Parameters
     ----------
@@ -38,11 +37,11 @@ def istft(
     hop_length, win_length, n_fft, window, center
         As in `stft`.
     length : int, optional
-        Samples of the result.
+        Number of samples of the result.
     dtype : float32 or float64, optional
         Type of the result; by default, the precision of `stft_matrix`.
     out : array, optional
-        Array for the result.
+        Array to write the result to.
 
     Returns
     -------

@@ -43,7 +43,7 @@ def melspectrogram(
     y : float32 or float64 [shape=(..., n)], optional
         Signal at the sample rate `sr` in Hz.
     S : [shape=(..., 1 + n_fft // 2, t)], optional
-        A spectrogram to use instead, as it is.
+        Spectrogram to use instead of `y`, as it is.
     n_fft, hop_length, win_length, window, center, pad_mode
         See `stft`; hop_length is 512 here.
     power : float
@@ -51,8 +51,7 @@ def melspectrogram(
     n_mels, fmin, fmax, htk, norm
         See `filters.mel`.
     dtype : float32 or float64
-        Type of the filter bank, which is computed as float32; with float64 the result has this
-        type.
+        Type of the filter bank, which is computed as float32; with float64, the result is float64.
 
     Returns
     -------
@@ -98,20 +97,20 @@ def mfcc(
     Parameters
     ----------
     y : float32 or float64 [shape=(..., n)], optional
-        Signal at the sample rate `sr` in Hz. Its mel spectrogram is taken in dB with a range of
-        80 dB below the maximum over all channels.
+        Signal at the sample rate `sr` in Hz. Its mel spectrogram is converted to dB, at most 80 dB
+        below the maximum over all channels.
     S : [shape=(..., n_mels, t)], optional
-        A mel spectrogram in dB to use instead.
+        Mel spectrogram in dB to use instead of `y`.
     n_mfcc : int
-        Number of coefficients, at most that of mel bands.
+        Number of coefficients, at most the number of mel bands.
     dct_type : {1, 2, 3}
         Type of the cosine transform.
     norm : {"ortho", None}
-        Its normalisation.
+        Normalisation of the cosine transform.
     lifter : float
-        Cepstral liftering, 0 for none.
+        Coefficient of the liftering; 0 for none.
     mel_norm, **kwargs
-        `norm` and the other arguments of `melspectrogram`.
+        Arguments of `melspectrogram`; `mel_norm` is its `norm`.
 
     Returns
     -------
@@ -154,18 +153,18 @@ def delta(
     data : float32 or float64
         Features, frames along `axis`.
     width : int
-        Frames per fit: an odd number, at least 3.
+        Number of frames per fit: odd, at least 3.
     order : int
         Order of the derivative and degree of the polynomial.
     mode : {"interp", "nearest", "mirror", "constant", "wrap"}
-        How to handle the ends.
+        How to treat the ends.
     **kwargs
         `cval`, the value beyond the ends with "constant", and `delta`, the time between frames, as
         in `scipy.signal.savgol_filter`.
 
     Returns
     -------
-    per frame, in the shape and precision of `data`
+    change per frame, in the shape and precision of `data`
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Arrays of an archive, read when they are asked for."""
+"""Arrays of an archive, read on first access."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def read_member(archive: Any, name: str, member: str) -> Values:
     Raises
     ------
     ParameterError
-        It is damaged, or holds Python objects.
+        The member is damaged, or holds Python objects.
     """
     # `archive[member]` looks through the list of all members.
     try:
@@ -35,8 +35,8 @@ def read_member(archive: Any, name: str, member: str) -> Values:
 
 
 class Members(MutableMapping[str, Any]):
-    """By id the arrays of a recording, as a dict; they are read from the open archive when they are
-    first asked for, and kept."""
+    """The arrays of each recording by id; they are read from the open archive on first access, and
+    kept."""
 
     def __init__(self, archive: Any, name: str, members: dict[str, Names]) -> None:
         self._archive, self._name = archive, name

@@ -1,4 +1,4 @@
-"""Features of several frames together (librosa.feature.stack_memory)."""
+"""Several frames stacked (librosa.feature.stack_memory)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .errors import ParameterError
 def stack_memory(
     data: npt.ArrayLike, *, n_steps: int = 2, delay: int = 1, **kwargs: Any
 ) -> npt.NDArray[Any]:
-    """Each frame together with earlier ones (librosa.feature.stack_memory).
+    """Each frame stacked with earlier ones (librosa.feature.stack_memory).
 
     Parameters
     ----------
@@ -25,9 +25,9 @@ def stack_memory(
     n_steps : int
         Number of frames to stack.
     delay : int
-        Frames from one to the next; negative for later frames.
+        Distance between stacked frames; negative for later frames.
     **kwargs
-        Arguments of `numpy.pad` for values beyond the ends; zeros by default.
+        Arguments of `numpy.pad` for frames beyond the ends; zeros by default.
 
     Returns
     -------

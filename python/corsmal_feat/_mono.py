@@ -1,4 +1,4 @@
-"""Mixing channels to one."""
+"""Mixing channels down to one."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ._refusals import refuses
 
 @refuses
 def to_mono(y: npt.ArrayLike) -> Floats:
-    """Mean over all leading axes [shape=(n,)] (librosa.to_mono).
+    """Mean of all channels (librosa.to_mono).
 
     Parameters
     ----------
     y : float32 or float64 [shape=(..., n)]
-        Signals in its leading axes.
+        Signal; its leading axes are channels.
 
     Returns
     -------
