@@ -43,7 +43,8 @@ def _recording(y: Any) -> Singles:
 def spec9216(
     y: npt.ArrayLike, sr: float, fixed_len: int | None = None, *, librosa: str = "0.11"
 ) -> Floats:
-    """Image of one channel: divided by its RMS, |STFT| (n_fft 512, hop 128) in dB, resized to 96 x 96.
+    """Image of one channel: divided by its RMS, |STFT| (n_fft=512, hop 128) in dB, resized to 96 x
+    96.
 
     Parameters
     ----------
@@ -79,8 +80,8 @@ def spec9216(
 
 @refuses
 def esc26(y: npt.ArrayLike, sr: float) -> Doubles:
-    """The vector of the baseline, from the mean channel: means, then standard deviations of MFCC 1 to
-    12 over frames, then mean and standard deviation of the zero-crossing rate.
+    """The vector of the baseline, from the mean channel: means, then standard deviations of MFCC 1
+    to 12 over frames, then mean and standard deviation of the zero-crossing rate.
 
     Parameters
     ----------
@@ -163,8 +164,8 @@ def m2_mfcc(y: npt.ArrayLike, sr: float, *, padded: bool = True, librosa: str = 
 def m3_spectrogram(
     y: npt.ArrayLike, sr: float, *, n_fft: int = 1124, hop_length: int = 3087
 ) -> Singles:
-    """M3's input: magnitudes of the last 32,000 samples at 16,600 Hz. Window and hop are our choice:
-    the paper gives neither.
+    """M3's input: magnitudes of the last 32,000 samples at 16,600 Hz. Window and hop are our
+    choice: the paper gives neither.
 
     Parameters
     ----------
