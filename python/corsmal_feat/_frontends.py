@@ -276,8 +276,8 @@ def m5_vggish_patches(y: npt.ArrayLike, sr: float, *, res_type: str = "kaiser_be
         One recording, float in -1..1.
     sr : float
         Its sample rate in Hz.
-    res_type : str
-        How to resample to 16 kHz, see `resample`.
+    res_type : {"kaiser_best", "kaiser_fast", "soxr_hq"}
+        Resampling to 16 kHz, see `resample`.
 
     Returns
     -------

@@ -20,14 +20,14 @@ from .errors import DecodeError, ModelError, ParameterError
 
 
 class TrainedModel:
-    """Any model file: steps, classifier, labels and the features it was trained on.
+    """A model of any classifier: steps, classifier, labels and the features it was trained on.
 
     Attributes
     ----------
     path : str
         The file.
     header : dict
-        What the file says about the model.
+        Description of the model in the file.
     classes_ : array
         Labels, in the order of `predict_proba`.
     n_features_in_ : int
@@ -48,7 +48,7 @@ class TrainedModel:
         self.n_features_in_ = self._model.n_features()
 
     def __reduce__(self) -> tuple[type[TrainedModel], tuple[str]]:
-        # As the file that it is: other processes read it again.
+        # Other processes read the file again.
         return TrainedModel, (os.path.abspath(self.path),)
 
     def __repr__(self) -> str:
@@ -63,7 +63,7 @@ class TrainedModel:
 
     @property
     def feature_config(self) -> dict[str, Any] | None:
-        """The full configuration of the features, or None."""
+        """The full configuration of the features; None if the model was trained on other rows."""
         config: dict[str, Any] | None = self.header["feature_config"]
         return config
 
@@ -76,7 +76,8 @@ class TrainedModel:
         X : array [shape=(rows, features)], path, or list of paths
             Rows of features or, for a model that knows its features, recordings.
         any_rate : bool
-            Accept recordings with a sample rate or channels that the model was not trained on.
+            Whether to accept recordings with a sample rate or a number of channels that the model
+            was not trained on.
 
         Returns
         -------
@@ -85,7 +86,7 @@ class TrainedModel:
         Raises
         ------
         DecodeError : a recording has no features
-        ParameterError : rows or recordings differ from those in training
+        ParameterError : rows or recordings do not fit the model
         """
         return self.classes_[self._model.predict(self._rows(X, any_rate))]
 
@@ -188,7 +189,7 @@ class TrainedModel:
         return np.stack([row_of[path] for path in paths])
 
     def _check_formats(self, outcomes: list[dict[str, Any]]) -> None:
-        """Refuses recordings of a format that changes their features."""
+        """Refuses recordings in a format that changes their features."""
         for row in outcomes:
             reason = self.refusal(row.get("sample_rate"), row.get("channels"))
             if reason is not None:
@@ -197,7 +198,7 @@ class TrainedModel:
 
 @refuses
 def load_model(path: str | os.PathLike[str]) -> TrainedModel:
-    """Reads any model file, from `corsmal-feat train` or `save`.
+    """Reads the model file of any classifier, written by `corsmal-feat train` or `save`.
 
     Parameters
     ----------

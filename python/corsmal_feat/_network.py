@@ -1,4 +1,4 @@
-"""A network with its numbers."""
+"""A network and its parameters."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from .errors import ParameterError
 
 
 class TrainingSteps(TypedDict):
-    """What `Network.train_steps` returns."""
+    """The result of `Network.train_steps`."""
 
     losses: list[float]
     gradient_norms: dict[str, float]
 
 
 class Network:
-    """A network with its numbers. `build` makes one.
+    """A network and its parameters; `build` returns one.
 
     Attributes
     ----------
     name : str
-        Its name.
+        Name of the network.
     num_parameters : int
-        Numbers that training changes.
+        Number of trainable parameters.
     layers : list
-        Layers in their order, each with the shape of an item after it.
+        Layers in order, each with the shape of an item after it.
 
     Examples
     --------
@@ -46,29 +46,29 @@ class Network:
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """Name of the network."""
         return self._network.name()
 
     @property
     def num_parameters(self) -> int:
-        """Numbers that training changes."""
+        """Number of trainable parameters."""
         return self._network.num_parameters()
 
     @property
     def layers(self) -> list[tuple[str, str]]:
-        """Layers in their order, each with the shape of an item after it."""
+        """Layers in order, each with the shape of an item after it."""
         return self._network.layers()
 
     def state_dict(self) -> dict[str, Singles]:
-        """All numbers with PyTorch's names, including running statistics."""
+        """All parameters and running statistics, with PyTorch's names."""
         return self._network.state()
 
     @refuses
     def load_state_dict(self, state: Mapping[str, npt.ArrayLike]) -> None:
-        """Replaces all numbers.
+        """Replaces all parameters and running statistics.
 
-        `num_batches_tracked` may be present. Every other name and shape must be this network's: a
-        `ParameterError` lists all that differ, and nothing is changed.
+        `num_batches_tracked` may be present. All other names and shapes must be those of this
+        network: otherwise, a `ParameterError` lists all that differ, and nothing is changed.
         """
         self._network.load_state(
             [(str(name), single(value)) for name, value in state.items()],
@@ -81,15 +81,15 @@ class Network:
         Parameters
         ----------
         inputs : arrays in PyTorch's layouts: [items, channels, height, width], [items, steps,
-            numbers] or [items, numbers]; four views as one array [items, 4, steps, numbers]
-        lengths : steps of each item, if items were padded; without it the network runs through the
-            padding, as in PyTorch on a padded batch
+            features] or [items, features]; four views as one array [items, 4, steps, features]
+        lengths : number of steps of each item, if items are padded; without it, the network also
+            processes the padding, as PyTorch does with a padded batch
         """
         return self._network.forward([single(x) for x in inputs], _lengths(lengths))
 
     @refuses
     def features(self, *inputs: npt.ArrayLike) -> Singles:
-        """What the network's last layers work on [shape=(items, n)]."""
+        """Inputs of the network's last layers [shape=(items, n)]."""
         return self._network.features([single(x) for x in inputs])
 
     @refuses
@@ -109,17 +109,17 @@ class Network:
         Parameters
         ----------
         inputs : as in `forward`, in a list
-        y : a class for each item (whole numbers), or numbers for a network that estimates numbers
+        y : class of each item (a whole number), or its target for a network that estimates numbers
         steps : number of steps
         recipe : "optimizer" ("adam" or "sgd"), "lr", and, if needed, "momentum", "weight_decay",
             "clip_grad_norm", "class_weights", "loss" ("cross_entropy" or "mse")
         dropout : whether dropout is active
         seed : seed of dropout
-        lengths : steps of each item
+        lengths : number of steps of each item
 
         Returns
         -------
-        losses before each step, and the norm of each parameter's gradient at the first
+        loss before each step, and the norm of each parameter's gradient in the first step
         """
         arrays = [inputs] if isinstance(inputs, np.ndarray) else list(inputs)  # type: ignore[arg-type]
         targets = np.asarray(y)
@@ -148,7 +148,7 @@ class Network:
 
 
 def single(value: Any) -> Singles:
-    """A contiguous array in single precision, of finite numbers."""
+    """A contiguous array of finite numbers in single precision."""
     array = np.ascontiguousarray(value, dtype=np.float32)
     if not np.isfinite(array).all():
         raise ParameterError("inputs and weights must be finite")

@@ -24,18 +24,18 @@ _Column = tuple[npt.NDArray[np.float32], list[int]]
 class NetworkClassifier(ClassifierMixin, BaseEstimator):
     """A network of the paper, trained with its published recipe.
 
-    `X` is an array [items, ...] in the layout of `nets.build(network).forward`, or a list with an
-    array for each item, whose lengths may differ: [steps, numbers] for recurrent networks, and a
-    list of four such arrays for each item of M5's R(2+1)D networks.
+    `X` is an array [items, ...] in the layout of `nets.build(network).forward`, or a list with one
+    array per item, which may differ in length: [steps, features] for recurrent networks, and a list
+    of four such arrays per item for M5's R(2+1)D networks.
 
     Parameters
     ----------
-    network : a name of `nets.names()`
+    network : one of `nets.names()`
     recipe : keys of the recipe to change from the published values, such as {"epochs": 3, "batch":
         8}
-    random_state : seed; the recipe's own if None
-    checkpoint : file in which the training is saved after each epoch, and from which it continues
-    progress : called with the epochs done, all epochs, the last loss, last score and seconds left
+    random_state : seed; None for that of the recipe
+    checkpoint : file to which the training is saved after each epoch, and from which it continues
+    progress : called with epochs done, total epochs, last loss, last score and seconds left
 
     Examples
     --------
@@ -70,8 +70,8 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
     def fit(self, X: Any, y: Any, *, watched: Sequence[int] | None = None) -> Self:
         """Trains on `X` and `y`, one label per item.
 
-        `watched` are indices of items that are not used for training: their score after each epoch
-        is in `history_`, and with the recipe's `select` it chooses the epoch to keep.
+        `watched` are indices of items that are not used for training. Their score after each epoch
+        is in `history_` and, with the recipe's `select`, chooses the epoch to keep.
         """
         columns = self._columns(X)
         count = len(columns[0][1]) - 1
@@ -112,7 +112,7 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         return labels
 
     def state_dict(self) -> dict[str, npt.NDArray[np.float32]]:
-        """The trained numbers with PyTorch's names."""
+        """All trained parameters and running statistics, with PyTorch's names."""
         if not hasattr(self, "_model"):
             raise not_fitted(self)
         return self._model.state()
@@ -163,7 +163,7 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
 
 
 def _column(items: list[Any], place: str, shape: str) -> _Column:
-    """Items one after another, images channels last. `shape` is "steps x 128" or the like."""
+    """Items one after another, images with channels last. `shape` is such as "steps x 128"."""
     expected = shape.split(" x ")
     arrays = []
     for number, item in enumerate(items):

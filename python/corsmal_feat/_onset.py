@@ -26,7 +26,7 @@ def _count(name: str, value: Any) -> int:
 
 
 def _double_melspectrogram(*, y: Any, **kwargs: Any) -> Any:
-    """`melspectrogram` by a transform in double precision: differences of decibels bring out its
+    """`melspectrogram` from a transform in double precision: differences of decibels amplify its
     rounding where a spectrum is mostly empty."""
     y = audio(y)
     return melspectrogram(y=y.astype(np.float64), **kwargs).astype(y.dtype)
@@ -49,7 +49,7 @@ def onset_strength(
     hop_length: int = 512,
     **kwargs: Any,
 ) -> Floats:
-    """Spectral flux envelope [shape=(..., t)] of the mel spectrogram in dB, or of S in dB
+    """Onset strength: spectral flux of the mel spectrogram in dB, or of `S` in dB
     (librosa.onset.onset_strength).
 
     Parameters
@@ -57,19 +57,19 @@ def onset_strength(
     y : float32 or float64 [shape=(..., n)]
         Signal at the sample rate `sr` in Hz.
     S : [shape=(..., d, t)], optional
-        A spectrogram in dB to use instead.
+        Spectrogram in dB to use instead of `y`.
     lag, max_size : int
-        Frames to look back, and bands of the maximum filter.
+        Number of frames to look back, and number of bands of the maximum filter.
     ref : [shape of S], optional
-        Spectrogram to compare with instead of the filtered S.
+        Spectrogram to compare with instead of the filtered `S`.
     detrend, center : bool
-        Whether to remove the slow part; whether to align frames with their centres.
+        Whether to remove the slow part, and whether to align frames with their centres.
     feature, aggregate : callable
         Functions to use instead of `melspectrogram` and the mean over bands.
     n_fft, hop_length : int
         See `stft`.
     **kwargs
-        Of `feature`.
+        Arguments of `feature`.
 
     Returns
     -------
@@ -119,15 +119,15 @@ def onset_strength_multi(
     channels: Sequence[int] | Sequence[slice] | None = None,
     **kwargs: Any,
 ) -> Floats:
-    """Spectral flux of groups of bands, or with `aggregate=False` of every band
-    [shape=(..., groups, t)] (librosa.onset.onset_strength_multi).
+    """Onset strength of groups of bands or, with `aggregate=False`, of every band
+    (librosa.onset.onset_strength_multi).
 
     Parameters
     ----------
     y, sr, S, n_fft, hop_length, lag, max_size, ref, detrend, center, feature, **kwargs
         See `onset_strength`.
     channels : list of int or of slice, optional
-        Bands where groups begin and end, or the groups themselves; one group by default.
+        Bands at which groups begin and end, or the groups themselves; by default, one group.
     aggregate : callable or False
         Function to use instead of the mean over the bands of a group; False keeps every band.
 
@@ -164,8 +164,8 @@ def _compared(
     framing: tuple[int, int],
     keywords: dict[str, Any],
 ) -> tuple[Any, Any]:
-    """The spectrogram in dB [shape=(..., d, t)], and the rows of what it is compared with. `source`
-    is (y, sr, S), `framing` (n_fft, hop_length)."""
+    """The spectrogram in dB [shape=(..., d, t)], and the rows that it is compared with. `source` is
+    (y, sr, S), `framing` (n_fft, hop_length)."""
     (y, sr, S), (n_fft, hop_length) = source, framing
     if S is None:
         if feature is None:
@@ -183,7 +183,7 @@ def _compared(
 
 
 def _delayed(flux: Any, lag: int, delay: int | None, length: int | None) -> Any:
-    """`flux` behind the zeros before its first comparison, cut to `length` where it is centred."""
+    """`flux` after zeros for the frames without comparison, cut to `length` if centred."""
     padding = [(0, 0)] * (flux.ndim - 1) + [(lag + (delay or 0), 0)]
     padded = np.pad(flux, padding)
     return padded if delay is None else padded[..., :length]
@@ -229,23 +229,24 @@ def onset_detect(
     y : float32 or float64 [shape=(..., n)], optional
         Signal at the sample rate `sr` in Hz.
     onset_envelope : [shape=(..., t)], optional
-        Onset strength to use instead.
+        Onset strength to use instead of `y`.
     hop_length : int
         Samples between frames.
     backtrack : bool
-        Move each onset to the minimum of `energy` (the envelope by default) before it.
+        Whether to move each onset to the minimum of `energy` (by default, the envelope) before it.
     units : {"frames", "samples", "time"}
-        Units of the onsets.
+        Unit of the onsets.
     normalize : bool
-        Scale the envelope to 0..1 first.
+        Whether to scale the envelope to 0..1 first.
     sparse : bool
-        Whether to return onsets, or else a mask of all frames.
+        Whether to return the onsets; otherwise, a mask over all frames.
     pre_max, post_max, pre_avg, post_avg, delta, wait : float, optional
-        Conditions of a peak; librosa's defaults for the sample rate and hop.
+        Conditions for a peak, in frames, and `delta` in units of the envelope; by default, those of
+        librosa for the sample rate and hop.
 
     Returns
     -------
-    [shape=(n_onsets,)], or with `sparse=False` bool in the shape of the envelope
+    [shape=(n_onsets,)] or, with `sparse=False`, bool in the shape of the envelope
 
     Examples
     --------
@@ -312,7 +313,7 @@ def onset_backtrack(events: npt.ArrayLike, energy: npt.ArrayLike) -> npt.NDArray
     events : int [shape=(n,)]
         Frames.
     energy : [shape=(t,)]
-        Energy or onset strength; of more dimensions, minima along the first one.
+        Energy or onset strength; with more dimensions, minima along the first axis.
 
     Returns
     -------

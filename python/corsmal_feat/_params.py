@@ -1,4 +1,4 @@
-"""Parameters as the Rust side takes them: one named tuple for each group."""
+"""Parameters in the form that the Rust side takes: one named tuple for each group."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NUMBER = (int, float, np.integer, np.floating)
 
 
 def _checked(kind: _Params) -> _Params:
-    """Numbers of another type are refused here, by name: the Rust side has only a `TypeError`."""
+    """Refuses values of another type by name; the Rust side would only raise a `TypeError`."""
     make = kind.__new__
     wanted = {}
     for name, hint in get_type_hints(kind).items():
@@ -44,7 +44,7 @@ def _checked(kind: _Params) -> _Params:
 
 @_checked
 class StftParams(NamedTuple):
-    """A short-time Fourier transform, all resolved."""
+    """A short-time Fourier transform, with all defaults filled in."""
 
     n_fft: int
     hop_length: int
@@ -65,7 +65,7 @@ class FrameParams(NamedTuple):
 
 @_checked
 class MelParams(NamedTuple):
-    """A mel filter bank; `norm` is "slaney", "none" or a number in words."""
+    """A mel filter bank; `norm` is "slaney", "none" or a number as text."""
 
     sr: float
     n_fft: int
@@ -103,7 +103,7 @@ class PitchParams(NamedTuple):
 
 @_checked
 class PeakParams(NamedTuple):
-    """Conditions of an onset; None is librosa's default for the sample rate and hop."""
+    """Conditions for an onset; None is librosa's default for the sample rate and hop."""
 
     pre_max: int | None
     post_max: int | None
@@ -166,7 +166,7 @@ class PaaFrames(NamedTuple):
 
 @_checked
 class PcenParams(NamedTuple):
-    """Per-channel energy normalisation; `b` is instead of the time constant."""
+    """Per-channel energy normalisation; `b` replaces the time constant."""
 
     sr: float
     hop_length: int

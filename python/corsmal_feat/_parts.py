@@ -1,4 +1,4 @@
-"""Files of a job on a cluster, and the task that computes one."""
+"""The files of a job on a cluster, and the task that computes one of them."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ _CRASHED = f"its process ended {DEATHS} times while it was computed"
 
 
 def compute_part(table: Any, folder: str, name: str, options: dict[str, Any]) -> None:
-    """Computes a file, in a worker. The log of attempts says which recording was open when a
-    process ended."""
+    """Computes a file in a worker. The log of attempts says which recording was open when a process
+    ended."""
     pa = pyarrow()
     log = Path(folder, ATTEMPTS, name).with_suffix(".log")
     opened: Counter[int] = Counter()
@@ -50,7 +50,7 @@ def compute_part(table: Any, folder: str, name: str, options: dict[str, Any]) ->
 
 
 def write_whole(path: Path, content: Any) -> None:
-    """Writes a file that appears when it is whole and on the disk."""
+    """Writes a file that appears only when it is complete and on the disk."""
     draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
     with draft.open("wb") as file:
         file.write(content)

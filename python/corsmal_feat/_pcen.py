@@ -34,30 +34,30 @@ def pcen(
     zi: npt.ArrayLike | None = None,
     return_zf: bool = False,
 ) -> Floats | tuple[Floats, Floats]:
-    """Per-channel energy normalisation of a spectrogram (librosa.pcen): every band divided by its
-    smoothed level and compressed.
+    """Per-channel energy normalisation (librosa.pcen): every band is divided by its smoothed level,
+    and compressed.
 
     Parameters
     ----------
     S : float32 or float64 [shape=(..., d, t)]
-        A non-negative spectrogram, made for 32-bit counts: multiply one of samples within -1 and 1
-        by 2**31.
+        Non-negative spectrogram. The defaults suit 32-bit integer samples: multiply a spectrogram
+        of samples in -1..1 by 2**31.
     sr, hop_length : number, int
-        Sample rate in Hz and samples between frames: `time_constant` is in seconds.
+        Sample rate in Hz, and samples between frames; `time_constant` is in seconds.
     gain, bias, power, time_constant, eps, b : number
-        Of the gain control, the compression and the smoothing.
+        Parameters of the gain control, the compression and the smoothing.
     max_size, max_axis : int
-        Bands of a maximum filter before the smoothing, and their axis.
+        Number of bands of a maximum filter before the smoothing, and the axis of bands.
     ref : [shape of S], optional
-        What to smooth instead of S.
+        Spectrogram to smooth instead of `S`.
     axis : int
         The axis of time.
     zi, return_zf
-        State that the smoothing begins with, and whether to return the one behind the last frame.
+        Initial state of the smoothing, and whether to return the state after the last frame.
 
     Returns
     -------
-    float64 [shape of S]; with `return_zf` also the state [shape of S, 1 along `axis`]
+    float64 [shape of S]; with `return_zf`, also the state [shape of S, 1 along `axis`]
 
     Examples
     --------

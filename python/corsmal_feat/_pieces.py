@@ -1,4 +1,4 @@
-"""Long recordings in pieces, and their frames put together again."""
+"""Cuts long recordings into pieces, and joins their frames again."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ _SHORTEST, _LONGEST = 0.1, 3e8
 def cut(table: Any, longest: float) -> Any:
     """A manifest with a row for each piece of recordings of more than `longest` seconds.
 
-    Every piece is of so many whole samples but the last, which goes to the end. Compressed audio
-    stays whole, since only decoding leads to its samples, as do stretches whose end is behind that
-    of the recording.
+    All pieces have the same number of whole samples, except the last, which goes to the end.
+    Compressed audio stays whole, because its samples can only be reached by decoding, as do
+    stretches that end after the recording.
     """
     pa = arrow()
     if not _SHORTEST <= longest <= _LONGEST:
@@ -74,7 +74,7 @@ def cut(table: Any, longest: float) -> Any:
 def _bounds(
     rate: int, frames: int, start: float | None, end: float | None, longest: float
 ) -> list[tuple[int, int | None]]:
-    """First and last sample of each piece, from the start of the stretch; none: it is not cut."""
+    """First sample and end of each piece, from the start of the stretch; empty if not cut."""
 
     first = _sample(start, rate)
     last = frames if end is None else _sample(end, rate)
@@ -86,7 +86,7 @@ def _bounds(
 
 
 def _sample(time: float | None, rate: int) -> int:
-    """The last sample that does not begin later, as the engine has it."""
+    """The last sample that does not begin after `time`, as in the engine."""
     return int(min((time or 0) * rate, 2.0**63) + 1e-3)
 
 
@@ -97,23 +97,23 @@ def _place(rate: int, start: float | None, first: int) -> str:
 
 @refuses
 def join_pieces(found: Any) -> Any:
-    """Frames of pieces put together: a row for each recording, as `extract_batch` gives it uncut.
+    """Joins the frames of pieces: one row per recording, as `extract_batch` returns it uncut.
 
     Parameters
     ----------
     found : pyarrow.Table
-        What `extract_batch` gave for a manifest with `longest`: all pieces of a recording follow
-        each other in their order. Other rows stay as they are.
+        The result of `extract_batch` for a manifest with `longest`. All pieces of a recording must
+        be consecutive rows, in order. Other rows stay as they are.
 
     Returns
     -------
     pyarrow.Table
-        Without the columns of pieces. A recording with a piece that has no features has none: its
-        status and reason are those of that piece.
+        The table without the columns of pieces. If a piece has no features, neither has its
+        recording, with the status and reason of that piece.
 
     Raises
     ------
-    ParameterError : pieces are missing, or not in order
+    ParameterError : pieces are missing or out of order
 
     Examples
     --------
@@ -188,7 +188,7 @@ def join_pieces(found: Any) -> Any:
 
 
 def _fail(columns: dict[str, Any], empty: dict[int, str]) -> None:
-    """Recordings without a frame of a feature have none of any, as uncut."""
+    """Recordings without a frame of one feature have no features at all, as when uncut."""
     pa = arrow()
     told = {name: columns[name].to_pylist() for name in ("status", "reason", "decoded_frames")}
     for k, name in empty.items():
@@ -206,7 +206,7 @@ def _sum(counts: list[int | None]) -> int | None:
 
 
 def _require_whole(found: Any, groups: list[range], recordings: list[str]) -> None:
-    """Refuses recordings without all their pieces in order, from the first sample to the end."""
+    """Refuses recordings unless all pieces from the first sample to the end are there in order."""
     firsts, ends = (found[name].to_pylist() for name in PIECE)
     for group in groups:
         bounds = [(firsts[i], ends[i]) for i in group]
@@ -231,7 +231,7 @@ def _is_nested(table: Any, name: str) -> bool:
 
 
 def _joined(column: Any, groups: list[range], bad: list[int | None]) -> list[Singles | None]:
-    """Frames [channels][coefficients][frames] one behind the other."""
+    """Frames [channels][coefficients][frames], one piece after another."""
     rows: list[Singles | None] = []
     for group, fault in zip(groups, bad, strict=True):
         pieces = [] if fault is not None else [_array(column[i]) for i in group]

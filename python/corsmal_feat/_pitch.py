@@ -76,27 +76,26 @@ def piptrack(
     pad_mode: str = "constant",
     ref: float | Callable[..., Any] | None = None,
 ) -> tuple[Floats, Floats]:
-    """Interpolated frequencies in Hz and magnitudes of spectral peaks, 0 elsewhere, each
-    [shape=(..., d, t)] (librosa.piptrack).
+    """Interpolated frequencies and magnitudes of spectral peaks; 0 elsewhere (librosa.piptrack).
 
     Parameters
     ----------
     y : float32 or float64 [shape=(..., n)]
         Signal at the sample rate `sr` in Hz.
     S : [shape=(..., 1 + n_fft // 2, t)], optional
-        A spectrogram to use instead, as it is.
+        Spectrogram to use instead of `y`, as it is.
     n_fft, hop_length, win_length, window, center, pad_mode
-        See `stft`; hop_length is `n_fft // 4` by default.
+        See `stft`; by default, hop_length is `n_fft // 4`.
     fmin, fmax : float
-        Range of the frequencies in Hz.
+        Lowest and highest frequency in Hz.
     threshold : float
-        Peaks are above this multiple of `ref`.
+        Peaks must exceed this multiple of `ref`.
     ref : float or callable, optional
-        Level to compare with, by default the maximum of the frame.
+        Level to compare with; by default, the maximum of the frame.
 
     Returns
     -------
-    two arrays [shape=(..., 1 + n_fft // 2, t)]: Hz and magnitudes
+    frequencies in Hz, and magnitudes, each [shape=(..., 1 + n_fft // 2, t)]
 
     Examples
     --------
@@ -131,27 +130,28 @@ def estimate_tuning(
     pad_mode: str = "constant",
     ref: float | Callable[..., Any] | None = None,
 ) -> float:
-    """Tuning in fractions of a bin, in [-0.5, 0.5): one for all channels and frames, and a
-    discontinuous function of them (librosa.estimate_tuning).
+    """Tuning of a signal in fractions of a bin (librosa.estimate_tuning).
+
+    It is one value for all channels and frames, and can jump with small changes of the input.
 
     Parameters
     ----------
     y : float32 or float64 [shape=(..., n)]
         Signal at the sample rate `sr` in Hz.
     S : [shape=(..., 1 + n_fft // 2, t)], optional
-        A spectrogram to use instead, as it is.
+        Spectrogram to use instead of `y`, as it is.
     n_fft : int
         Length of the transform.
     resolution : float
         Step of the result in fractions of a bin.
     bins_per_octave : int
-        Bins of an octave.
+        Bins per octave.
     hop_length, fmin, fmax, threshold, win_length, window, center, pad_mode, ref
         See `piptrack`.
 
     Returns
     -------
-    float
+    float, in [-0.5, 0.5)
 
     Examples
     --------
@@ -179,11 +179,11 @@ def pitch_tuning(
     Parameters
     ----------
     frequencies : float [any shape]
-        Hz; those of 0 and below do not count.
+        Hz; values of 0 and below are left out.
     resolution : float
         Step of the result in fractions of a bin.
     bins_per_octave : int
-        Bins of an octave.
+        Bins per octave.
 
     Returns
     -------

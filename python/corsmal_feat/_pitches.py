@@ -32,7 +32,7 @@ def hz_to_mel(frequencies: npt.ArrayLike, *, htk: bool = False) -> Any:
     frequencies : number or [shape=(n,)]
         Hz.
     htk : bool
-        HTK's formula, or Slaney's.
+        Whether to use HTK's formula instead of Slaney's.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def mel_to_hz(mels: npt.ArrayLike, *, htk: bool = False) -> Any:
     mels : number or [shape=(n,)]
         Mel.
     htk : bool
-        HTK's formula, or Slaney's.
+        Whether to use HTK's formula instead of Slaney's.
 
     Returns
     -------
@@ -153,7 +153,7 @@ def hz_to_octs(
 def hz_to_octs(
     frequencies: npt.ArrayLike, *, tuning: float = 0.0, bins_per_octave: int = 12
 ) -> Any:
-    """Hertz to octaves, A0 being 0 (librosa.hz_to_octs).
+    """Hertz to octaves; A0 is 0 (librosa.hz_to_octs).
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def hz_to_octs(
     tuning : float
         Deviation from A440 in fractions of a bin.
     bins_per_octave : int
-        Bins of an octave.
+        Bins per octave.
 
     Returns
     -------
@@ -189,7 +189,7 @@ def octs_to_hz(octs: npt.ArrayLike, *, tuning: float = 0.0, bins_per_octave: int
     Parameters
     ----------
     octs : number or [shape=(n,)]
-        Octaves, A0 being 0.
+        Octaves; A0 is 0.
     tuning, bins_per_octave
         See `hz_to_octs`.
 
@@ -215,14 +215,14 @@ def A4_to_tuning(A4: Number, *, bins_per_octave: int = 12) -> np.float64: ...
 def A4_to_tuning(A4: npt.ArrayLike, *, bins_per_octave: int = 12) -> Doubles: ...
 @refuses
 def A4_to_tuning(A4: npt.ArrayLike, *, bins_per_octave: int = 12) -> Any:
-    """The frequency of A4 as a tuning (librosa.A4_to_tuning).
+    """Frequency of A4 to tuning (librosa.A4_to_tuning).
 
     Parameters
     ----------
     A4 : number or [shape=(n,)]
         Hz.
     bins_per_octave : int
-        Bins of an octave.
+        Bins per octave.
 
     Returns
     -------
@@ -242,14 +242,14 @@ def tuning_to_A4(tuning: Number, *, bins_per_octave: int = 12) -> np.float64: ..
 def tuning_to_A4(tuning: npt.ArrayLike, *, bins_per_octave: int = 12) -> Doubles: ...
 @refuses
 def tuning_to_A4(tuning: npt.ArrayLike, *, bins_per_octave: int = 12) -> Any:
-    """A tuning as the frequency of A4 (librosa.tuning_to_A4).
+    """Tuning to frequency of A4 (librosa.tuning_to_A4).
 
     Parameters
     ----------
     tuning : number or [shape=(n,)]
         Deviation from A440 in fractions of a bin.
     bins_per_octave : int
-        Bins of an octave.
+        Bins per octave.
 
     Returns
     -------
@@ -284,9 +284,9 @@ def note_to_midi(note: str | Names, *, round_midi: bool = True) -> Any:
     Parameters
     ----------
     note : str or iterable of str
-        Such as "C4", "A#3", "B!3" (a flat), "C4-32" (cents). The octave is 0 where it is missing.
+        Such as "C4", "A#3", "B!3" (a flat) or "C4-32" (cents). A missing octave is 0.
     round_midi : bool
-        Whole numbers; otherwise cents are kept.
+        Whether to round to whole numbers; otherwise, cents are kept.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Predictions, as prediction files hold them."""
+"""Predictions, as in prediction files."""
 
 from __future__ import annotations
 
@@ -18,14 +18,13 @@ StrPath = str | os.PathLike[str]
 
 @dataclass(frozen=True)
 class Predictions:
-    """Predictions of recordings, as the command writes them.
+    """Predictions of recordings, as in the files that the command writes.
 
     Attributes
     ----------
-    columns : text of the columns other than prediction and probabilities, such as `id`, `fold`,
-        `true`
-    predicted : name of each predicted class; "" without a prediction, "unknown" if rejected
-    labels : names of the classes
+    columns : the other columns as text, such as `id`, `fold`, `true`
+    predicted : name of each predicted class; "" if there is none, "unknown" if rejected
+    labels : names of the classes, in the order of `proba`
     proba : probabilities [shape=(rows, classes)]; NaN if there are none
 
     Examples
@@ -45,7 +44,7 @@ class Predictions:
 
     @property
     def ids(self) -> list[str]:
-        """The name of each recording."""
+        """Id of each recording."""
         return next(iter(self.columns.values()))
 
     def __len__(self) -> int:
@@ -53,7 +52,7 @@ class Predictions:
 
     @refuses
     def save(self, path: StrPath) -> None:
-        """Writes the prediction file: CSV that `score`, `fuse` and the command read."""
+        """Writes a prediction file: a CSV that `score`, `fuse` and the command read."""
         Path(place(path)).write_text(self._text, encoding="utf-8", newline="")
 
 

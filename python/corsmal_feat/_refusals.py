@@ -1,4 +1,4 @@
-"""Refusals: every error that an argument causes is one of this package, and names the argument."""
+"""Refusals: an argument at fault raises an error of this package, which names it."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ _LIBRARY = ("<frozen", f"{Path(os.__file__).parent}{os.sep}")
 
 
 def refuses(function: Callable[P, R]) -> Callable[P, R]:
-    """A public function whose refusals are all errors of this package.
+    """Makes a public function raise only errors of this package.
 
-    Nothing is checked before the call. After an error the arguments are compared with the
-    annotations, and the first one that does not fit them is named. Errors of a function that the
-    caller passes in are left alone.
+    Nothing is checked before the call. After an error, the arguments are compared with the
+    annotations, and the first one that does not fit is named. Errors of a function that the caller
+    passes in are not changed.
     """
 
     @wraps(function)
@@ -96,7 +96,7 @@ def _told(
 
 
 def of_file(error: OSError) -> FileError:
-    """The same as an error of this package."""
+    """The same error as one of this package."""
     kind = MissingFileError if isinstance(error, FileNotFoundError) else FileError
     place = f"{error.filename}: " if error.filename is not None else ""
     told = kind(f"{place}{error.strerror or error}")
@@ -112,7 +112,7 @@ def place(path: Any) -> str:
 
 
 def existing(path: Any) -> str:
-    """The path of something that is there, as text."""
+    """The path of an existing file or folder, as text."""
     name = place(path)
     try:
         os.stat(name)
@@ -124,7 +124,7 @@ def existing(path: Any) -> str:
 
 
 def _of_the_caller(error: BaseException) -> bool:
-    """Whether code of neither this package, numpy nor Python's library had a part in it."""
+    """Whether code outside this package, numpy and Python's library took part."""
     step = error.__traceback__
     while step is not None:
         file = step.tb_frame.f_code.co_filename
@@ -136,7 +136,7 @@ def _of_the_caller(error: BaseException) -> bool:
 
 
 def _shown(value: Any) -> str:
-    """A value as it may stand in a message, at most a line."""
+    """A value for a message, at most one line long."""
     if isinstance(value, np.ndarray):
         return f"an array of shape {value.shape} and type {value.dtype}"
     return reprlib.repr(value)
@@ -156,7 +156,7 @@ _ARRAYS = (np.ndarray, npt.NDArray)
 
 
 def _split(hint: Any) -> tuple[frozenset[Any], list[Any]]:
-    """numpy's union that a hint holds, if any, and its other alternatives."""
+    """numpy's union in a hint, if any, and the other alternatives."""
     kinds = _parts(hint)
     for group in (_ARRAY_LIKE, _DTYPE_LIKE):
         if group <= set(kinds):
@@ -165,7 +165,7 @@ def _split(hint: Any) -> tuple[frozenset[Any], list[Any]]:
 
 
 def _fits(hint: Any, value: Any) -> bool:
-    """Whether a value may stand where a parameter has this annotation."""
+    """Whether a value fits the annotation of a parameter."""
     group, kinds = _split(hint)
     if group and (_is_array(value) if group is _ARRAY_LIKE else _is_dtype(value)):
         return True
@@ -192,7 +192,7 @@ def _is_dtype(value: Any) -> bool:
 
 
 def _is_number(value: Any) -> bool:
-    """Numbers, and arrays without dimension of one."""
+    """Whether a value is a number, or an array of 0 dimensions that holds one."""
     if isinstance(value, np.ndarray):
         return value.ndim == 0 and value.dtype.kind in "biuf"
     return isinstance(value, (bool, int, float, np.bool_, np.integer, np.floating))
@@ -253,7 +253,7 @@ _NAMES: dict[Any, str] = {
 
 
 def _words(hint: Any) -> str:
-    """What an annotation takes, in words."""
+    """The values that an annotation accepts, in words."""
     group, kinds = _split(hint)
     words = []
     if group:

@@ -42,22 +42,22 @@ def resample(
     scale: bool = False,
     axis: int = -1,
 ) -> Floats:
-    """`y` at another rate (librosa.resample).
+    """Converts a signal to another sample rate (librosa.resample).
 
     Parameters
     ----------
     y : float32 or float64 [shape=(..., n)]
         Signal, along the last axis unless `axis` says otherwise.
     orig_sr, target_sr : float
-        Rates in Hz. Equal rates return `y` itself.
+        Sample rates in Hz. If they are equal, the result is `y` itself.
     res_type : str
         "soxr_hq" (librosa's default since 0.10), "kaiser_best" (its default before) or
         "kaiser_fast"; "fft" or "scipy", "polyphase" (whole numbers of Hz), "linear" and
-        "zero_order_hold". The other soxr_* and sinc_* give what "soxr_hq" gives.
+        "zero_order_hold". The other soxr_* and sinc_* types are the same as "soxr_hq".
     fix : bool
-        The result has `ceil(n * target_sr / orig_sr)` samples.
+        Whether to cut or pad the result to `ceil(n * target_sr / orig_sr)` samples.
     scale : bool
-        The result is divided by the square root of the ratio.
+        Whether to divide the result by the square root of the ratio.
     axis : int
         Axis of time.
 
@@ -122,7 +122,7 @@ def _by_whole_signal(y: Floats, orig_sr: float, target_sr: float, name: str) -> 
 
 
 def _fourier(y: Floats, samples: int) -> Any:
-    """The spectrum cut or continued with zeros (scipy.signal.resample)."""
+    """Cuts the spectrum or continues it with zeros (scipy.signal.resample)."""
     n = y.shape[-1]
     spectrum = np.fft.rfft(y)
     shorter = min(n, samples)
@@ -135,7 +135,7 @@ def _fourier(y: Floats, samples: int) -> Any:
 
 
 def _polyphase(y: Floats, orig_sr: float, target_sr: float) -> Any:
-    """A windowed sinc of the rates' ratio in whole numbers (scipy.signal.resample_poly)."""
+    """Filters by a windowed sinc for a ratio of whole numbers (scipy.signal.resample_poly)."""
     if int(orig_sr) != orig_sr or int(target_sr) != target_sr:
         raise ParameterError(
             "orig_sr and target_sr must be whole numbers of Hz for polyphase,"
@@ -170,7 +170,7 @@ def _polyphase(y: Floats, orig_sr: float, target_sr: float) -> Any:
 
 
 def _interpolated(y: Floats, samples: int, ratio: float, linear: bool) -> Any:
-    """Between neighbouring samples, or the one before."""
+    """Interpolates between neighbouring samples, or repeats the one before."""
     at = np.minimum(np.arange(samples) / ratio, y.shape[-1] - 1)
     before = at.astype(np.int64)
     if not linear:

@@ -25,7 +25,7 @@ __all__ = [
     "score",
 ]
 
-#: What `labels` says where each recording lies in a folder named like its class.
+#: Value of `labels` if each recording is in a folder named after its class.
 FOLDERS = "folders"
 
 
@@ -35,9 +35,9 @@ class CrossValidation:
 
     Attributes
     ----------
-    accuracy, weighted_f1, macro_f1 : over folds, `mean`, `std`, and the ends `low` and `high` of
+    accuracy, weighted_f1, macro_f1 : `mean` and `std` over folds, and the ends `low` and `high` of
         the 95 % interval (Student's t)
-    predictions : of the held-out rows
+    predictions : predictions for the held-out rows
     report : everything, as `corsmal-feat cross-validate --json` prints it; `report["held_out"]` has
         the bootstrap intervals and the calibration of all held-out rows
 
@@ -61,8 +61,8 @@ class Comparison:
 
     Attributes
     ----------
-    only_first, only_second : recordings that only one of the two got right
-    p_value : of McNemar's exact test
+    only_first, only_second : number of recordings that only one of the two got right
+    p_value : p value of McNemar's exact test
     difference, low, high : weighted F1 of the second minus that of the first, with its 95 %
         bootstrap interval over recordings
     report : everything, as `corsmal-feat compare-predictions --json` prints it
@@ -90,8 +90,8 @@ class ScoreReport:
     Attributes
     ----------
     kind : "classes" or "numbers"
-    values : the scores over all rows, by name: `accuracy`, `weighted_f1`, `macro_f1`, and if there
-        are probabilities `brier`, `ece`, `roc_auc`, `average_precision`; of numbers
+    values : scores over all rows by name: `accuracy`, `weighted_f1`, `macro_f1` and, if there are
+        probabilities, `brier`, `ece`, `roc_auc`, `average_precision`; for numbers,
         `mean_absolute_error`, `root_mean_squared_error`, `mean_relative_error`, `r2`, `score`
     report : everything, as `corsmal-feat score --json` prints it: classes, confusion, intervals,
         curves
@@ -134,7 +134,7 @@ def cross_validate(
     features : path
         Feature file of `extract` with statistics, or any `.npz` with a member `X`.
     target : str
-        Label column to learn.
+        Label column to predict.
     labels : path or "folders", optional
         CSV with labels, or "folders" if the folders of the recordings are their classes; by
         default the label columns of the feature file.
@@ -149,9 +149,9 @@ def cross_validate(
     parameters : mapping, optional
         Parameters of the classifier; scikit-learn's names work, too.
     standardize, pca : bool, int or float
-        Steps before the classifier, fitted on training rows only.
+        Steps before the classifier, which are fitted on training rows only.
     tune : mapping, optional
-        Values to try by parameter; the choice is made on folds inside the training rows.
+        Values to try for each parameter; they are compared on folds inside the training rows.
     seed : int
         Seed of the classifier and of shuffled folds.
 
@@ -189,7 +189,7 @@ def cross_validate(
 
 
 def validated(text: str, held_out: str) -> CrossValidation:
-    """From the report as JSON and the predictions of the held-out rows as CSV."""
+    """The result, from the report as JSON and the predictions for the held-out rows as CSV."""
     report = json.loads(text)
     result = report["result"]
     return CrossValidation(
@@ -215,11 +215,11 @@ def fuse(
     Parameters
     ----------
     predictions : path or paths
-        Prediction files of the same recordings and classes. They are averaged.
+        Prediction files of the same recordings and classes, to be averaged.
     weights : iterable of float, optional
         One positive number per file.
     vote : {"majority", "mean"}, optional
-        First combine the windows of each recording into one decision.
+        How to combine the windows of each recording into one decision first.
     background : str, optional
         With a majority: this class wins only if no other class has `least` windows.
 
@@ -230,7 +230,7 @@ def fuse(
     Raises
     ------
     ParameterError
-        Files have other recordings or classes, or weights are not one positive number per file.
+        Files differ in recordings or classes, or weights are not one positive number per file.
 
     Examples
     --------
@@ -320,7 +320,7 @@ def score(
     predictions : path
         Prediction file of `classify`, `cross_validate` or `fuse`.
     labels : path or "folders", optional
-        Where true classes come from, if not from the file itself.
+        Source of the true classes, if not the file itself.
     id_column : str, optional
         Column of the label file that names the recordings by id, path or file name.
     target : str, optional
@@ -329,9 +329,9 @@ def score(
         Column of groups that the bootstrap draws together; by default `group`, `container` or
         `recording` if there is one.
     reject : float
-        Predictions whose highest probability is below this are unknown and count as wrong.
+        Predictions with a highest probability below this are unknown, and count as wrong.
     numeric : bool
-        Whether the target is a number even if all its values are whole.
+        Whether to treat the target as a number even if all its values are whole.
     resamples, seed : int
         Number of bootstrap resamples, and the seed.
 
@@ -342,7 +342,7 @@ def score(
     Raises
     ------
     ParameterError
-        Columns are missing, or recordings lack labels, or labels lack recordings.
+        A column is missing, a recording has no label, or a label has no recording.
 
     Examples
     --------

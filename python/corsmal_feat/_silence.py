@@ -1,4 +1,4 @@
-"""Parts with sound, pre-emphasis (librosa.effects)."""
+"""Trimming and splitting by silence, pre-emphasis (librosa.effects)."""
 
 from __future__ import annotations
 
@@ -46,24 +46,24 @@ def trim(
     hop_length: int = 512,
     aggregate: Callable[..., Any] = np.max,
 ) -> tuple[Floats, npt.NDArray[np.int64]]:
-    """The signal without silence at its ends (librosa.effects.trim).
+    """Removes silence from both ends of a signal (librosa.effects.trim).
 
     Parameters
     ----------
     y : float32 or float64 [shape=(..., n)]
         Signal.
     top_db : float
-        Frames further below the reference are silent.
+        Frames more than this many dB below the reference are silent.
     ref : float or callable
-        The level of 0 dB, or a function that finds it in the levels of the frames.
+        Level of 0 dB, or a function that computes it from the levels of the frames.
     frame_length, hop_length : int
         Samples per frame, and from one frame to the next.
     aggregate : callable
-        Combines the levels of all channels into one.
+        Function that combines the levels of all channels.
 
     Returns
     -------
-    the part [shape=(..., m)], and its start and end in samples [shape=(2,)]
+    the trimmed signal [shape=(..., m)], and its start and end in samples [shape=(2,)]
 
     Examples
     --------
@@ -90,7 +90,7 @@ def split(
     hop_length: int = 512,
     aggregate: Callable[..., Any] = np.max,
 ) -> npt.NDArray[np.int64]:
-    """The parts with sound (librosa.effects.split).
+    """Splits a signal into parts that are not silent (librosa.effects.split).
 
     Parameters
     ----------
@@ -139,14 +139,14 @@ def preemphasis(
     zi: npt.ArrayLike | None = None,
     return_zf: bool = False,
 ) -> Floats | tuple[Floats, Floats]:
-    """`y[n] - coef * y[n - 1]` (librosa.effects.preemphasis).
+    """Pre-emphasis filter, `y[n] - coef * y[n - 1]` (librosa.effects.preemphasis).
 
     Parameters
     ----------
     y : float32 or float64 [shape=(..., n)]
-        Signal of two samples or more.
+        Signal, at least 2 samples long.
     coef : float
-        The coefficient.
+        Coefficient of the filter.
     zi : [shape=(..., 1)], optional
         Value to add to the first sample: the state after the previous block. Without it, the
         signal is extended as a straight line.
@@ -155,7 +155,7 @@ def preemphasis(
 
     Returns
     -------
-    in the shape of `y`, and the state [shape=(..., 1)] if requested
+    filtered signal in the shape of `y`, and the state [shape=(..., 1)] if requested
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""scikit-learn's base classes, or stand-ins with the same parameters where it is not installed.
+"""scikit-learn's base classes, or stand-ins with the same methods where it is not installed.
 
 Importing scikit-learn takes a second: only the modules of the estimators import this one.
 """
@@ -36,11 +36,11 @@ if TYPE_CHECKING or not INSTALLED:
             return sorted(n for n in inspect.signature(cls.__init__).parameters if n != "self")
 
         def get_params(self, deep: bool = True) -> dict[str, Any]:
-            """The parameters by name; `deep` is scikit-learn's and has no effect."""
+            """The parameters by name; `deep` has no effect here."""
             return {name: getattr(self, name) for name in self._get_param_names()}
 
         def set_params(self, **params: Any) -> Self:
-            """Changes parameters by name; they count from the next `fit` on."""
+            """Changes parameters by name; they take effect in the next `fit`."""
             known = self._get_param_names()
             for name, value in params.items():
                 if name not in known:
@@ -67,16 +67,16 @@ if TYPE_CHECKING or not INSTALLED:
         """Scores of classifiers."""
 
         def score(self, X: Any, y: Any, sample_weight: Any = None) -> float:
-            """Part of the rows of `X` whose predicted label is that in `y`."""
+            """Share of the rows of `X` whose predicted label is the one in `y`."""
             right = self.predict(X) == np.asarray(y).ravel()  # type: ignore[attr-defined]
             return float(np.average(right, weights=sample_weight))
 
     class TransformerMixin:
-        """Nothing is needed of it without scikit-learn."""
+        """Empty, because nothing is needed without scikit-learn."""
 
 
 class _NotFitted(NotFittedError, _Theirs):
-    """Ours and scikit-learn's, whichever the caller catches."""
+    """Both our error and scikit-learn's, so that callers can catch either."""
 
 
 def not_fitted(estimator: object) -> Exception:

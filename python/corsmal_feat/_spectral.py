@@ -1,4 +1,4 @@
-"""Features of the shape of a spectrum (librosa.feature.spectral_*, poly_features)."""
+"""Spectral shape (librosa.feature.spectral_*, poly_features)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .errors import ParameterError
 
 
 def _spectra(y: Any, S: Any, n_fft: int, framing: Framing, whole: bool = False) -> Spectra:
-    """Magnitudes of `y` or `S`; `whole` says that other arrays are to fit the spectrogram."""
+    """Magnitudes of `y` or `S`; `whole` if other arrays must fit the spectrogram."""
     if whole and S is None:
         S, n_fft = spectrogram(y, None, n_fft, *framing, 1.0)
     return spectra(y, S, n_fft, framing)
@@ -67,7 +67,7 @@ def spectral_centroid(
     y : float32 or float64 [shape=(..., n)], optional
         Signal at the sample rate `sr` in Hz. It is transformed in double precision.
     S : [shape=(..., 1 + n_fft // 2, t)], optional
-        A magnitude spectrogram to use instead.
+        Magnitude spectrogram to use instead of `y`.
     n_fft, hop_length, win_length, window, center, pad_mode
         See `stft`; hop_length is 512 here.
     freq : float [shape=(1 + n_fft // 2,) or that of S], optional
@@ -114,15 +114,15 @@ def spectral_bandwidth(
     y : float32 or float64 [shape=(..., n)], optional
         Signal at the sample rate `sr` in Hz. It is transformed in double precision.
     S : [shape=(..., 1 + n_fft // 2, t)], optional
-        A magnitude spectrogram to use instead.
+        Magnitude spectrogram to use instead of `y`.
     n_fft, hop_length, win_length, window, center, pad_mode
         See `stft`; hop_length is 512 here.
     freq : float [shape=(1 + n_fft // 2,) or that of S], optional
         Frequencies of the bins in Hz.
     centroid : float [shape=(..., 1, t)], optional
-        Centroids in Hz; those of the frames by default.
+        Centroids in Hz; by default, those of the frames.
     norm : bool
-        Divide the magnitudes by their sum first.
+        Whether to divide the magnitudes by their sum first.
     p : float
         Exponent of the deviations, above 0.
 
@@ -163,7 +163,7 @@ def spectral_rolloff(
     freq: npt.ArrayLike | None = None,
     roll_percent: float = 0.85,
 ) -> Doubles:
-    """Lowest frequency that has the fraction `roll_percent` of the magnitudes at or below it
+    """Lowest frequency with the fraction `roll_percent` of the magnitudes at or below it
     (librosa.feature.spectral_rolloff).
 
     Parameters
@@ -171,13 +171,13 @@ def spectral_rolloff(
     y : float32 or float64 [shape=(..., n)], optional
         Signal at the sample rate `sr` in Hz. It is transformed in double precision.
     S : [shape=(..., 1 + n_fft // 2, t)], optional
-        A magnitude spectrogram to use instead.
+        Magnitude spectrogram to use instead of `y`.
     n_fft, hop_length, win_length, window, center, pad_mode
         See `stft`; hop_length is 512 here.
     freq : float [shape=(1 + n_fft // 2,) or that of S], optional
         Frequencies of the bins in Hz.
     roll_percent : float
-        The fraction, between 0 and 1.
+        Fraction, between 0 and 1.
 
     Returns
     -------
@@ -209,25 +209,25 @@ def spectral_flatness(
     amin: float = 1e-10,
     power: float = 2.0,
 ) -> Floats:
-    """Geometric over arithmetic mean of the powers: 1 for white noise and silence
+    """Geometric mean of the powers over their arithmetic mean: high for noise, 1 for silence
     (librosa.feature.spectral_flatness).
 
     Parameters
     ----------
     y : float32 or float64 [shape=(..., n)], optional
-        Signal at the sample rate `sr` in Hz. It is transformed in double precision.
+        Signal. It is transformed in double precision.
     S : [shape=(..., 1 + n_fft // 2, t)], optional
-        A magnitude spectrogram to use instead.
+        Magnitude spectrogram to use instead of `y`.
     n_fft, hop_length, win_length, window, center, pad_mode
         See `stft`; hop_length is 512 here.
     amin : float
-        Floor of the powers, above 0.
+        Lower limit of the powers, above 0.
     power : float
         Exponent that turns magnitudes into powers.
 
     Returns
     -------
-    in the precision of `y` or `S` [shape=(..., 1, t)]
+    [shape=(..., 1, t)] in the precision of `y` or `S`
 
     Examples
     --------
@@ -260,15 +260,15 @@ def spectral_contrast(
     quantile: float = 0.02,
     linear: bool = False,
 ) -> Doubles:
-    """Peaks over valleys of octave bands (librosa.feature.spectral_contrast), both clamped 80 dB
-    below their maximum over the whole array.
+    """Contrast of peaks and valleys in octave bands (librosa.feature.spectral_contrast). Both are
+    clamped at 80 dB below their maximum over the whole array.
 
     Parameters
     ----------
     y : float32 or float64 [shape=(..., n)], optional
         Signal at the sample rate `sr` in Hz. It is transformed in double precision.
     S : [shape=(..., 1 + n_fft // 2, t)], optional
-        A magnitude spectrogram to use instead.
+        Magnitude spectrogram to use instead of `y`.
     n_fft, hop_length, win_length, window, center, pad_mode
         See `stft`; hop_length is 512 here.
     freq : float [shape=(1 + n_fft // 2,)], optional
@@ -276,11 +276,11 @@ def spectral_contrast(
     fmin : float
         Upper edge of the lowest band in Hz.
     n_bands : int
-        Octaves above it.
+        Number of octaves above the lowest band.
     quantile : float
         Fraction of the bins of a band that form its peak and its valley.
     linear : bool
-        Whether to take the difference of magnitudes instead of dB.
+        Whether to return differences of magnitudes instead of dB.
 
     Returns
     -------
@@ -333,14 +333,14 @@ def poly_features(
     order: int = 1,
     freq: npt.ArrayLike | None = None,
 ) -> Doubles:
-    """Polynomial over frequency, fitted to each frame (librosa.feature.poly_features).
+    """Polynomial over frequency that fits each frame (librosa.feature.poly_features).
 
     Parameters
     ----------
     y : float32 or float64 [shape=(..., n)], optional
         Signal at the sample rate `sr` in Hz. It is transformed in double precision.
     S : [shape=(..., 1 + n_fft // 2, t)], optional
-        A magnitude spectrogram to use instead.
+        Magnitude spectrogram to use instead of `y`.
     n_fft, hop_length, win_length, window, center, pad_mode
         See `stft`; hop_length is 512 here.
     order : int

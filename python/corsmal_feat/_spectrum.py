@@ -1,4 +1,4 @@
-"""Short-time Fourier transform (librosa.stft) and what features are computed from."""
+"""Short-time Fourier transform (librosa.stft), and the spectra behind features."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def stft_params(
     center: bool,
     pad_mode: str,
 ) -> StftParams:
-    """Transform parameters with librosa's defaults filled in: hop is a quarter of the window."""
+    """Parameters of a transform, with librosa's defaults: the hop is a quarter of the window."""
     n_fft = size("n_fft", n_fft)
     win_length = size("win_length", n_fft if win_length is None else win_length)
     hop_length = size("hop_length", win_length // 4 if hop_length is None else hop_length)
@@ -56,7 +56,7 @@ def stft(
     Parameters
     ----------
     y : float32 or float64 [shape=(..., n)]
-        Any number of channels or other leading axes.
+        Signal, with any number of leading axes.
     n_fft : int
         Length of the transform in samples.
     hop_length : int, optional
@@ -66,13 +66,13 @@ def stft(
     window : str, tuple, float, array or callable
         See `filters.get_window`.
     center : bool
-        Frame `t` is centred on sample `t * hop_length` (or starts there).
+        Whether frame `t` is centred on sample `t * hop_length`; otherwise, it starts there.
     pad_mode : {"constant", "edge", "reflect", "symmetric"}
-        What `center` puts before the first and after the last sample.
+        How to pad the signal at both ends if `center`.
     dtype : complex dtype, optional
-        Of the result; by default that of the precision of `y`.
+        Type of the result; by default, in the precision of `y`.
     out : complex [shape=(..., 1 + n_fft // 2, at least t)], optional
-        Array for the result.
+        Array to write the result to.
 
     Returns
     -------
@@ -115,12 +115,12 @@ def warn_short(y: Floats, n_fft: int) -> None:
 
 
 class Spectra(NamedTuple):
-    """What a feature is computed from: the Rust side makes the spectra of a signal one at a time,
-    so that no spectrogram is held."""
+    """The input of a feature. The Rust side computes the spectra of a signal one at a time, so no
+    spectrogram is kept in memory."""
 
     #: a signal [shape=(channels, n)] and its transform, or a spectrogram
     source: Floats | tuple[Floats, StftParams]
-    #: the axes of the caller's array before those that the feature is about
+    #: the leading axes of the caller's array
     leading: tuple[int, ...]
     n_fft: int
     #: the shape of the spectrogram where there is one
@@ -141,7 +141,7 @@ def signal(
     center: bool,
     pad_mode: str,
 ) -> tuple[Floats, StftParams]:
-    """`y` and the parameters of its transform, checked."""
+    """`y` and the parameters of its transform, after checks."""
     if y is None:
         raise ParameterError("y or S must be given")
     y = audio(y)
@@ -151,12 +151,12 @@ def signal(
 
 
 def length_of(s: Floats, n_fft: int) -> int:
-    """The transform length of a spectrogram: `n_fft`, unless the bins say otherwise."""
+    """The transform length of a spectrogram: `n_fft`, unless the number of bins differs."""
     return n_fft if n_fft // 2 + 1 == s.shape[-2] else 2 * (s.shape[-2] - 1)
 
 
 def spectra(y: Any, S: Any, n_fft: int, framing: Framing) -> Spectra:
-    """Magnitudes, from `S` or by a transform of `y`."""
+    """Magnitudes, from `S` or from a transform of `y`."""
     if S is not None:
         s = spectrum(S)
         return Spectra(rows(s, 2), s.shape[:-2], length_of(s, n_fft), s.shape)
@@ -175,8 +175,8 @@ def spectrogram(
     pad_mode: str,
     power: float,
 ) -> tuple[Floats, int]:
-    """`S`, or |stft(y)|**power by a transform in double precision where S is None, and the
-    transform length it has (librosa.core.spectrum._spectrogram)."""
+    """`S` or, if it is None, |stft(y)|**power from a transform in double precision, with the length
+    of the transform (librosa.core.spectrum._spectrogram)."""
     if S is not None:
         S = spectrum(S)
         return S, length_of(S, n_fft)

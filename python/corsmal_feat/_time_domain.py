@@ -39,7 +39,7 @@ def zero_crossing_rate(
     pad: bool = False,
     zero_pos: bool = True,
 ) -> Doubles:
-    """Share of the samples of a frame where the sign changes
+    """Share of the samples in a frame at which the sign changes
     (librosa.feature.zero_crossing_rate).
 
     Parameters
@@ -49,15 +49,16 @@ def zero_crossing_rate(
     frame_length, hop_length : int
         Samples per frame, and from one frame to the next.
     center : bool
-        Whether frames are centred, with the first and the last sample repeated.
+        Whether to centre frames, with the first and last samples repeated.
     threshold : float
         Values of at most this magnitude count as zero.
     ref_magnitude : float or callable, optional
-        Value of which `threshold` is a multiple, such as `numpy.max` of the magnitudes.
+        Value that `threshold` is multiplied by, or a function that computes it from the magnitudes,
+        such as `numpy.max`.
     pad : bool
         Whether the first sample of a frame counts as a crossing.
     zero_pos : bool
-        Whether zero is positive (or has its own sign).
+        Whether zero counts as positive; otherwise, it has its own sign.
 
     Returns
     -------
@@ -99,13 +100,13 @@ def rms(
     y : float32 or float64 [shape=(..., n)], optional
         Signal.
     S : [shape=(..., 1 + frame_length // 2, t)], optional
-        A magnitude spectrogram to use instead.
+        Magnitude spectrogram to use instead of `y`.
     frame_length, hop_length : int
         Samples per frame, and from one frame to the next.
     center, pad_mode
         See `stft`.
     dtype : float32 or float64
-        Of the result, which is computed as float32.
+        Type of the result, which is computed as float32.
 
     Returns
     -------
@@ -130,7 +131,7 @@ def rms(
 
 
 def framing(frame_length: int, hop_length: int, center: bool) -> FrameParams:
-    """Framing as the Rust side takes it."""
+    """Framing in the form that the Rust side takes."""
     length, hop = size("frame_length", frame_length), size("hop_length", hop_length)
     room("a frame", length)
     return FrameParams(length, hop, bool(center))

@@ -51,7 +51,7 @@ def frames_to_samples(
     hop_length : int
         Samples between frames.
     n_fft : int, optional
-        Of frames that are not centred: half of it is added.
+        Length of the transform if frames are not centred; half of it is added.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def samples_to_frames(
 def samples_to_frames(
     samples: npt.ArrayLike, *, hop_length: int = 512, n_fft: int | None = None
 ) -> Any:
-    """The frame that each sample lies in (librosa.samples_to_frames).
+    """Frame of each sample (librosa.samples_to_frames).
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def samples_to_time(samples: Number, *, sr: float = 22050) -> np.float64: ...
 def samples_to_time(samples: npt.ArrayLike, *, sr: float = 22050) -> Doubles: ...
 @refuses
 def samples_to_time(samples: npt.ArrayLike, *, sr: float = 22050) -> Any:
-    """Seconds at each sample (librosa.samples_to_time).
+    """Time of each sample (librosa.samples_to_time).
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def samples_to_time(samples: npt.ArrayLike, *, sr: float = 22050) -> Any:
 
     Returns
     -------
-    float64, in the shape of `samples`
+    seconds, float64, in the shape of `samples`
 
     Examples
     --------
@@ -132,7 +132,7 @@ def time_to_samples(times: Number, *, sr: float = 22050) -> np.int64: ...
 def time_to_samples(times: npt.ArrayLike, *, sr: float = 22050) -> Integers: ...
 @refuses
 def time_to_samples(times: npt.ArrayLike, *, sr: float = 22050) -> Any:
-    """The sample at each time (librosa.time_to_samples).
+    """Sample at each time (librosa.time_to_samples).
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def frames_to_time(
 def frames_to_time(
     frames: npt.ArrayLike, *, sr: float = 22050, hop_length: int = 512, n_fft: int | None = None
 ) -> Any:
-    """Seconds at each frame (librosa.frames_to_time).
+    """Time of each frame (librosa.frames_to_time).
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def frames_to_time(
 
     Returns
     -------
-    float64, in the shape of `frames`
+    seconds, float64, in the shape of `frames`
 
     Examples
     --------
@@ -201,7 +201,7 @@ def time_to_frames(
 def time_to_frames(
     times: npt.ArrayLike, *, sr: float = 22050, hop_length: int = 512, n_fft: int | None = None
 ) -> Any:
-    """The frame at each time (librosa.time_to_frames).
+    """Frame at each time (librosa.time_to_frames).
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def blocks_to_samples(blocks: npt.ArrayLike, *, block_length: int, hop_length: i
     blocks : number or [shape=(n,)]
         Block numbers.
     block_length, hop_length : int
-        Frames of a block, samples between frames.
+        Frames per block, and samples between frames.
 
     Returns
     -------
@@ -288,20 +288,20 @@ def blocks_to_time(
 ) -> Doubles: ...
 @refuses
 def blocks_to_time(blocks: npt.ArrayLike, *, block_length: int, hop_length: int, sr: float) -> Any:
-    """Seconds at the start of each block of `stream` (librosa.blocks_to_time).
+    """Start time of each block of `stream` (librosa.blocks_to_time).
 
     Parameters
     ----------
     blocks : number or [shape=(n,)]
         Block numbers.
     block_length, hop_length : int
-        Frames of a block, samples between frames.
+        Frames per block, and samples between frames.
     sr : float
         Sample rate in Hz.
 
     Returns
     -------
-    float64, in the shape of `blocks`
+    seconds, float64, in the shape of `blocks`
 
     Examples
     --------
@@ -325,7 +325,7 @@ def samples_like(
     Parameters
     ----------
     X : array, or int
-        Feature array, or how many frames it has.
+        Feature array, or its number of frames.
     hop_length, n_fft
         See `frames_to_samples`.
     axis : int
@@ -353,7 +353,7 @@ def times_like(
     n_fft: int | None = None,
     axis: int = -1,
 ) -> Doubles:
-    """Seconds at each frame of a feature array (librosa.times_like).
+    """Time of each frame of a feature array (librosa.times_like).
 
     Parameters
     ----------
@@ -364,7 +364,7 @@ def times_like(
 
     Returns
     -------
-    float64 [shape=(t,)]
+    seconds, float64 [shape=(t,)]
 
     Examples
     --------

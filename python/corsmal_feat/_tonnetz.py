@@ -28,9 +28,9 @@ def tonnetz(
     y : float32 or float64 [shape=(..., n)], optional
         Signal at the sample rate `sr` in Hz.
     chroma : [shape=(..., n_chroma, t)], optional
-        A chromagram to use instead of `chroma_cqt(y=y, sr=sr, **kwargs)`.
+        Chromagram to use instead of `chroma_cqt(y=y, sr=sr, **kwargs)`.
     **kwargs
-        Of `chroma_cqt`.
+        Arguments of `chroma_cqt`.
 
     Returns
     -------

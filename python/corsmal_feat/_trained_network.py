@@ -24,7 +24,7 @@ class TrainedNetwork:
     Attributes
     ----------
     header : dict
-        What the file says about the network: name, recipe, history, features.
+        Description of the network in the file: name, recipe, history, features.
     classes_ : array
         Labels, in the order of `predict_proba`.
 
@@ -52,16 +52,17 @@ class TrainedNetwork:
         any_rate: bool = False,
         jobs: int | None = None,
     ) -> npt.NDArray[np.float64]:
-        """Probabilities of recordings; the mean over their windows if the network takes windows.
+        """Probabilities of recordings; for a network on windows, the mean over the windows.
 
         Parameters
         ----------
         recordings : paths
             One path per recording.
         any_rate : bool
-            Accept recordings with a sample rate or channels that the network was not trained on.
+            Whether to accept recordings with a sample rate or a number of channels that the network
+            was not trained on.
         jobs : int, optional
-            Recordings that are read at a time; one per core by default.
+            Number of recordings to read at a time; by default, one per core.
 
         Returns
         -------
@@ -102,7 +103,7 @@ class TrainedNetwork:
 
     @refuses
     def save(self, path: StrPath) -> None:
-        """Writes the model file, completely or not at all; `corsmal-feat classify` takes it."""
+        """Writes the model file, completely or not at all; `corsmal-feat classify` reads it."""
         self._network.save(place(path))
 
     def __reduce__(self) -> tuple[Callable[[bytes], TrainedNetwork], tuple[bytes]]:

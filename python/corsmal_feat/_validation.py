@@ -1,4 +1,4 @@
-"""Checks of features and labels, with the words that scikit-learn's own checks look for."""
+"""Checks of features and labels, in the words that scikit-learn's own checks expect."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Matrix = npt.NDArray[np.float64]
 
 
 def names_of(X: Any) -> npt.NDArray[np.object_] | None:
-    """Column names of a data frame, if they are all text."""
+    """Column names of a data frame, if all are strings."""
     columns = getattr(X, "columns", None)
     if columns is None:
         return None
@@ -59,7 +59,7 @@ def features(X: Any, owner: str) -> Matrix:
 
 
 def labels_of(y: Any, rows: int, owner: str) -> tuple[npt.NDArray[Any], npt.NDArray[np.int64]]:
-    """Sorted different labels, and the position of each row's label among them."""
+    """Sorted unique labels, and the position of each row's label among them."""
     if y is None:
         raise ParameterError(f"{owner} requires y to be passed, but the target y is None")
     labels = _array("y", y, owner)
@@ -95,7 +95,7 @@ def labels_of(y: Any, rows: int, owner: str) -> tuple[npt.NDArray[Any], npt.NDAr
 
 
 def weights_of(sample_weight: Any, rows: int, owner: str) -> Matrix | None:
-    """How much each row counts [shape=(rows,)], or None where all count alike."""
+    """Weight of each row [shape=(rows,)]; None if all weigh the same."""
     if sample_weight is None:
         return None
     try:

@@ -1,4 +1,4 @@
-"""Calibrations, masks and depth images of views."""
+"""Calibrations, masks and depth images of camera views."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ class Calibration:
     Attributes
     ----------
     rgb : Camera
-        Colour.
+        Colour camera.
     ir1, ir2 : Camera, optional
-        Infrared, where the file has them.
+        Infrared cameras, if the file has them.
 
     Examples
     --------
@@ -68,9 +68,9 @@ class Calibration:
 
 @refuses
 def load_calibration(path: StrPath) -> Calibration:
-    """Reads a calibration file of the data set, or the same as JSON.
+    """Reads a calibration file of the data set, or the same content as JSON.
 
-    A pickle is not executed: lists, dictionaries, strings, numbers and numpy arrays are read,
+    A pickle is not executed: only lists, dictionaries, strings, numbers and numpy arrays are read;
     anything else is refused.
 
     Parameters
@@ -85,7 +85,7 @@ def load_calibration(path: StrPath) -> Calibration:
     Raises
     ------
     ParameterError
-        The file cannot be read, does more than make arrays, or lacks the colour camera.
+        The file cannot be read, holds anything else, or has no colour camera.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def load_calibration(path: StrPath) -> Calibration:
 
 @refuses
 def load_mask(path: StrPath) -> npt.NDArray[np.bool_]:
-    """Reads a mask's PNG.
+    """Reads the PNG of a mask.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def load_mask(path: StrPath) -> npt.NDArray[np.bool_]:
     Returns
     -------
     bool [shape=(height, width)]
-        True where its first channel is not 0.
+        True where the first channel is not 0.
 
     Examples
     --------
@@ -130,7 +130,7 @@ def load_depth(path: StrPath) -> npt.NDArray[np.uint16]:
     Returns
     -------
     uint16 [shape=(height, width)]
-        mm, 0 where nothing was measured.
+        Depth in mm; 0 where nothing was measured.
 
     Examples
     --------
@@ -160,7 +160,7 @@ def camera_numbers(calibration: Calibration | StrPath) -> list[float]:
 
 
 def mask_pixels(mask: Mask) -> npt.NDArray[np.bool_]:
-    """A mask, read where it is a path."""
+    """A mask, which is read if it is a path."""
     if isinstance(mask, np.ndarray):
         if mask.dtype != np.bool_ or mask.ndim != 2:
             raise ParameterError(
@@ -171,7 +171,7 @@ def mask_pixels(mask: Mask) -> npt.NDArray[np.bool_]:
 
 
 def depth_pixels(depth: Depth) -> npt.NDArray[np.uint16]:
-    """A depth image, read where it is a path."""
+    """A depth image, which is read if it is a path."""
     if isinstance(depth, np.ndarray):
         if depth.dtype != np.uint16 or depth.ndim != 2:
             raise ParameterError(

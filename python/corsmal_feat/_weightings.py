@@ -35,7 +35,7 @@ def A_weighting(frequencies: npt.ArrayLike, *, min_db: float | None = -80.0) -> 
     frequencies : number or [shape=(n,)]
         Hz.
     min_db : float, optional
-        Lowest weight; None keeps all.
+        Lower limit of the weights; None for none.
 
     Returns
     -------
@@ -149,14 +149,14 @@ def D_weighting(frequencies: npt.ArrayLike, *, min_db: float | None = -80.0) -> 
 
 @refuses
 def Z_weighting(frequencies: npt.ArrayLike, *, min_db: float | None = None) -> Doubles:
-    """Zeros: no weighting (librosa.Z_weighting).
+    """Z weighting in dB: zero at all frequencies (librosa.Z_weighting).
 
     Parameters
     ----------
     frequencies : [shape=(n,)]
         Hz.
     min_db : float, optional
-        Lowest weight.
+        Lower limit of the weights.
 
     Returns
     -------
@@ -185,16 +185,16 @@ _KINDS: dict[str | None, Callable[..., Any]] = {
 def frequency_weighting(
     frequencies: npt.ArrayLike, *, kind: str | None = "A", **kwargs: Any
 ) -> Doubles:
-    """The weighting of that name (librosa.frequency_weighting).
+    """Frequency weighting by name (librosa.frequency_weighting).
 
     Parameters
     ----------
     frequencies : number or [shape=(n,)]
         Hz.
     kind : {"A", "B", "C", "D", "Z", None}
-        Which one.
+        Name of the weighting.
     **kwargs
-        `min_db` of that weighting.
+        `min_db` of the weighting.
 
     Returns
     -------
@@ -216,14 +216,14 @@ def frequency_weighting(
 def multi_frequency_weighting(
     frequencies: npt.ArrayLike, *, kinds: Iterable[str] = "ZAC", **kwargs: Any
 ) -> Doubles:
-    """Several weightings (librosa.multi_frequency_weighting).
+    """Several frequency weightings, stacked (librosa.multi_frequency_weighting).
 
     Parameters
     ----------
     frequencies : [shape=(n,)]
         Hz.
     kinds : iterable of str
-        See `frequency_weighting`.
+        Names of the weightings, see `frequency_weighting`.
     **kwargs
         `min_db` of the weightings.
 
@@ -248,9 +248,9 @@ def perceptual_weighting(
     Parameters
     ----------
     S : [shape=(..., d, t)]
-        Powers.
+        Power spectrogram.
     frequencies : [shape=(d,)]
-        Of the rows of `S`, in Hz.
+        Frequencies of the rows of `S` in Hz.
     kind : str
         See `frequency_weighting`.
     **kwargs

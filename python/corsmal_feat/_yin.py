@@ -13,7 +13,7 @@ from ._warnings import warn
 from .errors import ParameterError
 from .util import frame, tiny
 
-#: Values of one block of frames: bounds the memory of the transforms.
+#: Values per block of frames: bounds the memory of the transforms.
 _BLOCK = 1 << 22
 _NOT_GIVEN: Any = object()
 _PADDINGS = ("constant", "edge", "reflect", "symmetric", "wrap", "linear_ramp")
@@ -41,19 +41,19 @@ def yin(
     y : float32 or float64 [shape=(..., n)]
         Signal at the sample rate `sr` in Hz.
     fmin, fmax : float
-        Range in Hz, up to half the sample rate.
+        Lowest and highest frequency in Hz, at most half the sample rate.
     frame_length : int
-        Samples of a frame; two periods of `fmin` should fit.
+        Samples per frame; at least two periods of `fmin` should fit.
     win_length : deprecated
         Has no effect, as in librosa 0.11.
     hop_length : int, optional
-        Samples between frames, a quarter of `frame_length` by default.
+        Samples between frames; by default, a quarter of `frame_length`.
     trough_threshold : float
-        The first trough of the difference function below it is the period.
+        The period is the first trough of the difference function below this.
     center : bool
-        Frames are centred, the signal padded.
+        Whether to centre frames by padding the signal.
     pad_mode : str
-        Of `numpy.pad`.
+        Padding mode of `numpy.pad`.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def _periods(frames: Floats, shortest: int, longest: int, threshold: float) -> F
 
 
 def _normalized_difference(frames: Floats, shortest: int, longest: int) -> Floats:
-    """Squared differences at lags `shortest..=longest` over their mean at all shorter lags."""
+    """Squared differences at lags `shortest` to `longest`, over their mean at all shorter lags."""
     n = frames.shape[1]
     spectrum = np.fft.rfft(frames, _good_length(2 * n - 1), axis=1)
     power = spectrum.real**2 + spectrum.imag**2
@@ -153,7 +153,7 @@ def _normalized_difference(frames: Floats, shortest: int, longest: int) -> Float
 
 
 def _good_length(n: int) -> int:
-    """The least length of factors 2, 3 and 5 that is at least `n`."""
+    """The smallest length of at least `n` with only the factors 2, 3 and 5."""
     best = 1 << (n - 1).bit_length()
     fives = 1
     while fives < best:

@@ -1,4 +1,4 @@
-"""Features for the rows of Arrow tables: one function that Ray, Dask, Spark and others can call.
+"""Features for the rows of Arrow tables: a function that Ray, Dask, Spark and others can call.
 
 Needs pyarrow (`pip install pyarrow`).
 """
@@ -31,7 +31,7 @@ def extract_batch(
     channels: int | None = None,
     jobs: int = 1,
 ) -> Any:
-    """Features of the recordings that a batch names, one row for each row, in the same order.
+    """Features of the recordings in a batch: one row for each row, in the same order.
 
     Parameters
     ----------
@@ -40,12 +40,12 @@ def extract_batch(
         `start` and `end` in seconds; `archive`, `offset` and `size` of a member of a tar. All
         others are labels, which are copied to the output unchanged.
     preset, config, set : see `corsmal_feat.extract`; by default the configuration of `model`
-    projection : file from `corsmal_feat.corsmal.fit_projection` with which statistics are projected
-    model : file of a classifier with its feature configuration: adds `predicted` and, if the
-        classifier gives probabilities, `p_<label>`
+    projection : file from `corsmal_feat.corsmal.fit_projection` by which to project statistics
+    model : file of a classifier with a feature configuration; adds the columns `predicted` and, if
+        the classifier gives probabilities, `p_<label>`
     summary : "columns" gives each statistic a column with its name; "list" gives one column
         `features` of lists of fixed size, with the names in the schema's metadata
-    frames : "list" leaves out the configuration's summary: frames instead of statistics
+    frames : "list" returns frames instead of statistics, without the configuration's summary
     channels : number of channels that recordings must have, if the width of the table depends on
         it; others have the status mismatch. By default the number that most recordings of this
         batch have; for batches of one table, set it
@@ -64,7 +64,7 @@ def extract_batch(
 
     Raises
     ------
-    ParameterError : columns, configuration or model cannot be used
+    ParameterError : a column, the configuration or the model cannot be used
     RunError : a temporary file failed
 
     Examples

@@ -1,4 +1,4 @@
-"""Compound inputs of the benchmark's systems: re-exported from one private module per family."""
+"""Inputs of the benchmark's systems: re-exported from one private module per family."""
 
 from ._af193 import af193
 from ._compound import (

@@ -1,4 +1,4 @@
-"""Harmonic and percussive parts, silence, pre-emphasis (librosa.effects)."""
+"""Harmonic and percussive parts, trimming, pre-emphasis (librosa.effects)."""
 
 from ._hpss import effects_hpss as hpss
 from ._hpss import harmonic, percussive

@@ -1,4 +1,4 @@
-"""Exceptions: each is a `CorsmalFeatError`, and also the built-in error of its kind."""
+"""Exceptions: each is a `CorsmalFeatError` and also the built-in error of its kind."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ __all__ = [
 
 
 class CorsmalFeatError(Exception):
-    """Any refusal of this package."""
+    """Base class of all errors of this package."""
 
 
 class ParameterError(CorsmalFeatError, ValueError):
-    """A parameter or array was refused."""
+    """A parameter or array is wrong."""
 
 
 class DataTypeError(ParameterError, TypeError):
-    """Data are of a type that is not accepted."""
+    """Data have a type that is not accepted."""
 
 
 class ConfigError(ParameterError):
-    """A configuration of `extract` is refused."""
+    """A configuration is wrong."""
 
 
 class ModelError(ParameterError):
-    """A model file cannot be read or written, or has another model in it."""
+    """A model file cannot be read or written, or holds another kind of model."""
 
 
 class NotFittedError(ParameterError, AttributeError):
@@ -53,7 +53,7 @@ class RunError(CorsmalFeatError, RuntimeError):
 
 
 class DecodeError(RunError):
-    """A recording has no features, but every recording needs them."""
+    """A recording cannot be read or has no features, where it must have them."""
 
 
 class FileError(RunError, OSError):

@@ -1,4 +1,4 @@
-"""Onset strength and onsets (librosa.onset)."""
+"""Onset strength and onset detection (librosa.onset)."""
 
 from ._onset import onset_backtrack, onset_detect, onset_strength, onset_strength_multi
 
