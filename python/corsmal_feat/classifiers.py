@@ -1,7 +1,7 @@
 """Classifiers: scikit-learn estimators, trained and stored by the Rust side.
 
-`save` writes the model file that `corsmal-feat classify` reads, `load_model` reads what
-`corsmal-feat train` wrote. They also work without scikit-learn; docs/classifiers.md says how each
+`save` writes a model file that `corsmal-feat classify` reads, and `load_model` reads the model file
+of `corsmal-feat train`. They also work without scikit-learn; docs/classifiers.md says how each
 differs from scikit-learn's.
 """
 
@@ -41,15 +41,15 @@ class KNN(Classifier):
     Parameters
     ----------
     n_neighbors : int
-        Neighbours that vote.
+        Number of neighbours that vote.
     weights : str
         "uniform", or "distance" for votes of 1 / distance.
     metric : str
         "euclidean", "manhattan", "cosine", "chebyshev" or "minkowski".
     p : float
-        Exponent of the minkowski metric.
+        Exponent of the "minkowski" metric.
     algorithm : str
-        "brute", or "linfa" for neighbours found by linfa-nn.
+        "brute", or "linfa" to search with linfa-nn.
 
     Examples
     --------
@@ -96,18 +96,18 @@ class KNN(Classifier):
         Parameters
         ----------
         X : array [shape=(rows, features)], optional
-            Without it, the neighbours of each training row among the others.
+            Rows of features; by default, each training row, with its neighbours among the others.
         n_neighbors : int, optional
-            Number of neighbours; by default, as many as vote.
+            Number of neighbours; by default, that of the classifier.
         return_distance : bool
             Whether to return the distances, too.
 
         Returns
         -------
         distances : float64 [shape=(rows, n_neighbors)]
-            Nearest first; left out without `return_distance`.
+            Distances, nearest first; left out with `return_distance=False`.
         positions : int64 [shape=(rows, n_neighbors)]
-            Numbers of training rows.
+            Positions of the neighbours among the training rows.
         """
         if not hasattr(self, "_model"):
             raise not_fitted(self)
@@ -136,7 +136,7 @@ class SVC(WeightedClassifier):
     tol : float
         Tolerance of the optimality conditions.
     cache_size : int
-        Memory for kernel values, MiB.
+        Memory for kernel values in MiB.
     random_state : int, RandomState, optional
         Seed of the folds for the probabilities.
     solver : str
@@ -183,7 +183,7 @@ class SVC(WeightedClassifier):
 
     @property
     def predict_proba(self) -> Any:
-        """As in the other classifiers; absent without `probability`, so that scikit-learn's tools
+        """As in the other classifiers; missing without `probability`, so that scikit-learn's tools
         do not use it."""
         if not self.probability:
             raise AttributeError("predict_proba needs SVC(probability=True)")
@@ -248,7 +248,7 @@ class DecisionTree(GrownClassifier):
 
 
 class RandomForest(Forest):
-    """Random forest, as `sklearn.ensemble.RandomForestClassifier`; all cores, same result.
+    """Random forest, as `sklearn.ensemble.RandomForestClassifier`; same on any number of cores.
 
     Parameters
     ----------
@@ -257,12 +257,12 @@ class RandomForest(Forest):
     criterion, max_depth, min_samples_split, min_samples_leaf
         See `DecisionTree`.
     max_features : str, int or float, optional
-        Number of features considered in each split: "sqrt", "log2", a number or a fraction; None
+        Features to consider in each split: "sqrt", "log2", a number, or a fraction up to 1.0; None
         for all.
     bootstrap : bool
-        Draw rows with replacement for each tree.
+        Whether to draw rows with replacement for each tree.
     oob_score : bool
-        Whether to score each tree on the rows that it has not seen; needs `bootstrap`.
+        Whether to score trees on the rows that they have not seen; needs `bootstrap`.
     class_weight : dict or str, optional
         "balanced", or a weight by label.
     random_state : int, RandomState, optional
@@ -271,10 +271,10 @@ class RandomForest(Forest):
     Attributes
     ----------
     feature_importances_ : float64 [shape=(features,)]
-        How much impurity the splits on each feature removed, as the mean over the trees; the sum
-        is one. Available after `fit`, but not stored in model files.
+        Impurity that the splits on each feature removed, as the mean over trees; the sum is 1.
+        Available after `fit`, but not stored in model files.
     oob_score_ : float
-        With `oob_score`: share of rows whose label is predicted by the trees that have not seen
+        With `oob_score`: share of the rows whose label is predicted by the trees that have not seen
         them.
     oob_decision_function_ : float64 [shape=(rows, classes)]
         With `oob_score`: class fractions from those trees; NaN for a row that every tree has seen.
@@ -322,9 +322,9 @@ class ExtraTrees(Forest):
     Parameters
     ----------
     n_estimators, criterion, max_depth, min_samples_split, min_samples_leaf, max_features
-        See `RandomForest`, which also has the attributes.
+        See `RandomForest`, which also describes the attributes.
     bootstrap, oob_score, class_weight, random_state
-        See there; no `bootstrap` by default.
+        See `RandomForest`; by default, `bootstrap` is False.
 
     Examples
     --------
@@ -367,11 +367,11 @@ class LogisticRegression(WeightedClassifier):
     Parameters
     ----------
     C : float
-        Inverse of the penalty's strength.
+        Inverse of the strength of the penalty.
     class_weight : dict or str, optional
         "balanced", or a weight by label.
     tol : float
-        Maximum slope of the mean loss at the end.
+        Maximum slope of the mean loss at which to stop.
     max_iter : int
         Maximum number of steps.
 

@@ -1,4 +1,4 @@
-"""Spectrograms and waveforms (librosa.display), with matplotlib: the extra `plot`."""
+"""Plots of spectrograms and waveforms (librosa.display); needs matplotlib, the extra `plot`."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from .errors import ParameterError
 __all__ = ["specshow", "waveshow"]
 
 _C1 = float(midi_to_hz(24))
-#: Axes in seconds or beats of them, and what one second is.
+#: Axes of time, and one second in their units.
 _TIMES = {"time": 1.0, "s": 1.0, "ms": 1e3}
 _PLAIN = ("frames", "off", "none", None)
 _HERTZ = ("linear", "fft", "hz", "log", "mel", "cqt_hz", "cqt_note")
 _CLASSES = ("chroma", "tonnetz")
-#: Axes of one kind, which have one scale where they have the same limits.
+#: Axes of the same kind, which share a scale if they have the same limits.
 _ALIKE = (
     set(_TIMES),
     {"linear", "fft", "hz"},
     *({name} for name in ("frames", "log", "mel", "cqt_hz", "cqt_note", "chroma", "tonnetz")),
 )
-#: What only librosa's ticks of Indian and just intonation, keys and tempograms need.
+#: Arguments that only librosa's ticks of Indian music, just intonation, keys and tempograms need.
 _LEFT_OUT = (
     "Sa", "intervals", "key", "mela", "tempo_max", "tempo_min", "thaat", "unicode", "unison",
 )  # fmt: skip
@@ -73,28 +73,28 @@ def specshow(
     data : [shape=(d, t)]
         Data to draw; for complex values, their magnitude.
     x_coords, y_coords : [shape=(t,)] and [shape=(d,)], optional
-        Positions instead of those of the axes.
+        Positions to use instead of those of the axes.
     x_axis, y_axis : str, optional
-        "time", "s", "ms", "frames", "linear" (or "fft", "hz"), "log", "mel", "cqt_hz",
-        "cqt_note", "chroma", "tonnetz", "off", or None.
+        Kind of axis: "time", "s", "ms", "frames", "linear" (or "fft", "hz"), "log", "mel",
+        "cqt_hz", "cqt_note", "chroma", "tonnetz", "off", or None.
     sr : float
         Sample rate in Hz.
     hop_length, n_fft, win_length : int
-        Of the transform.
+        Parameters of the transform.
     fmin, fmax : float, optional
-        Range of mel bands, lowest bin of a constant-Q transform, in Hz.
+        Range of mel bands, or `fmin` for the lowest bin of a constant-Q transform, in Hz.
     tuning : float
-        Of a constant-Q transform, in fractions of a bin.
+        Tuning of a constant-Q transform in fractions of a bin.
     bins_per_octave : int
-        Of a constant-Q transform, or of a chromagram.
+        Bins per octave of a constant-Q transform or a chromagram.
     auto_aspect : bool
-        Draw squares if both axes are of the same kind and have the same limits.
+        Whether to use equal scales if both axes are of the same kind and have the same limits.
     htk : bool
-        Scale of the mel bands.
+        Whether mel bands are on HTK's scale instead of Slaney's.
     ax : matplotlib axes, optional
-        Where to draw; the current ones by default.
+        Where to draw; by default, the current axes.
     **kwargs
-        Of matplotlib's `pcolormesh`.
+        Arguments of matplotlib's `pcolormesh`.
 
     Returns
     -------
@@ -172,7 +172,7 @@ def specshow(
 
 
 def _colors(values: npt.NDArray[Any]) -> str:
-    """A map of two colours where there are values on both sides of zero, but for the outermost."""
+    """A diverging colour map if values, without the outermost, are on both sides of zero."""
     if values.dtype == bool:
         return "gray_r"
     finite = values[np.isfinite(values)]
@@ -223,33 +223,33 @@ def waveshow(
     ax: Any = None,
     **kwargs: Any,
 ) -> Any:
-    """Draws a waveform: its samples, or the range of each piece if there are too many
+    """Draws a waveform: its samples or, if there are too many, the range of each stretch
     (librosa.display.waveshow).
 
     Parameters
     ----------
     y : [shape=(n,) or (channels, n)]
-        Signal; for two or more channels, the largest magnitudes.
+        Signal; for two or more channels, the largest magnitude is drawn.
     sr : float
         Sample rate in Hz.
     max_points : int
         Maximum number of points to draw.
     axis : {"time", "s", "ms", "frames", "off", None}
-        Label of the horizontal axis.
+        Kind of the time axis, see `specshow`.
     offset : float
-        Seconds at the first sample.
+        Time of the first sample in seconds.
     marker : matplotlib marker
-        Marker of the samples, if these are drawn.
+        Marker for samples, if they are drawn.
     where : {"post", "pre", "mid"}
-        Where a value's step begins or ends.
+        Where steps are placed, as in matplotlib's `step`.
     label : str, optional
         Label for the legend.
     transpose : bool
-        Whether time goes upwards.
+        Whether to draw time upwards.
     ax : matplotlib axes, optional
-        Where to draw; the current ones by default.
+        Where to draw; by default, the current axes.
     **kwargs
-        Of matplotlib's `step` or `fill_between`.
+        Arguments of matplotlib's `step` or `fill_between`.
 
     Returns
     -------

@@ -1,10 +1,10 @@
 """The networks of the paper: built, loaded, run and trained by the Rust side.
 
 `build(name)` returns a network as published, with PyTorch's parameter names and layouts in
-`state_dict` and `load_state_dict`. `train` trains one on recordings, `load` reads a trained one,
-and both return a `TrainedNetwork`, which classifies recordings; `embed` computes embeddings of
-recordings. docs/networks.md says what each network is and where the published code differs from
-the paper.
+`state_dict` and `load_state_dict`. `train` trains a network on recordings, and `load` reads a
+trained one: both return a `TrainedNetwork`, which classifies recordings. `embed` computes
+embeddings of recordings. docs/networks.md describes each network and where the published code
+differs from the paper.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def names() -> dict[str, str]:
     Returns
     -------
     dict
-        A sentence about each network, by name.
+        A description of each network, by name.
 
     Examples
     --------
@@ -66,16 +66,16 @@ def names() -> dict[str, str]:
 
 @refuses
 def build(name: str, *, outputs: int | None = None, seed: int = 0) -> Network:
-    """The published network with this name; a hyphen is the same as an underscore.
+    """Builds a published network by name; a hyphen is the same as an underscore.
 
     Parameters
     ----------
     name : str
         One of `names()`.
     outputs : int, optional
-        Number of classes, if not the published one.
+        Number of classes; by default, the published one.
     seed : int
-        Seed of the initial numbers.
+        Seed of the initial parameters.
 
     Returns
     -------
@@ -114,18 +114,18 @@ def train(
     recordings : paths
         One path per recording.
     y : array [shape=(recordings,)]
-        Their labels.
+        Label of each recording.
     groups : array [shape=(recordings,)], optional
-        Groups that must not be split if the recipe holds out a validation group.
+        Group of each recording; groups are not split if the recipe holds out a validation group.
     recipe : mapping, optional
         Keys of the recipe to change from the published values, such as {"epochs": 3, "seed": 1}.
     checkpoints : path, optional
         Folder in which to save the training after each epoch; the next training continues from
         there.
     progress : function, optional
-        Called with the epochs done, all epochs, the last loss, the last score and the seconds left.
+        Called with epochs done, total epochs, last loss, last score and seconds left.
     jobs : int, optional
-        Recordings that are read at a time; one per core by default.
+        Number of recordings to read at a time; by default, one per core.
 
     Returns
     -------
@@ -166,10 +166,10 @@ def cross_validate(
     Parameters
     ----------
     name, recordings, y, recipe, progress, jobs
-        See `train`; epochs are those of each fold.
+        See `train`; `progress` counts the epochs of each fold.
     groups : array [shape=(recordings,)], optional
-        Groups that must not be split between training and test. Each is held out once, unless `cv`
-        says otherwise.
+        Group of each recording; groups are not split between training and test. Each group is held
+        out once, unless `cv` says otherwise.
     cv : int or str, optional
         Number of folds, or a plan on the column `groups`, such as "lists=1,4,7/2,5,8".
     checkpoints : path, optional
@@ -209,7 +209,7 @@ def cross_validate(
 
 @refuses
 def load(path: StrPath) -> TrainedNetwork:
-    """Reads a trained network, from `corsmal-feat train --net` or `save`.
+    """Reads a trained network, written by `corsmal-feat train --net` or `save`.
 
     Parameters
     ----------
@@ -243,19 +243,19 @@ def embed(
     Parameters
     ----------
     name : str
-        A network that embeds: `vggish`.
+        A network that computes embeddings: `vggish`.
     recordings : paths
         Files, folders, globs and manifests.
     weights : path
-        Its weights, `.pth`, `.safetensors` or `.npz`.
+        Weights of the network: `.pth`, `.safetensors` or `.npz`.
     jobs : int, optional
-        Recordings that are read at a time; one per core by default.
+        Number of recordings to read at a time; by default, one per core.
 
     Returns
     -------
     dict
-        The rows of each recording by id [shape=(rows, numbers)]; VGGish has a row of 128 numbers
-        for each .96 s.
+        Embeddings [shape=(rows, numbers)] of each recording by id; VGGish gives a row of 128
+        numbers for each 0.96 s.
 
     Examples
     --------
@@ -275,7 +275,7 @@ def embed(
 
 @refuses
 def read_weights(path: StrPath) -> dict[str, Singles]:
-    """Reads weights; nothing in the file is run.
+    """Reads a file of weights; no code in it is executed.
 
     Parameters
     ----------
@@ -285,7 +285,7 @@ def read_weights(path: StrPath) -> dict[str, Singles]:
     Returns
     -------
     dict
-        The numbers by name.
+        Arrays by name.
 
     Examples
     --------
@@ -298,14 +298,14 @@ def read_weights(path: StrPath) -> dict[str, Singles]:
 
 @refuses
 def write_weights(path: StrPath, state: Mapping[str, npt.ArrayLike]) -> None:
-    """Writes weights, completely or not at all.
+    """Writes a file of weights, completely or not at all.
 
     Parameters
     ----------
     path : path
         `.npz` or `.safetensors`.
     state : mapping
-        The numbers by name, such as a network's `state_dict()`.
+        Arrays by name, such as a network's `state_dict()`.
 
     Examples
     --------
@@ -353,7 +353,7 @@ def _tell_left_out(left_out: list[tuple[str, str]], count: int) -> None:
 
 
 def __getattr__(name: str) -> Any:
-    # The estimator is scikit-learn's where that is installed, and importing it takes a second.
+    # The estimator imports scikit-learn where it is installed, which takes a second.
     if name != "NetworkClassifier":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return import_module("._network_classifier", __package__).NetworkClassifier

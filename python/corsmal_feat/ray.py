@@ -1,6 +1,6 @@
 """Extraction on a Ray cluster, with every recording accounted for.
 
-Needs Ray and pyarrow (`pip install 'corsmal-feat[ray]'`). The same as a command:
+Needs Ray and pyarrow (`pip install 'corsmal-feat[ray]'`). Also available as a command:
 `python -m corsmal_feat.ray --help`.
 """
 
@@ -32,15 +32,15 @@ from .errors import CorsmalFeatError, ParameterError, RunError
 __all__ = ["Accounting", "extract", "manifest"]
 
 _JOB = "job.json"
-#: Batches that wait for each core.
+#: Batches that are queued for each core.
 _AHEAD = 2
-#: Seconds without a finished part after which it is said that there is none.
+#: Seconds without a finished part after which a warning says so.
 _SILENCE = 300.0
 
 
 @refuses
 def manifest(paths: StrPath | Iterable[StrPath], *, longest: float | None = None) -> Any:
-    """The recordings that the names mean, as in the command `corsmal-feat extract`.
+    """The recordings that `paths` stand for, as in the command `corsmal-feat extract`.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def manifest(paths: StrPath | Iterable[StrPath], *, longest: float | None = None
     longest : seconds; longer recordings of uncompressed audio (WAV, AIFF, ...) are cut into pieces,
         one row each. Joined by `corsmal_feat.arrow.join_pieces`, their frames are those of the
         whole recording, bit for bit. Statistics, and features that depend on the whole recording,
-        have no pieces: `extract_batch` refuses them
+        cannot be computed on pieces: `extract_batch` refuses them
 
     Returns
     -------
@@ -139,7 +139,7 @@ def extract(
     ------
     ParameterError : configuration, model or manifest cannot be used; two recordings have the same
         id
-    RunError : `out` has another job; or the ids of the files are not those of the manifest
+    RunError : `out` holds another job, or the ids in its files are not those of the manifest
 
     Examples
     --------
@@ -197,7 +197,7 @@ def _require_paths(table: Any) -> None:
 
 
 def _claim(folder: Path, job: Job, table: Any, channels: int | None, rows: int) -> None:
-    """Makes the folder this job's, or finds that it is."""
+    """Claims the folder for this job, or checks that it already belongs to it."""
     digest = hashlib.blake2b(digest_size=32)
     for batch in table.to_batches(1 << 16):
         rows_here = [{k: _known_by(v) for k, v in row.items()} for row in batch.to_pylist()]
@@ -231,7 +231,7 @@ def _claim(folder: Path, job: Job, table: Any, channels: int | None, rows: int) 
 
 
 def _known_by(value: Any) -> Any:
-    """A value without what signs a web address: signed anew it is the same recording."""
+    """A value without the signature of a web address, which changes while the recording stays."""
     return _core.shown(value) if isinstance(value, str) and _core.is_stored(value) else value
 
 
@@ -300,7 +300,7 @@ def _compute(
 
 
 def _main(arguments: list[str] | None = None) -> int:
-    """The command: 0 fine, 1 recordings without features, 2 could not run, 130 interrupted."""
+    """The command: 0 done, 1 recordings without features, 2 could not run, 130 interrupted."""
     parser = argparse.ArgumentParser(
         prog="python -m corsmal_feat.ray",
         description="Extracts on a Ray cluster into a folder of Parquet files.",
@@ -312,7 +312,7 @@ def _main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--preset", help="configuration that comes with the package")
     parser.add_argument("--config", help="TOML file with a configuration")
     parser.add_argument("--projection", help="file of fitted principal components")
-    parser.add_argument("--model", help="classifier file: adds predictions")
+    parser.add_argument("--model", help="classifier file; adds predictions")
     parser.add_argument("--summary", choices=("columns", "list"), default="columns")
     parser.add_argument("--frames", choices=("list",), help="frames instead of statistics")
     parser.add_argument("--channels", type=int, help="number of channels that recordings must have")

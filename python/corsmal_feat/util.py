@@ -1,4 +1,4 @@
-"""Frames, lengths, norms (librosa.util)."""
+"""Framing, padding, normalisation (librosa.util)."""
 
 from __future__ import annotations
 
@@ -41,20 +41,20 @@ def frame(
     Parameters
     ----------
     x : array
-        What is cut.
+        Array to cut into frames.
     frame_length, hop_length : int
-        Elements of a frame, and between frames.
+        Elements per frame, and from one frame to the next.
     axis : int
-        The axis that is cut. A negative one gives [shape=(..., frame_length, t)], another one
+        Axis to cut. A negative axis gives [shape=(..., frame_length, t)], any other
         [shape=(t, frame_length, ...)].
     writeable : bool
-        Whether the view may be written to; its elements overlap.
+        Whether the view can be written to; note that its elements overlap.
     subok : bool
-        Keep a subclass of numpy's arrays.
+        Whether to keep a subclass of `numpy.ndarray`.
 
     Returns
     -------
-    view of `x` with one dimension more
+    view of `x` with one more dimension
 
     Examples
     --------
@@ -89,13 +89,13 @@ def fix_length(data: npt.ArrayLike, *, size: int, axis: int = -1, **kwargs: Any)
     Parameters
     ----------
     data : array
-        What is cut or padded at its end.
+        Array to cut or pad at the end of the axis.
     size : int
-        Elements wanted.
+        Length of the axis in the result.
     axis : int
-        The axis.
+        Axis to change.
     **kwargs
-        Of `numpy.pad`; zeros by default.
+        Arguments of `numpy.pad`; zeros by default.
 
     Returns
     -------
@@ -135,13 +135,13 @@ def pad_center(data: npt.ArrayLike, *, size: int, axis: int = -1, **kwargs: Any)
     Parameters
     ----------
     data : array
-        What is padded; it ends up in the middle.
+        Array to pad; it ends up in the middle.
     size : int
-        Elements wanted, at least as many as there are.
+        Length of the axis in the result, at least the present one.
     axis : int
-        The axis.
+        Axis to change.
     **kwargs
-        Of `numpy.pad`; zeros by default.
+        Arguments of `numpy.pad`; zeros by default.
 
     Returns
     -------
@@ -166,16 +166,16 @@ def pad_center(data: npt.ArrayLike, *, size: int, axis: int = -1, **kwargs: Any)
 def fix_frames(
     frames: npt.ArrayLike, *, x_min: int | None = 0, x_max: int | None = None, pad: bool = True
 ) -> npt.NDArray[np.int64]:
-    """Different frame numbers within limits, sorted (librosa.util.fix_frames).
+    """Unique, sorted frame numbers within limits (librosa.util.fix_frames).
 
     Parameters
     ----------
     frames : int [shape=(n,)]
         Frame numbers, 0 or more.
     x_min, x_max : int, optional
-        The limits.
+        Limits.
     pad : bool
-        Add the limits, and move what is outside to them; otherwise it is left out.
+        Whether to add the limits and clip frames to them; otherwise, frames outside are dropped.
 
     Returns
     -------
@@ -201,13 +201,13 @@ def fix_frames(
 
 @refuses
 def tiny(x: npt.ArrayLike) -> np.floating[Any]:
-    """Smallest normal number of the precision of `x`, float32 where it holds integers
+    """Smallest positive normal number in the precision of `x`, or in float32 if `x` holds integers
     (librosa.util.tiny).
 
     Parameters
     ----------
     x : number or array
-        Whose precision is meant.
+        Value or array that gives the precision.
 
     Returns
     -------
@@ -225,12 +225,12 @@ def tiny(x: npt.ArrayLike) -> np.floating[Any]:
 
 @refuses
 def valid_audio(y: object) -> bool:
-    """True, or an error that says why `y` is not a signal (librosa.util.valid_audio).
+    """Checks that `y` is a signal: returns True, or raises an error (librosa.util.valid_audio).
 
     Parameters
     ----------
     y : array
-        Floating point, finite, at least one dimension.
+        Signal: floating-point, finite, with at least one dimension.
 
     Returns
     -------
@@ -261,20 +261,22 @@ def normalize(
     threshold: float | None = None,
     fill: bool | None = None,
 ) -> Array:
-    """Divides by a norm along an axis (librosa.util.normalize).
+    """Divides an array by its norm along an axis (librosa.util.normalize).
 
     Parameters
     ----------
     S : array
-        What is normalised, finite.
+        Array of finite values.
     norm : {inf, -inf, 0, None} or float above 0
-        Largest or smallest magnitude, number of values that are not zero, p-norm; None for none.
+        inf or -inf for the largest or smallest magnitude, 0 for the number of non-zero values, a
+        positive p for the p-norm; None to change nothing.
     axis : int, optional
-        The axis; None takes the norm of the whole array.
+        Axis of the norm; None for the norm of the whole array.
     threshold : float, optional
         Smaller norms count as zero.
     fill : bool, optional
-        What is too small stays (None), becomes 0 (False) or constant of norm 1 (True).
+        What becomes of values with too small a norm: they stay (None), or are set to 0 (False) or
+        to a constant of norm 1 (True).
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""Capacity of a container from calibrated views: masks, depth images; only M2 runs a network.
+"""Capacity of a container from calibrated views, by masks and depth images; only M2 uses a network.
 
-Lengths are in mm and capacities in mL unless stated otherwise. `docs/vision.md` says what is
-published, what is corrected and what is our interpretation.
+Lengths are in mm and capacities in mL unless stated otherwise. `docs/vision.md` says what was
+published, what is corrected, and what is our interpretation.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ __all__ = [
 
 
 class LodeEstimate(TypedDict):
-    """What `lode` measures."""
+    """The result of `lode`."""
 
     height: float
     width: float
@@ -62,7 +62,7 @@ class LodeEstimate(TypedDict):
 
 
 class Cuboid(TypedDict):
-    """What `cuboid` measures."""
+    """The result of `cuboid`."""
 
     capacity: float
     low: Doubles
@@ -72,7 +72,7 @@ class Cuboid(TypedDict):
 
 
 class UprightBox(TypedDict):
-    """What `upright_box` measures."""
+    """The result of `upright_box`."""
 
     volume: float
     sides: Doubles
@@ -80,7 +80,7 @@ class UprightBox(TypedDict):
 
 
 class Region(TypedDict):
-    """What `region` finds."""
+    """The result of `region`."""
 
     bounds: tuple[int, int, int, int]
     image: npt.NDArray[np.float32]
@@ -98,12 +98,12 @@ def lode(
 
     Parameters
     ----------
-    masks : two paths of PNGs or boolean arrays [height, width]
-    calibrations : the two views' calibrations, or their files
+    masks : two paths of PNGs, or two boolean arrays [height, width]
+    calibrations : calibrations of the two views, or their files
     variant : {"corrected", "published"}
         "published" keeps the quirks of the published program: indices left of or above an image
-        wrap, a circle that extends beyond the image ends the estimate, gaps in the profile count
-        as height.
+        wrap around, a circle that extends beyond the image ends the estimate, and gaps in the
+        profile count as height.
 
     Returns
     -------
@@ -115,7 +115,8 @@ def lode(
     Raises
     ------
     ParameterError
-        There is no estimate: an empty mask, no circle on both masks, a circle outside an image.
+        No estimate is possible: a mask is empty, no circle is on both masks, or a circle is outside
+        an image.
 
     Examples
     --------
@@ -154,26 +155,27 @@ def cuboid(
     outliers: Literal["published", "corrected", "kept"] = "corrected",
     seed: int = 1,
 ) -> Cuboid:
-    """M4's capacity: the box around an object's points times its share on the mask.
+    """M4's capacity: the volume of the box around an object's points, times its share on the mask.
 
     Parameters
     ----------
     depth : path, or uint16 [shape=(height, width)]
         A 16-bit PNG or its values in mm, aligned with the colour camera.
     mask : path, or bool [shape=(height, width)]
-        The object.
+        Mask of the object.
     calibration : Calibration, or path
         Calibration of the view.
     outliers : {"corrected", "published", "kept"}
-        Points are dropped by four isolation forests; the last has no effect as published.
+        Outliers are dropped by four isolation forests; in the published program, the last has no
+        effect. "kept" drops none.
     seed : int
         Seed of the forests.
 
     Returns
     -------
     dict
-        `capacity` in mL, corners `low` and `high` [3] in m, the `share` of the box on the mask,
-        `points` kept.
+        `capacity` in mL, corners `low` and `high` [3] in m, the `share` of the box on the mask, and
+        the number of `points` kept.
 
     Examples
     --------
@@ -201,7 +203,7 @@ def upright_box(
     masks: Sequence[Mask],
     calibrations: Sequence[Calibration | StrPath],
 ) -> UprightBox:
-    """The smallest upright box around an object's points from the depth of several views.
+    """Smallest upright box around an object's points, from the depth of several views.
 
     Parameters
     ----------
@@ -211,7 +213,7 @@ def upright_box(
     Returns
     -------
     dict
-        `volume` in mL, `sides` [3]: longer and shorter side of the ground plan and height in m,
+        `volume` in mL; `sides` [3] in m: longer and shorter side of the base, and height; number of
         `points`.
 
     Examples
@@ -269,13 +271,13 @@ def m2_capacity(depth: Depth | Region, weights: StrPath) -> float | None:
 
     Parameters
     ----------
-    depth : path of a 16-bit PNG, array of uint16 in mm, or what `region` found
+    depth : path of a 16-bit PNG, array of uint16 in mm, or a result of `region`
     weights : path of the published weights of M2's capacity network (.pth, .npz, .safetensors)
 
     Returns
     -------
     float or None
-        None if no near object is large enough. The network may give impossible values, even below
+        None if no near object is large enough. The network can give impossible values, even below
         0.
 
     Raises
