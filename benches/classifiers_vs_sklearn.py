@@ -1,10 +1,10 @@
-"""Seconds to fit and to predict, corsmal-feat against scikit-learn, as a Markdown table.
+"""Times to fit and to predict: corsmal-feat and scikit-learn, as a Markdown table.
 
     python benches/classifiers_vs_sklearn.py [--tables 0,1,2] [--only knn,rf,et,svm] [--repeats 5]
 
-Both sides get the same numpy array, float64 or (`--dtype float32`) float32, the same parameters,
-and two threads; they take turns and the medians are given. The tables are Gaussian classes on
-low-dimensional subspaces, seeded. Every row is trained on and every row predicted.
+Both sides get the same numpy array (float64, or float32 with `--dtype float32`), the same
+parameters and two threads. They take turns, and medians are printed. The tables are seeded Gaussian
+classes on low-dimensional subspaces. All rows are used for training, and all are predicted.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ PAIRS: dict[str, tuple[Callable[[], Any], Callable[[], Any]]] = {
 
 
 def table(rows: int, columns: int, dtype: str) -> tuple[np.ndarray, np.ndarray]:
-    """Seven classes that overlap."""
+    """Seven overlapping classes."""
     informative = min(40, columns)
     x, y = make_classification(
         rows,

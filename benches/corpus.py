@@ -1,4 +1,4 @@
-"""Recordings for the benchmarks: a synthetic corpus, and rearrangements of one."""
+"""Recordings for the benchmarks: a synthetic corpus, and variants of it."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def write(path: pathlib.Path, pcm: Pcm, rate: int = RATE) -> None:
 
 
 def read(path: pathlib.Path) -> Pcm:
-    """`[samples, channels]` of a 16-bit WAV file."""
+    """The samples of a 16-bit WAV file, `[samples, channels]`."""
     with wave.open(str(path), "rb") as file:
         samples = np.frombuffer(file.readframes(file.getnframes()), dtype="<i2")
         return samples.reshape(-1, file.getnchannels())
 
 
 def seconds(folder: pathlib.Path) -> float:
-    """Length of all recordings of a folder together."""
+    """Total length in seconds of all recordings in a folder."""
     total = 0.0
     for path in folder.glob("*.wav"):
         with wave.open(str(path), "rb") as file:
@@ -42,7 +42,7 @@ def seconds(folder: pathlib.Path) -> float:
 
 
 def recording(rng: np.random.Generator, length: float, channels: int = 8) -> Pcm:
-    """Knocks and rustling before noise, in every channel with another level and delay."""
+    """Knocks and rustling over noise, with another level and delay in each channel."""
     n = int(length * RATE)
     time = np.arange(n) / RATE
     source = np.zeros(n)
@@ -66,7 +66,7 @@ def recording(rng: np.random.Generator, length: float, channels: int = 8) -> Pcm
 
 
 def make(folder: pathlib.Path) -> None:
-    """48 recordings of 8 channels, the same bytes from any run with one version of numpy."""
+    """Makes 48 recordings of 8 channels, with the same bytes in every run of one numpy version."""
     folder.mkdir(parents=True, exist_ok=True)
     order = np.random.default_rng(2026).permutation(len(SECONDS))
     for i, which in enumerate(order):
@@ -75,14 +75,14 @@ def make(folder: pathlib.Path) -> None:
 
 
 def subset(corpus: pathlib.Path, every: int = 4) -> Iterator[tuple[str, Pcm]]:
-    """Every so-many-th recording by name."""
+    """Every n-th recording by name."""
     for path in sorted(corpus.glob("*.wav"))[::every]:
         yield path.name, read(path)
 
 
 def regrouped(corpus: pathlib.Path, folder: pathlib.Path, channels: int) -> None:
-    """A quarter of the corpus as recordings of fewer channels, which follow each other in time:
-    as many files, the same samples."""
+    """A quarter of the corpus with fewer channels, one after another in time: as many files, the
+    same samples."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, pcm in subset(corpus):
         groups = np.split(pcm, pcm.shape[1] // channels, axis=1)
@@ -90,20 +90,20 @@ def regrouped(corpus: pathlib.Path, folder: pathlib.Path, channels: int) -> None
 
 
 def at_rate(corpus: pathlib.Path, folder: pathlib.Path, rate: int) -> None:
-    """A quarter of the corpus declared to have another rate."""
+    """A quarter of the corpus, declared to have another sample rate."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, pcm in subset(corpus):
         write(folder / name, pcm, rate)
 
 
 def shortened(corpus: pathlib.Path, folder: pathlib.Path, longest: float) -> None:
-    """A half of the corpus, cut to the usual length of the takes in CORSMAL's data set."""
+    """Half of the corpus, cut to the usual length of a recording in the CORSMAL data set."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, pcm in subset(corpus, 2):
         write(folder / name, pcm[: int(longest * RATE)])
 
 
 def joined(corpus: pathlib.Path, path: pathlib.Path, every: int) -> None:
-    """Every so-many-th recording in one long one."""
+    """Every n-th recording, joined into one long recording."""
     path.parent.mkdir(parents=True, exist_ok=True)
     write(path, np.concatenate([pcm for _, pcm in subset(corpus, every)]))

@@ -1,15 +1,15 @@
-"""Whole-command benchmarks of corsmal-feat beside the packages it replaces.
+"""Benchmarks of whole commands: corsmal-feat and the packages that it replaces.
 
     cargo build --release
-    python benches/macro.py all                  # measures everything, writes docs/benchmarks.*
-    python benches/macro.py peers --repeats 5    # one part; `report` writes the documents anew
+    python benches/macro.py all                  # measures everything, writes docs/speed.*
+    python benches/macro.py peers --repeats 5    # one part; `report` rewrites the documents
 
-Needs numpy here, the peers in the interpreter named by --python (librosa, resampy, scikit-image,
-pyAudioAnalysis, scipy),
-and valgrind for `instructions`. The corpus is made on the first run; --corpus takes another.
-Results gather in --results until `report` writes them between the markers of docs/speed.md and
-draws docs/speed.svg. Every timed command runs in a process of its own, contenders in turn;
---prefix puts a command before each, for example one that keeps the machine quiet meanwhile.
+Needs numpy here, the peers (librosa, resampy, scikit-image, pyAudioAnalysis, scipy) in the
+interpreter given by --python, and valgrind for `instructions`. The first run makes the corpus;
+--corpus uses another one. Results are collected in --results until `report` writes them between the
+markers in docs/speed.md and draws docs/speed.svg. Each timed command runs in its own process, and
+the contenders take turns. --prefix puts a command before each, for example one that keeps the
+machine quiet.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ Arrays = Mapping[str, npt.NDArray[Any]]
 
 @dataclasses.dataclass(frozen=True)
 class Workload:
-    """What is extracted, by whom, and how close the values must be."""
+    """What to extract, by which peer, and how close the values must be."""
 
     title: str
     arguments: Sequence[str]
@@ -106,13 +106,13 @@ class Bench:
             self.results = json.loads(args.results.read_text())
 
     def keep(self, part: str, rows: Any) -> None:
-        """Stores the results of one part, with what it was measured on."""
+        """Stores the results of one part, and the machine that it was measured on."""
         self.results[part] = {"rows": rows, **machine(self.binary)}
         self.args.results.write_text(json.dumps(self.results, indent=1))
 
     def once(self, command: Sequence[str], count: int = 1) -> dict[str, Any]:
-        """Runs a command `count` times in a row: lists of seconds, CPU seconds, MiB, and what a
-        peer says of itself."""
+        """Runs a command `count` times in a row: lists of seconds, CPU seconds and MiB, and what a
+        peer reports about itself."""
         here = [sys.executable, str(pathlib.Path(__file__).resolve()), "_once", str(count)]
         prefix = shlex.split(self.args.prefix)
         done = subprocess.run([*prefix, *here, *command], stdout=subprocess.PIPE, check=True)
@@ -134,7 +134,7 @@ class Bench:
         return [*command, "--out", str(out), *options]
 
     def median(self, commands: Mapping[Any, Callable[[], list[str]]]) -> dict[Any, dict[str, Any]]:
-        """Every command in turn, --repeats times over: lists of what `once` measures."""
+        """Runs all commands in turn, --repeats times: lists of what `once` measures."""
         runs: dict[Any, dict[str, Any]] = {key: {} for key in commands}
         for repeat in range(self.args.repeats):
             for key, command in commands.items():
@@ -172,7 +172,7 @@ def once(count: int, command: Sequence[str]) -> None:
 
 
 def machine(binary: str) -> dict[str, str]:
-    """What results depend on."""
+    """The machine and versions that results depend on."""
     cpu = "unknown processor"
     for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines():
         if line.startswith("model name"):
@@ -187,7 +187,7 @@ def machine(binary: str) -> dict[str, str]:
 
 
 def ours(work: pathlib.Path, workload: Workload) -> Arrays:
-    """Values of our last run by recording."""
+    """Values of our last run, by recording."""
     with np.load(work / "ours.npz") as npz:
         ids = [str(name) for name in npz["__ids__"]]
         if "__summary__" in npz:
@@ -199,7 +199,7 @@ def ours(work: pathlib.Path, workload: Workload) -> Arrays:
 
 
 def difference(work: pathlib.Path, workload: Workload) -> dict[str, float]:
-    """Largest absolute difference from the peer's last run, and the largest in tolerances."""
+    """Largest difference from the peer's last run: absolute, and relative to the tolerance."""
     absolute, relative = workload.tolerance
     worst, share = 0.0, 0.0
     for name, mine in ours(work, workload).items():
@@ -214,7 +214,7 @@ def difference(work: pathlib.Path, workload: Workload) -> dict[str, float]:
 
 
 def measure_peers(bench: Bench) -> None:
-    """Every workload against its peer, values compared."""
+    """Every workload against its peer; values are compared."""
     rows: dict[str, Any] = {}
     for key in bench.args.workloads.split(","):
         workload = WORKLOADS[key]
@@ -235,7 +235,7 @@ def measure_peers(bench: Bench) -> None:
 
 
 def measure_presets(bench: Bench) -> None:
-    """Every preset under librosa 0.8's conventions against the code that it stands for."""
+    """Every preset, with librosa 0.8's conventions, against the code that it replaces."""
     folder = bench.work / "takes"
     if not folder.exists():
         corpus.shortened(bench.corpus, folder, 7.0)
@@ -252,7 +252,7 @@ def measure_presets(bench: Bench) -> None:
 
 
 def measure_scaling(bench: Bench) -> None:
-    """One job and two: many files, one long file in spans of time, one by channels."""
+    """One job and two: many files, one long file by spans of time, one by channels."""
     long, short = bench.work / "long" / "all.wav", bench.work / "long" / "eighth.wav"
     if not short.exists():
         corpus.joined(bench.corpus, long, 1)
@@ -312,7 +312,7 @@ def measure_nfft(bench: Bench) -> None:
 
 
 def measure_startup(bench: Bench) -> None:
-    """`--version`, and what `import corsmal_feat` adds to numpy where it is installed."""
+    """`--version`, and what `import corsmal_feat` adds to numpy's import, if it is installed."""
     rows = {"corsmal-feat --version": bench.once([bench.binary, "--version"], 20)}
     python = [str(bench.args.python), "-c"]
     probe = subprocess.run([*python, "import corsmal_feat"], capture_output=True)
@@ -332,7 +332,7 @@ def measure_memory(bench: Bench) -> None:
 
 
 def measure_instructions(bench: Bench) -> None:
-    """Instructions of each workload on the shortest recording, counted by valgrind."""
+    """Instructions of each workload on the shortest recording, as counted by valgrind."""
     shortest = min(bench.corpus.glob("*.wav"), key=lambda path: path.stat().st_size)
     counter = ["valgrind", "--tool=cachegrind", "--cache-sim=no", "--cachegrind-out-file=/dev/null"]
     cases = {"--version": [bench.binary, "--version"]}

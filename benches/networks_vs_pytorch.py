@@ -1,11 +1,11 @@
-"""CPU seconds of networks, corsmal-feat against PyTorch and ONNX Runtime, as Markdown tables.
+"""CPU time of networks: corsmal-feat, PyTorch and ONNX Runtime, as Markdown tables.
 
     python benches/networks_vs_pytorch.py [train] [infer] [--only m2_type,m4_type] [--repeats 3]
 
-A training step is forward, backward and update of the published recipe on random inputs of the
-published size, from the same weights on both sides; the losses are compared first, without dropout.
-Sides take turns and medians are given. Each works in one thread; CPU seconds are those of the
-process.
+A training step is the forward pass, backward pass and update of the published recipe, on random
+inputs of the published size and from the same weights on both sides. The losses are compared first,
+without dropout. The sides take turns, and medians are printed. Each uses one thread; CPU seconds
+are those of the process.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ LENGTHS = [
 
 
 class Named(nn.Module):
-    """Layers one after another, each under its name."""
+    """Layers in sequence, each under its name."""
 
     def __init__(self, layers: Sequence[tuple[str, nn.Module]]) -> None:
         super().__init__()
@@ -119,7 +119,7 @@ def m6_action() -> nn.Module:
 
 
 class Recurrent(nn.Module):
-    """GRU or LSTM, then the last step; over packed sequences where lengths are given."""
+    """GRU or LSTM, then the last step; on packed sequences if lengths are given."""
 
     def __init__(
         self, name: str, rnn: nn.Module, middle: nn.Module, fc: nn.Linear, end: nn.Module
@@ -154,7 +154,7 @@ def m4_level() -> nn.Module:
 
 @dataclass(frozen=True)
 class Case:
-    """A network, as it is trained."""
+    """A network and its training."""
 
     name: str
     about: str
@@ -214,7 +214,7 @@ CASES = [
 
 
 def weights_of(network: nets.Network, theirs: nn.Module) -> None:
-    """Gives PyTorch's network the numbers of ours."""
+    """Copies our weights into PyTorch's network."""
     state = {name: torch.from_numpy(np.array(v)) for name, v in network.state_dict().items()}
     missing, unexpected = theirs.load_state_dict(state, strict=False)
     assert not unexpected and all(name.endswith("num_batches_tracked") for name in missing)
@@ -242,7 +242,7 @@ def inputs_of(case: Case, items: int) -> tuple[np.ndarray, list[int] | None]:
 
 
 def training(case: Case) -> tuple[float, float]:
-    """Median CPU seconds of a step: PyTorch's, ours."""
+    """Median CPU seconds of a step: PyTorch, corsmal-feat."""
     ours, theirs = nets.build(case.name), case.build()
     weights_of(ours, theirs)
     x, lengths = inputs_of(case, case.shape[0])
@@ -285,7 +285,7 @@ def training(case: Case) -> tuple[float, float]:
 
 
 def inference(case: Case, items: int, folder: Path) -> tuple[float, float, float]:
-    """Median CPU seconds of a forward pass: PyTorch's, ONNX Runtime's, ours."""
+    """Median CPU seconds of a forward pass: PyTorch, ONNX Runtime, corsmal-feat."""
     ours, theirs = nets.build(case.name), case.build()
     weights_of(ours, theirs)
     theirs.eval()

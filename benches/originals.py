@@ -1,9 +1,9 @@
-"""What the code behind each preset computes, in the packages that it was written with.
+"""The computation behind each preset, in the packages that the original code used.
 
-Written anew from the descriptions of the methods, with librosa 0.11 under the conventions of the
-librosa that they ran on (reflected edges, resampy's kernels): its cost is theirs. Where a method
-has only a paper, this is what its words say in numpy and librosa. The values are held against the
-published ones elsewhere (docs/parity.md); here they are only timed.
+Rewritten from the descriptions of the methods, with librosa 0.11 and the conventions of the librosa
+version that they ran on (reflected edges, resampy's kernels), so that the cost is the same. If a
+method has only a paper, this follows its text in numpy and librosa. Values are compared with the
+published ones elsewhere (docs/parity.md); here, they are only timed.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
-"""Feature extraction as users of other packages write it, timed over a folder of recordings.
+"""Feature extraction as users of other packages write it, timed on a folder of recordings.
 
     python benches/peers.py librosa logmel --corpus DIR --out DIR [--processes 2] [--n-fft 2048]
 
-Every worker process imports its package and computes the shortest recording once; then all start
-together. Timed is what follows: each file from disk to an array, written as one .npz. Prints one
-line of JSON: seconds, CPU seconds, peak memory of all workers together, start-up before.
+Each worker process imports its package and computes the shortest recording once; then all start
+together. The time is taken from there: each file is read from disk, computed, and written as one
+.npz. Prints one line of JSON: seconds, CPU seconds, peak memory of all workers together, and the
+start-up time before.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Functions on arrays in memory: corsmal_feat beside librosa, as a Markdown table.
+"""Functions on arrays in memory: corsmal_feat and librosa, as a Markdown table.
 
     python benches/python_arrays.py [--channels 8] [--seconds 10] [--n-fft 2048] [--only REGEX]
 
-Both run on the same array in one process, each its calls in a row, after a rest: the BLAS threads
-behind librosa spin for a while after a call and would take a core from the next one. The figures
-are medians.
+Both run on the same array in one process. Each makes its calls in a row, after a pause, because the
+BLAS threads behind librosa spin for a while after a call and would take a core from the next one.
+The figures are medians.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ REST, UNCOUNTED, COUNTED = 0.5, 0.3, 0.4
 
 
 def recording(channels: int, seconds: float, dtype: Any) -> Any:
-    """Noise with a rising resonance in every channel [shape=(channels, n)]."""
+    """Noise with a rising resonance in each channel [shape=(channels, n)]."""
     rng = np.random.default_rng(0)
     t = np.arange(int(seconds * SR)) / SR
     tone = 0.3 * np.sin(2 * np.pi * (400 + 150 * t) * t)
@@ -38,7 +38,7 @@ def recording(channels: int, seconds: float, dtype: Any) -> Any:
 
 
 def cases(y: Any, n_fft: int) -> dict[str, Callable[[Any], Any]]:
-    """By name what to call with either module; defaults but for the transform."""
+    """Calls to make with either module, by name; defaults except for the transform."""
     framing = {} if n_fft == 2048 else {"n_fft": n_fft, "hop_length": n_fft // 4}
     power = librosa.feature.melspectrogram(y=y, sr=SR, **framing)
     spectrum = librosa.stft(y, **framing)
@@ -79,7 +79,7 @@ def seconds(function: Callable[[], Any]) -> float:
 
 
 def median(function: Callable[[], Any], least: int) -> float:
-    """Median seconds after a rest and calls that are not counted; of `least` calls or more."""
+    """Median seconds of at least `least` calls, after a pause and calls that are not counted."""
     time.sleep(REST)
     spent, runs = 0.0, []
     while spent < UNCOUNTED + COUNTED or len(runs) < least:

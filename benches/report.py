@@ -1,4 +1,4 @@
-"""Tables and chart of the macro benchmarks in docs/speed.md and docs/speed.svg."""
+"""Tables and charts of the macro benchmarks in docs/speed.md and docs/speed.svg."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 
 def write(results: dict[str, Any], docs: pathlib.Path) -> None:
-    """Replaces what stands between `<!-- NAME -->` and `<!-- /NAME -->`, and draws the chart."""
+    """Replaces the text between `<!-- NAME -->` and `<!-- /NAME -->`, and draws the charts."""
     page = docs / "speed.md"
     text = page.read_text()
     for name, section in SECTIONS.items():
@@ -160,7 +160,7 @@ STYLE = """
 
 
 def chart(result: dict[str, Any]) -> str:
-    """Bars of times real time, one scale for all workloads."""
+    """Bars of speed relative to real time, on one scale for all workloads."""
     rows = result["rows"]
     workloads = sorted(rows["workloads"].items())
     speeds = [
@@ -194,7 +194,7 @@ def chart(result: dict[str, Any]) -> str:
 
 
 def preset_chart(result: dict[str, Any]) -> str:
-    """A bar for each preset: how many times the original's CPU seconds are ours."""
+    """A bar for each preset: CPU time of the original divided by ours."""
     runs = result["rows"]["runs"]
     ratios = {
         preset: median(run["theirs"], "cpu") / median(run["ours"], "cpu")

@@ -1,10 +1,10 @@
-"""CPU time of `extract` for many small recordings: a folder, tar shards, a bucket, shards in it.
+"""CPU time of `extract` on many small recordings: folder, tar shards, bucket, shards in a bucket.
 
     python benches/scale.py --count 10000 [--store versitygw|moto] [--jobs 2]
 
 Needs the command (CORSMAL_FEAT, or target/release/corsmal-feat) built with `--features cloud`, and
-a server of S3: versitygw on the path, or moto (`pip install 'moto[server]'`). What is measured is
-user and system time of the command by getrusage; the server's is not in it.
+an S3 server: versitygw on the path, or moto (`pip install 'moto[server]'`). Measures user and
+system time of the command by getrusage, without that of the server.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ KEY, SECRET = "benchmark", "benchmark-secret"
 
 
 def wav(seed: int) -> bytes:
-    """A recording of 6.4 KB, another for every seed."""
+    """A recording of 6.4 KB, different for each seed."""
     data = random.Random(seed).randbytes(int(2 * RATE * SECONDS))
     head = struct.pack("<4sI4s4sIHHIIHH4sI", b"RIFF", 36 + len(data), b"WAVE", b"fmt ", 16, 1, 1,
                        RATE, 2 * RATE, 2, 16, b"data", len(data))  # fmt: skip
@@ -48,7 +48,7 @@ def make(folder: Path, count: int) -> None:
 
 
 def serve(kind: str, root: Path) -> tuple[subprocess.Popen[bytes], str]:
-    """A server of S3 and its address. Folders in `root` are versitygw's buckets."""
+    """An S3 server and its address. Folders in `root` are versitygw's buckets."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -65,7 +65,7 @@ def serve(kind: str, root: Path) -> tuple[subprocess.Popen[bytes], str]:
                 return server, f"http://127.0.0.1:{port}"
         time.sleep(0.1)
     server.kill()
-    raise SystemExit(f"{kind} does not start")
+    raise SystemExit(f"{kind} did not start")
 
 
 def measured(tool: str, source: str, out: Path, more: list[str]) -> tuple[float, float, int]:
@@ -121,7 +121,7 @@ def main() -> None:
 
 
 def fill(endpoint: str, bucket: Path) -> None:
-    """Puts the files of a folder into a bucket of its name."""
+    """Uploads the files of a folder to a bucket with its name."""
     import urllib.request
 
     headers = {

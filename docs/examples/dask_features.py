@@ -1,9 +1,8 @@
-"""Features of a manifest on a cluster of Dask.
+"""Features of a manifest on a Dask cluster.
 
     python dask_features.py manifest.parquet features/ [scheduler:8786]
 
-Needs dask, distributed, pyarrow and corsmal-feat on all machines, and a file system that
-they share.
+Needs dask, distributed, pyarrow and corsmal-feat on all machines, and a shared file system.
 """
 
 import hashlib
@@ -23,13 +22,13 @@ OPTIONS = {"preset": "mfcc-zcr", "channels": 2}
 
 
 def name(number: int, batch: pa.Table) -> str:
-    """A file by its place, its recordings and the options: another job has other names."""
+    """The file name of a part: it depends on position, recordings and options, so on the job."""
     text = json.dumps([batch.to_pylist(), OPTIONS, corsmal_feat.__version__], default=str)
     return f"{number:08d}-{hashlib.blake2b(text.encode(), digest_size=8).hexdigest()}.parquet"
 
 
 def part(batch: pa.Table, path: str) -> int:
-    """Computes some rows into a file, whole or not at all; gives its rows."""
+    """Computes some rows into a file, completely or not at all; returns the number of rows."""
     found = extract_batch(batch, **OPTIONS)
     # Dask may run a task twice at the same time.
     draft = Path(path).with_suffix(f".{uuid.uuid4().hex}.draft")
@@ -39,7 +38,7 @@ def part(batch: pa.Table, path: str) -> int:
 
 
 def main(manifest: str, out: str, scheduler: str | None = None) -> None:
-    """Computes what is not there yet, and compares the rows with the manifest."""
+    """Computes the missing parts, and compares their rows with the manifest."""
     table, folder = pq.read_table(manifest), Path(out).absolute()
     folder.mkdir(parents=True, exist_ok=True)
     batches = [table.slice(at, ROWS) for at in range(0, table.num_rows, ROWS)]
@@ -55,7 +54,7 @@ def main(manifest: str, out: str, scheduler: str | None = None) -> None:
             done.result()
     found = [i for path in parts for i in pq.read_table(path, columns=["path"])["path"].to_pylist()]
     if found != table["path"].to_pylist():
-        sys.exit(f"{len(found)} rows, which are not those of the manifest ({table.num_rows})")
+        sys.exit(f"the {len(found)} rows are not the {table.num_rows} of the manifest")
     print(f"{len(found)} rows in {len(parts)} parts")
 
 

@@ -19,13 +19,13 @@ OPTIONS = {"preset": "mfcc-zcr", "channels": 2}
 
 
 def features(batches: Iterator[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
-    """`mapInArrow` passes the batches of a partition one by one."""
+    """Computes the batches of a partition, which `mapInArrow` passes one by one."""
     for batch in batches:
         yield extract_batch(batch, **OPTIONS)
 
 
 def main(manifest: str, out: str) -> None:
-    """Computes all rows, and compares their number with that of the manifest."""
+    """Computes all rows, and compares their number with the manifest."""
     # Workers start their own Python: this one, unless the cluster says otherwise.
     os.environ.setdefault("PYSPARK_PYTHON", sys.executable)
     batches = ("spark.sql.execution.arrow.maxRecordsPerBatch", "64")
@@ -39,7 +39,7 @@ def main(manifest: str, out: str) -> None:
     counted, wanted = spark.read.parquet(out).count(), table.count()
     spark.stop()
     if counted != wanted:
-        sys.exit(f"{counted} rows of {wanted}")
+        sys.exit(f"found {counted} of {wanted} rows")
     print(f"{counted} rows")
 
 
