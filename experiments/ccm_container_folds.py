@@ -1,32 +1,35 @@
-"""Filling type and level on the CCM training features, containers held out three at a time.
+"""Filling type and level from the CCM training features; containers are held out three at a time.
 
     python experiments/ccm_container_folds.py [--shared ../shared] [--only m5,a34f,fusion]
         [--inner] [--check]
 
-m5      random forest of 500 trees on A34F, the settings of M5; five seeds
-a34f    classifiers on A34F, weighed inside the training containers
-fusion  classifiers on A34F and VGGish (`ccm_vggish.py` has the inputs), averaged
+m5      random forest of 500 trees on A34F, with the settings of M5; five seeds
+a34f    classifiers on A34F, weighted inside the training containers
+fusion  classifiers on A34F and VGGish (inputs from `ccm_vggish.py`), averaged
 
-Outer folds: {1,4,7}, {2,5,8}, {3,6,9} held out. Scores: mean over them, as M5's. Fixed seeds.
---check runs it all with the recordings' labels shuffled: type must end near 28 %, level near 36 %
-weighted F1 or below.
+Outer folds hold out {1,4,7}, {2,5,8} and {3,6,9}. Scores are means over them, as for M5. Seeds are
+fixed. --check runs everything with the labels of recordings shuffled: weighted F1 must be near 28 %
+for type and near 36 % for level, or below.
 
 Protocol of a34f, written down before its scores on held-out containers were seen:
 
-* Candidates: LEARNERS on A34F, trained on the seven joint classes (probabilities added up over the
-  classes of type or level), and DIRECT learners trained on the target itself.
-* Each of the six training containers is held out once; `stacking.weights` of these out-of-fold
-  probabilities, for type and for level apart.
-* All candidates are fitted on the six containers, their probabilities weighted, the largest taken.
+* Candidates: LEARNERS on A34F, trained on the seven joint classes (with probabilities summed over
+  the classes of type or level), and DIRECT learners, trained on the target itself.
+* Each of the six training containers is held out once; `stacking.weights` uses these out-of-fold
+  probabilities, for type and for level separately.
+* All candidates are fitted on the six containers; their probabilities are weighted, and the largest
+  is chosen.
 
-Protocol of fusion, the second one, written down before its one run on the outer folds (the first
-one's scores on them were known: docs/results.md):
+Protocol of fusion, the second one, written down before its only run on the outer folds (the scores
+of the first one on them were known: docs/results.md):
 
-* The FUSED classifiers are fitted on the six training containers and their probabilities averaged,
-  all alike; the largest is taken. The patch models inside the inputs are fitted there as well.
-* Chosen by the inner scores alone (--inner): in each outer fold, each of the six training
-  containers held out once, everything fitted on the other five. One fold's training containers
-  are the others' test containers, so that the choice, one for all folds, is not free of them.
+* The FUSED classifiers are fitted on the six training containers, their probabilities are averaged
+  with equal weights, and the largest is chosen. The patch models inside the inputs are fitted on
+  the same containers.
+* FUSED was chosen by inner scores alone (--inner): in each outer fold, each of the six training
+  containers is held out once, and everything is fitted on the other five. The training containers
+  of one fold are the test containers of the others, so the choice, which is the same for all folds,
+  is not independent of them.
 """
 
 from __future__ import annotations
@@ -82,14 +85,14 @@ FUSED: tuple[tuple[str, Callable[[], Model], bool], ...] = (
 
 
 def merged(proba: Matrix, classes: Labels) -> Matrix:
-    """Joint probabilities added up over the classes of type or level."""
+    """Joint probabilities summed over the classes of type or level."""
     return np.stack([proba[:, classes == c].sum(axis=1) for c in range(classes.max() + 1)], axis=1)
 
 
 def candidates(
     x: Matrix, targets: dict[str, Labels], train: Labels, test: Labels, folds: Labels
 ) -> dict[str, dict[str, tuple[Matrix, Matrix]]]:
-    """By target and candidate: out-of-fold probabilities of `train`, and those of `test`."""
+    """By target and candidate: out-of-fold probabilities of `train`, probabilities of `test`."""
 
     def both(y: Labels, make: Callable[[], Model]) -> tuple[Matrix, Matrix]:
         def fit_predict(a: Labels, b: Labels) -> Matrix:
@@ -109,7 +112,7 @@ def candidates(
 
 
 def fitted(x: Matrix, y: Labels, make: Callable[[], Model], train: Labels, test: Labels) -> Matrix:
-    """Probabilities of the rows `test` by a classifier of the rows `train`."""
+    """Probabilities of the rows `test`, from a classifier trained on the rows `train`."""
     model = make()
     model.fit(x[train], y[train])
     return model.predict_proba(x[test])
@@ -146,7 +149,7 @@ Predict = Callable[[Recordings, Labels, Labels], dict[str, Matrix]]
 
 
 def inside(predict: Predict, recordings: Recordings, train: Labels) -> dict[str, Matrix]:
-    """Probabilities of `train` by target, each of its containers held out once."""
+    """Probabilities of `train` by target, with each of its containers held out once."""
     container = recordings.container
     result = {target: np.zeros((len(train), c.max() + 1)) for target, c in CLASSES.items()}
     for held in np.unique(container[train]):
@@ -157,7 +160,7 @@ def inside(predict: Predict, recordings: Recordings, train: Labels) -> dict[str,
 
 
 def over_folds(predict: Predict, recordings: Recordings, inner: bool) -> None:
-    """Prints the scores of every outer fold, or inside its training containers, and their means."""
+    """Prints scores and means on the outer folds, or inside the training containers of each."""
     container = recordings.container
     scores: dict[str, list[tuple[float, float]]] = {target: [] for target in CLASSES}
     for fold in OUTER:
@@ -183,7 +186,7 @@ def over_folds(predict: Predict, recordings: Recordings, inner: bool) -> None:
 
 
 def m5(recordings: Recordings) -> None:
-    """M5's forest: 500 trees, one forest for type and one for level; five seeds."""
+    """M5's forests: 500 trees, one forest for type and one for level; five seeds."""
     for target in CLASSES:
         y = recordings.targets[target]
         runs = []

@@ -1,10 +1,10 @@
-"""Inputs for filling type and level from VGGish sequences (one vector each 0.96 s) and A34F.
+"""Inputs for filling type and level from VGGish sequences (one vector per 0.96 s) and A34F.
 
-What tells half from full in a recording: how long the filling flows, and how its sound has changed
-when it stops (the resonance of the container rises with the filling). So besides plain pooling
+Two things distinguish half from full: how long the filling flows, and how its sound has changed
+when it stops (the resonance of the container rises as it fills). So, in addition to plain pooling
 over equal parts of a recording, small patch models learn from the manual annotations of *training*
-recordings when something is poured or shaken and how full the container then is; recordings are
-pooled over the activity found. No annotation of a test recording is used.
+recordings when something is poured or shaken, and how full the container is then. Recordings are
+pooled over the activity that they find. No annotation of a test recording is used.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ PATCH_MODELS: tuple[Callable[[], Model], ...] = (
 
 @dataclass
 class Recordings:
-    """The 684 training recordings, in the order of the A34F file."""
+    """The 684 training recordings in the order of the A34F file."""
 
     a34f: Matrix
     #: VGGish vectors of all recordings, one after the other, and where each begins
@@ -50,7 +50,7 @@ class Recordings:
         a, v = np.load(folder / "a34f_train.npz"), np.load(folder / "vggish_train.npz")
         same = (a["sequence"] == v["sequence"]).all() and (a["container"] == v["container"]).all()
         if not same:
-            raise SystemExit("the rows of the two tables are not the same recordings")
+            raise SystemExit("the two tables hold different recordings")
         with open(folder / "man_annotations.csv", newline="") as file:
             action = {
                 (int(row["folder_num"]), row["file_name"].removesuffix("_c2")): (
@@ -70,7 +70,7 @@ class Recordings:
         )
 
     def shuffle_labels(self) -> None:
-        """Gives the recordings each other's labels."""
+        """Shuffles the labels among the recordings."""
         order = np.random.default_rng(0).permutation(len(self.a34f))
         self.targets = {k: y[order] for k, y in self.targets.items()}
 
@@ -93,7 +93,7 @@ def equal_parts(sequence: Matrix, parts: int) -> Matrix:
 
 
 def patch_labels(recordings: Recordings) -> tuple[Labels, Labels]:
-    """For each patch what is heard (0 nothing, else the type) and how full it is (0, or 1 to 4)."""
+    """For each patch, what is heard (0 for nothing, or the type) and how full it is (0 to 4)."""
     content, filling = [], []
     for row, sequence in enumerate(recordings.sequences()):
         start, end = recordings.action[row]
@@ -109,7 +109,7 @@ def patch_labels(recordings: Recordings) -> tuple[Labels, Labels]:
 
 
 def patch_inputs(recordings: Recordings) -> Matrix:
-    """Each patch with its neighbours, its time and the length of the recording."""
+    """Each patch with its neighbours, its time, and the length of the recording."""
     rows = []
     for sequence in recordings.sequences():
         padded = np.concatenate([sequence[:1], sequence, sequence[-1:]])
@@ -122,8 +122,8 @@ def patch_inputs(recordings: Recordings) -> Matrix:
 def patch_probabilities(
     recordings: Recordings, train: Labels, test: Labels, make: Callable[[], Model]
 ) -> tuple[Matrix, Matrix]:
-    """Probabilities of `patch_labels` for every patch: of training containers by models of the
-    other training containers, of the rest by models of all training containers."""
+    """Probabilities of `patch_labels` for every patch: for training containers, from models of the
+    other training containers; for the rest, from models of all training containers."""
     x, owner = patch_inputs(recordings), recordings.owners()
     inside = np.flatnonzero(np.isin(owner, train))
     outside = np.flatnonzero(np.isin(owner, test))
@@ -146,7 +146,7 @@ def patch_probabilities(
 
 
 def progress(content: Matrix, filling: Matrix) -> Matrix:
-    """Evidence for each type, durations, extremes and trend of what the patch models heard in one
+    """Evidence for each type, and durations, extremes and trend of what the patch models hear in a
     recording."""
     active = 1 - content[:, 0]
     total = active.sum() + 1e-9
@@ -176,7 +176,7 @@ def progress(content: Matrix, filling: Matrix) -> Matrix:
 
 
 def over_activity(sequence: Matrix, active: Matrix) -> Matrix:
-    """Means over the beginning, middle and end of the activity, and end less beginning."""
+    """Means over the beginning, middle and end of the activity, and end minus beginning."""
     weight = active + 1e-6
     done = (np.cumsum(weight) - weight / 2) / weight.sum()
     means = []
@@ -187,7 +187,7 @@ def over_activity(sequence: Matrix, active: Matrix) -> Matrix:
 
 
 def inputs(recordings: Recordings, train: Labels, test: Labels) -> dict[str, Matrix]:
-    """Inputs of all recordings by name; patch models are fitted on `train` alone."""
+    """Inputs of all recordings by name; patch models are fitted only on `train`."""
     sequences = recordings.sequences()
     spans = [slice(a, b) for a, b in itertools.pairwise(recordings.offsets)]
     heard = [patch_probabilities(recordings, train, test, make) for make in PATCH_MODELS]

@@ -1,12 +1,12 @@
-"""The 12 CORSMAL audio baselines on ESC-10, from the .ogg files: a Markdown table.
+"""The 12 CORSMAL audio baselines on ESC-10, from the .ogg files, as a Markdown table.
 
     python experiments/esc10_baselines.py [--tool corsmal-feat] [--shared ../shared] [--work DIR]
         [--librosa 0.8]
 
-Runs `corsmal-feat extract` and `corsmal-feat cross-validate --cv fold=fold` and prints mean
-accuracy over the five published folds beside the reference runs; forests: mean of seeds 0 to 4.
-The settings are those of the published baselines, nothing is chosen. Classes are numbers, as in the
-reference: equal votes go to the lower one, and the order of the names would decide otherwise.
+Runs `corsmal-feat extract` and `corsmal-feat cross-validate --cv fold=fold`, and prints mean
+accuracy over the five published folds next to the reference runs; for forests, the mean of seeds 0
+to 4. The settings are those of the published baselines; nothing is chosen. Classes are numbers, as
+in the reference, where the lower one wins a tie; with names, their order would decide.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--tool", default="corsmal-feat")
     parser.add_argument("--shared", default="../shared", type=pathlib.Path)
-    parser.add_argument("--work", type=pathlib.Path, help="keeps the features here")
-    parser.add_argument("--librosa", help="conventions of the features, if not the presets' own")
+    parser.add_argument("--work", type=pathlib.Path, help="folder in which to keep the features")
+    parser.add_argument("--librosa", help="librosa version whose conventions are used")
     arguments = parser.parse_args()
     data = arguments.shared / "data" / "esc10"
     reference: dict[tuple[str, str], list[float]] = {}

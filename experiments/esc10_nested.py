@@ -1,21 +1,21 @@
-"""Own configuration on ESC-10, chosen inside the training folds, from the .ogg files.
+"""Our configuration on ESC-10, chosen inside the training folds, from the .ogg files.
 
     python experiments/esc10_nested.py [--shared ../shared] [--check]
 
-Protocol, written down before any score of these candidates on a published fold was seen (those of
-the baselines, `esc10_baselines.py`, were known):
+Protocol, written down before any score of these candidates on a published fold was seen (the scores
+of the baselines, `esc10_baselines.py`, were known):
 
-* Inputs: statistics over frames (CONFIG) of the whole clip and of windows of 1 s and of 2.5 s, hop
-  half a window. Windows that are quieter than 1 % of the clip's loudest window are left out
-  (padding).
-* Candidates: each of the three lengths with each of LEARNERS. A clip's probabilities are the mean
-  of those of its windows.
-* For each published fold: out-of-fold probabilities of every candidate on the four other folds,
-  each held out once; `stacking.weights` of the nine candidates; the nine fitted on all four,
-  weighted, and scored on the fold. Score: mean accuracy over the five folds. Nothing else is
-  chosen. One run, fixed seeds.
+* Inputs: statistics over frames (CONFIG) of the whole clip, and of windows of 1 s and 2.5 s with a
+  hop of half a window. Windows that are quieter than 1 % of the loudest window of the clip
+  (padding) are left out.
+* Candidates: each of the three lengths with each of LEARNERS. The probabilities of a clip are the
+  means over its windows.
+* For each published fold: every candidate gives out-of-fold probabilities on the four other folds,
+  each held out once; `stacking.weights` weights the nine candidates; the nine are fitted on all
+  four folds, weighted, and scored on the fold. The score is the mean accuracy over the five folds.
+  Nothing else is chosen. One run, fixed seeds.
 
---check runs all of it with the labels shuffled: it must end near 10 %.
+--check runs everything with shuffled labels: the accuracy must be near 10 %.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ QUIET = 0.01
 
 
 class Windows:
-    """Features of windows, `[windows, features]`, and the clip of each."""
+    """Features of windows, `[windows, features]`, and the clip of each window."""
 
     def __init__(self, data: pathlib.Path, clips: list[dict[str, str]], length: float) -> None:
         with tempfile.TemporaryDirectory() as folder:
@@ -90,7 +90,7 @@ class Windows:
         self.x, self.clip = x[keep], clip[keep]
 
     def predict(self, make: Callable[[], Model], y: Labels, train: Labels, test: Labels) -> Matrix:
-        """Probabilities of the clips `test` by a model of the clips `train`."""
+        """Probabilities of the clips `test`, from a model of the clips `train`."""
         inside = np.isin(self.clip, train)
         model = make()
         model.fit(self.x[inside], y[self.clip[inside]])

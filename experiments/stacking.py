@@ -1,9 +1,9 @@
-"""Honest choice among classifiers: weights learnt on folds inside the training rows.
+"""Weights of classifiers, learned on folds inside the training rows.
 
-Used by the nested evaluations beside it. Every candidate gives out-of-fold probabilities on inner
-folds of the training rows; the weights, at least 0 and of sum 1, that minimise the log loss of the
-weighted mean of these probabilities weigh the candidates fitted on all training rows (a super
-learner, van der Laan et al. 2007).
+Used by the nested evaluations in this folder. Every candidate gives out-of-fold probabilities on
+inner folds of the training rows. The weights, at least 0 and with sum 1, minimise the log loss of
+the weighted mean of these probabilities, and then weight the candidates fitted on all training rows
+(a super learner, van der Laan et al. 2007).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Labels = npt.NDArray[np.int64]
 
 
 class Model(Protocol):
-    """What is asked of a classifier."""
+    """The methods that a classifier needs."""
 
     def fit(self, x: Matrix, y: Labels) -> object: ...
 
@@ -27,7 +27,7 @@ class Model(Protocol):
 
 
 class Standardized:
-    """A classifier behind standardisation with the training rows' mean and deviation."""
+    """A classifier after standardisation by the mean and deviation of the training rows."""
 
     def __init__(self, classifier: Model) -> None:
         self.classifier = classifier
@@ -43,8 +43,8 @@ class Standardized:
 
 
 class Ranked:
-    """A classifier of ranks: each feature is replaced by its place among the training rows, from -1
-    to 1, so that no recording lies far outside in any of them."""
+    """A classifier of ranks: each feature is replaced by its rank among the training rows, from -1
+    to 1, so that no recording is an extreme outlier in any of them."""
 
     def __init__(self, classifier: Model) -> None:
         self.classifier = classifier
@@ -66,7 +66,7 @@ class Ranked:
 
 
 def weighted_f1(truth: Labels, predicted: Labels) -> float:
-    """F1 of each class weighted by its rows."""
+    """F1 of each class, weighted by its number of rows."""
     total = 0.0
     for label in np.unique(truth):
         hits = np.sum((truth == label) & (predicted == label))
@@ -91,7 +91,8 @@ def held_out(fit_predict: Callable[[Labels, Labels], Matrix], folds: Labels) -> 
 
 
 def weights(probas: Sequence[Matrix], truth: Labels) -> npt.NDArray[np.float64]:
-    """Weights of the mean with the smallest log loss (convex; by expectation maximisation)."""
+    """Weights of the mean with the smallest log loss (a convex problem), by
+    expectation-maximisation."""
     rows = np.arange(len(truth))
     likelihood = np.stack([p[rows, truth] for p in probas], axis=1).clip(1e-6)
     w = np.full(len(probas), 1 / len(probas))
@@ -107,6 +108,6 @@ def mixture(probas: Sequence[Matrix], w: npt.NDArray[np.float64]) -> Matrix:
 
 
 def shown(names: Mapping[str, object] | Sequence[str], w: npt.NDArray[np.float64]) -> str:
-    """Names with weights of at least one per cent, the heaviest first."""
+    """Names with weights of at least 1 %, the largest first."""
     pairs = sorted(zip(w, names, strict=True), reverse=True)
     return ", ".join(f"{name} {value:.2f}" for value, name in pairs if value >= 0.01)
