@@ -1,4 +1,4 @@
-"""What all classifiers share."""
+"""Base classes of all classifiers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Learned(NamedTuple):
-    """What a classifier has learned from."""
+    """Labels and weights that a classifier was trained on."""
 
     #: position of each row's label in `classes_`
     positions: npt.NDArray[np.int64]
@@ -31,7 +31,7 @@ class Learned(NamedTuple):
 
 
 class Classifier(ClassifierMixin, BaseEstimator):
-    """What all classifiers share. Parameters are those of the subclass's `__init__`."""
+    """Base class of all classifiers. The parameters are those of the subclass's `__init__`."""
 
     _name: str
     #: keyword of the subclass -> parameter of the Rust side, where they differ

@@ -53,7 +53,7 @@ def evaluate(
     seed: int | None = None,
     containers: Iterable[int] | None = None,
 ) -> Scores:
-    """Scores of a CORSMAL submission, as the command `corsmal-feat evaluate` computes them.
+    """Scores a CORSMAL submission, as the command `corsmal-feat evaluate` does.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ def extract(
     overwrite: bool = False,
     progress: bool | Progress = False,
 ) -> Features:
-    """Features of recordings, as the command `corsmal-feat extract` computes them.
+    """Extracts features of recordings, as the command `corsmal-feat extract` does.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def _toml(key: str, value: Any) -> str:
 
 
 class SignalExtractor:
-    """Features of one signal that arrives in blocks; however it is split, the bits are the same.
+    """Extracts features of one signal that arrives in blocks; any split gives the same bits.
 
     Parameters
     ----------

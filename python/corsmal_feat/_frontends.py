@@ -70,7 +70,7 @@ def spec9216(
     """
     y = audio(y)
     if y.ndim != 1:
-        raise ParameterError(f"y has {y.ndim} dimensions, expected one channel")
+        raise ParameterError(f"y has {y.ndim} dimensions, expected 1")
     room("a signal", fixed_len or 0)
     image: Any = _core.spec9216(rows(y, 1), fixed_len or None, librosa).ravel()
     padded = (fixed_len or 0) > len(y)

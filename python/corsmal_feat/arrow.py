@@ -31,7 +31,7 @@ def extract_batch(
     channels: int | None = None,
     jobs: int = 1,
 ) -> Any:
-    """Features of the recordings in a batch: one row for each row, in the same order.
+    """Extracts features of the recordings in a batch: one row for each row, in the same order.
 
     Parameters
     ----------
