@@ -1,7 +1,7 @@
-"""Runs the targets one after another and keeps count: python fuzz/run.py --seconds 300
+"""Runs the fuzz targets one after another and logs the results: python fuzz/run.py --seconds 300
 
-Build them first: RUSTC_BOOTSTRAP=1 cargo fuzz build --fuzz-dir fuzz --sanitizer none. What is new
-goes into the corpus, what crashes, hangs or takes more than 2 GiB into its folder `artifacts`.
+Build them first: RUSTC_BOOTSTRAP=1 cargo fuzz build --fuzz-dir fuzz --sanitizer none. New inputs
+are added to the corpus; inputs that crash, hang or take more than 2 GiB go to `artifacts` in it.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def cpu_of_children() -> float:
 
 
 def was_starved(binary: Path, artifacts: Path) -> bool:
-    """Whether the newest finding timed out only since others had the processor: it is removed."""
+    """Whether the newest finding timed out only because the processor was busy; removes it then."""
     newest = max(artifacts.iterdir(), key=lambda path: path.stat().st_mtime, default=None)
     if newest is None or not newest.name.startswith("timeout-"):
         return False
@@ -47,7 +47,7 @@ def was_starved(binary: Path, artifacts: Path) -> bool:
 
 
 def one(target: str, options: argparse.Namespace) -> dict[str, object]:
-    """A target for some seconds; it is started again after what it finds."""
+    """Runs a target for some seconds, and starts it again after each finding."""
     corpus, artifacts = options.corpus / target, options.corpus / "artifacts" / target
     corpus.mkdir(parents=True, exist_ok=True)
     artifacts.mkdir(parents=True, exist_ok=True)
@@ -103,12 +103,12 @@ def summary(log: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("targets", nargs="*", default=TARGETS)
-    parser.add_argument("--seconds", type=int, default=300, help="for each target in each round")
+    parser.add_argument("--seconds", type=int, default=300, help="seconds per target and round")
     parser.add_argument("--rounds", type=int, default=1)
     parser.add_argument("--corpus", type=Path, default=HERE / "corpus")
     built = HERE / "target/x86_64-unknown-linux-gnu/release"
     parser.add_argument("--binaries", type=Path, default=built)
-    parser.add_argument("--summary", action="store_true", help="only print what was done so far")
+    parser.add_argument("--summary", action="store_true", help="only print the results so far")
     options = parser.parse_args()
     log = options.corpus / "log.csv"
     if options.summary:

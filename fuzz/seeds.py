@@ -1,7 +1,7 @@
-"""Writes seeds for every target with the tool itself: python fuzz/seeds.py CORSMAL_FEAT
+"""Writes seeds for every fuzz target with the command itself: python fuzz/seeds.py CORSMAL_FEAT
 
 They go to fuzz/corpus/TARGET, where cargo fuzz looks for them, or to FUZZ_CORPUS/TARGET. The
-hostile files of CORSMAL_SHARED, if it is there, go along.
+hostile files of CORSMAL_SHARED, if it exists, are added.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ HOSTILE = SHARED / "cases" / "hostile"
 
 
 def seed(target: str, name: str, content: bytes) -> None:
-    """One seed; what is long costs more than it finds."""
+    """Writes one seed, unless it is too long: long seeds cost more than they find."""
     if len(content) <= 200_000:
         folder = CORPUS / target
         folder.mkdir(parents=True, exist_ok=True)
@@ -229,5 +229,5 @@ def main() -> None:
 
 if __name__ == "__main__":
     if shutil.which("tar") is None:
-        raise SystemExit("tar is needed")
+        raise SystemExit("tar is not installed")
     main()

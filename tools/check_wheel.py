@@ -1,4 +1,4 @@
-"""Whether an installed wheel works: `tools/release` runs it in fresh environments."""
+"""Checks that an installed wheel works; `tools/release` runs this in fresh environments."""
 
 from __future__ import annotations
 

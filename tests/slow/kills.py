@@ -1,12 +1,12 @@
-"""Kills runs of `extract` at random moments and goes on with them.
+"""Kills runs of `extract` at random moments and resumes them.
 
     python tests/slow/kills.py --kills 200
 
-For each of five kinds of run: the finished output has the bytes of an undisturbed run, and the
-recordings that were read but not recorded when the kill came, which are read again, are counted
-by the system's own record of opened files (inotify, so Linux only). Results are written in the
-order of the inputs, and at most four for each job wait for their turn: exit code 1 if bytes
-differ, or if a kill cost more than that.
+For each of five kinds of run, this checks that the finished output has the bytes of an undisturbed
+run, and counts the recordings that are read again because they were read but not yet recorded when
+the kill came. The system reports opened files (inotify, so Linux only). Results are written in the
+order of the inputs, and at most four per job wait for their turn: the exit code is 1 if bytes
+differ, or if a kill costs more than that.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Opened:
 
 
 def recordings(folder: Path, rng: random.Random) -> None:
-    """Recordings of unequal length, an hour old: of new files the content is read as well."""
+    """Recordings of unequal length, an hour old, since the content of new files is also read."""
     for i in range(FILES):
         path = folder / f"r{i:04}.wav"
         with wave.open(str(path), "wb") as file:
@@ -78,7 +78,7 @@ def recordings(folder: Path, rng: random.Random) -> None:
 
 
 def done(out: Path) -> int:
-    """Recordings that the ledger holds."""
+    """Number of recordings in the ledger."""
     ledger = Path(f"{out}.ledger")
     return max(0, ledger.read_bytes().count(b"\n") - 1) if ledger.exists() else 0
 
