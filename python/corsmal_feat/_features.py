@@ -141,7 +141,9 @@ class Features:
             near = isinstance(recording, str)
             close = [i for i in self.ids if near and (recording in i or i in recording)][:3]
             hint = f"; did you mean {', '.join(map(repr, close))}?" if close else ""
-            raise UnknownIdError(f"no recording of {len(self.ids)} has the id {recording!r}{hint}")
+            raise UnknownIdError(
+                f"none of the {len(self.ids)} recordings has the id {recording!r}{hint}"
+            )
         if self.summary is None:
             # A recording may be too short for any frame.
             return {} if len(self.config["features"]) > 1 else np.empty((0, 0, 0), np.float32)

@@ -43,8 +43,8 @@ def _recording(y: Any) -> Singles:
 def spec9216(
     y: npt.ArrayLike, sr: float, fixed_len: int | None = None, *, librosa: str = "0.11"
 ) -> Floats:
-    """Image of one channel: divided by its RMS, |STFT| (n_fft=512, hop 128) in dB, resized to 96 x
-    96.
+    """Image of one channel: divided by its RMS, |STFT| (n_fft=512, hop 128) in dB, resized to
+    96 x 96.
 
     Parameters
     ----------
