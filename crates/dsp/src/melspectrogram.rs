@@ -7,7 +7,7 @@ use crate::error::{DspError, Result};
 use crate::lanes::{LANES, Row};
 use crate::mel::SparseBank;
 use crate::real::Real;
-use crate::stft::{StftParams, magnitude, single};
+use crate::stft::{LONGEST_ROWS, StftParams, magnitude, single};
 use crate::sums;
 use crate::tiles::{LanePlan, for_each_tile, neighbours, planar, write_columns};
 use crate::transform::Forward;
@@ -32,7 +32,7 @@ pub fn melspectrogram<T: Real>(
     let (channels, _, frames) = stft.shape_of(y)?;
     let mut out = Array3::zeros((channels, bands, frames));
     let y = planar(y);
-    if T::SINGLE {
+    if T::SINGLE && stft.n_fft <= LONGEST_ROWS {
         let plan = LanePlan::<Row>::new(stft)?;
         let rows = |n| vec![Row::ZERO; n];
         let state = || (plan.frames(), rows(stft.n_bins()), rows(bands));
@@ -126,6 +126,21 @@ mod tests {
                     assert!((want - f64::from(*single)).abs() < 1e-6 * largest);
                 }
             }
+        }
+    }
+
+    /// Rows of a long transform would take gigabytes a thread.
+    #[test]
+    fn long_transforms_of_single_precision_are_taken_one_by_one() {
+        let y = noise(3000);
+        let stft = StftParams::new(2 * LONGEST_ROWS, 1000);
+        let mel = MelParams { n_mels: 12, ..MelParams::new(16000.0, stft.n_fft) };
+        let bank = SparseBank::new(&mel_filter(&mel).unwrap());
+        let double = melspectrogram(y.view(), &stft, 2.0, &bank).unwrap();
+        let single = melspectrogram(y.mapv(|x| x as f32).view(), &stft, 2.0, &bank).unwrap();
+        let largest = double.iter().fold(0.0, |m: f64, x| m.max(*x));
+        for (double, single) in double.iter().zip(&single) {
+            assert!((double - f64::from(*single)).abs() < 1e-6 * largest);
         }
     }
 

@@ -3,7 +3,7 @@
 use ndarray::{Array2, ArrayView2, s};
 
 use crate::error::{DspError, Result};
-use crate::real::{Real, part_finite, require_finite};
+use crate::real::{Real, require_all_finite};
 use crate::simd::vectorized;
 use crate::stft::PadMode;
 use crate::tiles::read_columns;
@@ -55,9 +55,7 @@ pub(crate) fn resize_extended<T: Real>(
     }
     let image = image.as_standard_layout();
     let values = image.as_slice().expect("contiguous");
-    if !part_finite(values) {
-        require_finite("image", image.view())?;
-    }
+    require_all_finite("image", image.view())?;
     let (n_rows, known) = image.dim();
     let shrinks = rows < n_rows || columns < n_columns;
     let smooths = params.anti_aliasing.unwrap_or(shrinks);

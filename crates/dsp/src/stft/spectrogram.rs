@@ -13,7 +13,7 @@ use crate::transform::Forward;
 
 /// Longest transform of rows, which take 192 bytes a sample and thread; of longer ones frames are
 /// taken one by one.
-const LONGEST_ROWS: usize = 1 << 16;
+pub(crate) const LONGEST_ROWS: usize = 1 << 16;
 
 /// Complex spectrogram `[channels, n_fft / 2 + 1, frames]` of `y [channels, samples]` (librosa 0.11
 /// `stft`). `f32` signals are transformed in single precision (within 1e-6 of the largest value of
