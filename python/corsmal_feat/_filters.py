@@ -57,7 +57,7 @@ def window_spec(window: Window, length: int) -> WindowSpec:
             f" Kaiser window), an array, or a function of the length, not {window!r}"
         )
     if len(values) != length:
-        raise ParameterError(f"window has {len(values)} points, expected {length}")
+        raise ParameterError(f"Window size mismatch: {len(values)} points, expected {length}")
     if not np.isfinite(values).all():
         raise ParameterError("window contains NaN or infinite values")
     return values
