@@ -12,6 +12,8 @@ use corsmal_files::table::{RESERVED, Table};
 use ndarray::{Array1, ArrayD};
 use serde::Serialize;
 
+use super::texts::{self, TextColumn};
+
 /// Name under which frame times are compared.
 const TIMES: &str = "frame times";
 
@@ -51,6 +53,7 @@ pub(super) struct ComparedFile {
     /// Where each of them lies in a Parquet file.
     places: Vec<Place>,
     table: Option<NumericTable>,
+    texts: Vec<TextColumn>,
     provenance: Option<Provenance>,
     refused: Vec<Refused>,
 }
@@ -67,9 +70,11 @@ impl ComparedFile {
 
     fn npz(mut npz: NpzFile) -> Result<Self, FeatureFileError> {
         let (mut table, mut provenance, mut features) = (None, None, Vec::new());
+        let mut texts = Vec::new();
         if layout::is_ours(&npz) {
             let (found, made) = layout::read_table(&mut npz)?;
             features = made.features();
+            texts = texts::of_table(&found);
             table = (!found.feature_names().is_empty()).then(|| columns(&found));
             provenance = Some(made);
         }
@@ -86,6 +91,14 @@ impl ComparedFile {
                 Err(error) => return Err(error.into()),
             };
             if matches!(header.dtype.kind, Kind::Text | Kind::Bytes) {
+                if provenance.is_none() {
+                    match npz.texts(&name) {
+                        Ok(values) => texts.push(TextColumn { name, ids: None, values }),
+                        Err(error) => {
+                            refused.push(Refused { array: name, reason: error.to_string() });
+                        }
+                    }
+                }
                 continue;
             }
             let ours = provenance.as_ref().and_then(|_| owner(&name, &features));
@@ -96,6 +109,7 @@ impl ComparedFile {
             arrays,
             places: vec![],
             table,
+            texts,
             provenance,
             refused,
         })
@@ -106,7 +120,15 @@ impl ComparedFile {
         let dtype = npy.header().dtype.to_string();
         let arrays = vec![ArrayEntry { name, ours: None, dtype }];
         let source = FeatureFile::Npy(npy);
-        Self { source, arrays, places: vec![], table: None, provenance: None, refused: vec![] }
+        Self {
+            source,
+            arrays,
+            places: vec![],
+            table: None,
+            texts: vec![],
+            provenance: None,
+            refused: vec![],
+        }
     }
 
     fn parquet(parquet: ParquetFile) -> Result<Self, FeatureFileError> {
@@ -121,9 +143,21 @@ impl ComparedFile {
         let refused = refused.collect();
         // Tables of other tools have no provenance.
         let provenance = parquet.provenance().ok();
+        let texts = match provenance {
+            Some(_) => texts::of_table(&parquet.table()?.0),
+            None => table
+                .texts
+                .iter()
+                .map(|(name, values)| TextColumn {
+                    name: name.clone(),
+                    ids: table.ids.clone(),
+                    values: values.clone(),
+                })
+                .collect(),
+        };
         let source = FeatureFile::Parquet(parquet);
         let (arrays, places) = (vec![], vec![]);
-        Ok(Self { source, arrays, places, table: Some(table), provenance, refused })
+        Ok(Self { source, arrays, places, table: Some(table), texts, provenance, refused })
     }
 
     /// The frames of an output of ours, named as in an `.npz`.
@@ -146,8 +180,10 @@ impl ComparedFile {
                 }
             }
         }
+        let texts = texts::of_table(&found);
         let source = FeatureFile::Parquet(parquet);
-        Ok(Self { source, arrays, places, table: None, provenance: Some(made), refused: vec![] })
+        let (provenance, refused) = (Some(made), vec![]);
+        Ok(Self { source, arrays, places, table: None, texts, provenance, refused })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -172,11 +208,27 @@ impl ComparedFile {
         self.table.as_ref()
     }
 
+    /// Labels and statuses of an output of ours, texts of another file.
+    pub(super) fn texts(&self) -> &[TextColumn] {
+        &self.texts
+    }
+
+    /// The values of an array of 64-bit integers; `None` of any other.
+    pub(super) fn integers(&mut self, index: usize) -> Option<ArrayD<i128>> {
+        let entry = &self.arrays[index];
+        match &mut self.source {
+            FeatureFile::Npz(npz) if entry.dtype.ends_with("i8") || entry.dtype.ends_with("u8") => {
+                npz.integers(&entry.name).ok()
+            }
+            _ => None,
+        }
+    }
+
     pub(super) fn provenance(&self) -> Option<&Provenance> {
         self.provenance.as_ref()
     }
 
-    /// Arrays that are there but cannot be read as numbers, text aside.
+    /// Arrays that are there but cannot be read.
     pub(super) fn refused(&self) -> &[Refused] {
         &self.refused
     }

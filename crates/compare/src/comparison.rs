@@ -11,6 +11,7 @@ use super::difference::{Difference, Tolerance};
 use super::matching::{ArrayMatch, Matching, TableMatch};
 use super::pair::{Axes, Pair, index_of};
 use super::settings::Settings;
+use super::texts::{self, TextReport};
 use corsmal_files::parquet::NumericTable;
 
 /// The differences between two files.
@@ -29,6 +30,8 @@ pub struct Comparison {
     pub settings: Option<Settings>,
     /// One entry per feature, or per array of files that are not ours.
     pub features: Vec<FeatureReport>,
+    /// Labels, statuses, texts and whole numbers beyond 2^53 that both files have, compared exactly.
+    pub texts: Vec<TextReport>,
     /// Arrays, columns and rows of the first file only.
     pub only_a: Vec<String>,
     /// Arrays, columns and rows of the second file only.
@@ -94,13 +97,14 @@ pub struct FeatureReport {
 /// Puts a report together, a pair at a time.
 pub(super) struct ComparisonBuilder {
     tolerance: Tolerance,
+    exact: Vec<TextReport>,
     features: Vec<FeatureReport>,
     places: HashMap<String, usize>,
 }
 
 impl ComparisonBuilder {
     pub(super) fn new(tolerance: Tolerance) -> Self {
-        Self { tolerance, features: Vec::new(), places: HashMap::new() }
+        Self { tolerance, exact: Vec::new(), features: Vec::new(), places: HashMap::new() }
     }
 
     /// Compares two arrays.
@@ -141,6 +145,20 @@ impl ComparisonBuilder {
         if feature.difference.values - feature.difference.equal > equal {
             feature.causes(causes::of_values(&pair, dtypes), &found.place);
         }
+    }
+
+    /// Compares whole numbers that doubles would round, exactly; `false` if the arrays are of other shapes.
+    pub(super) fn integers(
+        &mut self,
+        found: &ArrayMatch,
+        a: &ArrayD<i128>,
+        b: &ArrayD<i128>,
+    ) -> bool {
+        let same = a.shape() == b.shape();
+        if same {
+            self.exact.push(TextReport::of_integers(&found.place, a.iter().zip(b)));
+        }
+        same
     }
 
     /// Compares the common rows and columns of two tables. Without tables nothing was found.
@@ -221,16 +239,20 @@ impl ComparisonBuilder {
             }
         }
         let equal = |f: &FeatureReport| f.differing == 0;
+        let mut texts = self.exact;
+        texts.extend(texts::compare(a.texts(), b.texts(), matching.by_file_name));
         Comparison {
             a: FileReport::new(a),
             b: FileReport::new(b),
             within: self.features.iter().all(equal)
+                && texts.iter().all(|t| t.differing == 0)
                 && matching.only_a.is_empty()
                 && matching.only_b.is_empty()
                 && refused.is_empty(),
             by_file_name: matching.by_file_name,
             settings,
             features: self.features,
+            texts,
             only_a: matching.only_a,
             only_b: matching.only_b,
             refused,

@@ -33,6 +33,7 @@ mod error;
 mod matching;
 mod pair;
 mod settings;
+mod texts;
 
 use std::path::Path;
 
@@ -42,10 +43,12 @@ pub use comparison::{Comparison, FeatureReport, FileReport, Finding, Shapes};
 pub use difference::{Difference, Extreme, Tolerance};
 pub use error::CompareError;
 pub use settings::{Setting, Settings};
+pub use texts::{TextDifference, TextReport};
 
 use compared_file::ComparedFile;
 use comparison::ComparisonBuilder;
 use matching::Matching;
+use ndarray::ArrayD;
 
 /// What counts as equal, and which arrays belong together.
 #[derive(Debug, Clone, Default)]
@@ -66,10 +69,23 @@ pub fn compare(a: &Path, b: &Path, criteria: &Criteria) -> Result<Comparison, Co
     let mut builder = ComparisonBuilder::new(criteria.tolerance);
     for found in &matching.arrays {
         let values = (a.load(found.a)?, b.load(found.b)?);
+        if beyond_doubles(&values.0)
+            && beyond_doubles(&values.1)
+            && let (Some(x), Some(y)) = (a.integers(found.a), b.integers(found.b))
+            && builder.integers(found, &x, &y)
+        {
+            continue;
+        }
         builder.arrays(found, &a.arrays()[found.a], &b.arrays()[found.b], values);
     }
     for found in &matching.tables {
         builder.table(found, a.table(), b.table());
     }
     Ok(builder.finish(&a, &b, matching))
+}
+
+/// Whether doubles may have rounded whole numbers to these.
+fn beyond_doubles(values: &ArrayD<f64>) -> bool {
+    const EXACT: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
+    values.iter().any(|x| x.abs() >= EXACT)
 }

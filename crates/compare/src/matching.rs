@@ -182,7 +182,7 @@ impl Matching {
 }
 
 /// The last part of an id.
-fn file_name(id: &str) -> &str {
+pub(super) fn file_name(id: &str) -> &str {
     id.rsplit('/').next().unwrap_or(id)
 }
 

@@ -29,6 +29,18 @@ pub enum TableError {
         /// Values given.
         actual: usize,
     },
+    /// The rows are not those of the recordings with features.
+    #[error(
+        "row {row} of the table is of {actual:?}, expected {expected:?}: the ids do not fit the outcomes, so the file was changed after it was written"
+    )]
+    Id {
+        /// The row, from 0.
+        row: usize,
+        /// Id of the recording in the outcomes; empty where there is none.
+        expected: String,
+        /// Id of the row; empty where there is none.
+        actual: String,
+    },
     /// Labels do not fit the columns.
     #[error("{id}: expected the label columns {expected:?}, found {actual:?}")]
     Labels {
@@ -194,7 +206,8 @@ impl Table {
     /// Puts a table together from what a reader found.
     ///
     /// # Errors
-    /// [`TableError::Row`] with the id `table` when counts disagree, [`TableError::Column`].
+    /// [`TableError::Id`] when rows and outcomes disagree, [`TableError::Row`] with the id `table` when
+    /// counts do, [`TableError::Column`].
     pub(crate) fn from_parts(
         ids: Vec<String>,
         feature_names: Vec<String>,
@@ -202,12 +215,21 @@ impl Table {
         labels: Vec<(String, Vec<String>)>,
         outcomes: Vec<Outcome>,
     ) -> Result<Self, TableError> {
-        let with_features = outcomes.iter().filter(|o| o.status.has_features()).map(|o| &o.id);
-        let wrong = |expected, actual| TableError::Row { id: "table".into(), expected, actual };
-        if !with_features.eq(&ids) {
-            let count = outcomes.iter().filter(|o| o.status.has_features()).count();
-            return Err(wrong(count, ids.len()));
+        let mut with_features =
+            outcomes.iter().filter(|o| o.status.has_features()).map(|o| &o.id).fuse();
+        let mut rows = ids.iter().fuse();
+        for row in 0.. {
+            match (with_features.next(), rows.next()) {
+                (None, None) => break,
+                (expected, actual) if expected == actual => {}
+                (expected, actual) => {
+                    let text = |id: Option<&String>| id.cloned().unwrap_or_default();
+                    let (expected, actual) = (text(expected), text(actual));
+                    return Err(TableError::Id { row, expected, actual });
+                }
+            }
         }
+        let wrong = |expected, actual| TableError::Row { id: "table".into(), expected, actual };
         if Some(values.len()) != ids.len().checked_mul(feature_names.len()) {
             return Err(wrong(feature_names.len() * ids.len(), values.len()));
         }

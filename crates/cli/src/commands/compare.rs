@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use corsmal_compare::{Comparison, Criteria, FeatureReport, Setting, Tolerance};
+use corsmal_compare::{
+    Comparison, Criteria, FeatureReport, Setting, TextDifference, TextReport, Tolerance,
+};
+use corsmal_files::quote::quoted;
 use serde_json::Value;
 
 use crate::failure::Failure;
@@ -24,7 +27,8 @@ Files may be outputs of `extract`, any .npz or .npy with numeric arrays, or a Pa
 Arrays are paired by name, outputs of `extract` by recording (id, else file name) and feature,
 tables by id and column; if each file has only one array, they need no name. The last axis is
 frames, the one before coefficients, the one before that channels (librosa's order). Only two
-arrays are in memory at a time.
+arrays are in memory at a time. Labels, statuses and texts that both files have, and integers
+beyond 2^53, are compared exactly.
 
 Likely causes are derived from the values, each with its evidence: offsets, factors, clamps,
 padding, order of axes and channels, and so on. docs/parity.md explains them.
@@ -106,14 +110,26 @@ fn text(report: &Comparison) -> String {
     for feature in &report.features {
         details(feature, &mut lines);
     }
+    for text in report.texts.iter().filter(|text| text.differing > 0) {
+        let TextReport { name, values, differing, first } = text;
+        lines.push(format!("\n{name}\n  {differing} of {values} values differ"));
+        if let Some(TextDifference { place, a, b }) = first {
+            lines.push(format!("  first in {}: {} and {}", quoted(place), quoted(a), quoted(b)));
+        }
+    }
     for (side, names) in [("a", &report.only_a), ("b", &report.only_b)] {
         if !names.is_empty() {
             lines.push(format!("\nonly in {side}: {}", listing(names)));
         }
     }
+    let of_texts = report.texts.iter().filter(|text| text.differing > 0).count();
     let differing = report.features.iter().filter(|f| f.differing > 0).count();
     lines.push(match (report.within, differing) {
         (true, _) => "\nequal within the tolerance".into(),
+        (false, 0) if of_texts > 0 => {
+            "\nfeatures are equal within the tolerance; labels, statuses or other texts differ"
+                .into()
+        }
         (false, 0) => {
             "\nwhat both files have is equal within the tolerance; the rest is in only one of them"
                 .into()

@@ -13,7 +13,8 @@ pub(super) fn detect(pair: &Pair, dtypes: [&str; 2], noise: f64) -> Option<Cause
     let largest = pair.largest();
     let (mut most, mut most_relative) = (0.0f64, 0.0f64);
     for (a, b) in pair.values() {
-        if a.is_finite() != b.is_finite() {
+        // No rounding makes an infinity of a number, or turns its sign.
+        if a.is_finite() != b.is_finite() || (a.is_infinite() && a != b) {
             return None;
         }
         if a.is_finite() && a != b {

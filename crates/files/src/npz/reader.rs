@@ -17,7 +17,7 @@ use zip::{CompressionMethod, ZipArchive};
 use super::entry::{Compression, EntryRecord};
 use super::error::NpzError;
 use super::limits::{MAX_INFLATED, MAX_RATIO, MAX_STRINGS};
-use crate::npy::{self, DType, Endian, Header, Kind, NpyError};
+use crate::npy::{self, DType, Endian, Header, Kind, NpyError, Order};
 use crate::quote::quoted;
 
 const EXTENSION: &str = ".npy";
@@ -132,12 +132,27 @@ impl NpzFile {
     /// # Errors
     /// [`NpzError`] names the member and what is wrong with it.
     pub fn strings(&mut self, name: &str) -> Result<Vec<String>, NpzError> {
+        let header = self.header(name)?;
+        if !matches!((header.dtype.kind, &header.shape[..]), (Kind::Text | Kind::Bytes, [_])) {
+            return self.read(name, 0, |_, header, wrong| {
+                Err(wrong.kind("a list of strings (U or S)", header))
+            });
+        }
+        self.texts(name)
+    }
+
+    /// A text member of any shape, as [`strings`](Self::strings); the last axis runs fastest.
+    ///
+    /// # Errors
+    /// [`NpzError`] names the member and what is wrong with it; arrays in Fortran's order are refused.
+    pub fn texts(&mut self, name: &str) -> Result<Vec<String>, NpzError> {
         let most = MAX_INFLATED.max(self.length.saturating_mul(MAX_RATIO)) - self.text;
         let strings = self.read(name, size_of::<String>(), |body, header, wrong| {
-            let (Kind::Text | Kind::Bytes, &[count]) = (header.dtype.kind, header.shape.as_slice())
-            else {
-                return Err(wrong.kind("a list of strings (U or S)", header));
+            let in_order = header.order == Order::C || header.shape.len() < 2;
+            let (Kind::Text | Kind::Bytes, true) = (header.dtype.kind, in_order) else {
+                return Err(wrong.kind("strings (U or S) in C order", header));
             };
+            let count = header.elements().map_err(|e| wrong.npy(e))?;
             let width = header.dtype.itemsize;
             // Only with bytes behind them are width and count more than a header's word.
             match (count, width) {

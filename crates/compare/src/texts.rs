@@ -1,0 +1,157 @@
+//! What is compared exactly: labels, statuses, text members, and whole numbers that doubles would round.
+
+use std::collections::HashMap;
+
+use corsmal_files::table::Table;
+use serde::Serialize;
+
+use super::matching::file_name;
+
+/// Name under which the statuses of recordings are compared.
+const STATUS: &str = "status";
+
+/// A column of texts in one file.
+#[derive(Debug)]
+pub(super) struct TextColumn {
+    /// Its name.
+    pub name: String,
+    /// What its rows are named by: ids, or their numbers.
+    pub ids: Option<Vec<String>>,
+    /// Its values.
+    pub values: Vec<String>,
+}
+
+/// How texts of two files differ.
+#[derive(Debug, Serialize)]
+pub struct TextReport {
+    /// The label, or the member.
+    pub name: String,
+    /// Values compared.
+    pub values: usize,
+    /// Those that differ.
+    pub differing: usize,
+    /// The first that differs.
+    pub first: Option<TextDifference>,
+}
+
+/// Two texts in the same place.
+#[derive(Debug, Serialize)]
+pub struct TextDifference {
+    /// The recording, or the number of the value.
+    pub place: String,
+    /// In the first file; empty where there is none.
+    pub a: String,
+    /// In the second file; empty where there is none.
+    pub b: String,
+}
+
+/// Labels and statuses of an output of ours.
+pub(super) fn of_table(table: &Table) -> Vec<TextColumn> {
+    let labels = table.labels().map(|(name, values)| TextColumn {
+        name: name.to_owned(),
+        ids: Some(table.ids().to_vec()),
+        values: values.to_vec(),
+    });
+    let outcomes = table.outcomes();
+    let statuses = TextColumn {
+        name: STATUS.into(),
+        ids: Some(outcomes.iter().map(|outcome| outcome.id.clone()).collect()),
+        values: outcomes.iter().map(|outcome| outcome.status.name().to_owned()).collect(),
+    };
+    labels.chain([statuses]).collect()
+}
+
+/// Compares the columns that both files have, in the rows that both have.
+pub(super) fn compare(a: &[TextColumn], b: &[TextColumn], by_file_name: bool) -> Vec<TextReport> {
+    let pair = |x: &TextColumn| {
+        let y = b.iter().find(|y| y.name == x.name)?;
+        Some(of_columns(x, y, by_file_name))
+    };
+    a.iter().filter_map(pair).collect()
+}
+
+fn of_columns(a: &TextColumn, b: &TextColumn, by_file_name: bool) -> TextReport {
+    let mut report = TextReport { name: a.name.clone(), values: 0, differing: 0, first: None };
+    if let (Some(in_a), Some(in_b)) = (&a.ids, &b.ids) {
+        let key = |id: &String| if by_file_name { file_name(id).to_owned() } else { id.clone() };
+        let places: HashMap<String, usize> = in_b.iter().map(key).zip(0..).collect();
+        for (id, x) in in_a.iter().zip(&a.values) {
+            if let Some(&row) = places.get(&key(id)) {
+                report.add(|| id.clone(), Some(x), b.values.get(row));
+            }
+        }
+    } else {
+        for i in 0..a.values.len().max(b.values.len()) {
+            report.add(|| format!("value {i}"), a.values.get(i), b.values.get(i));
+        }
+    }
+    report
+}
+
+impl TextReport {
+    /// Compares whole numbers, of arrays of one shape.
+    pub(super) fn of_integers<'a>(
+        name: &str,
+        pairs: impl Iterator<Item = (&'a i128, &'a i128)>,
+    ) -> Self {
+        let mut report = Self { name: name.into(), values: 0, differing: 0, first: None };
+        for (i, (x, y)) in pairs.enumerate() {
+            report.add(|| format!("value {i}"), Some(x), Some(y));
+        }
+        report
+    }
+
+    fn add<T: PartialEq + ToString>(
+        &mut self,
+        place: impl FnOnce() -> String,
+        a: Option<&T>,
+        b: Option<&T>,
+    ) {
+        self.values += 1;
+        if a == b {
+            return;
+        }
+        self.differing += 1;
+        let text = |value: Option<&T>| value.map(T::to_string).unwrap_or_default();
+        if self.first.is_none() {
+            self.first = Some(TextDifference { place: place(), a: text(a), b: text(b) });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn column(ids: Option<&[&str]>, values: &[&str]) -> TextColumn {
+        let texts = |list: &[&str]| list.iter().map(ToString::to_string).collect::<Vec<_>>();
+        TextColumn { name: "class".into(), ids: ids.map(texts), values: texts(values) }
+    }
+
+    #[test]
+    fn texts_are_compared_by_id_whatever_their_order() {
+        let a = column(Some(&["x/1", "x/2", "x/3"]), &["rain", "dog", "sea"]);
+        let b = column(Some(&["x/2", "x/1", "x/4"]), &["dog", "Rain", "sea"]);
+        let found = &compare(&[a], &[b], false)[0];
+        assert_eq!((found.values, found.differing), (2, 1));
+        let first = found.first.as_ref().unwrap();
+        assert_eq!((&*first.place, &*first.a, &*first.b), ("x/1", "rain", "Rain"));
+        let a = column(Some(&["x/1"]), &["rain"]);
+        let b = column(Some(&["y/1"]), &["dog"]);
+        assert_eq!(compare(&[a], &[b], true)[0].differing, 1);
+    }
+
+    #[test]
+    fn lists_of_other_lengths_differ() {
+        let (a, b) = (column(None, &["rain", ""]), column(None, &["rain"]));
+        assert_eq!(compare(&[a], &[b], false)[0].differing, 1);
+    }
+
+    #[test]
+    fn whole_numbers_beyond_doubles_are_told_apart() {
+        let (x, y) = ([1_i128 << 53, (1 << 53) + 1], [1_i128 << 53, 1 << 53]);
+        let found = TextReport::of_integers("x", x.iter().zip(&y));
+        assert_eq!((found.values, found.differing), (2, 1));
+        assert_eq!(found.first.unwrap().a, "9007199254740993");
+    }
+}
