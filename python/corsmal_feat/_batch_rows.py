@@ -28,6 +28,11 @@ def rows_of(batch: Any) -> list[Any]:
     names = batch.schema.names
     if len({*names}) != len(names):
         raise ParameterError(f"batch has two columns with the same name: {', '.join(names)}")
+    for name in names:
+        if name.lower() in (ID, START, END) and name not in (ID, START, END):
+            raise ParameterError(
+                f"the column {name!r} must be called {name.lower()!r}; a label must be called otherwise"
+            )
     if PATH not in names and BYTES not in names:
         raise ParameterError(f"batch needs a column path or bytes, but has only {', '.join(names)}")
 

@@ -115,6 +115,14 @@ impl ManifestColumns {
         if place == MAX_COLUMNS {
             return Err(format!("more than {MAX_COLUMNS} different columns"));
         }
+        // As a label it would be passed on unread, and the whole recording computed.
+        let meant = [ID, START, END].into_iter().find(|own| name.eq_ignore_ascii_case(own));
+        if let Some(own) = meant.filter(|own| *own != name) {
+            let name = quoted(name);
+            return Err(format!(
+                "column {name} must be called `{own}`; a label must be called otherwise"
+            ));
+        }
         self.places.insert(name.into(), place);
         if ![PATH, ID, START, END].contains(&name) {
             self.labels.push((place, name.into()));
@@ -226,10 +234,18 @@ fn json_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
         let fields = fields(text).map_err(|reason| wrong(path, line, reason))?;
         let mut cells = Vec::with_capacity(fields.len());
         for (name, value) in fields {
-            let value = label(value).ok_or_else(|| {
-                let name = quoted(&name);
-                wrong(path, line, format!("{name} must be a string, a number or a boolean"))
-            })?;
+            let value = match label(value) {
+                Ok(Some(value)) => value,
+                Ok(None) => {
+                    let name = quoted(&name);
+                    let reason = format!("{name} must be a string, a number or a boolean");
+                    return Err(wrong(path, line, reason));
+                }
+                Err(rounded) => {
+                    let reason = format!("{}: {rounded}", quoted(&name));
+                    return Err(wrong(path, line, reason));
+                }
+            };
             let place = columns.place(&name).map_err(|reason| wrong(path, line, reason))?;
             cells.push((place, value));
         }
@@ -251,14 +267,25 @@ pub(crate) fn fields(text: &str) -> Result<Vec<(String, Value)>, String> {
     Ok(object.0)
 }
 
-/// The text of a value that can be a label.
-pub(crate) fn label(value: Value) -> Option<String> {
-    match value {
+/// The text of a value that can be a label; none of lists and objects.
+///
+/// # Errors
+/// A whole number that was rounded when it was read: two of them could become one label.
+pub(crate) fn label(value: Value) -> Result<Option<String>, String> {
+    const EXACT: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
+    Ok(match value {
         Value::Null => Some(String::new()),
         Value::String(text) => Some(text),
+        Value::Number(number)
+            if number.is_f64() && number.as_f64().is_none_or(|x| x.abs() >= EXACT) =>
+        {
+            return Err(format!(
+                "{number} must be a string: a number of so many digits is rounded"
+            ));
+        }
         Value::Bool(_) | Value::Number(_) => Some(value.to_string()),
         Value::Array(_) | Value::Object(_) => None,
-    }
+    })
 }
 
 /// A JSON object with its keys in the order written, each once.
@@ -290,5 +317,44 @@ impl<'de> Deserialize<'de> for Object {
             }
         }
         deserializer.deserialize_map(Fields)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(name: &str, text: &str) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        read(&path).unwrap_err().to_string()
+    }
+
+    /// Whole recordings were computed, and their times passed on as labels.
+    #[test]
+    fn times_under_other_names_are_refused() {
+        for (name, own) in [("Start", "start"), ("END", "end"), ("Id", "id")] {
+            let text = refusal("list.csv", &format!("path,{name}\na.wav,1\n"));
+            assert!(text.contains(&format!("must be called `{own}`")), "{text}");
+            let text = refusal("list.jsonl", &format!("{{\"path\": \"a.wav\", \"{name}\": 1}}\n"));
+            assert!(text.contains(&format!("must be called `{own}`")), "{text}");
+        }
+    }
+
+    /// Two numbers became one label.
+    #[test]
+    fn whole_numbers_of_more_than_64_bits_are_refused() {
+        let row = |n: &str| format!("{{\"path\": \"a.wav\", \"serial\": {n}}}\n");
+        for n in ["12345678901234567890123", "-9223372036854775809", "1e300"] {
+            let text = refusal("list.jsonl", &row(n));
+            assert!(text.contains("must be a string"), "{text}");
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("list.jsonl");
+        std::fs::write(&path, row("18446744073709551615") + &row("0.5")).unwrap();
+        let labels: Vec<String> =
+            read(&path).unwrap().into_iter().map(|entry| entry.labels[0].1.clone()).collect();
+        assert_eq!(labels, ["18446744073709551615", "0.5"]);
     }
 }

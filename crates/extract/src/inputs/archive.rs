@@ -342,7 +342,11 @@ fn labels_of(member: &Member, content: &mut impl Read) -> Result<Vec<(String, St
     }
     // Values that are lists or objects are no labels; an output has ids of its own.
     let fields = manifest::fields(&text)?.into_iter().filter(|(name, _)| name != manifest::ID);
-    Ok(fields.filter_map(|(name, value)| Some((name, manifest::label(value)?))).collect())
+    let label = |(name, value)| match manifest::label(value) {
+        Ok(text) => text.map(|text| Ok((name, text))),
+        Err(rounded) => Some(Err(format!("{}: {rounded}", quoted(&name)))),
+    };
+    fields.filter_map(label).collect()
 }
 
 /// Whether a block of zeros follows the last member.
