@@ -172,7 +172,7 @@ fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
             (None, csv::ErrorKind::Io(_)) => reader.get_ref().get_ref().line,
             (None, _) => 1,
         };
-        wrong(path, line, error.to_string())
+        wrong(path, line, csv_text::fault(&error))
     };
     let mut reader = csv_text::reader(open(path)?).map_err(|e| InputError::io(path, e))?;
     let mut columns = ManifestColumns::default();

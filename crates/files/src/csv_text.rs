@@ -32,6 +32,18 @@ pub fn reader<R: BufRead>(mut text: R) -> io::Result<csv::Reader<R>> {
     Ok(builder.delimiter(delimiter).trim(csv::Trim::All).from_reader(text))
 }
 
+/// What is wrong with a table, and what to do about text that is not UTF-8, such as Excel's `CSV` in
+/// Western Europe.
+pub fn fault(error: &csv::Error) -> String {
+    match (error.kind(), error.position()) {
+        (csv::ErrorKind::Utf8 { .. }, position) => {
+            let line = position.map(|p| format!("line {}: ", p.line())).unwrap_or_default();
+            format!("{line}text that is not UTF-8: save the table as \"CSV UTF-8\"")
+        }
+        _ => error.to_string(),
+    }
+}
+
 /// A name that two columns have; columns without a name are not told apart.
 pub fn repeated<S: AsRef<str>>(header: impl IntoIterator<Item = S>) -> Option<String> {
     let mut seen = HashSet::new();
@@ -42,6 +54,14 @@ pub fn repeated<S: AsRef<str>>(header: impl IntoIterator<Item = S>) -> Option<St
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn text_of_older_encodings_is_refused_with_advice() {
+        let mut table = reader(&b"id,class\n1,caf\xe9\n"[..]).unwrap();
+        let error = table.records().next().unwrap().unwrap_err();
+        let expected = "line 2: text that is not UTF-8: save the table as \"CSV UTF-8\"";
+        assert_eq!(fault(&error), expected);
+    }
 
     #[test]
     fn separators_and_marks_are_recognised() {

@@ -51,7 +51,10 @@ impl<'a> Index<'a> {
                     && !told.contains(&other)
                 {
                     told.push(other);
-                    let what = format!("contradicts {} about {which}", other.display());
+                    let what = match other == file.path {
+                        true => format!("has two rows about {which} that contradict each other"),
+                        false => format!("contradicts {} about {which}", other.display()),
+                    };
                     index.contradictions.push(Oddity { path: file.path.clone(), what });
                 }
             }

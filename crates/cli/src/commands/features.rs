@@ -1,7 +1,8 @@
-//! `corsmal-feat features`: every feature that a configuration can name.
+//! `corsmal-feat features`: everything that a configuration can name.
 
 use std::process::ExitCode;
 
+use corsmal_extract::config::{SECTIONS, Section};
 use corsmal_extract::features::{Entry, find, kinds, registry};
 use serde_json::{Value, json};
 
@@ -17,9 +18,12 @@ const NAMES: usize = 20;
 Examples:
   corsmal-feat features
   corsmal-feat features mfcc                 what it computes, every key with its default and meaning
-  corsmal-feat features mfcc >> my.toml      the same as a part of a configuration file")]
+  corsmal-feat features mfcc >> my.toml      the same as a part of a configuration file
+  corsmal-feat features signal               channels, sample rate, level: the keys of [signal]
+  corsmal-feat features summary              statistics over frames: the keys of [summary]")]
 pub struct Args {
-    /// A feature to show with its parameters and their defaults; without it, all features are listed.
+    /// A feature to show with its parameters and their defaults, or `signal` or `summary`; without it, all
+    /// features are listed.
     name: Option<String>,
     /// Print everything as JSON.
     #[arg(long)]
@@ -40,8 +44,12 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         }
         return Ok(ExitCode::SUCCESS);
     };
+    if let Some(section) = SECTIONS.iter().find(|section| section.name == name) {
+        return shown(section, args.json);
+    }
     let Some(feature) = find(&name) else {
-        let choices = corsmal_names::choices(&name, kinds());
+        let names = kinds().into_iter().chain(SECTIONS.iter().map(|section| section.name));
+        let choices = corsmal_names::choices(&name, names);
         return Err(Failure::new(format!("feature \"{name}\" is unknown: {choices}")));
     };
     if args.json {
@@ -58,6 +66,26 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
             println!("{}", wrapped(feature.explain(&key).unwrap_or_default(), "# "));
             println!("{key} = {value}");
         }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Explains a section.
+fn shown(section: &Section, json: bool) -> Result<ExitCode, Failure> {
+    let Section { name, about, keys } = section;
+    let example = section.example();
+    if json {
+        let keys = keys
+            .iter()
+            .map(|(key, meaning)| json!({"key": key, "example": example[key], "meaning": meaning}));
+        let keys: Vec<Value> = keys.collect();
+        let all = json!({"name": name, "about": about, "keys": keys});
+        println!("{}", serde_json::to_string_pretty(&all)?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!("{}\n\n[{name}]", wrapped(about, "# "));
+    for (key, meaning) in *keys {
+        println!("{}\n{key} = {}", wrapped(meaning, "# "), example[key]);
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -3,6 +3,7 @@
 
 mod librosa;
 mod preset;
+mod section;
 mod set;
 mod signal;
 #[cfg(test)]
@@ -11,6 +12,7 @@ mod tests;
 pub use crate::params::ConfigError;
 pub use corsmal_dsp::resample::ResType;
 pub use preset::{PRESETS, Preset};
+pub use section::{SECTIONS, Section};
 pub use signal::{Channels, Normalize, SignalConfig};
 
 use std::path::Path;

@@ -45,7 +45,10 @@ impl Header {
             ("ledger version", self.ledger_version.to_string()),
             ("tool version", self.tool_version.clone()),
             ("configuration", self.config_hash.clone()),
-            ("input list", self.inputs_hash.clone()),
+            (
+                "a list of inputs (ids, paths, times, labels) with the hash",
+                self.inputs_hash.clone(),
+            ),
             ("shard", self.shard.clone()),
             ("format", self.format.clone()),
         ]

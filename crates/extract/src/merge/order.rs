@@ -79,7 +79,10 @@ pub(super) fn in_order(
                 ("layout version", p.layout_version.to_string()),
                 ("tool version", p.tool_version.clone()),
                 ("configuration", p.config_hash.clone()),
-                ("input list", p.inputs_hash.clone()),
+                (
+                    "a list of inputs (ids, paths, times, labels) with the hash",
+                    p.inputs_hash.clone(),
+                ),
                 ("configuration text", p.config.clone()),
             ]
         };

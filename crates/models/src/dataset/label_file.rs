@@ -55,7 +55,7 @@ impl LabelFile {
     /// [`DatasetError::Content`] for a file that is not a table, has no such column, names a column
     /// twice, or names a recording twice.
     pub fn read(path: &Path, key: Option<&str>) -> Result<Self> {
-        let fault = |e: csv::Error| DatasetError::content(path, e.to_string());
+        let fault = |e: csv::Error| DatasetError::content(path, csv_text::fault(&e));
         let other = |e: std::io::Error| DatasetError::content(path, e.to_string());
         let text = BufReader::new(File::open(path).map_err(other)?);
         let mut reader = csv_text::reader(text).map_err(other)?;

@@ -35,7 +35,8 @@ impl PredictionTable {
     /// As [`PredictionTable::read`].
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
         let mut reader = csv_text::reader(bytes).map_err(|e| content(path, e.to_string()))?;
-        let fault = |e: csv::Error| content(path, format!("not a readable table: {e}"));
+        let fault =
+            |e: csv::Error| content(path, format!("not a readable table: {}", csv_text::fault(&e)));
         let header: Vec<String> =
             reader.headers().map_err(fault)?.iter().map(String::from).collect();
         let mut lines = Vec::new();

@@ -198,9 +198,10 @@ fn check_features(model: &Model, table: &LabelledTable, meter: &Meter) -> Result
     if known != given {
         let channels = table.outcomes.iter().find_map(|o| o.channels);
         let channels = channels.map_or(String::new(), |n| format!(", of {}", plural(n, "channel")));
+        let names = (&model.header().feature_names, &table.feature_names);
         let reason = format!(
-            "gives {given} features{channels}; the model was trained on {known}, from recordings \
-             with another number of channels"
+            "gives {given} features{channels}; the model was trained on {known}{}",
+            apart(names.0, names.1)
         );
         table.ids.iter().for_each(|id| refuse(meter, id, &reason));
         return Ok(false);
@@ -212,6 +213,18 @@ fn check_features(model: &Model, table: &LabelledTable, meter: &Meter) -> Result
             "{}: feature {at} must be {known}, as in training, not {given}",
             table.path.display()
         ))),
+    }
+}
+
+/// The first names that only one of the lists has.
+fn apart(known: &[String], given: &[String]) -> String {
+    let only =
+        |of: &[String], other: &[String]| of.iter().find(|name| !other.contains(name)).cloned();
+    match (only(known, given), only(given, known)) {
+        (None, None) => String::new(),
+        (Some(lacks), None) => format!("; {lacks} is missing"),
+        (None, Some(has)) => format!("; {has} was not there"),
+        (Some(lacks), Some(has)) => format!("; {lacks} is missing, {has} was not there"),
     }
 }
 
