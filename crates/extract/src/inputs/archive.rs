@@ -14,6 +14,7 @@ use corsmal_audio::{AudioError, BlockSource};
 use corsmal_files::identity;
 use corsmal_files::quote::quoted;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use tar::{Archive, EntryType};
 
 use super::beside;
@@ -342,7 +343,7 @@ fn labels_of(member: &Member, content: &mut impl Read) -> Result<Vec<(String, St
     }
     // Values that are lists or objects are no labels; an output has ids of its own.
     let fields = manifest::fields(&text)?.into_iter().filter(|(name, _)| name != manifest::ID);
-    let label = |(name, value)| match manifest::label(value) {
+    let label = |(name, value): (String, Value)| match manifest::label(value) {
         Ok(text) => text.map(|text| Ok((name, text))),
         Err(rounded) => Some(Err(format!("{}: {rounded}", quoted(&name)))),
     };
