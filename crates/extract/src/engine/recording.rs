@@ -89,13 +89,11 @@ impl Recording {
         self.total.unwrap_or(0)
     }
 
-    /// Frames of the feature with the fewest.
-    pub fn fewest_frames(&self) -> usize {
-        let frames = |(store, f): (&Store, &PlannedFeature)| {
-            let width = f.raw_rows * self.plan.channels;
-            (width > 0).then(|| store.len() / width)
-        };
-        self.raw.iter().zip(&self.plan.features).filter_map(frames).min().unwrap_or(0)
+    /// Name of the first feature without a frame.
+    fn without_frames(&self) -> Option<&str> {
+        let mut features = self.raw.iter().zip(&self.plan.features);
+        let none = features.find(|(store, f)| f.raw_rows > 0 && store.len() == 0)?;
+        Some(&none.1.name)
     }
 
     /// The features of a recording of which every span is there.
@@ -107,9 +105,14 @@ impl Recording {
         if total == 0 {
             return Err(Failed::new(Status::Empty, "no samples"));
         }
-        if self.fewest_frames() == 0 {
+        if let Some(feature) = self.without_frames() {
             let needed = self.plan.shortest();
-            let reason = format!("{total} samples; one frame needs at least {needed}");
+            let reason = if total < needed {
+                format!("{total} samples; one frame needs at least {needed}")
+            } else {
+                // M4's code makes frames of shorter and longer recordings, but none of one frame's length.
+                format!("{feature} makes no frame of exactly {total} samples")
+            };
             return Err(Failed::new(Status::TooShort, reason));
         }
         let plan = self.plan.clone();

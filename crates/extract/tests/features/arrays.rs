@@ -23,8 +23,8 @@ use corsmal_dsp::spectral::{
 };
 use corsmal_dsp::stft::{PadMode, StftParams, spectrogram};
 use corsmal_dsp::tonnetz::tonnetz;
-use corsmal_extract::config::Config;
-use corsmal_extract::engine::{Extractor, Features, Plan};
+use corsmal_extract::config::{Config, Preset};
+use corsmal_extract::engine::{Extractor, Features, Plan, Signals};
 use ndarray::{Array2, Array3, ArrayView2, Axis, concatenate, s};
 
 use crate::support::{SR, alone, features, frames, signal};
@@ -271,4 +271,20 @@ fn decibels_of_amplitudes() {
             close(&text, &frames(&text, y.view(), 4099), &want.mapv(|x| x.max(floor)), 1e-4);
         }
     }
+}
+
+#[test]
+fn m4_makes_no_frame_of_exactly_one_frame() {
+    let preset = Preset::find("m4-code").unwrap();
+    let config = Arc::new(Config::with_overrides(preset.toml, "m4-code", &[]).unwrap());
+    let signals = Signals::new(config);
+    let run = |samples: usize| {
+        let mut of = signals.start(22_050, 1).unwrap();
+        of.push(&signal(1, samples).into_raw_vec_and_offset().0).unwrap();
+        of.finish()
+    };
+    // A frame has 551 samples. As published, shorter and longer recordings have frames.
+    assert!(run(550).is_ok() && run(552).is_ok());
+    let error = run(551).err().unwrap().to_string();
+    assert!(error.contains("m4_logmel makes no frame of exactly 551 samples"), "{error}");
 }
