@@ -150,17 +150,14 @@ fn examples(samples: &[&Sample]) -> Vec<Example> {
                 others.filter(|s| s.category == sample.category).copied().collect();
             M3::fit(&others).ok()
         });
-        let mut estimates = sample.estimates.clone();
-        if let Some(normal) =
-            m3.as_ref().zip(sample.vote.as_ref()).and_then(|(m3, vote)| m3.predict(vote).ok())
-        {
-            estimates.insert("m3".into(), normal.mean.exp());
-        }
+        let both = m3.as_ref().zip(sample.vote.as_ref());
+        let normal = both.and_then(|(m3, vote)| m3.predict(vote).ok());
         examples.push(Example {
             container: sample.container,
             category: sample.category,
             capacity: sample.capacity,
-            estimates,
+            estimates: sample.estimates.clone(),
+            learned: normal.map(|normal| ("m3".into(), normal.mean.exp())).into_iter().collect(),
         });
     }
     examples

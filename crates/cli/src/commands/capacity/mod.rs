@@ -98,7 +98,8 @@ enum MethodName {
     M4,
     /// LoDE: circles that fit the masks of both side views.
     M5,
-    /// All available methods, weighted by measured reliability (beyond the paper).
+    /// The method that was near on known containers, or else all, weighted by how well each did
+    /// (beyond the paper).
     Fused,
 }
 
