@@ -40,6 +40,7 @@ pub mod model;
 pub mod network;
 pub mod networks;
 pub mod optimiser;
+mod packed;
 pub mod parameters;
 pub mod picture;
 pub mod random;

@@ -1,11 +1,13 @@
 //! The numbers of a network, under PyTorch's names and in PyTorch's layouts.
 
 use std::collections::HashMap;
+use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
 use crate::error::{NetError, Result};
 use crate::matrix::Matrix;
+use crate::packed::Packed;
 use crate::random::Stream;
 use crate::weights::State;
 
@@ -59,6 +61,8 @@ pub struct Parameters {
     declared: Vec<Declared>,
     /// `[first dimension, product of the others]`
     values: Vec<Matrix>,
+    /// the same as products read them, until they change
+    packed: Vec<OnceLock<Arc<Packed>>>,
     index: HashMap<String, usize>,
 }
 
@@ -77,7 +81,8 @@ impl Parameters {
             })
             .collect();
         let index = declared.iter().enumerate().map(|(i, d)| (d.name.clone(), i)).collect();
-        Self { declared, values, index }
+        let packed = vec![OnceLock::new(); declared.len()];
+        Self { declared, values, packed, index }
     }
 
     /// What each parameter is.
@@ -93,8 +98,16 @@ impl Parameters {
         &self.values[self.index[name]]
     }
 
+    /// The weights of a layer, packed by `pack` at the first call after they changed.
+    pub(crate) fn packed(&self, name: &str, pack: impl FnOnce(&Matrix) -> Packed) -> &Packed {
+        let i = self.index[name];
+        self.packed[i].get_or_init(|| Arc::new(pack(&self.values[i])))
+    }
+
     pub(crate) fn get_mut(&mut self, name: &str) -> &mut Matrix {
-        &mut self.values[self.index[name]]
+        let i = self.index[name];
+        self.packed[i] = OnceLock::new();
+        &mut self.values[i]
     }
 
     /// Parameters with their values.
@@ -161,6 +174,7 @@ impl Parameters {
         for (d, value) in self.declared.iter().zip(&mut self.values) {
             *value = matrix_of(d, given[d.name.as_str()].to_vec());
         }
+        self.packed.fill(OnceLock::new());
         Ok(())
     }
 }

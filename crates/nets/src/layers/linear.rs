@@ -6,6 +6,7 @@ use crate::error::{NetError, Result};
 use crate::kernels;
 use crate::layer::{Backward, Layer, Pass, Saved};
 use crate::matrix::Matrix;
+use crate::packed::Packed;
 use crate::parameters::Declared;
 
 /// `y = x W^T + b` at every place.
@@ -45,10 +46,9 @@ impl Layer for Linear {
     }
 
     fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch {
-        let weight = pass.parameters.get(&format!("{}.weight", self.name));
+        let weight = pass.parameters.packed(&format!("{}.weight", self.name), Packed::new);
         let bias = pass.parameters.get(&format!("{}.bias", self.name));
-        let mut values = input.values.dot_t(weight);
-        kernels::add_to_rows(values.values_mut(), bias.values());
+        let values = weight.product(input.values.values(), Some(bias.values()));
         let shape = input.shape.with_numbers(self.outputs);
         let lengths = input.lengths.clone();
         pass.save(|| Saved::Batch(input));

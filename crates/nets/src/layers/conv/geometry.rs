@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::kernels;
 use crate::matrix::{Matrix, Stretches};
+use crate::packed::Runs;
 
 /// Places that a piece of work for a thread should have: images are taken together until there are as many.
 const PLACES: usize = 1024;
@@ -11,6 +12,9 @@ const PLACES: usize = 1024;
 const GATHERED: usize = 1 << 17;
 /// Places that are gathered at least: a product of fewer rows spends its time on the other matrix.
 const LEAST: usize = 256;
+
+/// Places that are computed at a time: what they see and their outputs stay in the second cache.
+const TOGETHER: usize = 384;
 
 /// Sizes of a convolution over one image.
 #[derive(Clone, Copy, Debug)]
@@ -56,14 +60,6 @@ impl Seen<'_> {
         }
     }
 
-    /// Times `weight^T`.
-    pub(super) fn dot_t(&self, weight: &Matrix) -> Matrix {
-        match self {
-            Self::Gathered(matrix) => matrix.dot_t(weight),
-            Self::There(images, stretches) => images.stretches_dot_t(*stretches, weight),
-        }
-    }
-
     /// `gradient^T` times this.
     pub(super) fn t_dot(&self, gradient: &Matrix) -> Matrix {
         match self {
@@ -80,7 +76,67 @@ impl Seen<'_> {
     }
 }
 
+/// Memory for [`Geometry::runs_of`].
+#[derive(Default)]
+pub(super) struct Work {
+    padded: Vec<f32>,
+    starts: Vec<usize>,
+}
+
 impl Geometry {
+    /// Rows of outputs that are computed at a time.
+    pub(super) fn lines_together(&self) -> usize {
+        TOGETHER.div_ceil(self.out_width.max(1))
+    }
+
+    /// What these rows of outputs see, counted over all images: runs of pixels in the images, or in a copy with
+    /// their padding.
+    pub(super) fn runs_of<'a>(
+        &self,
+        images: &'a [f32],
+        lines: Range<usize>,
+        work: &'a mut Work,
+    ) -> Runs<'a> {
+        let (padding, channels) = (self.padding, self.channels);
+        let width = (self.width + 2 * padding) * channels;
+        let Work { padded, starts } = work;
+        padded.clear();
+        starts.clear();
+        let mut line = lines.start;
+        while line < lines.end {
+            let (image, first) = (line / self.out_height, line % self.out_height);
+            let count = (lines.end - line).min(self.out_height - first);
+            let image = image * self.input_len();
+            let origin = match padding {
+                0 => image + first * self.stride * width,
+                _ => padded.len(),
+            };
+            for y in 0..count {
+                let of_line = origin + y * self.stride * width;
+                starts.extend((0..self.out_width).map(|x| of_line + x * self.stride * channels));
+            }
+            if padding > 0 {
+                let rows = first * self.stride..(first + count - 1) * self.stride + self.kernel.0;
+                for row in rows {
+                    let end = padded.len() + width;
+                    if (padding..padding + self.height).contains(&row) {
+                        let row = image + (row - padding) * self.width * channels;
+                        padded.resize(padded.len() + padding * channels, 0.0);
+                        padded.extend_from_slice(&images[row..row + self.width * channels]);
+                    }
+                    padded.resize(end, 0.0);
+                }
+            }
+            line += count;
+        }
+        let values = if padding > 0 { padded } else { images };
+        let (count, length) = match self.is_whole() {
+            true => (1, self.field()),
+            false => (self.kernel.0, self.kernel.1 * channels),
+        };
+        Runs { values, starts, count, jump: width, length }
+    }
+
     pub(super) fn input_len(&self) -> usize {
         self.height * self.width * self.channels
     }

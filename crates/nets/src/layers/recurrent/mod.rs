@@ -17,6 +17,7 @@ use crate::layer::{Backward, Layer, Pass, Saved};
 use crate::layers::dropout;
 use crate::layers::linear::column;
 use crate::matrix::Matrix;
+use crate::packed::Packed;
 use crate::parameters::{Declared, Parameters};
 use cell::{Cell, Gradients, States};
 use packing::Packing;
@@ -65,16 +66,15 @@ impl Recurrent {
         parameters: &Parameters,
     ) -> States {
         let get = |what| parameters.get(&self.key(what, layer));
-        let mut gates = input.dot_t(get("weight_ih"));
-        kernels::add_to_rows(gates.values_mut(), get("bias_ih").values());
+        let packed = |what| parameters.packed(&self.key(what, layer), Packed::new);
+        let gates = packed("weight_ih").product(input.values(), Some(get("bias_ih").values()));
         let mut states = States::new(self.cell, gates, self.hidden);
-        let recurrent = get("weight_hh");
+        let recurrent = packed("weight_hh");
         for step in 0..packing.steps() {
             let products = (step > 0).then(|| {
                 let (before, n) = (packing.rows(step - 1).start, packing.rows(step).len());
                 let rows = before * self.hidden..(before + n) * self.hidden;
-                let state = Matrix::new(n, self.hidden, states.hidden.values()[rows].to_vec());
-                state.dot_t(recurrent)
+                recurrent.product(&states.hidden.values()[rows], None)
             });
             let before = step.checked_sub(1).map(|s| packing.rows(s).start);
             states.step(packing.rows(step), before, products.as_ref(), get("bias_hh").values());

@@ -1,0 +1,271 @@
+//! Weights in the order in which products read them, packed once for all calls.
+//!
+//! A product keeps a block of outputs in registers: a few rows times a panel of two vectors of outputs. Every output
+//! is one sum over its weights in their order, so results depend neither on threads nor on the other rows.
+
+use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
+use rayon::prelude::*;
+
+use crate::matrix::Matrix;
+
+/// Vectors of outputs in a panel.
+const VECTORS: usize = 2;
+/// Rows of a block: with two vectors each, their sums are twelve of sixteen registers.
+const ROWS: usize = 6;
+/// Panels of a block of one row, so that as many sums run side by side.
+const PANELS: usize = 4;
+/// Rows that a thread multiplies at a time: what they see stays in the cache while the panels pass.
+const TOGETHER: usize = 32 * ROWS;
+
+/// Weights `[outputs, inputs]`.
+#[derive(Debug)]
+pub(crate) struct Packed {
+    inputs: usize,
+    outputs: usize,
+    /// outputs of a panel
+    width: usize,
+    /// `[panels][inputs][width]`, zeros beyond the last output
+    panels: Vec<f32>,
+}
+
+/// What rows of a product see: each several runs of numbers, as many as the weights have inputs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Runs<'a> {
+    pub(crate) values: &'a [f32],
+    /// where the first run of each row begins
+    pub(crate) starts: &'a [usize],
+    /// runs of a row
+    pub(crate) count: usize,
+    /// from the beginning of a run to that of the next
+    pub(crate) jump: usize,
+    /// numbers of a run
+    pub(crate) length: usize,
+}
+
+impl Packed {
+    pub(crate) fn new(weight: &Matrix) -> Self {
+        let (outputs, inputs) = (weight.rows(), weight.cols());
+        let width = Arch::new().dispatch(Width);
+        let mut panels = vec![0.0; outputs.div_ceil(width) * width * inputs];
+        let rows = weight.values().par_chunks((width * inputs).max(1));
+        panels.par_chunks_mut((width * inputs).max(1)).zip(rows).for_each(|(panel, rows)| {
+            for (o, row) in rows.chunks_exact(inputs).enumerate() {
+                panel[o..].iter_mut().step_by(width).zip(row).for_each(|(to, w)| *to = *w);
+            }
+        });
+        Self { inputs, outputs, width, panels }
+    }
+
+    /// The product of rows of `inputs` numbers with `weight^T`, plus `bias` in every row.
+    pub(crate) fn product(&self, values: &[f32], bias: Option<&[f32]>) -> Matrix {
+        let rows = values.len() / self.inputs.max(1);
+        let mut out = Matrix::zeros(rows, self.outputs);
+        let share = rows.div_ceil(rayon::current_num_threads()).next_multiple_of(ROWS);
+        let together = share.clamp(ROWS, TOGETHER);
+        let pieces = out.values_mut().par_chunks_mut((together * self.outputs).max(1)).enumerate();
+        pieces.for_each(|(piece, out)| {
+            let first = piece * together;
+            let rows = first..rows.min(first + together);
+            let starts: Vec<usize> = rows.map(|row| row * self.inputs).collect();
+            let runs = Runs { values, starts: &starts, count: 1, jump: 0, length: self.inputs };
+            self.multiply(runs, bias, out);
+        });
+        out
+    }
+
+    /// The same into `out` for rows that lie anywhere, on this thread.
+    ///
+    /// # Panics
+    /// When rows have other numbers than the weights, or leave the values.
+    pub(crate) fn multiply(&self, runs: Runs<'_>, bias: Option<&[f32]>, out: &mut [f32]) {
+        assert_eq!(runs.count * runs.length, self.inputs, "numbers of a row");
+        assert_eq!(out.len(), runs.starts.len() * self.outputs, "numbers of the product");
+        assert!(bias.is_none_or(|bias| bias.len() == self.outputs), "a bias for each output");
+        Arch::new().dispatch(Product { packed: self, runs, bias, out });
+    }
+}
+
+struct Width;
+
+impl WithSimd for Width {
+    type Output = usize;
+
+    fn with_simd<S: Simd>(self, _: S) -> usize {
+        VECTORS * S::F32_LANES
+    }
+}
+
+struct Product<'a> {
+    packed: &'a Packed,
+    runs: Runs<'a>,
+    bias: Option<&'a [f32]>,
+    out: &'a mut [f32],
+}
+
+impl WithSimd for Product<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let rows = self.runs.starts.len();
+        let panels = self.packed.outputs.div_ceil(self.packed.width);
+        if rows == 1 {
+            let (blocks, rest) = (panels / PANELS, panels % PANELS);
+            (0..blocks).for_each(|b| self.block::<S, 1, PANELS>(simd, 0, b * PANELS));
+            (panels - rest..panels).for_each(|p| self.block::<S, 1, 1>(simd, 0, p));
+            return;
+        }
+        for panel in 0..panels {
+            let whole = rows / ROWS * ROWS;
+            (0..whole).step_by(ROWS).for_each(|row| self.block::<S, ROWS, 1>(simd, row, panel));
+            match rows - whole {
+                5 => self.block::<S, 5, 1>(simd, whole, panel),
+                4 => self.block::<S, 4, 1>(simd, whole, panel),
+                3 => self.block::<S, 3, 1>(simd, whole, panel),
+                2 => self.block::<S, 2, 1>(simd, whole, panel),
+                1 => self.block::<S, 1, 1>(simd, whole, panel),
+                _ => (),
+            }
+        }
+    }
+}
+
+impl Product<'_> {
+    #[inline(always)]
+    fn block<S: Simd, const R: usize, const P: usize>(
+        &mut self,
+        simd: S,
+        row: usize,
+        panel: usize,
+    ) {
+        let Self { packed, runs, bias, out } = self;
+        simd.vectorize(Block::<S, R, P> {
+            simd,
+            packed,
+            runs: *runs,
+            bias: *bias,
+            row,
+            panel,
+            out,
+        });
+    }
+}
+
+/// `R` rows times `P` panels.
+struct Block<'a, S: Simd, const R: usize, const P: usize> {
+    simd: S,
+    packed: &'a Packed,
+    runs: Runs<'a>,
+    bias: Option<&'a [f32]>,
+    row: usize,
+    panel: usize,
+    out: &'a mut [f32],
+}
+
+impl<S: Simd, const R: usize, const P: usize> NullaryFnOnce for Block<'_, S, R, P> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { simd, packed, runs, bias, row, panel, out } = self;
+        let each = packed.width * packed.inputs;
+        let weights: [_; P] = std::array::from_fn(|p| {
+            let panel = &packed.panels[(panel + p) * each..][..each];
+            S::as_simd_f32s(panel).0.as_chunks::<VECTORS>().0
+        });
+        let starts = &runs.starts[row..row + R];
+        let mut sums = [[[simd.splat_f32s(0.0); VECTORS]; P]; R];
+        for run in 0..runs.count {
+            let x: [_; R] =
+                std::array::from_fn(|r| &runs.values[starts[r] + run * runs.jump..][..runs.length]);
+            let w: [_; P] =
+                std::array::from_fn(|p| &weights[p][run * runs.length..][..runs.length]);
+            for k in 0..runs.length {
+                let w: [[S::f32s; VECTORS]; P] = std::array::from_fn(|p| w[p][k]);
+                for r in 0..R {
+                    let x = simd.splat_f32s(x[r][k]);
+                    for p in 0..P {
+                        for v in 0..VECTORS {
+                            sums[r][p][v] = simd.mul_add_e_f32s(x, w[p][v], sums[r][p][v]);
+                        }
+                    }
+                }
+            }
+        }
+        for (r, sums) in sums.iter().enumerate() {
+            for (p, sums) in sums.iter().enumerate() {
+                let first = (panel + p) * packed.width;
+                let width = packed.width.min(packed.outputs - first);
+                let to = &mut out[(row + r) * packed.outputs + first..][..width];
+                for (to, sum) in to.chunks_mut(S::F32_LANES).zip(sums) {
+                    simd.partial_store_f32s(to, *sum);
+                }
+                if let Some(bias) = bias {
+                    to.iter_mut().zip(&bias[first..]).for_each(|(to, b)| *to += b);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::batch::transpose;
+
+    fn numbers(n: usize, step: usize) -> Vec<f32> {
+        (0..n).map(|i| ((i * step) % 1000) as f32 * 2e-3 - 1.0).collect()
+    }
+
+    #[test]
+    fn products_are_those_of_burn_for_any_size() {
+        for inputs in [1, 3, 40, 129] {
+            for outputs in [1, 4, 16, 33, 150] {
+                let weight = Matrix::new(outputs, inputs, numbers(inputs * outputs, 7919));
+                let mut turned = vec![0.0; inputs * outputs];
+                transpose(weight.values(), &mut turned, outputs, inputs);
+                let transposed = Matrix::new(inputs, outputs, turned);
+                let packed = Packed::new(&weight);
+                let bias = numbers(outputs, 31);
+                for rows in [1, 2, 3, 4, 5, 6, 7, 13, 400] {
+                    let values = Matrix::new(rows, inputs, numbers(rows * inputs, 6007));
+                    let wanted = values.dot(&transposed);
+                    let found = packed.product(values.values(), Some(&bias));
+                    let pairs = found.values().iter().zip(wanted.values()).enumerate();
+                    for (i, (found, wanted)) in pairs {
+                        let off = (found - wanted - bias[i % outputs]).abs();
+                        assert!(off < 1e-4, "{rows} x {inputs} x {outputs} at {i}: off by {off}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_row_has_the_same_bits_whatever_rows_and_threads_there_are() {
+        let weight = Matrix::new(70, 55, numbers(70 * 55, 7919));
+        let packed = Packed::new(&weight);
+        let values = numbers(401 * 55, 6007);
+        let all = packed.product(&values, None);
+        for row in [0, 5, 397, 400] {
+            let found = packed.product(&values[row * 55..][..55], None);
+            assert_eq!(found.values(), &all.values()[row * 70..][..70], "row {row}");
+        }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+        let found = pool.install(|| packed.product(&values, None));
+        assert_eq!(found.values(), all.values());
+    }
+
+    #[test]
+    fn runs_lie_anywhere() {
+        let values = numbers(100, 37);
+        let weight = Matrix::new(3, 6, numbers(18, 211));
+        let starts = [50, 0, 7];
+        let runs = Runs { values: &values, starts: &starts, count: 2, jump: 20, length: 3 };
+        let mut found = vec![0.0; 9];
+        Packed::new(&weight).multiply(runs, None, &mut found);
+        let rows = starts.iter().flat_map(|&s| [&values[s..s + 3], &values[s + 20..s + 23]]);
+        let gathered: Vec<f32> = rows.flatten().copied().collect();
+        assert_eq!(found, Packed::new(&weight).product(&gathered, None).values());
+    }
+}
