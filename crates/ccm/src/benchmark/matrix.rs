@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use corsmal_extract::config::Config;
+use corsmal_extract::config::{Config, ConfigError};
 use corsmal_extract::inputs::{Input, InputSource};
-use corsmal_extract::run::{self, Quiet, RunError};
+use corsmal_extract::run::{self, Begun, RunError, RunReport};
 use corsmal_files::layout;
 use corsmal_files::npz::{Compression, NpzFile};
 use corsmal_files::shard::Shard;
@@ -18,6 +18,7 @@ use corsmal_models::model_file::TrainedOn;
 use ndarray::Array2;
 
 use super::features::FeatureSet;
+use super::remaining::Told;
 use super::results::{Rows, Target};
 use crate::dataset::{Actions, DataSet, Filling};
 use crate::error::{CcmError, Result};
@@ -38,53 +39,88 @@ pub(super) struct Matrices {
 pub(super) struct Store<'a> {
     pub(super) folder: PathBuf,
     pub(super) jobs: usize,
+    pub(super) progress: &'a (dyn Fn(&str) + Sync),
     pub(super) stop: &'a Arc<AtomicBool>,
 }
 
+/// Features of a part by one set.
+struct Part {
+    values: Array2<f64>,
+    names: Vec<String>,
+    trained_on: Option<TrainedOn>,
+}
+
+/// A file of features: where it is, of what, and by which configuration.
+struct Kept {
+    path: PathBuf,
+    inputs: Vec<Input>,
+    config: Arc<Config>,
+}
+
 impl Store<'_> {
-    /// The features of every part, computed where they are not there yet.
+    /// The features of every part by each of `sets`, computed where they are not there yet. A recording is read
+    /// once for all sets.
     pub(super) fn load(
         &self,
         set: &DataSet,
         rows: &Rows,
-        features: FeatureSet,
-    ) -> Result<Matrices> {
-        let config = features.config().map_err(|e| CcmError::Request(e.to_string()))?;
-        let config = Arc::new(config);
-        let actions = if features.cropped() { set.actions()? } else { Actions::new() };
-        let name = |part: &str| {
-            format!("{}-{:.12}-{}.npz", features.slug(), config.hash(), part.replace(' ', "-"))
+        sets: &[FeatureSet],
+    ) -> Result<Vec<Matrices>> {
+        let fault = |e: ConfigError| CcmError::Request(e.to_string());
+        let configs: Vec<Arc<Config>> =
+            sets.iter().map(|s| s.config().map(Arc::new).map_err(fault)).collect::<Result<_>>()?;
+        let kept = |part: &str, targets: &[Target], actions: &Actions| -> Vec<Kept> {
+            let none = Actions::new();
+            let each = sets.iter().zip(&configs).map(|(features, config)| {
+                let actions = if features.cropped() { actions } else { &none };
+                let (slug, hash, part) = (features.slug(), config.hash(), part.replace(' ', "-"));
+                Kept {
+                    path: self.folder.join(format!("{slug}-{hash:.12}-{part}.npz")),
+                    inputs: inputs(&set.root, targets, actions),
+                    config: config.clone(),
+                }
+            });
+            each.collect()
         };
-        let training = inputs(&set.root, &rows.training, &actions);
-        let (training, names, trained_on) = self.part(&name("training"), &training, &config)?;
-        let mut tests = Vec::with_capacity(rows.tests.len());
+        let cropped = sets.iter().any(|features| features.cropped());
+        let actions = if cropped { set.actions()? } else { Actions::new() };
+        let all = rows.training.len() + rows.tests.iter().map(|t| t.rows.len()).sum::<usize>();
+        let told = Told::new(all, self.progress);
+        let training = self.parts(&kept("training", &rows.training, &actions), &told)?;
+        let matrices = configs.iter().cloned().zip(training).map(|(config, part)| Matrices {
+            training: part.values,
+            tests: Vec::with_capacity(rows.tests.len()),
+            names: part.names,
+            config,
+            trained_on: part.trained_on,
+        });
+        let mut matrices: Vec<Matrices> = matrices.collect();
         for test in &rows.tests {
-            let inputs = inputs(&set.root, &test.rows, &Actions::new());
-            let (values, own, _) = self.part(&name(test.subset.name()), &inputs, &config)?;
-            if own != names {
-                return Err(CcmError::Request(format!(
-                    "{}: {} recordings have other features than those of training: another number \
-                     of channels?",
-                    set.root.display(),
-                    test.subset.name()
-                )));
+            let part = kept(test.subset.name(), &test.rows, &Actions::new());
+            for (matrices, part) in matrices.iter_mut().zip(self.parts(&part, &told)?) {
+                if part.names != matrices.names {
+                    return Err(CcmError::Request(format!(
+                        "{}: {} recordings have other features than those of training: another \
+                         number of channels?",
+                        set.root.display(),
+                        test.subset.name()
+                    )));
+                }
+                matrices.tests.push(part.values);
             }
-            tests.push(values);
         }
-        Ok(Matrices { training, tests, names, config, trained_on })
+        Ok(matrices)
     }
 
-    fn part(
-        &self,
-        name: &str,
-        inputs: &[Input],
-        config: &Arc<Config>,
-    ) -> Result<(Array2<f64>, Vec<String>, Option<TrainedOn>)> {
-        let path = self.folder.join(name);
-        let fault = |e: &dyn std::fmt::Display| CcmError::Request(e.to_string());
-        let extract = |overwrite: bool| {
-            let options = run::RunOptions {
-                out: path.clone(),
+    /// The features of one part by each set.
+    fn parts(&self, kept: &[Kept], told: &Told<'_>) -> Result<Vec<Part>> {
+        let fault = |error: RunError| match error {
+            RunError::Interrupted => CcmError::Interrupted,
+            error => CcmError::Request(error.to_string()),
+        };
+        let options = |overwrite: bool| {
+            let of = |kept: &Kept| run::RunOptions {
+                out: kept.path.clone(),
                 work: None,
                 partition_by: None,
                 compression: Compression::Stored,
@@ -94,18 +130,32 @@ impl Store<'_> {
                 overwrite,
                 max_errors: None,
             };
-            run::run(inputs, config, &options, &Quiet, self.stop)
+            kept.iter().map(of).collect::<Vec<_>>()
         };
-        let report = match extract(false) {
-            Err(RunError::Interrupted) => return Err(CcmError::Interrupted),
-            // Kept features of other recordings, or of an earlier version, are of no use.
-            Err(RunError::Exists { .. } | RunError::Ledger(_)) => extract(true),
-            done => done,
-        };
-        let report = match report {
-            Err(RunError::Interrupted) => return Err(CcmError::Interrupted),
-            report => report.map_err(|e| fault(&e))?,
-        };
+        let (keep, replace) = (options(false), options(true));
+        let mut begun = Vec::with_capacity(kept.len());
+        for (Kept { inputs, config, .. }, (keep, replace)) in
+            kept.iter().zip(keep.iter().zip(&replace))
+        {
+            let begin = |options| Begun::new(inputs, config, options, told, self.stop);
+            begun.push(match begin(keep) {
+                // Kept features of other recordings, or of an earlier version, are of no use.
+                Err(RunError::Exists { .. } | RunError::Ledger(_)) => {
+                    begin(replace).map_err(fault)?
+                }
+                begun => begun.map_err(fault)?,
+            });
+        }
+        let reports = run::together(begun, self.jobs, told, self.stop).map_err(fault)?;
+        told.part(kept.first().map_or(0, |kept| kept.inputs.len()));
+        kept.iter().zip(reports).map(|(kept, report)| kept.read(&report)).collect()
+    }
+}
+
+impl Kept {
+    /// The features, once they are there.
+    fn read(&self, report: &RunReport) -> Result<Part> {
+        let fault = |e: &dyn std::fmt::Display| CcmError::Request(e.to_string());
         if let Some(bad) = report.outcomes.iter().find(|o| !o.status.has_features()) {
             return Err(CcmError::Request(format!(
                 "{}: {}: {} ({} recordings have no features)",
@@ -115,11 +165,12 @@ impl Store<'_> {
                 report.failed()
             )));
         }
-        let mut npz = NpzFile::open(&path).map_err(|e| fault(&e))?;
+        let mut npz = NpzFile::open(&self.path).map_err(|e| fault(&e))?;
         let (table, _) = layout::read_table(&mut npz).map_err(|e| fault(&e))?;
         let trained_on =
             TrainedOn::of(table.outcomes().iter().map(|o| (o.sample_rate, o.channels)));
-        Ok((table.values().mapv(f64::from), table.feature_names().to_vec(), trained_on))
+        let names = table.feature_names().to_vec();
+        Ok(Part { values: table.values().mapv(f64::from), names, trained_on })
     }
 }
 

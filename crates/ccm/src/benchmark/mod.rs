@@ -12,6 +12,7 @@ mod matrix;
 mod method;
 mod predicted;
 mod protocols;
+mod remaining;
 mod report;
 mod results;
 mod system;
@@ -35,9 +36,10 @@ use rayon::prelude::*;
 use crate::dataset::{Container, DataSet, Subset};
 use crate::error::{CcmError, Result};
 use baselines::BaselineResult;
-use matrix::Store;
+use matrix::{Matrices, Store};
 use predicted::Predicted;
 use protocols::{Setting, Unit};
+use results::Rows;
 
 /// Capacities of a method.
 #[derive(Clone, Debug)]
@@ -135,7 +137,7 @@ pub fn run(
     let tables: Vec<Added> =
         tables.map(|t| Added::capacities(&t.name, &t.path)).collect::<Result<_>>()?;
     let set = DataSet::open(&options.data)?;
-    let rows = results::Rows::of(&set)?;
+    let rows = Rows::of(&set)?;
     let added = added.iter().map(|a| a.place(&rows)).collect::<Result<Vec<_>>>()?;
     let tables = tables.iter().zip(&options.capacities);
     let capacities =
@@ -148,37 +150,7 @@ pub fn run(
         options.capacities.iter().filter_map(CapacityTable::caution).collect();
     cautions.iter().for_each(|caution| progress(caution));
     files::prepare(&options.out)?;
-    let store = Store { folder: options.out.join("features"), jobs: options.jobs, stop };
-    let mut outcomes = Vec::new();
-    let (done, total) = (AtomicUsize::new(0), options.baselines.len() * Variant::ALL.len());
-    for feature_set in FeatureSet::ALL {
-        let wanted: Vec<_> =
-            options.baselines.iter().filter(|b| b.features == feature_set).copied().collect();
-        if wanted.is_empty() {
-            continue;
-        }
-        progress(&format!("features: {}", feature_set.name()));
-        let matrices = store.load(&set, &rows, feature_set)?;
-        let out = options.out.as_path();
-        let finish = |outcome: &BaselineResult, spec: PipelineSpec, model: Pipeline| {
-            files::write_outcome(out, outcome, &rows)?;
-            files::write_model(out, outcome, (spec, model), &matrices, &rows)?;
-            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            let name = outcome.baseline.name();
-            progress(&format!("{done} of {total}: {name}, {}", outcome.variant.name()));
-            Ok(())
-        };
-        let seed = options.seed;
-        let setting = Setting { rows: &rows, matrices: &matrices, seed, stop, finish: &finish };
-        let units = Unit::all(&wanted);
-        let made: Vec<Result<Vec<BaselineResult>>> =
-            units.par_iter().map(|u| u.run(&setting)).collect();
-        let made = made.into_iter().collect::<Result<Vec<_>>>()?;
-        let mut made: Vec<BaselineResult> = made.into_iter().flatten().collect();
-        // As they were asked for, whatever was finished first.
-        made.sort_by_key(|o| (wanted.iter().position(|b| *b == o.baseline), o.variant));
-        outcomes.extend(made);
-    }
+    let outcomes = baselines(options, (&set, &rows), progress, stop)?;
     let mut runs = Vec::new();
     if !options.systems.is_empty() {
         let (folder, how) = (options.out.join("features"), (options.jobs, options.seed));
@@ -206,4 +178,56 @@ pub fn run(
     report::write_figures(&figures, &rows, &predicted, options.seed)?;
     report.write(&options.out)?;
     Ok(report)
+}
+
+/// The outcomes of all baselines, in the order of their feature sets.
+fn baselines(
+    options: &BenchmarkOptions,
+    (set, rows): (&DataSet, &Rows),
+    progress: &(dyn Fn(&str) + Sync),
+    stop: &Arc<AtomicBool>,
+) -> Result<Vec<BaselineResult>> {
+    let BenchmarkOptions { out, baselines, jobs, seed, .. } = options;
+    let (jobs, seed) = (*jobs, *seed);
+    let of = |set: FeatureSet| -> Vec<Baseline> {
+        baselines.iter().filter(|b| b.features == set).copied().collect()
+    };
+    let sets: Vec<FeatureSet> =
+        FeatureSet::ALL.into_iter().filter(|s| !of(*s).is_empty()).collect();
+    if sets.is_empty() {
+        return Ok(Vec::new());
+    }
+    let names: Vec<&str> = sets.iter().map(|features| features.name()).collect();
+    progress(&format!("features: {}", names.join(", ")));
+    let store = Store { folder: out.join("features"), jobs, progress, stop };
+    let matrices = store.load(set, rows, &sets)?;
+    let (done, total) = (AtomicUsize::new(0), baselines.len() * Variant::ALL.len());
+    let finish = |matrices: &Matrices, outcome: &BaselineResult, made: (PipelineSpec, Pipeline)| {
+        files::write_outcome(out, outcome, rows)?;
+        files::write_model(out, outcome, made, matrices, rows)?;
+        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        let name = outcome.baseline.name();
+        progress(&format!("{done} of {total}: {name}, {}", outcome.variant.name()));
+        Ok(())
+    };
+    let setting = |matrices| Setting { rows, matrices, seed, stop, finish: &finish };
+    // The widest tables take longest: what is short fills the gaps behind them.
+    let units: Vec<(Setting<'_>, Unit)> = sets
+        .iter()
+        .zip(&matrices)
+        .rev()
+        .flat_map(|(set, matrices)| {
+            Unit::all(&of(*set)).into_iter().map(|u| (setting(matrices), u))
+        })
+        .collect();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build();
+    let pool = pool.map_err(|e| CcmError::Request(format!("{jobs} threads: {e}")))?;
+    let made: Vec<Result<Vec<BaselineResult>>> =
+        pool.install(|| units.par_iter().map(|(setting, unit)| unit.run(setting)).collect());
+    let made = made.into_iter().collect::<Result<Vec<_>>>()?;
+    let mut made: Vec<BaselineResult> = made.into_iter().flatten().collect();
+    // As they were asked for, whatever was finished first.
+    let place = |b: &Baseline| (b.features, baselines.iter().position(|other| other == b));
+    made.sort_by_key(|outcome| (place(&outcome.baseline), outcome.variant));
+    Ok(made)
 }

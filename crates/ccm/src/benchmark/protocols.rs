@@ -36,8 +36,12 @@ pub(super) struct Setting<'a> {
     /// Ends the work at the next baseline.
     pub(super) stop: &'a AtomicBool,
     /// Takes what is finished, with the pipeline that predicted the tests.
-    pub(super) finish: &'a (dyn Fn(&BaselineResult, PipelineSpec, Pipeline) -> Result<()> + Sync),
+    pub(super) finish: &'a Finish<'a>,
 }
+
+/// Takes the outcome of a baseline on the features, and its pipeline.
+pub(super) type Finish<'a> =
+    dyn Fn(&Matrices, &BaselineResult, (PipelineSpec, Pipeline)) -> Result<()> + Sync + 'a;
 
 /// Baselines on the same values under one protocol.
 pub(super) struct Unit {
@@ -93,7 +97,7 @@ impl Unit {
                 }
                 let (outcome, spec, model) =
                     one(i, baseline).map_err(|e| self.fault(baseline, &e))?;
-                (setting.finish)(&outcome, spec, model)?;
+                (setting.finish)(setting.matrices, &outcome, (spec, model))?;
                 Ok(outcome)
             })
             .collect();

@@ -27,6 +27,11 @@ impl Failed {
         Self { status, reason: reason.into(), byte_offset: None, temporary: None }
     }
 
+    /// The same for something else that was to be computed of the recording.
+    pub fn same(&self) -> Self {
+        Self { byte_offset: self.byte_offset, ..Self::new(self.status, self.reason.clone()) }
+    }
+
     /// A temporary file failed.
     pub fn temporary(error: io::Error) -> Self {
         let reason = format!("temporary file: {error}");

@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use corsmal_audio::BlockSource;
 use corsmal_files::outcome::{Outcome, Status};
 
-use super::extractor::{Extractor, Span};
+use super::extractor::Span;
 use super::failed::Failed;
-use super::held::Held;
 use super::live::Live;
+use super::pass::Pass;
 use super::plans::Planned;
 use super::signal_chain::SignalChain;
 use super::watch::Watch;
@@ -19,11 +19,11 @@ use crate::inputs::stored::Purpose;
 use crate::inputs::{Input, InputSource};
 
 /// Samples read at a time, all channels together.
-const BLOCK: usize = 1 << 16;
-/// Values computed of a span before they are handed on (8 MiB).
-const PART: usize = 1 << 21;
+pub(super) const BLOCK: usize = 1 << 16;
 /// The repair of a stretch whose end is behind that of its recording.
 const END_BEYOND: &str = "end_beyond_recording";
+/// The span of a signal that is not cut.
+pub const WHOLE: Range<u64> = 0..u64::MAX;
 /// Frames of a span; recordings of more than two are cut.
 const SPAN: u64 = 1 << 20;
 
@@ -80,16 +80,15 @@ pub fn crop(
 
 /// Spans of the signal that can be computed apart; one where it cannot be cut.
 pub fn spans(source: &dyn BlockSource, planned: &Planned, crop: &Range<u64>) -> Vec<Range<u64>> {
-    let whole = 0..u64::MAX;
     let separable = source.seekable()
         && !planned.plan.needs_whole()
         && SignalChain::is_local(&planned.plan.config.signal, planned.resample.is_some());
     let Some(most) = source.most_frames().filter(|_| separable) else {
-        return vec![whole];
+        return vec![WHOLE];
     };
     let frames = most.min(crop.end).saturating_sub(crop.start);
     if frames <= 2 * SPAN {
-        return vec![whole];
+        return vec![WHOLE];
     }
     let mut spans: Vec<Range<u64>> = (0..frames / SPAN).map(|i| i * SPAN..(i + 1) * SPAN).collect();
     // The last span takes the rest, whatever the header said.
@@ -105,111 +104,32 @@ pub fn spans(source: &dyn BlockSource, planned: &Planned, crop: &Range<u64>) -> 
 pub fn compute(
     source: &mut dyn BlockSource,
     planned: &Planned,
-    (crop, span): (&Range<u64>, &Range<u64>),
+    crop_and_span: (&Range<u64>, &Range<u64>),
     stop: &AtomicBool,
     decoded: &mut u64,
     mut each: impl FnMut(Span) -> Result<(), Failed>,
 ) -> Result<bool, Failed> {
-    let plan = &planned.plan;
-    let config = &plan.config.signal;
-    let channels = usize::from(source.spec().channels);
-    let mut front = SignalChain::new(config, channels, planned.resample.clone(), plan.sample_rate)
-        .map_err(|e| Failed::new(Status::Unsupported, e))?;
-    // Padding by reflection may reach back twice the padding of a frame; one more is for what looks at the
-    // sample before.
-    let (before, after) = plan.context();
-    let passed = unread(source, planned, crop, span);
-    let first = span.start.saturating_sub(2 * before as u64 + 1) + passed;
-    let begin = crop.start.saturating_add(first);
-    *decoded += passed;
-    let end = crop.end.min(crop.start.saturating_add(span.end.saturating_add(after as u64)));
-    skip_to(source, begin)?;
-    let own = crop.start.saturating_add(span.start)..crop.start.saturating_add(span.end);
-    let checked = source.spec().encoding.may_be_non_finite();
-    let mut extractor = Extractor::new(plan.clone(), span.clone(), first);
-    let rate = plan.sample_rate / f64::from(source.spec().sample_rate);
-    if let Some(most) = source.most_frames() {
-        // Rounding may add a frame, the end of the recording some of a block that is not filled.
-        let frames = most.min(end).saturating_sub(begin) as f64 * rate;
-        extractor.reserve(frames as u64 + 1 + (BLOCK / channels) as u64);
-    }
-    let mut held = Held::of(plan);
-    let mut hold = |frames: u64| held.as_mut().map_or(Ok(()), |held| held.reach(frames));
-    let identity = front.is_identity();
-    let (mut block, mut signal) = (Vec::new(), Vec::new());
-    let step = planned.step(BLOCK / channels, source.spec().sample_rate);
-    let mut position = begin;
+    let mut pass = Pass::new(source, planned, crop_and_span)?;
+    let mut each_of = |_: usize, span: Span| each(span);
+    *decoded += pass.passed();
+    skip_to(source, pass.reads().start)?;
+    let mut block = Vec::new();
     let mut ended = false;
-    // Frames read belong to the span, to its context, or in part to both.
-    let mut count = |position: u64, frames: usize| {
-        let end = (position + frames as u64).min(own.end);
-        *decoded += end.saturating_sub(position.max(own.start));
-    };
-    while position < end {
+    while !ended && pass.wanted() > 0 {
         if stop.load(Ordering::Relaxed) {
             return Ok(false);
         }
-        if extractor.stored() > PART {
-            each(extractor.take())?;
-        }
-        let wanted = (step as u64).min(end - position) as usize;
-        let frames = if identity {
-            let room = extractor.room(wanted);
-            let frames = source.read(room)?;
-            count(position, frames);
-            if checked {
-                let byte_of = |frame| source.byte_of(frame);
-                require_finite(&room[..frames * channels], position, channels, byte_of)?;
-            }
-            extractor.commit(wanted, frames);
-            frames
-        } else {
-            block.resize(wanted * channels, 0.0);
-            let frames = source.read(&mut block)?;
-            count(position, frames);
-            let samples = &block[..frames * channels];
-            if checked {
-                require_finite(samples, position, channels, |frame| source.byte_of(frame))?;
-            }
-            front.push(samples, &mut signal);
-            extractor.push(&signal);
-            signal.clear();
-            frames
-        };
-        if frames == 0 {
-            ended = true;
-            break;
-        }
-        position += frames as u64;
-        hold(((position - begin) as f64 * rate) as u64)?;
+        pass.hand_on(&mut each_of)?;
+        ended = pass.read(source, &mut block, decoded)? == 0;
     }
-    // The end of the crop is the end of the signal, too.
-    let at_end = ended || end == crop.end;
-    if !identity && at_end {
-        let whole = front.finish(|rest| {
-            if stop.load(Ordering::Relaxed) {
-                return Ok(false);
-            }
-            if extractor.stored() > PART {
-                each(extractor.take())?;
-            }
-            extractor.push(rest);
-            if plan.needs_whole() {
-                hold(extractor.reached())?;
-            }
-            Ok::<_, Failed>(true)
-        })?;
-        if !whole {
-            return Ok(false);
-        }
-    }
-    each(extractor.finish(at_end)?)?;
+    let Some(last) = pass.finish(ended, stop, &mut each_of)? else { return Ok(false) };
+    last.into_iter().try_for_each(|span| each(span?))?;
     Ok(true)
 }
 
 /// Frames at the beginning of a crop that no feature depends on, and that can be passed without a look:
 /// integers, which are valid whatever they are, each of which has its place in the file.
-fn unread(
+pub(super) fn unread(
     source: &dyn BlockSource,
     planned: &Planned,
     crop: &Range<u64>,
@@ -221,7 +141,7 @@ fn unread(
         && !source.spec().encoding.may_be_non_finite()
         && SignalChain::is_local(signal, planned.resample.is_some())
         && signal.preemphasis == 0.0
-        && *span == (0..u64::MAX);
+        && *span == WHOLE;
     match source.most_frames().filter(|_| plain) {
         Some(most) => planned.plan.unread(most.min(crop.end).saturating_sub(crop.start)),
         None => 0,
@@ -229,7 +149,7 @@ fn unread(
 }
 
 /// Goes to a frame, by reading where the source cannot seek.
-fn skip_to(source: &mut dyn BlockSource, frame: u64) -> Result<(), Failed> {
+pub(super) fn skip_to(source: &mut dyn BlockSource, frame: u64) -> Result<(), Failed> {
     if frame == 0 {
         return Ok(());
     }

@@ -53,6 +53,11 @@ impl InputSource {
         }
     }
 
+    /// Whether reading it may be waiting for bytes to come.
+    pub(crate) fn waits(&self) -> bool {
+        *self == Self::Stdin || self.is_stored()
+    }
+
     /// Whether the bytes come from a store, which takes time and can be called off.
     pub(crate) fn is_stored(&self) -> bool {
         match self {

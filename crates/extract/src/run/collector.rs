@@ -23,7 +23,7 @@ use super::queue::{Partial, Queue, Work};
 use super::work::{self, Parts, SpanJob, broken, outcome_of};
 use crate::config::Config;
 use crate::engine::{Failed, Planned, Plans, Recording, Watch, reading};
-use crate::inputs::{Input, InputSource};
+use crate::inputs::Input;
 use crate::survey::Survey;
 
 /// How much is done at a time, and how much may fail.
@@ -256,14 +256,10 @@ impl<'a> Collector<'a> {
         let plan = &planned.plan;
         match work::finish(input, (planned, watch), recording, compression, &mut outcome) {
             Ok(Parts { arrays, row, total }) => {
-                if let Some(longest) = plan.longest_transform()
-                    && total < longest as u64
+                if let Some(warning) = work::short(plan, total, &outcome)
                     && !std::mem::replace(&mut self.lock().warned, true)
                 {
-                    self.progress.warning(&format!(
-                        "{}: {total} samples are fewer than n_fft = {longest} (reported once per run)",
-                        outcome.id
-                    ));
+                    self.progress.warning(&warning);
                 }
                 let row = row.map(|row| (row, plan.summary_names()));
                 self.hand_over(index, Finished { outcome, arrays, row });
@@ -280,8 +276,7 @@ impl<'a> Collector<'a> {
             return;
         }
         let source = &self.inputs[index].source;
-        let waits = source == &InputSource::Stdin || source.is_stored();
-        if waits && self.stop.load(Ordering::Relaxed) {
+        if source.waits() && self.stop.load(Ordering::Relaxed) {
             // The stream or store did not fail: it was no longer listened to.
             return;
         }

@@ -293,7 +293,7 @@ impl<'a> Iterator for InOrder<'a> {
 }
 
 /// Threads of one call alone: they cannot be missing in a process that was forked.
-fn pool(jobs: usize) -> Result<rayon::ThreadPool, RunError> {
+pub(super) fn pool(jobs: usize) -> Result<rayon::ThreadPool, RunError> {
     require_jobs(jobs)?;
     rayon::ThreadPoolBuilder::new()
         .num_threads(jobs)

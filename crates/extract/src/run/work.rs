@@ -11,17 +11,22 @@ use corsmal_files::outcome::{Outcome, Status};
 
 use super::output::Member;
 use crate::engine::reading::Part;
-use crate::engine::{Failed, Features, Planned, Plans, Recording, Span, Watch, reading};
+use crate::engine::together::Wanted;
+use crate::engine::{Failed, Features, Plan, Planned, Plans, Recording, Span, Watch, reading};
 use crate::inputs::Input;
 use crate::survey::Survey;
 
 /// The outcome of an input before anything is known of it but what its bytes are.
 pub(super) fn outcome_of(input: &Input) -> Outcome {
-    let mut outcome = Outcome::new(&input.id, input.source.to_string(), Status::Ok, "");
     // Objects of stores tell theirs when they are read.
-    if !input.source.is_stored() {
-        outcome.identity = input.source.identity();
-    }
+    let identity = if input.source.is_stored() { String::new() } else { input.source.identity() };
+    known_outcome_of(input, identity)
+}
+
+/// The same where it is known what its bytes are.
+pub(super) fn known_outcome_of(input: &Input, identity: String) -> Outcome {
+    let mut outcome = Outcome::new(&input.id, input.source.to_string(), Status::Ok, "");
+    outcome.identity = identity;
     outcome
 }
 
@@ -48,14 +53,24 @@ pub(super) fn open(
     }
     let source = opened?;
     reading::describe(outcome, source.as_ref());
+    let Wanted { planned, crop } = wanted(input, source.as_ref(), (plans, survey))?;
+    let spans = reading::spans(source.as_ref(), &planned, &crop);
+    Ok(Opened { source, planned, crop, spans })
+}
+
+/// What is to be computed of a recording that is open.
+pub(super) fn wanted(
+    input: &Input,
+    source: &dyn BlockSource,
+    (plans, survey): (&Plans<'_>, &Survey),
+) -> Result<Wanted, Failed> {
     if let Some(reason) = survey.refusal(source.spec().channels) {
         return Err(Failed::new(Status::Mismatch, reason));
     }
     let planned = plans.of(source.spec()).map_err(|e| Failed::new(Status::Unsupported, e))?;
     let signal = &planned.plan.config.signal;
     let crop = reading::crop(signal, (input.start, input.end), source.spec().sample_rate);
-    let spans = reading::spans(source.as_ref(), &planned, &crop);
-    Ok(Opened { source, planned, crop, spans })
+    Ok(Wanted { planned, crop })
 }
 
 /// Computes a recording as one span; `None` where the run was stopped. Adds to `outcome` what the
@@ -70,7 +85,7 @@ pub(super) fn whole(
     let Opened { source, planned, crop, .. } = &mut opened;
     let mut recording = Recording::new(planned.plan.clone(), folder);
     let decoded = &mut outcome.decoded_frames;
-    let span = (&*crop, &(0..u64::MAX));
+    let span = (&*crop, &reading::WHOLE);
     let computed = reading::compute(source.as_mut(), planned, span, stop, decoded, |part| {
         recording.add(part).map_err(Failed::temporary)
     });
@@ -191,6 +206,13 @@ pub(super) fn complete(
     stretch?;
     let total = recording.total();
     Ok((recording.complete()?, total))
+}
+
+/// What to tell of a recording of `total` samples that is shorter than a transform.
+pub(super) fn short(plan: &Plan, total: u64, outcome: &Outcome) -> Option<String> {
+    let longest = plan.longest_transform().filter(|longest| total < *longest as u64)?;
+    let id = &outcome.id;
+    Some(format!("{id}: {total} samples are fewer than n_fft = {longest} (reported once per run)"))
 }
 
 /// Why an input has no features, in its outcome.

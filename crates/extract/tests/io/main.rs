@@ -13,4 +13,5 @@ mod pieces;
 mod projection;
 mod resume;
 mod support;
+mod together;
 mod windows;
