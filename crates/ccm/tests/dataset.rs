@@ -147,6 +147,19 @@ fn what_is_wrong_is_said() {
     assert_eq!(findings.containers[0].missing.len(), 83);
 }
 
+/// The benchmark said nothing of a recording that had lost half of its bytes.
+#[test]
+fn a_recording_that_is_cut_off_is_odd() {
+    let dir = tempfile::tempdir().unwrap();
+    synth::generate(dir.path(), Size::Small, 2).unwrap();
+    let path = DataSet::open(dir.path()).unwrap().recordings[0].path.clone();
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    let findings = check(&DataSet::open(dir.path()).unwrap());
+    let odd: Vec<_> = findings.odd.iter().filter(|odd| odd.what.contains("cut off")).collect();
+    assert!(!findings.sound() && odd.len() == 1 && odd[0].path == path, "{:?}", findings.odd);
+}
+
 /// Ids that mean other recordings, as in the two annotation files that were published for the flat
 /// release.
 #[test]

@@ -84,6 +84,11 @@ pub fn check(set: &DataSet) -> Findings {
                 let length =
                     spec.declared_frames.map_or(0.0, |n| n as f64 / f64::from(spec.sample_rate));
                 seconds += length;
+                if let (Some(declared), Some(there)) = (spec.declared_frames, source.most_frames())
+                    && there < declared
+                {
+                    fault(format!("cut off: {there} of {declared} samples a channel are there"));
+                }
                 if spec.channels != 8 || spec.sample_rate != 44_100 {
                     fault(format!(
                         "{} channels at {} Hz; the data set has 8 at 44100 Hz",

@@ -16,7 +16,7 @@ use super::Made;
 use super::method::{Part, methods};
 use super::predicted::Predicted;
 use super::results::Rows;
-use crate::dataset::DataSet;
+use crate::dataset::{DataSet, check};
 use crate::error::Result;
 use crate::paper::Task;
 
@@ -56,10 +56,29 @@ pub(super) fn report(
                   from the sound of pouring and shaking and from views, next to the results published in the \
                   paper."
             .into(),
-        warning: set.synthetic.then(|| SYNTHETIC.to_string()),
+        warning: warning(set),
         facts: about::facts(set, rows, outcomes, seed, made),
         sections,
     })
+}
+
+/// What must not be missed: that the data are synthetic, and recordings that are not as they should be.
+fn warning(set: &DataSet) -> Option<String> {
+    let odd = check(set).odd;
+    let odd = odd.first().map(|first| {
+        format!(
+            "{} odd: {}: {}. `corsmal-feat dataset check` lists all.",
+            match odd.len() {
+                1 => "One file is".to_owned(),
+                n => format!("{n} files are"),
+            },
+            first.path.display(),
+            first.what
+        )
+    });
+    let all: Vec<String> =
+        set.synthetic.then(|| SYNTHETIC.to_owned()).into_iter().chain(odd).collect();
+    (!all.is_empty()).then(|| all.join(" "))
 }
 
 /// Writes the confusion matrices of every baseline, of both protocols, and of every system into a
