@@ -107,7 +107,13 @@ def load_mask(path: StrPath) -> npt.NDArray[np.bool_]:
     Returns
     -------
     bool [shape=(height, width)]
-        True where the first channel is not 0.
+        True where a pixel is not black.
+
+    Raises
+    ------
+    ParameterError
+        The file cannot be read, has several values beside black, or has the mask in its
+        transparency.
 
     Examples
     --------

@@ -21,12 +21,12 @@ pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
                 false => Ok(of_depth(&depth)),
             }
         }
-        Err(_) => Rgb::read(path).and_then(|image| {
+        Err(_) => Rgb::read(path).map(|image| {
             let grey = image.data.as_chunks::<3>().0.iter().all(|p| p[0] == p[1] && p[0] == p[2]);
-            match grey && two_values(image.data.iter().copied(), u8::MAX) {
-                true => Mask::read(path).map(|mask| of_mask(&mask)),
-                false => Ok(of_colours(&image)),
-            }
+            let mask = grey && two_values(image.data.iter().copied(), u8::MAX);
+            // What is drawn in transparency alone is no mask.
+            let mask = mask.then(|| Mask::read(path).ok()).flatten();
+            mask.as_ref().map_or_else(|| of_colours(&image), of_mask)
         }),
     };
     let (kind, text, mut facts) = match found {

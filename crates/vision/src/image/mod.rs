@@ -1,5 +1,7 @@
 //! Images: depth as 16-bit PNG, colour as PNG or JPEG, masks as PNG.
 
+mod mask;
+
 use std::io::Cursor;
 use std::path::Path;
 
@@ -9,7 +11,6 @@ use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
 use crate::error::{Result, VisionError, read};
-use crate::mask::Mask;
 
 /// Largest file that is read.
 const MAX_BYTES: u64 = 64 << 20;
@@ -127,36 +128,6 @@ impl Rgb {
     }
 }
 
-impl Mask {
-    /// Reads a PNG; a pixel belongs to the mask where it is not black, whatever its transparency.
-    ///
-    /// # Errors
-    /// [`VisionError`] when the file is damaged, too large, or no PNG.
-    pub fn read(path: &Path) -> Result<Self> {
-        // Cut to 8 bits, a 1 of 16 bits would be 0.
-        let (bytes, kept) = (read(path, MAX_BYTES)?, png::Transformations::EXPAND);
-        let mut data = Vec::new();
-        let (width, height) = decode_png(&bytes, path, kept, |row, format| {
-            let bytes = format.bits.div_ceil(8);
-            // Classes in a palette have colours of any channel.
-            let colours = if format.channels > 2 { 3 } else { 1 };
-            let pixels = row.chunks_exact(format.channels * bytes);
-            data.extend(pixels.map(|pixel| pixel[..colours * bytes].iter().any(|&byte| byte != 0)));
-            Ok(())
-        })?;
-        Ok(Self { width, height, data })
-    }
-
-    /// PNG with one channel of 8 bits, 255 inside.
-    ///
-    /// # Errors
-    /// The size does not fit the values.
-    pub fn to_png(&self) -> Result<Vec<u8>> {
-        let bytes: Vec<u8> = self.data.iter().map(|&inside| 255 * u8::from(inside)).collect();
-        encode_png(self.width, self.height, png::ColorType::Grayscale, png::BitDepth::Eight, &bytes)
-    }
-}
-
 /// What the values of a row are.
 #[derive(Clone, Copy)]
 struct Format {
@@ -263,6 +234,7 @@ fn encode_png(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mask::Mask;
 
     /// A few KB that claim the most pixels, and pixels beyond.
     #[test]
@@ -300,35 +272,5 @@ mod tests {
         !bytes.iter().fold(u32::MAX, |sum, &byte| {
             (0..8).fold(sum ^ u32::from(byte), |s, _| (s >> 1) ^ (0xedb8_8320 * (s & 1)))
         })
-    }
-
-    /// Cut to 8 bits, a 1 of 16 bits would be outside.
-    #[test]
-    fn a_mask_of_any_depth_is_what_is_not_black() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("m.png");
-        for value in [1, 255, 256, u16::MAX] {
-            let deep = Depth { width: 3, height: 1, data: vec![0, value, 0] };
-            std::fs::write(&path, deep.to_png().unwrap()).unwrap();
-            assert_eq!(Mask::read(&path).unwrap().data, [false, true, false], "{value}");
-        }
-        let green = Rgb { width: 2, height: 1, data: vec![0, 0, 0, 0, 128, 0] };
-        std::fs::write(&path, green.to_png().unwrap()).unwrap();
-        assert_eq!(Mask::read(&path).unwrap().data, [false, true]);
-        let clear = encode_png(
-            2,
-            1,
-            png::ColorType::Rgba,
-            png::BitDepth::Eight,
-            &[0, 0, 0, 255, 1, 0, 0, 0],
-        );
-        std::fs::write(&path, clear.unwrap()).unwrap();
-        assert_eq!(Mask::read(&path).unwrap().data, [false, true]);
-        for depth in [png::BitDepth::One, png::BitDepth::Two, png::BitDepth::Four] {
-            let bytes = [0b1000_0000];
-            let grey = png::ColorType::Grayscale;
-            std::fs::write(&path, encode_png(2, 1, grey, depth, &bytes).unwrap()).unwrap();
-            assert_eq!(Mask::read(&path).unwrap().data, [true, false], "{depth:?}");
-        }
     }
 }
