@@ -371,7 +371,9 @@ def lode(
     masks: tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]],
     cameras: tuple[list[float], list[float]],
     published: bool,
-) -> tuple[float, float, float, float | None, float | None, list[list[float]], list[float]]: ...
+) -> tuple[
+    float, float, float, float | None, float | None, list[list[float]], list[float], float
+]: ...
 def cuboid(
     depth_mm: npt.NDArray[np.uint16],
     pixels: npt.NDArray[np.bool_],

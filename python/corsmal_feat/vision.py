@@ -59,6 +59,7 @@ class LodeEstimate(TypedDict):
     capacity_high: float | None
     centre: Doubles
     profile: Doubles
+    residual: float
 
 
 class Cuboid(TypedDict):
@@ -103,20 +104,22 @@ def lode(
     variant : {"corrected", "published"}
         "published" keeps the quirks of the published program: indices left of or above an image
         wrap around, a circle that extends beyond the image ends the estimate, and gaps in the
-        profile count as height.
+        profile count as height. "corrected" also refuses masks that do not show one object, and an
+        object that reaches the ends of what is tried (`docs/vision.md`).
 
     Returns
     -------
     dict
         `height` and largest `width` in mm, `capacity` in mL; `capacity_low` and `capacity_high`
-        with masks one pixel smaller and larger (None if nothing is left); `centre` [3] and
-        `profile` [circles, 2] (height above the world's origin and radius) in m.
+        with masks one pixel smaller and larger (None if they give no estimate); `centre` [3] and
+        `profile` [circles, 2] (height above the world's origin and radius) in m; `residual` in px,
+        how far from the middles of the masks the centre is seen: a pixel or a few.
 
     Raises
     ------
     ParameterError
-        No estimate is possible: a mask is empty, no circle is on both masks, or a circle is outside
-        an image.
+        No estimate is possible: a mask is empty, no circle is on both masks, a circle is outside an
+        image, or the views contradict each other.
 
     Examples
     --------
@@ -132,7 +135,7 @@ def lode(
         )
     first, second = (mask_pixels(m) for m in masks)
     left, right = (camera_numbers(c) for c in calibrations)
-    height, width, capacity, low, high, profile, centre = _core.lode(
+    height, width, capacity, low, high, profile, centre, residual = _core.lode(
         (first, second), (left, right), variant == "published"
     )
     return {
@@ -143,6 +146,7 @@ def lode(
         "capacity_high": high,
         "centre": np.array(centre),
         "profile": np.array(profile).reshape(-1, 2),
+        "residual": residual,
     }
 
 
@@ -176,6 +180,12 @@ def cuboid(
     dict
         `capacity` in mL, corners `low` and `high` [3] in m, the `share` of the box on the mask, and
         the number of `points` kept.
+
+    Raises
+    ------
+    ParameterError
+        The calibration is of another resolution, no depth is on the mask, or the capacity is
+        impossible (1 mL to 100 L), as with depth in another unit.
 
     Examples
     --------
@@ -215,6 +225,11 @@ def upright_box(
     dict
         `volume` in mL; `sides` [3] in m: longer and shorter side of the base, and height; number of
         `points`.
+
+    Raises
+    ------
+    ParameterError
+        As in `cuboid`.
 
     Examples
     --------

@@ -40,7 +40,7 @@ def test_lode_measures_a_cylinder(tmp_path: Path) -> None:
     assert found["capacity"] == pytest.approx(np.pi * 9.0 * 10.0, rel=0.12)
     assert found["capacity_low"] is not None and found["capacity_high"] is not None
     assert found["capacity_low"] < found["capacity"] < found["capacity_high"]
-    assert found["profile"].shape[1] == 2
+    assert found["profile"].shape[1] == 2 and 0.0 <= found["residual"] < 2.0
     read = [vision.load_calibration(file) for file in files]
     assert vision.lode([mask, mask], read)["capacity"] == found["capacity"]
     assert read[0].rgb.projection.shape == (3, 4) and read[0].ir1 is None
@@ -104,6 +104,29 @@ def test_masks_of_another_size_are_refused(tmp_path: Path) -> None:
     half = cylinder()[::2, ::2]
     with pytest.raises(ParameterError, match=r"view 1 has 320 by 350 px.* about 640 by 640 px"):
         vision.lode([half, half], files)
+
+
+def test_inputs_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
+    files = [calibration(tmp_path / f"{i}.json", i * np.pi / 2) for i in range(2)]
+    mask = cylinder()
+    with pytest.raises(ParameterError, match="at the same place"):
+        vision.lode([mask, mask], [files[0], files[0]])
+    with pytest.raises(ParameterError, match=r"do not meet at one point, by \d+ px"):
+        vision.lode([mask, np.roll(mask, 100, axis=0)], files)
+    with pytest.raises(ParameterError, match="beyond the heights that are tried"):
+        vision.lode([np.ones_like(mask), np.ones_like(mask)], files)
+    depth = np.where(mask, 970 + np.abs(np.arange(640) - 320), 0).astype(np.uint16)
+    for values in (depth // 10, depth * 30):
+        with pytest.raises(ParameterError, match="impossible for a container"):
+            vision.cuboid(values, mask, files[0], outliers="kept")
+    half = np.ascontiguousarray(depth[::2, ::2])
+    with pytest.raises(ParameterError, match="depth image has 320 by 350 px"):
+        vision.cuboid(half, half > 0, files[0])
+    camera = vision.load_calibration(files[0]).rgb
+    longer = np.diag([1.5, 1.5, 1.0]) @ camera.intrinsic
+    other = vision.Camera(longer, camera.rotation, camera.translation, camera.projection)
+    with pytest.raises(ParameterError, match="'projMatrix' is not 'intrinsic' times"):
+        vision.lode([mask, mask], [vision.Calibration(other), files[1]])
 
 
 def test_cameras_that_see_nothing_are_refused(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ use crate::pool::compute;
 
 /// Intrinsic, rotation, translation and projection of a camera, row by row.
 pub(crate) type Numbers = [f64; 33];
-pub(crate) type Sizes = (f64, f64, f64, Option<f64>, Option<f64>, Vec<[f64; 2]>, [f64; 3]);
+pub(crate) type Sizes = (f64, f64, f64, Option<f64>, Option<f64>, Vec<[f64; 2]>, [f64; 3], f64);
 pub(crate) type Box3 = ([f64; 3], [f64; 3], f64, f64, usize);
 pub(crate) type FoundRegion<'py> = Option<([usize; 4], Bound<'py, PyArray2<f32>>, [f32; 2])>;
 
@@ -84,7 +84,7 @@ pub(crate) fn load_depth(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, Py
     Ok(array.map_err(value_error)?.into_pyarray(py))
 }
 
-/// Height, width, capacity, its band, profile and centre.
+/// Height, width, capacity, its band, profile, centre and residual.
 #[pyfunction]
 pub(crate) fn lode(
     py: Python<'_>,
@@ -101,7 +101,8 @@ pub(crate) fn lode(
     })?
     .map_err(value_error)?;
     let (low, high) = (band.low, band.high);
-    Ok((found.height, found.width, found.capacity, low, high, found.profile, found.centre))
+    let (profile, centre, residual) = (found.profile, found.centre, found.residual);
+    Ok((found.height, found.width, found.capacity, low, high, profile, centre, residual))
 }
 
 /// Corners, share on the mask, capacity and points of M4's box.

@@ -17,6 +17,12 @@ const MAX_PX: f64 = 1e5;
 pub(crate) const MAX_DISTANCE: f64 = 100.0;
 /// How far a rotation times its transpose may be from the unit matrix; real files: 1e-7.
 const TURNED: f64 = 1e-3;
+/// How far a row of 'projMatrix' may be from that of the other parts, as a share of its length: 1 or 2 px. Real
+/// files: 0.
+const PROJECTED: f64 = 1e-3;
+/// Least share of an image's size that twice the principal point is, or the other way around; real cameras:
+/// 0.98.
+const OFF_CENTRE: f64 = 0.8;
 
 /// A camera without lens distortion, as the data set gives it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -55,7 +61,7 @@ impl Camera {
     }
 
     /// Whether anything can be seen with it: focal lengths above 0 and a principal point, in px, a
-    /// rotation, and a place within 100 m.
+    /// rotation, a place within 100 m, and the projection that follows from them.
     ///
     /// # Errors
     /// A text that names the part at fault.
@@ -89,7 +95,50 @@ impl Camera {
         if !self.projection.iter().flatten().all(|p| p.abs() <= MAX_PX * MAX_DISTANCE * 4.0) {
             return Err("'projMatrix' has numbers that are impossible for a camera".into());
         }
+        if !self.projects() {
+            return Err(
+                "'projMatrix' is not 'intrinsic' times 'rvec' and 'tvec': they are of different \
+                 calibrations; leave 'projMatrix' out, or take all four from one calibration"
+                    .into(),
+            );
+        }
         Ok(())
+    }
+
+    /// Whether the projection is that of the other parts, up to a factor, which changes no pixel.
+    fn projects(&self) -> bool {
+        let own = Self::new(self.intrinsic, self.rotation, self.translation).projection;
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+        // The last row begins with a row of the rotation, whose length is 1.
+        let factor = dot(&self.projection[2][..3], &own[2][..3]);
+        let near = |given: &[f64; 4], own: &[f64; 4]| {
+            let off: [f64; 4] = std::array::from_fn(|c| given[c] - factor * own[c]);
+            dot(&off, &off) <= (PROJECTED * factor).powi(2) * dot(own, own)
+        };
+        factor != 0.0 && self.projection.iter().zip(&own).all(|(given, own)| near(given, own))
+    }
+
+    /// Refuses images of another resolution than the calibrated ones: a lens points near the middle of its
+    /// image, and everything measured on another would be as wrong as its scale.
+    pub(crate) fn check_size(&self, what: &str, width: usize, height: usize) -> Result<()> {
+        let calibrated = [0, 1].map(|axis| self.intrinsic[axis][2] * 2.0);
+        let fits = |size: usize, expected: f64| {
+            (size as f64 * OFF_CENTRE..=size as f64 / OFF_CENTRE).contains(&expected)
+        };
+        if fits(width, calibrated[0]) && fits(height, calibrated[1]) {
+            return Ok(());
+        }
+        Err(VisionError::Conflict(format!(
+            "{what} has {width} by {height} px, but its calibration is of images of about {:.0} by {:.0} px; \
+             give images and a calibration of the same resolution",
+            calibrated[0], calibrated[1]
+        )))
+    }
+
+    /// Where the camera is, in m.
+    pub(crate) fn place(&self) -> [f64; 3] {
+        let along = |axis: usize| (0..3).map(move |k| self.rotation[k][axis] * self.translation[k]);
+        std::array::from_fn(|axis| -along(axis).sum::<f64>())
     }
 
     /// Pixel (column, row) of a point in m; computed as OpenCV's `projectPoints` does.
@@ -99,6 +148,11 @@ impl Camera {
         let over = if z == 0.0 { 1.0 } else { 1.0 / z };
         let k = &self.intrinsic;
         [x * over * k[0][0] + k[0][2], y * over * k[1][1] + k[1][2]]
+    }
+
+    /// Distance of a point along the camera's axis in m; below 0 behind the camera.
+    pub(crate) fn depth(&self, point: [f64; 3]) -> f64 {
+        matrix::times(&self.rotation, point)[2] + self.translation[2]
     }
 
     /// Turns pixels with depth into points of the world; `None` for a singular camera.
@@ -280,6 +334,25 @@ mod tests {
         }
     }
 
+    /// The camera with a projection of a focal length and a distance, times a factor.
+    fn projected(focal: f64, away: f64, factor: f64) -> String {
+        let rows = [
+            [focal, 0.0, 640.0, 640.0 * away],
+            [0.0, focal, 360.0, 360.0 * away],
+            [0.0, 0.0, 1.0, away],
+        ];
+        let rows = rows.map(|row| row.map(|v| v * factor));
+        CAMERA.replace("\"rvec\"", &format!("\"projMatrix\":{rows:?},\"rvec\""))
+    }
+
+    #[test]
+    fn a_projection_is_that_of_the_other_parts_up_to_a_factor_and_rounding() {
+        for (focal, factor) in [(900.0, 1.0), (900.0, -0.5), (900.4, 1.0)] {
+            let camera = parse(&projected(focal, 2.0, factor)).unwrap().rgb;
+            assert_eq!(camera.projection[0][0], focal * factor);
+        }
+    }
+
     #[test]
     fn what_is_missing_or_wrong_is_named() {
         for (text, part) in [
@@ -301,6 +374,19 @@ mod tests {
             ),
             (&CAMERA.replace("[0,0,0]", "[[1,0,0],[0,1,0],[0,0,-1]]"), "'rvec' is not a rotation"),
             (&CAMERA.replace("[0,0,0]", "[1e200,0,0]"), "'rvec' is not a rotation"),
+            // Of a focal length of 600 px, and of another place.
+            (
+                &projected(600.0, 2.0, 1.0),
+                "'projMatrix' is not 'intrinsic' times 'rvec' and 'tvec'",
+            ),
+            (
+                &projected(900.0, 2.1, 1.0),
+                "'projMatrix' is not 'intrinsic' times 'rvec' and 'tvec'",
+            ),
+            (
+                &projected(900.0, 2.0, 0.0),
+                "'projMatrix' is not 'intrinsic' times 'rvec' and 'tvec'",
+            ),
         ] {
             let error = parse(text).unwrap_err().to_string();
             assert!(error.starts_with("c.json: ") && error.contains(part), "{error}");

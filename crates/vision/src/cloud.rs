@@ -6,6 +6,7 @@
 use serde::Serialize;
 
 use crate::calibration::{Camera, MAX_DISTANCE};
+use crate::capacity::possible;
 use crate::error::{Result, VisionError};
 use crate::image::Depth;
 use crate::mask::Mask;
@@ -50,6 +51,7 @@ pub(crate) fn points(view: &DepthView<'_>) -> Result<Vec<[f64; 3]>> {
             depth.width, depth.height, mask.width, mask.height
         )));
     }
+    camera.check_size("the depth image", depth.width, depth.height)?;
     let back = camera
         .back_projection()
         .ok_or_else(|| VisionError::Conflict("the camera matrix cannot be inverted".into()))?;
@@ -71,8 +73,8 @@ pub(crate) fn points(view: &DepthView<'_>) -> Result<Vec<[f64; 3]>> {
 /// The upright box around the points of all views.
 ///
 /// # Errors
-/// [`VisionError::Conflict`] when sizes differ or the camera does not fit, [`VisionError::Request`] when hardly
-/// any depth lies on the masks.
+/// [`VisionError::Conflict`] when sizes differ or a camera does not fit its images, [`VisionError::Request`] when
+/// hardly any depth lies on the masks, or no container has the volume.
 pub fn upright_box(views: &[DepthView<'_>]) -> Result<UprightBox> {
     let mut cloud = Vec::new();
     for view in views {
@@ -99,7 +101,8 @@ pub fn upright_box(views: &[DepthView<'_>]) -> Result<UprightBox> {
     });
     let [a, b] = plans.min_by(|a, b| (a[0] * a[1]).total_cmp(&(b[0] * b[1]))).unwrap_or_default();
     let sides = [a.max(b), a.min(b), height];
-    Ok(UprightBox { sides, volume: a * b * height * 1e6, points: thinned.len() })
+    let volume = possible(a * b * height * 1e6)?;
+    Ok(UprightBox { sides, volume, points: thinned.len() })
 }
 
 /// Length between the percentiles of stray points.
@@ -167,5 +170,15 @@ mod tests {
         let empty = Mask::empty(400, 300);
         let none = DepthView { mask: &empty, ..view(0) };
         assert!(upright_box(&[none]).unwrap_err().to_string().contains("0 points"));
+        let mut halved = views[0].2.clone();
+        halved.intrinsic = [[450.0, 0.0, 100.0], [0.0, 450.0, 75.0], [0.0, 0.0, 1.0]];
+        let error = upright_box(&[DepthView { camera: &halved, ..view(0) }]).unwrap_err();
+        assert!(matches!(error, VisionError::Conflict(_)), "{error}");
+        assert!(error.to_string().contains("depth image has 400 by 300 px"), "{error}");
+        // In tenths of a metre.
+        let mut coarse = views[0].0.clone();
+        coarse.data.iter_mut().for_each(|mm| *mm = mm.div_ceil(100));
+        let error = upright_box(&[DepthView { depth: &coarse, ..view(0) }]).unwrap_err();
+        assert!(error.to_string().contains("impossible for a container"), "{error}");
     }
 }

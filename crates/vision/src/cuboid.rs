@@ -6,6 +6,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
 use crate::calibration::Camera;
+use crate::capacity::possible;
 use crate::cloud::{self, DepthView};
 use crate::detections::Detection;
 use crate::error::{Result, VisionError};
@@ -55,8 +56,8 @@ pub struct Cuboid {
 /// The same seed gives the same estimate.
 ///
 /// # Errors
-/// [`VisionError::Conflict`] when sizes differ or the camera does not fit, [`VisionError::Request`] when no
-/// depth lies on the mask or the box is larger than anything that is measured.
+/// [`VisionError::Conflict`] when sizes differ or the camera does not fit the images, [`VisionError::Request`]
+/// when no depth lies on the mask, or no container has the capacity.
 pub fn cuboid(
     depth: &Depth,
     mask: &Mask,
@@ -76,7 +77,8 @@ pub fn cuboid(
     });
     let share = share_on_mask(low, high, mask, camera)?;
     let volume: f64 = (0..3).map(|i| high[i] - low[i]).product();
-    Ok(Cuboid { low, high, share, capacity: volume * 1e6 * share, points: points.len() })
+    let capacity = possible(volume * 1e6 * share)?;
+    Ok(Cuboid { low, high, share, capacity, points: points.len() })
 }
 
 /// What the forests keep: in space first, then in the planes xy, xz and yz of what is left.
@@ -254,6 +256,20 @@ mod tests {
         wide.data[0] = 1;
         let all = Mask { data: vec![true; 640 * 480], ..mask };
         assert!(reason(&wide, &all).contains("at most 20 m³"));
+        // Depth in cm, and in tenths of a mm.
+        let scaled = |of: fn(u16) -> u16| {
+            let data = depth.data.iter().map(|&mm| of(mm)).collect();
+            reason(&Depth { data, ..depth.clone() }, &mask)
+        };
+        for said in [scaled(|mm| mm.div_ceil(10)), scaled(|mm| mm * 10)] {
+            assert!(said.contains("impossible for a container"), "{said}");
+        }
+        // A calibration of half the resolution.
+        let k = [[300.0, 0.0, 160.0], [0.0, 300.0, 120.0], [0.0, 0.0, 1.0]];
+        let halved = Camera { intrinsic: k, ..camera() };
+        let error = cuboid(&depth, &mask, &halved, Outliers::Kept, 1).unwrap_err();
+        assert!(matches!(error, VisionError::Conflict(_)), "{error}");
+        assert!(error.to_string().contains("images of about 320 by 240 px"), "{error}");
         // A camera whose points leave every room, as single precision cannot hold them.
         let mut far = camera();
         far.translation = [0.0, 0.0, 1e39];

@@ -22,6 +22,7 @@
 //! [`region`] finds it in a depth image alone, [`fused`] weighs several estimates.
 
 mod calibration;
+mod capacity;
 pub mod category;
 pub mod cloud;
 mod coco;

@@ -4,14 +4,15 @@
 //! where its projections lie on the masks of both views. The largest such circle at every height is
 //! the profile of the object.
 
+mod centre;
+mod circles;
+
 use std::f64::consts::PI;
 
-use linfa_linalg::svd::SVD;
-use ndarray::Array2;
 use serde::Serialize;
 
 use crate::calibration::Camera;
-use crate::contour;
+use crate::capacity::possible;
 use crate::error::{Result, VisionError};
 use crate::mask::Mask;
 
@@ -45,9 +46,8 @@ impl Grid {
     }
 }
 
-/// Least share of an image's size that twice the principal point is, or the other way around; real cameras:
-/// 0.98.
-const OFF_CENTRE: f64 = 0.8;
+/// Share of the circles that may have the largest radius. Boxes in synthetic views, wider than that: 0.78.
+const MAX_WIDEST: f64 = 0.9;
 
 /// How faithfully the published program is followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -56,7 +56,8 @@ pub enum Variant {
     /// As published: indices left of or above an image wrap to its other side, a circle that
     /// reaches beyond the other sides ends the estimate, gaps in the profile count as height.
     Published,
-    /// Pixels outside an image are not on the mask; only heights that belong to the object count.
+    /// Pixels outside an image are not on the mask; only heights that belong to the object count. No
+    /// estimate where the masks cannot show one object, or it reaches the ends of the search.
     Corrected,
 }
 
@@ -73,6 +74,8 @@ pub struct Dimensions {
     pub capacity: f64,
     /// Height above the world's origin and radius of every accepted circle, in m, from below.
     pub profile: Vec<[f64; 2]>,
+    /// Largest distance in px between the middle of a mask and where the centre is seen.
+    pub residual: f64,
 }
 
 impl Dimensions {
@@ -103,7 +106,7 @@ impl Dimensions {
 /// Capacity and what one pixel more or less on both masks makes of it, in mL.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Band {
-    /// With masks eroded by a pixel; `None` where nothing is left.
+    /// With masks eroded by a pixel; `None` where there is no estimate.
     pub low: Option<f64>,
     /// With masks dilated by a pixel.
     pub high: Option<f64>,
@@ -134,21 +137,13 @@ pub struct View<'a> {
 ///
 /// # Errors
 /// [`VisionError::Request`] with the reason when there is no estimate: an empty mask, a circle
-/// outside an image (published variant), no circle on both masks. [`VisionError::Conflict`] for masks of
-/// another size than the calibrated images.
+/// outside an image (published variant), no circle on both masks; in the corrected variant also masks that
+/// do not show one object, an object that reaches the ends of the search, and a capacity that no container
+/// has. [`VisionError::Conflict`] for masks of another size than the calibrated images, and for cameras at
+/// one place.
 pub fn dimensions(views: [View<'_>; 2], variant: Variant) -> Result<Dimensions> {
-    let mut centres = [[0.0; 2]; 2];
-    for (i, view) in views.iter().enumerate() {
-        check_size(view, i + 1)?;
-        let border = contour::largest(view.mask)
-            .ok_or_else(|| VisionError::Request(format!("the mask of view {} is empty", i + 1)))?;
-        centres[i] = border.centroid().ok_or_else(|| {
-            VisionError::Request(format!("the mask of view {} has no area", i + 1))
-        })?;
-    }
-    let centre = triangulate(views.map(|v| v.camera), centres)
-        .ok_or_else(|| VisionError::Request("the two lines of sight do not meet".into()))?;
-    let (width, accepted) = profile(views, centre, variant)?;
+    let centre = centre::centre(views, variant)?;
+    let (width, accepted) = circles::profile(views, centre.point, variant)?;
     let (Some(&(first, _)), Some(&(last, _))) = (accepted.first(), accepted.last()) else {
         return Err(VisionError::Request("no circle fits both masks".into()));
     };
@@ -159,13 +154,41 @@ pub fn dimensions(views: [View<'_>; 2], variant: Variant) -> Result<Dimensions> 
         // Each circle stands for a slice of the grid's step.
         Variant::Corrected => count * HEIGHTS.step() * 1000.0,
     };
+    let capacity = radius.powi(2) * height * PI / 1000.0;
+    if variant == Variant::Corrected {
+        check_ends(&accepted)?;
+        possible(capacity)?;
+    }
     Ok(Dimensions {
-        centre,
+        centre: centre.point,
         height,
         width,
-        capacity: radius.powi(2) * height * PI / 1000.0,
+        capacity,
         profile: accepted.iter().map(|&(h, r)| [HEIGHTS.get(h), RADII.get(r)]).collect(),
+        residual: centre.residual,
     })
+}
+
+/// Refuses an object that reaches the ends of what is tried: its size would be that of the search.
+fn check_ends(accepted: &[(usize, usize)]) -> Result<()> {
+    let ends = [0, HEIGHTS.count - 1];
+    let widest = accepted.iter().filter(|&&(_, radius)| radius == 0).count();
+    let reason = if accepted.iter().any(|(height, _)| ends.contains(height)) {
+        let [low, high] = ends.map(|end| HEIGHTS.get(end) * 1000.0);
+        format!(
+            "the object reaches beyond the heights that are tried, {low:.0} to {high:.0} mm above the world's origin"
+        )
+    } else if widest as f64 > MAX_WIDEST * accepted.len() as f64 {
+        let width = RADII.first * 2000.0;
+        format!(
+            "the object is wider than the largest circle that is tried, {width:.0} mm, at nearly all heights"
+        )
+    } else {
+        return Ok(());
+    };
+    Err(VisionError::Request(format!(
+        "{reason}; check that the masks show the object alone, and that the calibrations are in m"
+    )))
 }
 
 /// The same with masks one pixel smaller and larger: how much the masks decide.
@@ -176,135 +199,6 @@ pub fn band(views: [View<'_>; 2], variant: Variant) -> Band {
         dimensions(changed, variant).ok().map(|d| d.capacity)
     };
     Band { low: capacity(Mask::eroded), high: capacity(Mask::dilated) }
-}
-
-/// A lens points near the middle of its image: a mask whose middle is far from the principal point is of
-/// another size, and everything measured on it would be as wrong as its scale.
-fn check_size(view: &View<'_>, number: usize) -> Result<()> {
-    let Mask { width, height, .. } = *view.mask;
-    let calibrated = [0, 1].map(|axis| view.camera.intrinsic[axis][2] * 2.0);
-    let fits = |size: usize, expected: f64| {
-        (size as f64 * OFF_CENTRE..=size as f64 / OFF_CENTRE).contains(&expected)
-    };
-    if fits(width, calibrated[0]) && fits(height, calibrated[1]) {
-        return Ok(());
-    }
-    Err(VisionError::Conflict(format!(
-        "the mask of view {number} has {width} by {height} px, but its calibration is of images of about \
-         {:.0} by {:.0} px; give the mask at the size of the calibrated image",
-        calibrated[0], calibrated[1]
-    )))
-}
-
-/// The point in m seen at two pixels: least squares on the homogeneous equations of both cameras.
-fn triangulate(cameras: [&Camera; 2], pixels: [[f64; 2]; 2]) -> Option<[f64; 3]> {
-    let mut equations = Array2::zeros((4, 4));
-    for (view, (camera, pixel)) in cameras.iter().zip(pixels).enumerate() {
-        for axis in 0..2 {
-            for column in 0..4 {
-                equations[[2 * view + axis, column]] =
-                    pixel[axis] * camera.projection[2][column] - camera.projection[axis][column];
-            }
-        }
-    }
-    let (_, values, vectors) = equations.svd(false, true).ok()?;
-    let smallest = (0..4).min_by(|&a, &b| values[a].total_cmp(&values[b]))?;
-    let v = vectors?.row(smallest).to_owned();
-    let point = [v[0] / v[3], v[1] / v[3], v[2] / v[3]];
-    point.iter().all(|x| x.is_finite()).then_some(point)
-}
-
-/// Projections of circles around a centre: a pixel is `(a + radius * b) / (c + radius * d)`.
-struct Circles {
-    /// Cosine and sine of the angles.
-    turns: [(f64, f64); ANGLES.count],
-    centre: [f64; 3],
-}
-
-/// Width in mm, and numbers of height and radius of the accepted circles.
-type Profile = (f64, Vec<(usize, usize)>);
-
-fn profile(views: [View<'_>; 2], centre: [f64; 3], variant: Variant) -> Result<Profile> {
-    let circles = Circles {
-        turns: std::array::from_fn(|i| {
-            let angle = ANGLES.get(i).to_radians();
-            (angle.cos(), angle.sin())
-        }),
-        centre,
-    };
-    let mut widest = 0.0f64;
-    let mut accepted = Vec::new();
-    for h in 0..HEIGHTS.count {
-        let mut radius = RADII.count - 1;
-        for r in 0..RADII.count {
-            let mut inside = true;
-            for view in &views {
-                match circles.seen(view, RADII.get(r), HEIGHTS.get(h), variant) {
-                    Seen::Inside => {}
-                    Seen::Partly => inside = false,
-                    Seen::Beyond => {
-                        return Err(VisionError::Request(format!(
-                            "a circle of {:.1} mm at height {:.0} mm reaches beyond an image, where the published program stops",
-                            RADII.get(r) * 1000.0,
-                            HEIGHTS.get(h) * 1000.0
-                        )));
-                    }
-                }
-                // The published program looks at both images before it decides.
-                if !inside && variant == Variant::Corrected {
-                    break;
-                }
-            }
-            if inside {
-                accepted.push((h, r));
-                radius = r;
-                break;
-            }
-        }
-        widest = widest.max(RADII.get(radius) * 2.0 * 1000.0);
-    }
-    if variant == Variant::Corrected {
-        widest = accepted.iter().map(|&(_, r)| RADII.get(r) * 2000.0).fold(0.0, f64::max);
-    }
-    Ok((widest, accepted))
-}
-
-/// Where the points of a circle lie.
-#[derive(PartialEq)]
-enum Seen {
-    Inside,
-    Partly,
-    Beyond,
-}
-
-impl Circles {
-    fn seen(&self, view: &View<'_>, radius: f64, height: f64, variant: Variant) -> Seen {
-        let (width, rows) = (view.mask.width as i64, view.mask.height as i64);
-        let mut seen = Seen::Inside;
-        for &(cos, sin) in &self.turns {
-            let point = [self.centre[0] + radius * cos, self.centre[1] + radius * sin, height];
-            let pixel = view.camera.project(point);
-            let [x, y] = match variant {
-                // Truncated towards zero and wrapped, as numpy does.
-                Variant::Published => {
-                    let [x, y] = pixel.map(|v| v as i64);
-                    [x + if x < 0 { width } else { 0 }, y + if y < 0 { rows } else { 0 }]
-                }
-                Variant::Corrected => pixel.map(|v| v.floor() as i64),
-            };
-            let in_image = (0..width).contains(&x) && (0..rows).contains(&y);
-            if !in_image && variant == Variant::Published {
-                return Seen::Beyond;
-            }
-            if !in_image || !view.mask.data[(y * width + x) as usize] {
-                if variant == Variant::Corrected {
-                    return Seen::Partly;
-                }
-                seen = Seen::Partly;
-            }
-        }
-        seen
-    }
 }
 
 #[cfg(test)]
@@ -357,7 +251,8 @@ mod tests {
         let band = band(views, Variant::Corrected);
         assert!(band.low.unwrap() < d.capacity && d.capacity < band.high.unwrap(), "{band:?}");
         let published = dimensions(views, Variant::Published).unwrap();
-        assert_eq!(published.width, d.width);
+        assert_eq!((published.width, published.residual), (d.width, d.residual));
+        assert!(d.residual < 1.0, "{}", d.residual);
         // Without the rows below the object, circles reach beyond the image.
         let cut = masks.map(|m| Mask { width: 640, height: 400, data: m.data[..400 * 640].into() });
         let views = [0, 1].map(|i| View { mask: &cut[i], camera: &cameras[i] });
@@ -385,6 +280,70 @@ mod tests {
         }
     }
 
+    /// What the corrected variant says of masks and cameras of which nothing can be measured; the published
+    /// program gives a number.
+    #[test]
+    fn what_the_search_cannot_hold_is_no_estimate() {
+        let cameras = [camera(0.3), camera(0.3 + PI / 2.0)];
+        let masks = [0, 1].map(|i| cylinder(&cameras[i]));
+        let reason = |masks: [&Mask; 2], cameras: [&Camera; 2], variant| {
+            let views = [0, 1].map(|i| View { mask: masks[i], camera: cameras[i] });
+            dimensions(views, variant).map(|d| d.capacity).map_err(|error| {
+                let conflict = matches!(error, VisionError::Conflict(_));
+                (conflict, error.to_string())
+            })
+        };
+        let corrected = |masks, cameras: [&Camera; 2]| {
+            let (conflict, said) = reason(masks, cameras, Variant::Corrected).unwrap_err();
+            assert!(!conflict, "{said}");
+            said
+        };
+        let both = [&cameras[0], &cameras[1]];
+        // Masks of everything, and of everything else.
+        let all = Mask { data: vec![true; 640 * 480], ..masks[0] };
+        let said = corrected([&all, &all], both);
+        assert!(said.contains("beyond the heights that are tried, -100 to 400 mm"), "{said}");
+        let inverted =
+            [0, 1].map(|i| Mask { data: masks[i].data.iter().map(|p| !p).collect(), ..masks[i] });
+        let said = corrected([&inverted[0], &inverted[1]], both);
+        assert!(said.contains("beyond the heights that are tried"), "{said}");
+        // In decimetres.
+        let far = [0, 1].map(|i| {
+            let Camera { intrinsic, rotation, translation, .. } = cameras[i];
+            Camera::new(intrinsic, rotation, translation.map(|t| t * 10.0))
+        });
+        let said = corrected([&masks[0], &masks[1]], [&far[0], &far[1]]);
+        assert!(said.contains("beyond the heights that are tried"), "{said}");
+        // Another object in one of the views.
+        let lower = |i: usize| {
+            let data =
+                (0..640 * 480).map(|at| at >= 60 * 640 && masks[i].data[at - 60 * 640]).collect();
+            Mask { data, ..masks[i] }
+        };
+        let said = corrected([&masks[0], &lower(1)], both);
+        assert!(said.contains("px (at most 20 px); check that both masks"), "{said}");
+        assert!(!said.contains("by 0 px"), "{said}");
+        // One camera.
+        for variant in [Variant::Published, Variant::Corrected] {
+            let (conflict, said) =
+                reason([&masks[0], &masks[0]], [&cameras[0], &cameras[0]], variant).unwrap_err();
+            assert!(conflict && said.contains("at the same place"), "{said}");
+        }
+    }
+
+    #[test]
+    fn an_object_that_ends_within_the_search_may_be_wide() {
+        let profile = |widest: usize| -> Vec<(usize, usize)> {
+            (100..200).map(|h| (h, usize::from(h >= 100 + widest))).collect()
+        };
+        assert!(check_ends(&profile(90)).is_ok());
+        let said = check_ends(&profile(91)).unwrap_err().to_string();
+        assert!(said.contains("wider than the largest circle that is tried, 150 mm"), "{said}");
+        for end in [0, HEIGHTS.count - 1] {
+            assert!(check_ends(&[(end, 50)]).is_err(), "{end}");
+        }
+    }
+
     #[test]
     fn a_stem_holds_nothing() {
         let profile = |radius: &dyn Fn(f64) -> f64| -> Vec<[f64; 2]> {
@@ -396,6 +355,7 @@ mod tests {
             width: 60.0,
             capacity: 0.0,
             profile,
+            residual: 0.0,
         };
         let slice = PI * 0.03 * 0.03 * HEIGHTS.step() * 1e6;
         let tumbler = of(profile(&|_| 0.03));
