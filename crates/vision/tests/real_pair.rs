@@ -65,6 +65,12 @@ fn the_real_pair_gives_the_published_size() {
     let corrected = lode::dimensions(views, Variant::Corrected).unwrap();
     assert_eq!(corrected.width, published.width);
     assert!((corrected.height - published.height).abs() < 1.1, "{}", corrected.height);
+    // Exchanged masks are no object; the published program measures them.
+    assert!(corrected.residual < 1.0, "{}", corrected.residual);
+    let exchanged = [0, 1].map(|i| View { mask: &masks[1 - i], camera: &cameras[i] });
+    let error = lode::dimensions(exchanged, Variant::Corrected).unwrap_err().to_string();
+    assert!(error.contains("do not meet at one point"), "{error}");
+    assert!(lode::dimensions(exchanged, Variant::Published).is_ok());
 }
 
 /// Height, width and capacity by file name; `None` where the file has the prior.
