@@ -9,6 +9,7 @@ use crate::layout::{self, LayoutError};
 use crate::npy::NpyFile;
 use crate::npz::{NpzError, NpzFile};
 use crate::parquet::{ParquetFile, ParquetTableError};
+use crate::partition;
 use crate::provenance::Provenance;
 use crate::table::Table;
 
@@ -27,9 +28,18 @@ pub enum FeatureFileError {
     /// A folder, probably of recordings.
     #[error(
         "{path} is a folder, but a feature file is expected: corsmal-feat extract {path} -o \
-         feats.npz makes one from the recordings in it"
+         table.npz --preset mfcc-zcr makes one with a row of statistics for each recording in it"
     )]
     Folder {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// The folder of a partitioned output.
+    #[error(
+        "{path} is a folder of parts, which `extract --partition-by` wrote, but a single file is \
+         expected: extract without --partition-by"
+    )]
+    Parts {
         /// The folder.
         path: PathBuf,
     },
@@ -83,6 +93,9 @@ impl FeatureFile {
     /// # Errors
     /// [`FeatureFileError`].
     pub fn open(path: &Path) -> Result<Self, FeatureFileError> {
+        if partition::is_partitioned(path) {
+            return Err(FeatureFileError::Parts { path: path.into() });
+        }
         if path.is_dir() {
             return Err(FeatureFileError::Folder { path: path.into() });
         }

@@ -236,6 +236,8 @@ mod tests {
         let path = folder.path().join("out");
         write_parts(&path, &parts);
         assert!(is_partitioned(&path));
+        let refused = crate::feature_file::FeatureFile::open(&path).unwrap_err().to_string();
+        assert!(refused.contains("--partition-by"), "{refused}");
         let (found, label) = open(&path).unwrap();
         assert_eq!((found.table, label.as_str()), (table, "type"));
     }
