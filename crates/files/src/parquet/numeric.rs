@@ -3,10 +3,11 @@
 use std::fs::File;
 use std::path::Path;
 
+use half::f16;
 use ndarray::Array2;
 use parquet::basic::{ConvertedType, LogicalType, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
-use parquet::data_type::{ByteArray, DataType};
+use parquet::data_type::{ByteArray, DataType, FixedLenByteArray};
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
@@ -23,7 +24,7 @@ pub struct NumericTable {
     pub ids: Option<Vec<String>>,
     /// Names of the numeric columns.
     pub names: Vec<String>,
-    /// Their types: `float32`, `float64`, `int32`, `int64`, `uint32`, `uint64` or `bool`.
+    /// Their types: `float16`, `float32`, `float64`, `int32`, `int64`, `uint32`, `uint64` or `bool`.
     pub types: Vec<&'static str>,
     /// `[rows, columns]`; nulls are NaN.
     pub values: Array2<f64>,
@@ -96,6 +97,9 @@ fn of_column(
             ColumnReader::DoubleColumnReader(reader) => {
                 append(reader, levels, &mut numbers, Ok, f64::NAN)?;
             }
+            ColumnReader::FixedLenByteArrayColumnReader(reader) => {
+                append(reader, levels, &mut numbers, half_precision, f64::NAN)?;
+            }
             ColumnReader::BoolColumnReader(reader) => {
                 let number = |v| Ok(f64::from(u8::from(v)));
                 append(reader, levels, &mut numbers, number, f64::NAN)?;
@@ -126,7 +130,7 @@ fn of_column(
     }
     Ok(match kind {
         TEXT => bytes.into_iter().collect::<Option<_>>().map_or(Column::Other, Column::Texts),
-        "float32" | "float64" | "bool" => Column::Numbers(kind, numbers),
+        HALF | "float32" | "float64" | "bool" => Column::Numbers(kind, numbers),
         _ => whole(column, kind, integers, left)?,
     })
 }
@@ -153,7 +157,19 @@ fn whole(
     Ok(Column::Texts(texts))
 }
 
+/// A number of two bytes.
+fn half_precision(value: FixedLenByteArray) -> Result<f64, ParquetError> {
+    match value.data() {
+        &[low, high] => Ok(f16::from_le_bytes([low, high]).to_f64()),
+        other => {
+            let reason = format!("a float16 has 2 bytes, not {}", other.len());
+            Err(ParquetError::General(reason))
+        }
+    }
+}
+
 const TEXT: &str = "text";
+const HALF: &str = "float16";
 const UNSIGNED32: &str = "uint32";
 const UNSIGNED64: &str = "uint64";
 
@@ -183,8 +199,13 @@ fn kind_of(column: &ColumnDescriptor) -> Option<&'static str> {
         Physical::INT64 => whole("int64", UNSIGNED64),
         Physical::BYTE_ARRAY if column.converted_type() == ConvertedType::DECIMAL => None,
         Physical::BYTE_ARRAY => Some(TEXT),
+        Physical::FIXED_LEN_BYTE_ARRAY if is_half(column) => Some(HALF),
         _ => None,
     }
+}
+
+fn is_half(column: &ColumnDescriptor) -> bool {
+    matches!(column.logical_type_ref(), Some(LogicalType::Float16))
 }
 
 /// Appends the rows of a column, `missing` where the definition level says that there is no value.
@@ -220,7 +241,9 @@ fn append<T: DataType, V: Clone>(
 mod tests {
     use std::sync::Arc;
 
-    use parquet::data_type::{ByteArrayType, DoubleType, Int32Type, Int64Type};
+    use parquet::data_type::{
+        ByteArrayType, DoubleType, FixedLenByteArrayType, Int32Type, Int64Type,
+    };
     use parquet::file::properties::WriterProperties;
     use parquet::file::writer::SerializedFileWriter;
     use parquet::schema::parser::parse_message_type;
@@ -283,7 +306,8 @@ mod tests {
         let schema = parse_message_type(
             "message m { required int64 id; required int64 large; required int64 at (TIMESTAMP_MICROS);
              required int64 price (DECIMAL(9,2)); required int64 unsigned (UINT_64);
-             required int32 small (UINT_32); required int64 whole; required binary bytes; }",
+             required int32 small (UINT_32); required int64 whole; required binary bytes;
+             required fixed_len_byte_array(2) half (FLOAT16); }",
         );
         let file = std::fs::File::create(&path).unwrap();
         let properties = Arc::new(WriterProperties::builder().build());
@@ -306,6 +330,11 @@ mod tests {
         let bytes = [vec![0xff_u8], vec![0xfe]].map(ByteArray::from);
         column.typed::<ByteArrayType>().write_batch(&bytes, None, None).unwrap();
         column.close().unwrap();
+        let mut column = group.next_column().unwrap().unwrap();
+        let halves = [f16::from_f32(0.5), f16::from_f32(-3.0)];
+        let halves = halves.map(|v| ByteArray::from(v.to_le_bytes().to_vec()).into());
+        column.typed::<FixedLenByteArrayType>().write_batch(&halves, None, None).unwrap();
+        column.close().unwrap();
         group.close().unwrap();
         writer.close().unwrap();
 
@@ -314,10 +343,14 @@ mod tests {
         assert_eq!(found.skipped, ["at", "price", "bytes"]);
         assert_eq!(
             (found.names, found.types),
-            (vec!["small".into(), "whole".into()], vec!["uint32", "int64"])
+            (
+                vec!["small".into(), "whole".into(), "half".into()],
+                vec!["uint32", "int64", "float16"]
+            )
         );
         assert_eq!(found.values.column(0).to_vec(), [4_294_967_295.0, 1.0]);
         assert_eq!(found.values.column(1).to_vec(), [9_007_199_254_740_992.0, -3.0]);
+        assert_eq!(found.values.column(2).to_vec(), [0.5, -3.0]);
         let texts = [
             ("large", ["9007199254740993", "9007199254740992"]),
             ("unsigned", ["18446744073709551615", "1"]),
