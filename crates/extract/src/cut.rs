@@ -1,12 +1,16 @@
-//! Recordings cut into windows, each an input of its own.
+//! Recordings cut into windows or stretches, each an input of its own.
 
+use std::collections::HashMap;
+use std::path::absolute;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+use corsmal_files::spelling;
 
 use crate::inputs::{Input, InputError, InputSource};
 use crate::survey::{headers, lengths};
 
-/// Column that holds the recording of a window: the group that folds keep together.
+/// Column that holds the recording of a window or stretch: the group that folds keep together.
 pub const RECORDING: &str = "recording";
 /// Most windows of a run.
 const MOST: u64 = 50_000_000;
@@ -18,6 +22,34 @@ pub struct WindowSpan {
     pub window: f64,
     /// From the begin of one to that of the next.
     pub hop: f64,
+}
+
+/// The same with a label `recording`, the path, where inputs are stretches of one file: folds keep them
+/// together also where another program rewrites the table. A label of that name stays as it is.
+pub fn name_recordings(mut inputs: Vec<Input>) -> Vec<Input> {
+    let is_stretch = |input: &Input| input.start.is_some() || input.end.is_some();
+    let is_named = |input: &Input| input.labels.iter().any(|(name, _)| name == RECORDING);
+    if !inputs.iter().any(is_stretch) || inputs.iter().any(is_named) {
+        return inputs;
+    }
+    // A file may be written in several ways; the first one names it.
+    let mut names: HashMap<String, String> = HashMap::new();
+    let mut recordings = Vec::with_capacity(inputs.len());
+    for input in &inputs {
+        let name = spelling::plain(&input.source.to_string());
+        let place = match &input.source {
+            InputSource::File(path) => absolute(path).ok(),
+            _ => None,
+        };
+        let place = place.map(|path| spelling::plain(&path.to_string_lossy()));
+        let place = place.unwrap_or_else(|| name.clone());
+        recordings.push(names.entry(place).or_insert(name).clone());
+    }
+    if names.len() < inputs.len() {
+        let named = inputs.iter_mut().zip(recordings);
+        named.for_each(|(input, recording)| input.labels.push((RECORDING.into(), recording)));
+    }
+    inputs
 }
 
 /// The windows of every recording, in the order of time: `x@0.5` begins half a second into `x`.

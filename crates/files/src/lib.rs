@@ -54,4 +54,5 @@ pub mod partition;
 pub mod provenance;
 pub mod quote;
 pub mod shard;
+pub mod spelling;
 pub mod table;

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use corsmal_extract::config::{Config, Preset};
+use corsmal_extract::cut::name_recordings;
 use corsmal_extract::engine::{FeatureArray, Features, Signal, Signals};
 use corsmal_extract::inputs::{self, InputError};
 use corsmal_extract::projection::Projection;
@@ -127,7 +128,8 @@ pub(crate) fn extract(
         if let Some(skipped) = found.warning() {
             told.warning(&skipped);
         }
-        run::run(&found.inputs, &config, &options, &told, stop).map_err(|error| match error {
+        let inputs = name_recordings(found.inputs);
+        run::run(&inputs, &config, &options, &told, stop).map_err(|error| match error {
             run::RunError::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
             other => RunError::new_err(other.to_string()),
         })

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use corsmal_extract::config::Config;
-use corsmal_extract::cut::{WindowSpan, into_windows};
+use corsmal_extract::cut::{WindowSpan, into_windows, name_recordings};
 use corsmal_extract::inputs::InputError;
 use corsmal_extract::run::{self, Progress, RunError, RunOptions};
 use corsmal_extract::survey::Survey;
@@ -54,7 +54,8 @@ pub struct Args {
     #[command(flatten)]
     jobs: Jobs,
     /// Cut recordings into windows of this many seconds: each gets a row or arrays, with the id
-    /// RECORDING@START, the labels of its recording, and the label `recording`.
+    /// RECORDING@START, the labels of its recording, and the label `recording`. Stretches of one file
+    /// in a manifest get that label, too.
     #[arg(long, value_name = "SECONDS", value_parser = window_seconds)]
     window: Option<f64>,
     /// Seconds from the start of one window to the start of the next; half a window by default.
@@ -150,15 +151,18 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
     let meter = Meter::new(args.log_format, args.told.quiet);
     let stop = crate::interrupt::flag();
     let mut found = recordings::named(&names, |warning| meter.warning(warning))?;
-    if let Some(window) = args.window {
-        let span = WindowSpan { window, hop: args.hop.unwrap_or(window / 2.0) };
-        found = match into_windows(found, span, stop) {
-            Err(error @ InputError::Stopped) => {
-                return Err(Failure::interrupted(error.to_string()));
+    found = match args.window {
+        None => name_recordings(found),
+        Some(window) => {
+            let span = WindowSpan { window, hop: args.hop.unwrap_or(window / 2.0) };
+            match into_windows(found, span, stop) {
+                Err(error @ InputError::Stopped) => {
+                    return Err(Failure::interrupted(error.to_string()));
+                }
+                windows => windows?,
             }
-            windows => windows?,
-        };
-    }
+        }
+    };
     let options = RunOptions {
         out: args.out,
         work: args.work,

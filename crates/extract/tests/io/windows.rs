@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use corsmal_extract::cut::{WindowSpan, into_windows};
+use corsmal_extract::cut::{WindowSpan, into_windows, name_recordings};
 use corsmal_extract::inputs::{Input, InputSource};
 
 /// 30,000 frames at 44.1 kHz.
@@ -46,4 +46,23 @@ fn what_cannot_be_read_stays_one_input_for_its_row() {
         assert_eq!((windows.len(), windows[0].id.as_str()), (1, "x"));
         assert_eq!((windows[0].start, windows[0].end), (None, None));
     }
+}
+
+#[test]
+fn stretches_are_named_after_their_file_however_it_is_written() {
+    let stretch = |path: &str, start: Option<f64>| Input { start, ..input(Path::new(path)) };
+    let named = |inputs: Vec<Input>| -> Vec<Vec<(String, String)>> {
+        name_recordings(inputs).into_iter().map(|input| input.labels).collect()
+    };
+    let x = stretch("a/x.wav", Some(0.0));
+    let others = [stretch("./a/../a/x.wav", Some(1.0)), stretch("b/y.wav", None)];
+    let found = named([&[x.clone()], &others[..]].concat());
+    let recording = |path: &str| vec![("recording".to_string(), path.to_string())];
+    assert_eq!(found, ["a/x.wav", "a/x.wav", "b/y.wav"].map(recording));
+    // Each is a file of its own; a label of that name is there; nothing is cut.
+    let unnamed = |inputs: Vec<Input>| named(inputs).iter().all(Vec::is_empty);
+    assert!(unnamed(vec![x.clone(), others[1].clone()]));
+    assert!(unnamed(vec![others[1].clone(), others[1].clone()]));
+    let own = Input { labels: recording("mine"), ..x.clone() };
+    assert_eq!(named(vec![own.clone(), own]), [recording("mine"), recording("mine")]);
 }

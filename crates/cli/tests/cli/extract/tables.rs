@@ -108,7 +108,11 @@ fn windows_are_rows_with_the_labels_and_the_id_of_their_recording() {
                 long.wav,d,0.75,1.25\nshort.wav,e,,\n";
     std::fs::write(at("by_hand.csv"), rows).unwrap();
     extract(&at("by_hand.csv"), &at("h.npz"), &["--preset", "esc26"]).with(0);
-    assert_eq!(found.values(), table(&at("h.npz")).values());
+    let by_hand = table(&at("h.npz"));
+    assert_eq!(found.values(), by_hand.values());
+    let (column, recordings) = by_hand.labels().next().unwrap();
+    assert_eq!(column, "recording");
+    assert!(recordings[..4].iter().all(|r| r.ends_with("long.wav")), "{recordings:?}");
 
     // The hop is half a window unless it is given, as for `classify`.
     let listed =
