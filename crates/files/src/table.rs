@@ -14,6 +14,8 @@ pub const RESERVED: &str = "__";
 
 /// Name of the id column.
 pub const ID: &str = "id";
+/// What other programs call a column of ids, the likelier name first.
+pub const ID_NAMES: [&str; 2] = [ID, "ids"];
 
 /// What a table refuses.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]

@@ -7,14 +7,16 @@
 //! | `view` `[items]` | which input of the network an item is; those of one recording are joined |
 //! | any other of one dimension, one value for each item, unless its name begins with `__` | a column |
 //!
-//! Ids are the member `ids`, else `container/sequence` where both are there, else numbers.
+//! Ids are the member `ids`, else `id` where it has another value for each item, else
+//! `container/sequence` where both are there, else numbers.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use corsmal_files::draft::Draft;
 use corsmal_files::npy::{DType, Header, Kind};
 use corsmal_files::npz::{Compression, NpzError, NpzFile, NpzWriter};
+use corsmal_files::table::ID;
 use thiserror::Error;
 
 use crate::batch::{Batch, Shape};
@@ -130,7 +132,7 @@ impl Dataset {
             let name = named.unwrap_or_default();
             refuse(format!("{name}: expected a value for each of the {count} items"))
         })?;
-        let mut seen = std::collections::HashSet::new();
+        let mut seen = HashSet::new();
         if let Some(twice) = ids.iter().find(|id| !seen.insert(id.as_str())) {
             return Err(refuse(format!("id {twice:?} occurs twice")));
         }
@@ -273,7 +275,9 @@ fn views_of(
 
 fn ids(columns: &[(String, Vec<String>)], count: usize) -> Vec<String> {
     let find = |name: &str| columns.iter().find(|(n, _)| n == name).map(|(_, v)| v);
-    match (find("ids"), find("container"), find("sequence")) {
+    let different = |ids: &&Vec<String>| ids.iter().collect::<HashSet<_>>().len() == count;
+    let ids = find("ids").or_else(|| find(ID).filter(different));
+    match (ids, find("container"), find("sequence")) {
         (Some(ids), ..) => ids.clone(),
         (None, Some(containers), Some(sequences)) => {
             containers.iter().zip(sequences).map(|(c, s)| format!("{c}/{s}")).collect()

@@ -20,6 +20,9 @@ const FOLDER_COLUMN: &str = "class";
 /// Label columns that are groups rather than something to predict.
 const NO_TARGETS: [&str; 5] = ["fold", "group", "container", "recording", "view"];
 
+/// Most members that a message says to be no labels.
+const SHOWN: usize = 3;
+
 /// How to read a file that `extract` did not write.
 #[derive(clap::Args, Clone)]
 pub struct MemberArgs {
@@ -27,8 +30,8 @@ pub struct MemberArgs {
     /// one-dimensional members with as many rows are label columns.
     #[arg(long, value_name = "MEMBER", default_value = "X")]
     x: String,
-    /// In a file from another program: the member or column with the ids; by default the column id
-    /// of a Parquet table, else rows are numbered from 0.
+    /// In a file from another program: the member or column with the ids; by default one called id
+    /// or ids that has another value in every row, else rows are numbered from 0.
     #[arg(long, value_name = "MEMBER")]
     ids: Option<String>,
 }
@@ -40,7 +43,6 @@ impl MemberArgs {
     }
 
     /// Refuses names of members where there is no file of another program.
-    #[cfg_attr(not(feature = "nets"), expect(dead_code, reason = "for networks"))]
     pub fn refuse(&self) -> Result<(), Failure> {
         match (self.x.as_str(), &self.ids) {
             ("X", None) => Ok(()),
@@ -207,10 +209,16 @@ impl DatasetArgs {
         let candidates: Vec<&str> = columns.filter(is_group).collect();
         match candidates.as_slice() {
             [only] => Ok((*only).into()),
-            [] => Err(Failure::new(format!(
-                "{}: has no label column; --labels adds labels from a CSV or from class folders",
-                self.path().display()
-            ))),
+            [] => {
+                let unread = table.unread().iter().take(SHOWN);
+                let unread = unread.map(|(name, why)| format!("; member {name:?} {why}"));
+                Err(Failure::new(format!(
+                    "{}: has no label column; --labels adds labels from a CSV or from class \
+                     folders{}",
+                    self.path().display(),
+                    unread.collect::<String>()
+                )))
+            }
             several if several.iter().any(|name| Some(*name) == usual) => {
                 Ok(usual.unwrap_or_default().into())
             }

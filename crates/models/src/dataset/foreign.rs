@@ -7,7 +7,7 @@ use corsmal_files::feature_file::FeatureFileError;
 use corsmal_files::npy::{Kind, NpyError};
 use corsmal_files::npz::{NpzError, NpzFile};
 use corsmal_files::parquet::{NumericTable, ParquetFile};
-use corsmal_files::table::RESERVED;
+use corsmal_files::table::{ID, ID_NAMES, RESERVED};
 use ndarray::{Axis, Ix2};
 use serde_json::Value;
 
@@ -19,8 +19,8 @@ use super::table::LabelledTable;
 pub struct MemberNames {
     /// in an `.npz`, the member with the features, rows x features
     pub x: String,
-    /// the member or the column with one id per row; else the column `id` of a Parquet table; else
-    /// rows are numbered from 0
+    /// the member or the column with one id per row; else one called `id` or `ids` that has another
+    /// value in every row; else rows are numbered from 0
     pub ids: Option<String>,
 }
 
@@ -29,6 +29,9 @@ impl Default for MemberNames {
         Self { x: "X".into(), ids: None }
     }
 }
+
+/// The member that names the features.
+const FEATURE_NAMES: &str = "feature_names";
 
 /// Every one-dimensional member with as many values as there are rows is a label column.
 pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Result<LabelledTable> {
@@ -64,19 +67,30 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
                 _ => npz.integers(&name)?.iter().map(i128::to_string).collect(),
             };
             columns.push((name, values));
+        } else if name != members.x && name != FEATURE_NAMES {
+            let (shape, rows) = (&header.shape, x.nrows());
+            let reason = match header.dtype.kind {
+                Kind::Complex => "has complex numbers, which are no labels".into(),
+                _ => format!("has shape {shape:?}, expected [{rows}], one value for each row"),
+            };
+            unread.push((name, reason));
         }
     }
     let ids = match &members.ids {
-        None => (0..x.nrows()).map(|row| row.to_string()).collect(),
+        None => take_ids(&mut columns).unwrap_or_else(|| numbers(x.nrows())),
         Some(name) => match columns.iter().find(|(column, _)| column == name) {
             Some((_, ids)) => ids.clone(),
-            None => return Err(fault(format!("no member {name:?} (--ids) with one id per row"))),
+            None => {
+                let why = unread.iter().find(|(member, _)| member == name);
+                let why = why.map(|(_, why)| format!(": it {why}")).unwrap_or_default();
+                return Err(fault(format!("no member {name:?} (--ids) with one id per row{why}")));
+            }
         },
     };
     require_unique(path, &ids)?;
     let names_fit =
-        npz.contains("feature_names") && npz.header("feature_names")?.shape == [x.ncols() as u64];
-    let feature_names = if names_fit { npz.strings("feature_names")? } else { Vec::new() };
+        npz.contains(FEATURE_NAMES) && npz.header(FEATURE_NAMES)?.shape == [x.ncols() as u64];
+    let feature_names = if names_fit { npz.strings(FEATURE_NAMES)? } else { Vec::new() };
     Ok(LabelledTable {
         path: path.into(),
         x: x.as_standard_layout().into_owned(),
@@ -93,6 +107,20 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
 /// Why a column of a Parquet table is neither feature nor label.
 const UNREAD: &str = "has neither numbers nor text: dates, lists, decimals and bytes are not read";
 
+/// Takes the column of ids out, if one of a usual name has another value in every row.
+fn take_ids(columns: &mut Vec<(String, Vec<String>)>) -> Option<Vec<String>> {
+    let at = |name: &str| {
+        columns.iter().position(|(column, ids)| column == name && not_an_id(ids).is_none())
+    };
+    let at = ID_NAMES.into_iter().find_map(at)?;
+    Some(columns.remove(at).1)
+}
+
+/// Rows that have no ids.
+pub(super) fn numbers(rows: usize) -> Vec<String> {
+    (0..rows).map(|row| row.to_string()).collect()
+}
+
 /// Columns of decimal numbers are features, all others label columns: so pandas and polars leave a
 /// table of ours. Where all values of a column are whole, they may make it one of integers: names
 /// such as `mfcc[0].mean` stay features.
@@ -102,8 +130,19 @@ pub(super) fn read_parquet(
     members: &MemberNames,
 ) -> Result<LabelledTable> {
     let fault = |reason: String| DatasetError::content(path, reason);
+    if members.x != MemberNames::default().x {
+        return Err(fault(
+            "--x is for an .npz: the features of a Parquet table are columns".into(),
+        ));
+    }
     let NumericTable { ids, names, types, values, mut texts, skipped } =
         parquet.numbers().map_err(FeatureFileError::from)?;
+    // Whole numbers with gaps become such a column; it is no feature.
+    if members.ids.is_none() && names.iter().any(|name| name == ID) {
+        let reason =
+            format!("column {ID:?} has decimal numbers: write ids as text or whole numbers");
+        return Err(fault(reason));
+    }
     // pandas keeps its index in such a column.
     texts.retain(|(name, _)| !name.starts_with(RESERVED));
     let mut features = Vec::new();
@@ -125,7 +164,7 @@ pub(super) fn read_parquet(
     }
     let ids = match (&members.ids, ids) {
         (None, Some(ids)) => ids,
-        (None, None) => (0..values.nrows()).map(|row| row.to_string()).collect(),
+        (None, None) => take_ids(&mut texts).unwrap_or_else(|| numbers(values.nrows())),
         (Some(name), _) => match texts.iter().find(|(column, _)| column == name) {
             Some((_, ids)) => ids.clone(),
             None => {
@@ -148,12 +187,15 @@ pub(super) fn read_parquet(
 }
 
 fn require_unique(path: &Path, ids: &[String]) -> Result<()> {
+    not_an_id(ids).map_or(Ok(()), |reason| Err(DatasetError::content(path, reason)))
+}
+
+/// Why values do not name rows: one is empty, or there twice.
+pub(super) fn not_an_id(ids: &[String]) -> Option<String> {
     if let Some(row) = ids.iter().position(String::is_empty) {
-        return Err(DatasetError::content(path, format!("row {row} has no id")));
+        return Some(format!("row {row} has no id"));
     }
     let mut seen = HashSet::new();
-    match ids.iter().find(|id| !seen.insert(id.as_str())) {
-        Some(twice) => Err(DatasetError::content(path, format!("id {twice:?} occurs twice"))),
-        None => Ok(()),
-    }
+    let twice = ids.iter().find(|id| !seen.insert(id.as_str()))?;
+    Some(format!("id {twice:?} occurs twice"))
 }

@@ -23,6 +23,13 @@ impl LabelledTable {
                 foreign::read_parquet(path, &parquet, members)
             }
             mut ours => {
+                if ours.is_ours() && *members != MemberNames::default() {
+                    return Err(DatasetError::content(
+                        path,
+                        "is of `extract`, which names its own features and ids: --x and --ids are \
+                         for files from other programs",
+                    ));
+                }
                 let FeatureTable { table, provenance, .. } = ours.table()?;
                 let config = serde_json::from_str(&provenance.config)
                     .map_err(|e| DatasetError::content(path, format!("its configuration: {e}")))?;

@@ -4,12 +4,14 @@ use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use corsmal_files::outcome::Outcome;
-use corsmal_files::table::Table;
+use corsmal_files::spelling;
+use corsmal_files::table::{ID_NAMES, Table};
 use linfa::DatasetBase;
 use ndarray::{Array2, ArrayView2};
 use serde_json::Value;
 
 use super::error::{DatasetError, Result};
+use super::foreign::{not_an_id, numbers};
 use super::label_file::{LabelFile, LabelSource};
 use crate::formats::TrainedOn;
 use crate::labels::{Labels, require_few};
@@ -111,6 +113,15 @@ impl LabelledTable {
         let columns = match source {
             LabelSource::Folders { column } => vec![(column.clone(), self.folders()?)],
             LabelSource::File { path, key } => {
+                if let Some(why) = self.unsure_ids() {
+                    return Err(DatasetError::content(
+                        &self.path,
+                        format!(
+                            "its rows are only numbered, so labels could go to the wrong rows: {why}; \
+                             --ids names the ids"
+                        ),
+                    ));
+                }
                 let file = LabelFile::read(path, key.as_deref())?;
                 let pairs = |with_features: bool| -> Vec<(&str, &str)> {
                     let of = |o: &&Outcome| o.status.has_features() == with_features;
@@ -129,6 +140,23 @@ impl LabelledTable {
         let hidden = columns.iter().map(|(name, _)| name).filter(there).cloned().collect();
         self.columns.splice(0..0, columns);
         Ok(hidden)
+    }
+
+    /// Why what looks like ids is none, where rows are numbered instead.
+    fn unsure_ids(&self) -> Option<String> {
+        if !self.outcomes.is_empty()
+            || self.ids != numbers(self.ids.len())
+            || self.columns.iter().any(|(_, values)| *values == self.ids)
+        {
+            return None;
+        }
+        let of = |name: &str| {
+            let column = self.columns.iter().find(|(column, _)| column == name);
+            let repeated = column.and_then(|(_, values)| not_an_id(values));
+            let unread = self.unread.iter().find(|(member, _)| member == name);
+            repeated.or_else(|| unread.map(|(_, why)| why.clone()))
+        };
+        ID_NAMES.into_iter().find_map(|name| Some(format!("member {name:?}: {}", of(name)?)))
     }
 
     /// The folder in which each recording lies.
@@ -150,6 +178,11 @@ impl LabelledTable {
     /// Label columns by name, one value per row.
     pub fn columns(&self) -> &[(String, Vec<String>)] {
         &self.columns
+    }
+
+    /// Members of files of other programs that are no label columns, and why.
+    pub fn unread(&self) -> &[(String, String)] {
+        &self.unread
     }
 
     /// A label column as text, one value per row. `joint` is type and level together where there is
@@ -231,11 +264,10 @@ impl LabelledTable {
     fn shared_paths(&self) -> Option<Vec<String>> {
         let path_of: HashMap<&str, &str> =
             self.outcomes.iter().map(|o| (o.id.as_str(), o.path.as_str())).collect();
-        let paths: Option<Vec<&str>> =
-            self.ids.iter().map(|id| path_of.get(id.as_str()).copied()).collect();
-        let paths = paths?;
-        let different: HashSet<&str> = paths.iter().copied().collect();
-        (different.len() < paths.len()).then(|| paths.into_iter().map(String::from).collect())
+        let plain = |id: &String| path_of.get(id.as_str()).map(|path| spelling::plain(path));
+        let paths: Vec<String> = self.ids.iter().map(plain).collect::<Option<_>>()?;
+        let different: HashSet<&str> = paths.iter().map(String::as_str).collect();
+        (different.len() < paths.len()).then_some(paths)
     }
 
     /// Name of a feature, or its number.

@@ -338,6 +338,20 @@ fn items_of_another_layout_are_refused() {
 }
 
 #[test]
+fn a_member_id_names_the_items() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.npz");
+    let network = networks::named("m1").unwrap().build(None, 0).unwrap();
+    for (ids, expected) in [(["b", "a"], ["b", "a"]), (["b", "b"], ["0", "1"])] {
+        let mut npz = NpzWriter::create(&path, Compression::Stored).unwrap();
+        npz.floats("X", &[2, 2050], &[0.0; 4100]).unwrap();
+        npz.strings("id", &ids).unwrap();
+        npz.finish().unwrap();
+        assert_eq!(Dataset::read(&path, &network).unwrap().ids, expected);
+    }
+}
+
+#[test]
 fn members_of_other_names_are_read() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x.npz");

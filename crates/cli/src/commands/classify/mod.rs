@@ -37,6 +37,9 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     if vote.is_some() && args.window.is_none() {
         return Err(Failure::new("--vote needs --window"));
     }
+    if args.features.is_none() {
+        args.members.refuse()?;
+    }
     let (end, records) = match (&args.features, args.windowing()?) {
         (Some(path), _) => {
             let table = LabelledTable::read(path, &args.members.names())?;
