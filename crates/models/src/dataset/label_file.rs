@@ -1,6 +1,6 @@
 //! Label files: CSV with a column that names the recording, and label columns.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -33,10 +33,19 @@ pub struct LabelFile {
     path: PathBuf,
     key: Key,
     columns: Vec<String>,
-    /// line in the file and values, by the key's text
-    rows: HashMap<String, (u64, Vec<String>)>,
+    /// by the key's text
+    rows: HashMap<String, Line>,
     /// keys by their path without extension, as ids are made, where that is unique
     stems: HashMap<String, String>,
+}
+
+/// A line of the file.
+#[derive(Clone, Debug)]
+struct Line {
+    number: u64,
+    values: Vec<String>,
+    /// what a column `path` says beside the ids; empty without one
+    path: String,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,13 +101,18 @@ impl LabelFile {
         }
         let is_label = |i: usize| i != at && !matches!(&header[i], "id" | "path");
         let label_at: Vec<usize> = (0..header.len()).filter(|&i| is_label(i)).collect();
-        let mut rows: HashMap<String, (u64, Vec<String>)> = HashMap::new();
+        let mut rows: HashMap<String, Line> = HashMap::new();
+        let beside = find("path").filter(|_| key == Key::Id);
         for record in reader.records() {
             let record = record.map_err(fault)?;
-            let line = record.position().map_or(0, csv::Position::line);
-            let values = label_at.iter().map(|&i| record[i].to_string()).collect();
-            if let Some((before, _)) = rows.insert(record[at].to_string(), (line, values)) {
-                let reason = format!("line {line} repeats {:?} of line {before}", &record[at]);
+            let line = Line {
+                number: record.position().map_or(0, csv::Position::line),
+                values: label_at.iter().map(|&i| record[i].to_string()).collect(),
+                path: beside.map_or("", |i| &record[i]).to_string(),
+            };
+            let number = line.number;
+            if let Some(Line { number: before, .. }) = rows.insert(record[at].to_string(), line) {
+                let reason = format!("line {number} repeats {:?} of line {before}", &record[at]);
                 return Err(DatasetError::content(path, reason));
             }
         }
@@ -125,13 +139,19 @@ impl LabelFile {
         features: &Path,
     ) -> Result<Vec<(String, Vec<String>)>> {
         let mut unused: HashMap<&str, u64> =
-            self.rows.iter().map(|(key, (line, _))| (key.as_str(), *line)).collect();
+            self.rows.iter().map(|(key, line)| (key.as_str(), line.number)).collect();
         let mut columns: Vec<(String, Vec<String>)> =
             self.columns.iter().map(|c| (c.clone(), Vec::new())).collect();
         let mut missing = Vec::new();
         let mut of_name: HashMap<&str, (&str, &str)> = HashMap::new();
+        let known: HashSet<&str> = recordings
+            .iter()
+            .flat_map(|(_, path)| [Some(*path), file_name(path)])
+            .flatten()
+            .collect();
         for &recording in recordings {
-            let Some((key, (line, values))) = self.find(recording) else {
+            let Some((key, Line { number: line, values, path: beside })) = self.find(recording)
+            else {
                 missing.push(recording.0);
                 continue;
             };
@@ -147,6 +167,13 @@ impl LabelFile {
                          them by id or path"
                     ),
                 ));
+            }
+            if is_of_another(beside, path, &known) {
+                let reason = format!(
+                    "line {line}: id {key:?} is the recording {path}, but path names another one, \
+                     {beside}: correct the line, or leave out the column that is wrong"
+                );
+                return Err(DatasetError::content(&self.path, reason));
             }
             unused.remove(key.as_str());
             columns.iter_mut().zip(values).for_each(|((_, column), v)| column.push(v.clone()));
@@ -176,7 +203,7 @@ impl LabelFile {
 
     /// By id; by path as extracted or, failing that, the path without extension as id; by any of
     /// these or the file name where the column has another name.
-    fn find(&self, (id, path): (&str, &str)) -> Option<(&String, &(u64, Vec<String>))> {
+    fn find(&self, (id, path): (&str, &str)) -> Option<(&String, &Line)> {
         let get = |key: &str| self.rows.get_key_value(key);
         if self.key == Key::Id {
             return get(id);
@@ -198,6 +225,18 @@ impl LabelFile {
         let stem = || file.file_stem().and_then(|n| n.to_str()).and_then(get);
         by_path.or_else(|| get(id)).or_else(name).or_else(stem)
     }
+}
+
+fn file_name(path: &str) -> Option<&str> {
+    Path::new(path).file_name()?.to_str()
+}
+
+/// Whether what a label file calls the path is that of another recording. Folders may differ where the
+/// file name is that of no other.
+fn is_of_another(written: &str, path: &str, known: &HashSet<&str>) -> bool {
+    let (name, own) = (file_name(written), file_name(path));
+    (written != path && !written.is_empty() && known.contains(written))
+        || (name != own && name.is_some_and(|name| known.contains(name)))
 }
 
 #[cfg(test)]
@@ -244,5 +283,29 @@ mod tests {
         let file = file("file,class\nx.wav,cat\n", Some("file")).unwrap();
         let refused = file.for_recordings(&recordings, &[], Path::new("f.npz")).unwrap_err();
         assert!(refused.to_string().contains("matches the recordings \"a/x\" and \"b/x\""));
+    }
+
+    #[test]
+    fn ids_and_paths_that_contradict_each_other_are_refused() {
+        let recordings = [("a/x", "data/a/x.wav"), ("b/y", "data/b/y.flac")];
+        let labels = |text: &str| {
+            file(text, None).unwrap().for_recordings(&recordings, &[], Path::new("f.npz"))
+        };
+        for text in [
+            "id,path,class\na/x,data/a/x.wav,cat\nb/y,data/b/y.flac,dog\n",
+            "id,path,class\na/x,/elsewhere/x.wav,cat\nb/y,,dog\n",
+        ] {
+            assert_eq!(labels(text).unwrap()[0].1, ["cat", "dog"], "{text}");
+        }
+        for text in [
+            "id,path,class\na/x,data/b/y.flac,cat\nb/y,data/a/x.wav,dog\n",
+            "id,path,class\na/x,y.flac,cat\nb/y,x.wav,dog\n",
+        ] {
+            let refused = labels(text).unwrap_err().to_string();
+            assert!(
+                refused.contains("line 2: id \"a/x\" is the recording data/a/x.wav"),
+                "{refused}"
+            );
+        }
     }
 }
