@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 
 use corsmal_files::format::Content;
 use corsmal_models::folds::CvPlan;
+use corsmal_models::labels::alike;
 use corsmal_nets::NetError;
 use corsmal_nets::fit::Progress;
 use corsmal_nets::networks;
@@ -97,6 +98,9 @@ impl Request<'_> {
     /// Trains on all items.
     pub fn train(&self, name: &str) -> Result<Trained, Failure> {
         let Loaded { examples, recipe, target } = self.load(name)?;
+        for warning in alike(&examples.table.classes(&target)?.0) {
+            eprintln!("warning: {warning}");
+        }
         let files = match (examples.is_of_recordings(), examples.pictures()) {
             (true, _) => Value::Null,
             (false, Some(identity)) => {

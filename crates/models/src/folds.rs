@@ -4,9 +4,10 @@ use std::collections::HashMap;
 use std::fmt;
 use std::str::FromStr;
 
+use crate::copies;
 use crate::dataset::{LabelledTable, Result};
 use crate::error::ModelError;
-use crate::labels::Labels;
+use crate::labels::{Labels, alike, is_missing, missing};
 use crate::splits::{self, Fold};
 use crate::targets::Classes;
 use crate::words::count;
@@ -18,6 +19,10 @@ const FOLDS: usize = 5;
 const GROUPS: [&str; 2] = ["container", "group"];
 /// The recordings of windows, which no folds split unless the user names other groups.
 const RECORDING: &str = "recording";
+
+/// Said where there is nothing else to hold out.
+const ONE_RECORDING: &str = "all rows are parts of one recording, so training and test rows are \
+    neighbours: the scores are better than they would be on other recordings";
 
 /// A plan as written by the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -83,7 +88,7 @@ pub struct Folds {
     /// what is never split, one name per row
     groups: Option<Vec<String>>,
     /// what is odd about them, in words
-    warning: Option<String>,
+    odd: Vec<String>,
     /// whether these groups are no more than the folds of a column
     are_folds: bool,
     /// of the classes
@@ -117,7 +122,7 @@ impl Folds {
             CvPlan::Group(column) | CvPlan::Fold(column) => Some(column.as_str()),
             CvPlan::K(_) | CvPlan::Lists(_) => groups,
         };
-        let parts = column.map(|c| table.column(c)).transpose()?;
+        let parts = column.map(|c| values_of(table, c)).transpose()?;
         let outer = match (plan, &parts) {
             (CvPlan::Group(_) | CvPlan::Fold(_), Some(g)) => splits::leave_one_group_out(g)?,
             (CvPlan::K(k), Some(g)) => splits::group_k_fold(g, *k)?,
@@ -137,7 +142,7 @@ impl Folds {
         };
         let kept = match groups {
             Some(groups) if column != Some(groups) => {
-                let values = table.column(groups)?;
+                let values = values_of(table, groups)?;
                 refuse_split(&outer, &values, (plan, groups))?;
                 Some(values)
             }
@@ -146,14 +151,14 @@ impl Folds {
         let one = kept.is_none()
             && table.ids.len() > 1
             && table.column(RECORDING).is_ok_and(|values| Labels::of(&values).0.len() == 1);
-        let warning = one.then(|| {
-            "all rows are parts of one recording, so training and test rows are neighbours: the \
-             scores are better than they would be on other recordings"
-                .into()
-        });
+        let mut odd = alike(labels);
+        if one {
+            odd.push(ONE_RECORDING.into());
+        }
+        odd.extend(copies::warning(table, &outer));
         let are_folds = matches!(plan, CvPlan::Fold(_)) && groups.is_none();
         let names = labels.names().to_vec();
-        Ok(Self { description, outer, groups: kept, warning, are_folds, names, seed })
+        Ok(Self { description, outer, groups: kept, odd, are_folds, names, seed })
     }
 
     /// What is never split, one name per row; `None` where any row may be held out.
@@ -194,14 +199,14 @@ impl Folds {
         splits::group_k_fold(&inside, different.clamp(2, FOLDS))
     }
 
-    /// What is odd, in words: classes that some fold tests without having trained on them, rows that
-    /// are all parts of one recording.
+    /// What is odd, in words: classes that look the same, rows that are all parts of one recording or
+    /// copies of one another, classes that some fold tests without having trained on them.
     pub fn warnings(&self, classes: &Classes) -> Vec<String> {
         let one = |(class, fold): (usize, &str)| {
             format!("fold {fold}: class {} has no training rows", self.names[class])
         };
         let untrained = self.untrained(classes).into_iter().map(one);
-        self.warning.iter().cloned().chain(untrained).collect()
+        self.odd.iter().cloned().chain(untrained).collect()
     }
 
     /// Classes that some fold tests without having trained on them, each with the fold.
@@ -218,6 +223,22 @@ impl Folds {
         }
         found
     }
+}
+
+/// The values of a column of groups or folds: every row has one.
+fn values_of(table: &LabelledTable, column: &str) -> Result<Vec<String>> {
+    let values = table.column(column)?;
+    let Some(first) = values.iter().position(|value| is_missing(value)) else {
+        return Ok(values);
+    };
+    let reason = format!(
+        "{} without {column} of {}, the first is {}: give every row one, leave these rows out, or use \
+         another column; --cv 5 without --groups needs none",
+        count(missing(&values), "row"),
+        values.len(),
+        table.ids[first]
+    );
+    Err(ModelError::Folds { reason }.into())
 }
 
 /// Refuses folds that hold out a part of a group.
@@ -274,5 +295,27 @@ mod tests {
         for wrong in ["k=", "k=x", "leave=1", "-3", ""] {
             assert!(wrong.parse::<CvPlan>().is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn rows_without_a_group_or_fold_are_refused() {
+        let column = |values: [&str; 4]| values.map(String::from).to_vec();
+        let columns = vec![
+            ("y".to_string(), column(["a", "b", "a", "b"])),
+            ("f".to_string(), column(["1", "", "2", "NaN"])),
+        ];
+        let ids = column(["r0", "r1", "r2", "r3"]);
+        let table = LabelledTable::of_columns(std::path::Path::new("x.npz"), ids, columns);
+        let (labels, classes) = table.classes("y").unwrap();
+        let folds = |plan: &str, groups| {
+            let plan: CvPlan = plan.parse().unwrap();
+            Folds::new(Some(&plan), &table, groups, (&labels, &classes), 0)
+        };
+        for (plan, groups) in [("fold=f", None), ("group=f", None), ("2", Some("f"))] {
+            let refused = folds(plan, groups).unwrap_err().to_string();
+            let expected = "2 rows without f of 4, the first is r1";
+            assert!(refused.contains(expected), "{plan}: {refused}");
+        }
+        assert!(folds("2", None).is_ok());
     }
 }

@@ -1,7 +1,9 @@
 //! Label names and class indices.
 
+use std::collections::hash_map::Entry;
 use std::collections::{BTreeSet, HashMap};
 
+use icu_normalizer::ComposingNormalizerBorrowed;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{ModelError, Result};
@@ -78,7 +80,63 @@ impl Labels {
     }
 }
 
+/// How many values are none: empty, or NaN as other programs write it.
+pub(crate) fn missing<S: AsRef<str>>(values: &[S]) -> usize {
+    values.iter().filter(|value| is_missing(value.as_ref())).count()
+}
+
+pub(crate) fn is_missing(value: &str) -> bool {
+    value.is_empty() || value.parse::<f64>().is_ok_and(f64::is_nan)
+}
+
+/// Classes that are probably one, in words: names that differ only in case, in spaces around them, in
+/// how Unicode composes their letters, or in how a whole number is written.
+pub fn alike(labels: &Labels) -> Vec<String> {
+    let plain = |name: &str| match name.trim().parse::<i128>() {
+        Ok(number) => number.to_string(),
+        Err(_) => {
+            let composed = ComposingNormalizerBorrowed::new_nfc();
+            composed.normalize(&composed.normalize(name.trim()).to_lowercase()).into_owned()
+        }
+    };
+    let mut first: HashMap<String, &str> = HashMap::new();
+    let mut found = Vec::new();
+    for name in labels.names() {
+        match first.entry(plain(name)) {
+            Entry::Vacant(entry) => {
+                entry.insert(name);
+            }
+            Entry::Occupied(entry) => found.push(format!(
+                "the classes {:?} and {name:?} differ only in how they are written: if they are one \
+                 class, write them alike",
+                entry.get()
+            )),
+        }
+    }
+    found
+}
+
 /// The index of each name.
 pub(crate) fn positions(names: &[String]) -> HashMap<&str, usize> {
     names.iter().enumerate().map(|(i, name)| (name.as_str(), i)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn classes_that_look_the_same_are_said() {
+        for (a, b) in [("\u{e9}", "e\u{301}"), ("Rain", "rain"), ("1", "01"), ("x", "x ")] {
+            let found = alike(&Labels::of(&[a, "other", b]).0);
+            assert_eq!(found.len(), 1, "{a} {b}");
+            assert!(found[0].contains(&format!("{a:?}")) && found[0].contains(&format!("{b:?}")));
+        }
+        assert!(alike(&Labels::of(&["1", "10", "rain", "ruin", "e", "\u{e9}"]).0).is_empty());
+    }
+
+    #[test]
+    fn cells_without_a_value_are_counted() {
+        assert_eq!(missing(&["", "NaN", "nan", "0", "no", "inf"]), 3);
+    }
 }

@@ -42,6 +42,7 @@
 
 pub mod classifiers;
 pub mod comparison;
+mod copies;
 pub mod cross_validation;
 pub mod dataset;
 pub mod error;

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use corsmal_models::cross_validation::{Data, choose};
 use corsmal_models::dataset::LabelledTable;
 use corsmal_models::folds::Folds;
-use corsmal_models::labels::Labels;
+use corsmal_models::labels::{Labels, alike};
 use corsmal_models::model_file::{Model, ModelHeader};
 use linfa::traits::Fit;
 use serde_json::{Map, Value, json};
@@ -68,6 +68,9 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
     let candidates = args.pipeline.candidates()?;
     let (table, target) = args.dataset.load()?;
     let (labels, classes) = table.classes(&target)?;
+    for warning in alike(&labels) {
+        eprintln!("warning: {warning}");
+    }
     let rows_of = counts(&labels, &classes.indices().to_vec());
     for (name, rows) in &rows_of {
         if *rows == 1 {

@@ -86,6 +86,8 @@ impl HeldOut<'_> {
         study.facts = vec![Fact::new("Features", self.table.path.display().to_string())];
         study.facts.extend(self.facts);
         study.facts.push(Fact::new("Held out", &self.folds.description));
+        let cautions = self.folds.warnings(self.classes).into_iter();
+        study.facts.extend(cautions.map(|caution| Fact::new("Caution", caution)));
         if !self.table.config_hash.is_empty() {
             study.facts.push(Fact::new("Feature configuration", &self.table.config_hash));
         }

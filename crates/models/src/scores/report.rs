@@ -11,8 +11,9 @@ use super::interval::{Interval, intervals, units};
 use super::reliability::Reliability;
 use super::{NumericScores, Scores, Tally};
 use crate::error::ModelError;
-use crate::labels::{Labels, positions};
+use crate::labels::{Labels, is_missing, missing, positions};
 use crate::predictions::{PredictionError, PredictionTable};
+use crate::words::count;
 
 /// What is scored against what.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,6 +114,16 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
                 self.content(format!("no column {name:?} of groups; {choices}"))
             })?),
         };
+        if let (Some(name), Some(values)) = (column, &groups)
+            && let Some(first) = values.iter().position(|value| is_missing(value))
+        {
+            let (rows, id) = (count(missing(values), "row"), &self.rows[first].key);
+            return Err(self.content(format!(
+                "{rows} without {name} of {}, the first is {id}: give every row one, or name other \
+                 groups, such as id",
+                values.len()
+            )));
+        }
         // Windows of one recording are not independent of each other.
         let recordings: Option<Vec<String>> = (of_windows && groups.is_none())
             .then(|| self.rows.iter().map(|row| row.key.to_string()).collect());
