@@ -327,6 +327,14 @@ def test_labels_that_are_objects_are_said(tmp_path: Path) -> None:
     assert cf.cross_validate(tmp_path / "table.npz", "y", cv=2).predictions.labels == ["a", "b"]
 
 
+def test_ids_with_gaps_are_refused(tmp_path: Path) -> None:
+    pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    columns = {"id": [1.0, None, 3.0, 4.0], "x": [0.5, 1.5, 0.25, 1.25], "y": ["a", "b"] * 2}
+    pq.write_table(pa.table(columns), tmp_path / "table.parquet")
+    with pytest.raises(cf.ParameterError, match=r'column "id" has decimal numbers'):
+        cf.cross_validate(tmp_path / "table.parquet", "y", cv=2)
+
+
 def test_parquet_of_the_shared_cases() -> None:
     if not (CASES / "own_ed.parquet").exists():
         pytest.skip("no shared cases here")
