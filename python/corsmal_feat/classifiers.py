@@ -47,7 +47,7 @@ class KNN(Classifier):
     metric : str
         "euclidean", "manhattan", "cosine", "chebyshev" or "minkowski".
     p : float
-        Exponent of the "minkowski" metric.
+        Exponent of `metric="minkowski"`; refused with another metric.
     algorithm : str
         "brute", or "linfa" to search with linfa-nn.
 

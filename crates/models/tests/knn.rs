@@ -50,3 +50,23 @@ fn values_beyond_single_precision() {
     x.row_mut(8).fill(-1e150);
     same_together_and_alone(&x, &y, "two outliers");
 }
+
+/// `p=1` without `metric=minkowski`, scikit-learn's default, had no effect in silence.
+#[test]
+fn an_exponent_without_the_metric_that_has_one_is_refused() {
+    let (x, y) = clouds(30, 4, 3, 4);
+    let train = |metric, p| {
+        ClassifierSpec::from(KNearestParams { metric, p, ..Default::default() })
+            .train(x.view(), &y, 3)
+            .map_err(|e| e.to_string())
+    };
+    let refused = train(Metric::Euclidean, 1.0).unwrap_err();
+    assert!(refused.contains("knn: p must be left out with metric=euclidean"), "{refused}");
+    assert!(refused.ends_with("(metric=minkowski has one), not 1"), "{refused}");
+    for (metric, p) in [(Metric::Cosine, 3.0), (Metric::Chebyshev, 1.0), (Metric::Manhattan, 3.0)] {
+        assert!(train(metric, p).is_err(), "{metric:?}");
+    }
+    for (metric, p) in [(Metric::Minkowski, 1.0), (Metric::Manhattan, 1.0), (Metric::Cosine, 2.0)] {
+        assert!(train(metric, p).is_ok(), "{metric:?}");
+    }
+}

@@ -33,7 +33,7 @@ parameters! {
         weights: Weights = Weights::Uniform, "uniform or distance", "how votes count";
         metric: Metric = Metric::Euclidean,
             "euclidean, manhattan, cosine, chebyshev or minkowski", "distance between rows";
-        p: f64 = 2.0, "a number of at least 1", "exponent of the minkowski metric";
+        p: f64 = 2.0, "a number of at least 1", "exponent of metric=minkowski";
         #[serde(skip_serializing_if = "Search::is_brute")]
         algorithm: Search = Search::Brute, "brute or linfa",
             "this program's search for neighbours, or linfa-nn";
@@ -45,6 +45,30 @@ parameters! {
             Search::Brute => Ok(()),
             Search::Linfa => linfa::check(this.metric),
         }
+    }
+}
+
+impl KNearestParams {
+    /// Refuses an exponent that the metric does not have. Models of earlier versions that hold one
+    /// are read: it had no effect on them.
+    fn check_exponent(&self) -> Result<()> {
+        let fits = match self.metric {
+            Metric::Minkowski => true,
+            Metric::Manhattan => self.p == 1.0 || self.p == 2.0,
+            Metric::Euclidean | Metric::Cosine | Metric::Chebyshev => self.p == 2.0,
+        };
+        if fits {
+            return Ok(());
+        }
+        Err(ModelError::ParameterValue {
+            owner: Self::OWNER,
+            key: "p".into(),
+            value: self.p.to_string(),
+            allowed: format!(
+                "left out with metric={}, which has no exponent (metric=minkowski has one)",
+                format!("{:?}", self.metric).to_lowercase()
+            ),
+        })
     }
 }
 
@@ -64,6 +88,7 @@ impl Train for KNearestParams {
         y: &[usize],
         n_classes: usize,
     ) -> Result<FittedNeighbours> {
+        self.check_exponent()?;
         if self.k > x.nrows() {
             return Err(ModelError::ParameterValue {
                 owner: Self::OWNER,
