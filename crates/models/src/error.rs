@@ -38,6 +38,16 @@ pub enum ModelError {
         /// what to do
         remedy: String,
     },
+    /// A key that several texts of the form `key=value` set.
+    #[error("{key} is given twice, as {first} and as {second}: keep one of them")]
+    KeyTwice {
+        /// the key
+        key: String,
+        /// its first value
+        first: String,
+        /// the other one
+        second: String,
+    },
     /// A name outside a table (classifier, step, metric).
     #[error("there is no {kind} {name}: {allowed}")]
     UnknownName {

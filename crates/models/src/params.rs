@@ -199,7 +199,7 @@ pub fn json<T: Serialize>(value: &T) -> Value {
 /// list, anything else is text.
 ///
 /// # Errors
-/// [`ModelError::NotKeyValue`].
+/// [`ModelError::NotKeyValue`], [`ModelError::KeyTwice`].
 pub fn key_values<S: AsRef<str>>(texts: &[S]) -> Result<Map<String, Value>> {
     let mut object = Map::new();
     for text in texts.iter().map(AsRef::as_ref) {
@@ -207,7 +207,12 @@ pub fn key_values<S: AsRef<str>>(texts: &[S]) -> Result<Map<String, Value>> {
             .split_once('=')
             .filter(|(key, _)| !key.trim().is_empty())
             .ok_or_else(|| ModelError::NotKeyValue { text: text.into() })?;
-        object.insert(key.trim().into(), scalar_or_list(value.trim()));
+        let (key, value) = (key.trim(), scalar_or_list(value.trim()));
+        if let Some(first) = object.get(key) {
+            let (first, second) = (first.to_string(), value.to_string());
+            return Err(ModelError::KeyTwice { key: key.into(), first, second });
+        }
+        object.insert(key.into(), value);
     }
     Ok(object)
 }

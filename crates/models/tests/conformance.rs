@@ -233,6 +233,8 @@ fn parameters_are_checked_by_name() {
     assert!(refuse("rf", &["max_features=0.0"]).contains("max_features"));
     assert!(refuse("forest", &[]).contains("knn, svm, tree, rf, et, logistic"));
     assert!(key_values(&["k"]).is_err());
+    let twice = key_values(&["C=1", "gamma=2", " C = 100"]).unwrap_err().to_string();
+    assert_eq!(twice, "C is given twice, as 1 and as 100: keep one of them");
     let spec = ClassifierSpec::new(
         "svm",
         &key_values(&["C=20", "gamma=1e-5", "kernel=linear", "class_weight=1,2,3"]).unwrap(),

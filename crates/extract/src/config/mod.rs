@@ -95,8 +95,9 @@ impl Config {
     /// A tree of tables with `key=value` overrides.
     ///
     /// # Errors
-    /// An unknown key or an impossible value.
+    /// An unknown key, an impossible value, or a key that two overrides set.
     pub fn from_tree(mut tree: Value, overrides: &[String]) -> Result<Self, ConfigError> {
+        set::check_once_each(overrides)?;
         for assignment in overrides {
             set::apply(&mut tree, assignment)?;
         }

@@ -1,5 +1,7 @@
 //! Changes to a configuration: `--set key=value` and `--add feature`.
 
+use std::collections::HashMap;
+
 use serde_json::{Map, Value, json};
 
 use super::signal::SignalConfig;
@@ -20,6 +22,21 @@ const ELSEWHERE: [(&str, &str); 7] = [
     ("stat", "summary.stats"),
     ("statistics", "summary.stats"),
 ];
+
+/// Refuses a key that several changes set: the last one would win.
+pub fn check_once_each(changes: &[String]) -> Result<(), ConfigError> {
+    let mut seen: HashMap<String, &str> = HashMap::new();
+    for change in changes.iter().filter(|change| !change.starts_with('+')) {
+        let Some((key, text)) = change.split_once('=') else { continue };
+        let (key, text) = (key.trim(), text.trim());
+        let short = key.strip_prefix("features.").unwrap_or(key);
+        if let Some(first) = seen.insert(short.into(), text) {
+            let message = format!("is given twice, as {first} and as {text}: keep one of them");
+            return Err(ConfigError::key(key, message));
+        }
+    }
+    Ok(())
+}
 
 /// Applies one change to a configuration tree: `key=value`, or `+NAME` or `+NAME=KIND`, which adds a
 /// feature with its defaults.
@@ -205,6 +222,22 @@ mod tests {
         assert_eq!(tree["features"]["melspectrogram"]["norm"], "inf");
         apply(&mut tree, "signal.start=-nan").unwrap();
         assert_eq!(tree["signal"]["start"].as_str().unwrap().to_lowercase(), "nan");
+    }
+
+    #[test]
+    fn a_key_is_set_once() {
+        let check = |changes: &[&str]| {
+            let changes: Vec<String> = changes.iter().map(ToString::to_string).collect();
+            check_once_each(&changes).map_err(|e| e.to_string())
+        };
+        for second in ["mfcc.n_mels=40", "features.mfcc.n_mels = 40"] {
+            let refused = check(&["mfcc.n_mels=64", "signal.channels=mean", second]).unwrap_err();
+            assert!(
+                refused.ends_with("is given twice, as 64 and as 40: keep one of them"),
+                "{refused}"
+            );
+        }
+        assert!(check(&["+a=mfcc", "+b=mfcc", "a.n_mels=64", "b.n_mels=40"]).is_ok());
     }
 
     #[test]
