@@ -6,7 +6,7 @@ use std::collections::{HashMap, HashSet};
 use std::fmt;
 use std::path::Path;
 
-use corsmal_models::predictions::{PredictionRow, PredictionTable};
+use corsmal_models::predictions::{Id, PredictionRow, PredictionTable};
 
 use crate::dataset::{Container, PathParts, SequenceName, Subset};
 use crate::error::{CcmError, Result};
@@ -61,6 +61,9 @@ pub fn named(table: PredictionTable) -> Result<RecordingPredictions> {
             }
         }));
     }
+    if let Some(named) = by_labels(&table) {
+        return Ok(table.with_keys(|row| named[&row.key].clone()));
+    }
     let naming = table.naming;
     let texts = |row: &PredictionRow<RowName>| row.cells[..naming].to_vec();
     let named = table.with_keys(|row| by_text(&row.cells[..naming]));
@@ -73,6 +76,28 @@ pub fn named(table: PredictionTable) -> Result<RecordingPredictions> {
         return Ok(named.with_keys(|row| RowName::Other(row.cells[0].clone())));
     }
     Ok(named)
+}
+
+/// What label columns for container and sequence call the recording of each id: they tell more than
+/// a number does where each id is another recording of the data set by them. `None` where they are
+/// labels of other data.
+fn by_labels(table: &PredictionTable) -> Option<HashMap<Id, RowName>> {
+    let find = |name: &str| table.columns.iter().position(|c| c.eq_ignore_ascii_case(name));
+    let container = ["Object", "container", "Container ID"].iter().find_map(|name| find(name))?;
+    let sequence = find("sequence")?;
+    let mut named: HashMap<Id, RowName> = HashMap::new();
+    for row in &table.rows {
+        let key = sequence_key(&table.path, &row.cells[container], &row.cells[sequence]).ok()?;
+        let RowKey::Sequence(number, _) = key else { return None };
+        Container::new(number)?;
+        let name = RowName::Recording(key);
+        let before = named.insert(row.key.clone(), name.clone());
+        if before.is_some_and(|before| before != name) {
+            return None;
+        }
+    }
+    let different: HashSet<&RowName> = named.values().collect();
+    (different.len() == named.len()).then_some(named)
 }
 
 fn by_text(text: &[String]) -> RowName {
@@ -273,6 +298,23 @@ mod tests {
         let m5 = table("Object,Sequence,p0,p1\n10,0002,1,0\n1,s0_fi1_fu1_b0_l0,0.5,0.5\n");
         assert_eq!(names[..2], m5.rows.iter().map(|r| r.key.clone()).collect::<Vec<_>>());
         assert_eq!(m5.labels, ["0", "1"]);
+    }
+
+    /// Label columns of these names hid the ids, and two lines of other ids became one recording.
+    #[test]
+    fn container_and_sequence_beside_ids_name_recordings_of_the_data_set_only() {
+        let names = |rows: &str| {
+            let ours = table(&format!("id,container,sequence,p_x,p_y\n{rows}"));
+            ours.rows.iter().map(|r| r.key.to_string()).collect::<Vec<_>>()
+        };
+        let numbered = names("0,10,3,1,0\n1,11,0004,0,1\n");
+        let keys = [RowKey::Sequence(10, 3), RowKey::Sequence(11, 4)];
+        assert_eq!(numbered, keys.map(|key| key.to_string()));
+        for other in
+            ["a,cup,1,1,0\nb,cup,1,0,1\n", "a,1,1,1,0\nb,1,1,0,1\n", "a,99,1,1,0\nb,1,1,1,0\n"]
+        {
+            assert_eq!(names(other), ["id a", "id b"], "{other}");
+        }
     }
 
     #[test]

@@ -13,8 +13,8 @@ use crate::labels::{Labels, positions};
 use crate::table::argmax;
 
 impl PredictionTable {
-    /// Reads a file; a recording may have several lines, one for each of its windows. Columns
-    /// `Object` or `container` with `sequence` name a recording together.
+    /// Reads a file; a recording may have several lines, one for each of its windows. A column `id`
+    /// names it; without one, `Object` or `container` with `sequence` do so together, else `path`.
     ///
     /// # Errors
     /// [`PredictionError`] for a file that is not a table, missing columns, no lines, probabilities
@@ -34,6 +34,12 @@ impl PredictionTable {
     /// # Errors
     /// As [`PredictionTable::read`].
     pub fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
+        // A line of `classify --json`.
+        if bytes.trim_ascii_start().starts_with(b"{") {
+            let reason = "is JSON, but prediction files are read as CSV: `classify` without --json \
+                          writes it";
+            return Err(content(path, reason));
+        }
         let mut reader = csv_text::reader(bytes).map_err(|e| content(path, e.to_string()))?;
         let fault =
             |e: csv::Error| content(path, format!("not a readable table: {}", csv_text::fault(&e)));
@@ -60,6 +66,8 @@ type Lines = [(u64, csv::StringRecord)];
 /// Columns by what they hold.
 struct PredictionColumns {
     naming: Vec<usize>,
+    /// whether these name a recording together, else the first of them does
+    together: bool,
     others: Vec<usize>,
     /// one per class; none in files without probabilities
     proba: Vec<usize>,
@@ -88,10 +96,12 @@ impl PredictionColumns {
             column: column.into(),
             header: header.join(", "),
         };
-        let id = KEYS.iter().filter_map(|name| find(name)).collect::<Vec<_>>();
-        let naming = match (container, find("sequence")) {
-            (Some(container), Some(sequence)) => vec![container, sequence],
-            _ => id,
+        let keys = KEYS.iter().filter_map(|name| find(name)).collect::<Vec<_>>();
+        // Beside ids, columns of these names are labels.
+        let has_id = KEYS.iter().any(|name| *name != "path" && find(name).is_some());
+        let (naming, together) = match (container, find("sequence")) {
+            (Some(container), Some(sequence)) if !has_id => (vec![container, sequence], true),
+            _ => (keys, false),
         };
         if naming.is_empty() {
             return Err(lacking("id, path, or container and sequence"));
@@ -128,7 +138,7 @@ impl PredictionColumns {
         }
         let taken = |i: &usize| naming.contains(i) || proba.contains(i) || predicted == Some(*i);
         let others = (0..header.len()).filter(|i| !taken(i)).collect();
-        Ok(Self { naming, others, proba, predicted, labels })
+        Ok(Self { naming, together, others, proba, predicted, labels })
     }
 
     fn table(self, path: &Path, header: &[String], lines: &Lines) -> Result<PredictionTable> {
@@ -189,7 +199,8 @@ impl PredictionColumns {
             },
         };
         let cells: Vec<String> = order.iter().map(|&at| text(at).to_string()).collect();
-        let key = Id(cells[..self.naming.len().min(1)].concat());
+        let named_by = if self.together { self.naming.len() } else { 1 };
+        let key = Id(cells[..named_by].join("/"));
         Ok(PredictionRow { key, cells, class, proba })
     }
 }
