@@ -129,10 +129,13 @@ pub struct Comparison {
     pub mcnemar: McNemar,
     /// difference of weighted F1 with recordings drawn
     pub bootstrap_rows: Bootstrap,
-    /// the same with whole folds drawn, where all lines have one and there are several
+    /// the same with whole folds drawn, where all lines have one, there are several, and they do not
+    /// differ between the files
     pub bootstrap_folds: Option<Bootstrap>,
-    /// number of folds
+    /// number of folds of the first file
     pub folds: usize,
+    /// whether a recording has another fold in the second file
+    pub folds_differ: bool,
     /// draws of each bootstrap
     pub resamples: usize,
     /// its seed
@@ -198,7 +201,11 @@ pub fn compare(
     };
     let folds = first.column("fold").unwrap_or_default();
     let n_folds = Labels::of(&folds).0.len();
-    let foldwise = n_folds > 1 && folds.iter().all(|fold| !fold.is_empty());
+    let folds_differ = second.column("fold").is_some_and(|others| {
+        let pairs = first.rows.iter().zip(&folds);
+        pairs.into_iter().any(|(row, fold)| others[places[&row.key]] != *fold)
+    });
+    let foldwise = n_folds > 1 && !folds_differ && folds.iter().all(|fold| !fold.is_empty());
     let by_fold = foldwise.then(|| bootstrap(truth, a, b, Some(&folds), resamples, seed));
     Ok(Comparison {
         rows: truth.len(),
@@ -208,6 +215,7 @@ pub fn compare(
         bootstrap_rows: bootstrap::<&str>(truth, a, b, None, resamples, seed).map_err(refuse)?,
         bootstrap_folds: by_fold.transpose().map_err(refuse)?,
         folds: n_folds,
+        folds_differ,
         resamples,
         seed,
     })

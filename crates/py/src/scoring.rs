@@ -119,8 +119,8 @@ pub(crate) fn fuse(
         let table = compute(py, || PredictionTable::read(path))?.map_err(value_error)?;
         tables.push(match rule(&table.labels)? {
             Some(rule) => {
-                let windows =
-                    predictions::named(table.windows_by_recording()).map_err(value_error)?;
+                let windows = table.windows_by_recording().map_err(value_error)?;
+                let windows = predictions::named(windows).map_err(value_error)?;
                 windows.vote(rule).map_err(value_error)?
             }
             None => predictions::named(table).map_err(value_error)?,

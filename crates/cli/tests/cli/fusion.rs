@@ -187,6 +187,54 @@ fn prediction_files_are_averaged_by_id() {
     assert_eq!(table, "id,path,predicted,p_x,p_y\nr,r.wav,y,0.375,0.625\ns,s.wav,,,\n");
 }
 
+/// The first file, or window, had the last word.
+#[test]
+fn contradictions_and_repeated_windows_are_not_fused() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let head = "id,fold,true,predicted,p_x,p_y\n";
+    let one = put("1.csv", &format!("{head}a,1,x,x,0.9,0.1\nb,2,y,y,0.2,0.8\n"));
+    for (other, message) in [
+        ("a,1,y,x,0.9,0.1\nb,2,y,y,0.2,0.8\n", "id a: true is y here and x in"),
+        ("a,1,x,x,0.9,0.1\nb,1,y,y,0.2,0.8\n", "id b: fold is 1 here and 2 in"),
+        ("a,1,x,x,,\nb,2,y,y,0.2,0.8\n", "id a: is predicted without probabilities"),
+    ] {
+        let two = put("2.csv", &format!("{head}{other}"));
+        let found = refused(&["fuse", text(&one), text(&two), "-o", "-"]);
+        assert!(found.contains(message), "{found}");
+    }
+    let unlabelled = put("2.csv", "id,predicted,p_x,p_y\na,x,0.9,0.1\nb,y,0.2,0.8\n");
+    assert!(done(&["fuse", text(&one), text(&unlabelled), "-o", "-"]).contains("a,1,x,x,"));
+    for (windows, message) in [
+        ("id,start,end,predicted\na,0,1,x\na,1,2,y\na,1,2,y\n", "one window of id a, start \"1\""),
+        ("id,start,true,predicted\na,0,x,x\na,1,y,y\n", "true is x in one window and y in another"),
+        ("id,recording,predicted\na@0-1,a,x\na@0-1,a,x\n", "more than one row: id a@0-1"),
+    ] {
+        let windows = put("w.csv", windows);
+        let found = refused(&["fuse", text(&windows), "--vote", "majority", "-o", "-"]);
+        assert!(found.contains(message), "{found}");
+    }
+    let lengths = put("w.csv", "id,start,end,predicted\na,0,1,x\na,0,2,y\na,1,2,y\n");
+    assert!(done(&["fuse", text(&lengths), "--vote", "majority", "-o", "-"]).contains("\na,y,"));
+}
+
+#[test]
+fn other_folds_are_not_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let (a, b) = (folder.path().join("a.csv"), folder.path().join("b.csv"));
+    std::fs::write(&a, "id,fold,true,predicted\nr,1,x,x\ns,2,y,y\n").unwrap();
+    std::fs::write(&b, "id,fold,true,predicted\nr,2,x,x\ns,1,y,y\n").unwrap();
+    let output = run(&["compare-predictions", text(&a), text(&b)]);
+    assert!(output.status.success());
+    let (shown, warned) = (String::from_utf8(output.stdout), String::from_utf8(output.stderr));
+    assert!(!shown.unwrap().contains("folds"));
+    assert!(warned.unwrap().contains("its folds are not those of"));
+}
+
 #[test]
 fn two_classifiers_are_tested_on_the_same_rows() {
     let folder = tempfile::tempdir().unwrap();

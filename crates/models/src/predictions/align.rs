@@ -11,12 +11,20 @@ use crate::fusion::{self, WindowVotes};
 use crate::table::argmax;
 use crate::voting::VotingRule;
 
+/// Columns of a recording that every file and every window must give alike, where they have them.
+const AGREED: [&str; 3] = ["true", "fold", "group"];
+
 impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     /// Makes the windows of each recording one decision, in the order in which recordings appear.
     ///
     /// # Errors
-    /// What the rule refuses.
+    /// What the rule refuses; a window that occurs twice, windows of a recording that contradict each
+    /// other about its true class, fold or group.
     pub fn vote(&self, rule: VotingRule) -> Result<Self> {
+        if let Some(fault) = self.repeated_window() {
+            return Err(fault);
+        }
+        let agreed = self.agreed(self);
         let mut at: HashMap<&K, usize> = HashMap::new();
         let mut recordings: Vec<(&PredictionRow<K>, WindowVotes)> = Vec::new();
         for row in &self.rows {
@@ -24,6 +32,14 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
             let slot = *at.entry(&row.key).or_insert(next);
             if slot == next {
                 recordings.push((row, WindowVotes::new(self.labels.len())));
+            }
+            let first = recordings[slot].0;
+            if let Some((column, one, two)) = contradiction(&agreed, first, row) {
+                return Err(self.content(format!(
+                    "{}: {column} is {one} in one window and {two} in another; a vote needs one \
+                     value for each recording, or a file without the column",
+                    row.key
+                )));
             }
             if let Some(class) = row.class {
                 let votes = &mut recordings[slot].1;
@@ -45,7 +61,9 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     ///
     /// # Errors
     /// [`PredictionError`] for no tables, weights that are not one positive number per table, other
-    /// classes, recordings with several lines, and predictions that a table has and another has not.
+    /// classes, recordings with several lines, predictions without probabilities, predictions that a
+    /// table has and another has not, and tables that contradict each other about true class, fold or
+    /// group of a recording.
     pub fn average(tables: &[Self], weights: Option<&[f64]>) -> Result<Self> {
         let Some(first) = tables.first() else {
             return Err(content("".as_ref(), "no prediction files to average"));
@@ -63,6 +81,9 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
                     first.rows.push(row);
                 }
             }
+        }
+        for table in &tables[1..] {
+            table.check_agreement(&first)?;
         }
         let aligned = tables.iter().map(|t| t.aligned_to(&first)).collect::<Result<Vec<_>>>()?;
         let equal = vec![1.0; tables.len()];
@@ -96,12 +117,50 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     /// Several rows of a recording that are no windows, or of one window.
     pub(crate) fn check_windows(&self) -> Result<bool> {
         let Err(repeated) = self.check_once_each() else { return Ok(false) };
-        let Some(starts) = self.column("start") else { return Err(repeated) };
-        let mut seen = HashSet::new();
-        match self.rows.iter().zip(starts).find(|(row, start)| !seen.insert((&row.key, *start))) {
-            Some((row, _)) => Err(self.rows_fault("more than one row", &row.key, self)),
-            None => Ok(true),
+        if self.column("start").is_none() {
+            return Err(repeated);
         }
+        self.repeated_window().map_or(Ok(true), Err)
+    }
+
+    /// Why the windows, told apart by their times, cannot be used: one occurs twice.
+    fn repeated_window(&self) -> Option<PredictionError> {
+        let (starts, ends) = (self.column("start")?, self.column("end"));
+        let mut seen = HashSet::new();
+        let mut windows = self.rows.iter().zip(&starts).enumerate();
+        let (_, (row, start)) = windows.find(|(at, (row, start))| {
+            !seen.insert((&row.key, **start, ends.as_ref().map(|ends| ends[*at])))
+        })?;
+        Some(self.content(format!(
+            "more than one row for one window of {}, start {start:?}: remove the repeated lines",
+            row.key
+        )))
+    }
+
+    /// Where this table and another have the columns that must agree, with their names.
+    fn agreed(&self, other: &Self) -> Vec<(&'static str, usize, usize)> {
+        let at = |table: &Self, name: &str| table.columns.iter().position(|c| c == name);
+        let both = |name| Some((name, at(self, name)?, at(other, name)?));
+        AGREED.into_iter().filter_map(both).collect()
+    }
+
+    /// Refuses another true class, fold or group of a recording than that of another table.
+    fn check_agreement(&self, other: &Self) -> Result<()> {
+        let agreed = self.agreed(other);
+        let known: HashMap<&K, &PredictionRow<K>> =
+            other.rows.iter().map(|row| (&row.key, row)).collect();
+        for row in &self.rows {
+            let Some(theirs) = known.get(&row.key) else { continue };
+            if let Some((column, own, their)) = contradiction(&agreed, row, theirs) {
+                return Err(self.content(format!(
+                    "{}: {column} is {own} here and {their} in {}: correct it, or remove the \
+                     column {column} from one of the files",
+                    row.key,
+                    other.path.display()
+                )));
+            }
+        }
+        Ok(())
     }
 
     /// The same without the columns that tell how a single line came about: times, status, windows.
@@ -146,6 +205,13 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
                 }
                 return Err(self.rows_fault("missing rows", &row.key, other));
             };
+            if own.class.is_some() && own.proba.is_none() {
+                return Err(self.content(format!(
+                    "{}: is predicted without probabilities (p_<label>), and an average needs \
+                     them: use a classifier that has them",
+                    row.key
+                )));
+            }
             known.push(own.proba.is_some());
             if let Some(proba) = &own.proba {
                 to.iter_mut().zip(&order).for_each(|(to, &class)| *to = proba[class]);
@@ -167,12 +233,26 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     }
 }
 
+/// The first column of those that must agree in which two rows have different values, and these.
+fn contradiction<'a, K>(
+    agreed: &[(&'static str, usize, usize)],
+    one: &'a PredictionRow<K>,
+    two: &'a PredictionRow<K>,
+) -> Option<(&'static str, &'a str, &'a str)> {
+    let values =
+        agreed.iter().map(|&(name, a, b)| (name, one.cells[a].as_str(), two.cells[b].as_str()));
+    values.into_iter().find(|(_, a, b)| !a.is_empty() && !b.is_empty() && a != b)
+}
+
 impl PredictionTable {
     /// The same with the recordings as ids where the rows are windows that `extract --window` made:
     /// ids `RECORDING@TIMES` beside a column `recording`.
-    pub fn windows_by_recording(mut self) -> Self {
+    ///
+    /// # Errors
+    /// [`PredictionError::Rows`] for a window that occurs twice.
+    pub fn windows_by_recording(mut self) -> Result<Self> {
         let Some(at) = self.columns.iter().position(|column| column == "recording") else {
-            return self;
+            return Ok(self);
         };
         let is_window = |row: &PredictionRow<Id>| {
             let times = row.key.0.strip_prefix(row.cells[at].as_str());
@@ -180,11 +260,12 @@ impl PredictionTable {
         };
         let id = self.columns.iter().position(|column| column == "id");
         if let Some(id) = id.filter(|_| self.rows.iter().all(is_window)) {
+            self.check_once_each()?;
             for row in &mut self.rows {
                 row.key = Id(row.cells[at].clone());
                 row.cells[id].clone_from(&row.key.0);
             }
         }
-        self
+        Ok(self)
     }
 }

@@ -108,7 +108,7 @@ impl Args {
             let mut table = PredictionTable::read(path)?;
             let rule = self.vote.rule(&Labels::new(table.labels.clone())?)?;
             if rule.is_some() {
-                table = table.windows_by_recording();
+                table = table.windows_by_recording()?;
                 if table.check_once_each().is_ok() {
                     eprintln!(
                         "warning: {}: it has one line per recording, so there is nothing to vote \
