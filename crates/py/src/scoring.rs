@@ -174,11 +174,12 @@ pub(crate) fn score(
     seed: u64,
 ) -> PyResult<String> {
     let source = labels.source();
-    let scoring = Scoring { target, groups, reject, numeric, draws: resamples, seed };
+    let mut scoring = Scoring { target, groups, reject, numeric, draws: resamples, seed };
     let report = compute(py, || {
         let mut table = PredictionTable::read(&predictions)?;
         if let Some(source) = &source {
-            table.add_labels(source)?;
+            let (target, groups) = (scoring.target.as_deref(), scoring.groups.as_deref());
+            scoring.target = table.add_labels(source, target, groups)?;
         }
         table.score(&scoring)
     })?;

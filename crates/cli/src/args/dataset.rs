@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use corsmal_files::identity;
 use corsmal_files::outcome::Outcome;
 use corsmal_models::dataset::{LabelSource, LabelledTable, MemberNames};
+use corsmal_models::predictions::NO_TARGETS;
 use serde_json::{Value, json};
 
 use crate::failure::Failure;
@@ -16,9 +17,6 @@ const FOLDERS: &str = "folders";
 
 /// Column of the classes that folders name.
 const FOLDER_COLUMN: &str = "class";
-
-/// Label columns that are groups rather than something to predict.
-const NO_TARGETS: [&str; 5] = ["fold", "group", "container", "recording", "view"];
 
 /// Most members that a message says to be no labels.
 const SHOWN: usize = 3;

@@ -33,7 +33,7 @@ pub struct Args {
     second: PathBuf,
     #[command(flatten)]
     labels: LabelArgs,
-    /// Column of the true classes; `true` by default.
+    /// Column of the true classes; by default the only label column of --labels, else `true`.
     #[arg(long, visible_alias = "y", value_name = "COLUMN")]
     target: Option<String>,
     /// Number of bootstrap resamples.
@@ -49,21 +49,26 @@ pub struct Args {
 
 /// Compares and prints.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
-    let mut target = args.target.clone();
-    let source = args.labels.source(target.as_deref())?;
-    if args.labels.folders() {
-        target.get_or_insert_with(|| "class".into());
-    }
-    let read = |path: &PathBuf| -> Result<PredictionTable, Failure> {
+    let target = args.target.as_deref();
+    let source = args.labels.source(target)?;
+    let read = |path: &PathBuf| -> Result<(PredictionTable, Option<String>), Failure> {
         let mut table = PredictionTable::read(path)?;
-        if let Some(source) = &source {
-            table.add_labels(source)?;
-        }
-        Ok(table)
+        let target = match &source {
+            Some(source) => table.add_labels(source, target, None)?,
+            None => target.map(String::from),
+        };
+        Ok((table, target))
     };
-    let (first, second) = (read(&args.first)?, read(&args.second)?);
+    let ((first, target), (second, _)) = (read(&args.first)?, read(&args.second)?);
     let draws = args.resamples as usize;
     let report = compare(&first, &second, target.as_deref(), draws, args.seed)?;
+    if report.folds_differ {
+        eprintln!(
+            "warning: {}: its folds are not those of {}, so none are drawn",
+            args.second.display(),
+            args.first.display()
+        );
+    }
     if args.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
         return Ok(ExitCode::SUCCESS);

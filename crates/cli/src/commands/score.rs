@@ -35,7 +35,8 @@ pub struct Args {
     predictions: PathBuf,
     #[command(flatten)]
     labels: LabelArgs,
-    /// Column of the true classes; `true` by default, or `class` with --labels folders.
+    /// Column of the true classes; by default the only label column of --labels, else `true`, or
+    /// `class` with --labels folders.
     #[arg(long, visible_alias = "y", value_name = "COLUMN")]
     target: Option<String>,
     /// Column of groups that the bootstrap draws together; by default group, container or recording
@@ -75,10 +76,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let mut table = PredictionTable::read(&args.predictions)?;
     let mut target = args.target.clone();
     if let Some(source) = args.labels.source(target.as_deref())? {
-        table.add_labels(&source)?;
-        if args.labels.folders() {
-            target.get_or_insert_with(|| "class".into());
-        }
+        target = table.add_labels(&source, target.as_deref(), args.groups.as_deref())?;
     }
     let scoring = Scoring {
         target,

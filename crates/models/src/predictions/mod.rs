@@ -14,6 +14,7 @@
 //! ```
 
 mod align;
+mod labels;
 mod read;
 mod record;
 mod write;
@@ -25,10 +26,10 @@ use std::path::{Path, PathBuf};
 use ndarray::{Array2, ArrayView2};
 use thiserror::Error;
 
-use crate::dataset::{DatasetError, LabelFile, LabelSource};
 use crate::error::ModelError;
 use crate::fusion;
 
+pub use labels::NO_TARGETS;
 pub use record::{Record, RecordWriter, Unit};
 pub use write::{Cell, Form, PredictionWriter};
 
@@ -183,48 +184,6 @@ impl<K> PredictionTable<K> {
                 Err(self.content(format!("{row}: has no true class ({name} is empty; {lines})")))
             }
         }
-    }
-
-    /// Adds columns of labels; they hide columns of the same name.
-    ///
-    /// # Errors
-    /// [`PredictionError::Content`] for recordings without labels and labels without recording.
-    pub fn add_labels(&mut self, source: &LabelSource) -> Result<()> {
-        let cell = |name: &str| self.columns.iter().position(|column| column == name);
-        let (id, path) = (0, cell("path").unwrap_or(0));
-        let added = match source {
-            LabelSource::Folders { column } => {
-                let folder = |row: &PredictionRow<K>| {
-                    let folder = Path::new(&row.cells[path]).parent().and_then(Path::file_name);
-                    folder.and_then(|name| name.to_str()).map(String::from)
-                };
-                let folders: Option<Vec<String>> = self.rows.iter().map(folder).collect();
-                let remedy = "its paths have no class folders; give --labels a CSV";
-                vec![(column.clone(), folders.ok_or_else(|| self.content(remedy))?)]
-            }
-            LabelSource::File { path: file, key } => {
-                let refuse = |e: DatasetError| content(&self.path, e.to_string());
-                let labels = LabelFile::read(file, key.as_deref()).map_err(refuse)?;
-                let names =
-                    |row: &PredictionRow<K>| (row.cells[id].clone(), row.cells[path].clone());
-                let names: Vec<(String, String)> = self.rows.iter().map(names).collect();
-                let pairs: Vec<(&str, &str)> =
-                    names.iter().map(|(id, path)| (id.as_str(), path.as_str())).collect();
-                labels.for_recordings(&pairs, &[], &self.path).map_err(refuse)?
-            }
-        };
-        for (name, values) in added {
-            match self.columns.iter().position(|column| *column == name) {
-                Some(at) => {
-                    self.rows.iter_mut().zip(values).for_each(|(row, v)| row.cells[at] = v);
-                }
-                None => {
-                    self.columns.push(name);
-                    self.rows.iter_mut().zip(values).for_each(|(row, v)| row.cells.push(v));
-                }
-            }
-        }
-        Ok(())
     }
 
     /// The same lines told apart by other keys.
