@@ -104,6 +104,20 @@ def test_rejected_predictions_are_unknown_and_wrong(tmp_path: Path) -> None:
     assert report["scores"]["weighted_f1"] == pytest.approx(weighted)
 
 
+def test_doubtful_scores_are_refused_or_warned_of(tmp_path: Path) -> None:
+    path = tmp_path / "p.csv"
+    path.write_text("id,true,predicted,p_x,p_y\na,x,x,0.1,0.9\nb,y,y,0.8,0.2\n")
+    with pytest.warns(UserWarning, match="no class predicted is the most probable one"):
+        assert corsmal_feat.score(path)["accuracy"] == 1.0
+    path.write_text("id,true,predicted\na,1,1.0\nb,2,2.0\n")
+    with pytest.raises(ParameterError, match="are the same number"):
+        corsmal_feat.score(path)
+    path.write_text("id,true,predicted\na,x,x\nb,y,y\n")
+    labels = tmp_path / "labels.csv"
+    labels.write_text("id,class\na,y\nb,x\n")
+    assert corsmal_feat.score(path, labels=labels)["accuracy"] == 0.0
+
+
 def test_numbers_are_scored(tmp_path: Path) -> None:
     path = tmp_path / "p.csv"
     truth = np.array([100.0, 250.5, 0.0, 80.0])

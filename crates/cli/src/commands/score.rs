@@ -103,7 +103,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
             }
         }
     }
-    warn(&table, &report);
+    warn(&table, &scoring, &report)?;
     if args.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
         return Ok(ExitCode::SUCCESS);
@@ -212,19 +212,24 @@ fn print_numbers(scores: &NumericScores) {
 }
 
 /// Says what the scores may not be meant to be.
-fn warn(table: &PredictionTable, report: &ScoreReport) {
-    let ScoreReport::Classes(report) = report else { return };
+fn warn(table: &PredictionTable, scoring: &Scoring, report: &ScoreReport) -> Result<(), Failure> {
     let place = table.path.display();
-    let (known, strange) = report.labels.split_at(table.labels.len().min(report.labels.len()));
-    if let Some(first) = strange.first() {
-        let like = corsmal_names::closest(first, known.iter().map(String::as_str));
-        let like = like.map(|name| format!("; did you mean {name:?}?")).unwrap_or_default();
-        let listed = strange.iter().take(6).map(|name| format!("{name:?}"));
-        eprintln!(
-            "warning: {place}: no prediction can be one of the true classes {}, so their rows are \
-             wrong{like}",
-            listed.collect::<Vec<_>>().join(", ")
-        );
+    let report = match report {
+        ScoreReport::Classes(report) => report,
+        ScoreReport::Numbers(_) => {
+            let truth = table.truth(scoring.target.as_deref())?;
+            let whole = |text: &&str| text.parse::<f64>().is_ok_and(|value| value.fract() == 0.0);
+            if !scoring.numeric && truth.iter().all(whole) {
+                eprintln!(
+                    "note: {place}: true values with a decimal point are scored as numbers; write \
+                     classes without one"
+                );
+            }
+            return Ok(());
+        }
+    };
+    for warning in &report.warnings {
+        eprintln!("warning: {place}: {warning}");
     }
     let whole = |name: &String| name.parse::<i64>().is_ok();
     let has_proba = table.rows.iter().any(|row| row.proba.is_some());
@@ -233,4 +238,5 @@ fn warn(table: &PredictionTable, report: &ScoreReport) {
             "note: {place}: whole numbers are scored as classes; --numeric scores them as numbers"
         );
     }
+    Ok(())
 }

@@ -69,6 +69,85 @@ fn labels_come_from_a_file_with_any_key_column() {
     assert!(unnamed.contains("--id-column"), "{unnamed}");
 }
 
+/// A corrected label file had no effect beside a column `true` of the predictions.
+#[test]
+fn the_only_label_column_has_the_true_classes() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let file = put("p.csv", "id,true,predicted\na,x,x\nb,y,y\n");
+    let accuracy = |labels: &std::path::Path, more: &[&str]| {
+        let score = ["score", text(&file), "--labels", text(labels), "--json"];
+        let report: Value = serde_json::from_str(&done(&[&score[..], more].concat())).unwrap();
+        report["scores"]["accuracy"].as_f64().unwrap()
+    };
+    let one = put("one.csv", "id,class\na,y\nb,x\n");
+    assert_eq!(accuracy(&one, &[]), 0.0);
+    assert_eq!(accuracy(&one, &["--target", "true"]), 1.0);
+    let group = put("group.csv", "id,site\na,1\nb,2\n");
+    assert_eq!(accuracy(&group, &["--groups", "site"]), 1.0);
+    let two = put("two.csv", "id,site,class\na,1,y\nb,2,x\n");
+    let score = ["score", text(&file), "--labels", text(&two)];
+    let message = refused(&score);
+    assert!(
+        message.contains("the labels have site, class: --target names the column"),
+        "{message}"
+    );
+    let compare = ["compare-predictions", text(&file), text(&file), "--labels"];
+    assert!(refused(&[&compare[..], &[text(&two)]].concat()).contains("--target"));
+    let compared = done(&[&compare[..], &[text(&one), "--json"]].concat());
+    let compared: Value = serde_json::from_str(&compared).unwrap();
+    assert_eq!(compared["first"]["scores"]["accuracy"], 0.0);
+}
+
+/// Label columns of these names hid the ids.
+#[test]
+fn ids_name_recordings_before_container_and_sequence_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let one = put("1.csv", "id,container,sequence,true,predicted\na,1,1,c,c\nb,1,1,d,c\n");
+    let two = put("2.csv", "id,container,sequence,true,predicted\nb,1,1,d,d\na,1,1,c,d\n");
+    assert!(done(&["score", text(&one)]).contains("2 rows"));
+    let compared = done(&["compare-predictions", text(&one), text(&two), "--json"]);
+    let compared: Value = serde_json::from_str(&compared).unwrap();
+    assert_eq!((&compared["mcnemar"]["only_first"], &compared["rows"]), (&1.into(), &2.into()));
+    // Without ids they name a recording together.
+    let published = put("m5.csv", "Object,Sequence,true,p0,p1\n10,0,0,1,0\n10,1,1,0,1\n");
+    assert!(done(&["score", text(&published)]).contains("2 rows"));
+}
+
+#[test]
+fn doubtful_scores_are_refused_or_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("p.csv");
+    let warned = |table: &str| {
+        std::fs::write(&file, table).unwrap();
+        let output = run(&["score", text(&file)]);
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let exchanged = warned("id,true,predicted,p_x,p_y\na,x,x,0.1,0.9\nb,y,y,0.8,0.2\n");
+    assert!(
+        exchanged.contains("warning: ") && exchanged.contains("in another order"),
+        "{exchanged}"
+    );
+    let decimal = warned("id,true,predicted\na,1.0,1.0\nb,2.0,1.0\n");
+    assert!(decimal.contains("note: ") && decimal.contains("scored as numbers"), "{decimal}");
+    std::fs::write(&file, "id,true,predicted\na,1,1.0\nb,2,2.0\n").unwrap();
+    assert!(refused(&["score", text(&file)]).contains("are the same number"));
+    assert!(done(&["score", text(&file), "--numeric"]).contains("mean absolute error"));
+    std::fs::write(&file, "{\"id\":\"a\",\"predicted\":\"x\"}\n").unwrap();
+    let json = refused(&["score", text(&file), "--labels", "folders"]);
+    assert!(json.contains("is JSON, but prediction files are read as CSV"), "{json}");
+}
+
 #[test]
 fn classifiers_are_explained() {
     let list = done(&["classifiers"]);

@@ -2,6 +2,7 @@
 
 mod confusion;
 mod curves;
+mod doubts;
 mod interval;
 mod numeric;
 mod reliability;

@@ -7,6 +7,7 @@ use ndarray::ArrayView1;
 use serde::Serialize;
 
 use super::curves::ClassCurves;
+use super::doubts;
 use super::interval::{Interval, intervals, units};
 use super::reliability::Reliability;
 use super::{NumericScores, Scores, Tally};
@@ -76,6 +77,9 @@ pub struct ClassReport {
     pub roc_auc: Option<f64>,
     /// mean of the average precisions
     pub average_precision: Option<f64>,
+    /// what makes the scores doubtful; left out of JSON if there is nothing
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
 }
 
 /// Intervals of the scores over all classes.
@@ -135,7 +139,11 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         let drawn = column.unwrap_or(by_default).to_string();
         let decimal = |text: &&str| text.parse::<f64>().is_ok() && text.parse::<i128>().is_err();
         let has_proba = self.rows.iter().any(|row| row.proba.is_some());
-        if how.numeric || (!has_proba && truth.iter().any(decimal)) {
+        let numbers = !has_proba && truth.iter().any(decimal);
+        if !how.numeric {
+            doubts::check_spelling(self, &truth, numbers)?;
+        }
+        if how.numeric || numbers {
             return self.score_numbers(&truth, groups.as_deref(), how).map(ScoreReport::Numbers);
         }
         let report = self.score_classes(&truth, groups.as_deref(), drawn, how)?;
@@ -191,6 +199,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         strange.sort_unstable();
         strange.dedup();
         labels.extend(strange.into_iter().map(String::from));
+        let warnings = doubts::warnings(self, truth, &labels[self.labels.len()..]);
         let names = Labels::new(labels.clone()).map_err(|e| self.model(e))?;
         let truth = names.encode(truth).map_err(|e| self.model(e))?;
         let predicted: Vec<Option<usize>> = table.rows.iter().map(|row| row.class).collect();
@@ -235,6 +244,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
             average_precision: mean(|c| c.average_precision),
             curves,
             labels,
+            warnings,
         })
     }
 }
