@@ -56,7 +56,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     }
 
     /// Weighted mean of tables over the same recordings, in the order of the first. A recording
-    /// without probabilities in one of them has none; one that some table lacks is allowed where the
+    /// without a prediction in one of them has none; one that some table lacks is allowed where the
     /// others have no prediction of it either.
     ///
     /// # Errors
