@@ -68,32 +68,63 @@ def room(what: str, *shape: int) -> None:
     raise ParameterError(f"not enough memory for {what} of {sizes} values")
 
 
+def unmasked(name: str, value: Any) -> Any:
+    """`value` itself; refused if it is a masked array that hides values, or a list with one."""
+    for part in value if isinstance(value, list | tuple) else (value,):
+        if isinstance(part, np.ma.MaskedArray) and np.ma.is_masked(part):
+            raise ParameterError(
+                f"{name} must not hide values by a mask, but {part.mask.sum()} of {part.size}"
+                " are hidden: fill them first, for example with .filled(0)"
+            )
+    return value
+
+
+def as_array(name: str, value: Any, dtype: npt.DTypeLike | None = None) -> npt.NDArray[Any]:
+    """An array from the caller, aligned as the Rust side needs it. Functions that return masked
+    arrays for masked arrays do not need this."""
+    array = np.asarray(unmasked(name, value), dtype=dtype)
+    return array if array.flags.aligned else array.copy()
+
+
 def floats(name: str, value: Any, min_ndim: int = 1) -> Floats:
     """A float32 or float64 array; others are refused with a hint."""
-    array = np.asarray(value)
+    array = as_array(name, value)
     if array.dtype.kind == "f" and not array.dtype.isnative:
         array = array.astype(array.dtype.newbyteorder("="))
     if array.dtype not in (np.float32, np.float64):
-        hint = ""
-        if array.dtype.kind in "iu" and name == "y":
-            bits = 8 * array.dtype.itemsize
-            hint = f"; divide {array.dtype} samples by 2**{bits - 1} and cast them to float32 first"
-            if bits > 16:
-                hint = (
-                    "; divide the samples by their full scale (2**15 for 16 bits) and cast them to"
-                    " float32 first"
-                )
-        elif array.dtype.kind in "iuf":
-            hint = "; cast it first, for example with .astype(numpy.float32)"
-        raise ParameterError(f"{name} has dtype {array.dtype}, expected float32 or float64{hint}")
+        raise ParameterError(
+            f"{name} has dtype {array.dtype}, expected float32 or float64{_advice(name, array)}"
+        )
     if array.ndim < min_ndim:
         raise ParameterError(f"{name} has {array.ndim} dimensions, expected at least {min_ndim}")
     return array
 
 
+def _advice(name: str, given: npt.NDArray[Any]) -> str:
+    """How to convert an array of another type."""
+    kind, bits = given.dtype.kind, 8 * given.dtype.itemsize
+    if kind not in "iuf":
+        return ""
+    if kind == "f" or name != "y":
+        return "; cast it first, for example with .astype(numpy.float32)"
+    if bits > 16:
+        return (
+            "; divide the samples by their full scale (2**15 for 16 bits) and cast them to float32"
+            " first"
+        )
+    half = f"2**{bits - 1}"
+    if kind == "u":
+        # Silence is in the middle of the range.
+        return (
+            f"; cast {given.dtype} samples to float32 first, then subtract {half} and divide by"
+            f" {half}"
+        )
+    return f"; divide {given.dtype} samples by {half} and cast them to float32 first"
+
+
 def spectrum(S: Any, min_ndim: int = 2) -> Floats:
     """A spectrogram `S` [shape=(..., d, t)]; whole numbers become double precision."""
-    array = np.asarray(S)
+    array = as_array("S", S)
     return floats("S", array.astype(np.float64) if array.dtype.kind in "iu" else array, min_ndim)
 
 

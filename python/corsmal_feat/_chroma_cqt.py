@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, audio, floats, number, room, rows, size, unrows
+from ._arrays import Floats, as_array, audio, floats, number, room, rows, size, unrows
 from ._cqt import C1, cqt_params
 from ._params import CqtChromaParams
 from ._pitch import estimate_tuning
@@ -70,7 +70,7 @@ def chroma_cqt(
     room("a chromagram", n_chroma)
     bins_per_octave = n_chroma if bins_per_octave is None else bins_per_octave
     bins_per_octave = size("bins_per_octave", bins_per_octave)
-    weights = None if window is None else np.asarray(window).ravel()
+    weights = None if window is None else as_array("window", window).ravel()
     chroma = CqtChromaParams(
         bins_per_octave=bins_per_octave,
         n_chroma=n_chroma,

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Doubles, Floats, floats, number, room, rows, size, unrows
+from ._arrays import Doubles, Floats, as_array, floats, number, room, rows, size, unrows
 from ._params import PaaFrames
 from ._refusals import refuses
 from .errors import ParameterError
@@ -29,7 +29,7 @@ __all__ = [
 
 def _doubles(name: str, value: Any, ndim: int) -> Doubles:
     """`value` in double precision, with at least `ndim` dimensions (exactly two for a matrix)."""
-    array = np.asarray(value)
+    array = as_array(name, value)
     if array.dtype.kind not in "iuf":
         raise ParameterError(f"{name} has dtype {array.dtype}, expected real numbers")
     if array.ndim < ndim or (ndim == 2 and array.ndim != 2):

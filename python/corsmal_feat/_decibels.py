@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Complexes, Floats, floats, number
+from ._arrays import Complexes, Floats, as_array, floats, number
 from ._refusals import refuses
 from ._warnings import warn
 from .errors import ParameterError
@@ -45,7 +45,7 @@ def power_to_db(
     >>> corsmal_feat.power_to_db(np.array([1.0, 0.1, 0.0]))
     array([  0., -10., -80.])
     """
-    array: Any = np.asarray(S)
+    array: Any = as_array("S", S)
     if np.iscomplexobj(array):
         warn("power_to_db was called on complex input: phase is discarded")
         array = np.abs(array)
@@ -86,7 +86,7 @@ def amplitude_to_db(
     >>> corsmal_feat.amplitude_to_db(np.array([1.0, 0.1]))
     array([  0., -20.])
     """
-    S = np.asarray(S)
+    S = as_array("S", S)
     if np.iscomplexobj(S):
         warn("amplitude_to_db was called on complex input: phase is discarded")
     if amin <= 0:
@@ -165,7 +165,7 @@ def magphase(D: npt.ArrayLike, *, power: float = 1) -> tuple[Floats, Complexes]:
     >>> corsmal_feat.magphase(np.array([[3 + 4j, 0]]))
     (array([[5., 0.]]), array([[0.6+0.8j, 1. +0.j ]]))
     """
-    array = np.asarray(D)
+    array = as_array("D", D)
     magnitude: Any = np.abs(array)
     zero = magnitude == 0
     divisor = magnitude + zero

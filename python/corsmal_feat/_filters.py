@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import number, precision, room, size
+from ._arrays import as_array, number, precision, room, size
 from ._params import ChromaParams, MelParams, WindowSpec
 from ._refusals import refuses
 from ._warnings import warn
@@ -46,7 +46,7 @@ def window_spec(window: Window, length: int) -> WindowSpec:
     try:
         if np.iscomplexobj(np.asarray(window)):
             raise ParameterError("window must be real, not complex")
-        values = np.ascontiguousarray(window, dtype=np.float64)
+        values = np.ascontiguousarray(as_array("window", window, np.float64))
     except ParameterError:
         raise
     except (TypeError, ValueError):

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, audio, floats, number, rows, size, unrows
+from ._arrays import Floats, as_array, audio, floats, number, rows, size, unrows
 from ._filters import Window
 from ._params import HpssParams
 from ._refusals import refuses
@@ -75,7 +75,7 @@ def hpss(
     True
     """
     params = _hpss_params(kernel_size, power, margin)
-    spectrogram = np.asarray(S)
+    spectrogram = as_array("S", S)
     s = floats("S", np.abs(spectrogram) if np.iscomplexobj(spectrogram) else spectrogram, 2)
     harmonic, percussive = (unrows(m, s, 2) for m in _core.hpss_masks(rows(s, 2), params))
     if np.isinf(power):

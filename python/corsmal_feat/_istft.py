@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, room, size
+from ._arrays import Floats, as_array, room, size
 from ._filters import Window
 from ._refusals import refuses
 from ._spectrum import stft_params
@@ -53,7 +53,7 @@ def istft(
     >>> np.allclose(corsmal_feat.istft(corsmal_feat.stft(y), length=8000), y)
     True
     """
-    d = np.asarray(stft_matrix)
+    d = as_array("stft_matrix", stft_matrix)
     if d.ndim < 2:
         raise ParameterError(f"stft_matrix has {d.ndim} dimensions, expected at least 2")
     if d.shape[-1] == 0:

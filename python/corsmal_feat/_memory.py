@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ._arrays import MOST
+from ._arrays import MOST, as_array
 from ._refusals import refuses
 from .errors import ParameterError
 
@@ -43,7 +43,7 @@ def stack_memory(
         raise ParameterError(f"n_steps must be a whole number of at least 1, not {n_steps}")
     if delay == 0:
         raise ParameterError("delay must not be 0")
-    array = np.atleast_2d(np.asarray(data))
+    array = np.atleast_2d(as_array("data", data))
     frames = array.shape[-1]
     if frames < 1:
         raise ParameterError(f"data has 0 frames (its shape is {array.shape}), expected at least 1")

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Singles
+from ._arrays import Singles, as_array
 from ._refusals import refuses
 from .errors import ParameterError
 
@@ -122,7 +122,7 @@ class Network:
         loss before each step, and the norm of each parameter's gradient in the first step
         """
         arrays = [inputs] if isinstance(inputs, np.ndarray) else list(inputs)  # type: ignore[arg-type]
-        targets = np.asarray(y)
+        targets = as_array("y", y)
         classes = numbers = None
         if targets.dtype.kind in "iub":
             if targets.ndim != 1 or (targets.size and targets.min() < 0):
@@ -149,7 +149,7 @@ class Network:
 
 def single(value: Any) -> Singles:
     """A contiguous array of finite numbers in single precision."""
-    array = np.ascontiguousarray(value, dtype=np.float32)
+    array = np.ascontiguousarray(as_array("inputs or weights", value, np.float32))
     if not np.isfinite(array).all():
         raise ParameterError("inputs and weights must be finite")
     return array

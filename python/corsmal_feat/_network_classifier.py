@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
+from ._arrays import as_array
 from ._classifier import class_labels
 from ._refusals import existing, place
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
@@ -167,7 +168,7 @@ def _column(items: list[Any], place: str, shape: str) -> _Column:
     expected = shape.split(" x ")
     arrays = []
     for number, item in enumerate(items):
-        array = np.asarray(item, dtype=np.float32)
+        array = as_array(f"item {number} of X", item, np.float32)
         known = [
             size if size == "steps" and given else str(given)
             for size, given in zip(expected, array.shape, strict=False)

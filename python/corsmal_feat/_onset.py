@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, audio, floats, number, rows, size, unrows
+from ._arrays import Floats, as_array, audio, floats, number, rows, size, unrows
 from ._decibels import power_to_db
 from ._mel import melspectrogram
 from ._params import PeakParams
@@ -175,7 +175,7 @@ def _compared(
         S = power_to_db(np.abs(mel))
     s: Any = np.atleast_2d(floats("S", S))
     if ref is not None:
-        ref = np.asarray(ref)
+        ref = as_array("ref", ref)
         if ref.shape != s.shape:
             raise ParameterError(f"ref has shape {ref.shape}, expected {s.shape}")
         ref = rows(ref.astype(s.dtype), 2)
@@ -324,7 +324,7 @@ def onset_backtrack(events: npt.ArrayLike, energy: npt.ArrayLike) -> npt.NDArray
     >>> corsmal_feat.onset.onset_backtrack(np.array([3]), np.array([2.0, 0.0, 1.0, 5.0, 1.0]))
     array([1])
     """
-    events = np.asarray(events)
+    events = as_array("events", events)
     if events.dtype.kind not in "iu" and events.size:
         raise ParameterError(f"events has dtype {events.dtype}, expected integers")
     array: Any = np.ascontiguousarray(floats("energy", energy))

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, rows, size, spectrum, unrows
+from ._arrays import Floats, as_array, rows, size, spectrum, unrows
 from ._params import PcenParams
 from ._refusals import refuses
 from ._warnings import warn
@@ -67,7 +67,7 @@ def pcen(
     """
     if np.iscomplexobj(S):
         warn("pcen was called on complex input: phase is discarded")
-        S = np.abs(np.asarray(S))
+        S = np.abs(as_array("S", S))
     s: Any = spectrum(S, 1)
     time = axis % s.ndim if -s.ndim <= axis < s.ndim else None
     if time is None:
@@ -93,7 +93,7 @@ def pcen(
     ordered = in_order(s)
     levels = None
     if ref is not None:
-        given = np.asarray(ref)
+        given = as_array("ref", ref)
         if given.shape != s.shape:
             raise ParameterError(f"ref has shape {given.shape}, expected {s.shape}")
         levels = rows(in_order(given.astype(s.dtype)), 2)
@@ -102,7 +102,7 @@ def pcen(
         shape = list(s.shape)
         shape[time] = 1
         try:
-            begun = np.broadcast_to(np.asarray(zi, np.float64), shape)
+            begun = np.broadcast_to(as_array("zi", zi, np.float64), shape)
         except ValueError:
             found = np.shape(zi)
             raise ParameterError(f"zi has shape {found}, expected {tuple(shape)}") from None

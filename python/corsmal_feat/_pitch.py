@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Floats, number, rows, size, unrows
+from ._arrays import Floats, as_array, number, rows, size, unrows
 from ._filters import Window
 from ._params import PitchParams
 from ._refusals import refuses
@@ -55,7 +55,7 @@ def _tracked(
         if levels.shape != shape:
             raise ParameterError(f"ref(S) has shape {levels.shape}, expected {shape}")
     else:
-        levels = np.broadcast_to(np.abs(ref), shape)
+        levels = np.broadcast_to(np.abs(as_array("ref", ref)), shape)
     return s, rows(levels.astype(s.dtype), 1), params
 
 
@@ -194,7 +194,7 @@ def pitch_tuning(
     >>> corsmal_feat.pitch_tuning(np.array([440.0, 880.0]))
     0.0
     """
-    array = np.atleast_1d(np.asarray(frequencies))
+    array = np.atleast_1d(as_array("frequencies", frequencies))
     if array.dtype != np.float32:
         array = array.astype(np.float64)
     bins = size("bins_per_octave", bins_per_octave)

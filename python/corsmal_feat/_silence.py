@@ -8,7 +8,7 @@ from typing import Any, Literal, overload
 import numpy as np
 import numpy.typing as npt
 
-from ._arrays import Floats, audio
+from ._arrays import Floats, as_array, audio
 from ._decibels import amplitude_to_db
 from ._refusals import refuses
 from ._time_domain import rms
@@ -166,7 +166,9 @@ def preemphasis(
     if signal.shape[-1] < (2 if zi is None else 1):
         raise ParameterError(f"y has {signal.shape[-1]} samples, expected at least 2 (1 with zi)")
     factor = signal.dtype.type(coef)
-    state: Any = 2 * signal[..., :1] - signal[..., 1:2] if zi is None else np.atleast_1d(zi)
+    state: Any = (
+        2 * signal[..., :1] - signal[..., 1:2] if zi is None else np.atleast_1d(as_array("zi", zi))
+    )
     state = np.asarray(state, dtype=signal.dtype)
     if state.shape != (*signal.shape[:-1], 1) and state.shape != (1,):
         raise ParameterError(f"zi has shape {state.shape}, expected {(*signal.shape[:-1], 1)}")

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Doubles, Floats, number, room, rows, size
+from ._arrays import Doubles, Floats, as_array, number, room, rows, size
 from ._filters import Window
 from ._refusals import refuses
 from ._spectrum import Framing, Spectra, spectra, spectrogram
@@ -27,7 +27,7 @@ def _frequencies(freq: Any, sr: float, s: Spectra) -> Any:
     """Frequencies [bins] of the rows of `s`, or [channels, bins, frames] where they vary."""
     if freq is None:
         return _core.fft_frequencies(number("sr", sr), s.n_fft)
-    freq = np.asarray(freq, dtype=np.float64)
+    freq = as_array("freq", freq, np.float64)
     if freq.ndim == 1 or s.shape is None:
         return np.ascontiguousarray(freq)
     return rows(_fitting("freq", freq, s.shape), 2)
@@ -142,7 +142,7 @@ def spectral_bandwidth(
     centres: Any = None
     if centroid is not None and s.shape is not None:
         shape = (*s.shape[:-2], 1, s.shape[-1])
-        given = np.asarray(centroid, dtype=np.float64)
+        given = as_array("centroid", centroid, np.float64)
         centres = rows(_fitting("centroid", given, shape), 2)[:, 0]
     result = _core.spectral_bandwidth(s.source, at, centres, bool(norm), number("p", p))
     return s.restored(result)

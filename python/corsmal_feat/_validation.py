@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
+from ._arrays import as_array, unmasked
 from ._sklearn import DataConversionWarning
 from ._warnings import warn
 from .errors import DataTypeError, ParameterError
@@ -99,7 +100,7 @@ def weights_of(sample_weight: Any, rows: int, owner: str) -> Matrix | None:
     if sample_weight is None:
         return None
     try:
-        weights = np.asarray(sample_weight, dtype=np.float64)
+        weights = as_array("sample_weight", sample_weight, np.float64)
     except (TypeError, ValueError) as error:
         raise ParameterError(f"{owner}: sample_weight must be numbers: {error}") from error
     if weights.ndim == 0:
@@ -123,8 +124,9 @@ def weights_of(sample_weight: Any, rows: int, owner: str) -> Matrix | None:
 
 
 def _array(name: str, value: Any, owner: str) -> npt.NDArray[Any]:
+    unmasked(name, value)
     try:
-        return np.asarray(value)
+        return as_array(name, value)
     except ValueError as error:
         raise ParameterError(f"{owner}: the rows of {name} differ in length") from error
 

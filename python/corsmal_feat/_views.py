@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
+from ._arrays import as_array
 from ._refusals import refuses
 from .errors import ParameterError
 
@@ -157,7 +158,7 @@ def camera_numbers(calibration: Calibration | StrPath) -> list[float]:
         calibration = load_calibration(calibration)
     camera = calibration.rgb
     parts = (camera.intrinsic, camera.rotation, camera.translation, camera.projection)
-    numbers = np.concatenate([np.asarray(part, dtype=np.float64).ravel() for part in parts])
+    numbers = np.concatenate([as_array("calibration", part, np.float64).ravel() for part in parts])
     if numbers.size != 33:
         raise ParameterError(
             f"calibration has {numbers.size} numbers, expected 33 (3 x 3, 3 x 3, 3 and 3 x 4)"
@@ -172,7 +173,7 @@ def mask_pixels(mask: Mask) -> npt.NDArray[np.bool_]:
             raise ParameterError(
                 f"mask has dtype {mask.dtype} and shape {mask.shape}, expected bool [height, width]"
             )
-        return mask
+        return as_array("mask", mask)
     return load_mask(mask)
 
 
@@ -184,5 +185,5 @@ def depth_pixels(depth: Depth) -> npt.NDArray[np.uint16]:
                 f"depth has dtype {depth.dtype} and shape {depth.shape}, expected uint16 "
                 "[height, width] in mm"
             )
-        return depth
+        return as_array("depth", depth)
     return load_depth(depth)

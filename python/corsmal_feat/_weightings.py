@@ -8,6 +8,7 @@ from typing import Any, overload
 import numpy as np
 import numpy.typing as npt
 
+from ._arrays import unmasked
 from ._decibels import power_to_db
 from ._refusals import refuses
 from ._times import Doubles, Number
@@ -236,6 +237,7 @@ def multi_frequency_weighting(
     >>> corsmal_feat.multi_frequency_weighting([100.0, 1000.0], kinds="ZA").shape
     (2, 2)
     """
+    unmasked("frequencies", frequencies)
     return np.stack([frequency_weighting(frequencies, kind=k, **kwargs) for k in kinds])
 
 

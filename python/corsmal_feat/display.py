@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from ._arrays import as_array
 from ._frequencies import cqt_frequencies, fft_frequencies, mel_frequencies
 from ._pitches import midi_to_hz
 from ._refusals import refuses
@@ -109,7 +110,7 @@ def specshow(
     left_out = [name for name in _LEFT_OUT if name in kwargs]
     if left_out:
         raise ParameterError(f"{left_out[0]} is not available here: use librosa.display.specshow")
-    values = np.asarray(data)
+    values = np.asanyarray(data)  # matplotlib leaves masked cells empty
     if values.ndim != 2:
         raise ParameterError(f"data has {values.ndim} dimensions, expected 2")
     if np.iscomplexobj(values):
@@ -122,7 +123,7 @@ def specshow(
 
     def positions(axis: str | None, count: int, given: npt.ArrayLike | None) -> Any:
         if given is not None:
-            found = np.asarray(given)
+            found = as_array("x_coords or y_coords", given)
             if found.shape not in ((count,), (count + 1,)):
                 raise ParameterError(
                     f"x_coords or y_coords has shape {found.shape}, expected ({count},)"
@@ -175,7 +176,8 @@ def _colors(values: npt.NDArray[Any]) -> str:
     """A diverging colour map if values, without the outermost, are on both sides of zero."""
     if values.dtype == bool:
         return "gray_r"
-    finite = values[np.isfinite(values)]
+    shown = np.ma.compressed(values)
+    finite = shown[np.isfinite(shown)]
     low, high = np.percentile(finite, [2, 98]) if finite.size else (0.0, 0.0)
     return "coolwarm" if low < 0 < high else "magma"
 
@@ -261,7 +263,7 @@ def waveshow(
     >>> area.axes.get_xlabel()
     'Time'
     """
-    signal = np.atleast_2d(np.asarray(y))
+    signal = np.atleast_2d(as_array("y", y))
     if signal.ndim > 2 or not signal.size:
         raise ParameterError(f"y has shape {np.shape(y)}, expected (n,) or (channels, n)")
     if not sr > 0:

@@ -15,11 +15,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Singles
+from ._arrays import Singles, as_array
 from ._features import StrPath
 from ._network import Network, TrainingSteps, plain, seed_of, single
 from ._refusals import refuses
@@ -320,8 +319,8 @@ def _rows(
     groups: Sequence[object] | npt.NDArray[Any] | None,
 ) -> tuple[list[tuple[str, str, str | None]], str]:
     """Path, label and group of each recording, and the kind of the labels."""
-    paths, labels = paths_of(recordings), np.asarray(y)
-    of_group = None if groups is None else np.asarray(groups)
+    paths, labels = paths_of(recordings), as_array("y", y)
+    of_group = None if groups is None else as_array("groups", groups)
     for what, values in (("y", labels), ("groups", of_group)):
         if values is not None and values.shape != (len(paths),):
             raise ParameterError(

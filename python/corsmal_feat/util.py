@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ._arrays import as_array, unmasked
 from ._arrays import size as whole
 from ._refusals import refuses
 from .errors import ParameterError
@@ -64,7 +65,7 @@ def frame(
            [2, 4],
            [3, 5]])
     """
-    array = np.asanyarray(x) if subok else np.asarray(x)
+    array = np.asanyarray(unmasked("x", x)) if subok else np.asarray(unmasked("x", x))
     length = _along(array, axis, "x")
     if frame_length < 1 or length < frame_length:
         raise ParameterError(
@@ -106,7 +107,7 @@ def fix_length(data: npt.ArrayLike, *, size: int, axis: int = -1, **kwargs: Any)
     >>> corsmal_feat.util.fix_length(np.arange(3), size=5)
     array([0, 1, 2, 0, 0])
     """
-    array = np.asarray(data)
+    array = as_array("data", data)
     length, size = _along(array, axis), whole("size", size, 0)
     if length > size:
         part = [slice(None)] * array.ndim
@@ -152,7 +153,7 @@ def pad_center(data: npt.ArrayLike, *, size: int, axis: int = -1, **kwargs: Any)
     >>> corsmal_feat.util.pad_center(np.ones(2), size=5)
     array([0., 1., 1., 0., 0.])
     """
-    array = np.asarray(data)
+    array = as_array("data", data)
     length = _along(array, axis)
     if size < length:
         raise ParameterError(f"size must be at least {length}, the length of data, not {size}")
@@ -186,7 +187,7 @@ def fix_frames(
     >>> corsmal_feat.util.fix_frames([3, 9, 9, 40], x_max=20)
     array([ 0,  3,  9, 20])
     """
-    values = np.asarray(frames)
+    values = as_array("frames", frames)
     if np.any(values < 0):
         raise ParameterError("frames must be at least 0, but some are negative")
     limits = [limit for limit in (x_min, x_max) if limit is not None]
@@ -247,7 +248,7 @@ def valid_audio(y: object) -> bool:
         raise ParameterError(f"Audio data must be floating-point, got {y.dtype}; cast it first")
     if y.ndim == 0:
         raise ParameterError("Audio data must be at least one-dimensional, given y.shape=()")
-    if not np.isfinite(y).all():
+    if not np.isfinite(unmasked("y", y)).all():
         raise ParameterError("Audio buffer is not finite everywhere")
     return True
 
@@ -288,7 +289,7 @@ def normalize(
     array([[ 0.5,  0. ],
            [-1. ,  0. ]])
     """
-    array = np.asarray(S)
+    array = as_array("S", S)
     if threshold is None:
         threshold = float(tiny(array))
     elif not threshold > 0:

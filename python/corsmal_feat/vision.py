@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
+from ._arrays import as_array
 from ._refusals import refuses
 from ._views import (
     Calibration,
@@ -315,7 +316,7 @@ def m2_capacity(depth: Depth | Region, weights: StrPath) -> float | None:
     found = depth if isinstance(depth, dict) else region(depth)
     if found is None:
         return None
-    image = np.asarray(found["image"], dtype=np.float32)
+    image = as_array("image", found["image"], np.float32)
     if image.ndim != 2:
         raise ParameterError(f"the image of a region has shape {image.shape}, expected (112, 112)")
     height, width = found["size"]

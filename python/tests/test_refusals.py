@@ -282,6 +282,77 @@ def test_refusals(
     assert not wrong, f"{name}\n" + "\n".join(wrong)
 
 
+#: Of these arrays, only the shape or the type counts.
+SHAPES = {"Z_weighting", "get_duration", "samples_like", "times_like", "util.tiny"}
+#: Optional arrays that some calls do not read.
+UNREAD = {"energy", "variance", "window"}
+
+
+def arrays_of(values: dict[str, Any], change: Callable[[Any], Any]) -> Iterator[dict[str, Any]]:
+    """The arguments of a call with one array of numbers changed, also one in a list."""
+    for name, value in values.items():
+        if isinstance(value, np.ndarray):
+            yield values | {name: change(value)}
+        elif isinstance(value, list) and value and isinstance(value[0], np.ndarray):
+            yield values | {name: [*value[:-1], change(value[-1])]}
+        elif isinstance(value, list) and value and isinstance(value[0], int | float):
+            yield values | {name: change(np.array(value))}
+
+
+def parts_of(result: Any) -> list[Any]:
+    if isinstance(result, dict):
+        result = tuple(result.values())
+    return list(result) if isinstance(result, tuple) else [result]
+
+
+@pytest.mark.parametrize("name", sorted({name for name, _, _ in calls()} - SHAPES))
+@pytest.mark.filterwarnings("ignore")
+def test_a_mask_is_refused_or_kept(name: str, inputs: dict[str, Any]) -> None:
+    function, arguments = next(rest for at, *rest in calls() if at == name)
+    good: dict[str, Any] = eval(f"dict({arguments})", inputs)
+
+    def masked(value: Any) -> Any:
+        hidden = np.zeros(value.shape, bool)
+        hidden.flat[0] = True
+        return np.ma.array(value, mask=hidden)
+
+    hints = get_type_hints(function)
+    tried = list(arrays_of(good, masked))
+    for key in inspect.signature(function).parameters.keys() - good.keys() - UNREAD:
+        if "_NestedSequence" in str(hints.get(key)):  # an optional array in numpy's union
+            tried += [good | {key: masked(inputs[other])} for other in "yS"]
+    for arguments in tried:
+        try:
+            result = function(**arguments)
+        except corsmal_feat.CorsmalFeatError as error:
+            if arguments.keys() == good.keys():
+                assert "mask" in str(error), name
+        else:
+            assert all(np.ma.is_masked(part) for part in parts_of(result)), (name, arguments)
+
+
+@pytest.mark.parametrize("name", sorted(name for name, _, _ in calls()))
+@pytest.mark.filterwarnings("ignore")
+def test_arrays_need_no_alignment(name: str, inputs: dict[str, Any]) -> None:
+    """As `numpy.frombuffer` and `numpy.memmap` give them for a file with a header."""
+    function, arguments = next(rest for at, *rest in calls() if at == name)
+    good: dict[str, Any] = eval(f"dict({arguments})", inputs)
+
+    def shifted(value: Any) -> Any:
+        buffer = bytearray(1) + value.tobytes()
+        return np.frombuffer(buffer, value.dtype, offset=1).reshape(value.shape)
+
+    for arguments in arrays_of(good, shifted):
+        found = []
+        for given in (good, arguments):
+            try:
+                found.append(parts_of(function(**given)))
+            except corsmal_feat.CorsmalFeatError as error:
+                found.append([str(error)])
+        for expected, actual in zip(*found, strict=True):
+            np.testing.assert_array_equal(actual, expected)
+
+
 def test_errors_of_a_given_function_are_its_own(inputs: dict[str, Any]) -> None:
     class Mine(ValueError):
         pass
