@@ -53,7 +53,8 @@ def resample(
     res_type : str
         "soxr_hq" (librosa's default since 0.10), "kaiser_best" (its default before) or
         "kaiser_fast"; "fft" or "scipy", "polyphase" (whole numbers of Hz), "linear" and
-        "zero_order_hold". The other soxr_* and sinc_* types are the same as "soxr_hq".
+        "zero_order_hold". The other soxr_* and sinc_* types are the same as "soxr_hq". The kaiser_*
+        types are those of resampy 0.2; librosa's are those of the installed resampy.
     fix : bool
         Whether to cut or pad the result to `ceil(n * target_sr / orig_sr)` samples.
     scale : bool

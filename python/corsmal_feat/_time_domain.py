@@ -100,7 +100,7 @@ def rms(
     y : float32 or float64 [shape=(..., n)], optional
         Signal.
     S : [shape=(..., 1 + frame_length // 2, t)], optional
-        Magnitude spectrogram to use instead of `y`.
+        Magnitude spectrogram, used only without `y`.
     frame_length, hop_length : int
         Samples per frame, and from one frame to the next.
     center, pad_mode
@@ -118,12 +118,12 @@ def rms(
     np.float32(0.5)
     """
     kind = precision(dtype)
-    if S is not None:
+    if y is None and S is None:
+        raise ParameterError("y or S must be given")
+    if y is None:
         s = floats("S", S, 2)
         level = unrows(_core.rms_of_spectrogram(rows(s, 2), int(frame_length)), s, 2)
         return level.astype(kind, copy=False)
-    if y is None:
-        raise ParameterError("y or S must be given")
     y = audio(y)
     frame = framing(frame_length, hop_length, center)
     level = unrows(_core.rms(channels(y), frame, str(pad_mode)), y, 1)
