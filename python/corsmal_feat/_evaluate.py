@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from . import _core
+from ._by_name import ByName
 from ._refusals import refuses
 from .errors import ParameterError
 
@@ -16,7 +17,7 @@ StrPath = str | os.PathLike[str]
 
 
 @dataclass(frozen=True)
-class Scores:
+class Scores(ByName):
     """Scores of a submission under a rule set.
 
     Attributes
@@ -38,9 +39,6 @@ class Scores:
     rules: str
     recordings: int
     notes: list[str]
-
-    def __getitem__(self, name: str) -> float:
-        return self.values[name]
 
 
 @refuses

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from . import _core
+from ._by_name import ByName
 from ._predictions import Predictions, StrPath, parse
 from ._refusals import existing, refuses
 from ._warnings import warn
@@ -85,7 +86,7 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class ScoreReport:
+class ScoreReport(ByName):
     """Scores of a prediction file.
 
     Attributes
@@ -107,9 +108,6 @@ class ScoreReport:
     kind: str
     values: dict[str, float]
     report: dict[str, Any] = field(repr=False)
-
-    def __getitem__(self, name: str) -> float:
-        return self.values[name]
 
 
 @refuses
@@ -325,7 +323,7 @@ def score(
     id_column : str, optional
         Column of the label file that names the recordings by id, path or file name.
     target : str, optional
-        Column of the true classes; `true` by default.
+        Column of the true classes; by default the only label column of `labels`, else `true`.
     groups : str, optional
         Column of groups that the bootstrap draws together; by default `group`, `container` or
         `recording` if there is one.

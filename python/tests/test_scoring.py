@@ -194,3 +194,20 @@ def test_labels_come_from_a_file_or_from_folders(tmp_path: Path) -> None:
     assert corsmal_feat.score(path, labels="folders")["accuracy"] == 0.5
     with pytest.raises(ParameterError, match="true classes"):
         corsmal_feat.score(path)
+
+
+def test_the_only_label_column_replaces_the_true_classes_of_the_file(tmp_path: Path) -> None:
+    path, labels = tmp_path / "p.csv", tmp_path / "labels.csv"
+    path.write_text("id,true,predicted\na,x,x\nb,y,y\n")
+    labels.write_text("id,class\na,y\nb,x\n")
+    assert corsmal_feat.score(path)["accuracy"] == 1.0
+    assert corsmal_feat.score(path, labels=labels)["accuracy"] == 0.0
+    assert corsmal_feat.score(path, labels=labels, target="class")["accuracy"] == 0.0
+
+
+def test_scores_are_read_as_from_a_mapping(tmp_path: Path) -> None:
+    predictions(tmp_path / "p.csv", seed=3)
+    scored = corsmal_feat.score(tmp_path / "p.csv")
+    assert "accuracy" in scored and "nothing" not in scored
+    assert list(scored) == list(scored.values) and len(scored) == len(scored.values)
+    assert dict(scored) == scored.values
