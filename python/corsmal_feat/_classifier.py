@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import size
+from ._fingerprints import Fingerprints, check_rows, fingerprints
 from ._refusals import existing, place
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
 from ._validation import Matrix, features, labels_of, names_of, weights_of
@@ -37,6 +38,8 @@ class Classifier(ClassifierMixin, BaseEstimator):
     #: keyword of the subclass -> parameter of the Rust side, where they differ
     _renamed: ClassVar[dict[str, str]] = {}
     _model: _core.TrainedModel
+    #: the rows of `fit`; None if the model comes from a file
+    _fitted_on: Fingerprints | None = None
     classes_: npt.NDArray[Any]
     n_features_in_: int
     feature_names_in_: npt.NDArray[np.object_]
@@ -49,7 +52,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
         result = {}
         for name, value in self.get_params().items():
             if name == "class_weight" and isinstance(value, dict):
-                value = [value.get(c, 1.0) for c in ([] if classes is None else classes.tolist())]
+                value = self._weights_of_classes(value, classes)
             elif name == "random_state":
                 value = _seed(value)
             elif isinstance(value, np.generic):
@@ -62,6 +65,21 @@ class Classifier(ClassifierMixin, BaseEstimator):
             if value is not None:
                 result[self._renamed.get(name, name)] = value
         return result
+
+    def _weights_of_classes(
+        self, weights: dict[Any, Any], classes: npt.NDArray[Any] | None
+    ) -> list[Any]:
+        """A weight for each class; classes that are not named have 1."""
+        known = [] if classes is None else classes.tolist()
+        # As scikit-learn: names that y lacks are right if the others are all there, as for a fold
+        # without one of the classes.
+        strange = [name for name in weights if name not in known]
+        if strange and not weights.keys() >= set(known):
+            raise ParameterError(
+                f"{type(self).__name__}: class_weight has {strange[0]!r}, which is no label in y:"
+                f" expected some of {', '.join(map(repr, known[:10]))}"
+            )
+        return [weights.get(name, 1.0) for name in known]
 
     def fit(self, X: Any, y: Any) -> Self:
         """Trains on `X` [shape=(rows, features)] and `y`, one label per row."""
@@ -99,6 +117,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
         except ParameterError as error:
             size = f"n_samples = {x.shape[0]}, n_features = {x.shape[1]}"
             raise ParameterError(f"{owner}: {error} ({size})") from error
+        self._fitted_on = fingerprints(x)
         self.classes_ = classes
         self.n_features_in_ = x.shape[1]
         if names is not None:
@@ -150,12 +169,26 @@ class Classifier(ClassifierMixin, BaseEstimator):
         path : path
             The file.
         features : Features or FeatureExtractor, optional
-            Where the rows come from that the model was fitted on. With it, the model also takes
-            recordings: `load_model(path).predict(["a.wav"])`, `corsmal-feat classify`.
+            Where the rows come from that the model was fitted on, unchanged: scaled rows are
+            refused. With it, the model also takes recordings:
+            `load_model(path).predict(["a.wav"])`, `corsmal-feat classify`.
         """
         if not hasattr(self, "_model"):
             raise not_fitted(self)
-        self._model.save(place(path), None if features is None else made_of(features))
+        self._model.save(place(path), None if features is None else self._made_of(features))
+
+    def _made_of(self, features: Features | FeatureExtractor) -> str:
+        """What a model file says about its features, as JSON."""
+        try:
+            made, given = features._made_of(), features._fingerprints()
+        except AttributeError as error:
+            raise ParameterError(
+                f"features must be Features or a fitted FeatureExtractor, not {features!r}"
+            ) from error
+        # Other names or numbers of columns are refused when the file is written.
+        if len(made["feature_names"]) == self.n_features_in_:
+            check_rows(self._fitted_on, given)
+        return json.dumps(made)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
@@ -200,17 +233,6 @@ class WeightedClassifier(Classifier):
         """
         self._fit(X, y, sample_weight)
         return self
-
-
-def made_of(features: Features | FeatureExtractor) -> str:
-    """What a model file says about its features, as JSON."""
-    try:
-        made = features._made_of()
-    except AttributeError as error:
-        raise ParameterError(
-            f"features must be Features or a fitted FeatureExtractor, not {features!r}"
-        ) from error
-    return json.dumps(made)
 
 
 def _seed(value: Any) -> int:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import json
 import os
+from array import array
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _core
+from ._arrays import as_array, unmasked
 from ._extract import MOST_JOBS, Config, configuration, extract, interleaved, whole_rate
 from ._features import GOOD
+from ._fingerprints import Fingerprints, fingerprints
+from ._formats import Format, mismatch, taken
 from ._refusals import refuses
 from ._sklearn import BaseEstimator, TransformerMixin, not_fitted
 from ._warnings import warn
@@ -22,6 +26,16 @@ from .errors import DataTypeError, DecodeError, ParameterError
 __all__ = ["FeatureExtractor"]
 
 Matrix = npt.NDArray[np.float32]
+
+#: Rows whose fingerprints an extractor keeps: 8 MiB.
+_KEPT = 1 << 20
+
+
+class _Computed(NamedTuple):
+    names: list[str]
+    rows: Matrix
+    #: of the recordings that have features
+    formats: list[Format]
 
 
 class FeatureExtractor(TransformerMixin, BaseEstimator):
@@ -38,6 +52,8 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
     errors : what to do with a file without features: "raise" a `DecodeError`, or "nan" for a row
         of NaN and a warning
     progress : whether to show on standard error how many files are done
+    any_rate : whether `transform` accepts recordings with a sample rate or a number of channels
+        that `fit` has not seen
 
     Rows to transform are paths, or signals in memory: a list of float arrays, each [shape=(n,) or
     (channels, n)], or one array [shape=(recordings, n) or (recordings, channels, n)].
@@ -60,6 +76,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         jobs: int | None = None,
         errors: str = "raise",
         progress: bool = False,
+        any_rate: bool = False,
     ) -> None:
         self.preset = preset
         self.config = config
@@ -68,10 +85,13 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         self.jobs = jobs
         self.errors = errors
         self.progress = progress
+        self.any_rate = any_rate
 
     _names: list[str] | None = None
     #: sample rates and channels of the recordings that it was fitted on
-    _formats: list[tuple[int, int]]
+    _formats: list[Format]
+    #: fingerprints of the rows given since `fit`
+    _given: array[int] | None = None
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
@@ -90,17 +110,20 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         for position, recording in enumerate(recordings):
             if not _is_path(recording):
                 _signal(recording, position)
-        self._names, _ = self._compute(recordings[:1])
+        self._names = self._compute(recordings[:1]).names
         self._formats = self._formats_of(recordings)
+        self._given = array("Q")
         return self
 
     @refuses
     def fit_transform(self, X: Any, y: Any = None) -> Matrix:
         """`fit(X).transform(X)`."""
-        recordings = _recordings(X)
-        self._names, matrix = self._compute(recordings)
-        self._formats = self._formats_of(recordings)
-        return matrix
+        computed = self._compute(_recordings(X))
+        self._names = computed.names
+        self._formats = sorted(set(computed.formats))
+        self._given = array("Q")
+        self._keep(computed.rows)
+        return computed.rows
 
     @refuses
     def transform(self, X: Any) -> Matrix:
@@ -109,14 +132,40 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         Raises
         ------
         DecodeError : a recording has no features, unless `errors="nan"` makes its row NaN
+        ParameterError : a recording has a sample rate or a number of channels that `fit` has not
+            seen, unless `any_rate=True` accepts it
         """
-        names, matrix = self._compute(_recordings(X))
-        if self._names is not None and names != self._names:
+        computed = self._compute(_recordings(X))
+        if self._names is None:
+            return computed.rows
+        if computed.names != self._names:
             raise ParameterError(
-                f"X gives {len(names)} values per recording, but fit saw {len(self._names)}: the "
-                "number of channels or the configuration differs"
+                f"X gives {len(computed.names)} values per recording, but fit saw "
+                f"{len(self._names)}: the number of channels or the configuration differs"
             )
-        return matrix
+        if not self.any_rate:
+            self._check_formats(computed.formats)
+        self._keep(computed.rows)
+        return computed.rows
+
+    def _check_formats(self, formats: list[Format]) -> None:
+        """Refuses formats that change the features."""
+        config = json.loads(_core.effective_config(*self._configuration())[0])
+        rates, channels = taken(config, self._formats)
+        for found in sorted(set(formats)):
+            reason = mismatch(found, rates, channels, "this FeatureExtractor")
+            if reason is not None:
+                raise ParameterError(
+                    f"X has a recording with {reason}; any_rate=True accepts it as it is"
+                )
+
+    def _keep(self, rows: Matrix) -> None:
+        """Keeps what tells `save` of a classifier whether it was fitted on these rows."""
+        if self._given is not None:
+            self._given.extend(fingerprints(rows[: _KEPT - len(self._given)]).tolist())
+
+    def _fingerprints(self) -> Fingerprints:
+        return np.array(self._given or [], np.uint64)
 
     def _made_of(self) -> dict[str, Any]:
         """What a model file says about features."""
@@ -128,11 +177,11 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
             "formats": self._formats,
         }
 
-    def _formats_of(self, recordings: list[Any]) -> list[tuple[int, int]]:
+    def _formats_of(self, recordings: list[Any]) -> list[Format]:
         """Different formats of those that can be read."""
         return sorted({found for found in map(self._format, recordings) if found is not None})
 
-    def _format(self, recording: Any) -> tuple[int, int] | None:
+    def _format(self, recording: Any) -> Format | None:
         """Sample rate and channels of a recording, if it can be read."""
         if not _is_path(recording):
             return whole_rate(self.sr), np.atleast_2d(recording).shape[0]
@@ -159,14 +208,13 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
             )
         return config, overrides
 
-    def _compute(self, recordings: list[Any]) -> tuple[list[str], Matrix]:
-        """Names of the columns, and rows."""
+    def _compute(self, recordings: list[Any]) -> _Computed:
         config, overrides = self._configuration()
         if _is_path(recordings[0]):
             return self._of_files(recordings)
         return self._of_signals(recordings, _core.Signals(config, overrides))
 
-    def _of_files(self, paths: list[Any]) -> tuple[list[str], Matrix]:
+    def _of_files(self, paths: list[Any]) -> _Computed:
         names = [os.fspath(path) for path in paths]
         # The same file may be in X twice, as in a bootstrap.
         if self.errors not in ("raise", "nan"):
@@ -189,54 +237,59 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         rows = iter(found.summary if found.summary is not None else ())
         columns = found.names or self._names or []
         row_of: dict[str, Matrix] = {}
+        formats: list[Format] = []
         for name, outcome in zip(different, found.outcomes, strict=True):
             if outcome["status"] in GOOD:
                 row_of[name] = next(rows)
+                formats.append((outcome["sample_rate"], outcome["channels"]))
                 continue
             reason = f"{name}: {outcome['status']}: {outcome['reason']}"
             if self.errors == "raise" or not columns:
                 raise DecodeError(reason)
             warn(f"the row is NaN: {reason}")
             row_of[name] = np.full(len(columns), np.nan, dtype=np.float32)
-        return columns, np.stack([row_of[name] for name in names])
+        return _Computed(columns, np.stack([row_of[name] for name in names]), formats)
 
-    def _around(self, absent: list[str], names: list[str]) -> tuple[list[str], Matrix]:
+    def _around(self, absent: list[str], names: list[str]) -> _Computed:
         """The rows of the files that are there, and NaN for the others."""
         there = [name for name in names if name not in absent]
-        columns, found = self._of_files(there) if there else (self._names or [], np.zeros((0, 0)))
+        nothing = _Computed(self._names or [], np.zeros((0, 0), np.float32), [])
+        columns, found, formats = self._of_files(there) if there else nothing
         if not columns:
             raise DecodeError(f"{absent[0]}: no such file; no other file of X exists either")
         for name in absent:
             warn(f"the row is NaN: {name}: no such file")
         rows = iter(found)
         empty = np.full(len(columns), np.nan, dtype=np.float32)
-        return columns, np.stack([empty if name in absent else next(rows) for name in names])
+        stacked = np.stack([empty if name in absent else next(rows) for name in names])
+        return _Computed(columns, stacked, formats)
 
-    def _of_signals(self, signals: list[Any], by: _core.Signals) -> tuple[list[str], Matrix]:
+    def _of_signals(self, signals: list[Any], by: _core.Signals) -> _Computed:
         rate = whole_rate(self.sr)
         if self.jobs is not None and not 1 <= self.jobs <= MOST_JOBS:
             raise ParameterError(f"jobs must be 1 to {MOST_JOBS}, not {self.jobs}")
 
-        def row(position: int) -> tuple[list[str], Any]:
+        def row(position: int) -> tuple[list[str], Any, Format]:
             samples = _signal(signals[position], position)
             try:
                 signal = by.start(rate, samples.shape[1])
                 names = signal.summary_names()
                 signal.push(samples)
-                return names, signal.finish()[0]
+                return names, signal.finish()[0], (rate, samples.shape[1])
             except ParameterError as error:
                 raise ParameterError(f"recording {position}: {error}") from error
 
         with ThreadPoolExecutor(self.jobs or _core.jobs()) as pool:
             computed = list(pool.map(row, range(len(signals))))
         names = computed[0][0]
-        for position, (others, _) in enumerate(computed):
+        for position, (others, *_) in enumerate(computed):
             if others != names:
                 raise ParameterError(
                     f"recording {position} gives {len(others)} values, but the first one gives "
                     f"{len(names)}: the number of channels differs"
                 )
-        return names, np.stack([values for _, values in computed])
+        rows = np.stack([values for _, values, _ in computed])
+        return _Computed(names, rows, [found for *_, found in computed])
 
 
 def _recordings(X: Any) -> list[Any]:
@@ -244,12 +297,29 @@ def _recordings(X: Any) -> list[Any]:
         raise DataTypeError("sparse data was passed, but dense data is required; use .toarray()")
     if X is None:
         raise ParameterError("X must be paths or signals, not None")
+    if getattr(X, "ndim", 2) == 2 and (hasattr(X, "columns") or isinstance(X, np.ndarray)):
+        X = _column(X)
     recordings = [X] if _is_path(X) else list(X if hasattr(X, "__iter__") else np.asarray(X))
     if not recordings:
         raise ParameterError("Found array with 0 sample(s): at least one recording is needed")
     if len({_is_path(recording) for recording in recordings}) > 1:
         raise ParameterError("X mixes paths and signals: give one or the other")
     return recordings
+
+
+def _column(X: Any) -> Any:
+    """The only column of a table of paths; rows of samples stay as they are."""
+    table = unmasked("X", np.asarray(X) if hasattr(X, "columns") else X)
+    if not table.size or not _is_path(table.flat[0]):
+        return table
+    if table.shape[1] != 1:
+        names = getattr(X, "columns", None)
+        which = "" if names is None else f" ({', '.join(map(str, names))})"
+        raise ParameterError(
+            f"X has {table.shape[1]} columns{which}, expected one path per recording: pass the"
+            " column of paths only"
+        )
+    return table[:, 0]
 
 
 def _is_path(recording: Any) -> bool:
@@ -261,7 +331,7 @@ def _signal(y: Any, position: int) -> Matrix:
     if np.iscomplexobj(y):
         raise ParameterError(f"Complex data not supported: recording {position}")
     if np.asarray(y).dtype == object:
-        y = np.asarray(y, dtype=np.float64)
+        y = as_array("y", y, np.float64)
     if not np.ndim(y):
         raise ParameterError(
             f"recording {position} is a single value. Reshape your data to (recordings, n), or put "
@@ -276,5 +346,10 @@ def _signal(y: Any, position: int) -> Matrix:
         raise ParameterError(
             f"recording {position}: 0 feature(s) (shape={shape}) while a minimum of 1 is required: "
             "no samples"
+        )
+    if samples.shape[1] > len(samples):
+        raise ParameterError(
+            f"recording {position} has shape {np.shape(y)}, which is {samples.shape[1]} channels of"
+            f" {len(samples)} samples, expected (channels, n): transpose it"
         )
     return samples

@@ -215,8 +215,10 @@ class SignalExtractor:
         """Takes the next samples, float [shape=(channels, n)], or [shape=(n,)] for one channel."""
         samples = interleaved(block)
         if samples.shape[1] != self._channels:
+            turned = len(samples) == self._channels
+            hint = f" [shape=({self._channels}, n)]: transpose it" if turned else ""
             raise ParameterError(
-                f"block has {samples.shape[1]} channels, expected {self._channels}"
+                f"block has {samples.shape[1]} channels, expected {self._channels}{hint}"
             )
         self._signal.push(samples)
 

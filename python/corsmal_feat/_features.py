@@ -18,6 +18,7 @@ import numpy.typing as npt
 from . import _core
 from ._features_npz import of_npz
 from ._features_parquet import of_parquet, of_partitions
+from ._fingerprints import Fingerprints, fingerprints
 from ._refusals import refuses
 from .errors import ParameterError, UnknownIdError
 
@@ -216,6 +217,10 @@ class Features:
                 if row["status"] in GOOD
             ],
         }
+
+    def _fingerprints(self) -> Fingerprints:
+        """Those of the rows of the summary."""
+        return fingerprints(np.zeros((0, 0)) if self.summary is None else self.summary)
 
     def _names_of_recordings(self) -> list[str] | None:
         """The names of the columns for recordings like these, if the format of one is known."""

@@ -14,6 +14,7 @@ from . import _core
 from ._classifier import class_labels
 from ._extract import extract
 from ._features import GOOD
+from ._formats import mismatch
 from ._refusals import existing, refuses
 from ._validation import Matrix, features
 from .errors import DecodeError, ModelError, ParameterError
@@ -122,14 +123,7 @@ class TrainedModel:
                 f"{self.path} does not say which sample rates and channels it was trained on:"
                 " train it again, or pass any_rate=True to accept all recordings"
             ) from error
-        for found, known, what in (
-            (sample_rate, rates, "Hz"),
-            (channels, known_channels, "channels"),
-        ):
-            if found is not None and known is not None and found not in known:
-                trained = ", ".join(map(str, known))
-                return f"{found} {what}, but {self.path} was trained on {trained}"
-        return None
+        return mismatch((sample_rate, channels), rates, known_channels, self.path)
 
     def _rows(self, X: Any, any_rate: bool) -> Matrix:
         if isinstance(X, (str, os.PathLike)):

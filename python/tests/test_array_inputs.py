@@ -64,3 +64,9 @@ def test_the_advice_for_whole_numbers_gives_silence_as_zero(kind: type[np.intege
     assert advised in str(error.value)
     signal = (samples.astype(np.float32) - (0 if info.min < 0 else full)) / full
     assert signal[:2].tolist() == [-1, 0] and 0.99 < signal[2] < 1
+
+
+def test_rms_prefers_the_signal_as_librosa_does() -> None:
+    y = np.random.default_rng(2).standard_normal(4096)
+    both = cf.feature.rms(y=y, S=np.ones((1025, 9)))
+    assert np.array_equal(both, cf.feature.rms(y=y))

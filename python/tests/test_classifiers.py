@@ -154,3 +154,14 @@ def test_linfas_solvers_learn_and_survive_the_disk(estimator, tmp_path: Path):
     assert getattr(back, name) == "linfa"
     with pytest.raises(ParameterError, match=r"(own|brute) or linfa"):
         type(estimator)(**{name: "fast"}).fit(x, y)
+
+
+@pytest.mark.parametrize("kind", ["SVC", "LogisticRegression", "RandomForest", "DecisionTree"])
+def test_weights_of_classes_that_do_not_exist_are_refused(kind: str) -> None:
+    x, y = np.arange(8.0).reshape(-1, 1), ["Dog", "Rain"] * 4
+    for weights in ({"rain": 5}, {0: 5}, {"Rain": 5, "x": 3}):
+        with pytest.raises(ParameterError, match=r"class_weight has .* no label in y"):
+            getattr(classifiers, kind)(class_weight=weights).fit(x, y)
+    # One of all classes may be missing in a fold.
+    for weights in ({"Rain": 5}, {"Rain": 5, "Dog": 1, "x": 3}, {}):
+        getattr(classifiers, kind)(class_weight=weights).fit(x, y)

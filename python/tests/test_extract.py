@@ -258,6 +258,11 @@ def test_transformer_refuses(folder: Path):
         cf.FeatureExtractor("mfcc-zcr", set={"summary.stats": ["mean"]}, sr=RATE).fit(
             [signal]
         ).transform([signal[0]])
+    for frames in (60, 1000, 88200):
+        with pytest.raises(cf.ParameterError, match="transpose it"):
+            cf.FeatureExtractor("mfcc-zcr", sr=RATE).fit_transform([np.zeros((frames, 2))])
+    with pytest.raises(cf.ParameterError, match="transpose it"):
+        cf.SignalExtractor(RATE, channels=2, preset="mfcc-zcr").push(np.zeros((900, 2)))
     with pytest.raises(cf.NotFittedError, match="not fitted"):
         cf.FeatureExtractor().get_feature_names_out()
     (folder / "bad.wav").write_bytes(b"RIFF")
@@ -286,6 +291,21 @@ def test_transformer_in_scikit_learn(folder: Path):
     assert len(model[:-1].get_feature_names_out()) == 26
     assert base.clone(model[0]).get_params() == model[0].get_params()
     assert isinstance(model[0], base.TransformerMixin)
+
+
+def test_transformer_takes_a_table_with_one_column_of_paths(folder: Path):
+    pandas = pytest.importorskip("pandas", reason="pandas is absent")
+    paths = [str(folder / f"r{i}.wav") for i in (0, 1)]
+    wanted = cf.FeatureExtractor("esc26").fit_transform(paths)
+    table = pandas.DataFrame({"path": paths, "class": ["a", "b"]})
+    for one in (table[["path"]], np.array(paths)[:, None], np.array(paths, object)[:, None]):
+        np.testing.assert_array_equal(cf.FeatureExtractor("esc26").fit_transform(one), wanted)
+    with pytest.raises(cf.ParameterError, match=r"2 columns \(path, class\)"):
+        cf.FeatureExtractor("esc26").fit(table)
+    signals = np.stack([floats(pour(i)).ravel()[:RATE] for i in (0, 1)])
+    rows = cf.FeatureExtractor("esc26", sr=RATE).fit_transform(signals)
+    of_table = cf.FeatureExtractor("esc26", sr=RATE).fit_transform(pandas.DataFrame(signals))
+    np.testing.assert_array_equal(of_table, rows)
 
 
 def test_transformer_gives_data_frames(folder: Path):

@@ -92,6 +92,60 @@ def test_a_model_of_rows_says_so(recordings: tuple[list[Path], list[str]], tmp_p
     assert not (tmp_path / "wrong").exists()
 
 
+@pytest.mark.parametrize("described_by", ["features", "extractor"])
+def test_a_model_of_other_rows_is_not_saved_with_these_features(
+    recordings: tuple[list[Path], list[str]], tmp_path: Path, described_by: str
+) -> None:
+    paths, kinds = recordings
+    features = cf.extract(paths, preset="mfcc-zcr")
+    extractor = cf.FeatureExtractor("mfcc-zcr")
+    assert np.array_equal(extractor.fit(paths).transform(paths), features.summary)
+    extractor.transform(paths[:1])
+    described = features if described_by == "features" else extractor
+    rows = features.summary
+    resampled = cf.extract(paths, preset="mfcc-zcr", set={"signal.sample_rate": 8000}).summary
+    for other in ((rows - rows.mean(axis=0)) / rows.std(axis=0), rows[:, ::-1], resampled):
+        model = cf.KNN(1).fit(other, kinds)
+        with pytest.raises(cf.ParameterError, match="none of these 10: fit on"):
+            model.save(tmp_path / "model", features=described)
+        assert not (tmp_path / "model").exists()
+    frame = pandas.DataFrame(rows.astype(np.float64), columns=features.names)
+    for same in (rows, frame, rows[3:7]):
+        cf.KNN(1).fit(same, kinds[: len(same)]).save(tmp_path / "model", features=described)
+    mixed = cf.KNN(1).fit(np.concatenate([rows, rows + 1]), kinds * 2)
+    with pytest.warns(UserWarning, match="only 10 of the 20 rows"):
+        mixed.save(tmp_path / "model", features=described)
+    again = pickle.loads(pickle.dumps(cf.KNN(1).fit(rows + 1, kinds)))
+    with pytest.raises(cf.ParameterError, match="none of these"):
+        again.save(tmp_path / "wrong", features=described)
+    cf.KNN.load(tmp_path / "model").save(tmp_path / "model", features=described)
+
+
+def test_a_pipeline_refuses_other_rates_as_a_model_does(
+    recordings: tuple[list[Path], list[str]], tmp_path: Path
+) -> None:
+    paths, _ = recordings
+    other = record(tmp_path / "other.wav", 300, 5, rate=44100)
+    for fitted in (cf.FeatureExtractor("mfcc-zcr").fit(paths), cf.FeatureExtractor("mfcc-zcr")):
+        if fitted._names is None:
+            fitted.fit_transform(paths)
+        with pytest.raises(cf.ParameterError, match=r"44100 Hz, but .* on 16000; any_rate=True"):
+            fitted.transform([paths[0], other])
+    assert len(fitted.set_params(any_rate=True).transform([other])) == 1
+    both = cf.FeatureExtractor("mfcc-zcr").fit([*paths, other])
+    assert len(both.transform([other])) == 1
+    converted = cf.FeatureExtractor("mfcc-zcr", set={"signal.sample_rate": RATE}).fit(paths)
+    assert len(converted.transform([other])) == 1
+    first = cf.FeatureExtractor("mfcc-zcr", set={"signal.channels": [0]}).fit(paths)
+    stereo = record(tmp_path / "stereo.wav", 300, 5, channels=2)
+    with pytest.raises(cf.ParameterError, match="2 channels"):
+        first.transform([stereo])
+    signals = cf.FeatureExtractor("mfcc-zcr", sr=RATE)
+    signals.fit(np.ones((2, RATE)))
+    with pytest.raises(cf.ParameterError, match="8000 Hz"):
+        signals.set_params(sr=8000).transform(np.ones((2, RATE)))
+
+
 def test_the_command_and_python_share_models(
     recordings: tuple[list[Path], list[str]], tmp_path: Path
 ) -> None:
