@@ -45,6 +45,21 @@ pub(crate) fn scale(values: &mut [f32], factor: f32) {
     });
 }
 
+/// Adds `bias` to every row.
+pub(crate) fn add_to_rows(values: &mut [f32], bias: &[f32]) {
+    let n = bias.len();
+    values.par_chunks_mut(rows_per_piece(n) * n).for_each(|piece| {
+        vectorized(
+            #[inline(always)]
+            || {
+                for row in piece.chunks_exact_mut(n) {
+                    row.iter_mut().zip(bias).for_each(|(v, b)| *v += b);
+                }
+            },
+        );
+    });
+}
+
 /// Negative numbers become zero.
 pub(crate) fn relu(values: &mut [f32]) {
     values.par_chunks_mut(PIECE).for_each(|piece| {

@@ -5,7 +5,9 @@ use std::fmt::Debug;
 
 use crate::batch::{Batch, Shape};
 use crate::error::Result;
+use crate::kernels;
 use crate::matrix::Matrix;
+use crate::packed::Packed;
 use crate::parameters::{Declared, Parameters};
 use crate::random::Stream;
 
@@ -115,6 +117,19 @@ impl<'a> Pass<'a> {
         }
     }
 
+    /// Rows of numbers times the transposed weights of this name, plus the bias of that name. In training the product
+    /// is burn's: losses after some steps depend on the order of sums, and burn's is near PyTorch's.
+    pub(crate) fn product(&self, rows: &Matrix, weight: &str, bias: &str) -> Matrix {
+        let bias = self.parameters.get(bias).values();
+        if self.training.is_none() {
+            let packed = self.parameters.packed(weight, Packed::new);
+            return packed.product(rows.values(), Some(bias));
+        }
+        let mut out = rows.dot_t(self.parameters.get(weight));
+        kernels::add_to_rows(out.values_mut(), bias);
+        out
+    }
+
     /// Through all layers of a chain.
     pub fn chain(&mut self, layers: &[Box<dyn Layer>], input: Batch) -> Batch {
         layers.iter().fold(input, |x, layer| layer.forward(x, self))
@@ -172,7 +187,7 @@ impl<'a> Backward<'a> {
                 place.insert(gradient);
             }
             std::collections::hash_map::Entry::Occupied(mut sum) => {
-                crate::kernels::add(sum.get_mut().values_mut(), gradient.values());
+                kernels::add(sum.get_mut().values_mut(), gradient.values());
             }
         }
     }

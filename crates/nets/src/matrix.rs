@@ -1,7 +1,7 @@
 //! Matrices in single precision: the border to burn.
 //!
 //! Rows lie one after another. A clone shares the numbers; writing copies them only while they are
-//! shared. Products are burn's, on its CPU backend; those with weights are [`crate::packed`]'s.
+//! shared. Products are burn's, on its CPU backend; those of evaluation are `packed`'s.
 
 use burn_backend::ops::FloatTensorOps;
 use burn_backend::{DType, TensorData};
@@ -89,6 +89,11 @@ impl Matrix {
         product(self.tensor.clone(), other.tensor.clone(), self.rows, other.cols)
     }
 
+    /// `self * other^T`.
+    pub fn dot_t(&self, other: &Self) -> Self {
+        product(self.tensor.clone(), other.tensor.transpose(0, 1), self.rows, other.rows)
+    }
+
     /// `self^T * other`.
     pub fn t_dot(&self, other: &Self) -> Self {
         product(self.tensor.transpose(0, 1), other.tensor.clone(), self.cols, other.cols)
@@ -98,6 +103,15 @@ impl Matrix {
     pub fn t_dot_from(&self, first: usize, other: &Self) -> Self {
         let rest = self.tensor.narrow(0, first, self.rows - first);
         product(rest.transpose(0, 1), other.tensor.clone(), self.cols, other.cols)
+    }
+
+    /// The matrix of these stretches times `other^T`.
+    ///
+    /// # Panics
+    /// When a stretch leaves the matrix.
+    pub fn stretches_dot_t(&self, stretches: Stretches, other: &Self) -> Self {
+        let left = self.stretches(stretches);
+        product(left, other.tensor.transpose(0, 1), stretches.rows, other.rows)
     }
 
     /// `self^T` times the matrix of these stretches of another.
@@ -130,6 +144,9 @@ mod tests {
         let numbers = Matrix::new(2, 4, (0..8).map(|v| v as f32).collect());
         let stretches = Stretches { first: 1, step: 2, rows: 3, cols: 3 };
         let gathered = Matrix::new(3, 3, vec![1.0, 2.0, 3.0, 3.0, 4.0, 5.0, 5.0, 6.0, 7.0]);
+        let other = Matrix::new(2, 3, vec![1.0, 0.0, -1.0, 2.0, 0.5, 1.0]);
+        let found = numbers.stretches_dot_t(stretches, &other);
+        assert_eq!(found.values(), gathered.dot_t(&other).values());
         let left = Matrix::new(3, 2, vec![1.0, 2.0, 0.0, 1.0, 3.0, -1.0]);
         let found = left.t_dot_stretches(&numbers, stretches);
         assert_eq!(found.values(), left.t_dot(&gathered).values());
@@ -139,6 +156,6 @@ mod tests {
     #[should_panic(expected = "stretches to 10 of 8")]
     fn stretches_stay_within_the_numbers() {
         let stretches = Stretches { first: 1, step: 2, rows: 4, cols: 3 };
-        Matrix::zeros(4, 2).t_dot_stretches(&Matrix::zeros(2, 4), stretches);
+        Matrix::zeros(2, 4).stretches_dot_t(stretches, &Matrix::zeros(2, 3));
     }
 }

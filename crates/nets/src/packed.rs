@@ -1,7 +1,7 @@
 //! Weights in the order in which products read them, packed once for all calls.
 //!
 //! A product keeps a block of outputs in registers: a few rows times a panel of two vectors of outputs. Every output
-//! is one sum over its weights in their order, so results depend neither on threads nor on the other rows.
+//! is a sum over its weights in their order, so results depend neither on threads nor on the other rows.
 
 use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
 use rayon::prelude::*;
@@ -14,6 +14,8 @@ const VECTORS: usize = 2;
 const ROWS: usize = 6;
 /// Panels of a block of one row, so that as many sums run side by side.
 const PANELS: usize = 4;
+/// Numbers that are summed before their sum goes to the others, about: rounding grows with the length of a sum.
+const STRETCH: usize = 256;
 /// Rows that a thread multiplies at a time: what they see stays in the cache while the panels pass.
 const TOGETHER: usize = 32 * ROWS;
 
@@ -174,37 +176,104 @@ impl<S: Simd, const R: usize, const P: usize> NullaryFnOnce for Block<'_, S, R, 
             S::as_simd_f32s(panel).0.as_chunks::<VECTORS>().0
         });
         let starts = &runs.starts[row..row + R];
-        let mut sums = [[[simd.splat_f32s(0.0); VECTORS]; P]; R];
+        let mut to = Output { packed, bias, row, panel, out, empty: true };
+        let zeros = [[[simd.splat_f32s(0.0); VECTORS]; P]; R];
+        let (mut sums, mut summed) = (zeros, 0);
         for run in 0..runs.count {
-            let x: [_; R] =
-                std::array::from_fn(|r| &runs.values[starts[r] + run * runs.jump..][..runs.length]);
-            let w: [_; P] =
-                std::array::from_fn(|p| &weights[p][run * runs.length..][..runs.length]);
-            for k in 0..runs.length {
-                let w: [[S::f32s; VECTORS]; P] = std::array::from_fn(|p| w[p][k]);
-                for r in 0..R {
-                    let x = simd.splat_f32s(x[r][k]);
-                    for p in 0..P {
-                        for v in 0..VECTORS {
-                            sums[r][p][v] = simd.mul_add_e_f32s(x, w[p][v], sums[r][p][v]);
-                        }
-                    }
+            for first in (0..runs.length).step_by(STRETCH) {
+                if summed >= STRETCH {
+                    to.add(simd, &sums);
+                    (sums, summed) = (zeros, 0);
+                }
+                let length = STRETCH.min(runs.length - first);
+                let at = run * runs.jump + first;
+                let x: [_; R] = std::array::from_fn(|r| &runs.values[starts[r] + at..][..length]);
+                let at = run * runs.length + first;
+                let w: [_; P] = std::array::from_fn(|p| &weights[p][at..][..length]);
+                sums = multiplied(simd, x, w, sums);
+                summed += length;
+            }
+        }
+        to.add(simd, &sums);
+    }
+}
+
+/// The sums of a block and of some more numbers. They are passed by value to stay in registers.
+#[inline(always)]
+fn multiplied<S: Simd, const R: usize, const P: usize>(
+    simd: S,
+    x: [&[f32]; R],
+    w: [&[[S::f32s; VECTORS]]; P],
+    mut sums: [[[S::f32s; VECTORS]; P]; R],
+) -> [[[S::f32s; VECTORS]; P]; R] {
+    // Slices of one length, so that the loop needs no checks.
+    let length = x.first().map_or(0, |x| x.len());
+    let x: [&[f32]; R] = std::array::from_fn(|r| &x[r][..length]);
+    let w: [&[[S::f32s; VECTORS]]; P] = std::array::from_fn(|p| &w[p][..length]);
+    for k in 0..length {
+        let w: [[S::f32s; VECTORS]; P] = std::array::from_fn(|p| w[p][k]);
+        for r in 0..R {
+            let x = simd.splat_f32s(x[r][k]);
+            for p in 0..P {
+                for v in 0..VECTORS {
+                    sums[r][p][v] = simd.mul_add_e_f32s(x, w[p][v], sums[r][p][v]);
                 }
             }
         }
+    }
+    sums
+}
+
+/// Where the sums of a block go.
+struct Output<'a> {
+    packed: &'a Packed,
+    bias: Option<&'a [f32]>,
+    row: usize,
+    panel: usize,
+    out: &'a mut [f32],
+    /// nothing is there yet
+    empty: bool,
+}
+
+impl Output<'_> {
+    #[inline(always)]
+    fn add<S: Simd, const R: usize, const P: usize>(
+        &mut self,
+        simd: S,
+        sums: &[[[S::f32s; VECTORS]; P]; R],
+    ) {
+        let Packed { outputs, width, .. } = *self.packed;
         for (r, sums) in sums.iter().enumerate() {
             for (p, sums) in sums.iter().enumerate() {
-                let first = (panel + p) * packed.width;
-                let width = packed.width.min(packed.outputs - first);
-                let to = &mut out[(row + r) * packed.outputs + first..][..width];
-                for (to, sum) in to.chunks_mut(S::F32_LANES).zip(sums) {
-                    simd.partial_store_f32s(to, *sum);
+                let first = (self.panel + p) * width;
+                let end = outputs.min(first + width);
+                let row = (self.row + r) * outputs;
+                let to = &mut self.out[row + first..row + end];
+                let bias = self.bias.filter(|_| self.empty).map(|bias| &bias[first..end]);
+                if to.len() == width {
+                    let to = S::as_mut_simd_f32s(to).0;
+                    let bias = bias.map(|bias| S::as_simd_f32s(bias).0);
+                    for (v, (to, sum)) in to.iter_mut().zip(sums).enumerate() {
+                        *to = match bias {
+                            Some(bias) => simd.add_f32s(bias[v], *sum),
+                            None if self.empty => *sum,
+                            None => simd.add_f32s(*to, *sum),
+                        };
+                    }
+                    continue;
                 }
-                if let Some(bias) = bias {
-                    to.iter_mut().zip(&bias[first..]).for_each(|(to, b)| *to += b);
+                for (v, (to, sum)) in to.chunks_mut(S::F32_LANES).zip(sums).enumerate() {
+                    let first = v * S::F32_LANES;
+                    let before = match bias {
+                        Some(bias) => simd.partial_load_f32s(&bias[first..first + to.len()]),
+                        None if self.empty => simd.splat_f32s(0.0),
+                        None => simd.partial_load_f32s(to),
+                    };
+                    simd.partial_store_f32s(to, simd.add_f32s(before, *sum));
                 }
             }
         }
+        self.empty = false;
     }
 }
 

@@ -6,7 +6,6 @@ use crate::error::{NetError, Result};
 use crate::kernels;
 use crate::layer::{Backward, Layer, Pass, Saved};
 use crate::matrix::Matrix;
-use crate::packed::Packed;
 use crate::parameters::Declared;
 
 /// `y = x W^T + b` at every place.
@@ -46,9 +45,8 @@ impl Layer for Linear {
     }
 
     fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch {
-        let weight = pass.parameters.packed(&format!("{}.weight", self.name), Packed::new);
-        let bias = pass.parameters.get(&format!("{}.bias", self.name));
-        let values = weight.product(input.values.values(), Some(bias.values()));
+        let [weight, bias] = ["weight", "bias"].map(|what| format!("{}.{what}", self.name));
+        let values = pass.product(&input.values, &weight, &bias);
         let shape = input.shape.with_numbers(self.outputs);
         let lengths = input.lengths.clone();
         pass.save(|| Saved::Batch(input));

@@ -95,6 +95,33 @@ fn a_residual_network_has_right_gradients() {
 }
 
 #[test]
+fn evaluation_and_training_see_the_same_pixels() {
+    // Larger than a piece of work, smaller, and kernels that are as wide as the image.
+    for (height, width, items) in [(30, 41, 2), (5, 7, 9)] {
+        let image = Shape::Image { height, width, channels: 3 };
+        let convolutions = [
+            Conv2d::same3("c", 3, 5),
+            Conv2d::new("c", 3, 17, (2, 3)).stride(3).padding(2),
+            Conv2d::new("c", 3, 4, (5, 5)).stride(2).padding(3).unbiased(),
+            Conv2d::new("c", 3, 4, (1, 1)),
+            Conv2d::new("c", 3, 4, (3, 1)).stride(2),
+            Conv2d::new("c", 3, 6, (2, width)).stride(2),
+        ];
+        for convolution in convolutions {
+            let name = format!("{convolution:?}");
+            let layers: Chain = vec![Box::new(convolution), Box::new(AveragePool)];
+            let network = network(image, layers);
+            let x = [Batch::new(noise(6, items * image.len()), image)];
+            let targets = Targets::Classes(vec![0; items]);
+            let trained = network.gradients(&x, &targets, &Loss::CrossEntropy, &[], None).unwrap();
+            let evaluated = network.forward(&x).unwrap();
+            let pairs = evaluated.values.values().iter().zip(trained.outputs.values.values());
+            assert!(pairs.clone().all(|(a, b)| (a - b).abs() < 1e-5), "{name}");
+        }
+    }
+}
+
+#[test]
 fn pixels_are_flattened_in_their_order_and_back() {
     let image = Shape::Image { height: 2, width: 3, channels: 2 };
     let mut network = network(

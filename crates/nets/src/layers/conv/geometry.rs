@@ -60,6 +60,14 @@ impl Seen<'_> {
         }
     }
 
+    /// Times `weight^T`.
+    pub(super) fn dot_t(&self, weight: &Matrix) -> Matrix {
+        match self {
+            Self::Gathered(matrix) => matrix.dot_t(weight),
+            Self::There(images, stretches) => images.stretches_dot_t(*stretches, weight),
+        }
+    }
+
     /// `gradient^T` times this.
     pub(super) fn t_dot(&self, gradient: &Matrix) -> Matrix {
         match self {

@@ -104,6 +104,58 @@ impl Conv2d {
         }
         Matrix::new(weight.rows(), weight.cols(), self.rearranged(weight.values(), true))
     }
+
+    /// By packed weights; nothing is gathered.
+    fn packed_product(
+        &self,
+        g: Geometry,
+        input: &Batch,
+        bias: Option<&[f32]>,
+        pass: &Pass<'_>,
+    ) -> Matrix {
+        let pack = |weight: &Matrix| Packed::new(&self.matrix(weight));
+        let weight = pass.parameters.packed(&self.key("weight"), pack);
+        let (row, lines) = (g.out_width * self.outputs, g.lines_together());
+        let mut out = Matrix::zeros(input.items() * g.out_places(), self.outputs);
+        let pieces = out.values_mut().par_chunks_mut(lines * row).enumerate();
+        pieces.for_each_init(Work::default, |work, (piece, out)| {
+            let first = piece * lines;
+            let lines = first..first + out.len() / row;
+            weight.multiply(g.runs_of(input.values.values(), lines, work), bias, out);
+        });
+        out
+    }
+
+    /// By burn's product of gathered rows; see [`Pass::product`].
+    fn gathered_product(
+        &self,
+        g: Geometry,
+        input: &Batch,
+        bias: Option<&[f32]>,
+        pass: &Pass<'_>,
+    ) -> Matrix {
+        let weight = self.matrix(pass.parameters.get(&self.key("weight")));
+        let (places, n) = (g.out_places(), self.outputs);
+        let mut out = Matrix::zeros(input.items() * places, n);
+        let group = g.group();
+        out.values_mut().par_chunks_mut(group * places * n).enumerate().for_each_init(
+            Vec::new,
+            |buffer, (number, out)| {
+                let mut left = out;
+                for tile in g.tiles(number * group, left.len() / (places * n)) {
+                    let seen = g.seen(&input.values, tile, buffer);
+                    let (to, rest) = left.split_at_mut(seen.rows() * n);
+                    to.copy_from_slice(seen.dot_t(&weight).values());
+                    if let Some(bias) = bias {
+                        kernels::add_to_rows(to, bias);
+                    }
+                    left = rest;
+                    seen.give_back(buffer);
+                }
+            },
+        );
+        out
+    }
 }
 
 impl Layer for Conv2d {
@@ -149,17 +201,11 @@ impl Layer for Conv2d {
 
     fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch {
         let Some(g) = self.geometry(input.shape) else { unreachable!("shapes were checked") };
-        let pack = |weight: &Matrix| Packed::new(&self.matrix(weight));
-        let weight = pass.parameters.packed(&self.key("weight"), pack);
         let bias = self.bias.then(|| pass.parameters.get(&self.key("bias")).values());
-        let (row, lines) = (g.out_width * self.outputs, g.lines_together());
-        let mut out = Matrix::zeros(input.items() * g.out_places(), self.outputs);
-        let pieces = out.values_mut().par_chunks_mut(lines * row).enumerate();
-        pieces.for_each_init(Work::default, |work, (piece, out)| {
-            let first = piece * lines;
-            let lines = first..first + out.len() / row;
-            weight.multiply(g.runs_of(input.values.values(), lines, work), bias, out);
-        });
+        let out = match pass.training {
+            None => self.packed_product(g, &input, bias, pass),
+            Some(_) => self.gathered_product(g, &input, bias, pass),
+        };
         let shape =
             Shape::Image { height: g.out_height, width: g.out_width, channels: self.outputs };
         pass.save(|| Saved::Batch(input));

@@ -18,7 +18,7 @@ use crate::layers::dropout;
 use crate::layers::linear::column;
 use crate::matrix::Matrix;
 use crate::packed::Packed;
-use crate::parameters::{Declared, Parameters};
+use crate::parameters::Declared;
 use cell::{Cell, Gradients, States};
 use packing::Packing;
 use trace::LayerTrace;
@@ -63,21 +63,24 @@ impl Recurrent {
         layer: usize,
         input: &Matrix,
         packing: &Packing,
-        parameters: &Parameters,
+        pass: &Pass<'_>,
     ) -> States {
-        let get = |what| parameters.get(&self.key(what, layer));
-        let packed = |what| parameters.packed(&self.key(what, layer), Packed::new);
-        let gates = packed("weight_ih").product(input.values(), Some(get("bias_ih").values()));
+        let key = |what| self.key(what, layer);
+        let gates = pass.product(input, &key("weight_ih"), &key("bias_ih"));
         let mut states = States::new(self.cell, gates, self.hidden);
-        let recurrent = packed("weight_hh");
+        let (weight, bias) = (key("weight_hh"), pass.parameters.get(&key("bias_hh")).values());
         for step in 0..packing.steps() {
             let products = (step > 0).then(|| {
                 let (before, n) = (packing.rows(step - 1).start, packing.rows(step).len());
-                let rows = before * self.hidden..(before + n) * self.hidden;
-                recurrent.product(&states.hidden.values()[rows], None)
+                let rows = &states.hidden.values()[before * self.hidden..][..n * self.hidden];
+                match pass.training {
+                    None => pass.parameters.packed(&weight, Packed::new).product(rows, None),
+                    Some(_) => Matrix::new(n, self.hidden, rows.to_vec())
+                        .dot_t(pass.parameters.get(&weight)),
+                }
             });
             let before = step.checked_sub(1).map(|s| packing.rows(s).start);
-            states.step(packing.rows(step), before, products.as_ref(), get("bias_hh").values());
+            states.step(packing.rows(step), before, products.as_ref(), bias);
         }
         states
     }
@@ -191,7 +194,7 @@ impl Layer for Recurrent {
                     dropout::apply(values.values_mut(), &kept, self.dropout);
                 }
             }
-            let states = self.forward_layer(layer, &values, &packing, pass.parameters);
+            let states = self.forward_layer(layer, &values, &packing, pass);
             let output = states.hidden.clone();
             if pass.training.is_some() {
                 layers.push(LayerTrace { input: values, states, kept });
