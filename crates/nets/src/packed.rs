@@ -212,12 +212,10 @@ fn multiplied<S: Simd, const R: usize, const P: usize>(
     let w: [&[[S::f32s; VECTORS]]; P] = std::array::from_fn(|p| &w[p][..length]);
     for k in 0..length {
         let w: [[S::f32s; VECTORS]; P] = std::array::from_fn(|p| w[p][k]);
-        for r in 0..R {
-            let x = simd.splat_f32s(x[r][k]);
-            for p in 0..P {
-                for v in 0..VECTORS {
-                    sums[r][p][v] = simd.mul_add_e_f32s(x, w[p][v], sums[r][p][v]);
-                }
+        for (x, sums) in x.iter().zip(&mut sums) {
+            let x = simd.splat_f32s(x[k]);
+            for (w, sum) in w.as_flattened().iter().zip(sums.as_flattened_mut()) {
+                *sum = simd.mul_add_e_f32s(x, *w, *sum);
             }
         }
     }
