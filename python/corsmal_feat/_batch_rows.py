@@ -31,7 +31,8 @@ def rows_of(batch: Any) -> list[Any]:
     for name in names:
         if name.lower() in (ID, START, END) and name not in (ID, START, END):
             raise ParameterError(
-                f"the column {name!r} must be called {name.lower()!r}; a label must be called otherwise"
+                f"the column {name!r} must be called {name.lower()!r}; "
+                "a label must be called otherwise"
             )
     if PATH not in names and BYTES not in names:
         raise ParameterError(f"batch needs a column path or bytes, but has only {', '.join(names)}")
