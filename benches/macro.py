@@ -276,6 +276,28 @@ def measure_scaling(bench: Bench) -> None:
     bench.keep("scaling", {title: [runs[title, 1], runs[title, 2]] for title in cases})
 
 
+def measure_benchmark(bench: Bench) -> None:
+    """All baselines on 1,140 recordings: features and learning, and learning alone."""
+    data, out = bench.work / "ccm", bench.work / "report"
+    if not data.exists():
+        subprocess.run([bench.binary, "synth", "--full", "--quiet", "--out", str(data)], check=True)
+
+    def command(jobs: int, kept: bool) -> list[str]:
+        if not kept:
+            shutil.rmtree(out, ignore_errors=True)
+        folders = ["--data", str(data), "--out", str(out)]
+        return [bench.binary, "benchmark", "--quiet", "--jobs", str(jobs), *folders]
+
+    cases = {"from recordings": False, "from kept features": True}
+    commands = {
+        (title, jobs): lambda j=jobs, k=kept: command(j, k)
+        for jobs in (1, 2)
+        for title, kept in cases.items()
+    }
+    runs = bench.median(commands)
+    bench.keep("benchmark", {title: [runs[title, 1], runs[title, 2]] for title in cases})
+
+
 def measure_channels(bench: Bench) -> None:
     """The same samples as recordings of 1, 2 and 8 channels."""
     folders = {channels: bench.work / f"channels{channels}" for channels in (1, 2, 8)}
@@ -354,6 +376,7 @@ PARTS: dict[str, Callable[[Bench], None]] = {
     "peers": measure_peers,
     "presets": measure_presets,
     "scaling": measure_scaling,
+    "benchmark": measure_benchmark,
     "channels": measure_channels,
     "nfft": measure_nfft,
     "instructions": measure_instructions,

@@ -92,6 +92,14 @@ def scaling(rows: dict[str, Any]) -> list[str]:
     return table(["", "1 job", "2 jobs", "ratio"], cells)
 
 
+def benchmark(rows: dict[str, Any]) -> list[str]:
+    cells = [
+        [title, spread(one), spread(two), f"{median(two, 'cpu'):.1f}", f"{median(two, 'mib'):,.0f}"]
+        for title, (one, two) in rows.items()
+    ]
+    return table(["", "1 job", "2 jobs", "CPU s", "peak MiB"], cells)
+
+
 def channels(rows: dict[str, Any]) -> list[str]:
     cells = []
     for title, runs in rows["runs"].items():
@@ -137,6 +145,7 @@ SECTIONS: dict[str, Callable[[Any], list[str]]] = {
     "peers": peers,
     "presets": presets,
     "scaling": scaling,
+    "benchmark": benchmark,
     "channels": channels,
     "nfft": nfft,
     "startup": startup,

@@ -1,7 +1,9 @@
 //! Principal components (scikit-learn 1.9 `PCA(svd_solver="full")`).
 
 use linfa_linalg::eigh::{EigSort, EighInto};
-use ndarray::{Array1, Array2, ArrayView2, Axis, s};
+use ndarray::linalg::general_mat_mul;
+use ndarray::{Array1, Array2, ArrayView2, ArrayViewMut2, Axis, s};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{DspError, Result};
@@ -104,7 +106,7 @@ impl Eigen {
         let mean = x.sum_axis(Axis(0)) / rows as f64;
         let centred = &x - &mean;
         let tall = rows > columns;
-        let gram = if tall { centred.t().dot(&centred) } else { centred.dot(&centred.t()) };
+        let gram = if tall { gram(centred.t()) } else { gram(centred.view()) };
         require_finite("X, squared", &gram)?;
         let (values, vectors) = gram
             .eigh_into()
@@ -150,6 +152,29 @@ impl Eigen {
         }
         Ok(Pca { mean, components, explained_variance })
     }
+}
+
+/// `x xᵀ`. Only a half of it is computed, by all threads; its bits are those of the whole product, whose sums
+/// run in the same order.
+fn gram(x: ArrayView2<f64>) -> Array2<f64> {
+    /// Rows of the product that are computed together.
+    const ROWS: usize = 128;
+    let n = x.nrows();
+    let mut product = vec![0.0; n * n];
+    product.par_chunks_mut((ROWS * n).max(1)).enumerate().for_each(|(block, values)| {
+        let rows = values.len() / n;
+        let end = block * ROWS + rows;
+        let mut values = ArrayViewMut2::from_shape((rows, n), values).expect("whole rows");
+        let (own, all) = (x.slice(s![end - rows..end, ..]), x.slice(s![..end, ..]));
+        general_mat_mul(1.0, &own, &all.t(), 0.0, &mut values.slice_mut(s![.., ..end]));
+    });
+    let mut product = Array2::from_shape_vec((n, n), product).expect("a square");
+    for row in 0..n {
+        for column in row + 1..n {
+            product[[row, column]] = product[[column, row]];
+        }
+    }
+    product
 }
 
 /// `direction` made orthogonal to the first `k` components and of unit length; `None` if nothing is
@@ -205,6 +230,15 @@ mod tests {
             }
             let white = pca.project(x.view(), true).unwrap();
             assert!((white.column(0).mapv(|v| v * v).sum() / (rows - 1) as f64 - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn half_a_product_has_the_bits_of_the_whole() {
+        for (rows, columns) in [(2, 3), (127, 40), (300, 1000), (1000, 7)] {
+            let x = sample(rows, columns);
+            assert_eq!(gram(x.view()), x.dot(&x.t()), "{rows} x {columns}");
+            assert_eq!(gram(x.t()), x.t().dot(&x), "{columns} x {rows}");
         }
     }
 

@@ -268,16 +268,7 @@ fn run_fold(data: &Data<'_>, fold: &Fold, specs: &[PipelineSpec]) -> Result<Vec<
         match ready {
             Ok((prepared, test)) => outcomes.par_extend(members.into_par_iter().map(|i| {
                 let classifier = &specs[i].classifier;
-                (
-                    i,
-                    run_classifier(
-                        data,
-                        fold,
-                        classifier,
-                        (prepared.rows(), &train.targets),
-                        &test,
-                    ),
-                )
+                (i, run_classifier(data, fold, classifier, (&prepared, &train.targets), &test))
             })),
             Err(error) => outcomes.push((members[0], Err(error))),
         }
@@ -290,10 +281,10 @@ fn run_classifier(
     data: &Data<'_>,
     fold: &Fold,
     classifier: &ClassifierSpec,
-    (x, classes): (ArrayView2<'_, f64>, &Classes),
+    (prepared, classes): (&Prepared<'_>, &Classes),
     test: &CowArray<'_, f64, Ix2>,
 ) -> Result<FoldOutcome> {
-    let fitted = classifier.train(x, &classes.indices().to_vec(), classes.n_classes())?;
+    let fitted = prepared.train(classifier, &classes.indices().to_vec(), classes.n_classes())?;
     let predicted: Result<Predicted> = Predict::predict(&fitted, test);
     let Predicted { classes, proba } = predicted?;
     let (predicted, proba) = match (data.merge, proba) {
@@ -324,15 +315,16 @@ pub fn nested_cross_validate(
     data: &Data<'_>,
     folds: &[Fold],
     candidates: &[PipelineSpec],
-    inner: impl Fn(&[usize]) -> Result<Vec<Fold>>,
+    inner: impl Fn(&[usize]) -> Result<Vec<Fold>> + Sync,
 ) -> Result<CrossValidation> {
     data.check(folds)?;
-    let mut outcomes = Vec::with_capacity(folds.len());
-    for fold in folds {
+    let run = |fold: &Fold| {
         let (chosen, scores) = choose(data, &fold.train, candidates, &inner)?;
         let outcome = run_fold(data, fold, std::slice::from_ref(&candidates[chosen]))?.remove(0);
-        outcomes.push(FoldOutcome { chosen, inner: scores, ..outcome });
-    }
+        Ok(FoldOutcome { chosen, inner: scores, ..outcome })
+    };
+    let outcomes: Vec<Result<FoldOutcome>> = folds.par_iter().map(run).collect();
+    let outcomes = outcomes.into_iter().collect::<Result<_>>()?;
     CrossValidation::of(outcomes, |rows| data.scored(rows), data.scored_classes())
 }
 

@@ -61,7 +61,7 @@ impl PipelineSpec {
             check_labels(x.nrows(), y, n_classes)?;
         }
         let prepared = Prepared::fit(&self.steps, x)?;
-        let classifier = self.classifier.train_weighted(prepared.rows(), y, n_classes, weights)?;
+        let classifier = prepared.train_weighted(&self.classifier, y, n_classes, weights)?;
         Ok(Pipeline { steps: prepared.into_steps(), classifier })
     }
 }

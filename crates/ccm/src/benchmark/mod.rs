@@ -150,7 +150,10 @@ pub fn run(
         options.capacities.iter().filter_map(CapacityTable::caution).collect();
     cautions.iter().for_each(|caution| progress(caution));
     files::prepare(&options.out)?;
-    let outcomes = baselines(options, (&set, &rows), progress, stop)?;
+    let jobs = options.jobs;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build();
+    let pool = pool.map_err(|e| CcmError::Request(format!("{jobs} threads: {e}")))?;
+    let outcomes = baselines(options, (&set, &rows), &pool, (progress, stop))?;
     let mut runs = Vec::new();
     if !options.systems.is_empty() {
         let (folder, how) = (options.out.join("features"), (options.jobs, options.seed));
@@ -173,9 +176,11 @@ pub fn run(
         cautions: &cautions,
     };
     files::write_completed(&options.out, &rows, &predicted, options.seed)?;
-    let report = report::report(&set, &rows, &predicted, options.seed, made)?;
-    let figures = options.out.join("figures");
-    report::write_figures(&figures, &rows, &predicted, options.seed)?;
+    let (figures, seed) = (options.out.join("figures"), options.seed);
+    let report = pool.install(|| {
+        report::write_figures(&figures, &rows, &predicted, seed)?;
+        report::report(&set, &rows, &predicted, seed, made)
+    })?;
     report.write(&options.out)?;
     Ok(report)
 }
@@ -184,8 +189,8 @@ pub fn run(
 fn baselines(
     options: &BenchmarkOptions,
     (set, rows): (&DataSet, &Rows),
-    progress: &(dyn Fn(&str) + Sync),
-    stop: &Arc<AtomicBool>,
+    pool: &rayon::ThreadPool,
+    (progress, stop): (&(dyn Fn(&str) + Sync), &Arc<AtomicBool>),
 ) -> Result<Vec<BaselineResult>> {
     let BenchmarkOptions { out, baselines, jobs, seed, .. } = options;
     let (jobs, seed) = (*jobs, *seed);
@@ -220,8 +225,6 @@ fn baselines(
             Unit::all(&of(*set)).into_iter().map(|u| (setting(matrices), u))
         })
         .collect();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build();
-    let pool = pool.map_err(|e| CcmError::Request(format!("{jobs} threads: {e}")))?;
     let made: Vec<Result<Vec<BaselineResult>>> =
         pool.install(|| units.par_iter().map(|(setting, unit)| unit.run(setting)).collect());
     let made = made.into_iter().collect::<Result<Vec<_>>>()?;

@@ -133,10 +133,10 @@ impl Unit {
             reduced.into_iter().collect::<ModelResult<_>>().map_err(fault)?;
         let (x, tests) = (&reduced[0], &reduced[1..]);
         let y: Vec<usize> = fold.train.iter().map(|&row| joint[row]).collect();
-        let trained = x.select(Axis(0), &fold.train);
+        let trained = x.select(Axis(0), &fold.train).into_shared();
         self.each(setting, |_, baseline| {
             let spec = PipelineSpec::plain(baseline.learner.spec(seed));
-            let classifier = spec.classifier.train(trained.view(), &y, Filling::COUNT)?;
+            let classifier = spec.classifier.train_shared(&trained, &y, Filling::COUNT)?;
             let seen = estimates(&classifier, x.view())?;
             let tests = tests.iter().map(|x| estimates(&classifier, x.view()));
             let outcome = BaselineResult {
@@ -169,8 +169,11 @@ impl Unit {
         let classes = Classes::new(joint.clone(), Filling::COUNT).map_err(fault)?;
         let dataset = DatasetBase::new(matrices.training.view(), classes);
         let data = Data { dataset: &dataset, merge: None };
-        let validated = cross_validate_each(&data, &folds, &specs).map_err(fault)?;
-        let prepared = Prepared::fit(&steps, matrices.training.view()).map_err(fault)?;
+        let (validated, prepared) = rayon::join(
+            || cross_validate_each(&data, &folds, &specs),
+            || Prepared::fit(&steps, matrices.training.view()),
+        );
+        let (validated, prepared) = (validated.map_err(fault)?, prepared.map_err(fault)?);
         let tests = matrices.tests.iter().map(|x| through(prepared.steps(), x.view()));
         let tests = tests.collect::<ModelResult<Vec<_>>>().map_err(fault)?;
         self.each(setting, |i, baseline| {
@@ -183,7 +186,7 @@ impl Unit {
             }
             held_out.sort_by_key(|(row, _)| *row);
             let spec = specs[i].clone();
-            let classifier = spec.classifier.train(prepared.rows(), &joint, Filling::COUNT)?;
+            let classifier = prepared.train(&spec.classifier, &joint, Filling::COUNT)?;
             let tests = tests.iter().map(|x| estimates(&classifier, x.view()));
             let outcome = BaselineResult {
                 baseline: *baseline,

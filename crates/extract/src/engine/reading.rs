@@ -24,8 +24,10 @@ pub(super) const BLOCK: usize = 1 << 16;
 const END_BEYOND: &str = "end_beyond_recording";
 /// The span of a signal that is not cut.
 pub const WHOLE: Range<u64> = 0..u64::MAX;
-/// Frames of a span; recordings of more than two are cut.
-const SPAN: u64 = 1 << 20;
+/// Frames of a recording that is not cut.
+const UNCUT: u64 = 1 << 21;
+/// Frames of a span of one that is: few enough that threads end together.
+const SPAN: u64 = 1 << 19;
 
 /// Opens an input, all of it or a part. A stream on standard input and what comes from a store fail once
 /// `stop` is set, also while nothing comes.
@@ -87,7 +89,7 @@ pub fn spans(source: &dyn BlockSource, planned: &Planned, crop: &Range<u64>) -> 
         return vec![WHOLE];
     };
     let frames = most.min(crop.end).saturating_sub(crop.start);
-    if frames <= 2 * SPAN {
+    if frames <= UNCUT {
         return vec![WHOLE];
     }
     let mut spans: Vec<Range<u64>> = (0..frames / SPAN).map(|i| i * SPAN..(i + 1) * SPAN).collect();

@@ -9,7 +9,7 @@ use corsmal_files::outcome::Status;
 use super::extractor::Span;
 use super::failed::{Failed, FinishError};
 use super::plan::{Plan, PlannedFeature};
-use super::store::Store;
+use super::store::{Finish, Store};
 use crate::features::{Derived, FrameShape, TooFewFrames};
 use crate::summary::{Accumulator, Stat};
 
@@ -150,10 +150,10 @@ impl Recording {
                     self.in_time(values, name, planned, derived.as_ref())?
                 }
                 (None, Some(derived)) => {
-                    let mut finished = self.finished(store, planned, &self.peaks[i])?;
+                    let mut finished = self.finished(store, i);
                     self.in_time(&mut finished, &planned.name, planned, derived.as_ref())?
                 }
-                (_, None) => self.finished(store, planned, &self.peaks[i])?,
+                (_, None) => self.finished(store, i),
             };
             let coefficients = planned.labels.len();
             let per_frame = coefficients * self.plan.channels * if planned.complex { 2 } else { 1 };
@@ -178,18 +178,16 @@ impl Recording {
                         if planned.is_vector() { &[Stat::Mean][..] } else { &summary.stats };
                     let mut statistics = Accumulator::new(stats, width);
                     let mut means = Vec::new();
-                    array.values.batches(1, |chunks| {
-                        for chunk in chunks {
-                            if average {
-                                means.clear();
-                                means.extend(chunk.chunks_exact(channels).map(|values| {
-                                    let sum: f64 = values.iter().map(|x| f64::from(*x)).sum();
-                                    (sum / channels as f64) as f32
-                                }));
-                                statistics.push(&means);
-                            } else {
-                                statistics.push(chunk);
-                            }
+                    array.values.chunks(|chunk| {
+                        if average {
+                            means.clear();
+                            means.extend(chunk.chunks_exact(channels).map(|values| {
+                                let sum: f64 = values.iter().map(|x| f64::from(*x)).sum();
+                                (sum / channels as f64) as f32
+                            }));
+                            statistics.push(&means);
+                        } else {
+                            statistics.push(chunk);
                         }
                         io::Result::Ok(())
                     })?;
@@ -206,13 +204,9 @@ impl Recording {
         }
     }
 
-    /// Finished and kept coefficients of a feature.
-    fn finished(
-        &self,
-        store: Store,
-        planned: &PlannedFeature,
-        peaks: &[f32],
-    ) -> Result<Store, FinishError> {
+    /// Finished and kept coefficients of the feature with this index.
+    fn finished(&self, store: Store, index: usize) -> Store {
+        let planned = &self.plan.features[index];
         let channels = self.plan.channels;
         let rows = planned.raw_rows;
         let values_per = if planned.complex { 2 * channels } else { channels };
@@ -220,21 +214,23 @@ impl Recording {
         // What is derived needs all coefficients.
         let [first, end] = if planned.derived.is_some() { [0, all] } else { planned.kept };
         if planned.finish.is_none() && end - first == all {
-            return Ok(store);
+            return store;
         }
         // In the memory of the stored values, which are never fewer than the finished ones.
         let (stored, kept) = (rows * channels, (end - first) * values_per);
-        let finish_chunk = |mut values: Vec<f32>| {
+        let (plan, peaks) = (self.plan.clone(), self.peaks[index].clone());
+        let finish_chunk = move |mut values: Vec<f32>| {
+            let finish = &plan.features[index].finish;
             let frames = values.len() / stored;
             let mut raw = vec![0.0; stored];
             let mut finished = vec![0.0; all * values_per];
             for t in 0..frames {
                 raw.copy_from_slice(&values[t * stored..(t + 1) * stored]);
                 let out = &mut values[t * kept..(t + 1) * kept];
-                match &planned.finish {
-                    Some(finish) if end - first == all => finish.frame(&raw, peaks, channels, out),
+                match finish {
+                    Some(finish) if end - first == all => finish.frame(&raw, &peaks, channels, out),
                     Some(finish) => {
-                        finish.frame(&raw, peaks, channels, &mut finished);
+                        finish.frame(&raw, &peaks, channels, &mut finished);
                         out.copy_from_slice(&finished[first * values_per..end * values_per]);
                     }
                     None => out.copy_from_slice(&raw[first * values_per..end * values_per]),
@@ -247,7 +243,7 @@ impl Recording {
             }
             values
         };
-        Ok(store.map(finish_chunk)?)
+        store.finish(Finish { per_frame: (stored, kept), of: Box::new(finish_chunk) })
     }
 
     /// The kept coefficients of what is computed of finished frames in their order of time; `of`
@@ -275,12 +271,10 @@ impl Recording {
             }
             out.push(values)
         };
-        finished.batches(1, |chunks| {
-            chunks.iter().try_for_each(|chunk| {
-                let mut values = Vec::new();
-                state.push(chunk, &mut values);
-                keep(values)
-            })
+        finished.chunks(|chunk| {
+            let mut values = Vec::new();
+            state.push(chunk, &mut values);
+            keep(values)
         })?;
         let mut rest = Vec::new();
         state.finish(&mut rest).map_err(|TooFewFrames { frames, needed }| {

@@ -103,9 +103,7 @@ impl Member {
                     writer.array(&self.name, &self.header, bytemuck::cast_slice(values))?
                 }
                 None => writer.array_with(&self.name, &self.header, |out| {
-                    store.batches(1, |chunks| {
-                        chunks.iter().try_for_each(|c| out.write_all(bytemuck::cast_slice(c)))
-                    })
+                    store.chunks(|chunk| out.write_all(bytemuck::cast_slice(chunk)))
                 })?,
             },
         })

@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::{ArcArray2, Array2, ArrayView2};
 
 use crate::error::{ModelError, Result};
 use crate::params::Parameters;
@@ -20,6 +20,19 @@ pub trait Train: Parameters + Clone {
     /// # Errors
     /// Parameters that do not fit the rows, or numbers that cannot be computed with.
     fn train(&self, x: ArrayView2<'_, f64>, y: &[usize], n_classes: usize) -> Result<Self::Fitted>;
+
+    /// The same of rows that a method may keep as they are, without a copy.
+    ///
+    /// # Errors
+    /// As [`Train::train`].
+    fn train_shared(
+        &self,
+        x: &ArcArray2<f64>,
+        y: &[usize],
+        n_classes: usize,
+    ) -> Result<Self::Fitted> {
+        self.train(x.view(), y, n_classes)
+    }
 
     /// The same where rows count more or less: `weights` has a positive number for each.
     ///

@@ -2,7 +2,7 @@
 
 use linfa::DatasetBase;
 use linfa::traits::Fit;
-use ndarray::{Array1, ArrayBase, ArrayView2, Axis, Data, Ix2};
+use ndarray::{ArcArray2, Array1, ArrayBase, ArrayView2, Axis, Data, Ix2};
 use serde::de::{DeserializeOwned, Error as _};
 use serde::ser::SerializeStruct;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -102,7 +102,7 @@ macro_rules! built_in {
 
             fn fit_present(
                 &self,
-                x: ArrayView2<'_, f64>,
+                (x, shared): (ArrayView2<'_, f64>, Option<&ArcArray2<f64>>),
                 y: &[usize],
                 n: usize,
                 weights: Option<&[f64]>,
@@ -120,9 +120,10 @@ macro_rules! built_in {
                     });
                 }
                 match self {
-                    $(Self::$variant(p) => match weights {
-                        None => p.train(x, y, n),
-                        Some(weights) => p.train_weighted(x, y, n, weights),
+                    $(Self::$variant(p) => match (weights, shared) {
+                        (None, None) => p.train(x, y, n),
+                        (None, Some(shared)) => p.train_shared(shared, y, n),
+                        (Some(weights), _) => p.train_weighted(x, y, n, weights),
                     }.map($fitted),)*
                     Self::Registered(spec) => spec.train(x, y, n, weights).map(Fitted::Registered),
                 }
@@ -234,6 +235,29 @@ impl ClassifierSpec {
                 return self.train_weighted(x.view(), &y, n_classes, Some(&weights));
             }
         }
+        self.train_rows((x, None), y, n_classes, weights)
+    }
+
+    /// As [`ClassifierSpec::train`], of rows that the classifier may keep without a copy.
+    ///
+    /// # Errors
+    /// As [`ClassifierSpec::train`].
+    pub fn train_shared(
+        &self,
+        x: &ArcArray2<f64>,
+        y: &[usize],
+        n_classes: usize,
+    ) -> Result<Classifier> {
+        self.train_rows((x.view(), Some(x)), y, n_classes, None)
+    }
+
+    fn train_rows(
+        &self,
+        (x, shared): (ArrayView2<'_, f64>, Option<&ArcArray2<f64>>),
+        y: &[usize],
+        n_classes: usize,
+        weights: Option<&[f64]>,
+    ) -> Result<Classifier> {
         check_features(x)?;
         check_labels(x.nrows(), y, n_classes)?;
         check_varied(x)?;
@@ -243,7 +267,7 @@ impl ClassifierSpec {
         present.iter().enumerate().for_each(|(i, &c)| position[c] = i);
         let compact: Vec<usize> = y.iter().map(|&c| position[c]).collect();
         let spec = self.for_classes(&present, n_classes)?;
-        let fitted = spec.fit_present(x, &compact, present.len(), weights)?;
+        let fitted = spec.fit_present((x, shared), &compact, present.len(), weights)?;
         Ok(Classifier { present, n_classes, fitted })
     }
 

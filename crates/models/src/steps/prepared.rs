@@ -1,8 +1,9 @@
 //! Training rows behind steps that were fitted on them.
 
-use ndarray::{ArrayView2, CowArray, Ix2};
+use ndarray::{ArcArray2, Array2, ArrayView2, CowArray, Ix2};
 
 use super::{Step, StepSpec};
+use crate::classifiers::{Classifier, ClassifierSpec};
 use crate::error::Result;
 
 /// Rows `[rows, features]` through all `steps` in order.
@@ -21,7 +22,14 @@ pub fn through<'a>(steps: &[Step], x: ArrayView2<'a, f64>) -> Result<CowArray<'a
 #[derive(Clone, Debug)]
 pub struct Prepared<'a> {
     steps: Vec<Step>,
-    rows: CowArray<'a, f64, Ix2>,
+    rows: Rows<'a>,
+}
+
+#[derive(Clone, Debug)]
+enum Rows<'a> {
+    Given(ArrayView2<'a, f64>),
+    /// Classifiers share what steps have made.
+    Made(ArcArray2<f64>),
 }
 
 impl<'a> Prepared<'a> {
@@ -31,12 +39,15 @@ impl<'a> Prepared<'a> {
     /// Whatever a step refuses.
     pub fn fit(specs: &[StepSpec], x: ArrayView2<'a, f64>) -> Result<Self> {
         let mut steps = Vec::with_capacity(specs.len());
-        let mut rows = CowArray::from(x);
+        let mut made: Option<Array2<f64>> = None;
         for spec in specs {
-            let step = spec.fit(rows.view())?;
-            rows = step.transform(rows.view())?.into();
+            let rows = made.as_ref().map_or(x.view(), |made| made.view());
+            let step = spec.fit(rows)?;
+            let next = step.transform(rows)?;
             steps.push(step);
+            made = Some(next);
         }
+        let rows = made.map_or(Rows::Given(x), |made| Rows::Made(made.into_shared()));
         Ok(Self { steps, rows })
     }
 
@@ -45,9 +56,41 @@ impl<'a> Prepared<'a> {
         &self.steps
     }
 
-    /// The training rows behind them.
-    pub fn rows(&self) -> ArrayView2<'_, f64> {
-        self.rows.view()
+    /// A classifier of the training rows behind the steps.
+    ///
+    /// # Errors
+    /// As [`ClassifierSpec::train`].
+    pub fn train(
+        &self,
+        classifier: &ClassifierSpec,
+        y: &[usize],
+        n_classes: usize,
+    ) -> Result<Classifier> {
+        match &self.rows {
+            Rows::Given(rows) => classifier.train(*rows, y, n_classes),
+            Rows::Made(rows) => classifier.train_shared(rows, y, n_classes),
+        }
+    }
+
+    /// The same where rows count more or less to the classifier.
+    ///
+    /// # Errors
+    /// As [`ClassifierSpec::train_weighted`].
+    pub fn train_weighted(
+        &self,
+        classifier: &ClassifierSpec,
+        y: &[usize],
+        n_classes: usize,
+        weights: Option<&[f64]>,
+    ) -> Result<Classifier> {
+        if weights.is_none() {
+            return self.train(classifier, y, n_classes);
+        }
+        let rows = match &self.rows {
+            Rows::Given(rows) => rows.view(),
+            Rows::Made(rows) => rows.view(),
+        };
+        classifier.train_weighted(rows, y, n_classes, weights)
     }
 
     /// The fitted steps alone.

@@ -3,6 +3,7 @@
 use corsmal_plot::ConfusionMatrix as Plot;
 use corsmal_report::{Figure, FigureGroup, Section, Source};
 use ndarray::Array2;
+use rayon::prelude::*;
 
 use crate::benchmark::method::{HELD_OUT, Method, file_name, joint_names, kind_names, level_names};
 use crate::benchmark::results::{PartScores, Rows};
@@ -36,7 +37,7 @@ pub(super) fn section(rows: &Rows, methods: &[Method], seed: u64) -> Result<Opti
          these pictures for every baseline, under both protocols, and for every system.",
         best.name
     );
-    let groups = scored.iter().map(|(method, part, scores)| {
+    let groups = scored.par_iter().map(|(method, part, scores)| {
         let slug = format!("classes-{}", file_name(&method.name));
         let of = if held_out(part) { String::new() } else { format!(" ({part})") };
         Ok(FigureGroup {

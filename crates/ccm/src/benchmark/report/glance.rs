@@ -2,6 +2,7 @@
 
 use corsmal_plot::{Mark, ScorePlot, ScoreRow};
 use corsmal_report::{Cell, Figure, Row, Section, Source, Table};
+use rayon::prelude::*;
 
 use crate::benchmark::method::{Method, Part, of_task};
 use crate::benchmark::results::{PartScores, Rows};
@@ -95,10 +96,10 @@ fn plot(task: Task, rows: &Rows, methods: &[Method], seed: u64) -> ScorePlot {
         };
         lines.push(ScoreRow { name, marks: vec![mark] });
     }
-    for method in methods {
-        let Cell::Score(value, interval) = method.cell(rows, Part::Training, task, seed) else {
-            continue;
-        };
+    let cell = |method: &Method| method.cell(rows, Part::Training, task, seed);
+    let cells: Vec<Cell> = methods.par_iter().map(cell).collect();
+    for (method, cell) in methods.iter().zip(cells) {
+        let Cell::Score(value, interval) = cell else { continue };
         let series = match PROTOCOLS.iter().position(|p| *p == method.protocol) {
             Some(place) => 1 + place,
             None => 3,

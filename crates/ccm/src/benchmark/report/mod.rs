@@ -11,6 +11,7 @@ mod tasks;
 use std::path::Path;
 
 use corsmal_report::Report;
+use rayon::prelude::*;
 
 use super::Made;
 use super::method::{Part, methods};
@@ -89,13 +90,14 @@ pub(super) fn write_figures(
     predicted: &Predicted<'_>,
     seed: u64,
 ) -> Result<()> {
-    for method in methods(rows, predicted, seed).iter().filter(|m| !m.completes()) {
-        let Some(slug) = &method.slug else { continue };
-        let Some(scores) = method.scores(rows, Part::Training, seed, &|_| true) else { continue };
+    let methods = methods(rows, predicted, seed);
+    methods.par_iter().filter(|m| !m.completes()).try_for_each(|method| {
+        let Some(slug) = &method.slug else { return Ok(()) };
+        let Some(scores) = method.scores(rows, Part::Training, seed, &|_| true) else {
+            return Ok(());
+        };
         let title = format!("{}, {}", method.name, method.protocol);
-        for figure in classes::figures(slug, &title, &scores)? {
-            figure.write(folder)?;
-        }
-    }
-    Ok(())
+        let figures = classes::figures(slug, &title, &scores)?;
+        Ok(figures.iter().try_for_each(|figure| figure.write(folder))?)
+    })
 }

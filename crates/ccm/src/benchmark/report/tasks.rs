@@ -1,6 +1,7 @@
 //! A table for each task: the paper's methods and those of this run.
 
 use corsmal_report::{Cell, Row, Section, Source, Table};
+use rayon::prelude::*;
 
 use crate::benchmark::method::{Method, Part};
 use crate::benchmark::results::Rows;
@@ -30,8 +31,9 @@ pub(super) fn section(task: Task, rows: &Rows, methods: &[Method], seed: u64) ->
             ],
         })
         .collect();
-    for method in methods {
-        let figures = PARTS.map(|part| method.cell(rows, part, task, seed));
+    let cells = |method: &Method| PARTS.map(|part| method.cell(rows, part, task, seed));
+    let figures: Vec<[Cell; 4]> = methods.par_iter().map(cells).collect();
+    for (method, figures) in methods.iter().zip(figures) {
         if figures.iter().all(|f| *f == Cell::None) {
             continue;
         }

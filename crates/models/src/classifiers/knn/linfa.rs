@@ -72,8 +72,9 @@ impl Classify for LinfaNeighbours {
     }
 
     fn predict_proba(&self, x: ArrayView2<'_, f64>) -> Result<Array2<f64>> {
-        check_lengths(x)?;
-        check_range(&squared_lengths(x))?;
+        let squared = squared_lengths(x);
+        check_lengths(&squared)?;
+        check_range(&squared)?;
         let rows = &self.0.x;
         let kind = if rows.ncols() <= MOST_TREE_FEATURES {
             CommonNearestNeighbour::KdTree

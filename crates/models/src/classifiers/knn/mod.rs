@@ -10,7 +10,7 @@ mod nearest;
 mod params;
 mod screen;
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
+use ndarray::{ArcArray2, Array1, Array2, ArrayView1, ArrayView2, Axis};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -60,8 +60,8 @@ pub struct KNearest {
     metric: Metric,
     p: f64,
     n_classes: usize,
-    /// `[rows, features]`; rows of unit length for the cosine metric
-    x: Array2<f64>,
+    /// `[rows, features]`, shared with who trained it where that can be; rows of unit length for the cosine metric
+    x: ArcArray2<f64>,
     y: Vec<usize>,
     /// squared row lengths
     norms: Vec<f64>,
@@ -158,7 +158,7 @@ impl Classify for KNearest {
 impl KNearest {
     /// The screen, if it is worth its making, and the number of query rows in a block.
     fn prepare(&self, x: ArrayView2<'_, f64>) -> Result<(Option<Screen>, usize)> {
-        check_lengths(x)?;
+        check_lengths(&squared_lengths(x))?;
         let by_products = matches!(self.metric, Metric::Euclidean | Metric::Cosine);
         let screen = (by_products && x.nrows() >= SCREEN_FROM)
             .then(|| Screen::new(self.x.view(), self.metric == Metric::Euclidean));
@@ -294,8 +294,8 @@ fn lanes(
 }
 
 /// Refuses rows whose squared length is beyond the range of numbers.
-fn check_lengths(x: ArrayView2<'_, f64>) -> Result<()> {
-    match squared_lengths(x).iter().position(|norm| !norm.is_finite()) {
+fn check_lengths(squared: &[f64]) -> Result<()> {
+    match squared.iter().position(|norm| !norm.is_finite()) {
         None => Ok(()),
         Some(row) => Err(ModelError::Numerical {
             owner: OWNER,
@@ -311,7 +311,7 @@ fn squared_lengths(x: ArrayView2<'_, f64>) -> Vec<f64> {
 }
 
 /// A copy made by all threads, and its squared row lengths.
-fn copied(x: ArrayView2<'_, f64>) -> (Array2<f64>, Vec<f64>) {
+fn copied(x: ArrayView2<'_, f64>) -> (ArcArray2<f64>, Vec<f64>) {
     let mut copy = Array2::zeros(x.raw_dim());
     let norms = copy
         .axis_iter_mut(Axis(0))
@@ -322,7 +322,7 @@ fn copied(x: ArrayView2<'_, f64>) -> (Array2<f64>, Vec<f64>) {
             to.dot(&to)
         })
         .collect();
-    (copy, norms)
+    (copy.into_shared(), norms)
 }
 
 fn unit_rows(x: ArrayView2<'_, f64>) -> Array2<f64> {

@@ -1,6 +1,6 @@
 //! What k nearest neighbours are asked for.
 
-use ndarray::ArrayView2;
+use ndarray::{ArcArray2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
 use super::linfa::{self, LinfaNeighbours};
@@ -88,6 +88,32 @@ impl Train for KNearestParams {
         y: &[usize],
         n_classes: usize,
     ) -> Result<FittedNeighbours> {
+        self.keep(x, copied, y, n_classes)
+    }
+
+    fn train_shared(
+        &self,
+        x: &ArcArray2<f64>,
+        y: &[usize],
+        n_classes: usize,
+    ) -> Result<FittedNeighbours> {
+        if !x.is_standard_layout() {
+            return self.train(x.view(), y, n_classes);
+        }
+        self.keep(x.view(), |view| (x.clone(), squared_lengths(view)), y, n_classes)
+    }
+}
+
+impl KNearestParams {
+    /// Keeps the training rows, which `rows` gives with their squared lengths; for the cosine metric, rows of
+    /// unit length.
+    fn keep(
+        &self,
+        x: ArrayView2<'_, f64>,
+        rows: impl Fn(ArrayView2<'_, f64>) -> (ArcArray2<f64>, Vec<f64>),
+        y: &[usize],
+        n_classes: usize,
+    ) -> Result<FittedNeighbours> {
         self.check_exponent()?;
         if self.k > x.nrows() {
             return Err(ModelError::ParameterValue {
@@ -97,14 +123,18 @@ impl Train for KNearestParams {
                 allowed: format!("at most the number of training rows ({})", x.nrows()),
             });
         }
-        check_lengths(x)?;
         let (x, norms) = match self.metric {
             Metric::Cosine => {
-                let x = unit_rows(x);
+                check_lengths(&squared_lengths(x))?;
+                let x = unit_rows(x).into_shared();
                 let norms = squared_lengths(x.view());
                 (x, norms)
             }
-            _ => copied(x),
+            _ => {
+                let (x, norms) = rows(x);
+                check_lengths(&norms)?;
+                (x, norms)
+            }
         };
         let rows = KNearest {
             k: self.k,
