@@ -65,9 +65,10 @@ def istft(
     params = stft_params(n_fft, hop_length, win_length, window, center, "constant")
     samples = size("length", length) if length else None
     room("a signal", d.size // (d.shape[-2] * d.shape[-1] or 1), samples or 0)
-    flat = _core.istft(
-        np.ascontiguousarray(d.reshape(math.prod(d.shape[:-2]), *d.shape[-2:])), params, samples
-    )
+    stacked = d.reshape(math.prod(d.shape[:-2]), *d.shape[-2:])
+    if not stacked.flags.f_contiguous:
+        stacked = np.ascontiguousarray(stacked)
+    flat = _core.istft(stacked, params, samples)
     y: Floats = flat.reshape(*d.shape[:-2], flat.shape[-1])
     if dtype is not None:
         y = y.astype(dtype, copy=False)

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::error::{DspError, Result};
-use crate::lanes::{LANES, Row, decibel_double, power_to_decibel};
+use crate::lanes::{LANES, decibel, decibel_double};
 use crate::real::{Real, part_finite};
 use crate::simd::vectorized;
 
@@ -51,9 +51,9 @@ impl Decibel {
     /// `amin <= 0` or `top_db < 0`.
     pub fn power<T: Real>(&self, values: &mut [T]) -> Result<()> {
         self.check()?;
-        let peaks = values.par_chunks_mut(PART).map(|part| self.convert(part));
-        let peak = peaks.reduce(T::neg_infinity, larger);
-        self.clamp(values, peak);
+        let parts = values.par_chunks_mut(PART).map(|part| self.convert(&part.to_vec(), part));
+        let extremes: Vec<_> = parts.collect();
+        self.clamp(values, &extremes);
         Ok(())
     }
 
@@ -62,46 +62,73 @@ impl Decibel {
     /// # Errors
     /// As `power`.
     pub fn of<T: Real>(&self, values: &[T]) -> Result<Vec<T>> {
-        self.check()?;
         let mut out = vec![T::zero(); values.len()];
-        let parts = out.par_chunks_mut(PART).zip(values.par_chunks(PART));
-        let peaks = parts.map(|(part, values)| {
-            part.copy_from_slice(values);
-            self.convert(part)
-        });
-        let peak = peaks.reduce(T::neg_infinity, larger);
-        self.clamp(&mut out, peak);
+        self.write(values, &mut out)?;
         Ok(out)
     }
 
-    /// Decibels in place without the clamp; the largest of them.
-    fn convert<T: Real>(&self, values: &mut [T]) -> T {
+    /// [`power`](Self::power) of `values` written into `out`.
+    ///
+    /// # Errors
+    /// As `power`, or an array of another length.
+    pub fn write<T: Real>(&self, values: &[T], out: &mut [T]) -> Result<()> {
+        self.check()?;
+        if out.len() != values.len() {
+            let expected = format!("[{}]", values.len());
+            return Err(DspError::Shape { name: "out", expected, actual: vec![out.len()] });
+        }
+        let parts = out.par_chunks_mut(PART).zip(values.par_chunks(PART));
+        let extremes: Vec<_> = parts.map(|(out, values)| self.convert(values, out)).collect();
+        self.clamp(out, &extremes);
+        Ok(())
+    }
+
+    /// Decibels of `values` without the clamp; the smallest and the largest of them, NaN where one is.
+    fn convert<T: Real>(&self, values: &[T], out: &mut [T]) -> (T, T) {
         let floor = self.amin as f32;
-        if let Some(values) = T::as_f32_mut(values)
+        if let (Some(values), Some(out)) = (T::as_f32(values), T::as_f32_mut(out))
             && floor.is_normal()
             && part_finite(values)
         {
-            return T::of(f64::from(convert_rows(values, floor, self.offset() as f32)));
+            let offset = self.offset() as f32;
+            let decibel = |x: f32| decibel(x.max(floor)) - offset;
+            let (low, high) = map(values, out, f32::INFINITY, decibel);
+            return (T::of(low.into()), T::of(high.into()));
         }
         if !T::SINGLE && self.amin.is_normal() && part_finite(values) {
-            return convert_doubles(values, self.amin, self.offset());
+            let (amin, offset) = (self.amin, self.offset());
+            return map(values, out, T::infinity(), |x| {
+                let x = x.wide();
+                T::of(decibel_double(if x < amin { amin } else { x }) - offset)
+            });
         }
         let (amin, offset, ten) = (T::of(self.amin), T::of(self.offset()), T::of(10.0));
-        values.iter_mut().fold(T::neg_infinity(), |peak, v| {
+        let none = (T::infinity(), T::neg_infinity());
+        out.iter_mut().zip(values).fold(none, |(low, high), (slot, v)| {
             // Written so that NaN stays NaN.
             let floored = if *v < amin { amin } else { *v };
-            *v = ten * floored.log10() - offset;
-            larger(peak, *v)
+            *slot = ten * floored.log10() - offset;
+            (smaller(low, *slot), larger(high, *slot))
         })
     }
 
-    fn clamp<T: Real>(&self, values: &mut [T], peak: T) {
+    /// Clamps to the range below the largest value; `extremes` are those of the parts.
+    fn clamp<T: Real>(&self, values: &mut [T], extremes: &[(T, T)]) {
         let Some(top_db) = self.top_db else { return };
+        let peak = extremes.iter().fold(T::neg_infinity(), |peak, (_, high)| larger(peak, *high));
         let floor = peak - T::of(top_db);
-        values.par_chunks_mut(PART).for_each(|part| {
+        values.par_chunks_mut(PART).zip(extremes).for_each(|(part, (low, _))| {
+            // Parts within the range stay as they are.
+            if *low >= floor {
+                return;
+            }
             vectorized(
                 #[inline(always)]
-                || part.iter_mut().for_each(|v| *v = larger(*v, floor)),
+                || {
+                    for v in part {
+                        *v = larger(*v, floor);
+                    }
+                },
             );
         });
     }
@@ -115,54 +142,37 @@ fn larger<T: Real>(a: T, b: T) -> T {
     if a > b || a.is_nan() { a } else { b }
 }
 
-/// Decibels in place by rows; the largest of them.
-fn convert_rows(values: &mut [f32], amin: f32, offset: f32) -> f32 {
-    const ROWS: usize = 16;
-    let mut rows = [Row::ZERO; ROWS];
-    let mut peak = [f32::NEG_INFINITY; LANES];
-    for part in values.chunks_mut(ROWS * LANES) {
-        if part.len() < ROWS * LANES {
-            // What is left of the row becomes the floor, which is not a peak.
-            rows = [Row::ZERO; ROWS];
-        }
-        for (row, values) in rows.iter_mut().zip(part.chunks(LANES)) {
-            row.0[..values.len()].copy_from_slice(values);
-        }
-        power_to_decibel(&mut rows, amin, offset);
-        for (row, values) in rows.iter().zip(part.chunks_mut(LANES)) {
-            values.copy_from_slice(&row.0[..values.len()]);
-        }
-        vectorized(
-            #[inline(always)]
-            || {
-                for row in &rows {
-                    for (peak, x) in peak.iter_mut().zip(&row.0) {
-                        *peak = if *x > *peak { *x } else { *peak };
-                    }
-                }
-            },
-        );
-    }
-    peak.into_iter().fold(f32::NEG_INFINITY, f32::max)
+/// The smaller one, NaN where one is.
+fn smaller<T: Real>(a: T, b: T) -> T {
+    if a < b || a.is_nan() { a } else { b }
 }
 
-/// Decibels in place of finite values in double precision; the largest of them.
-fn convert_doubles<T: Real>(values: &mut [T], amin: f64, offset: f64) -> T {
-    let mut peak = [f64::NEG_INFINITY; LANES];
+/// `of` every value, none of which is NaN, into `out`; the smallest and the largest result.
+fn map<T: Real>(values: &[T], out: &mut [T], infinity: T, of: impl Fn(T) -> T) -> (T, T) {
+    let (mut low, mut high) = ([infinity; LANES], [-infinity; LANES]);
     vectorized(
         #[inline(always)]
         || {
-            for values in values.chunks_mut(LANES) {
-                for (peak, v) in peak.iter_mut().zip(values) {
-                    let x = v.wide();
-                    let x = decibel_double(if x < amin { amin } else { x }) - offset;
-                    *v = T::of(x);
-                    *peak = if x > *peak { x } else { *peak };
+            let (blocks, rest) = values.as_chunks::<LANES>();
+            let (out_blocks, out_rest) = out.as_chunks_mut::<LANES>();
+            for (slots, values) in out_blocks.iter_mut().zip(blocks) {
+                for l in 0..LANES {
+                    let x = of(values[l]);
+                    slots[l] = x;
+                    low[l] = if x < low[l] { x } else { low[l] };
+                    high[l] = if x > high[l] { x } else { high[l] };
                 }
+            }
+            for (slot, value) in out_rest.iter_mut().zip(rest) {
+                let x = of(*value);
+                *slot = x;
+                low[0] = if x < low[0] { x } else { low[0] };
+                high[0] = if x > high[0] { x } else { high[0] };
             }
         },
     );
-    T::of(peak.into_iter().fold(f64::NEG_INFINITY, f64::max))
+    let least = low.into_iter().fold(infinity, |a, b| if b < a { b } else { a });
+    (least, high.into_iter().fold(-infinity, |a, b| if b > a { b } else { a }))
 }
 
 #[cfg(test)]

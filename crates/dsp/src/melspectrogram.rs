@@ -1,15 +1,15 @@
 //! Mel spectrograms of whole signals (librosa 0.11 `feature.melspectrogram`).
 
-use ndarray::{Array3, ArrayView2, Axis};
+use ndarray::{Array3, ArrayView2, ArrayViewMut3, Axis};
 use num_complex::Complex;
 
 use crate::error::{DspError, Result};
-use crate::lanes::{LANES, Row};
+use crate::lanes::{DoubleRow, Lanes, Row, weighted_sums};
 use crate::mel::SparseBank;
 use crate::real::Real;
-use crate::stft::{LONGEST_ROWS, StftParams, magnitude, single};
+use crate::stft::{LONGEST_ROWS, StftParams, magnitude};
 use crate::sums;
-use crate::tiles::{LanePlan, for_each_tile, neighbours, planar, write_columns};
+use crate::tiles::{LanePlan, for_each_tile, neighbours, planar};
 use crate::transform::Forward;
 
 /// `bank @ |stft(y)|^power` as `[channels, bands, frames]` of `y [channels, samples]`: the
@@ -32,45 +32,69 @@ pub fn melspectrogram<T: Real>(
     let (channels, _, frames) = stft.shape_of(y)?;
     let mut out = Array3::zeros((channels, bands, frames));
     let y = planar(y);
-    if T::SINGLE && stft.n_fft <= LONGEST_ROWS {
-        let plan = LanePlan::<Row>::new(stft)?;
-        let rows = |n| vec![Row::ZERO; n];
-        let state = || (plan.frames(), rows(stft.n_bins()), rows(bands));
-        for_each_tile(out.view_mut(), state, |(frames, spectrum, mel), mut tile| {
-            let y = single(y.view(), tile.channel);
-            for (b, mut block) in tile.out.axis_chunks_iter_mut(Axis(1), LANES).enumerate() {
-                frames.power(y, tile.first + b * LANES, power, spectrum);
-                bank.apply_rows(spectrum, mel);
-                for (row, mel) in block.outer_iter_mut().zip(&*mel) {
-                    let row = neighbours(row).iter_mut();
-                    row.zip(&mel.0).for_each(|(slot, x)| *slot = T::of(f64::from(*x)));
-                }
-            }
-        });
-        return Ok(out);
+    if stft.n_fft > LONGEST_ROWS {
+        one_by_one(y.view(), stft, power, bank, out.view_mut())?;
+    } else if T::SINGLE {
+        rows_of::<T, Row>(y.view(), stft, power, bank.bands(), out.view_mut())?;
+    } else {
+        let wide = |weights: &Vec<f32>| weights.iter().map(|w| f64::from(*w)).collect();
+        let bands: Vec<_> = bank.bands().iter().map(|(k, w)| (*k, wide(w))).collect();
+        rows_of::<T, DoubleRow>(y.view(), stft, power, &bands, out.view_mut())?;
     }
-    let forward = Forward::<f64>::new(stft)?;
-    let zeros = |n| vec![T::zero(); n];
-    let state = || (forward.scratch(), zeros(stft.n_bins()), zeros(LANES * bands));
-    for_each_tile(out.view_mut(), state, |(scratch, spectrum, columns), mut tile| {
+    Ok(out)
+}
+
+/// [`melspectrogram`] of contiguous channels in the precision of the rows `R`.
+fn rows_of<T: Real, R: Lanes>(
+    y: ArrayView2<T>,
+    stft: &StftParams,
+    power: f64,
+    bands: &[(usize, Vec<R::Value>)],
+    out: ArrayViewMut3<T>,
+) -> Result<()> {
+    let plan = LanePlan::<R>::new(stft)?;
+    let rows = |n| vec![R::EMPTY; n];
+    let state = || (plan.frames(), rows(stft.n_bins()), rows(bands.len()));
+    for_each_tile(out, state, |(frames, spectrum, mel), mut tile| {
         let y = y.row(tile.channel);
         let y = y.to_slice().expect("contiguous");
-        for (b, block) in tile.out.axis_chunks_iter_mut(Axis(1), LANES).enumerate() {
-            let first = tile.first + b * LANES;
-            for (t, column) in columns.chunks_exact_mut(bands).take(block.ncols()).enumerate() {
-                let bins = forward.spectrum(y, first + t, scratch);
-                for (slot, z) in spectrum.iter_mut().zip(bins) {
-                    *slot = raised(Complex::new(T::of(z.re), T::of(z.im)), power);
-                }
-                for (slot, (first, weights)) in column.iter_mut().zip(bank.bands()) {
-                    let weighted = |w: f32, x: T| T::of(f64::from(w)) * x;
-                    *slot = sums::sum_pairs(weights, &spectrum[*first..], weighted);
-                }
+        for (b, mut block) in tile.out.axis_chunks_iter_mut(Axis(1), R::SLOTS).enumerate() {
+            frames.power(y, tile.first + b * R::SLOTS, power, spectrum);
+            weighted_sums(bands, spectrum, mel);
+            for (row, mel) in block.outer_iter_mut().zip(&*mel) {
+                let row = neighbours(row).iter_mut();
+                row.zip(mel.values()).for_each(|(slot, x)| *slot = T::of(x.wide()));
             }
-            write_columns(columns, block);
         }
     });
-    Ok(out)
+    Ok(())
+}
+
+/// [`rows_of`] frame by frame, in double precision.
+fn one_by_one<T: Real>(
+    y: ArrayView2<T>,
+    stft: &StftParams,
+    power: f64,
+    bank: &SparseBank,
+    out: ArrayViewMut3<T>,
+) -> Result<()> {
+    let forward = Forward::<f64>::new(stft)?;
+    let state = || (forward.scratch(), vec![T::zero(); stft.n_bins()]);
+    for_each_tile(out, state, |(scratch, spectrum), mut tile| {
+        let y = y.row(tile.channel);
+        let y = y.to_slice().expect("contiguous");
+        for (t, mut column) in tile.out.columns_mut().into_iter().enumerate() {
+            let bins = forward.spectrum(y, tile.first + t, scratch);
+            for (slot, z) in spectrum.iter_mut().zip(bins) {
+                *slot = raised(Complex::new(T::of(z.re), T::of(z.im)), power);
+            }
+            for (slot, (first, weights)) in column.iter_mut().zip(bank.bands()) {
+                let weighted = |w: f32, x: T| T::of(f64::from(w)) * x;
+                *slot = sums::sum_pairs(weights, &spectrum[*first..], weighted);
+            }
+        }
+    });
+    Ok(())
 }
 
 /// `|z|^power`.
@@ -131,7 +155,7 @@ mod tests {
 
     /// Rows of a long transform would take gigabytes a thread.
     #[test]
-    fn long_transforms_of_single_precision_are_taken_one_by_one() {
+    fn long_transforms_are_taken_one_by_one() {
         let y = noise(3000);
         let stft = StftParams::new(2 * LONGEST_ROWS, 1000);
         let mel = MelParams { n_mels: 12, ..MelParams::new(16000.0, stft.n_fft) };

@@ -1,10 +1,13 @@
 //! Onset strength and onset detection (librosa 0.11 `onset`, `util.peak_pick`).
 
-use ndarray::{Array2, Array3, ArrayView2, ArrayView3, s};
+use std::ops::Range;
+
+use ndarray::{Array2, Array3, ArrayView2, ArrayView3, CowArray, Ix3, s};
 
 use crate::error::{DspError, Result};
 use crate::frequency::require_rate;
 use crate::real::Real;
+use crate::simd::vectorized;
 
 /// Bounds the zeros that an envelope starts with.
 const MAX_LAG: usize = 1 << 24;
@@ -52,44 +55,51 @@ impl OnsetParams {
     }
 }
 
-/// Mean over the bands of what rose from `earlier` to `now`, both in dB.
-pub fn onset_flux<T: Real>(now: &[T], earlier: &[T]) -> T {
-    let rise = |(a, b): (&T, &T)| (*a - *b).max(T::zero()).wide();
-    T::of(now.iter().zip(earlier).map(rise).sum::<f64>() / now.len() as f64)
-}
-
 /// Maximum over `size` bands around each band, the window reaching further down when even.
 pub fn max_filter<T: Real>(spectrum: &[T], size: usize, out: &mut [T]) {
-    let (below, n) = (size / 2, spectrum.len());
     for (k, slot) in out.iter_mut().enumerate() {
-        let end = k.saturating_add(size - below).min(n);
-        let window = &spectrum[k.saturating_sub(below)..end];
+        let window = &spectrum[window(k, size, spectrum.len())];
         *slot = window.iter().fold(T::neg_infinity(), |m, x| x.max(m));
     }
 }
 
-/// The earlier spectra that `spectrogram` is compared with, as `[channels, frames, bands]`.
-fn references<T: Real>(
-    spectrogram: &ArrayView3<T>,
-    reference: Option<&ArrayView3<T>>,
+/// The `size` of `bands` bands around band `k`.
+fn window(k: usize, size: usize, bands: usize) -> Range<usize> {
+    let below = size / 2;
+    k.saturating_sub(below)..k.saturating_add(size - below).min(bands)
+}
+
+/// The earlier spectra that `spectrogram` is compared with, of the same shape, in C order.
+fn references<'a, T: Real>(
+    spectrogram: ArrayView3<'a, T>,
+    reference: Option<ArrayView3<'a, T>>,
     max_size: usize,
-) -> Result<Array3<T>> {
-    let given = reference.map_or_else(|| spectrogram.view(), |given| given.view());
+) -> Result<CowArray<'a, T, Ix3>> {
+    let given = reference.unwrap_or(spectrogram);
     if given.dim() != spectrogram.dim() {
         let expected = format!("{:?}", spectrogram.shape());
         return Err(DspError::Shape { name: "ref", expected, actual: given.shape().to_vec() });
     }
-    let mut by_frame = given.permuted_axes([0, 2, 1]).as_standard_layout().into_owned();
-    if reference.is_none() && max_size > 1 {
-        let mut filtered = vec![T::zero(); spectrogram.dim().1];
-        for mut row in by_frame.rows_mut() {
-            if let Some(row) = row.as_slice_mut() {
-                max_filter(row, max_size, &mut filtered);
-                row.copy_from_slice(&filtered);
+    let (filtered, bands) = (reference.is_none() && max_size > 1, given.dim().1);
+    if !filtered {
+        return Ok(in_c_order(given));
+    }
+    let mut highest = Array3::from_elem(given.raw_dim(), T::neg_infinity());
+    for (mut highest, given) in highest.outer_iter_mut().zip(given.outer_iter()) {
+        for (k, mut highest) in highest.outer_iter_mut().enumerate() {
+            for band in given.slice(s![window(k, max_size, bands), ..]).outer_iter() {
+                highest.zip_mut_with(&band, |high, x| *high = x.max(*high));
             }
         }
     }
-    Ok(by_frame)
+    Ok(highest.into())
+}
+
+fn in_c_order<T: Real>(array: ArrayView3<T>) -> CowArray<T, Ix3> {
+    match array.is_standard_layout() {
+        true => array.into(),
+        false => array.as_standard_layout().into_owned().into(),
+    }
 }
 
 /// What rose in each band, `[channels, bands, frames - lag]`: the onset strength before bands are
@@ -103,12 +113,20 @@ pub fn onset_rises<T: Real>(
     params: &OnsetParams,
 ) -> Result<Array3<T>> {
     params.check()?;
-    let earlier = references(&spectrogram, reference.as_ref(), params.max_size)?;
+    let given = reference.as_ref().map(ArrayView3::view);
+    let earlier = references(spectrogram.view(), given, params.max_size)?;
     let (channels, bands, frames) = spectrogram.dim();
     let kept = frames.saturating_sub(params.lag);
-    Ok(Array3::from_shape_fn((channels, bands, kept), |(c, k, t)| {
-        (spectrogram[[c, k, t + params.lag]] - earlier[[c, t, k]]).max(T::zero())
-    }))
+    let mut rises = Array3::zeros((channels, bands, kept));
+    if kept > 0 {
+        let (now, earlier) = (spectrogram.slice(s![.., .., params.lag..]), &earlier);
+        let earlier = earlier.slice(s![.., .., ..kept]);
+        ndarray::Zip::from(&mut rises)
+            .and(now)
+            .and(earlier)
+            .for_each(|rise, now, earlier| *rise = (*now - *earlier).max(T::zero()));
+    }
+    Ok(rises)
 }
 
 /// Onset strength envelope `[channels, frames]` of a spectrogram in dB `[channels, bands, frames]`.
@@ -128,20 +146,31 @@ pub fn onset_strength<T: Real>(
         let actual = spectrogram.shape().to_vec();
         return Err(DspError::Shape { name: "S", expected, actual });
     }
-    let earlier = references(&spectrogram, reference.as_ref(), params.max_size)?;
-    let now = spectrogram.permuted_axes([0, 2, 1]);
-    let now = now.as_standard_layout();
+    let given = reference.as_ref().map(ArrayView3::view);
+    let earlier = references(spectrogram.view(), given, params.max_size)?;
+    let now = in_c_order(spectrogram);
     let (before, length) = params.layout(frames);
     let mut envelope = Array2::zeros((channels, length));
-    for c in 0..channels {
-        for t in before..length {
-            let from = t - before;
-            let now = now.slice(s![c, from + params.lag, ..]);
-            let earlier = earlier.slice(s![c, from, ..]);
-            if let (Some(now), Some(earlier)) = (now.as_slice(), earlier.as_slice()) {
-                envelope[[c, t]] = onset_flux(now, earlier);
-            }
+    let mut sums = vec![0.0; length.saturating_sub(before)];
+    for (c, mut envelope) in envelope.outer_iter_mut().enumerate() {
+        sums.fill(0.0);
+        // Band by band: a frame has its bands in order.
+        for k in 0..bands {
+            let (now, earlier) = (now.slice(s![c, k, ..]), earlier.slice(s![c, k, ..]));
+            let now = &now.to_slice().expect("in C order")[params.lag.min(frames)..];
+            let earlier = earlier.to_slice().expect("in C order");
+            vectorized(
+                #[inline(always)]
+                || {
+                    for (sum, (now, earlier)) in sums.iter_mut().zip(now.iter().zip(earlier)) {
+                        let rise = *now - *earlier;
+                        *sum += if rise > T::zero() { rise } else { T::zero() }.wide();
+                    }
+                },
+            );
         }
+        let slots = envelope.iter_mut().skip(before);
+        slots.zip(&sums).for_each(|(slot, sum)| *slot = T::of(sum / bands as f64));
     }
     Ok(envelope)
 }

@@ -5,10 +5,11 @@ use std::sync::{Mutex, PoisonError};
 use ndarray::{
     Array2, ArrayView2, ArrayViewMut1, ArrayViewMut2, ArrayViewMut3, Axis, CowArray, Ix2,
 };
+use num_traits::Float;
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::lanes::{LANES, Lanes, Row, Spectrum};
+use crate::lanes::{LANES, Lanes, Spectrum, square_roots};
 use crate::real::Real;
 use crate::stft::StftParams;
 use crate::window::padded_window;
@@ -154,19 +155,17 @@ impl<R: Lanes> LaneFrames<'_, R> {
         self.load(y, first);
         self.plan.spectrum.complex(&mut self.rows, out);
     }
-}
 
-impl LaneFrames<'_, Row> {
     /// `|X|^power` of the frames from `first` on into `out` (`n_bins` rows).
-    pub fn power(&mut self, y: &[f32], first: usize, power: f64, out: &mut [Row]) {
+    pub fn power<T: Real>(&mut self, y: &[T], first: usize, power: f64, out: &mut [R]) {
         self.load(y, first);
-        if power == 1.0 {
-            return self.plan.spectrum.magnitude(&mut self.rows, out);
-        }
         self.plan.spectrum.power(&mut self.rows, out);
-        if power != 2.0 {
-            let exponent = (power / 2.0) as f32;
-            out.iter_mut().flat_map(|row| &mut row.0).for_each(|x| *x = x.powf(exponent));
+        if power == 1.0 {
+            square_roots(out);
+        } else if power != 2.0 {
+            let exponent = R::Value::of(power / 2.0);
+            let values = out.iter_mut().flat_map(R::values_mut);
+            values.for_each(|x| *x = Float::powf(*x, exponent));
         }
     }
 }
@@ -176,21 +175,10 @@ pub(crate) fn neighbours<T>(row: ArrayViewMut1<'_, T>) -> &mut [T] {
     row.into_slice().expect("made in C order")
 }
 
-/// Writes `columns`, one after another, as the columns of `out`.
-pub(crate) fn write_columns<T: Copy>(columns: &[T], mut out: ArrayViewMut2<T>) {
-    let rows = out.nrows();
-    // A square at a time, so that the lines of both sides stay in the cache.
-    for (b, mut part) in out.axis_chunks_iter_mut(Axis(0), LANES).enumerate() {
-        for (k, row) in part.outer_iter_mut().enumerate() {
-            let values = columns[b * LANES + k..].iter().step_by(rows);
-            neighbours(row).iter_mut().zip(values).for_each(|(slot, x)| *slot = *x);
-        }
-    }
-}
-
-/// Writes the columns of `part` one after another into `columns`: the inverse.
+/// Writes the columns of `part` one after another into `columns`.
 pub(crate) fn read_columns<T: Copy>(part: ArrayView2<T>, columns: &mut [T]) {
     let rows = part.nrows();
+    // A square at a time, so that the lines of both sides stay in the cache.
     for (b, part) in part.axis_chunks_iter(Axis(0), LANES).enumerate() {
         for (k, row) in part.outer_iter().enumerate() {
             let slots = columns[b * LANES + k..].iter_mut().step_by(rows);
@@ -236,12 +224,9 @@ mod tests {
 
     #[test]
     fn columns_are_transposed() {
-        let columns: Vec<usize> = (0..5 * 37).collect();
-        let mut out = ndarray::Array2::zeros((37, 5));
-        write_columns(&columns, out.view_mut());
-        assert!(out.indexed_iter().all(|((k, t), x)| *x == t * 37 + k));
-        let mut back = vec![0; columns.len()];
-        read_columns(out.view(), &mut back);
-        assert_eq!(back, columns);
+        let part = Array2::from_shape_fn((37, 5), |(k, t)| t * 37 + k);
+        let mut columns = vec![0; part.len()];
+        read_columns(part.view(), &mut columns);
+        assert!(columns.into_iter().eq(0..5 * 37));
     }
 }

@@ -101,8 +101,30 @@ impl<F: Real> Forward<F> {
 pub struct Inverse<F: Real> {
     params: StftParams,
     window: Vec<F>,
-    squares: Vec<f64>,
+    squares: SquareSums,
     fft: Arc<dyn ComplexToReal<F>>,
+}
+
+/// Sums of the squared windows over samples of overlapping frames.
+#[derive(Clone)]
+pub(crate) struct SquareSums {
+    squares: Vec<f64>,
+    hop: usize,
+}
+
+impl SquareSums {
+    /// Of windows that begin `hop` samples apart.
+    pub fn new(window: &[f64], hop: usize) -> Self {
+        Self { squares: window.iter().map(|w| w * w).collect(), hop }
+    }
+
+    /// Sum of the squared windows of `frames` frames over sample `at` (padding included), 1 where there is none.
+    pub fn divisor<F: Real>(&self, frames: usize, at: usize) -> F {
+        let first = (at + 1).saturating_sub(self.squares.len()).div_ceil(self.hop);
+        let end = frames.min(at / self.hop + 1);
+        let sum: f64 = (first..end).map(|t| self.squares[at - t * self.hop]).sum();
+        if sum > F::min_positive_value().wide() { F::of(sum) } else { F::one() }
+    }
 }
 
 impl<F: Real> Inverse<F> {
@@ -111,7 +133,7 @@ impl<F: Real> Inverse<F> {
     pub fn new(params: &StftParams) -> Result<Self> {
         params.check()?;
         let window = padded_window(&params.window, params.win_length, params.n_fft)?;
-        let squares = window.iter().map(|w| w * w).collect();
+        let squares = SquareSums::new(&window, params.hop_length);
         // The inverse transform is not normalised; its 1 / n_fft goes with the window.
         let scale = 1.0 / params.n_fft as f64;
         let window = window.into_iter().map(|w| F::of(w * scale)).collect();
@@ -163,7 +185,7 @@ impl<F: Real> Inverse<F> {
         let steady_to = (frames * hop).saturating_sub(pad).clamp(steady_from, y.len());
         let steady = &mut y[steady_from..steady_to];
         let sums: Vec<F> = (0..hop.min(steady.len()))
-            .map(|i| self.divisor(frames, pad + steady_from + i))
+            .map(|i| self.squares.divisor(frames, pad + steady_from + i))
             .collect();
         crate::simd::vectorized(
             #[inline(always)]
@@ -174,17 +196,8 @@ impl<F: Real> Inverse<F> {
             },
         );
         for i in (0..steady_from).chain(steady_to..y.len()) {
-            y[i] /= self.divisor(frames, pad + i);
+            y[i] /= self.squares.divisor(frames, pad + i);
         }
-    }
-
-    /// Sum of the squared windows over sample `at` (padding included), 1 where there is none.
-    fn divisor(&self, frames: usize, at: usize) -> F {
-        let hop = self.params.hop_length;
-        let first = (at + 1).saturating_sub(self.params.n_fft).div_ceil(hop);
-        let end = frames.min(at / hop + 1);
-        let sum: f64 = (first..end).map(|t| self.squares[at - t * hop]).sum();
-        if sum > F::min_positive_value().wide() { F::of(sum) } else { F::one() }
     }
 }
 

@@ -4,9 +4,11 @@
 use corsmal_dsp::Real;
 use corsmal_dsp::spectral::Spectra;
 use corsmal_dsp::stft::StftParams;
-use ndarray::{Array2, ArrayView2, ArrayView3, ArrayViewMut3, Dimension};
+use ndarray::{
+    Array2, ArrayView2, ArrayView3, ArrayViewMut, ArrayViewMut3, Dimension, IntoDimension,
+};
 use numpy::{
-    Element, IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+    Element, IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 
@@ -102,8 +104,23 @@ pub fn into_numpy<'py, T: Element + Clone, D: Dimension>(
     Ok(data.into_pyarray(py).reshape(shape)?.into_any())
 }
 
-/// The spectra of `y` as a numpy array, which `fill` writes without the GIL: numpy asks for huge
+/// A numpy array of this shape, which `fill` writes without the GIL: numpy asks for huge
 /// pages where its arrays are large, which makes fresh memory several times cheaper than ours is.
+pub fn written<'py, R: Element, D: Dimension>(
+    py: Python<'py>,
+    shape: D,
+    fill: impl FnOnce(ArrayViewMut<R, D>) -> corsmal_dsp::Result<()> + Send,
+) -> PyResult<Bound<'py, PyAny>> {
+    let sizes = shape.slice().to_vec();
+    let array = PyArray1::<R>::zeros(py, [shape.size()], false);
+    let mut values = array.readwrite();
+    let out = ArrayViewMut::from_shape(shape, values.as_slice_mut()?).map_err(value_error)?;
+    compute(py, || fill(out))?.map_err(value_error)?;
+    drop(values);
+    Ok(array.reshape(sizes)?.into_any())
+}
+
+/// The spectra of `y` as a numpy array, which `fill` writes.
 pub fn filled<'py, T: Element, R: Element>(
     py: Python<'py>,
     y: ArrayView2<T>,
@@ -111,12 +128,7 @@ pub fn filled<'py, T: Element, R: Element>(
     fill: impl FnOnce(ArrayView2<T>, ArrayViewMut3<R>) -> corsmal_dsp::Result<()> + Send,
 ) -> PyResult<Bound<'py, PyAny>> {
     let shape = params.shape_of(y).map_err(value_error)?;
-    let array = PyArray3::<R>::zeros(py, shape, false);
-    let mut values = array.readwrite();
-    let out = ArrayViewMut3::from_shape(shape, values.as_slice_mut()?).map_err(value_error)?;
-    compute(py, || fill(y, out))?.map_err(value_error)?;
-    drop(values);
-    Ok(array.into_any())
+    written(py, shape.into_dimension(), |out| fill(y, out))
 }
 
 /// Either precision of a two-dimensional result.

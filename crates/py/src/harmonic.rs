@@ -2,21 +2,22 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use corsmal_dsp::Lane;
 use corsmal_dsp::corsmal::af193::{Af193, LENGTH};
 use corsmal_dsp::cqt::{
     ChromaCqt, ChromaCqtParams, CqtParams, chroma_cqt as dsp_chroma_cqt, cqt as dsp_cqt,
 };
 use corsmal_dsp::hpss::{HpssParams, Part, masks as dsp_masks, separate as dsp_separate};
-use corsmal_dsp::istft::istft as dsp_istft;
+use corsmal_dsp::istft::{istft_into, istft_shape};
 use corsmal_dsp::librosa::LibrosaVersion;
+use corsmal_dsp::stft::StftParams;
 use corsmal_dsp::tonnetz::tonnetz as dsp_tonnetz;
-use ndarray::{Array2, ArrayView2, ArrayView3};
+use corsmal_dsp::{Lane, Real};
+use ndarray::{Array2, ArrayView2, ArrayView3, IntoDimension, ShapeBuilder};
 use num_complex::Complex;
-use numpy::{Element, PyReadonlyArrayDyn};
+use numpy::{Element, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::arrays::{Floats, each_precision, into_numpy, view2, view3};
+use crate::arrays::{Floats, each_precision, into_numpy, view2, view3, written};
 use crate::chroma::norm_of;
 use crate::errors::value_error;
 use crate::pool::compute;
@@ -38,15 +39,29 @@ pub(crate) fn istft<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let params = params.params()?;
     match spectrogram {
-        Complexes::Single(d) => {
-            let d = view3(&d)?;
-            into_numpy(py, compute(py, || dsp_istft(d, &params, length))?.map_err(value_error)?)
-        }
-        Complexes::Double(d) => {
-            let d = view3(&d)?;
-            into_numpy(py, compute(py, || dsp_istft(d, &params, length))?.map_err(value_error)?)
-        }
+        Complexes::Single(d) => inverted(py, &d, &params, length),
+        Complexes::Double(d) => inverted(py, &d, &params, length),
     }
+}
+
+/// The inverse of a spectrogram in C order or, as librosa's, in Fortran order.
+fn inverted<'py, T: Real + Element>(
+    py: Python<'py>,
+    array: &PyReadonlyArrayDyn<'py, Complex<T>>,
+    params: &StftParams,
+    length: Option<usize>,
+) -> PyResult<Bound<'py, PyAny>>
+where
+    Complex<T>: Element,
+{
+    let d = match array.shape() {
+        &[a, b, c] if !array.is_c_contiguous() && array.is_fortran_contiguous() => {
+            ArrayView3::from_shape((a, b, c).f(), array.as_slice()?).map_err(value_error)?
+        }
+        _ => view3(array)?,
+    };
+    let shape = istft_shape(d.dim(), params, length).map_err(value_error)?;
+    written(py, shape.into_dimension(), |out| istft_into(d, params, out))
 }
 
 /// `HpssParams` of the Python package.

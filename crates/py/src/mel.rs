@@ -1,14 +1,16 @@
 //! Mel spectra, decibels, cepstra and deltas.
 
+use corsmal_dsp::Real;
 use corsmal_dsp::decibel::Decibel;
 use corsmal_dsp::delta::{DeltaParams, delta as dsp_delta};
 use corsmal_dsp::mel::{MelParams, SparseBank, empty_filters, mel_filter};
 use corsmal_dsp::melspectrogram::melspectrogram as dsp_melspectrogram;
 use corsmal_dsp::mfcc::{DctNorm, MfccParams, mfcc as dsp_mfcc};
-use ndarray::Array1;
+use ndarray::Ix1;
+use numpy::Element;
 use pyo3::prelude::*;
 
-use crate::arrays::{Floats, each_precision, into_numpy, signal, view1, view2, view3};
+use crate::arrays::{Floats, each_precision, into_numpy, signal, view1, view2, view3, written};
 use crate::errors::value_error;
 use crate::transform::{Transform, named};
 
@@ -79,7 +81,20 @@ pub(crate) fn power_to_db<'py>(
     top_db: Option<f64>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let decibel = Decibel { reference, amin, top_db };
-    each_precision!(py, view1(s), decibel.of(s).map(Array1::from_vec))
+    match s {
+        Floats::F32(s) => decibels(py, view1(&s)?, &decibel),
+        Floats::F64(s) => decibels(py, view1(&s)?, &decibel),
+    }
+}
+
+fn decibels<'py, T: Real + Element>(
+    py: Python<'py>,
+    values: &[T],
+    decibel: &Decibel,
+) -> PyResult<Bound<'py, PyAny>> {
+    written(py, Ix1(values.len()), |mut out| {
+        decibel.write(values, out.as_slice_mut().unwrap_or_default())
+    })
 }
 
 /// Cepstral coefficients of a log-mel spectrogram.

@@ -15,6 +15,7 @@ use std::sync::Arc;
 
 use ndarray::{Array2, Array3, ArrayView2, Axis};
 use num_complex::Complex;
+use rayon::prelude::*;
 
 pub use chroma::{ChromaCqt, ChromaCqtParams, chroma_cqt, cq_to_chroma};
 pub use params::{C1, CqtParams};
@@ -155,26 +156,65 @@ impl CqtPlan {
         y: &[T],
         mut each: impl FnMut(usize, usize, &[T], &[T]),
     ) -> Result<()> {
+        let frames = self.n_frames(y.len());
+        for (octave, signal) in self.octaves.iter().zip(self.signals(y)?) {
+            self.octave(octave, &signal, frames, &mut each)?;
+        }
+        Ok(())
+    }
+
+    /// As [`transform`](Self::transform), octaves on all threads of the pool.
+    fn transform_at_once<T: Lane>(&self, y: &[T]) -> Result<Array2<Complex<T>>> {
+        let frames = self.n_frames(y.len());
+        let signals = self.signals(y)?;
+        let mut out = Array2::zeros((self.params.n_bins, frames));
+        let mut rest = out.as_slice_mut().expect("a new array");
+        let mut parts = Vec::with_capacity(self.octaves.len());
+        for (octave, signal) in self.octaves.iter().zip(&signals) {
+            let (lower, rows) = rest.split_at_mut(octave.first * frames);
+            parts.push((octave, signal, rows));
+            rest = lower;
+        }
+        parts.into_par_iter().try_for_each(|(octave, signal, rows)| {
+            self.octave(octave, signal, frames, &mut |bin, frame, re: &[T], im: &[T]| {
+                let row = &mut rows[(bin - octave.first) * frames + frame..];
+                for ((z, re), im) in row.iter_mut().zip(re).zip(im) {
+                    *z = Complex::new(*re, *im);
+                }
+            })
+        })?;
+        Ok(out)
+    }
+
+    /// The signals of the octaves, from the highest down.
+    fn signals<'y, T: Lane>(&self, y: &'y [T]) -> Result<Vec<Cow<'y, [T]>>> {
         let factor = 1usize << self.early;
         if y.is_empty() || y.len() < factor {
             return Err(DspError::TooShort { name: "y", actual: y.len(), needed: factor });
         }
-        let frames = self.n_frames(y.len());
         let mut signal = Cow::Borrowed(y);
         if self.early > 0 {
             signal = Cow::Owned(self.decimated_early(y)?);
         }
-        for (i, octave) in self.octaves.iter().enumerate() {
-            let narrow = T::as_f32(&signal).zip(octave.lanes.as_deref());
-            match narrow {
-                Some((signal, fft)) => {
-                    self.respond_in_lanes(octave, fft, signal, frames, &mut each);
-                }
-                None => self.respond(octave, &signal, frames, &mut each)?,
-            }
-            if octave.halve && i + 1 < self.octaves.len() {
-                signal = Cow::Owned(self.halved(&signal));
-            }
+        let mut signals = Vec::with_capacity(self.octaves.len());
+        for octave in &self.octaves {
+            let next = if octave.halve { Cow::Owned(self.halved(&signal)) } else { signal.clone() };
+            signals.push(std::mem::replace(&mut signal, next));
+        }
+        Ok(signals)
+    }
+
+    /// Calls `each` as [`respond_to`](Self::respond_to) does, for one octave of this signal.
+    fn octave<T: Lane>(
+        &self,
+        octave: &Octave,
+        signal: &[T],
+        frames: usize,
+        each: &mut impl FnMut(usize, usize, &[T], &[T]),
+    ) -> Result<()> {
+        match T::as_f32(signal).zip(octave.lanes.as_deref()) {
+            Some((signal, fft)) => self.respond_in_lanes(octave, fft, signal, frames, each),
+            None => self.respond(octave, signal, frames, each)?,
         }
         Ok(())
     }
@@ -320,7 +360,7 @@ fn early_halvings(nyquist: f64, cutoff: f64, hop: usize, n_octaves: usize) -> u3
 /// As [`CqtPlan::new`] and [`CqtPlan::transform`], or samples that are not finite.
 pub fn cqt<T: Lane>(y: ArrayView2<T>, p: &CqtParams) -> Result<Array3<Complex<T>>> {
     let plan = CqtPlan::new(p)?;
-    per_channel(y, |y| plan.transform(y))
+    per_channel(y, |y| plan.transform_at_once(y))
 }
 
 /// `each` channel's result, stacked.

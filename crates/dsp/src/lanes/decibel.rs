@@ -45,7 +45,7 @@ pub(crate) fn decibel_double(x: f64) -> f64 {
 /// vectorise: `x = 2^e (1 + f)` with `1 + f` in `[sqrt(1/2), sqrt(2))`, then the minimax polynomial
 /// of the Cephes library for `ln(1 + f)`.
 #[inline(always)]
-fn decibel(x: f32) -> f32 {
+pub(crate) fn decibel(x: f32) -> f32 {
     // 10 log10(2) split so that the product of the first part with an exponent is exact.
     const OCTAVE_HIGH: f32 = 6165.0 / 2048.0;
     const OCTAVE_LOW: f32 = 4.605_039e-5;

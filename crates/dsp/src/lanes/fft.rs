@@ -3,6 +3,7 @@
 use pulp::{Arch, Simd, WithSimd};
 
 use super::complex::{C, Dft, Pair, Points, add, load, mul, store, sub};
+use super::passes::{Stage, leaves, parts};
 use super::twiddles::{radices, reversed, turn, twiddles};
 use super::{Frames, Lanes, Row};
 use crate::error::{DspError, Result};
@@ -31,12 +32,6 @@ pub struct LaneFft<R: Lanes = Row> {
     unpack: Vec<[R::Value; 2]>,
 }
 
-/// Twiddles of a pass over blocks, for each column `w^0, w^j, w^2j, ...`.
-enum Stage<R: Lanes> {
-    Four(Vec<[[R::Value; 2]; 4]>),
-    Eight(Vec<[[R::Value; 2]; 8]>),
-}
-
 impl<R: Lanes> LaneFft<R> {
     /// Shortest and longest supported transform.
     pub const RANGE: std::ops::RangeInclusive<usize> = 64..=1 << 20;
@@ -57,15 +52,8 @@ impl<R: Lanes> LaneFft<R> {
         let m = n_fft / 2;
         let quarter = m / 4;
         let radices = radices(quarter);
-        let mut size = quarter;
-        let mut stages = Vec::new();
-        for radix in &radices[..radices.len() - 1] {
-            stages.push(match radix {
-                8 => Stage::Eight(twiddles(size, 1.0)),
-                _ => Stage::Four(twiddles(size, 1.0)),
-            });
-            size /= radix;
-        }
+        let (leaf, passes) = radices.split_last().expect("eight points or more");
+        let stages = Stage::nested(passes, quarter);
         let mut position = vec![0; quarter];
         reversed(&mut position, &radices, 0, 0, 1);
         let bin = |q| (0..quarter).map(move |p| turn(q + 4 * p, n_fft).map(R::Value::of));
@@ -74,7 +62,7 @@ impl<R: Lanes> LaneFft<R> {
             n_fft,
             first: twiddles(m, 0.5),
             stages,
-            leaf: size,
+            leaf: *leaf,
             position,
             unpack: (0..4).flat_map(bin).collect(),
         })
@@ -192,66 +180,6 @@ impl<R: Lanes, F: Source<R>> WithSimd for FirstPass<'_, F, R> {
     }
 }
 
-/// The first `N` parts of `length` values.
-#[inline(always)]
-fn parts<R: Lanes, const N: usize>(block: &mut [Pair<R>], length: usize) -> [&mut [Pair<R>]; N]
-where
-    Points: Dft<N>,
-{
-    let mut parts = block.chunks_exact_mut(length);
-    Points::list(|_| parts.next().map_or(&mut [][..], |part| &mut part[..length]))
-}
-
-/// A pass over a block: transforms across its parts, then twiddles.
-#[inline(always)]
-fn pass<R: Lanes, S: Simd, const N: usize>(
-    simd: S,
-    block: &mut [Pair<R>],
-    twiddles: &[[[R::Value; 2]; N]],
-) where
-    Points: Dft<N>,
-{
-    let length = twiddles.len();
-    let mut parts = parts::<R, N>(block, length);
-    for (j, w) in twiddles.iter().enumerate() {
-        for v in 0..R::registers::<S>() {
-            let x = Points::list(
-                #[inline(always)]
-                |q| load::<R, S>(&parts[q][j], v),
-            );
-            let y: [_; N] = Points::of::<R, S>(simd, x);
-            let _: [(); N] = Points::list(
-                #[inline(always)]
-                |q| {
-                    let turned = if q == 0 { y[0] } else { mul::<R, S>(simd, y[q], w[q]) };
-                    store::<R, S>(&mut parts[q][j], v, turned);
-                },
-            );
-        }
-    }
-}
-
-/// The last pass: neighbouring points, into natural order.
-#[inline(always)]
-fn leaves<R: Lanes, S: Simd, const N: usize>(simd: S, quarter: &mut [Pair<R>])
-where
-    Points: Dft<N>,
-{
-    for leaf in quarter.as_chunks_mut::<N>().0 {
-        for v in 0..R::registers::<S>() {
-            let x = Points::list(
-                #[inline(always)]
-                |q| load::<R, S>(&leaf[q], v),
-            );
-            let y: [_; N] = Points::of::<R, S>(simd, x);
-            let _: [(); N] = Points::list(
-                #[inline(always)]
-                |q| store::<R, S>(&mut leaf[q], v, y[q]),
-            );
-        }
-    }
-}
-
 /// What becomes of a bin.
 trait Output<R: Lanes> {
     fn put<S: Simd>(&mut self, simd: S, bin: usize, v: usize, x: C<R::Register<S>>);
@@ -323,21 +251,25 @@ fn quarters<R: Lanes, S: Simd>(
 #[inline(always)]
 fn transform<R: Lanes, S: Simd>(simd: S, plan: &LaneFft<R>, quarter: &mut [Pair<R>]) {
     let mut size = quarter.len();
-    for stage in &plan.stages {
-        for block in quarter.chunks_exact_mut(size) {
-            match stage {
-                Stage::Four(twiddles) => pass(simd, block, twiddles),
-                Stage::Eight(twiddles) => pass(simd, block, twiddles),
-            }
-        }
-        size /= match stage {
-            Stage::Four(_) => 4,
-            Stage::Eight(_) => 8,
-        };
+    let mut nested = &plan.stages[..];
+    if let [outer, inner @ ..] = nested {
+        outer.forward(simd, quarter);
+        size /= outer.radix();
+        nested = inner;
     }
-    match plan.leaf {
-        8 => leaves::<R, S, 8>(simd, quarter),
-        _ => leaves::<R, S, 4>(simd, quarter),
+    // Part by part, each of which stays in the nearest cache.
+    for part in quarter.chunks_exact_mut(size) {
+        let mut size = size;
+        for stage in nested {
+            for block in part.chunks_exact_mut(size) {
+                stage.forward(simd, block);
+            }
+            size /= stage.radix();
+        }
+        match plan.leaf {
+            8 => leaves::<R, S, 8>(simd, part),
+            _ => leaves::<R, S, 4>(simd, part),
+        }
     }
 }
 

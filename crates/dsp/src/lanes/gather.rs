@@ -1,5 +1,6 @@
 //! Windowed frames of an interleaved signal into rows.
 
+use pulp::bytemuck::cast;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::{DoubleRow, LANES, Lanes, Row};
@@ -45,18 +46,30 @@ impl Slots {
 ///
 /// `signal` is interleaved and starts at the first sample of frame 0.
 pub fn gather(signal: &[f32], hop: usize, window: &[f32], slots: Slots, rows: &mut [Row]) {
+    gather_part(signal, hop, window, slots, rows.as_chunks_mut::<1>().0, 0);
+}
+
+/// [`gather`] into row `part` of every group.
+pub(crate) fn gather_part<const PARTS: usize>(
+    signal: &[f32],
+    hop: usize,
+    window: &[f32],
+    slots: Slots,
+    rows: &mut [[Row; PARTS]],
+    part: usize,
+) {
     debug_assert_eq!(window.len(), rows.len());
-    let aligned = slots.aligned();
-    if aligned && slots.channels == 1 {
-        return Arch::new().dispatch(Mono { signal, hop, window, slots, rows });
+    if slots.channels == 1 {
+        return Arch::new().dispatch(Mono { signal, hop, window, slots, rows, part });
     }
+    let (aligned, rows) = (slots.aligned(), Parts { rows, part });
     vectorized(
         #[inline(always)]
         || match slots.channels {
-            2 if aligned => groups::<2, 8>(signal, hop, window, slots, rows),
-            4 if aligned => groups::<4, 4>(signal, hop, window, slots, rows),
-            8 if aligned => groups::<8, 2>(signal, hop, window, slots, rows),
-            16 if aligned => groups::<16, 1>(signal, hop, window, slots, rows),
+            2 if aligned => groups::<2, 8, PARTS>(signal, hop, window, slots, rows),
+            4 if aligned => groups::<4, 4, PARTS>(signal, hop, window, slots, rows),
+            8 if aligned => groups::<8, 2, PARTS>(signal, hop, window, slots, rows),
+            16 if aligned => groups::<16, 1, PARTS>(signal, hop, window, slots, rows),
             _ => strided(signal, hop, window, slots, rows),
         },
     );
@@ -66,10 +79,10 @@ pub fn gather(signal: &[f32], hop: usize, window: &[f32], slots: Slots, rows: &m
 pub(super) fn channel<T: Real>(signal: &[T], hop: usize, window: &[f32], rows: &mut [Row]) {
     let slots = Slots { first: 0, len: LANES, channels: 1 };
     match T::as_f32(signal) {
-        Some(signal) => Arch::new().dispatch(Mono { signal, hop, window, slots, rows }),
+        Some(signal) => gather(signal, hop, window, slots, rows),
         None => {
             let signal: Vec<f32> = signal.iter().map(|x| x.wide() as f32).collect();
-            Arch::new().dispatch(Mono { signal: &signal, hop, window, slots, rows });
+            gather(&signal, hop, window, slots, rows);
         }
     }
 }
@@ -141,21 +154,13 @@ impl<T: Real> WithSimd for Turned<'_, T> {
         let frames = |f: usize| &signal[f * hop..][..window.len()];
         // Slot `PAIR * g + j` is in group `g` of the register that frame set `j` fills.
         let sets: [[&[[T; PAIR]]; SLOTS / PAIR]; PAIR] = std::array::from_fn(|j| {
-            std::array::from_fn(|g| frames(PAIR * g + j).as_chunks::<PAIR>().0)
+            std::array::from_fn(|g| &frames(PAIR * g + j).as_chunks::<PAIR>().0[..whole / PAIR])
         });
         let pairs = pairs.as_chunks_mut::<PAIR>().0.iter_mut();
         for (n, (rows, w)) in pairs.zip(window.as_chunks::<PAIR>().0).enumerate() {
-            let mut x = [DoubleRow::EMPTY; PAIR];
-            for (row, set) in x.iter_mut().zip(&sets) {
-                for (group, frame) in row.0.as_chunks_mut::<PAIR>().0.iter_mut().zip(set) {
-                    for (slot, x) in group.iter_mut().zip(&frame[n]) {
-                        *slot = x.wide();
-                    }
-                }
-            }
             for v in 0..DoubleRow::registers::<S>() {
                 // Transposes the square that each group of the two registers makes.
-                let x = [x[0].load::<S>(v), x[1].load::<S>(v)];
+                let x = [pair::<S, T>(&sets[0], v, n), pair::<S, T>(&sets[1], v, n)];
                 let x = simd.deinterleave_shfl_f64s(x);
                 for (row, (x, w)) in rows.iter_mut().zip(x.into_iter().zip(w)) {
                     row.store::<S>(v, simd.mul_f64s(x, simd.splat_f64s(*w)));
@@ -173,15 +178,17 @@ impl<T: Real> WithSimd for Turned<'_, T> {
 
 /// `FRAMES` whole frames of `CHANNELS` channels fill the lanes.
 #[inline(always)]
-fn groups<const CHANNELS: usize, const FRAMES: usize>(
+fn groups<const CHANNELS: usize, const FRAMES: usize, const PARTS: usize>(
     signal: &[f32],
     hop: usize,
     window: &[f32],
     slots: Slots,
-    rows: &mut [Row],
+    rows: Parts<PARTS>,
 ) {
     let frames = Aligned::<CHANNELS, FRAMES>::new(signal, hop, window.len(), slots).0;
-    for (n, (row, w)) in rows.iter_mut().zip(window).enumerate() {
+    let Parts { rows, part } = rows;
+    for (n, (rows, w)) in rows.iter_mut().zip(window).enumerate() {
+        let row = &mut rows[part];
         for (group, frame) in row.0.as_chunks_mut::<CHANNELS>().0.iter_mut().zip(&frames) {
             for (slot, x) in group.iter_mut().zip(&frame[n]) {
                 *slot = x * w;
@@ -190,54 +197,89 @@ fn groups<const CHANNELS: usize, const FRAMES: usize>(
     }
 }
 
-/// Sixteen frames of one channel.
-struct Mono<'a> {
+/// The rows `part` of groups.
+struct Parts<'a, const PARTS: usize> {
+    rows: &'a mut [[Row; PARTS]],
+    part: usize,
+}
+
+/// Frames of one channel, up to sixteen.
+struct Mono<'a, const PARTS: usize> {
     signal: &'a [f32],
     hop: usize,
     window: &'a [f32],
     slots: Slots,
-    rows: &'a mut [Row],
+    rows: &'a mut [[Row; PARTS]],
+    part: usize,
 }
 
 /// Samples of a frame that are read together: a quarter of the widest register.
 const QUAD: usize = 4;
 
-impl WithSimd for Mono<'_> {
+impl<const PARTS: usize> WithSimd for Mono<'_, PARTS> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { signal, hop, window, slots, rows } = self;
+        let Self { signal, hop, window, slots, rows, part } = self;
         let wide = S::F32_LANES.is_multiple_of(QUAD);
         let whole = if wide { rows.len() / QUAD * QUAD } else { 0 };
         let (quads, rest) = rows.split_at_mut(whole);
-        let frames = |f| &signal[(slots.first + f) * hop..][..window.len()];
+        let silence = vec![0.0; if slots.len < LANES { window.len() } else { 0 }];
+        let frames = |f: usize| match f < slots.len {
+            true => &signal[(slots.first + f) * hop..][..window.len()],
+            false => &silence[..],
+        };
         // Slot `QUAD * g + j` is in group `g` of the register that frame set `j` fills.
         let sets: [[&[[f32; QUAD]]; LANES / QUAD]; QUAD] = std::array::from_fn(|j| {
-            std::array::from_fn(|g| frames(QUAD * g + j).as_chunks::<QUAD>().0)
+            std::array::from_fn(|g| &frames(QUAD * g + j).as_chunks::<QUAD>().0[..whole / QUAD])
         });
         let quads = quads.as_chunks_mut::<QUAD>().0.iter_mut();
         for (n, (rows, w)) in quads.zip(window.as_chunks::<QUAD>().0).enumerate() {
-            let x: [Row; QUAD] = std::array::from_fn(|j| {
-                let mut row = Row::ZERO;
-                for (group, frame) in row.0.as_chunks_mut::<QUAD>().0.iter_mut().zip(&sets[j]) {
-                    *group = frame[n];
-                }
-                row
-            });
             for v in 0..Row::registers::<S>() {
                 // Transposes the square that each group of the four registers makes.
-                let x: [S::f32s; QUAD] = std::array::from_fn(|j| x[j].load::<S>(v));
+                let [a, b, c, d] = &sets;
+                let x = [
+                    quad::<S>(a, v, n),
+                    quad::<S>(b, v, n),
+                    quad::<S>(c, v, n),
+                    quad::<S>(d, v, n),
+                ];
                 let x = simd.deinterleave_shfl_f32s(x);
-                for (row, (x, w)) in rows.iter_mut().zip(x.into_iter().zip(w)) {
-                    row.store::<S>(v, simd.mul_f32s(x, simd.splat_f32s(*w)));
+                for (group, (x, w)) in rows.iter_mut().zip(x.into_iter().zip(w)) {
+                    group[part].store::<S>(v, simd.mul_f32s(x, simd.splat_f32s(*w)));
                 }
             }
         }
-        for (n, row) in rest.iter_mut().enumerate() {
+        for (n, group) in rest.iter_mut().enumerate() {
             let n = whole + n;
-            row.0 = std::array::from_fn(|f| frames(f)[n] * window[n]);
+            group[part].0 = std::array::from_fn(|f| frames(f)[n] * window[n]);
         }
+    }
+}
+
+/// Quad `n` of each frame whose slot is in register `v`: joined in registers, as memory would wait for the parts.
+#[inline(always)]
+fn quad<S: Simd>(set: &[&[[f32; QUAD]]; LANES / QUAD], v: usize, n: usize) -> S::f32s {
+    match S::F32_LANES / QUAD {
+        4 => cast([set[0][n], set[1][n], set[2][n], set[3][n]]),
+        2 => cast([set[2 * v][n], set[2 * v + 1][n]]),
+        _ => cast(set[v][n]),
+    }
+}
+
+/// [`quad`] of pairs in double precision.
+#[inline(always)]
+fn pair<S: Simd, T: Real>(
+    set: &[&[[T; PAIR]]; DoubleRow::SLOTS / PAIR],
+    v: usize,
+    n: usize,
+) -> S::f64s {
+    let wide = |g: usize| [set[g][n][0].wide(), set[g][n][1].wide()];
+    match S::F64_LANES / PAIR {
+        4 => cast([wide(0), wide(1), wide(2), wide(3)]),
+        2 => cast([wide(2 * v), wide(2 * v + 1)]),
+        _ => cast(wide(v)),
     }
 }
 
@@ -281,16 +323,22 @@ impl<const CHANNELS: usize, const FRAMES: usize> Frames<Row> for Aligned<'_, CHA
 
 /// Any number of channels, and blocks that are not full: runs of neighbouring channels of a frame.
 #[inline(always)]
-fn strided(signal: &[f32], hop: usize, window: &[f32], slots: Slots, rows: &mut [Row]) {
-    rows.fill(Row::ZERO);
+fn strided<const PARTS: usize>(
+    signal: &[f32],
+    hop: usize,
+    window: &[f32],
+    slots: Slots,
+    Parts { rows, part }: Parts<PARTS>,
+) {
+    rows.iter_mut().for_each(|group| group[part] = Row::ZERO);
     let channels = slots.channels;
     let mut s = 0;
     while s < slots.len {
         let (frame, channel) = slots.pair(s);
         let run = (channels - channel).min(slots.len - s);
         let samples = signal[frame * hop * channels + channel..].chunks(channels);
-        for ((row, w), x) in rows.iter_mut().zip(window).zip(samples) {
-            for (slot, x) in row.0[s..s + run].iter_mut().zip(x) {
+        for ((group, w), x) in rows.iter_mut().zip(window).zip(samples) {
+            for (slot, x) in group[part].0[s..s + run].iter_mut().zip(x) {
                 *slot = x * w;
             }
         }

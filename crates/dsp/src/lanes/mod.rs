@@ -7,19 +7,22 @@
 //! chosen at run time by the `pulp` crate; this module has no unsafe code.
 
 mod complex;
+mod convolution;
 mod decibel;
 mod fft;
 mod gather;
+mod passes;
 mod row;
 mod spectrum;
 mod twiddles;
 mod weighted;
 
-pub(crate) use decibel::decibel_double;
+pub(crate) use convolution::{Change, Convolution};
 pub use decibel::power_to_decibel;
+pub(crate) use decibel::{decibel, decibel_double};
 pub use fft::LaneFft;
-pub(crate) use gather::gather_double;
 pub use gather::{Aligned, Frames, Slots, gather};
+pub(crate) use gather::{gather_double, gather_part};
 pub use row::{DoubleRow, LANES, Lanes, Row};
 pub use spectrum::{Spectrum, square_roots};
 pub use weighted::weighted_sums;

@@ -2,14 +2,14 @@
 
 use std::borrow::Cow;
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 use rayon::prelude::*;
 
 use super::check::check_rates;
 use super::converter::Converter;
 use super::sinc::{SincPlan, resample_sinc};
 use super::{ResType, ResamplePlan};
-use crate::error::Result;
+use crate::error::{DspError, Result};
 use crate::real::{Real, all_finite, part_finite, require_finite};
 use crate::tiles::planar;
 use crate::vector::Lane;
@@ -30,44 +30,106 @@ pub fn resample<T: Lane>(
     fix: bool,
     scale: bool,
 ) -> Result<Array2<T>> {
+    let n = resampled_len(y.ncols(), orig_sr, target_sr, res_type, fix)?;
+    let mut out = Array2::zeros((y.nrows(), n));
+    resample_into(y, orig_sr, target_sr, res_type, scale, out.view_mut())?;
+    Ok(out)
+}
+
+/// Samples that [`resample`] gives for `n`.
+///
+/// # Errors
+/// Impossible rates.
+pub fn resampled_len(
+    n: usize,
+    orig_sr: f64,
+    target_sr: f64,
+    res_type: ResType,
+    fix: bool,
+) -> Result<usize> {
+    check_rates(orig_sr, target_sr)?;
+    if orig_sr == target_sr {
+        return Ok(n);
+    }
+    if fix {
+        return Ok((n as f64 * (target_sr / orig_sr)).ceil() as usize);
+    }
+    Ok(match Converter::shared(orig_sr, target_sr, res_type)? {
+        Converter::Soxr(plan) => plan.filtered_len(n as u64) as usize,
+        Converter::Sinc(plan) => plan.filtered_len(n as u64) as usize,
+    })
+}
+
+/// [`resample`] written into `out [channels, samples]`: what the filters give beyond its samples is left out, and
+/// what they lack is zero.
+///
+/// # Errors
+/// As [`resample`], or an array of other channels or not in C order.
+pub fn resample_into<T: Lane>(
+    y: ArrayView2<T>,
+    orig_sr: f64,
+    target_sr: f64,
+    res_type: ResType,
+    scale: bool,
+    mut out: ArrayViewMut2<T>,
+) -> Result<()> {
     check_rates(orig_sr, target_sr)?;
     let y = planar(y);
     if !all_finite(y.as_slice().expect("contiguous")) {
         require_finite("y", &y)?;
     }
-    if orig_sr == target_sr {
-        return Ok(y.into_owned());
+    let (channels, width) = out.dim();
+    if channels != y.nrows() || !out.is_standard_layout() {
+        let expected = format!("{} channels in C order", y.nrows());
+        return Err(DspError::Shape { name: "out", expected, actual: vec![channels, width] });
     }
-    let ratio = target_sr / orig_sr;
+    let n = y.ncols();
+    let slots = out.as_slice_mut().expect("in C order");
+    if slots.is_empty() {
+        return Ok(());
+    }
     let samples = y.as_slice().expect("contiguous");
-    let mut out = match Converter::shared(orig_sr, target_sr, res_type)? {
-        Converter::Soxr(plan) => resample_hq(y.view(), &plan),
-        Converter::Sinc(plan) => {
-            let n = y.ncols();
-            let mut out = Array2::zeros((y.nrows(), plan.filtered_len(n as u64) as usize));
-            let slots = out.as_slice_mut().expect("made in C order");
-            match (T::as_f32(samples), T::as_f32_mut(slots)) {
-                (Some(samples), Some(slots)) => resample_sinc(samples, n, &plan, slots),
-                _ => {
-                    let fast = res_type == ResType::KaiserFast;
-                    let plan = SincPlan::<T>::new(orig_sr, target_sr, fast)?;
-                    resample_sinc(samples, n, &plan, slots);
-                }
-            }
-            out
+    if orig_sr == target_sr {
+        let channels = samples.chunks_exact(n.max(1));
+        let rows = beginnings(slots, width, n as u64);
+        rows.zip(channels).for_each(|(row, y)| row.copy_from_slice(&y[..row.len()]));
+        return Ok(());
+    }
+    match Converter::shared(orig_sr, target_sr, res_type)? {
+        Converter::Soxr(plan) => {
+            let rows = beginnings(slots, width, plan.filtered_len(n as u64));
+            resample_hq(samples, n, &plan, rows);
         }
-    };
-    let n_out = (y.ncols() as f64 * ratio).ceil() as usize;
-    if fix && out.ncols() != n_out {
-        let mut fixed = Array2::zeros((out.nrows(), n_out));
-        let common = n_out.min(out.ncols());
-        fixed.slice_mut(ndarray::s![.., ..common]).assign(&out.slice(ndarray::s![.., ..common]));
-        out = fixed;
+        Converter::Sinc(plan) => {
+            let rows = beginnings(slots, width, plan.filtered_len(n as u64));
+            if let Some(single) = T::as_f32(samples) {
+                resample_sinc(single, n, &plan, rows.filter_map(T::as_f32_mut));
+            } else {
+                let fast = res_type == ResType::KaiserFast;
+                let plan = SincPlan::<T>::new(orig_sr, target_sr, fast)?;
+                resample_sinc(samples, n, &plan, rows);
+            }
+        }
     }
     if scale {
-        out.mapv_inplace(|v| T::of(v.wide() / ratio.sqrt()));
+        let divisor = (target_sr / orig_sr).sqrt();
+        out.mapv_inplace(|v| T::of(v.wide() / divisor));
     }
-    Ok(out)
+    Ok(())
+}
+
+/// The first `length` values, or all, of every row of `width` values; the rest becomes zero.
+fn beginnings<T: Real>(
+    rows: &mut [T],
+    width: usize,
+    length: u64,
+) -> impl Iterator<Item = &mut [T]> {
+    let length = (length as usize).min(width);
+    rows.chunks_exact_mut(width).map(move |row| {
+        let (first, rest) = row.split_at_mut(length);
+        rest.fill(T::zero());
+        first
+    })
 }
 
 /// The last `count` samples of [`resample`] of one channel by libsoxr's filters, or all of them
@@ -124,16 +186,19 @@ pub(crate) fn before_last(orig_sr: f64, target_sr: f64, frames: u64, count: usiz
     Ok(if same { left_out } else { 0 })
 }
 
-/// `y` has contiguous channels.
-fn resample_hq<T: Real>(y: ArrayView2<T>, plan: &ResamplePlan) -> Array2<T> {
-    let ((channels, n), span) = (y.dim(), plan.span());
-    let mut out = Array2::zeros((channels, plan.filtered_len(n as u64) as usize));
-    let rows = out.outer_iter_mut().zip(y.outer_iter()).flat_map(|(row, signal)| {
-        let signal = signal.to_slice().expect("contiguous");
-        let spans = row.into_slice().expect("made in C order").chunks_mut(span).enumerate();
+/// Channels of `n` samples one after another into `rows`.
+fn resample_hq<'a, T: Lane>(
+    y: &[T],
+    n: usize,
+    plan: &ResamplePlan,
+    rows: impl Iterator<Item = &'a mut [T]>,
+) {
+    let span = plan.span();
+    let spans = rows.zip(y.chunks_exact(n.max(1))).flat_map(|(row, signal)| {
+        let spans = row.chunks_mut(span).enumerate();
         spans.map(move |(i, out)| (i * span, out, signal))
     });
-    let spans: Vec<_> = rows.collect();
+    let spans: Vec<_> = spans.collect();
     spans.into_par_iter().for_each(|(first, out, signal)| {
         let range = first as u64..(first + out.len()) as u64;
         let needed = plan.input_range(range.clone());
@@ -141,9 +206,11 @@ fn resample_hq<T: Real>(y: ArrayView2<T>, plan: &ResamplePlan) -> Array2<T> {
         let signal = &signal[start..(needed.end.max(0) as usize).clamp(start, n)];
         let single = || Cow::Owned(signal.iter().map(|v| v.wide() as f32).collect());
         let samples = T::as_f32(signal).map_or_else(single, Cow::Borrowed);
-        let converted = plan.segment(1, range, &samples, start as u64);
-        let converted = converted.expect("one channel is whole frames");
-        out.iter_mut().zip(converted).for_each(|(slot, v)| *slot = T::of(f64::from(v)));
+        if let Some(out) = T::as_f32_mut(out) {
+            return plan.segment_into(1, range, &samples, start as u64, out);
+        }
+        let mut made = vec![0.0; out.len()];
+        plan.segment_into(1, range, &samples, start as u64, &mut made);
+        out.iter_mut().zip(made).for_each(|(slot, v)| *slot = T::of(f64::from(v)));
     });
-    out
 }

@@ -1,8 +1,8 @@
 //! The inner loops, on whatever vector unit the machine has.
 //!
 //! Every output is `fma(tap, sample, sum)` over the taps in a fixed order, whatever the vector
-//! width: the results are the same bits on every machine, block size and channel layout. (Halving by
-//! transforms, in `halve.rs`, may differ between machines.)
+//! width: the results are the same bits on every machine, block size and channel layout. (Long filters
+//! by transforms, in `overlap_save.rs`, may differ between machines.)
 
 use pulp::{Arch, Simd, WithSimd};
 

@@ -14,12 +14,14 @@ mod kaiser;
 mod kernel;
 mod low_pass;
 mod overlap_save;
+mod poly;
 mod rounded;
 mod sinc;
 mod stage;
 mod stream;
 mod strided;
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
@@ -28,8 +30,8 @@ use crate::error::{Result, from_name};
 use check::{check_interleaved, check_rates};
 use stage::{Frames, Stage};
 
-pub use array::resample;
 pub(crate) use array::{before_last, resample_last};
+pub use array::{resample, resample_into, resampled_len};
 pub use converter::{Converter, ConverterStream};
 pub(crate) use kaiser::halving;
 pub use sinc::{SincPlan, SincStream};
@@ -81,8 +83,7 @@ impl ResamplePlan {
         let chain =
             if orig_sr == target_sr { Vec::new() } else { design::chain(orig_sr / target_sr) };
         let grain = period(orig_sr, target_sr).map_or(1, |(inputs, _)| inputs as usize);
-        let stages = chain.iter().map(|design| Stage::new(design, grain)).collect();
-        Ok(Self { orig_sr, target_sr, stages })
+        Ok(Self { orig_sr, target_sr, stages: Stage::chain(&chain, grain) })
     }
 
     /// Input rate in hertz.
@@ -158,6 +159,20 @@ impl ResamplePlan {
         start: u64,
     ) -> Result<Vec<f32>> {
         check_interleaved(channels, input)?;
+        let mut made = vec![0.0; (out.end - out.start) as usize * channels];
+        self.segment_into(channels, out, input, start, &mut made);
+        Ok(made)
+    }
+
+    /// [`segment`](Self::segment) of whole frames written into `made`.
+    fn segment_into(
+        &self,
+        channels: usize,
+        out: Range<u64>,
+        input: &[f32],
+        start: u64,
+        made: &mut [f32],
+    ) {
         let mut range = out.start as i64..out.end as i64;
         let mut steps = Vec::with_capacity(self.stages.len());
         for stage in self.stages.iter().rev() {
@@ -165,16 +180,24 @@ impl ResamplePlan {
             steps.push((stage, std::mem::replace(&mut range, from.clone()), from));
         }
         let mut data = covering(channels, &range, input, start as i64);
-        for (stage, to, from) in steps.into_iter().rev() {
-            let out = clip(&to);
-            let mut next = vec![0.0; (out.start as i64 - to.start) as usize * channels];
+        let Some((last, earlier)) = steps.split_first() else {
+            return made.copy_from_slice(&data);
+        };
+        for (stage, to, from) in earlier.iter().rev() {
+            let mut next = vec![0.0; (to.end - to.start) as usize * channels];
+            let out = clip(to);
             if !out.is_empty() {
                 let input = Frames { data: &data, start: from.start };
-                stage.run(channels, out, input, &mut next);
+                let before = (out.start as i64 - to.start) as usize * channels;
+                stage.run(channels, out.start, input, &mut next[before..]);
             }
-            data = next;
+            data = Cow::Owned(next);
         }
-        Ok(data)
+        let (stage, to, from) = last;
+        if !to.is_empty() {
+            let input = Frames { data: &data, start: from.start };
+            stage.run(channels, to.start as u64, input, made);
+        }
     }
 }
 
@@ -203,16 +226,28 @@ fn clip(range: &Range<i64>) -> Range<u64> {
 }
 
 /// Frames `range` cut from `input`, which begins at frame `start`; zeros where it has none.
-fn covering(channels: usize, range: &Range<i64>, input: &[f32], start: i64) -> Vec<f32> {
-    let mut data = vec![0.0; (range.end - range.start).max(0) as usize * channels];
+fn covering<'a>(
+    channels: usize,
+    range: &Range<i64>,
+    input: &'a [f32],
+    start: i64,
+) -> Cow<'a, [f32]> {
     let end = start + (input.len() / channels) as i64;
     let (from, to) = (range.start.max(start), range.end.min(end));
-    if from < to {
-        let source = &input[(from - start) as usize * channels..(to - start) as usize * channels];
-        let at = (from - range.start) as usize * channels;
-        data[at..at + source.len()].copy_from_slice(source);
+    let source = match from < to {
+        true => &input[(from - start) as usize * channels..(to - start) as usize * channels],
+        false => &[],
+    };
+    let needed = (range.end - range.start).max(0) as usize * channels;
+    if source.len() == needed {
+        return Cow::Borrowed(source);
     }
-    data
+    let mut data = vec![0.0; needed];
+    let at = (from - range.start).max(0) as usize * channels;
+    if let Some(slots) = data.get_mut(at..at + source.len()) {
+        slots.copy_from_slice(source);
+    }
+    Cow::Owned(data)
 }
 
 #[cfg(test)]

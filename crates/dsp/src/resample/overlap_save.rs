@@ -1,51 +1,64 @@
-//! A long symmetric filter by fast transforms of sixteen blocks at once, at the rate or half of it.
+//! A long symmetric filter by fast transforms of thirty-two blocks at once.
 
 use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
-use realfft::RealFftPlanner;
-
+use super::common;
+use super::poly::Poly;
 use super::stage::Frames;
-use crate::lanes::{LANES, LaneFft, Row, Slots, gather};
+use crate::lanes::{Change, Convolution, LANES, Row, Slots, gather_part};
 use crate::pool::Pool;
-use crate::simd::vectorized;
 
 /// How much less than the length of a transform samples become, so that no sum is infinite whose
 /// result is not: a power of two, so that no bit changes.
 const HEADROOM: f32 = 64.0;
-/// Fewest taps that are worth transforms.
+/// Fewest taps that are worth transforms, at the rate of the input.
 const LEAST_TAPS: usize = 96;
+/// Logarithms of the lengths of transforms.
+const LENGTHS: Range<u32> = 8..14;
+/// Points of a transform whose rows fit the nearest cache but one, and how much more longer ones cost.
+const CACHED: usize = 2048;
+const BEYOND: f64 = 1.2;
 
-/// A symmetric filter of odd length that keeps every output or every second, by overlap-save.
+/// A symmetric filter of odd length that may double the rate, then keeps some of its outputs or interpolates
+/// between them, by overlap-save.
 ///
-/// Outputs come in blocks that begin at multiples of the length of one, each from a transform of its
-/// own: how the input is cut changes no bits. Machines with and without fused multiply-add may differ
-/// in the last bits.
+/// Outputs come in blocks that begin at multiples of the length of one. Two neighbouring blocks are the real and
+/// the imaginary part of a transform of their own: how the input is cut changes no bits. Machines with
+/// and without fused multiply-add may differ in the last bits.
 #[derive(Clone)]
 pub(super) struct OverlapSave(Arc<Tables>);
 
 struct Tables {
-    /// 1, or 2 where every second output is kept.
-    down: usize,
-    /// Frames of a block before that of its first output: the reach of the filter, or one more.
+    convolution: Convolution,
+    after: After,
+    /// Frames of a block before that of its first output.
     before: usize,
-    /// Outputs of a block.
+    /// Row of a result that its first output is, or begins with.
+    from: usize,
+    /// Filtered samples before those of a block that its outputs depend on.
+    earlier: usize,
+    /// Inputs from one block to the next.
     block: usize,
-    forward: LaneFft,
-    /// Back to time, of as many points for each output that is kept.
-    back: LaneFft,
-    /// The real response of each bin, over the lengths of both transforms.
-    response: Vec<f32>,
+    /// Outputs of a block.
+    made: usize,
     /// A power of two that keeps the sums of transforms in range, however large the samples are.
     window: Vec<f32>,
     memory: Pool<Memory>,
 }
 
+/// What becomes of the samples that the filter gives.
+enum After {
+    /// Every so-manieth is kept.
+    Kept(usize),
+    Interpolated(Poly),
+}
+
 #[derive(Default)]
 struct Memory {
-    frames: Vec<Row>,
-    spectrum: Vec<Row>,
+    circle: Vec<[Row; 2]>,
+    made: Vec<[Row; 2]>,
 }
 
 impl fmt::Debug for OverlapSave {
@@ -54,166 +67,219 @@ impl fmt::Debug for OverlapSave {
     }
 }
 
+/// What binds the lengths of blocks.
+struct Measure {
+    /// Inputs of which a block has a multiple.
+    multiple: usize,
+    /// Inputs around a block that its outputs depend on.
+    around: usize,
+}
+
+impl Measure {
+    /// The length of transform that takes least for each sample, and the inputs of its blocks.
+    fn length_and_block(&self) -> Option<(usize, usize)> {
+        let block = |n: usize| n.saturating_sub(self.around) / self.multiple * self.multiple;
+        let cost = |(n, block): (usize, usize)| {
+            let longer = if n > CACHED { BEYOND } else { 1.0 };
+            longer * (n as f64 * (n as f64).log2()) / block as f64
+        };
+        let lengths = LENGTHS.map(|e| (1 << e, block(1 << e))).filter(|(_, block)| *block > 0);
+        lengths.min_by(|a, b| cost(*a).total_cmp(&cost(*b)))
+    }
+}
+
 impl OverlapSave {
-    /// `down` is 1 or 2; blocks are a multiple of `grain` inputs, where one has so many. `None` where the
-    /// filter is too short for transforms.
-    pub fn new(taps: &[f64], down: usize, grain: usize) -> Option<Self> {
-        if taps.len() < LEAST_TAPS || taps.len().is_multiple_of(2) || !(1..=2).contains(&down) {
+    /// `up` and `down` are the rate's change; two blocks are a multiple of `grain` inputs, where they have so many.
+    /// `None` where the filter is too short for transforms, or the rate rises by more than 2.
+    pub fn new(taps: &[f64], (up, down): (usize, usize), grain: usize) -> Option<Self> {
+        let (change, kept) = match (up, down) {
+            (1, down) if down.is_multiple_of(2) => (Change::Half, down / 2),
+            (1, down) => (Change::Same, down),
+            (2, down) => (Change::Double, down),
+            _ => return None,
+        };
+        Self::followed(taps, change, After::Kept(kept), grain)
+    }
+
+    /// [`new`](Self::new) with an interpolator behind the filter; `None` also where its places do not repeat.
+    pub fn interpolating(
+        taps: &[f64],
+        rates: (usize, usize),
+        poly: Poly,
+        grain: usize,
+    ) -> Option<Self> {
+        let change = match rates {
+            (1, 1) => Change::Same,
+            (2, 1) => Change::Double,
+            _ => return None,
+        };
+        Self::followed(taps, change, After::Interpolated(poly), grain)
+    }
+
+    fn followed(taps: &[f64], change: Change, after: After, grain: usize) -> Option<Self> {
+        let rate = change.of(2);
+        if 2 * taps.len() < rate.max(2) * LEAST_TAPS || taps.len().is_multiple_of(2) {
             return None;
         }
-        let reach = taps.len() / 2;
-        let before = reach.next_multiple_of(2);
-        let n = (4 * taps.len()).next_power_of_two();
-        // The filter around sample 0 of a circle: its transform is real.
-        let mut circle = vec![0.0; n];
-        for (i, tap) in taps.iter().enumerate() {
-            circle[(n + i - reach) % n] = *tap;
-        }
-        let fft = RealFftPlanner::<f64>::new().plan_fft_forward(n);
-        let mut bins = fft.make_output_vec();
-        fft.process(&mut circle, &mut bins).ok()?;
-        let block = (n - 1 - before - reach) / down + 1;
-        let grain = if grain.is_multiple_of(down) { grain / down } else { grain };
-        let block = if grain <= block { block / grain * grain } else { block };
+        // Of the filtered samples: those from one place to the next that is alike, the outputs that they become, and
+        // what lies around those of a block.
+        let (between, outputs, earlier, later) = match &after {
+            After::Kept(kept) => (*kept, 1, 0, 0),
+            After::Interpolated(poly) => {
+                let (between, outputs) = poly.period()?;
+                let reach = poly.input_range(&(0..1));
+                (between as usize, outputs as usize, -reach.start as usize, reach.end as usize)
+            }
+        };
+        let times = rate / common(rate as u128, 2 * between as u128) as usize;
+        let inputs = 2 * between * times / rate;
+        let reach = (taps.len() / 2).div_ceil(rate.div_ceil(2));
+        let around = |samples: usize| reach + (2 * samples).div_ceil(rate);
+        let (before, behind) = (around(earlier).next_multiple_of(2), around(later));
+        let half = grain / common(grain as u128, 2) as usize;
+        let coarse = inputs / common(inputs as u128, half as u128) as usize * half;
+        let measure = |multiple| Measure { multiple, around: before + behind };
+        let measures = [measure(coarse), measure(inputs)];
+        let (n, block) = measures.iter().find_map(Measure::length_and_block)?;
+        let convolution = Convolution::new(taps, n, change);
+        let scale = 1.0 / (convolution.rows() as f32 * HEADROOM);
         Some(Self(Arc::new(Tables {
-            down,
+            after,
             before,
+            from: change.of(before) - earlier,
+            earlier,
             block,
-            forward: LaneFft::new(n).ok()?,
-            back: LaneFft::new(n / down).ok()?,
-            response: bins.iter().map(|bin| bin.re as f32).collect(),
-            window: vec![1.0 / (n as f32 * HEADROOM); n],
+            made: block / inputs * outputs * times,
+            window: vec![scale; n],
+            convolution,
             memory: Pool::default(),
         })))
     }
 
+    /// Outputs of two neighbouring blocks.
+    fn pair(&self) -> u64 {
+        2 * self.0.made as u64
+    }
+
     /// Outputs of each channel that one pass over the lanes makes.
     pub fn pass(&self, channels: usize) -> u64 {
-        ((LANES / channels).max(1) * self.0.block) as u64
+        (LANES / channels).max(1) as u64 * self.pair()
     }
 
     /// [`Self::pass`] of one channel.
     pub fn span(&self) -> usize {
-        LANES * self.0.block
+        self.pass(1) as usize
     }
 
-    /// Inputs from one block to the next.
-    pub fn step(&self) -> usize {
-        self.0.down * self.0.block
+    /// Inputs from one pair of blocks to the next, and the change of rate as a fraction.
+    pub fn repeats(&self) -> (u64, u64, u64) {
+        let Tables { block, made, .. } = *self.0;
+        let both = common(block as u128, made as u128) as u64;
+        (2 * block as u64, made as u64 / both, block as u64 / both)
     }
 
-    /// Outputs for one of which there are so many inputs.
-    pub fn down(&self) -> usize {
-        self.0.down
-    }
-
-    /// Input frames that cover the blocks of outputs `out`.
+    /// Input frames that cover the pairs of blocks of outputs `out`.
     pub fn input_range(&self, out: &Range<u64>) -> Range<i64> {
-        let blocks = self.blocks(out);
-        let (first, last) = (blocks.start as i64, blocks.end as i64 - 1);
-        let start = |block: i64| block * self.step() as i64 - self.0.before as i64;
-        start(first)..start(last) + self.0.forward.n_fft() as i64
+        let pairs = self.pairs(out);
+        let first = |pair: u64| pair as i64 * 2 * self.0.block as i64 - self.0.before as i64;
+        first(pairs.start)..first(pairs.end - 1) + self.reach() as i64
     }
 
-    /// Outputs whose blocks are complete when inputs before `end` are known.
+    /// Inputs that a pair of blocks depends on.
+    fn reach(&self) -> usize {
+        self.0.block + self.0.window.len()
+    }
+
+    /// Outputs whose pairs of blocks are complete when inputs before `end` are known.
     pub fn available(&self, end: i64) -> u64 {
-        let past = end + self.0.before as i64 - self.0.forward.n_fft() as i64;
-        let step = self.step() as i64;
-        if past < 0 { 0 } else { (past / step + 1) as u64 * self.0.block as u64 }
+        let past = end + self.0.before as i64 - self.reach() as i64;
+        if past < 0 { 0 } else { (past as u64 / (2 * self.0.block as u64) + 1) * self.pair() }
     }
 
-    /// The blocks of outputs `out`.
-    fn blocks(&self, out: &Range<u64>) -> Range<u64> {
-        let block = self.0.block as u64;
-        out.start / block..out.end.div_ceil(block)
+    /// The pairs of blocks of outputs `out`.
+    fn pairs(&self, out: &Range<u64>) -> Range<u64> {
+        out.start / self.pair()..out.end.div_ceil(self.pair())
     }
 
-    /// Appends outputs `out` (interleaved) computed from `input`, which covers
+    /// Outputs from number `first` on into `to` (interleaved), computed from `input`, which covers
     /// [`Self::input_range`].
-    pub fn run(&self, channels: usize, out: Range<u64>, input: Frames, to: &mut Vec<f32>) {
-        let Tables { block, window, .. } = &*self.0;
-        let blocks = self.blocks(&out);
-        let base = to.len();
-        to.resize(base + (out.end - out.start) as usize * channels, 0.0);
-        let to = &mut to[base..];
-        let from = (self.input_range(&out).start - input.start) as usize * channels;
-        let signal = &input.data[from..];
-        let mut memory = self.0.memory.take();
-        memory.frames.resize(window.len(), Row::ZERO);
-        memory.spectrum.resize(window.len() + 2, Row::ZERO);
-        for slots in Slots::blocks((blocks.end - blocks.start) as usize, channels) {
-            gather(signal, self.step(), window, slots, &mut memory.frames);
-            self.filter(&mut memory);
-            for s in 0..slots.len {
-                let (at, channel) = slots.pair(s);
-                let first = (blocks.start + at as u64) * *block as u64;
-                let skipped = out.start.saturating_sub(first) as usize;
-                let kept = (out.end - first).min(*block as u64) as usize;
-                let place = (first + skipped as u64 - out.start) as usize * channels + channel;
-                let rows = &memory.frames[skipped..kept];
-                if channels == 1 {
-                    to[place..].iter_mut().zip(rows).for_each(|(slot, row)| *slot = row.0[s]);
+    pub fn run(&self, channels: usize, first: u64, input: Frames, to: &mut [f32]) {
+        let Tables { convolution, after, from, earlier, block, made, window, memory, .. } =
+            &*self.0;
+        let out = first..first + (to.len() / channels) as u64;
+        let pairs = self.pairs(&out);
+        let start = (self.input_range(&out).start - input.start) as usize * channels;
+        let signal = &input.data[start..];
+        let mut work = memory.take();
+        work.circle.resize(convolution.rows(), [Row::ZERO; 2]);
+        for slots in Slots::blocks((pairs.end - pairs.start) as usize, channels) {
+            let circle = &mut work.circle[..window.len()];
+            gather_part(signal, 2 * block, window, slots, circle, 0);
+            gather_part(&signal[block * channels..], 2 * block, window, slots, circle, 1);
+            convolution.run(&mut work.circle);
+            let rows = &mut work.circle[*from..];
+            if pairs.start == 0 {
+                // The filter gives nothing before its first output.
+                let first = (0..slots.len).filter(|s| slots.pair(*s).0 == 0);
+                for s in first {
+                    rows[..*earlier].iter_mut().for_each(|[_, row]| row.0[s] = 0.0);
+                }
+            }
+            let rows = &*rows;
+            let (rows, apart) = match after {
+                After::Kept(apart) => (rows, *apart),
+                After::Interpolated(poly) => {
+                    work.made.resize(*made, [Row::ZERO; 2]);
+                    poly.run_rows(rows, &mut work.made);
+                    (&work.made[..], 1)
+                }
+            };
+            let whole = Made { rows, apart, count: *made, channels };
+            whole.scatter(slots, pairs.start, &out, to);
+        }
+        memory.give_back(work);
+    }
+}
+
+/// Outputs of a pass.
+struct Made<'a> {
+    /// Of both blocks of a pair, the second first; outputs are `apart` rows apart.
+    rows: &'a [[Row; 2]],
+    apart: usize,
+    /// Outputs of a block.
+    count: usize,
+    channels: usize,
+}
+
+impl Made<'_> {
+    /// Writes the outputs `out` that are among those of `slots` to their places in `to`; slots begin with pair
+    /// `first`.
+    fn scatter(&self, slots: Slots, first: u64, out: &Range<u64>, to: &mut [f32]) {
+        let Self { rows, apart, count, channels } = *self;
+        let mut s = 0;
+        while s < slots.len {
+            let (pair, channel) = slots.pair(s);
+            // Neighbouring channels are neighbours on both sides.
+            let run = (channels - channel).min(slots.len - s);
+            for (part, second) in [(1, 0), (0, 1)] {
+                let block = (2 * (first + pair as u64) + second) * count as u64;
+                let (from, end) = (out.start.max(block), out.end.min(block + count as u64));
+                if from >= end {
                     continue;
                 }
-                let places = to[place..].chunks_mut(channels);
-                places.zip(rows).for_each(|(frame, row)| frame[0] = row.0[s]);
+                let kept = rows[(from - block) as usize * apart..].iter().step_by(apart);
+                let place = (from - out.start) as usize * channels + channel;
+                let places = to[place..].chunks_mut(channels).take((end - from) as usize);
+                match run {
+                    1 => places.zip(kept).for_each(|(to, row)| to[0] = HEADROOM * row[part].0[s]),
+                    _ => places.zip(kept).for_each(|(to, row)| {
+                        let values = row[part].0[s..s + run].iter();
+                        to.iter_mut().zip(values).for_each(|(slot, x)| *slot = HEADROOM * x);
+                    }),
+                }
             }
+            s += run;
         }
-        self.0.memory.give_back(memory);
-    }
-
-    /// Blocks of samples to blocks of outputs, at the start of `frames`.
-    fn filter(&self, Memory { frames, spectrum }: &mut Memory) {
-        let Tables { down, before, block, forward, back, response, .. } = &*self.0;
-        let n = back.n_fft();
-        forward.complex(frames, spectrum);
-        let bins = spectrum.as_chunks::<2>().0;
-        vectorized(
-            #[inline(always)]
-            || {
-                // The spectrum of a real signal becomes a real sequence, whose transform is that signal,
-                // mirrored halves added and subtracted (Hartley's transform). Where every second
-                // output is kept, bins above half of those that remain fold down onto them.
-                for k in 0..=n / 2 {
-                    let mirrored = n - k;
-                    let (w, [re, im]) = (response[k], &bins[k]);
-                    let (mut sum, mut difference) = (Row::ZERO, Row::ZERO);
-                    if *down == 1 {
-                        for s in 0..LANES {
-                            difference.0[s] = w * re.0[s] - w * im.0[s];
-                            sum.0[s] = w * re.0[s] + w * im.0[s];
-                        }
-                    } else {
-                        let (v, [high_re, high_im]) = (response[mirrored], &bins[mirrored]);
-                        for s in 0..LANES {
-                            let real = w * re.0[s] + v * high_re.0[s];
-                            let imaginary = w * im.0[s] - v * high_im.0[s];
-                            difference.0[s] = real - imaginary;
-                            sum.0[s] = real + imaginary;
-                        }
-                    }
-                    frames[k] = difference;
-                    if k > 0 {
-                        frames[mirrored] = sum;
-                    }
-                }
-            },
-        );
-        let spectrum = &mut spectrum[..n + 2];
-        back.complex(&mut frames[..n], spectrum);
-        let bins = spectrum.as_chunks::<2>().0;
-        vectorized(
-            #[inline(always)]
-            || {
-                for (at, row) in (before / down..).zip(&mut frames[..*block]) {
-                    let (bin, sign) = if at <= n / 2 { (at, -1.0) } else { (n - at, 1.0) };
-                    let [re, im] = &bins[bin];
-                    for s in 0..LANES {
-                        row.0[s] = HEADROOM * (re.0[s] + sign * im.0[s]);
-                    }
-                }
-            },
-        );
     }
 }
 
@@ -223,13 +289,14 @@ mod tests {
 
     #[test]
     fn outputs_are_sums_of_products_for_any_channels_and_range() {
-        let taps: Vec<f64> = (0..97)
-            .map(|i| (f64::from(i) - 48.0) * 0.8)
+        let taps: Vec<f64> = (0..197)
+            .map(|i| (f64::from(i) - 98.0) * 0.8)
             .map(|x| if x == 0.0 { 0.3 } else { 0.3 * x.sin() / x })
             .collect();
-        for (down, grain) in [(1, 1), (1, 30), (2, 1), (2, 12)] {
-            let filter = OverlapSave::new(&taps, down, grain).unwrap();
-            assert!(filter.step().is_multiple_of(grain), "{down} {grain}");
+        let rates = [(1, 1), (1, 2), (1, 3), (2, 1), (2, 3)];
+        for ((up, down), grain) in rates.into_iter().zip([1, 30, 12, 1, 7]) {
+            let filter = OverlapSave::new(&taps, (up, down), grain).unwrap();
+            assert!(filter.repeats().0.is_multiple_of(grain as u64), "{up} {down} {grain}");
             let x = |frame: i64, channel: usize| {
                 let n = (frame.rem_euclid(1 << 20)) as usize * 7 + channel * 13;
                 ((n * n) % 199) as f32 / 199.0 - 0.5
@@ -239,34 +306,35 @@ mod tests {
                     let needed = filter.input_range(&out);
                     assert!(filter.available(needed.end) >= out.end);
                     assert!(
-                        filter.available(needed.end - 1)
-                            < out.end.next_multiple_of(filter.0.block as u64)
+                        filter.available(needed.end - 1) < out.end.next_multiple_of(filter.pair())
                     );
                     let start = needed.start - 3;
                     let data: Vec<f32> = (start..needed.end)
                         .flat_map(|frame| (0..channels).map(move |c| x(frame, c)))
                         .collect();
-                    let mut got = Vec::new();
-                    filter.run(channels, out.clone(), Frames { data: &data, start }, &mut got);
-                    assert_eq!(got.len(), (out.end - out.start) as usize * channels);
+                    let mut got = vec![0.0; (out.end - out.start) as usize * channels];
+                    filter.run(channels, out.start, Frames { data: &data, start }, &mut got);
                     let frames = out.clone().zip(got.chunks_exact(channels));
                     for (o, frame) in frames.step_by(7) {
                         for (c, y) in frame.iter().enumerate() {
-                            let first = down as i64 * o as i64 - 48;
-                            let want: f64 =
-                                (first..).zip(&taps).map(|(i, w)| w * f64::from(x(i, c))).sum();
+                            let first = (down as u64 * o) as i64 - 98;
+                            let term = |(i, w): (i64, &f64)| {
+                                let hit = i.rem_euclid(up as i64) == 0;
+                                if hit { w * f64::from(x(i.div_euclid(up as i64), c)) } else { 0.0 }
+                            };
+                            let want: f64 = (first..).zip(&taps).map(term).sum();
                             assert!((f64::from(*y) - want).abs() < 1e-6, "{o} {c}: {y} for {want}");
                         }
                     }
                 }
             }
+            for channels in 1..=40 {
+                let slots = (filter.pass(channels) / filter.pair()) as usize * channels;
+                assert!(slots <= LANES.max(channels), "one pass of {channels} channels");
+            }
         }
-        let filter = OverlapSave::new(&taps, 2, 1).unwrap();
-        for channels in 1..=40 {
-            let slots = filter.pass(channels) as usize / filter.0.block * channels;
-            assert!(slots <= LANES.max(channels), "one pass of {channels} channels");
-        }
-        assert!(OverlapSave::new(&taps[1..], 2, 1).is_none());
-        assert!(OverlapSave::new(&taps[..31], 2, 1).is_none());
+        assert!(OverlapSave::new(&taps[1..], (1, 2), 1).is_none());
+        assert!(OverlapSave::new(&taps[..31], (1, 2), 1).is_none());
+        assert!(OverlapSave::new(&taps, (3, 1), 1).is_none());
     }
 }

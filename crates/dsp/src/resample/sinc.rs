@@ -186,13 +186,15 @@ fn phases(orig_sr: f64, target_sr: f64) -> Option<usize> {
     usize::try_from(target / a).ok()
 }
 
-/// `y`, channels of `n` samples one after another, at another rate: channels of
-/// [`SincPlan::filtered_len`] samples, into `out`.
-pub(super) fn resample_sinc<T: Lane>(y: &[T], n: usize, plan: &SincPlan<T>, out: &mut [T]) {
+/// `y`, channels of `n` samples one after another, at another rate into `rows`: of
+/// [`SincPlan::filtered_len`] samples, the first ones or all.
+pub(super) fn resample_sinc<'a, T: Lane>(
+    y: &[T],
+    n: usize,
+    plan: &SincPlan<T>,
+    rows: impl Iterator<Item = &'a mut [T]>,
+) {
     let length = plan.filtered_len(n as u64) as usize;
-    if length == 0 {
-        return;
-    }
     // Times are sums of steps: those of the spans' first outputs, in order.
     let mut time = 0.0;
     let starts: Vec<f64> = (0..length)
@@ -202,9 +204,8 @@ pub(super) fn resample_sinc<T: Lane>(y: &[T], n: usize, plan: &SincPlan<T>, out:
             start
         })
         .collect();
-    let spans: Vec<_> = out
-        .chunks_exact_mut(length)
-        .zip(y.chunks_exact(n))
+    let spans: Vec<_> = rows
+        .zip(y.chunks_exact(n.max(1)))
         .flat_map(|(row, signal)| {
             let spans = row.chunks_mut(SPAN).zip(&starts);
             spans.map(move |(out, start)| (out, signal, *start))

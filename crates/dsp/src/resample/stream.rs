@@ -9,8 +9,8 @@ use super::stage::Frames;
 use crate::error::Result;
 
 /// Converts interleaved frames as they come; the outputs do not depend on how the input is cut into
-/// blocks. Output lags by the filters' reach, where a filter is long by a pass of transforms: 16 blocks of
-/// one channel, 2 of eight, of up to eight times the filter's length.
+/// blocks. Output lags by the filters' reach, where a filter is long by a pass of transforms: 32 blocks of
+/// one channel, 4 of eight, of up to eight times the filter's length.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -101,10 +101,10 @@ impl ResampleStream {
             let available = stage.available(end);
             let left = if ends { 0 } else { available % stage.pass(channels) };
             let ready: Range<u64> = buffer.next..(available - left).max(buffer.next);
-            let mut made = Vec::new();
+            let mut made = vec![0.0; (ready.end - ready.start) as usize * channels];
             if !ready.is_empty() {
                 let frames = Frames { data: &buffer.data, start: buffer.start };
-                stage.run(channels, ready.clone(), frames, &mut made);
+                stage.run(channels, ready.start, frames, &mut made);
                 buffer.next = ready.end;
                 let first = stage.input_range(&(ready.end..ready.end + 1)).start;
                 let spent = (first - buffer.start).clamp(0, end - buffer.start) as usize;

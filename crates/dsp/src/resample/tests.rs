@@ -146,6 +146,26 @@ fn passes_in_the_middle_of_a_stream() {
     }
 }
 
+/// Ends included: a filter gives nothing before its first output.
+#[test]
+fn stages_that_are_joined_give_what_they_give_apart() {
+    for (from, to) in [(8000.0, 22050.0), (44100.0, 16000.0), (44100.0, 48000.0)] {
+        let plan = ResamplePlan::new(from, to).unwrap();
+        let designs = design::chain(from / to);
+        let apart = designs.chunks(1).flat_map(|design| Stage::chain(design, 1)).collect();
+        let apart = ResamplePlan { stages: apart, ..plan.clone() };
+        assert!(plan.stages.len() < apart.stages.len());
+        for n in [1, 300, 20_000] {
+            let (y, all) = (noise(n, 11), 0..plan.filtered_len(n as u64));
+            let got = plan.segment(1, all.clone(), &y, 0).unwrap();
+            let want = apart.segment(1, all, &y, 0).unwrap();
+            for (o, (got, want)) in got.iter().zip(&want).enumerate() {
+                assert!((got - want).abs() < 1e-6, "{from} -> {to}, {o}: {got} for {want}");
+            }
+        }
+    }
+}
+
 #[test]
 fn energy_scale() {
     let y = Array2::from_shape_vec((1, 1000), noise(1000, 3)).unwrap();

@@ -16,11 +16,11 @@ use ndarray::{Array3, ArrayView2, ArrayView3, Axis, CowArray, Ix2, s};
 use num_complex::Complex;
 
 use crate::error::{DspError, Result};
-use crate::lanes::LANES;
+use crate::lanes::{DoubleRow, LANES, Lanes};
 use crate::real::{Real, require_finite};
 use crate::simd::vectorized;
-use crate::stft::{StftParams, magnitude};
-use crate::tiles::{for_each_tile, planar, read_columns};
+use crate::stft::{LONGEST_ROWS, StftParams, magnitude};
+use crate::tiles::{LanePlan, for_each_tile, planar, read_columns};
 use crate::transform::Forward;
 
 pub use bandwidth::{Bandwidth, spectral_bandwidth};
@@ -69,8 +69,31 @@ impl Frequencies<'_> {
 pub enum Spectra<'a, T: Real> {
     /// A spectrogram `[channels, bins, frames]`.
     Given(ArrayView3<'a, T>),
-    /// Those of a signal `[channels, samples]`, by a transform in double precision, one at a time.
-    Of(CowArray<'a, T, Ix2>, Forward<f64>),
+    /// Those of a signal `[channels, samples]`, by a transform in double precision, a few at a time.
+    Of(CowArray<'a, T, Ix2>, Exact),
+}
+
+/// A transform of frames in double precision.
+pub struct Exact {
+    params: StftParams,
+    kind: Kind,
+}
+
+enum Kind {
+    Rows(LanePlan<DoubleRow>),
+    /// Of lengths for which rows would take too much memory.
+    Single(Forward<f64>),
+}
+
+impl Exact {
+    fn new(params: &StftParams) -> Result<Self> {
+        let kind = if params.n_fft > LONGEST_ROWS {
+            Kind::Single(Forward::new(params)?)
+        } else {
+            Kind::Rows(LanePlan::new(params)?)
+        };
+        Ok(Self { params: params.clone(), kind })
+    }
 }
 
 impl<'a, T: Real> From<ArrayView3<'a, T>> for Spectra<'a, T> {
@@ -86,17 +109,14 @@ impl<'a, T: Real> Spectra<'a, T> {
     /// Impossible parameters, or a signal too short for one frame.
     pub fn of(y: ArrayView2<'a, T>, params: &StftParams) -> Result<Self> {
         params.shape_of(y)?;
-        Ok(Self::Of(planar(y), Forward::new(params)?))
+        Ok(Self::Of(planar(y), Exact::new(params)?))
     }
 
     /// Channels, bins, frames.
     pub fn dim(&self) -> (usize, usize, usize) {
         match self {
             Self::Given(s) => s.dim(),
-            Self::Of(y, forward) => {
-                let p = forward.params();
-                (y.nrows(), p.n_bins(), p.n_frames(y.ncols()))
-            }
+            Self::Of(y, Exact { params: p, .. }) => (y.nrows(), p.n_bins(), p.n_frames(y.ncols())),
         }
     }
 
@@ -152,7 +172,26 @@ impl<'a, T: Real> Spectra<'a, T> {
                     }
                 },
             ),
-            Self::Of(y, forward) => for_each_tile(
+            Self::Of(y, Exact { kind: Kind::Rows(plan), .. }) => for_each_tile(
+                result.view_mut(),
+                || (buffers(), (plan.frames(), vec![DoubleRow::EMPTY; 2 * bins]), state()),
+                |((columns, out), (frames, spectrum), state), mut tile| {
+                    let signal = y.row(tile.channel);
+                    let signal = signal.to_slice().expect("contiguous");
+                    let blocks = tile.out.axis_chunks_iter_mut(Axis(1), DoubleRow::SLOTS);
+                    for (b, mut block) in blocks.enumerate() {
+                        let first = tile.first + b * DoubleRow::SLOTS;
+                        frames.complex(signal, first, spectrum);
+                        magnitudes(spectrum, columns);
+                        let spectra = columns.chunks_exact(bins).zip(block.columns_mut());
+                        for (i, (spectrum, mut column)) in spectra.enumerate() {
+                            each(state, tile.channel, first + i, spectrum, out);
+                            column.iter_mut().zip(&*out).for_each(|(o, x)| *o = *x);
+                        }
+                    }
+                },
+            ),
+            Self::Of(y, Exact { kind: Kind::Single(forward), .. }) => for_each_tile(
                 result.view_mut(),
                 || (buffers(), forward.scratch(), state()),
                 |((columns, out), scratch, state), mut tile| {
@@ -162,14 +201,9 @@ impl<'a, T: Real> Spectra<'a, T> {
                     for (i, mut column) in tile.out.axis_iter_mut(Axis(1)).enumerate() {
                         let t = tile.first + i;
                         let values = forward.spectrum(signal, t, scratch);
-                        vectorized(
-                            #[inline(always)]
-                            || {
-                                for (slot, z) in spectrum.iter_mut().zip(values) {
-                                    *slot = magnitude(Complex::new(T::of(z.re), T::of(z.im)));
-                                }
-                            },
-                        );
+                        for (slot, z) in spectrum.iter_mut().zip(values) {
+                            *slot = magnitude(Complex::new(T::of(z.re), T::of(z.im)));
+                        }
                         each(state, tile.channel, t, spectrum, out);
                         column.iter_mut().zip(&*out).for_each(|(o, x)| *o = *x);
                     }
@@ -178,6 +212,26 @@ impl<'a, T: Real> Spectra<'a, T> {
         }
         result
     }
+}
+
+/// Magnitudes of a row of frames, frame by frame.
+fn magnitudes<T: Real>(spectrum: &[DoubleRow], columns: &mut [T]) {
+    let bins = spectrum.len() / 2;
+    let columns = &mut columns[..DoubleRow::SLOTS * bins];
+    vectorized(
+        #[inline(always)]
+        || {
+            for (k, [re, im]) in spectrum.as_chunks::<2>().0.iter().enumerate() {
+                let mut values = [T::zero(); DoubleRow::SLOTS];
+                for s in 0..DoubleRow::SLOTS {
+                    values[s] = magnitude(Complex::new(T::of(re.0[s]), T::of(im.0[s])));
+                }
+                for s in 0..DoubleRow::SLOTS {
+                    columns[s * bins + k] = values[s];
+                }
+            }
+        },
+    );
 }
 
 #[cfg(test)]

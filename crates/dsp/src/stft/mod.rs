@@ -4,5 +4,5 @@ mod params;
 mod spectrogram;
 
 pub use params::{MAX_N_FFT, PadMode, StftParams};
-pub(crate) use spectrogram::{LONGEST_ROWS, magnitude, single, spectrogram_as};
+pub(crate) use spectrogram::{LONGEST_ROWS, magnitude, spectrogram_as};
 pub use spectrogram::{spectrogram, spectrogram_into, stft, stft_into};

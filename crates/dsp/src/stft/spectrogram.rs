@@ -64,12 +64,6 @@ fn check_out<R>(out: &ArrayViewMut3<R>, shape: (usize, usize, usize)) -> Result<
     Err(DspError::Shape { name: "out", expected, actual: out.shape().to_vec() })
 }
 
-/// Channel `c` of a contiguous single-precision signal.
-pub(crate) fn single<'a, T: Real>(y: ArrayView2<'a, T>, c: usize) -> &'a [f32] {
-    let row = y.index_axis_move(Axis(0), c).to_slice().and_then(T::as_f32);
-    row.expect("contiguous and of single precision")
-}
-
 /// `|stft|^power` as `[channels, n_fft / 2 + 1, frames]` (librosa 0.11 `_spectrogram`), by a
 /// transform in double precision whatever `T` is, as features need that amplify its rounding.
 ///

@@ -1,7 +1,9 @@
 //! Pitch tracking by parabolic interpolation, and tuning (librosa 0.11 `piptrack`,
 //! `estimate_tuning`, `pitch_tuning`).
 
-use ndarray::{Array3, ArrayView2, ArrayView3, s};
+mod tracks;
+
+use ndarray::{ArrayView2, ArrayView3, s};
 use rayon::prelude::*;
 
 use crate::columns::for_each_column;
@@ -11,6 +13,8 @@ use crate::log2::log2;
 use crate::real::Real;
 use crate::simd::vectorized;
 use crate::sums::largest;
+
+pub use tracks::piptrack;
 
 /// Parameters of the tracker, in librosa's names.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,36 +100,46 @@ impl PitchTracker {
             );
             T::of(self.params.threshold) * largest
         });
-        let kept = |s: T| if s > reference { s } else { T::zero() };
-        let last = magnitude.len().saturating_sub(1);
         // The first bin is never a peak; the last one only has a left neighbour.
         let (first, end) = (self.first.max(1), self.end.min(magnitude.len()));
         // Most bins are far below the reference: many are looked at together.
         let low = |bins: &[T]| bins.iter().fold(true, |low, s| low & (*s <= reference));
         let blocks = (first..end).step_by(AT_ONCE).map(|k| k..end.min(k + AT_ONCE));
         for k in blocks.filter(|bins| !low(&magnitude[bins.clone()])).flatten() {
-            let (left, here) = (magnitude[k - 1], magnitude[k]);
-            if here <= reference || here <= kept(left) {
-                continue;
+            let right = magnitude.get(k + 1).copied();
+            if let Some(peak) = self.peak(k, (magnitude[k - 1], magnitude[k], right), reference) {
+                each(peak);
             }
-            let (mut shift, mut skew) = (T::zero(), T::zero());
-            if k < last {
-                let right = magnitude[k + 1];
-                if here < kept(right) {
-                    continue;
-                }
-                // Sums of neighbours round to T, the rest is double, as numba types librosa's code.
-                let curvature = (right + left).wide() - 2.0 * here.wide();
-                let slope = (right - left).wide() / 2.0;
-                if slope.abs() < curvature.abs() {
-                    shift = T::of(-slope / curvature);
-                }
-                skew = T::of(0.5) * ((right - left) / T::of(2.0)) * shift;
-            }
-            let bin = k as f64 + shift.wide();
-            let pitch = T::of(bin * self.params.sr / self.params.n_fft as f64);
-            each(Peak { bin: k, pitch, magnitude: here + skew });
         }
+    }
+
+    /// The peak at `bin`, if its magnitude is one: between those of its neighbours, the last of which has no
+    /// upper one.
+    #[inline(always)]
+    fn peak<T: Real>(
+        &self,
+        bin: usize,
+        (left, here, right): (T, T, Option<T>),
+        reference: T,
+    ) -> Option<Peak<T>> {
+        let kept = |s: T| if s > reference { s } else { T::zero() };
+        if here <= reference || here <= kept(left) || right.is_some_and(|right| here < kept(right))
+        {
+            return None;
+        }
+        let (mut shift, mut skew) = (T::zero(), T::zero());
+        if let Some(right) = right {
+            // Sums of neighbours round to T, the rest is double, as numba types librosa's code.
+            let curvature = (right + left).wide() - 2.0 * here.wide();
+            let slope = (right - left).wide() / 2.0;
+            if slope.abs() < curvature.abs() {
+                shift = T::of(-slope / curvature);
+            }
+            skew = T::of(0.5) * ((right - left) / T::of(2.0)) * shift;
+        }
+        let place = bin as f64 + shift.wide();
+        let pitch = T::of(place * self.params.sr / self.params.n_fft as f64);
+        Some(Peak { bin, pitch, magnitude: here + skew })
     }
 }
 
@@ -150,31 +164,6 @@ fn check<T>(
         }
         _ => Ok(()),
     }
-}
-
-/// Pitches in Hz and magnitudes of all peaks, each shaped as `s [channels, bins, frames]` and zero
-/// elsewhere (`piptrack`). `reference [channels, frames]` replaces the threshold.
-///
-/// # Errors
-/// As [`PitchTracker::new`], or arrays that do not fit.
-pub fn piptrack<T: Real>(
-    s: ArrayView3<T>,
-    reference: Option<ArrayView2<T>>,
-    params: PitchParams,
-) -> Result<(Array3<T>, Array3<T>)> {
-    let tracker = PitchTracker::new(params)?;
-    check(&tracker, s, reference)?;
-    let (mut pitches, mut magnitudes) = (Array3::zeros(s.raw_dim()), Array3::zeros(s.raw_dim()));
-    let mut absolute = vec![T::zero(); tracker.n_bins()];
-    for_each_column(s, |c, t, spectrum| {
-        absolute.iter_mut().zip(spectrum).for_each(|(a, x)| *a = x.abs());
-        let reference = reference.map(|given| given[[c, t]]);
-        tracker.peaks(&absolute, reference, |peak| {
-            pitches[[c, peak.bin, t]] = peak.pitch;
-            magnitudes[[c, peak.bin, t]] = peak.magnitude;
-        });
-    });
-    Ok((pitches, magnitudes))
 }
 
 /// Collects the peaks of a recording and finds its tuning when all are known.
@@ -330,7 +319,7 @@ fn octaves<T: Real>(ratio: T) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ndarray::Axis;
+    use ndarray::{Array3, Axis};
 
     /// A spectrogram of one frame with parabolic peaks of height `h` around `bin`.
     fn peaks(n_bins: usize, places: &[(f64, f64)]) -> Array3<f64> {
