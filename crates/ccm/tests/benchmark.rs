@@ -179,6 +179,51 @@ fn the_report_is_complete_and_features_are_kept() {
     assert!(error.contains("s0_fi0_fu0_b1_l0_audio.wav: corrupt"), "{error}");
 }
 
+/// Every file below a folder, with its bytes.
+fn files(folder: &Path) -> std::collections::BTreeMap<std::path::PathBuf, Vec<u8>> {
+    let mut all = std::collections::BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            let inside = files(&path).into_iter();
+            all.extend(inside.map(|(name, bytes)| (path.join(name), bytes)));
+        } else {
+            all.insert(path.clone(), std::fs::read(&path).unwrap());
+        }
+    }
+    all
+}
+
+/// Two feature sets in one reading, and baselines side by side, on any number of threads.
+#[test]
+fn threads_change_no_byte() {
+    let dir = tempfile::tempdir().unwrap();
+    let data = dir.path().join("data");
+    synth::generate(&data, Size::Small, 7).unwrap();
+    let wanted = ["zcr-mfcc-knn", "spectrogram-svm", "spectrogram-pca-knn"];
+    let wanted = |b: &Baseline| wanted.contains(&b.slug().as_str());
+    let baselines: Vec<Baseline> = Baseline::all().into_iter().filter(wanted).collect();
+    let written = |jobs: usize| {
+        let out = dir.path().join("report");
+        let options = options(&data, &out, baselines.clone());
+        run(&BenchmarkOptions { jobs, ..options }).unwrap();
+        let all = files(&out);
+        std::fs::remove_dir_all(&out).unwrap();
+        all
+    };
+    let one = written(1);
+    assert!(one.len() > 30);
+    for jobs in [2, 5] {
+        let others = written(jobs);
+        assert!(one.keys().eq(others.keys()));
+        for (name, bytes) in &one {
+            // A PDF has the second of its making.
+            let is_pdf = name.extension().is_some_and(|e| e == "pdf");
+            assert!(is_pdf || others[name] == *bytes, "{} with {jobs} threads", name.display());
+        }
+    }
+}
+
 /// The flat release withholds which container a test file shows: it is predicted and named by id.
 #[test]
 fn flat_test_recordings_are_submitted_by_id() {

@@ -70,3 +70,21 @@ fn an_exponent_without_the_metric_that_has_one_is_refused() {
         assert!(train(metric, p).is_ok(), "{metric:?}");
     }
 }
+
+#[test]
+fn rows_that_are_shared_give_what_copies_give() {
+    let (x, y) = clouds(300, 20, 3, 4);
+    let across = x.t().as_standard_layout().into_owned().reversed_axes();
+    for metric in [Metric::Euclidean, Metric::Cosine, Metric::Manhattan] {
+        let spec = ClassifierSpec::from(KNearestParams { metric, ..Default::default() });
+        let copied = spec.train(x.view(), &y, 3).unwrap();
+        let expected = copied.predict_proba(x.view()).unwrap();
+        for rows in [x.to_shared(), across.to_shared()] {
+            let mut rows = rows;
+            let shared = spec.train_shared(&rows, &y, 3).unwrap();
+            // Who goes on to change the rows changes a copy.
+            rows.fill(0.0);
+            assert_eq!(shared.predict_proba(x.view()).unwrap(), expected, "{metric:?}");
+        }
+    }
+}
