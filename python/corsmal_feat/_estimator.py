@@ -143,7 +143,8 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
                 f"X gives {len(computed.names)} values per recording, but fit saw "
                 f"{len(self._names)}: the number of channels or the configuration differs"
             )
-        if not self.any_rate:
+        # Pickles of 0.1.0 lack it.
+        if not getattr(self, "any_rate", False):
             self._check_formats(computed.formats)
         self._keep(computed.rows)
         return computed.rows
