@@ -92,7 +92,7 @@ impl Recording {
     /// Name of the first feature without a frame.
     fn without_frames(&self) -> Option<&str> {
         let mut features = self.raw.iter().zip(&self.plan.features);
-        let none = features.find(|(store, f)| f.raw_rows > 0 && store.len() == 0)?;
+        let none = features.find(|(store, f)| f.raw_rows > 0 && store.is_empty())?;
         Some(&none.1.name)
     }
 
