@@ -91,16 +91,27 @@ impl Decibel {
             && part_finite(values)
         {
             let offset = self.offset() as f32;
-            let decibel = |x: f32| decibel(x.max(floor)) - offset;
-            let (low, high) = map(values, out, f32::INFINITY, decibel);
+            let (low, high) = map(
+                values,
+                out,
+                f32::INFINITY,
+                #[inline(always)]
+                |x| decibel(x.max(floor)) - offset,
+            );
             return (T::of(low.into()), T::of(high.into()));
         }
         if !T::SINGLE && self.amin.is_normal() && part_finite(values) {
             let (amin, offset) = (self.amin, self.offset());
-            return map(values, out, T::infinity(), |x| {
-                let x = x.wide();
-                T::of(decibel_double(if x < amin { amin } else { x }) - offset)
-            });
+            return map(
+                values,
+                out,
+                T::infinity(),
+                #[inline(always)]
+                |x| {
+                    let x = x.wide();
+                    T::of(decibel_double(if x < amin { amin } else { x }) - offset)
+                },
+            );
         }
         let (amin, offset, ten) = (T::of(self.amin), T::of(self.offset()), T::of(10.0));
         let none = (T::infinity(), T::neg_infinity());
@@ -148,6 +159,7 @@ fn smaller<T: Real>(a: T, b: T) -> T {
 }
 
 /// `of` every value, none of which is NaN, into `out`; the smallest and the largest result.
+#[inline(always)]
 fn map<T: Real>(values: &[T], out: &mut [T], infinity: T, of: impl Fn(T) -> T) -> (T, T) {
     let (mut low, mut high) = ([infinity; LANES], [-infinity; LANES]);
     vectorized(
