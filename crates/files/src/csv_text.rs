@@ -58,6 +58,7 @@ mod tests {
     #[test]
     fn text_of_older_encodings_is_refused_with_advice() {
         let mut table = reader(&b"id,class\n1,caf\xe9\n"[..]).unwrap();
+        table.headers().unwrap();
         let error = table.records().next().unwrap().unwrap_err();
         let expected = "line 2: text that is not UTF-8: save the table as \"CSV UTF-8\"";
         assert_eq!(fault(&error), expected);

@@ -26,10 +26,10 @@ pub(crate) fn of_training(network: &Network, course: &Course<'_>, recipe: &Recip
         Worst::of(network, course.items, rows, batch, recipe).numbers(network, of)
     };
     let training = step(course.train, recipe.batch, Network::kept);
+    let rating = step(course.watched, TOGETHER, Network::passing);
     // Weights are packed for it.
-    let packed = network.parameters().count() as u64;
-    let rating = step(course.watched, TOGETHER, Network::passing).saturating_add(packed);
-    FLOAT.saturating_mul(numbers.saturating_add(training.max(rating)))
+    let packed = if course.watched.is_empty() { 0 } else { network.parameters().count() as u64 };
+    FLOAT.saturating_mul(numbers.saturating_add(packed).saturating_add(training.max(rating)))
 }
 
 /// Bytes that the evaluation of these items together takes beyond the items and the network, roughly.
