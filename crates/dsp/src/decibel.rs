@@ -51,7 +51,10 @@ impl Decibel {
     /// `amin <= 0` or `top_db < 0`.
     pub fn power<T: Real>(&self, values: &mut [T]) -> Result<()> {
         self.check()?;
-        let parts = values.par_chunks_mut(PART).map(|part| self.convert(&part.to_vec(), part));
+        let parts = values.par_chunks_mut(PART).map(|part| {
+            let powers = part.to_vec();
+            self.convert(&powers, part)
+        });
         let extremes: Vec<_> = parts.collect();
         self.clamp(values, &extremes);
         Ok(())

@@ -70,7 +70,7 @@ pub enum Spectra<'a, T: Real> {
     /// A spectrogram `[channels, bins, frames]`.
     Given(ArrayView3<'a, T>),
     /// Those of a signal `[channels, samples]`, by a transform in double precision, a few at a time.
-    Of(CowArray<'a, T, Ix2>, Exact),
+    Of(CowArray<'a, T, Ix2>, Box<Exact>),
 }
 
 /// A transform of frames in double precision.
@@ -109,14 +109,16 @@ impl<'a, T: Real> Spectra<'a, T> {
     /// Impossible parameters, or a signal too short for one frame.
     pub fn of(y: ArrayView2<'a, T>, params: &StftParams) -> Result<Self> {
         params.shape_of(y)?;
-        Ok(Self::Of(planar(y), Exact::new(params)?))
+        Ok(Self::Of(planar(y), Box::new(Exact::new(params)?)))
     }
 
     /// Channels, bins, frames.
     pub fn dim(&self) -> (usize, usize, usize) {
         match self {
             Self::Given(s) => s.dim(),
-            Self::Of(y, Exact { params: p, .. }) => (y.nrows(), p.n_bins(), p.n_frames(y.ncols())),
+            Self::Of(y, exact) => {
+                (y.nrows(), exact.params.n_bins(), exact.params.n_frames(y.ncols()))
+            }
         }
     }
 
@@ -223,11 +225,11 @@ fn magnitudes<T: Real>(spectrum: &[DoubleRow], columns: &mut [T]) {
         || {
             for (k, [re, im]) in spectrum.as_chunks::<2>().0.iter().enumerate() {
                 let mut values = [T::zero(); DoubleRow::SLOTS];
-                for s in 0..DoubleRow::SLOTS {
-                    values[s] = magnitude(Complex::new(T::of(re.0[s]), T::of(im.0[s])));
+                for (value, (re, im)) in values.iter_mut().zip(re.0.iter().zip(&im.0)) {
+                    *value = magnitude(Complex::new(T::of(*re), T::of(*im)));
                 }
-                for s in 0..DoubleRow::SLOTS {
-                    columns[s * bins + k] = values[s];
+                for (column, value) in columns.chunks_exact_mut(bins).zip(&values) {
+                    column[k] = *value;
                 }
             }
         },
