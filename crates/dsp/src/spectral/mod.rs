@@ -70,29 +70,29 @@ pub enum Spectra<'a, T: Real> {
     /// A spectrogram `[channels, bins, frames]`.
     Given(ArrayView3<'a, T>),
     /// Those of a signal `[channels, samples]`, by a transform in double precision, a few at a time.
-    Of(CowArray<'a, T, Ix2>, Box<Exact>),
+    Of(CowArray<'a, T, Ix2>, Exact),
 }
 
 /// A transform of frames in double precision.
 pub struct Exact {
-    params: StftParams,
+    params: Box<StftParams>,
     kind: Kind,
 }
 
 enum Kind {
-    Rows(LanePlan<DoubleRow>),
+    Rows(Box<LanePlan<DoubleRow>>),
     /// Of lengths for which rows would take too much memory.
-    Single(Forward<f64>),
+    Single(Box<Forward<f64>>),
 }
 
 impl Exact {
     fn new(params: &StftParams) -> Result<Self> {
         let kind = if params.n_fft > LONGEST_ROWS {
-            Kind::Single(Forward::new(params)?)
+            Kind::Single(Box::new(Forward::new(params)?))
         } else {
-            Kind::Rows(LanePlan::new(params)?)
+            Kind::Rows(Box::new(LanePlan::new(params)?))
         };
-        Ok(Self { params: params.clone(), kind })
+        Ok(Self { params: Box::new(params.clone()), kind })
     }
 }
 
@@ -109,7 +109,7 @@ impl<'a, T: Real> Spectra<'a, T> {
     /// Impossible parameters, or a signal too short for one frame.
     pub fn of(y: ArrayView2<'a, T>, params: &StftParams) -> Result<Self> {
         params.shape_of(y)?;
-        Ok(Self::Of(planar(y), Box::new(Exact::new(params)?)))
+        Ok(Self::Of(planar(y), Exact::new(params)?))
     }
 
     /// Channels, bins, frames.
