@@ -153,7 +153,7 @@ pub fn run(
     let jobs = options.jobs;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build();
     let pool = pool.map_err(|e| CcmError::Request(format!("{jobs} threads: {e}")))?;
-    let outcomes = baselines(options, (&set, &rows), &pool, (progress, stop))?;
+    let outcomes = baselines(options, (&set, &rows), &pool, progress, stop)?;
     let mut runs = Vec::new();
     if !options.systems.is_empty() {
         let (folder, how) = (options.out.join("features"), (options.jobs, options.seed));
@@ -190,7 +190,8 @@ fn baselines(
     options: &BenchmarkOptions,
     (set, rows): (&DataSet, &Rows),
     pool: &rayon::ThreadPool,
-    (progress, stop): (&(dyn Fn(&str) + Sync), &Arc<AtomicBool>),
+    progress: &(dyn Fn(&str) + Sync),
+    stop: &Arc<AtomicBool>,
 ) -> Result<Vec<BaselineResult>> {
     let BenchmarkOptions { out, baselines, jobs, seed, .. } = options;
     let (jobs, seed) = (*jobs, *seed);
