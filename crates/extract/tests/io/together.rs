@@ -191,10 +191,10 @@ fn interrupted_runs_go_on_each_from_where_it_was() {
     assert_eq!(reports[0].resumed, 2);
     assert_eq!(*counting.0.lock().unwrap(), [(6, 0)]);
     assert_eq!(counting.1.load(Ordering::Relaxed), 6);
-    for i in 0..CONFIGS.len() {
+    for (i, config) in CONFIGS.iter().enumerate() {
         let name = format!("{i}.npz");
         let bytes = |folder: &Path| std::fs::read(folder.join(&name)).unwrap();
-        assert!(bytes(&whole) == bytes(&out), "{:?}", CONFIGS[i]);
+        assert!(bytes(&whole) == bytes(&out), "{config:?}");
     }
 }
 

@@ -56,7 +56,7 @@ fn stretches_are_named_after_their_file_however_it_is_written() {
     };
     let x = stretch("a/x.wav", Some(0.0));
     let others = [stretch("./a/../a/x.wav", Some(1.0)), stretch("b/y.wav", None)];
-    let found = named([&[x.clone()], &others[..]].concat());
+    let found = named([std::slice::from_ref(&x), &others[..]].concat());
     let recording = |path: &str| vec![("recording".to_string(), path.to_string())];
     assert_eq!(found, ["a/x.wav", "a/x.wav", "b/y.wav"].map(recording));
     // Each is a file of its own; a label of that name is there; nothing is cut.
