@@ -97,7 +97,6 @@ impl Decibel {
             let (low, high) = map(
                 values,
                 out,
-                f32::INFINITY,
                 #[inline(always)]
                 |x| decibel(x.max(floor)) - offset,
             );
@@ -108,7 +107,6 @@ impl Decibel {
             return map(
                 values,
                 out,
-                T::infinity(),
                 #[inline(always)]
                 |x| {
                     let x = x.wide();
@@ -163,7 +161,8 @@ fn smaller<T: Real>(a: T, b: T) -> T {
 
 /// `of` every value, none of which is NaN, into `out`; the smallest and the largest result.
 #[inline(always)]
-fn map<T: Real>(values: &[T], out: &mut [T], infinity: T, of: impl Fn(T) -> T) -> (T, T) {
+fn map<T: Real>(values: &[T], out: &mut [T], of: impl Fn(T) -> T) -> (T, T) {
+    let infinity = T::infinity();
     let (mut low, mut high) = ([infinity; LANES], [-infinity; LANES]);
     vectorized(
         #[inline(always)]

@@ -213,7 +213,7 @@ impl<T: Lane> Separator<T> {
             let needed = if stft.center { 1 } else { stft.n_fft };
             return Err(DspError::TooShort { name: "y", actual: y.len(), needed });
         }
-        let inverted = self.inverse.frames_within(y.len(), frames);
+        let inverted = stft.frames_within(y.len(), frames);
         for (_, out) in &mut *parts {
             assert_eq!(out.len(), y.len(), "one output sample per input sample");
             out.fill(T::zero());

@@ -73,7 +73,7 @@ mod tuned;
 mod vector;
 pub mod window;
 
-pub use error::{DspError, Result};
+pub use error::{DspError, Result, room_for};
 pub use real::Real;
 pub use tuned::ByTuning;
 pub use vector::Lane;

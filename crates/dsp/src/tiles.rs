@@ -108,6 +108,11 @@ impl<R: Lanes> LanePlan<R> {
         Ok(Self { params: params.clone(), window, spectrum: Spectrum::new(params.n_fft)? })
     }
 
+    /// As given.
+    pub fn params(&self) -> &StftParams {
+        &self.params
+    }
+
     /// What one thread works with.
     pub fn frames(&self) -> LaneFrames<'_, R> {
         // Frames that do not overlap are laid side by side.

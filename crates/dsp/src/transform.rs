@@ -150,11 +150,6 @@ impl<F: Real> Inverse<F> {
         }
     }
 
-    /// Frames that reach a signal of `length` samples, at most `frames`.
-    pub fn frames_within(&self, length: usize, frames: usize) -> usize {
-        frames.min((length + 2 * self.params.pad()).div_ceil(self.params.hop_length))
-    }
-
     /// Adds frame `t`, whose spectrum is in `scratch`, to the part of `y` that it reaches.
     pub fn add(&self, t: usize, y: &mut [F], scratch: &mut Scratch<F>) {
         let Scratch { frame, spectrum: bins, fft } = scratch;

@@ -1,9 +1,9 @@
 //! numpy arrays in and out. No `ndarray` type of the numpy crate crosses into our crates: the two
 //! may be built against different `ndarray` versions.
 
-use corsmal_dsp::Real;
 use corsmal_dsp::spectral::Spectra;
 use corsmal_dsp::stft::StftParams;
+use corsmal_dsp::{Real, room_for};
 use ndarray::{
     Array2, ArrayView2, ArrayView3, ArrayViewMut, ArrayViewMut3, Dimension, IntoDimension,
 };
@@ -112,6 +112,8 @@ pub fn written<'py, R: Element, D: Dimension>(
     fill: impl FnOnce(ArrayViewMut<R, D>) -> corsmal_dsp::Result<()> + Send,
 ) -> PyResult<Bound<'py, PyAny>> {
     let sizes = shape.slice().to_vec();
+    // numpy's own failure would be a panic.
+    room_for::<R>("the result", &sizes).map_err(value_error)?;
     let array = PyArray1::<R>::zeros(py, [shape.size()], false);
     let mut values = array.readwrite();
     let out = ArrayViewMut::from_shape(shape, values.as_slice_mut()?).map_err(value_error)?;

@@ -60,7 +60,7 @@ where
         }
         _ => view3(array)?,
     };
-    let shape = istft_shape(d.dim(), params, length).map_err(value_error)?;
+    let shape = istft_shape::<T>(d.dim(), params, length).map_err(value_error)?;
     written(py, shape.into_dimension(), |out| istft_into(d, params, out))
 }
 

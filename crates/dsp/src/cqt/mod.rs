@@ -157,8 +157,9 @@ impl CqtPlan {
         mut each: impl FnMut(usize, usize, &[T], &[T]),
     ) -> Result<()> {
         let frames = self.n_frames(y.len());
-        for (octave, signal) in self.octaves.iter().zip(self.signals(y)?) {
-            self.octave(octave, &signal, frames, &mut each)?;
+        let signals = self.signals(y)?;
+        for (i, octave) in self.octaves.iter().enumerate() {
+            self.octave(octave, of_octave(&signals, i), frames, &mut each)?;
         }
         Ok(())
     }
@@ -170,7 +171,8 @@ impl CqtPlan {
         let mut out = Array2::zeros((self.params.n_bins, frames));
         let mut rest = out.as_slice_mut().expect("a new array");
         let mut parts = Vec::with_capacity(self.octaves.len());
-        for (octave, signal) in self.octaves.iter().zip(&signals) {
+        for (i, octave) in self.octaves.iter().enumerate() {
+            let signal = of_octave(&signals, i);
             let (lower, rows) = rest.split_at_mut(octave.first * frames);
             parts.push((octave, signal, rows));
             rest = lower;
@@ -186,20 +188,22 @@ impl CqtPlan {
         Ok(out)
     }
 
-    /// The signals of the octaves, from the highest down.
+    /// The signals of the octaves, from the highest down; those below the last have its signal, as an odd
+    /// hop is not halved.
     fn signals<'y, T: Lane>(&self, y: &'y [T]) -> Result<Vec<Cow<'y, [T]>>> {
         let factor = 1usize << self.early;
         if y.is_empty() || y.len() < factor {
             return Err(DspError::TooShort { name: "y", actual: y.len(), needed: factor });
         }
-        let mut signal = Cow::Borrowed(y);
-        if self.early > 0 {
-            signal = Cow::Owned(self.decimated_early(y)?);
-        }
-        let mut signals = Vec::with_capacity(self.octaves.len());
-        for octave in &self.octaves {
-            let next = if octave.halve { Cow::Owned(self.halved(&signal)) } else { signal.clone() };
-            signals.push(std::mem::replace(&mut signal, next));
+        let first = match self.early {
+            0 => Cow::Borrowed(y),
+            _ => Cow::Owned(self.decimated_early(y)?),
+        };
+        let mut signals = vec![first];
+        let above = self.octaves.split_last().map_or(&[][..], |(_, above)| above);
+        for _ in above.iter().take_while(|octave| octave.halve) {
+            let next = self.halved(&signals[signals.len() - 1]);
+            signals.push(Cow::Owned(next));
         }
         Ok(signals)
     }
@@ -381,4 +385,9 @@ fn per_channel<T: Lane, R: Clone>(
         expected: "at least one channel".into(),
         actual: y.shape().to_vec(),
     })
+}
+
+/// The signal of octave `i` among those of [`ConstantQ::signals`].
+fn of_octave<'s, T: Clone>(signals: &'s [Cow<'_, [T]>], i: usize) -> &'s [T] {
+    &signals[i.min(signals.len() - 1)]
 }

@@ -27,16 +27,16 @@ pub fn istft<T: Real>(
     p: &StftParams,
     length: Option<usize>,
 ) -> Result<Array2<T>> {
-    let mut y = Array2::zeros(istft_shape(spectrogram.dim(), p, length)?);
+    let mut y = Array2::zeros(istft_shape::<T>(spectrogram.dim(), p, length)?);
     istft_into(spectrogram, p, y.view_mut())?;
     Ok(y)
 }
 
-/// Shape of what [`istft`] gives for a spectrogram of this one.
+/// Shape `[channels, samples]` of the signal of type `T` that [`istft`] gives for a spectrogram of this one.
 ///
 /// # Errors
 /// As [`istft`].
-pub fn istft_shape(
+pub fn istft_shape<T: Real>(
     (channels, bins, frames): (usize, usize, usize),
     p: &StftParams,
     length: Option<usize>,
@@ -51,7 +51,7 @@ pub fn istft_shape(
     let samples = length.or(natural).ok_or_else(|| {
         DspError::parameter("hop_length", p.hop_length, "so small that the signal fits in memory")
     })?;
-    room_for::<Complex<f64>>("the signal", &[channels, samples])?;
+    room_for::<T>("the signal", &[channels, samples])?;
     Ok((channels, samples))
 }
 
@@ -64,7 +64,7 @@ pub fn istft_into<T: Real>(
     p: &StftParams,
     mut out: ArrayViewMut2<T>,
 ) -> Result<()> {
-    istft_shape(spectrogram.dim(), p, Some(out.ncols()))?;
+    istft_shape::<T>(spectrogram.dim(), p, Some(out.ncols()))?;
     let channels = spectrogram.len_of(Axis(0));
     if out.nrows() != channels || !out.is_standard_layout() {
         let expected = format!("{channels} channels in C order");
@@ -73,7 +73,7 @@ pub fn istft_into<T: Real>(
     if p.n_fft > LONGEST_ROWS {
         let inverse = Inverse::<T>::new(p)?;
         for (spectra, mut y) in spectrogram.axis_iter(Axis(0)).zip(out.rows_mut()) {
-            one_by_one(&inverse, spectra, y.as_slice_mut().expect("in C order"));
+            one_by_one(p, &inverse, spectra, y.as_slice_mut().expect("in C order"));
         }
     } else if T::SINGLE {
         OverlapAdd::<Row>::new(p)?.run(spectrogram, out);
@@ -84,9 +84,14 @@ pub fn istft_into<T: Real>(
 }
 
 /// One channel, frame by frame.
-fn one_by_one<T: Real>(inverse: &Inverse<T>, spectra: ArrayView2<Complex<T>>, y: &mut [T]) {
+fn one_by_one<T: Real>(
+    p: &StftParams,
+    inverse: &Inverse<T>,
+    spectra: ArrayView2<Complex<T>>,
+    y: &mut [T],
+) {
     let mut scratch = inverse.scratch();
-    let frames = inverse.frames_within(y.len(), spectra.ncols());
+    let frames = p.frames_within(y.len(), spectra.ncols());
     for t in 0..frames {
         let mut given = spectra.column(t).into_iter().copied();
         scratch.bins().fill_with(|| given.next().unwrap_or_default());

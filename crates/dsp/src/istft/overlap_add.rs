@@ -77,8 +77,7 @@ impl<R: Lanes> OverlapAdd<R> {
     /// The signals of `spectra [channels, bins, frames]` into the rows of `out`, contiguous.
     pub fn run<T: Real>(&self, spectra: ArrayView3<Complex<T>>, mut out: ArrayViewMut2<T>) {
         let (hop, pad) = (self.params.hop_length, self.params.pad());
-        // Frames that reach the signal.
-        let frames = spectra.len_of(Axis(2)).min((out.ncols() + 2 * pad).div_ceil(hop));
+        let frames = self.params.frames_within(out.ncols(), spectra.len_of(Axis(2)));
         let spectra = spectra.slice(s![.., .., ..frames]);
         let mut parts = Vec::new();
         for (channel, y) in out.axis_iter_mut(Axis(0)).enumerate() {

@@ -4,7 +4,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::complex::{C, Dft, Pair, Points, load, store};
 use super::passes::Stage;
-use super::twiddles::radices;
+use super::twiddles::{radices, reversed};
 use super::{LaneFft, Lanes, Row};
 use crate::real::Real;
 
@@ -84,9 +84,12 @@ impl<R: Lanes> Convolution<R> {
         schedule(&radices, 0, 0..count, change == Change::Double, &mut steps);
         let bins = inputs.max(outputs);
         let whole = response(taps, bins);
-        let apart = count;
-        let leaf = |offset: usize| (0..first.max(last)).map(move |j| offset + j * apart);
-        let response = offsets(&radices).into_iter().flat_map(leaf);
+        let mut position = vec![0; bins];
+        reversed(&mut position, &[&radices[..], &[first.max(last)]].concat(), 0, 0, 1);
+        let mut response = vec![R::Value::of(0.0); bins];
+        for (bin, place) in whole.iter().zip(position) {
+            response[place as usize] = R::Value::of(*bin);
+        }
         Self {
             arch: Arch::new(),
             change,
@@ -95,7 +98,7 @@ impl<R: Lanes> Convolution<R> {
             forward: Stage::nested(&radices, inputs),
             back: Stage::nested(&radices, outputs),
             steps,
-            response: response.map(|bin| R::Value::of(whole[bin])).collect(),
+            response,
         }
     }
 
@@ -137,18 +140,6 @@ fn schedule(
         }
     }
     steps.push(Step::Back { stage, leaf });
-}
-
-/// First bin of every leaf, in the order in which the passes leave them.
-fn offsets(radices: &[usize]) -> Vec<usize> {
-    let mut offsets = vec![0];
-    let mut stride: usize = radices.iter().product();
-    for radix in radices.iter().rev() {
-        stride /= radix;
-        let part = |q: usize| offsets.iter().map(move |offset| q * stride + offset);
-        offsets = (0..*radix).flat_map(part).collect();
-    }
-    offsets
 }
 
 /// Response of the filter around sample 0 of a circle of `bins` samples: it is real.

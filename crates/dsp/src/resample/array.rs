@@ -85,12 +85,13 @@ pub fn resample_into<T: Lane>(
     }
     let n = y.ncols();
     let slots = out.as_slice_mut().expect("in C order");
-    if slots.is_empty() {
+    if slots.is_empty() || n == 0 {
+        slots.fill(T::zero());
         return Ok(());
     }
     let samples = y.as_slice().expect("contiguous");
     if orig_sr == target_sr {
-        let channels = samples.chunks_exact(n.max(1));
+        let channels = samples.chunks_exact(n);
         let rows = beginnings(slots, width, n as u64);
         rows.zip(channels).for_each(|(row, y)| row.copy_from_slice(&y[..row.len()]));
         return Ok(());
@@ -194,7 +195,7 @@ fn resample_hq<'a, T: Lane>(
     rows: impl Iterator<Item = &'a mut [T]>,
 ) {
     let span = plan.span();
-    let spans = rows.zip(y.chunks_exact(n.max(1))).flat_map(|(row, signal)| {
+    let spans = rows.zip(y.chunks_exact(n)).flat_map(|(row, signal)| {
         let spans = row.chunks_mut(span).enumerate();
         spans.map(move |(i, out)| (i * span, out, signal))
     });

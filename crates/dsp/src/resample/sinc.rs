@@ -6,6 +6,7 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::check::{check_interleaved, check_rates};
+use super::common;
 use super::dot::{BLOCK, dot};
 use super::kaiser::{KaiserSinc, PRECISION, Table};
 use super::kernel::SPAN;
@@ -179,11 +180,7 @@ impl<T: Lane> WithSimd for Weigh<'_, T> {
 fn phases(orig_sr: f64, target_sr: f64) -> Option<usize> {
     let whole = |rate: f64| (rate.fract() == 0.0 && rate < 2f64.powi(53)).then_some(rate as u64);
     let (orig, target) = (whole(orig_sr)?, whole(target_sr)?);
-    let (mut a, mut b) = (orig, target);
-    while b > 0 {
-        (a, b) = (b, a % b);
-    }
-    usize::try_from(target / a).ok()
+    usize::try_from(u128::from(target) / common(orig.into(), target.into())).ok()
 }
 
 /// `y`, channels of `n` samples one after another, at another rate into `rows`: of
@@ -205,7 +202,7 @@ pub(super) fn resample_sinc<'a, T: Lane>(
         })
         .collect();
     let spans: Vec<_> = rows
-        .zip(y.chunks_exact(n.max(1)))
+        .zip(y.chunks_exact(n))
         .flat_map(|(row, signal)| {
             let spans = row.chunks_mut(SPAN).zip(&starts);
             spans.map(move |(out, start)| (out, signal, *start))

@@ -74,10 +74,7 @@ pub enum Spectra<'a, T: Real> {
 }
 
 /// A transform of frames in double precision.
-pub struct Exact {
-    params: Box<StftParams>,
-    kind: Kind,
-}
+pub struct Exact(Kind);
 
 enum Kind {
     Rows(Box<LanePlan<DoubleRow>>),
@@ -87,12 +84,18 @@ enum Kind {
 
 impl Exact {
     fn new(params: &StftParams) -> Result<Self> {
-        let kind = if params.n_fft > LONGEST_ROWS {
+        Ok(Self(if params.n_fft > LONGEST_ROWS {
             Kind::Single(Box::new(Forward::new(params)?))
         } else {
             Kind::Rows(Box::new(LanePlan::new(params)?))
-        };
-        Ok(Self { params: Box::new(params.clone()), kind })
+        }))
+    }
+
+    fn params(&self) -> &StftParams {
+        match &self.0 {
+            Kind::Rows(plan) => plan.params(),
+            Kind::Single(forward) => forward.params(),
+        }
     }
 }
 
@@ -117,7 +120,8 @@ impl<'a, T: Real> Spectra<'a, T> {
         match self {
             Self::Given(s) => s.dim(),
             Self::Of(y, exact) => {
-                (y.nrows(), exact.params.n_bins(), exact.params.n_frames(y.ncols()))
+                let params = exact.params();
+                (y.nrows(), params.n_bins(), params.n_frames(y.ncols()))
             }
         }
     }
@@ -174,7 +178,7 @@ impl<'a, T: Real> Spectra<'a, T> {
                     }
                 },
             ),
-            Self::Of(y, Exact { kind: Kind::Rows(plan), .. }) => for_each_tile(
+            Self::Of(y, Exact(Kind::Rows(plan))) => for_each_tile(
                 result.view_mut(),
                 || (buffers(), (plan.frames(), vec![DoubleRow::EMPTY; 2 * bins]), state()),
                 |((columns, out), (frames, spectrum), state), mut tile| {
@@ -193,7 +197,7 @@ impl<'a, T: Real> Spectra<'a, T> {
                     }
                 },
             ),
-            Self::Of(y, Exact { kind: Kind::Single(forward), .. }) => for_each_tile(
+            Self::Of(y, Exact(Kind::Single(forward))) => for_each_tile(
                 result.view_mut(),
                 || (buffers(), forward.scratch(), state()),
                 |((columns, out), scratch, state), mut tile| {

@@ -147,6 +147,11 @@ impl StftParams {
         if n == 0 || padded < self.n_fft { 0 } else { 1 + (padded - self.n_fft) / self.hop_length }
     }
 
+    /// Frames that reach a signal of `length` samples, at most `frames`.
+    pub(crate) fn frames_within(&self, length: usize, frames: usize) -> usize {
+        frames.min((length + 2 * self.pad()).div_ceil(self.hop_length))
+    }
+
     /// Shape `[channels, n_fft / 2 + 1, frames]` of the transform of `y [channels, samples]`.
     ///
     /// # Errors
