@@ -3,8 +3,8 @@
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeSet, HashMap};
 
-use icu_normalizer::ComposingNormalizerBorrowed;
 use serde::{Deserialize, Serialize};
+use unicode_normalization::UnicodeNormalization;
 
 use crate::error::{ModelError, Result};
 
@@ -94,10 +94,7 @@ pub(crate) fn is_missing(value: &str) -> bool {
 pub fn alike(labels: &Labels) -> Vec<String> {
     let plain = |name: &str| match name.trim().parse::<i128>() {
         Ok(number) => number.to_string(),
-        Err(_) => {
-            let composed = ComposingNormalizerBorrowed::new_nfc();
-            composed.normalize(&composed.normalize(name.trim()).to_lowercase()).into_owned()
-        }
+        Err(_) => caseless(name),
     };
     let mut first: HashMap<String, &str> = HashMap::new();
     let mut found = Vec::new();
@@ -114,6 +111,13 @@ pub fn alike(labels: &Labels) -> Vec<String> {
         }
     }
     found
+}
+
+/// What names have in common that differ only in case, in spaces around them, or in how Unicode composes
+/// their letters.
+pub(crate) fn caseless(name: &str) -> String {
+    let composed: String = name.trim().nfc().collect();
+    composed.to_lowercase().nfc().collect()
 }
 
 /// The index of each name.

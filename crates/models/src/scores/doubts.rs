@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::labels::caseless;
 use crate::predictions::{PredictionError, PredictionTable, Result};
 
 /// Classes that are listed in a message.
@@ -88,7 +89,7 @@ pub(super) fn warnings<K>(
 ) -> Vec<String> {
     let mut warnings: Vec<String> = no_prediction(&table.labels, strange).into_iter().collect();
     let names = Names::of(table, truth);
-    let case = |name: &str| number(name).is_none().then(|| name.to_lowercase());
+    let case = |name: &str| number(name).is_none().then(|| caseless(name));
     for alike in names.alike(number).into_iter().chain(names.alike(case)) {
         warnings.push(format!("{} are scored as different classes", quoted(&alike)));
     }
