@@ -93,7 +93,10 @@ impl ComparedFile {
             if matches!(header.dtype.kind, Kind::Text | Kind::Bytes) {
                 if provenance.is_none() {
                     match npz.texts(&name) {
-                        Ok(values) => texts.push(TextColumn { name, ids: None, values }),
+                        Ok(values) => {
+                            let shape = header.shape.clone();
+                            texts.push(TextColumn { name, ids: None, shape, values });
+                        }
                         Err(error) => {
                             refused.push(Refused { array: name, reason: error.to_string() });
                         }
@@ -151,6 +154,7 @@ impl ComparedFile {
                 .map(|(name, values)| TextColumn {
                     name: name.clone(),
                     ids: table.ids.clone(),
+                    shape: vec![values.len() as u64],
                     values: values.clone(),
                 })
                 .collect(),
@@ -216,11 +220,13 @@ impl ComparedFile {
     /// The values of an array of 64-bit integers; `None` of any other.
     pub(super) fn integers(&mut self, index: usize) -> Option<ArrayD<i128>> {
         let entry = &self.arrays[index];
+        if !(entry.dtype.ends_with("i8") || entry.dtype.ends_with("u8")) {
+            return None;
+        }
         match &mut self.source {
-            FeatureFile::Npz(npz) if entry.dtype.ends_with("i8") || entry.dtype.ends_with("u8") => {
-                npz.integers(&entry.name).ok()
-            }
-            _ => None,
+            FeatureFile::Npz(npz) => npz.integers(&entry.name).ok(),
+            FeatureFile::Npy(npy) => npy.integers().ok(),
+            FeatureFile::Parquet(_) => None,
         }
     }
 

@@ -89,3 +89,29 @@ fn beyond_doubles(values: &ArrayD<f64>) -> bool {
     const EXACT: f64 = (1_u64 << f64::MANTISSA_DIGITS) as f64;
     values.iter().any(|x| x.abs() >= EXACT)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An `.npy` file of two `int64`.
+    fn npy(path: &Path, values: [i64; 2]) {
+        let dictionary = "{'descr': '<i8', 'fortran_order': False, 'shape': (2,), }";
+        let header = format!("{dictionary:<117}\n");
+        let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+        bytes.extend(header.as_bytes());
+        values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+        std::fs::write(path, bytes).unwrap();
+    }
+
+    #[test]
+    fn whole_numbers_that_doubles_round_are_compared_exactly() {
+        let folder = tempfile::tempdir().unwrap();
+        let (a, b) = (folder.path().join("a.npy"), folder.path().join("b.npy"));
+        npy(&a, [1 << 53, (1 << 53) + 1]);
+        npy(&b, [1 << 53, 1 << 53]);
+        assert!(compare(&a, &a, &Criteria::default()).unwrap().within);
+        let found = compare(&a, &b, &Criteria::default()).unwrap();
+        assert!(!found.within && found.texts[0].differing == 1, "{found:?}");
+    }
+}

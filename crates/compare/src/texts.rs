@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::matching::file_name;
 
 /// Name under which the statuses of recordings are compared.
-const STATUS: &str = "status";
+const STATUS: &str = "outcome status";
 
 /// A column of texts in one file.
 #[derive(Debug)]
@@ -17,6 +17,8 @@ pub(super) struct TextColumn {
     pub name: String,
     /// What its rows are named by: ids, or their numbers.
     pub ids: Option<Vec<String>>,
+    /// Length of each axis.
+    pub shape: Vec<u64>,
     /// Its values.
     pub values: Vec<String>,
 }
@@ -50,12 +52,14 @@ pub(super) fn of_table(table: &Table) -> Vec<TextColumn> {
     let labels = table.labels().map(|(name, values)| TextColumn {
         name: name.to_owned(),
         ids: Some(table.ids().to_vec()),
+        shape: vec![values.len() as u64],
         values: values.to_vec(),
     });
     let outcomes = table.outcomes();
     let statuses = TextColumn {
         name: STATUS.into(),
         ids: Some(outcomes.iter().map(|outcome| outcome.id.clone()).collect()),
+        shape: vec![outcomes.len() as u64],
         values: outcomes.iter().map(|outcome| outcome.status.name().to_owned()).collect(),
     };
     labels.chain([statuses]).collect()
@@ -74,18 +78,34 @@ fn of_columns(a: &TextColumn, b: &TextColumn, by_file_name: bool) -> TextReport 
     let mut report = TextReport { name: a.name.clone(), values: 0, differing: 0, first: None };
     if let (Some(in_a), Some(in_b)) = (&a.ids, &b.ids) {
         let key = |id: &String| if by_file_name { file_name(id).to_owned() } else { id.clone() };
-        let places: HashMap<String, usize> = in_b.iter().map(key).zip(0..).collect();
-        for (id, x) in in_a.iter().zip(&a.values) {
-            if let Some(&row) = places.get(&key(id)) {
-                report.add(|| id.clone(), Some(x), b.values.get(row));
+        let (rows_a, rows_b) = (rows(in_a, key), rows(in_b, key));
+        for (row, (id, x)) in in_a.iter().zip(&a.values).enumerate() {
+            // Which of several of one file name belong together is not known.
+            let place = rows_b.get(&key(id)).copied().flatten();
+            if let Some(place) = place
+                && rows_a.get(&key(id)) == Some(&Some(row))
+            {
+                report.add(|| id.clone(), Some(x), b.values.get(place));
             }
         }
+    } else if a.shape != b.shape {
+        let (x, y) = (format!("{:?}", a.shape), format!("{:?}", b.shape));
+        report.add(|| "shape".into(), Some(&x), Some(&y));
     } else {
         for i in 0..a.values.len().max(b.values.len()) {
             report.add(|| format!("value {i}"), a.values.get(i), b.values.get(i));
         }
     }
     report
+}
+
+/// The row of each key; none where several have it.
+fn rows(ids: &[String], key: impl Fn(&String) -> String) -> HashMap<String, Option<usize>> {
+    let mut rows = HashMap::new();
+    for (row, id) in ids.iter().enumerate() {
+        rows.entry(key(id)).and_modify(|place| *place = None).or_insert(Some(row));
+    }
+    rows
 }
 
 impl TextReport {
@@ -125,7 +145,8 @@ mod tests {
 
     fn column(ids: Option<&[&str]>, values: &[&str]) -> TextColumn {
         let texts = |list: &[&str]| list.iter().map(ToString::to_string).collect::<Vec<_>>();
-        TextColumn { name: "class".into(), ids: ids.map(texts), values: texts(values) }
+        let shape = vec![values.len() as u64];
+        TextColumn { name: "class".into(), ids: ids.map(texts), shape, values: texts(values) }
     }
 
     #[test]
@@ -139,6 +160,10 @@ mod tests {
         let a = column(Some(&["x/1"]), &["rain"]);
         let b = column(Some(&["y/1"]), &["dog"]);
         assert_eq!(compare(&[a], &[b], true)[0].differing, 1);
+        // Two of one file name: it is not known which is which.
+        let a = column(Some(&["x/1", "y/1"]), &["ok", "empty"]);
+        let b = column(Some(&["p/1", "q/1"]), &["ok", "empty"]);
+        assert_eq!(compare(&[a], &[b], true)[0].values, 0);
     }
 
     #[test]

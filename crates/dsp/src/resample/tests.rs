@@ -357,3 +357,16 @@ fn windowed_sinc_streams_give_the_bits_and_length_of_arrays() {
         }
     }
 }
+
+/// Only the first channel was cleared.
+#[test]
+fn no_samples_give_zeros_in_every_channel() {
+    for (orig, target) in [(44_100.0, 44_100.0), (44_100.0, 22_050.0)] {
+        for res_type in [ResType::SoxrHq, ResType::KaiserFast] {
+            let y = Array2::<f32>::zeros((2, 0));
+            let mut out = Array2::from_elem((2, 10), 7.0_f32);
+            resample_into(y.view(), orig, target, res_type, false, out.view_mut()).unwrap();
+            assert!(out.iter().all(|x| *x == 0.0), "{orig} {target} {res_type:?}");
+        }
+    }
+}

@@ -99,12 +99,19 @@ pub fn compute(
         }
         open = rest;
         position += frames as u64;
-        let Some(next) = open.iter().map(|shared| shared.wanted(position)).min() else {
+        let Some(first) = open.iter().map(|shared| shared.pass.reads().start).min() else {
             return Ok(true);
         };
         if stop.load(Ordering::Relaxed) {
             return Ok(false);
         }
+        // Nobody wants what lies before.
+        if first > position {
+            read = skip_to(source, first).map(|()| 0);
+            position = first;
+            continue;
+        }
+        let next = open.iter().map(|shared| shared.wanted(position)).min().unwrap_or(0);
         let wanted = usize::try_from(next).unwrap_or(most).min(most);
         read = source.read(&mut block[..wanted * channels]).map_err(Failed::from);
         ended = matches!(read, Ok(0));

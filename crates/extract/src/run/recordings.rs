@@ -144,9 +144,10 @@ impl Recordings {
         survey: &Survey,
         stop: &Arc<AtomicBool>,
     ) -> Result<(Outcome, Computed), RunError> {
+        let watch = Watch::begin(input);
         let mut outcome = outcome_of(input);
         let computed = catch_unwind(AssertUnwindSafe(|| {
-            self.features((input, piece), survey, stop, &mut outcome)
+            self.features((input, piece), &watch, survey, stop, &mut outcome)
         }));
         match computed.unwrap_or_else(|_| Err(broken())) {
             Ok(None) => Err(RunError::Interrupted),
@@ -167,21 +168,21 @@ impl Recordings {
     fn features(
         &self,
         (input, piece): (&Input, Option<&Range<u64>>),
+        watch: &Watch,
         survey: &Survey,
         stop: &Arc<AtomicBool>,
         outcome: &mut Outcome,
     ) -> Result<Computed, Failed> {
-        let watch = Watch::begin(input);
-        let opened = work::open(input, &watch, (&self.plans, survey), stop, outcome)?;
+        let opened = work::open(input, watch, (&self.plans, survey), stop, outcome)?;
         let planned = opened.planned.clone();
         if let Some(piece) = piece {
-            let found = work::piece(opened, piece, (&watch, &self.folder), stop, outcome)?;
+            let found = work::piece(opened, piece, (watch, &self.folder), stop, outcome)?;
             return Ok(found.map(|features| (planned.plan, features)));
         }
-        let Some(recording) = work::whole(opened, &watch, &self.folder, stop, outcome)? else {
+        let Some(recording) = work::whole(opened, watch, &self.folder, stop, outcome)? else {
             return Ok(None);
         };
-        let (features, _) = work::complete(input, (&planned, &watch), Ok(recording), outcome)?;
+        let (features, _) = work::complete(input, (&planned, watch), Ok(recording), outcome)?;
         Ok(Some((planned.plan, features)))
     }
 

@@ -24,7 +24,8 @@ use crate::survey::Survey;
 
 /// Completes runs that have begun, all of which make statistics, with `jobs` threads. Inputs with the same number
 /// that are stretches of the same recording are computed in one reading of it. Outputs and reports are those
-/// of runs one after the other. `progress` is told of each recording once, when all runs are done with it.
+/// of runs one after the other; only how many frames a recording with NaN or infinite samples had decoded when
+/// it failed may differ, as blocks do. `progress` is told of each recording once, when all runs are done with it.
 ///
 /// # Errors
 /// [`RunError`], as [`run`](super::run()); [`RunError::NoSummary`]. What the runs have done until then can be
@@ -68,7 +69,12 @@ pub fn together(
         let Some(found) = answers(asked.collect(), stop)? else {
             return Err(RunError::Interrupted);
         };
-        writer.lock().unwrap_or_else(|e| e.into_inner()).write(number, found)
+        // A fault while writing leaves the outputs in doubt: the runs end, their ledgers intact.
+        let written = catch_unwind(AssertUnwindSafe(|| match writer.lock() {
+            Ok(mut writer) => writer.write(number, found),
+            Err(_) => Err(RunError::Broken),
+        }));
+        written.unwrap_or(Err(RunError::Broken))
     };
     // Taken one after the other, so that few wait for those before them.
     pool.install(|| (next..all).par_bridge().try_for_each(compute))?;
@@ -170,6 +176,9 @@ fn of_source(
     asked: &[Asked<'_>],
     stop: &Arc<AtomicBool>,
 ) -> Result<Option<Vec<(usize, Finished)>>, RunError> {
+    let Some(first) = asked.first() else { return Ok(Some(Vec::new())) };
+    // Before anything is known of the bytes, so that another recording in its place is seen.
+    let watch = Watch::begin(first.input);
     let mut outcomes: Vec<Outcome> = Vec::with_capacity(asked.len());
     for Asked { input, .. } in asked {
         let known = outcomes.first().map(|outcome| outcome.identity.clone());
@@ -178,7 +187,7 @@ fn of_source(
             Some(identity) => known_outcome_of(input, identity),
         });
     }
-    let computed = AssertUnwindSafe(|| shared(asked, &mut outcomes, stop));
+    let computed = AssertUnwindSafe(|| shared(asked, &watch, &mut outcomes, stop));
     let found = match catch_unwind(computed).unwrap_or_else(|_| Err(broken())) {
         Ok(Some(found)) => found,
         Ok(None) => return Ok(None),
@@ -222,6 +231,7 @@ struct Row {
 /// stopped. Their outcomes learn what they would have learned alone.
 fn shared(
     asked: &[Asked<'_>],
+    watch: &Watch,
     outcomes: &mut [Outcome],
     stop: &Arc<AtomicBool>,
 ) -> Result<Option<Vec<Result<Row, Failed>>>, Failed> {
@@ -233,8 +243,7 @@ fn shared(
     if first.input.source == InputSource::Stdin {
         return Ok(one_by_one(outcomes));
     }
-    let watch = Watch::begin(first.input);
-    let opened = watch.settle(reading::open(first.input, &watch, Part::Whole, stop));
+    let opened = watch.settle(reading::open(first.input, watch, Part::Whole, stop));
     if let Some(identity) = watch.identity() {
         outcomes.iter_mut().for_each(|outcome| outcome.identity.clone_from(&identity));
     }
@@ -269,7 +278,7 @@ fn shared(
     let rows = each.map(|((asked, outcome), (planned, recording))| {
         let planned = planned?;
         let recording = recording.unwrap_or_else(|| Err(broken()))?;
-        asked.row(planned, &watch, recording, outcome)
+        asked.row(planned, watch, recording, outcome)
     });
     Ok(Some(rows.collect()))
 }
@@ -282,6 +291,10 @@ fn alone(
 ) -> Option<Result<Row, Failed>> {
     let Asked { by, input, .. } = asked;
     let watch = Watch::begin(input);
+    // The recording may be another than the one that the run before has read.
+    if !input.source.is_stored() {
+        outcome.identity = input.source.identity();
+    }
     let opened = work::open(input, &watch, (&by.plans, &by.survey), stop, outcome);
     let computed = opened.and_then(|opened| {
         let planned = opened.planned.clone();

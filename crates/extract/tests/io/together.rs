@@ -138,6 +138,37 @@ fn one_reading_gives_what_several_give() {
     }
 }
 
+/// What lies between them is not read.
+#[test]
+fn stretches_far_apart_are_those_of_runs_of_their_own() {
+    let dir = tempfile::tempdir().unwrap();
+    let audio = dir.path().join("audio");
+    recordings(&audio);
+    let (config, stop) = (config(0), Arc::default());
+    let stretches: Vec<Vec<Input>> = [(1.0, 1.2), (0.0, 0.1), (0.5, 0.6)]
+        .map(|(start, end)| {
+            let mut found = inputs_of(&audio, 0);
+            found.truncate(1);
+            (found[0].start, found[0].end) = (Some(start), Some(end));
+            found
+        })
+        .into();
+    let out = |kind: &str, i: usize| options(&dir.path().join(format!("{kind}{i}.npz")), |_| {});
+    let of: Vec<RunOptions> = (0..stretches.len()).map(|i| out("together", i)).collect();
+    let begun = stretches.iter().zip(&of);
+    let begun = begun.map(|(inputs, of)| Begun::new(inputs, &config, of, &Quiet, &stop).unwrap());
+    let reports = run::together(begun.collect(), 1, &Quiet, &stop).unwrap();
+    for (i, (inputs, report)) in stretches.iter().zip(&reports).enumerate() {
+        let alone = out("alone", i);
+        assert_eq!(
+            run::run(inputs, &config, &alone, &Quiet, &stop).unwrap().outcomes,
+            report.outcomes
+        );
+        assert_eq!(report.outcomes[0].status, Status::Ok);
+        assert!(std::fs::read(&alone.out).unwrap() == std::fs::read(&of[i].out).unwrap(), "{i}");
+    }
+}
+
 /// Stops the run at a recording.
 struct Stopping(usize, AtomicUsize, Arc<AtomicBool>);
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use ndarray::ArrayD;
 
-use super::{Header, NpyError, components};
+use super::{Header, NpyError, array, components};
 
 /// An open `.npy` file.
 #[derive(Debug)]
@@ -49,8 +49,20 @@ impl NpyFile {
     /// # Errors
     /// [`NpyError`]; text is refused.
     pub fn components(&self) -> Result<ArrayD<f64>, NpyError> {
+        components(&mut self.body()?, &self.header)
+    }
+
+    /// An array of whole numbers or truth values, exactly.
+    ///
+    /// # Errors
+    /// [`NpyError`]; floats and text are refused.
+    pub fn integers(&self) -> Result<ArrayD<i128>, NpyError> {
+        array(&mut self.body()?, &self.header)
+    }
+
+    fn body(&self) -> Result<BufReader<File>, NpyError> {
         let mut body = BufReader::new(File::open(&self.path)?);
         Header::read(&mut body)?;
-        components(&mut body, &self.header)
+        Ok(body)
     }
 }

@@ -146,7 +146,8 @@ impl NpzFile {
     /// # Errors
     /// [`NpzError`] names the member and what is wrong with it; arrays in Fortran's order are refused.
     pub fn texts(&mut self, name: &str) -> Result<Vec<String>, NpzError> {
-        let most = MAX_INFLATED.max(self.length.saturating_mul(MAX_RATIO)) - self.text;
+        let most =
+            MAX_INFLATED.max(self.length.saturating_mul(MAX_RATIO)).saturating_sub(self.text);
         let strings = self.read(name, size_of::<String>(), |body, header, wrong| {
             let in_order = header.order == Order::C || header.shape.len() < 2;
             let (Kind::Text | Kind::Bytes, true) = (header.dtype.kind, in_order) else {
