@@ -165,8 +165,11 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         if self._given is not None:
             self._given.extend(fingerprints(rows[: _KEPT - len(self._given)]).tolist())
 
-    def _fingerprints(self) -> Fingerprints:
-        return np.array(self._given or [], np.uint64)
+    def _fingerprints(self) -> Fingerprints | None:
+        """Those of the rows given so far; None if not all are known."""
+        if self._given is None or len(self._given) >= _KEPT:
+            return None
+        return np.array(self._given, np.uint64)
 
     def _made_of(self) -> dict[str, Any]:
         """What a model file says about features."""

@@ -31,15 +31,15 @@ def fingerprints(rows: npt.NDArray[Any]) -> Fingerprints:
     return found
 
 
-def check_rows(fitted: Fingerprints | None, given: Fingerprints) -> None:
+def check_rows(fitted: Fingerprints | None, given: Fingerprints | None) -> None:
     """Refuses a description of features of which none are those that a model was fitted on.
 
     Parameters
     ----------
     fitted : rows that the model was fitted on; None if it was loaded from a file
-    given : rows that the description stands for
+    given : rows that the description stands for; None if not all are known
     """
-    if fitted is None:
+    if fitted is None or given is None:
         return
     known = np.isin(fitted, given)
     if not known.any():

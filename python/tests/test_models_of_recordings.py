@@ -119,6 +119,10 @@ def test_a_model_of_other_rows_is_not_saved_with_these_features(
     with pytest.raises(cf.ParameterError, match="none of these"):
         again.save(tmp_path / "wrong", features=described)
     cf.KNN.load(tmp_path / "model").save(tmp_path / "model", features=described)
+    # Pickles of 0.1.0 do not say what they gave.
+    old = cf.FeatureExtractor("mfcc-zcr").fit(paths)
+    del old._given
+    cf.KNN(1).fit(rows, kinds).save(tmp_path / "model", features=pickle.loads(pickle.dumps(old)))
 
 
 def test_a_pipeline_refuses_other_rates_as_a_model_does(

@@ -11,10 +11,14 @@ pub(crate) fn warning(table: &LabelledTable, folds: &[Fold]) -> Option<String> {
         0 => (of_one_file(table), "are of the same file as"),
         _ => (of_equal_features(table), "have the same features as"),
     };
+    let mut copied = vec![false; first.len()];
+    for (row, &first) in first.iter().enumerate() {
+        copied[first] |= row != first;
+    }
     let mut found = Vec::new();
     for fold in folds {
         let mut trained: HashMap<usize, usize> = HashMap::new();
-        for &row in &fold.train {
+        for &row in fold.train.iter().filter(|&&row| copied[first[row]]) {
             trained.entry(first[row]).or_insert(row);
         }
         let tested = fold.test.iter();
@@ -34,13 +38,12 @@ pub(crate) fn warning(table: &LabelledTable, folds: &[Fold]) -> Option<String> {
 
 /// For each row, the first one with these features.
 fn of_equal_features(table: &LabelledTable) -> Vec<usize> {
-    let hash = |row: ndarray::ArrayView1<'_, f64>| {
-        let mut hasher = blake3::Hasher::new();
-        for value in row {
-            // Zero has two signs.
-            hasher.update(&(value + 0.0).to_le_bytes());
-        }
-        hasher.finalize()
+    let mut bytes = Vec::with_capacity(8 * table.x.ncols());
+    let mut hash = |row: ndarray::ArrayView1<'_, f64>| {
+        bytes.clear();
+        // Zero has two signs.
+        bytes.extend(row.iter().flat_map(|value| (value + 0.0).to_le_bytes()));
+        blake3::hash(&bytes)
     };
     let mut first: HashMap<blake3::Hash, usize> = HashMap::new();
     let rows = table.x.outer_iter().enumerate();

@@ -90,12 +90,9 @@ pub(crate) fn is_missing(value: &str) -> bool {
 }
 
 /// Classes that are probably one, in words: names that differ only in case, in spaces around them, in
-/// how Unicode composes their letters, or in how a whole number is written.
+/// how Unicode composes their letters, or in how a number is written.
 pub fn alike(labels: &Labels) -> Vec<String> {
-    let plain = |name: &str| match name.trim().parse::<i128>() {
-        Ok(number) => number.to_string(),
-        Err(_) => caseless(name),
-    };
+    let plain = |name: &str| number(name.trim()).unwrap_or_else(|| caseless(name));
     let mut first: HashMap<String, &str> = HashMap::new();
     let mut found = Vec::new();
     for name in labels.names() {
@@ -120,6 +117,16 @@ pub(crate) fn caseless(name: &str) -> String {
     composed.to_lowercase().nfc().collect()
 }
 
+/// A number in one spelling; `None` for other names.
+pub(crate) fn number(name: &str) -> Option<String> {
+    if let Ok(whole) = name.parse::<i128>() {
+        return Some(whole.to_string());
+    }
+    let value = name.parse::<f64>().ok().filter(|value| value.is_finite())?;
+    // Whole numbers are written without a point, and -0 is 0.
+    Some((value + 0.0).to_string())
+}
+
 /// The index of each name.
 pub(crate) fn positions(names: &[String]) -> HashMap<&str, usize> {
     names.iter().enumerate().map(|(i, name)| (name.as_str(), i)).collect()
@@ -131,7 +138,7 @@ mod tests {
 
     #[test]
     fn classes_that_look_the_same_are_said() {
-        for (a, b) in [("\u{e9}", "e\u{301}"), ("Rain", "rain"), ("1", "01"), ("x", "x ")] {
+        for (a, b) in [("\u{e9}", "e\u{301}"), ("Rain", "rain"), ("1", "01"), ("1", "1.0 "), ("x", "x ")] {
             let found = alike(&Labels::of(&[a, "other", b]).0);
             assert_eq!(found.len(), 1, "{a} {b}");
             assert!(found[0].contains(&format!("{a:?}")) && found[0].contains(&format!("{b:?}")));

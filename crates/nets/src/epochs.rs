@@ -77,7 +77,7 @@ pub(crate) fn run(
             let reached = rate(trainer.network)?;
             result.score = Some(reached);
             if recipe.select != Select::Last && best.as_ref().is_none_or(|b| reached > b.0) {
-                best = Some((reached, epoch, trainer.network.parameters().clone()));
+                best = Some((reached, epoch, trainer.network.parameters().unpacked()));
             }
         }
         epochs.push(result);

@@ -40,7 +40,9 @@ pub(crate) fn of_evaluation(
     recipe: &Recipe,
 ) -> u64 {
     let worst = Worst::of(network, items, rows, rows.len(), recipe);
-    FLOAT.saturating_mul(worst.numbers(network, Network::passing))
+    // Weights are packed for it.
+    let packed = network.parameters().count() as u64;
+    FLOAT.saturating_mul(worst.numbers(network, Network::passing).saturating_add(packed))
 }
 
 /// Numbers for an item of these shapes.

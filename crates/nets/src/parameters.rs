@@ -101,7 +101,20 @@ impl Parameters {
     /// The weights of a layer, packed by `pack` at the first call after they changed.
     pub(crate) fn packed(&self, name: &str, pack: impl FnOnce(&Matrix) -> Packed) -> &Packed {
         let i = self.index[name];
-        self.packed[i].get_or_init(|| Arc::new(pack(&self.values[i])))
+        if let Some(packed) = self.packed[i].get() {
+            return packed;
+        }
+        // Not inside of `get_or_init`: a thread of the pool that waits there could hold the work that
+        // the packing thread waits for.
+        let packed = Arc::new(pack(&self.values[i]));
+        self.packed[i].get_or_init(|| packed)
+    }
+
+    /// A copy without the packed weights.
+    pub(crate) fn unpacked(&self) -> Self {
+        let packed = vec![OnceLock::new(); self.declared.len()];
+        let (declared, values) = (self.declared.clone(), self.values.clone());
+        Self { declared, values, packed, index: self.index.clone() }
     }
 
     pub(crate) fn get_mut(&mut self, name: &str) -> &mut Matrix {

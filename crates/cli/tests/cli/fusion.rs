@@ -212,12 +212,26 @@ fn contradictions_and_repeated_windows_are_not_fused() {
     for (windows, message) in [
         ("id,start,end,predicted\na,0,1,x\na,1,2,y\na,1,2,y\n", "one window of id a, start \"1\""),
         ("id,start,true,predicted\na,0,x,x\na,1,y,y\n", "true is x in one window and y in another"),
+        (
+            "id,start,true,predicted\na,0,,x\na,1,x,x\na,2,y,y\n",
+            "true is x in one window and y in another",
+        ),
         ("id,recording,predicted\na@0-1,a,x\na@0-1,a,x\n", "more than one row: id a@0-1"),
     ] {
         let windows = put("w.csv", windows);
         let found = refused(&["fuse", text(&windows), "--vote", "majority", "-o", "-"]);
         assert!(found.contains(message), "{found}");
     }
+    // What one file or window leaves empty, another one says.
+    let empty = put("2.csv", &format!("{head}a,1,,x,0.9,0.1\nb,2,,y,0.2,0.8\n"));
+    let fused = done(&["fuse", text(&empty), text(&one), "-o", "-"]);
+    assert!(fused.contains("a,1,x,x,") && fused.contains("b,2,y,y,"), "{fused}");
+    let other = put("3.csv", &format!("{head}a,1,y,x,0.9,0.1\nb,2,y,y,0.2,0.8\n"));
+    let found = refused(&["fuse", text(&empty), text(&one), text(&other), "-o", "-"]);
+    assert!(found.contains("id a: true is y here and x in"), "{found}");
+    let partly = put("w.csv", "id,start,true,predicted\na,0,,x\na,1,x,x\n");
+    let voted = done(&["fuse", text(&partly), "--vote", "majority", "-o", "-"]);
+    assert!(voted.contains("a,x,x"), "{voted}");
     let lengths = put("w.csv", "id,start,end,predicted\na,0,1,x\na,0,2,y\na,1,2,y\n");
     assert!(done(&["fuse", text(&lengths), "--vote", "majority", "-o", "-"]).contains("\na,y,"));
 }

@@ -67,6 +67,12 @@ fn labels_come_from_a_file_with_any_key_column() {
     assert!(without.contains("--labels") && without.contains("--target"), "{without}");
     let unnamed = refused(&["score", text(&file), "--labels", text(&labels)]);
     assert!(unnamed.contains("--id-column"), "{unnamed}");
+    // Container and sequence are one name.
+    std::fs::write(&file, "container,sequence,predicted\n1,1,a\n1,2,b\n").unwrap();
+    std::fs::write(&labels, "id,class\n1/2,b\n1/1,b\n").unwrap();
+    let report = done(&["score", text(&file), "--labels", text(&labels), "--json"]);
+    let report: Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["scores"]["accuracy"], 0.5);
 }
 
 /// A corrected label file had no effect beside a column `true` of the predictions.

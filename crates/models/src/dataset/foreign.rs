@@ -77,9 +77,9 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
         }
     }
     let ids = match &members.ids {
-        None => take_ids(&mut columns).unwrap_or_else(|| numbers(x.nrows())),
+        None => take_ids(&mut columns),
         Some(name) => match columns.iter().find(|(column, _)| column == name) {
-            Some((_, ids)) => ids.clone(),
+            Some((_, ids)) => Some(ids.clone()),
             None => {
                 let why = unread.iter().find(|(member, _)| member == name);
                 let why = why.map(|(_, why)| format!(": it {why}")).unwrap_or_default();
@@ -87,7 +87,7 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
             }
         },
     };
-    require_unique(path, &ids)?;
+    let (ids, numbered) = named(path, ids, x.nrows())?;
     let names_fit =
         npz.contains(FEATURE_NAMES) && npz.header(FEATURE_NAMES)?.shape == [x.ncols() as u64];
     let feature_names = if names_fit { npz.strings(FEATURE_NAMES)? } else { Vec::new() };
@@ -101,6 +101,7 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
         config_hash: String::new(),
         columns,
         unread,
+        numbered,
     })
 }
 
@@ -116,9 +117,15 @@ fn take_ids(columns: &mut Vec<(String, Vec<String>)>) -> Option<Vec<String>> {
     Some(columns.remove(at).1)
 }
 
-/// Rows that have no ids.
-pub(super) fn numbers(rows: usize) -> Vec<String> {
-    (0..rows).map(|row| row.to_string()).collect()
+/// The ids, or numbers if rows have none, and whether it is so.
+fn named(path: &Path, ids: Option<Vec<String>>, rows: usize) -> Result<(Vec<String>, bool)> {
+    let Some(ids) = ids else {
+        return Ok(((0..rows).map(|row| row.to_string()).collect(), true));
+    };
+    match not_an_id(&ids) {
+        None => Ok((ids, false)),
+        Some(reason) => Err(DatasetError::content(path, reason)),
+    }
 }
 
 /// Columns of decimal numbers are features, all others label columns: so pandas and polars leave a
@@ -163,16 +170,16 @@ pub(super) fn read_parquet(
         )));
     }
     let ids = match (&members.ids, ids) {
-        (None, Some(ids)) => ids,
-        (None, None) => take_ids(&mut texts).unwrap_or_else(|| numbers(values.nrows())),
+        (None, Some(ids)) => Some(ids),
+        (None, None) => take_ids(&mut texts),
         (Some(name), _) => match texts.iter().find(|(column, _)| column == name) {
-            Some((_, ids)) => ids.clone(),
+            Some((_, ids)) => Some(ids.clone()),
             None => {
                 return Err(fault(format!("no column {name:?} (--ids) of text or whole numbers")));
             }
         },
     };
-    require_unique(path, &ids)?;
+    let (ids, numbered) = named(path, ids, values.nrows())?;
     Ok(LabelledTable {
         path: path.into(),
         x: values.select(Axis(1), &features),
@@ -183,11 +190,8 @@ pub(super) fn read_parquet(
         config_hash: String::new(),
         columns: texts,
         unread: skipped.into_iter().map(|name| (name, UNREAD.into())).collect(),
+        numbered,
     })
-}
-
-fn require_unique(path: &Path, ids: &[String]) -> Result<()> {
-    not_an_id(ids).map_or(Ok(()), |reason| Err(DatasetError::content(path, reason)))
 }
 
 /// Why values do not name rows: one is empty, or there twice.

@@ -144,11 +144,8 @@ impl LabelFile {
             self.columns.iter().map(|c| (c.clone(), Vec::new())).collect();
         let mut missing = Vec::new();
         let mut of_name: HashMap<&str, (&str, &str)> = HashMap::new();
-        let known: HashSet<&str> = recordings
-            .iter()
-            .flat_map(|(_, path)| [Some(*path), file_name(path)])
-            .flatten()
-            .collect();
+        let paths: HashSet<&str> = recordings.iter().map(|(_, path)| *path).collect();
+        let names: HashSet<&str> = paths.iter().filter_map(|path| file_name(path)).collect();
         for &recording in recordings {
             let Some((key, Line { number: line, values, path: beside })) = self.find(recording)
             else {
@@ -168,7 +165,7 @@ impl LabelFile {
                     ),
                 ));
             }
-            if is_of_another(beside, path, &known) {
+            if is_of_another(beside, path, &paths, &names) {
                 let reason = format!(
                     "line {line}: id {key:?} is the recording {path}, but path names another one, \
                      {beside}: correct the line, or leave out the column that is wrong"
@@ -233,10 +230,15 @@ fn file_name(path: &str) -> Option<&str> {
 
 /// Whether what a label file calls the path is that of another recording. Folders may differ where the
 /// file name is that of no other.
-fn is_of_another(written: &str, path: &str, known: &HashSet<&str>) -> bool {
+fn is_of_another(
+    written: &str,
+    path: &str,
+    paths: &HashSet<&str>,
+    names: &HashSet<&str>,
+) -> bool {
     let (name, own) = (file_name(written), file_name(path));
-    (written != path && !written.is_empty() && known.contains(written))
-        || (name != own && name.is_some_and(|name| known.contains(name)))
+    (written != path && !written.is_empty() && paths.contains(written))
+        || (name != own && name.is_some_and(|name| names.contains(name)))
 }
 
 #[cfg(test)]
@@ -294,6 +296,7 @@ mod tests {
         for text in [
             "id,path,class\na/x,data/a/x.wav,cat\nb/y,data/b/y.flac,dog\n",
             "id,path,class\na/x,/elsewhere/x.wav,cat\nb/y,,dog\n",
+            "id,path,class\na/x,x.wav,cat\nb/y,y.flac,dog\n",
         ] {
             assert_eq!(labels(text).unwrap()[0].1, ["cat", "dog"], "{text}");
         }

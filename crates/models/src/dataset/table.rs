@@ -11,7 +11,7 @@ use ndarray::{Array2, ArrayView2};
 use serde_json::Value;
 
 use super::error::{DatasetError, Result};
-use super::foreign::{not_an_id, numbers};
+use super::foreign::not_an_id;
 use super::label_file::{LabelFile, LabelSource};
 use crate::formats::TrainedOn;
 use crate::labels::{Labels, require_few};
@@ -37,6 +37,8 @@ pub struct LabelledTable {
     pub(super) columns: Vec<(String, Vec<String>)>,
     /// members of files of other programs that cannot be read, and why
     pub(super) unread: Vec<(String, String)>,
+    /// whether the ids are only the numbers of the rows
+    pub(super) numbered: bool,
 }
 
 impl LabelledTable {
@@ -52,6 +54,7 @@ impl LabelledTable {
             config_hash: String::new(),
             columns,
             unread: Vec::new(),
+            numbered: false,
         }
     }
 
@@ -82,6 +85,7 @@ impl LabelledTable {
             config_hash,
             columns: table.labels().map(|(name, c)| (name.to_string(), c.to_vec())).collect(),
             unread: Vec::new(),
+            numbered: false,
         })
     }
 
@@ -144,10 +148,7 @@ impl LabelledTable {
 
     /// Why what looks like ids is none, where rows are numbered instead.
     fn unsure_ids(&self) -> Option<String> {
-        if !self.outcomes.is_empty()
-            || self.ids != numbers(self.ids.len())
-            || self.columns.iter().any(|(_, values)| *values == self.ids)
-        {
+        if !self.numbered {
             return None;
         }
         let of = |name: &str| {

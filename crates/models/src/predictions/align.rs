@@ -24,33 +24,37 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         if let Some(fault) = self.repeated_window() {
             return Err(fault);
         }
-        let agreed = self.agreed(self);
+        let agreed = AGREED.map(|name| Some((name, self.position(name)?)));
         let mut at: HashMap<&K, usize> = HashMap::new();
-        let mut recordings: Vec<(&PredictionRow<K>, WindowVotes)> = Vec::new();
+        let mut recordings: Vec<(PredictionRow<K>, WindowVotes)> = Vec::new();
         for row in &self.rows {
             let next = recordings.len();
             let slot = *at.entry(&row.key).or_insert(next);
             if slot == next {
-                recordings.push((row, WindowVotes::new(self.labels.len())));
+                recordings.push((row.clone(), WindowVotes::new(self.labels.len())));
             }
-            let first = recordings[slot].0;
-            if let Some((column, one, two)) = contradiction(&agreed, first, row) {
-                return Err(self.content(format!(
-                    "{}: {column} is {one} in one window and {two} in another; a vote needs one \
-                     value for each recording, or a file without the column",
-                    row.key
-                )));
+            let (recording, votes) = &mut recordings[slot];
+            for (column, at) in agreed.into_iter().flatten() {
+                let (one, two) = (&mut recording.cells[at], &row.cells[at]);
+                if one.is_empty() {
+                    one.clone_from(two);
+                } else if !two.is_empty() && one != two {
+                    return Err(self.content(format!(
+                        "{}: {column} is {one} in one window and {two} in another; a vote needs \
+                         one value for each recording, or a file without the column",
+                        row.key
+                    )));
+                }
             }
             if let Some(class) = row.class {
-                let votes = &mut recordings[slot].1;
                 votes.add(class, row.proba.as_deref()).map_err(|e| self.model(e))?;
             }
         }
         let mut rows = Vec::with_capacity(recordings.len());
-        for (first, votes) in recordings {
+        for (recording, votes) in recordings {
             let decision = rule.decide(&votes).map_err(|e| self.model(e))?;
             let (class, proba) = decision.map_or((None, None), |(c, p)| (Some(c), p));
-            rows.push(PredictionRow { class, proba, ..first.clone() });
+            rows.push(PredictionRow { class, proba, ..recording });
         }
         Ok(Self { rows, ..self.clone() }.of_recordings())
     }
@@ -73,7 +77,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         for table in &tables[1..] {
             for row in table.rows.iter().filter(|row| row.class.is_none()) {
                 if known.insert(row.key.clone()) {
-                    let cell = |column| table.columns.iter().position(|c| c == column);
+                    let cell = |column: &String| table.position(column);
                     let cells = first.columns.iter().map(|column| {
                         cell(column).map_or(String::new(), |at| row.cells[at].clone())
                     });
@@ -82,10 +86,8 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
                 }
             }
         }
-        for table in &tables[1..] {
-            table.check_agreement(&first)?;
-        }
         let aligned = tables.iter().map(|t| t.aligned_to(&first)).collect::<Result<Vec<_>>>()?;
+        first.agree_with(tables)?;
         let equal = vec![1.0; tables.len()];
         let views: Vec<_> = aligned.iter().map(|(values, _)| values.view()).collect();
         let mean =
@@ -137,27 +139,35 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         )))
     }
 
-    /// Where this table and another have the columns that must agree, with their names.
-    fn agreed(&self, other: &Self) -> Vec<(&'static str, usize, usize)> {
-        let at = |table: &Self, name: &str| table.columns.iter().position(|c| c == name);
-        let both = |name| Some((name, at(self, name)?, at(other, name)?));
-        AGREED.into_iter().filter_map(both).collect()
+    fn position(&self, name: &str) -> Option<usize> {
+        self.columns.iter().position(|column| column == name)
     }
 
-    /// Refuses another true class, fold or group of a recording than that of another table.
-    fn check_agreement(&self, other: &Self) -> Result<()> {
-        let agreed = self.agreed(other);
-        let known: HashMap<&K, &PredictionRow<K>> =
-            other.rows.iter().map(|row| (&row.key, row)).collect();
-        for row in &self.rows {
-            let Some(theirs) = known.get(&row.key) else { continue };
-            if let Some((column, own, their)) = contradiction(&agreed, row, theirs) {
-                return Err(self.content(format!(
-                    "{}: {column} is {own} here and {their} in {}: correct it, or remove the \
-                     column {column} from one of the files",
-                    row.key,
-                    other.path.display()
-                )));
+    /// Refuses tables that give a recording two true classes, folds or groups, and takes over what
+    /// this one leaves empty.
+    fn agree_with(&mut self, tables: &[Self]) -> Result<()> {
+        for name in AGREED {
+            let mut said: HashMap<&K, (&str, &Self)> = HashMap::new();
+            for table in tables {
+                let Some(at) = table.position(name) else { continue };
+                for row in table.rows.iter().filter(|row| !row.cells[at].is_empty()) {
+                    let own = row.cells[at].as_str();
+                    let &mut (their, other) = said.entry(&row.key).or_insert((own, table));
+                    if own != their {
+                        return Err(table.content(format!(
+                            "{}: {name} is {own} here and {their} in {}: correct it, or remove \
+                             the column {name} from one of the files",
+                            row.key,
+                            other.path.display()
+                        )));
+                    }
+                }
+            }
+            let Some(at) = self.position(name) else { continue };
+            for row in &mut self.rows {
+                if let Some((value, _)) = said.get(&row.key) {
+                    row.cells[at] = (*value).to_string();
+                }
             }
         }
         Ok(())
@@ -233,17 +243,6 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     }
 }
 
-/// The first column of those that must agree in which two rows have different values, and these.
-fn contradiction<'a, K>(
-    agreed: &[(&'static str, usize, usize)],
-    one: &'a PredictionRow<K>,
-    two: &'a PredictionRow<K>,
-) -> Option<(&'static str, &'a str, &'a str)> {
-    let values =
-        agreed.iter().map(|&(name, a, b)| (name, one.cells[a].as_str(), two.cells[b].as_str()));
-    values.into_iter().find(|(_, a, b)| !a.is_empty() && !b.is_empty() && a != b)
-}
-
 impl PredictionTable {
     /// The same with the recordings as ids where the rows are windows that `extract --window` made:
     /// ids `RECORDING@TIMES` beside a column `recording`.
@@ -251,14 +250,12 @@ impl PredictionTable {
     /// # Errors
     /// [`PredictionError::Rows`] for a window that occurs twice.
     pub fn windows_by_recording(mut self) -> Result<Self> {
-        let Some(at) = self.columns.iter().position(|column| column == "recording") else {
-            return Ok(self);
-        };
+        let Some(at) = self.position("recording") else { return Ok(self) };
         let is_window = |row: &PredictionRow<Id>| {
             let times = row.key.0.strip_prefix(row.cells[at].as_str());
             times.is_some_and(|times| times.starts_with('@'))
         };
-        let id = self.columns.iter().position(|column| column == "id");
+        let id = self.position("id");
         if let Some(id) = id.filter(|_| self.rows.iter().all(is_window)) {
             self.check_once_each()?;
             for row in &mut self.rows {

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use super::{PredictionRow, PredictionTable, Result, content};
+use super::{Id, PredictionRow, PredictionTable, Result, content};
 use crate::dataset::{DatasetError, LabelFile, LabelSource};
 
 /// Label columns that are groups rather than something to predict.
 pub const NO_TARGETS: [&str; 5] = ["fold", "group", "container", "recording", "view"];
 
-impl<K> PredictionTable<K> {
+impl PredictionTable {
     /// Adds columns of labels; they hide columns of the same name. Gives the column of true classes:
     /// `target` if there is one, else that of the folders, or the only label column of the file that
     /// is no group; `None` stands for the column `true`.
@@ -60,10 +60,10 @@ impl<K> PredictionTable<K> {
 
     /// The columns of a source for the lines.
     fn found(&self, source: &LabelSource) -> Result<Vec<(String, Vec<String>)>> {
-        let (id, path) = (0, self.columns.iter().position(|c| c == "path").unwrap_or(0));
+        let path = self.columns.iter().position(|c| c == "path").unwrap_or(0);
         match source {
             LabelSource::Folders { column } => {
-                let folder = |row: &PredictionRow<K>| {
+                let folder = |row: &PredictionRow<Id>| {
                     let folder = Path::new(&row.cells[path]).parent().and_then(Path::file_name);
                     folder.and_then(|name| name.to_str()).map(String::from)
                 };
@@ -75,7 +75,7 @@ impl<K> PredictionTable<K> {
                 let refuse = |e: DatasetError| content(&self.path, e.to_string());
                 let labels = LabelFile::read(file, key.as_deref()).map_err(refuse)?;
                 let names =
-                    |row: &PredictionRow<K>| (row.cells[id].clone(), row.cells[path].clone());
+                    |row: &PredictionRow<Id>| (row.key.0.clone(), row.cells[path].clone());
                 let names: Vec<(String, String)> = self.rows.iter().map(names).collect();
                 let pairs: Vec<(&str, &str)> =
                     names.iter().map(|(id, path)| (id.as_str(), path.as_str())).collect();

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::labels::caseless;
+use crate::labels::{caseless, number};
 use crate::predictions::{PredictionError, PredictionTable, Result};
 
 /// Classes that are listed in a message.
@@ -133,16 +133,6 @@ fn improbable<K>(table: &PredictionTable<K>) -> Option<String> {
         let names = quoted(&names);
         format!("where {names} are predicted, another of them is always more probable: {remedy}")
     })
-}
-
-/// A number in one spelling; `None` for other names.
-fn number(name: &str) -> Option<String> {
-    if let Ok(whole) = name.parse::<i128>() {
-        return Some(whole.to_string());
-    }
-    let value = name.parse::<f64>().ok().filter(|value| value.is_finite())?;
-    // Whole numbers are written without a point, and -0 is 0.
-    Some((value + 0.0).to_string())
 }
 
 fn quoted<S: AsRef<str>>(names: &[S]) -> String {
