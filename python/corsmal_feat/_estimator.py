@@ -179,6 +179,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
             "feature_config": json.loads(config),
             "feature_config_hash": digest,
             "formats": self._formats,
+            "seconds": [],
         }
 
     def _formats_of(self, recordings: list[Any]) -> list[Format]:

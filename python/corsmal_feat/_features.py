@@ -29,6 +29,12 @@ Values = npt.NDArray[Any]
 GOOD = ("ok", "truncated")
 
 
+def lengths(outcomes: list[dict[str, Any]]) -> list[tuple[str, float]]:
+    """Path and seconds of the recordings that have features, as far as they are known."""
+    good = [row for row in outcomes if row["status"] in GOOD and row.get("sample_rate")]
+    return [(row["path"], row["decoded_frames"] / row["sample_rate"]) for row in good]
+
+
 @dataclass(repr=False)
 class Features:
     """The output of a run (see `load_features`).
@@ -216,6 +222,7 @@ class Features:
                 for row in self.outcomes
                 if row["status"] in GOOD
             ],
+            "seconds": [seconds for _, seconds in lengths(self.outcomes)],
         }
 
     def _fingerprints(self) -> Fingerprints:

@@ -13,10 +13,11 @@ import numpy.typing as npt
 from . import _core
 from ._classifier import class_labels
 from ._extract import extract
-from ._features import GOOD
+from ._features import GOOD, lengths
 from ._formats import mismatch
 from ._refusals import existing, refuses
 from ._validation import Matrix, features
+from ._warnings import warn
 from .errors import DecodeError, ModelError, ParameterError
 
 
@@ -164,6 +165,9 @@ class TrainedModel:
                 raise DecodeError(f"{path}: {outcome['status']}: {outcome['reason']}")
         if not any_rate:
             self._check_formats(found.outcomes)
+        strange = self._model.length_warning(lengths(found.outcomes))
+        if strange is not None:
+            warn(strange)
         if found.summary is None or len(found.names) != self.n_features_in_:
             raise ParameterError(
                 f"X gives {len(found.names)} values per recording, but {self.path} was trained on"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pickle
 import subprocess
+import warnings
 from pathlib import Path
 
 import corsmal_feat as cf
@@ -16,9 +17,12 @@ import soundfile
 RATE = 16000
 
 
-def record(path: Path, hz: float, seed: int, rate: int = RATE, channels: int = 1) -> Path:
-    noise = 0.02 * np.random.default_rng(seed).standard_normal((rate // 2, channels))
-    tone = 0.2 * np.sin(2 * np.pi * hz * np.arange(rate // 2) / rate)
+def record(
+    path: Path, hz: float, seed: int, rate: int = RATE, channels: int = 1, seconds: float = 0.5
+) -> Path:
+    samples = int(rate * seconds)
+    noise = 0.02 * np.random.default_rng(seed).standard_normal((samples, channels))
+    tone = 0.2 * np.sin(2 * np.pi * hz * np.arange(samples) / rate)
     soundfile.write(path, tone[:, None] + noise, rate)
     return path
 
@@ -55,7 +59,8 @@ def test_a_model_with_its_features_takes_recordings(
         again = pickle.loads(pickle.dumps(model))
         assert again.predict(paths[:2]).tolist() == kinds[:2]
         assert np.array_equal(model.predict_proba(paths), of_run.predict_proba(features.summary))
-        assert model.header["trained_on"] == {"sample_rates": [RATE], "channels": [1]}
+        trained = model.header["trained_on"]
+        assert (trained["sample_rates"], trained["channels"]) == ([RATE], [1])
         assert model.header["feature_names"] == features.names
     other = record(tmp_path / "other.wav", 300, 5, rate=44100)
     with pytest.raises(cf.ParameterError, match=r"44100 Hz, but .* was trained on 16000"):
@@ -123,6 +128,23 @@ def test_a_model_of_other_rows_is_not_saved_with_these_features(
     old = cf.FeatureExtractor("mfcc-zcr").fit(paths)
     del old._given
     cf.KNN(1).fit(rows, kinds).save(tmp_path / "model", features=pickle.loads(pickle.dumps(old)))
+
+
+def test_recordings_of_another_length_are_warned_of(
+    recordings: tuple[list[Path], list[str]], tmp_path: Path
+) -> None:
+    paths, kinds = recordings
+    features = cf.extract(paths, preset="mfcc-zcr")
+    model = cf.KNN(1).fit(features.summary, kinds)
+    model.save(tmp_path / "model", features=features)
+    model = cf.load_model(tmp_path / "model")
+    assert model.header["trained_on"]["seconds"] == {"shortest": 0.5, "longest": 0.5}
+    long = record(tmp_path / "long.wav", 300, 5, seconds=1.5)
+    with pytest.warns(UserWarning, match=r"long\.wav, 1\.5 s long, is not like the recordings .* 0\.5 s:"):
+        model.predict([paths[0], long])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model.predict(paths)
 
 
 def test_a_pipeline_refuses_other_rates_as_a_model_does(

@@ -119,6 +119,12 @@ impl Outcome {
             identity: String::new(),
         }
     }
+
+    /// How long the recording is, or the stretch of it that is taken, as far as it was decoded.
+    pub fn seconds(&self) -> Option<f64> {
+        let rate = self.sample_rate.filter(|rate| *rate > 0)?;
+        Some(self.decoded_frames as f64 / f64::from(rate))
+    }
 }
 
 #[cfg(test)]

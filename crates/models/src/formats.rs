@@ -2,20 +2,25 @@
 
 use std::collections::BTreeSet;
 
+use corsmal_files::outcome::Outcome;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
+use crate::lengths::Lengths;
 use crate::words;
 
 /// Formats of the recordings that a model was trained on.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainedOn {
     /// sampling rates in Hz, ascending
     pub sample_rates: Vec<u32>,
     /// channel counts, ascending
     pub channels: Vec<u32>,
+    /// how long they are; absent where unknown, as in models of version 0.1.0
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seconds: Option<Lengths>,
 }
 
 impl TrainedOn {
@@ -29,7 +34,14 @@ impl TrainedOn {
         let known = !rates.is_empty();
         let (sample_rates, channels) =
             (rates.into_iter().collect(), channels.into_iter().collect());
-        known.then_some(Self { sample_rates, channels })
+        known.then_some(Self { sample_rates, channels, seconds: None })
+    }
+
+    /// Formats and lengths of extracted recordings; `None` unless all formats are known.
+    pub fn of_outcomes(outcomes: &[Outcome]) -> Option<Self> {
+        let good = || outcomes.iter().filter(|o| o.status.has_features());
+        let formats = Self::of(good().map(|o| (o.sample_rate, o.channels)))?;
+        Some(Self { seconds: Lengths::of(good().filter_map(Outcome::seconds)), ..formats })
     }
 
     /// Which recordings may have features by the configuration `used`, where those trained on were

@@ -138,7 +138,9 @@ mod tests {
 
     #[test]
     fn classes_that_look_the_same_are_said() {
-        for (a, b) in [("\u{e9}", "e\u{301}"), ("Rain", "rain"), ("1", "01"), ("1", "1.0 "), ("x", "x ")] {
+        for (a, b) in
+            [("\u{e9}", "e\u{301}"), ("Rain", "rain"), ("1", "01"), ("1", "1.0 "), ("x", "x ")]
+        {
             let found = alike(&Labels::of(&[a, "other", b]).0);
             assert_eq!(found.len(), 1, "{a} {b}");
             assert!(found[0].contains(&format!("{a:?}")) && found[0].contains(&format!("{b:?}")));

@@ -53,6 +53,7 @@ pub mod fusion;
 pub mod grid;
 pub mod labels;
 mod lbfgs;
+mod lengths;
 pub mod model_file;
 mod mt19937;
 pub mod params;

@@ -30,9 +30,11 @@ use crate::classifiers::Predicted;
 use crate::error::{ModelError, Result};
 use crate::formats::is_resampled_alike;
 use crate::labels::Labels;
+use crate::lengths;
 use crate::pipeline::{Pipeline, PipelineSpec};
 
 pub use crate::formats::{FormatRule, OtherRate, TrainedOn};
+pub use crate::lengths::Lengths;
 
 const MAGIC: &[u8; 8] = b"CORSMDL\0";
 /// Version of the file format written.
@@ -241,6 +243,13 @@ impl Model {
                 Err(ModelFileError::FormatUnknown { version })
             }
         }
+    }
+
+    /// How long the recordings are that the model was trained on, where features made with `config`
+    /// depend on it and it is known.
+    pub fn lengths(&self, config: &Value) -> Option<Lengths> {
+        let trained = self.header.trained_on.as_ref().filter(|_| !lengths::is_cut(config));
+        trained.and_then(|trained| trained.seconds)
     }
 
     /// Writes the file, whole or not at all.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use corsmal_models::labels::Labels;
-use corsmal_models::model_file::{Model, ModelHeader, TrainedOn};
+use corsmal_models::model_file::{Lengths, Model, ModelHeader, TrainedOn};
 use corsmal_models::pipeline::PipelineSpec;
 use numpy::{IntoPyArray, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
@@ -30,6 +30,8 @@ struct MadeOf {
     feature_config_hash: String,
     /// sample rate and channels of each recording
     formats: Vec<(Option<u32>, Option<u32>)>,
+    /// length of each recording in seconds, as far as it is known
+    seconds: Vec<f64>,
 }
 
 /// The classifier's parameters with all defaults, as JSON: refuses names and values as training
@@ -174,7 +176,8 @@ impl PyModel {
             feature_names: made.feature_names,
             feature_config: made.feature_config,
             feature_config_hash: made.feature_config_hash,
-            trained_on: TrainedOn::of(made.formats),
+            trained_on: TrainedOn::of(made.formats)
+                .map(|formats| TrainedOn { seconds: Lengths::of(made.seconds), ..formats }),
             ..self.0.header().clone()
         };
         let model = Model::new(header, self.0.pipeline().clone()).map_err(value_error)?;
@@ -185,6 +188,12 @@ impl PyModel {
     fn format_rule(&self) -> PyResult<(Taken, Taken)> {
         let rule = self.0.format_rule(&self.0.header().feature_config).map_err(model_error)?;
         Ok((rule.sample_rates().map(<[u32]>::to_vec), rule.channels().map(<[u32]>::to_vec)))
+    }
+
+    /// A warning if some of these recordings, by name and seconds, are far from those learned from.
+    fn length_warning(&self, recordings: Vec<(String, f64)>) -> Option<String> {
+        let lengths = self.0.lengths(&self.0.header().feature_config)?;
+        lengths.warning(recordings.iter().map(|(name, seconds)| (name.as_str(), *seconds)))
     }
 
     /// Reads a model file.

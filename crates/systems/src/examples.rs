@@ -103,7 +103,7 @@ impl Examples {
             return Err(SystemError::NoExamples { path: path.into() });
         }
         let ids = heard.iter().map(|input| input.id.clone()).collect();
-        let trained_on = TrainedOn::of(outcomes.iter().map(|o| (o.sample_rate, o.channels)));
+        let trained_on = TrainedOn::of_outcomes(&outcomes);
         let mut table = LabelledTable::of_columns(path, ids, recordings::labels(&heard));
         table.outcomes = outcomes;
         let column = Column::of(items.iter().map(|item| item.values.as_slice()));

@@ -167,8 +167,7 @@ impl Kept {
         }
         let mut npz = NpzFile::open(&self.path).map_err(|e| fault(&e))?;
         let (table, _) = layout::read_table(&mut npz).map_err(|e| fault(&e))?;
-        let trained_on =
-            TrainedOn::of(table.outcomes().iter().map(|o| (o.sample_rate, o.channels)));
+        let trained_on = TrainedOn::of_outcomes(table.outcomes());
         let names = table.feature_names().to_vec();
         Ok(Part { values: table.values().mapv(f64::from), names, trained_on })
     }

@@ -265,6 +265,29 @@ fn windows_of_files_are_those_of_a_manifest() {
     }
 }
 
+/// A model of windows was applied to whole recordings, and the reverse, without a word.
+#[test]
+fn lengths_unlike_those_of_the_training_are_said() {
+    let trained = Trained::new(&["--classifier", "knn", "--set", "k=1"]);
+    let (model, long) = (trained.path("m"), trained.path("long.wav"));
+    recording(&long, &[0, 1, 2, 3]);
+    let said = |more: &[&str]| {
+        let output = run(&[&["classify", "-m", text(&model), "-q"], more].concat());
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let whole = said(&[text(&long)]);
+    let expected = "long, 4 s long, is not like the recordings that the model was trained on, 1 s:";
+    assert!(whole.starts_with("warning: ") && whole.contains(expected), "{whole}");
+    assert!(whole.contains("--window"), "{whole}");
+    let windows = said(&[text(&long), "--window", "3"]);
+    assert!(windows.contains("trained on recordings of 1 s, not on windows of 3 s"), "{windows}");
+    assert_eq!(said(&[text(&trained.path("train/0.wav"))]), "");
+    assert_eq!(said(&[text(&long), "--window", "1"]), "");
+    let inspected = done(&["inspect", text(&model)]);
+    assert!(inspected.contains("Hz, 1 channel, 1 s"), "{inspected}");
+}
+
 #[test]
 fn windows_are_voted_on() {
     let trained = Trained::new(&["--classifier", "knn", "--set", "k=1"]);

@@ -230,12 +230,7 @@ fn file_name(path: &str) -> Option<&str> {
 
 /// Whether what a label file calls the path is that of another recording. Folders may differ where the
 /// file name is that of no other.
-fn is_of_another(
-    written: &str,
-    path: &str,
-    paths: &HashSet<&str>,
-    names: &HashSet<&str>,
-) -> bool {
+fn is_of_another(written: &str, path: &str, paths: &HashSet<&str>, names: &HashSet<&str>) -> bool {
     let (name, own) = (file_name(written), file_name(path));
     (written != path && !written.is_empty() && paths.contains(written))
         || (name != own && name.is_some_and(|name| names.contains(name)))

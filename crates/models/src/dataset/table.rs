@@ -257,8 +257,7 @@ impl LabelledTable {
 
     /// What the rows were made from, for a model to know; `None` for files of other programs.
     pub fn trained_on(&self) -> Option<TrainedOn> {
-        let with_features = self.outcomes.iter().filter(|o| o.status.has_features());
-        TrainedOn::of(with_features.map(|o| (o.sample_rate, o.channels)))
+        TrainedOn::of_outcomes(&self.outcomes)
     }
 
     /// The path of each row where some rows are stretches of one file.

@@ -74,8 +74,7 @@ impl PredictionTable {
             LabelSource::File { path: file, key } => {
                 let refuse = |e: DatasetError| content(&self.path, e.to_string());
                 let labels = LabelFile::read(file, key.as_deref()).map_err(refuse)?;
-                let names =
-                    |row: &PredictionRow<Id>| (row.key.0.clone(), row.cells[path].clone());
+                let names = |row: &PredictionRow<Id>| (row.key.0.clone(), row.cells[path].clone());
                 let names: Vec<(String, String)> = self.rows.iter().map(names).collect();
                 let pairs: Vec<(&str, &str)> =
                     names.iter().map(|(id, path)| (id.as_str(), path.as_str())).collect();

@@ -20,6 +20,7 @@ use crate::configuration::difference;
 use crate::failure::Failure;
 use crate::plural::plural;
 use crate::progress::{LogFormat, Meter};
+use crate::recordings::warn;
 
 /// Extracts into memory, then predicts.
 pub fn run(args: &Args, model: &Model) -> Result<(End, Option<Records>), Failure> {
@@ -170,6 +171,15 @@ fn predictions(
             found.insert(id.clone(), none(Status::NonFinite));
         } else {
             usable.push(row);
+        }
+    }
+    if let Some(lengths) = model.lengths(&table.config) {
+        let given = usable.iter().filter_map(|&row| {
+            let outcome = by_id.get(table.ids[row].as_str())?;
+            Some((outcome.id.as_str(), outcome.seconds()?))
+        });
+        if let Some(warning) = lengths.warning(given) {
+            warn(&format!("{warning}; --window predicts windows of a length that you set"));
         }
     }
     if !usable.is_empty() {

@@ -30,12 +30,22 @@ pub fn run(
     vote: Option<VotingRule>,
 ) -> Result<(End, Option<Records>), Failure> {
     let config = configuration(args, model)?;
-    let formats = args.rule(model, &config.to_value())?;
+    let config_value = config.to_value();
+    let formats = args.rule(model, &config_value)?;
     let signals = Signals::new(config);
     let found = recordings(args)?;
     let columns: Vec<String> =
         found.iter().take(1).flat_map(|f| &f.labels).map(|(column, _)| column.clone()).collect();
     let header = model.header();
+    if let Some(lengths) = model.lengths(&config_value)
+        && lengths.differ_from(windowing.window())
+    {
+        crate::recordings::warn(&format!(
+            "the model was trained on recordings of {lengths}, not on windows of {} s: the predictions may be \
+             wrong",
+            windowing.window()
+        ));
+    }
     let mut records = args.records(&header.labels, &header.target, args.unit(vote), &columns)?;
     let stop = crate::interrupt::flag();
     let predictor = Predictor { model, formats, signals, windowing, vote, stop };

@@ -66,7 +66,9 @@ fn recordings(header: &ModelHeader) -> String {
     };
     let listed = |values: &[u32]| values.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
     let ending = if trained.channels == [1] { "" } else { "s" };
-    format!("{} Hz, {} channel{ending}", listed(&trained.sample_rates), listed(&trained.channels))
+    let lengths = trained.seconds.map(|seconds| format!(", {seconds}")).unwrap_or_default();
+    let (rates, channels) = (listed(&trained.sample_rates), listed(&trained.channels));
+    format!("{rates} Hz, {channels} channel{ending}{lengths}")
 }
 
 /// One line `key = value` for every value.
