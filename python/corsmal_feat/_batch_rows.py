@@ -34,6 +34,12 @@ def rows_of(batch: Any) -> list[Any]:
                 f"the column {name!r} must be called {name.lower()!r}; "
                 "a label must be called otherwise"
             )
+    lower = {name.lower() for name in names}
+    if {"onset", "offset"} <= lower and not {START, END} & lower:
+        raise ParameterError(
+            "the columns onset and offset must be called start and end for these stretches to be"
+            " taken; labels must be called otherwise"
+        )
     if PATH not in names and BYTES not in names:
         raise ParameterError(f"batch needs a column path or bytes, but has only {', '.join(names)}")
 

@@ -130,6 +130,22 @@ impl ManifestColumns {
         Ok(place)
     }
 
+    /// Refuses the names that annotations of events give to times: whole recordings would be computed.
+    fn check_times(&self) -> Result<(), String> {
+        let find = |name: &str| self.places.keys().find(|k| k.eq_ignore_ascii_case(name));
+        match (find("onset"), find("offset")) {
+            (Some(onset), Some(offset)) if find(START).is_none() && find(END).is_none() => {
+                Err(format!(
+                    "columns {} and {} must be called `{START}` and `{END}` for these stretches to be \
+                     taken; labels must be called otherwise",
+                    quoted(onset),
+                    quoted(offset)
+                ))
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn entry(
         &self,
         manifest: &Path,
@@ -194,6 +210,7 @@ fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
         }
         cells.push(index);
     }
+    columns.check_times().map_err(|reason| wrong(path, 1, reason))?;
     if !columns.places.contains_key(PATH) {
         let names: Vec<&str> = columns.labels.iter().map(|(_, name)| name.as_str()).collect();
         let likely = names.iter().find(|name| corsmal_names::names_files(name));
@@ -252,6 +269,7 @@ fn json_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
         rows.push((line, cells));
         require_cells(rows.len(), columns.labels.len()).map_err(|e| wrong(path, line, e))?;
     }
+    columns.check_times().map_err(|reason| wrong(path, 1, reason))?;
     let mut values = vec![String::new(); columns.places.len()];
     let entries = rows.into_iter().map(|(line, cells)| {
         values.iter_mut().for_each(String::clear);
@@ -340,6 +358,14 @@ mod tests {
             let text = refusal("list.jsonl", &format!("{{\"path\": \"a.wav\", \"{name}\": 1}}\n"));
             assert!(text.contains(&format!("must be called `{own}`")), "{text}");
         }
+        let text = refusal("list.csv", "path,onset,offset,event\na.wav,1,2,dog\n");
+        assert!(text.contains("must be called `start` and `end`"), "{text}");
+        let text = refusal("list.jsonl", "{\"path\": \"a.wav\", \"Onset\": 1, \"Offset\": 2}\n");
+        assert!(text.contains("must be called `start` and `end`"), "{text}");
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("list.csv");
+        std::fs::write(&path, "path,onset,offset,start,end\na.wav,1,2,1,2\n").unwrap();
+        assert_eq!(read(&path).unwrap()[0].start, Some(1.0));
     }
 
     /// Two numbers became one label.

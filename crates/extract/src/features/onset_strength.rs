@@ -43,8 +43,9 @@ impl WholeKernel for Envelope {
 impl FeatureKind for OnsetStrength {
     const KIND: &'static str = "onset_strength";
     const ABOUT: &'static str = "Mean rise over lag frames of the mel bands in dB \
-        (librosa.onset.onset_strength), 80 dB below the maximum of each channel. Holds the whole \
-        recording in memory.";
+        (librosa.onset.onset_strength), 80 dB below the maximum of each channel. `center` is \
+        that of the frames; the shift that librosa.onset calls `center` is always made. Holds the \
+        whole recording in memory.";
     const KEYS: &'static [Keys] = RiseSpec::KEYS;
     const PYTHON: &'static str = "onset.onset_strength";
 

@@ -69,6 +69,22 @@ impl<'a> PartitionBy<'a> {
                 return Err(refuse(format!("the values {a} and {b} would share a folder")));
             }
         }
+        // Where all values are whole numbers, readers of such folders make them numbers.
+        let written: Option<Vec<(i64, &String)>> = values
+            .iter()
+            .filter(|value| !value.is_empty())
+            .map(|value| Some((value.parse().ok()?, value)))
+            .collect();
+        let mut numbers = BTreeMap::new();
+        for (number, value) in written.unwrap_or_default() {
+            if let Some(other) = numbers.insert(number, value) {
+                let (a, b) = (quoted(other), quoted(value));
+                return Err(refuse(format!(
+                    "the values {a} and {b} are one number to readers of such folders: write them \
+                     alike"
+                )));
+            }
+        }
         Ok(by)
     }
 
