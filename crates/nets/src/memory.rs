@@ -171,7 +171,9 @@ mod tests {
         let inputs = 4 * 32 * 1000 * 128;
         assert!(together - alone < inputs + (8 << 20), "{alone} {together}");
         assert!(of(Padding::Published, &rows) > 8 * alone);
-        let evaluated = |rows: &[usize]| of_evaluation(&network, &items, rows, &definition.recipe);
+        let packed = 4 * network.parameters().count() as u64;
+        let evaluated =
+            |rows: &[usize]| of_evaluation(&network, &items, rows, &definition.recipe) - packed;
         assert!(evaluated(&rows) < 3 * evaluated(&rows[..1]) && evaluated(&rows[1..]) < 4 << 20);
     }
 

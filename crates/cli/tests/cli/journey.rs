@@ -311,5 +311,5 @@ fn other_numbers_of_channels_are_refused_where_one_is_read() {
     done(&[&classify[..], &["--set", "signal.channels=mean"]].concat());
     done(&[&classify[..], &["--any-rate"]].concat());
     let shown = done(&["inspect", text(&model)]);
-    assert!(shown.contains("recordings     16000 Hz, 1 channel\n"), "{shown}");
+    assert!(shown.contains("recordings     16000 Hz, 1 channel, 1.5 s\n"), "{shown}");
 }
