@@ -142,7 +142,8 @@ def main() -> None:
     factory = (args.peer, args.workload, args.n_fft, args.n_mels)
     begin = time.perf_counter()
     with context.Pool(args.processes, _start, (factory, str(paths[-1]), ready)) as pool:
-        ready.wait()
+        # A pool starts processes that crash again and again.
+        ready.wait(300)
         start = time.perf_counter()
         done = list(pool.imap_unordered(_extract, jobs))
         seconds = time.perf_counter() - start

@@ -16,20 +16,31 @@ from ._batches import failed_batch
 PARTS, ATTEMPTS = "parts", "attempts"
 #: Times that a recording may take its process with it.
 DEATHS = 2
-_CRASHED = f"its process ended {DEATHS} times while it was computed"
+_CRASHED = f"its process ended {DEATHS} times while it alone was computed"
 
 
 def compute_part(table: Any, folder: str, name: str, options: dict[str, Any]) -> None:
-    """Computes a file in a worker. The log of attempts says which recording was open when a process
-    ended."""
-    pa = pyarrow()
+    """Computes a file in a worker: all recordings at once or, after a process has ended in it, one by
+    one."""
     log = Path(folder, ATTEMPTS, name).with_suffix(".log")
-    opened: Counter[int] = Counter()
     if log.exists():
-        for line in log.read_text().splitlines():
-            kind, _, number = line.partition(" ")
-            if number.isdigit():
-                opened[int(number)] += 1 if kind == "open" else -1
+        whole = _one_by_one(table, log, options)
+    else:
+        log.write_bytes(b"all\n")
+        whole = arrow.extract_batch(table, **options).combine_chunks()
+    sink = pyarrow().BufferOutputStream()
+    import_module("pyarrow.parquet").write_table(whole, sink, compression="zstd")
+    write_whole(Path(folder, PARTS, name), sink.getvalue())
+    log.unlink(missing_ok=True)
+
+
+def _one_by_one(table: Any, log: Path, options: dict[str, Any]) -> Any:
+    """The log of attempts says which recording was open when a process ended."""
+    opened: Counter[int] = Counter()
+    for line in log.read_text().splitlines():
+        kind, _, number = line.partition(" ")
+        if number.isdigit():
+            opened[int(number)] += 1 if kind == "open" else -1
     pieces = []
     # Lines are short and appended at once: one that a kill has cut is none.
     with log.open("ab", buffering=0) as attempts:
@@ -42,11 +53,7 @@ def compute_part(table: Any, folder: str, name: str, options: dict[str, Any]) ->
             attempts.write(b"open %d\n" % row)
             pieces.append(arrow.extract_batch(one, **options))
             attempts.write(b"done %d\n" % row)
-    whole = pa.concat_tables(pieces).combine_chunks()
-    sink = pa.BufferOutputStream()
-    import_module("pyarrow.parquet").write_table(whole, sink, compression="zstd")
-    write_whole(Path(folder, PARTS, name), sink.getvalue())
-    log.unlink(missing_ok=True)
+    return pyarrow().concat_tables(pieces).combine_chunks()
 
 
 def write_whole(path: Path, content: Any) -> None:

@@ -116,7 +116,8 @@ def extract(
 
     Each task uses one core and computes `rows` recordings into one file, which appears when it is
     complete. Call this again after a failure, even of the driver: finished files are kept, the
-    others are computed again. A recording that crashes its process twice gets the status `crashed`.
+    others are computed again. Where a process has crashed, its recordings are then computed one by
+    one; a recording that crashes its process twice alone gets the status `crashed`.
 
     Parameters
     ----------
