@@ -20,8 +20,7 @@ _CRASHED = f"its process ended {DEATHS} times while it alone was computed"
 
 
 def compute_part(table: Any, folder: str, name: str, options: dict[str, Any]) -> None:
-    """Computes a file in a worker: all recordings at once or, after a process has ended in it, one by
-    one."""
+    """Computes a file in a worker: all recordings at once or, after a crash, one by one."""
     log = Path(folder, ATTEMPTS, name).with_suffix(".log")
     if log.exists():
         whole = _one_by_one(table, log, options)
