@@ -41,12 +41,12 @@ class Hook:
 
 def slow(real):
     def extract_batch(batch, **options):
-        name = batch["id"][0].as_py()
-        with open(os.environ["SCALE_TEST_LOG"], "a") as log:
-            log.write(f"{os.getpid()} {name}\\n")
-        if name == "poison":
-            os.kill(os.getpid(), signal.SIGKILL)
-        time.sleep(0.02)
+        for name in batch["id"].to_pylist():
+            with open(os.environ["SCALE_TEST_LOG"], "a") as log:
+                log.write(f"{os.getpid()} {name}\\n")
+            if name == "poison":
+                os.kill(os.getpid(), signal.SIGKILL)
+            time.sleep(0.02)
         return real(batch, **options)
     return extract_batch
 
