@@ -17,6 +17,7 @@ import multiprocessing
 import multiprocessing.synchronize
 import pathlib
 import resource
+import threading
 import time
 import warnings
 from collections.abc import Callable
@@ -142,8 +143,11 @@ def main() -> None:
     factory = (args.peer, args.workload, args.n_fft, args.n_mels)
     begin = time.perf_counter()
     with context.Pool(args.processes, _start, (factory, str(paths[-1]), ready)) as pool:
-        # A pool starts processes that crash again and again.
-        ready.wait(300)
+        try:
+            ready.wait(300)
+        except threading.BrokenBarrierError:
+            # A pool starts processes that crash again and again.
+            raise SystemExit(f"{args.peer}: no process was ready within 300 s") from None
         start = time.perf_counter()
         done = list(pool.imap_unordered(_extract, jobs))
         seconds = time.perf_counter() - start

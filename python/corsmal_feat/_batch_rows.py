@@ -35,10 +35,12 @@ def rows_of(batch: Any) -> list[Any]:
                 "a label must be called otherwise"
             )
     lower = {name.lower() for name in names}
-    if {"onset", "offset"} <= lower and not {START, END} & lower:
+    # In an archive, `offset` is a place.
+    others = {"duration"} if PLACE[0] in names else {"offset", "duration"}
+    if "onset" in lower and others & lower and not {START, END} & lower:
         raise ParameterError(
-            "the columns onset and offset must be called start and end for these stretches to be"
-            " taken; labels must be called otherwise"
+            f"columns onset and {min(others & lower)}: the times of stretches are read from columns"
+            " start and end, in seconds; if these are labels, give them other names"
         )
     if PATH not in names and BYTES not in names:
         raise ParameterError(f"batch needs a column path or bytes, but has only {', '.join(names)}")

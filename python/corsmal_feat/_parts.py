@@ -16,7 +16,7 @@ from ._batches import failed_batch
 PARTS, ATTEMPTS = "parts", "attempts"
 #: Times that a recording may take its process with it.
 DEATHS = 2
-_CRASHED = f"its process ended {DEATHS} times while it alone was computed"
+_CRASHED = f"its process ended {DEATHS} times while it computed only this recording"
 
 
 def compute_part(table: Any, folder: str, name: str, options: dict[str, Any]) -> None:
@@ -26,7 +26,11 @@ def compute_part(table: Any, folder: str, name: str, options: dict[str, Any]) ->
         whole = _one_by_one(table, log, options)
     else:
         log.write_bytes(b"all\n")
-        whole = arrow.extract_batch(table, **options).combine_chunks()
+        try:
+            whole = arrow.extract_batch(table, **options).combine_chunks()
+        except Exception:
+            log.unlink()
+            raise
     sink = pyarrow().BufferOutputStream()
     import_module("pyarrow.parquet").write_table(whole, sink, compression="zstd")
     write_whole(Path(folder, PARTS, name), sink.getvalue())

@@ -194,10 +194,9 @@ impl Progress for Meter {
     }
 
     fn done(&self, outcome: &Outcome) {
-        let rate = outcome.sample_rate.map_or(f64::INFINITY, f64::from);
         let total = {
             let mut seconds = self.seconds.lock().unwrap_or_else(|e| e.into_inner());
-            *seconds += outcome.decoded_frames as f64 / rate;
+            *seconds += outcome.seconds().unwrap_or(0.0);
             *seconds
         };
         self.bar.inc(1);

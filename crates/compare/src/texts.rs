@@ -1,6 +1,7 @@
 //! What is compared exactly: labels, statuses, text members, and whole numbers that doubles would round.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::hash::Hash;
 
 use corsmal_files::table::Table;
 use serde::Serialize;
@@ -77,7 +78,12 @@ pub(super) fn compare(a: &[TextColumn], b: &[TextColumn], by_file_name: bool) ->
 fn of_columns(a: &TextColumn, b: &TextColumn, by_file_name: bool) -> TextReport {
     let mut report = TextReport { name: a.name.clone(), values: 0, differing: 0, first: None };
     if let (Some(in_a), Some(in_b)) = (&a.ids, &b.ids) {
-        let key = |id: &String| if by_file_name { file_name(id).to_owned() } else { id.clone() };
+        let known: HashSet<&String> = in_b.iter().collect();
+        let both: HashSet<&String> = in_a.iter().filter(|id| known.contains(id)).collect();
+        let key = |id: &String| match by_file_name && !both.contains(id) {
+            true => (true, file_name(id).to_owned()),
+            false => (false, id.clone()),
+        };
         let (rows_a, rows_b) = (rows(in_a, key), rows(in_b, key));
         for (row, (id, x)) in in_a.iter().zip(&a.values).enumerate() {
             // Which of several of one file name belong together is not known.
@@ -100,7 +106,7 @@ fn of_columns(a: &TextColumn, b: &TextColumn, by_file_name: bool) -> TextReport 
 }
 
 /// The row of each key; none where several have it.
-fn rows(ids: &[String], key: impl Fn(&String) -> String) -> HashMap<String, Option<usize>> {
+fn rows<K: Eq + Hash>(ids: &[String], key: impl Fn(&String) -> K) -> HashMap<K, Option<usize>> {
     let mut rows = HashMap::new();
     for (row, id) in ids.iter().enumerate() {
         rows.entry(key(id)).and_modify(|place| *place = None).or_insert(Some(row));
@@ -160,6 +166,11 @@ mod tests {
         let a = column(Some(&["x/1"]), &["rain"]);
         let b = column(Some(&["y/1"]), &["dog"]);
         assert_eq!(compare(&[a], &[b], true)[0].differing, 1);
+        // What has the same id is compared by it, whatever else has its file name.
+        let a = column(Some(&["x/1", "y/1", "old/2"]), &["ok", "empty", "ok"]);
+        let b = column(Some(&["x/1", "y/1", "new/2"]), &["ok", "ok", "ok"]);
+        let found = &compare(&[a], &[b], true)[0];
+        assert_eq!((found.values, found.differing), (3, 1));
         // Two of one file name: it is not known which is which.
         let a = column(Some(&["x/1", "y/1"]), &["ok", "empty"]);
         let b = column(Some(&["p/1", "q/1"]), &["ok", "empty"]);

@@ -133,13 +133,13 @@ impl ManifestColumns {
     /// Refuses the names that annotations of events give to times: whole recordings would be computed.
     fn check_times(&self) -> Result<(), String> {
         let find = |name: &str| self.places.keys().find(|k| k.eq_ignore_ascii_case(name));
-        match (find("onset"), find("offset")) {
-            (Some(onset), Some(offset)) if find(START).is_none() && find(END).is_none() => {
+        match (find("onset"), find("offset").or(find("duration"))) {
+            (Some(onset), Some(other)) if find(START).is_none() && find(END).is_none() => {
                 Err(format!(
-                    "columns {} and {} must be called `{START}` and `{END}` for these stretches to be \
-                     taken; labels must be called otherwise",
+                    "columns {} and {}: the times of stretches are read from columns `{START}` and \
+                     `{END}`, in seconds; if these are labels, give them other names",
                     quoted(onset),
-                    quoted(offset)
+                    quoted(other)
                 ))
             }
             _ => Ok(()),
@@ -359,9 +359,11 @@ mod tests {
             assert!(text.contains(&format!("must be called `{own}`")), "{text}");
         }
         let text = refusal("list.csv", "path,onset,offset,event\na.wav,1,2,dog\n");
-        assert!(text.contains("must be called `start` and `end`"), "{text}");
+        assert!(text.contains("are read from columns `start` and `end`"), "{text}");
+        let text = refusal("list.csv", "path,onset,duration\na.wav,1,2\n");
+        assert!(text.contains("are read from columns `start` and `end`"), "{text}");
         let text = refusal("list.jsonl", "{\"path\": \"a.wav\", \"Onset\": 1, \"Offset\": 2}\n");
-        assert!(text.contains("must be called `start` and `end`"), "{text}");
+        assert!(text.contains("are read from columns `start` and `end`"), "{text}");
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("list.csv");
         std::fs::write(&path, "path,onset,offset,start,end\na.wav,1,2,1,2\n").unwrap();

@@ -92,7 +92,7 @@ pub(crate) fn is_missing(value: &str) -> bool {
 /// Classes that are probably one, in words: names that differ only in case, in spaces around them, in
 /// how Unicode composes their letters, or in how a number is written.
 pub fn alike(labels: &Labels) -> Vec<String> {
-    let plain = |name: &str| number(name.trim()).unwrap_or_else(|| caseless(name));
+    let plain = |name: &str| number(name).unwrap_or_else(|| caseless(name));
     let mut first: HashMap<String, &str> = HashMap::new();
     let mut found = Vec::new();
     for name in labels.names() {
@@ -119,6 +119,7 @@ pub(crate) fn caseless(name: &str) -> String {
 
 /// A number in one spelling; `None` for other names.
 pub(crate) fn number(name: &str) -> Option<String> {
+    let name = name.trim();
     if let Ok(whole) = name.parse::<i128>() {
         return Some(whole.to_string());
     }

@@ -43,14 +43,13 @@ impl Lengths {
         let (name, seconds) = first?;
         let more = match count - 1 {
             0 => String::new(),
-            1 => ", and another recording is not either".into(),
-            n => format!(", and {n} others are not either"),
+            1 => " (1 more recording is too long or too short)".into(),
+            n => format!(" ({n} more recordings are too long or too short)"),
         };
         Some(format!(
-            "{name}, {} s long, is not like the recordings that the model was trained on, {}{more}: \
-             the predictions may be wrong",
-            rounded(seconds),
-            self
+            "{name} is {} s long, but the model was trained on recordings of {self}{more}: the \
+             predictions may be wrong",
+            rounded(seconds)
         ))
     }
 }
@@ -71,12 +70,11 @@ pub(crate) fn is_cut(config: &Value) -> bool {
     config["signal"]["length"].as_f64().is_some_and(|seconds| seconds > 0.0)
 }
 
-/// Two digits, or all whole ones.
+/// Two significant digits, and all whole ones.
 fn rounded(seconds: f64) -> String {
     let digits = match seconds {
-        s if s >= 10.0 => 0,
-        s if s >= 1.0 => 1,
-        _ => 2,
+        s if s >= 10.0 || s <= 0.0 => 0,
+        s => (1.0 - s.log10().floor()) as usize,
     };
     let text = format!("{seconds:.digits$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
@@ -93,7 +91,8 @@ mod tests {
         assert_eq!(Lengths::of([]), None);
         assert_eq!(lengths.warning([("a", 2.0), ("b", 0.44)]), None);
         let found = lengths.warning([("a", 1.0), ("b", 10.0), ("c", 0.4)]).unwrap();
-        assert!(found.starts_with("b, 10 s long, is not like"), "{found}");
-        assert!(found.contains("0.88 to 1 s, and another recording is not either:"), "{found}");
+        assert!(found.starts_with("b is 10 s long, but"), "{found}");
+        assert!(found.contains("of 0.88 to 1 s (1 more recording is too"), "{found}");
+        assert_eq!([0.0, 0.004_21, 123.4].map(rounded), ["0", "0.0042", "123"]);
     }
 }

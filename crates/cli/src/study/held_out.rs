@@ -101,10 +101,8 @@ impl HeldOut<'_> {
         let Some((_, recordings)) = columns.clone().find(|(name, _)| name == "recording") else {
             return;
         };
-        let lengths = self.table.outcomes.iter().filter_map(|outcome| {
-            let rate = f64::from(outcome.sample_rate?);
-            Some((outcome.id.as_str(), outcome.decoded_frames as f64 / rate))
-        });
+        let outcomes = self.table.outcomes.iter();
+        let lengths = outcomes.filter_map(|o| Some((o.id.as_str(), o.seconds()?)));
         let lengths: HashMap<&str, f64> = lengths.collect();
         let mut stretches: HashMap<&str, (f64, f64)> = HashMap::new();
         for (id, recording) in self.table.ids.iter().zip(recordings) {

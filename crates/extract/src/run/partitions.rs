@@ -80,8 +80,8 @@ impl<'a> PartitionBy<'a> {
             if let Some(other) = numbers.insert(number, value) {
                 let (a, b) = (quoted(other), quoted(value));
                 return Err(refuse(format!(
-                    "the values {a} and {b} are one number to readers of such folders: write them \
-                     alike"
+                    "the values {a} and {b} would be read as the same number: write both the same \
+                     way"
                 )));
             }
         }

@@ -60,11 +60,13 @@ impl PredictionTable {
 
     /// The columns of a source for the lines.
     fn found(&self, source: &LabelSource) -> Result<Vec<(String, Vec<String>)>> {
-        let path = self.columns.iter().position(|c| c == "path").unwrap_or(0);
+        let at = self.columns.iter().position(|c| c == "path");
+        let path = |row: &PredictionRow<Id>| at.map_or(&row.key.0, |at| &row.cells[at]).clone();
         match source {
             LabelSource::Folders { column } => {
                 let folder = |row: &PredictionRow<Id>| {
-                    let folder = Path::new(&row.cells[path]).parent().and_then(Path::file_name);
+                    let path = path(row);
+                    let folder = Path::new(&path).parent().and_then(Path::file_name);
                     folder.and_then(|name| name.to_str()).map(String::from)
                 };
                 let folders: Option<Vec<String>> = self.rows.iter().map(folder).collect();
@@ -74,7 +76,7 @@ impl PredictionTable {
             LabelSource::File { path: file, key } => {
                 let refuse = |e: DatasetError| content(&self.path, e.to_string());
                 let labels = LabelFile::read(file, key.as_deref()).map_err(refuse)?;
-                let names = |row: &PredictionRow<Id>| (row.key.0.clone(), row.cells[path].clone());
+                let names = |row: &PredictionRow<Id>| (row.key.0.clone(), path(row));
                 let names: Vec<(String, String)> = self.rows.iter().map(names).collect();
                 let pairs: Vec<(&str, &str)> =
                     names.iter().map(|(id, path)| (id.as_str(), path.as_str())).collect();

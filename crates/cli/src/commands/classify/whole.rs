@@ -179,7 +179,7 @@ fn predictions(
             Some((outcome.id.as_str(), outcome.seconds()?))
         });
         if let Some(warning) = lengths.warning(given) {
-            warn(&format!("{warning}; --window predicts windows of a length that you set"));
+            warn(&warning);
         }
     }
     if !usable.is_empty() {

@@ -1,14 +1,14 @@
 //! A prediction for each window of a recording or of an endless stream, or one from all of them.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use corsmal_extract::engine::{Features, SignalError, Signals, Windowing, Windows};
 use corsmal_extract::inputs::Input;
 use corsmal_files::outcome::Status;
 use corsmal_models::classifiers::Predicted;
 use corsmal_models::fusion::WindowVotes;
-use corsmal_models::model_file::{FormatRule, Model};
+use corsmal_models::model_file::{FormatRule, Lengths, Model};
 use corsmal_models::predictions::Record;
 use corsmal_models::voting::{Decision, VotingRule};
 use linfa::traits::Predict;
@@ -18,6 +18,7 @@ use rayon::prelude::*;
 use super::args::{Args, configuration, recordings};
 use super::records::{End, Records, delivered, path_of};
 use crate::failure::Failure;
+use crate::recordings::warn;
 
 /// Recordings of each worker whose lines wait to be written in order.
 const AHEAD: usize = 4;
@@ -37,18 +38,10 @@ pub fn run(
     let columns: Vec<String> =
         found.iter().take(1).flat_map(|f| &f.labels).map(|(column, _)| column.clone()).collect();
     let header = model.header();
-    if let Some(lengths) = model.lengths(&config_value)
-        && lengths.differ_from(windowing.window())
-    {
-        crate::recordings::warn(&format!(
-            "the model was trained on recordings of {lengths}, not on windows of {} s: the predictions may be \
-             wrong",
-            windowing.window()
-        ));
-    }
     let mut records = args.records(&header.labels, &header.target, args.unit(vote), &columns)?;
     let stop = crate::interrupt::flag();
-    let predictor = Predictor { model, formats, signals, windowing, vote, stop };
+    let lengths = Mutex::new(model.lengths(&config_value));
+    let predictor = Predictor { model, formats, lengths, signals, windowing, vote, stop };
     let end = predict(args, &found, &predictor, &mut records)?;
     let nothing = matches!(end, End::Interrupted) && records.written == 0;
     Ok((end, (!nothing).then_some(records)))
@@ -109,6 +102,8 @@ struct Line<'a> {
 struct Predictor<'a> {
     model: &'a Model,
     formats: FormatRule,
+    /// those of the training, until a window was found that is of another length
+    lengths: Mutex<Option<Lengths>>,
     signals: Signals,
     windowing: Windowing,
     vote: Option<VotingRule>,
@@ -118,6 +113,16 @@ struct Predictor<'a> {
 impl Predictor<'_> {
     fn end(&self) -> End {
         if self.stopped() { End::Interrupted } else { End::Done }
+    }
+
+    /// Warns of the first window that is of another length than the recordings of the training.
+    fn check_length(&self, id: &str, seconds: f64) {
+        let mut lengths = self.lengths.lock().unwrap_or_else(|e| e.into_inner());
+        let name = format!("a window of {id}");
+        if let Some(warning) = lengths.and_then(|known| known.warning([(&*name, seconds)])) {
+            *lengths = None;
+            warn(&warning);
+        }
     }
 
     fn stopped(&self) -> bool {
@@ -159,7 +164,10 @@ impl Predictor<'_> {
                 return Ok(());
             }
             let (span, features) = match window {
-                Ok(window) => (Some((window.start, window.end)), window.features),
+                Ok(window) => {
+                    self.check_length(&input.id, window.end - window.start);
+                    (Some((window.start, window.end)), window.features)
+                }
                 Err(error) => (None, Err(error)),
             };
             match (features.and_then(|f| self.row(f)), self.vote) {

@@ -30,7 +30,7 @@ impl Recordings {
     /// Counts what the outcomes and labels of a table say.
     pub fn of(table: &Table) -> Self {
         let outcomes = table.outcomes().iter().filter(|outcome| outcome.status.has_features());
-        let seconds: Vec<f64> = outcomes.clone().filter_map(seconds).collect();
+        let seconds: Vec<f64> = outcomes.clone().filter_map(Outcome::seconds).collect();
         let sum: f64 = seconds.iter().sum();
         let shortest = seconds.iter().copied().reduce(f64::min);
         let longest = seconds.iter().copied().reduce(f64::max);
@@ -69,11 +69,6 @@ impl Recordings {
             lines.push(format!("  label       {name}: {shown}"));
         }
     }
-}
-
-/// Seconds of a recording that was read.
-fn seconds(outcome: &Outcome) -> Option<f64> {
-    outcome.sample_rate.map(|rate| outcome.decoded_frames as f64 / f64::from(rate))
 }
 
 fn counted<T: Ord>(values: impl Iterator<Item = T>) -> BTreeMap<T, usize> {

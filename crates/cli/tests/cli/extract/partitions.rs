@@ -125,7 +125,7 @@ fn what_cannot_be_partitioned_is_refused_and_nothing_is_removed() {
     assert!(!names(folder.path()).iter().any(|name| name.starts_with(".empty")));
     for (values, reason) in [
         (["Rice", "rice"], "would share a folder"),
-        (["1", "01"], "one number to readers"),
+        (["1", "01"], "read as the same number"),
         (["", "__HIVE_DEFAULT_PARTITION__"], "would share a folder"),
         ([&*"水".repeat(29), "x"], "too long for the name of a folder"),
     ] {
