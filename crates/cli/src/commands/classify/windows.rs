@@ -118,10 +118,9 @@ impl Predictor<'_> {
     /// Warns of the first window that is of another length than the recordings of the training.
     fn check_length(&self, id: &str, seconds: f64) {
         let mut lengths = self.lengths.lock().unwrap_or_else(|e| e.into_inner());
-        let name = format!("a window of {id}");
-        if let Some(warning) = lengths.and_then(|known| known.warning([(&*name, seconds)])) {
-            *lengths = None;
-            warn(&warning);
+        if let Some(known) = lengths.take_if(|known| known.differ_from(seconds)) {
+            let name = format!("a window of {id}");
+            known.warning([(&*name, seconds)]).iter().for_each(|warning| warn(warning));
         }
     }
 
