@@ -17,14 +17,16 @@ import multiprocessing
 import multiprocessing.synchronize
 import pathlib
 import resource
-import threading
 import time
 import warnings
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
 Compute = Callable[[str], Any]
 _compute: Compute
+_all_ready: multiprocessing.synchronize.Barrier
 
 
 def librosa(workload: str, n_fft: int, n_mels: int) -> Compute:
@@ -106,12 +108,16 @@ def version(peer: str) -> str | None:
 def _start(
     factory: tuple[str, str, int, int], shortest: str, ready: multiprocessing.synchronize.Barrier
 ) -> None:
-    global _compute
+    global _compute, _all_ready
     warnings.simplefilter("ignore")
     peer, *arguments = factory
     _compute = PEERS[peer][0](*arguments)
     _compute(shortest)
-    ready.wait()
+    _all_ready = ready
+
+
+def _wait_for_the_others() -> None:
+    _all_ready.wait(300)
 
 
 def _extract(job: tuple[str, str]) -> tuple[int, float, float]:
@@ -139,18 +145,20 @@ def main() -> None:
     args.out.mkdir(parents=True, exist_ok=True)
     jobs = [(str(path), str(args.out / f"{path.stem}.npz")) for path in paths]
     context = multiprocessing.get_context("spawn")
-    ready = context.Barrier(args.processes + 1)
+    ready = context.Barrier(args.processes)
     factory = (args.peer, args.workload, args.n_fft, args.n_mels)
     begin = time.perf_counter()
-    with context.Pool(args.processes, _start, (factory, str(paths[-1]), ready)) as pool:
-        try:
-            ready.wait(300)
-        except threading.BrokenBarrierError:
-            # A pool starts processes that crash again and again.
-            raise SystemExit(f"{args.peer}: no process was ready within 300 s") from None
-        start = time.perf_counter()
-        done = list(pool.imap_unordered(_extract, jobs))
-        seconds = time.perf_counter() - start
+    arguments = (factory, str(paths[-1]), ready)
+    try:
+        with ProcessPoolExecutor(args.processes, context, _start, arguments) as pool:
+            waits = [pool.submit(_wait_for_the_others) for _ in range(args.processes)]
+            for wait in waits:
+                wait.result()
+            start = time.perf_counter()
+            done = list(pool.map(_extract, jobs))
+            seconds = time.perf_counter() - start
+    except BrokenProcessPool:
+        raise SystemExit(f"{args.peer}: a process died; its message is above, if it had one") from None
     peaks: dict[int, float] = {}
     for process, _, peak in done:
         peaks[process] = max(peak, peaks.get(process, 0.0))
