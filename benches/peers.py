@@ -158,7 +158,7 @@ def main() -> None:
             done = list(pool.map(_extract, jobs))
             seconds = time.perf_counter() - start
     except BrokenProcessPool:
-        raise SystemExit(f"{args.peer}: a process died; its message is above, if it had one") from None
+        raise SystemExit(f"{args.peer}: a process died, perhaps with a message above") from None
     peaks: dict[int, float] = {}
     for process, _, peak in done:
         peaks[process] = max(peak, peaks.get(process, 0.0))
