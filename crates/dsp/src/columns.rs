@@ -4,8 +4,11 @@
 use ndarray::{Array3, ArrayView3, s};
 use num_traits::Zero;
 
-/// Frames transposed at a time: one cache line of `f32` values per bin.
-const BLOCK: usize = 16;
+use crate::lanes::LANES;
+use crate::tiles::read_columns;
+
+/// Frames transposed at a time.
+const BLOCK: usize = LANES;
 
 /// Calls `each(channel, frame, spectrum)` for every frame, frames in order within a channel.
 pub fn for_each_column<T: Copy + Default>(
@@ -17,12 +20,7 @@ pub fn for_each_column<T: Copy + Default>(
     for c in 0..channels {
         for start in (0..frames).step_by(BLOCK) {
             let end = frames.min(start + BLOCK);
-            let part = spectrogram.slice(s![c, .., start..end]);
-            for (k, row) in part.outer_iter().enumerate() {
-                for (j, x) in row.iter().enumerate() {
-                    block[j * bins + k] = *x;
-                }
-            }
+            read_columns(spectrogram.slice(s![c, .., start..end]), &mut block);
             for t in start..end {
                 let from = (t - start) * bins;
                 each(c, t, &block[from..from + bins]);

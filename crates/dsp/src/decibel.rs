@@ -162,31 +162,31 @@ fn smaller<T: Real>(a: T, b: T) -> T {
 /// `of` every value, none of which is NaN, into `out`; the smallest and the largest result.
 #[inline(always)]
 fn map<T: Real>(values: &[T], out: &mut [T], of: impl Fn(T) -> T) -> (T, T) {
+    // Two passes: with the extremes in it, the first would not be vectorised.
+    vectorized(
+        #[inline(always)]
+        || out.iter_mut().zip(values).for_each(|(slot, value)| *slot = of(*value)),
+    );
+    let smaller = |a: T, b: T| if b < a { b } else { a };
+    let larger = |a: T, b: T| if b > a { b } else { a };
     let infinity = T::infinity();
-    let (mut low, mut high) = ([infinity; LANES], [-infinity; LANES]);
     vectorized(
         #[inline(always)]
         || {
-            let (blocks, rest) = values.as_chunks::<LANES>();
-            let (out_blocks, out_rest) = out.as_chunks_mut::<LANES>();
-            for (slots, values) in out_blocks.iter_mut().zip(blocks) {
+            let (mut low, mut high) = ([infinity; LANES], [-infinity; LANES]);
+            let (blocks, rest) = out.as_chunks::<LANES>();
+            for block in blocks {
                 for l in 0..LANES {
-                    let x = of(values[l]);
-                    slots[l] = x;
-                    low[l] = if x < low[l] { x } else { low[l] };
-                    high[l] = if x > high[l] { x } else { high[l] };
+                    low[l] = smaller(low[l], block[l]);
+                }
+                for l in 0..LANES {
+                    high[l] = larger(high[l], block[l]);
                 }
             }
-            for (slot, value) in out_rest.iter_mut().zip(rest) {
-                let x = of(*value);
-                *slot = x;
-                low[0] = if x < low[0] { x } else { low[0] };
-                high[0] = if x > high[0] { x } else { high[0] };
-            }
+            let (low, high) = (low.iter().chain(rest), high.iter().chain(rest));
+            (low.copied().fold(infinity, smaller), high.copied().fold(-infinity, larger))
         },
-    );
-    let least = low.into_iter().fold(infinity, |a, b| if b < a { b } else { a });
-    (least, high.into_iter().fold(-infinity, |a, b| if b > a { b } else { a }))
+    )
 }
 
 #[cfg(test)]

@@ -108,24 +108,25 @@ pub fn delta<T: Real>(data: ArrayView2<T>, p: &DeltaParams) -> Result<Array2<T>>
         |(r, out)| {
             let row = data.row(r);
             let row = row.as_slice().map_or_else(|| Cow::Owned(row.to_vec()), Cow::Borrowed);
+            vectorized(
+                #[inline(always)]
+                || slide(&weights, &row, &mut out[inside.clone()]),
+            );
+            if p.mode == DeltaMode::Interp {
+                // The highest derivative of the fitted polynomial is constant over its window.
+                let [first, last] = [inside.start, inside.end - 1].map(|t| out[t]);
+                out[..inside.start].fill(first);
+                out[inside.end..].fill(last);
+                return;
+            }
             for t in (0..inside.start).chain(inside.end..frames) {
-                // The highest derivative of the fitted polynomial is constant over its window, so
-                // `interp` repeats the value at the first and last full window.
-                let center = match p.mode {
-                    DeltaMode::Interp => t.clamp(half, frames - 1 - half),
-                    _ => t,
-                };
                 let value = |(i, w): (usize, &f64)| {
-                    let at = (center + i) as isize - half as isize;
+                    let at = (t + i) as isize - half as isize;
                     Some(w * row[p.mode.index(at, frames)?].wide())
                 };
                 let products = weights.iter().enumerate().filter_map(value);
                 out[t] = T::of(products.fold(0.0, |sum, x| sum + x));
             }
-            vectorized(
-                #[inline(always)]
-                || slide(&weights, &row, &mut out[inside.clone()]),
-            );
         },
     );
     Ok(out)
@@ -145,7 +146,7 @@ fn slide<T: Real>(weights: &[f64], row: &[T], out: &mut [T]) {
         for (w, row) in weights.iter().zip(row[b * BLOCK..].windows(BLOCK)) {
             sums.iter_mut().zip(row).for_each(|(sum, x)| *sum += w * x.wide());
         }
-        *out = sums.map(T::of);
+        out.iter_mut().zip(sums).for_each(|(slot, sum)| *slot = T::of(sum));
     }
     for (t, out) in rest.iter_mut().enumerate() {
         let products = weights.iter().zip(&row[start + t..]).map(|(w, x)| w * x.wide());

@@ -185,6 +185,17 @@ pub(crate) fn read_columns<T: Copy>(part: ArrayView2<T>, columns: &mut [T]) {
     let rows = part.nrows();
     // A square at a time, so that the lines of both sides stay in the cache.
     for (b, part) in part.axis_chunks_iter(Axis(0), LANES).enumerate() {
+        if part.dim() == (LANES, LANES) {
+            let mut square = [[part[[0, 0]]; LANES]; LANES];
+            for (values, row) in square.iter_mut().zip(part.outer_iter()) {
+                values.iter_mut().zip(row).for_each(|(value, x)| *value = *x);
+            }
+            for (t, column) in columns.chunks_exact_mut(rows).take(LANES).enumerate() {
+                let slots = &mut column[b * LANES..(b + 1) * LANES];
+                slots.copy_from_slice(&square.map(|row| row[t]));
+            }
+            continue;
+        }
         for (k, row) in part.outer_iter().enumerate() {
             let slots = columns[b * LANES + k..].iter_mut().step_by(rows);
             slots.zip(row).for_each(|(slot, x)| *slot = *x);
@@ -229,9 +240,14 @@ mod tests {
 
     #[test]
     fn columns_are_transposed() {
-        let part = Array2::from_shape_fn((37, 5), |(k, t)| t * 37 + k);
-        let mut columns = vec![0; part.len()];
-        read_columns(part.view(), &mut columns);
-        assert!(columns.into_iter().eq(0..5 * 37));
+        for width in [5, LANES, LANES + 1] {
+            let part = Array2::from_shape_fn((37, width), |(k, t)| t * 37 + k);
+            let turned = part.t().as_standard_layout().into_owned();
+            for part in [part.view(), turned.t()] {
+                let mut columns = vec![0; part.len()];
+                read_columns(part, &mut columns);
+                assert!(columns.into_iter().eq(0..width * 37));
+            }
+        }
     }
 }

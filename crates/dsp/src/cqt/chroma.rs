@@ -2,8 +2,9 @@
 //! `feature.chroma_cqt`).
 
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis};
+use rayon::prelude::*;
 
-use super::{C1, CqtParams, CqtPlan, per_channel};
+use super::{C1, CqtParams, CqtPlan, Octave, per_channel};
 use crate::error::{DspError, Result};
 use crate::normalize::Norm;
 use crate::real::{Real, require_finite};
@@ -160,17 +161,30 @@ impl ChromaCqt {
             for (class, w) in &parts[bin] {
                 let mut row = chroma.row_mut(*class);
                 let row = &mut row.as_slice_mut().expect("a new array")[frame..];
-                vectorized(
-                    #[inline(always)]
-                    || {
-                        for ((sum, re), im) in row.iter_mut().zip(re).zip(im) {
-                            let (re, im) = (re.wide(), im.wide());
-                            *sum += *w * T::of((re * re + im * im).sqrt());
-                        }
-                    },
-                );
+                add_magnitudes(row, *w, re.iter().copied().zip(im.iter().copied()));
             }
         })?;
+        self.finish(&mut chroma);
+        Ok(chroma)
+    }
+
+    /// [`of_signal`](Self::of_signal) with the same bits, on all threads of the pool and with the whole
+    /// transform in memory.
+    fn of_signal_at_once<T: Lane>(&self, plan: &CqtPlan, y: &[T]) -> Result<Array2<T>> {
+        let transform = plan.transform_at_once(y)?;
+        let mut chroma = Array2::zeros((self.classes.len(), transform.ncols()));
+        let rows: Vec<_> = chroma.outer_iter_mut().zip(&self.classes).collect();
+        rows.into_par_iter().for_each(|(mut row, class)| {
+            let row = row.as_slice_mut().expect("a new array");
+            // Sums in the order in which the bins of one octave after another come.
+            for bin in plan.octaves.iter().flat_map(Octave::bins) {
+                for (w, _) in class.iter().filter(|(_, k)| *k == bin) {
+                    let values = transform.row(bin).to_slice().expect("a new array");
+                    let w = T::of(f64::from(*w));
+                    add_magnitudes(row, w, values.iter().map(|z| (z.re, z.im)));
+                }
+            }
+        });
         self.finish(&mut chroma);
         Ok(chroma)
     }
@@ -211,12 +225,46 @@ pub fn chroma_cqt<T: Lane>(
 ) -> Result<Array3<T>> {
     let fold = ChromaCqt::new(cqt.n_bins, p)?;
     let plan = CqtPlan::new(cqt)?;
-    per_channel(y, |y| fold.of_signal(&plan, y))
+    per_channel(y, |y| fold.of_signal_at_once(&plan, y))
+}
+
+/// Adds `w` times the magnitudes of `values` (real and imaginary parts) to `row`.
+fn add_magnitudes<T: Real>(row: &mut [T], w: T, values: impl Iterator<Item = (T, T)>) {
+    vectorized(
+        #[inline(always)]
+        || {
+            for (sum, (re, im)) in row.iter_mut().zip(values) {
+                let (re, im) = (re.wide(), im.wide());
+                *sum += w * T::of((re * re + im * im).sqrt());
+            }
+        },
+    );
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn both_ways_over_the_bins_give_the_same_bits() {
+        let y: Vec<f32> = (0..30_000).map(|i| ((i * i) % 257) as f32 / 257.0 - 0.5).collect();
+        for bins_per_octave in [12, 36] {
+            let p = ChromaCqtParams {
+                bins_per_octave,
+                window: Some(vec![1.0, 2.0, 1.0]),
+                ..ChromaCqtParams::default()
+            };
+            let params = CqtParams {
+                bins_per_octave,
+                n_bins: 5 * bins_per_octave,
+                ..CqtParams::new(22050.0)
+            };
+            let (fold, plan) =
+                (ChromaCqt::new(params.n_bins, &p).unwrap(), CqtPlan::new(&params).unwrap());
+            let want = fold.of_signal(&plan, &y).unwrap();
+            assert_eq!(fold.of_signal_at_once(&plan, &y).unwrap(), want);
+        }
+    }
 
     #[test]
     fn three_neighbours_are_centred_on_their_class() {

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
 
 use crate::resample::halving;
 use crate::vector::Lane;
@@ -100,29 +101,44 @@ impl Decimator {
     /// Every second sample of the low-passed `y`, times `sqrt(2)`: `n` samples, the first one
     /// aligned with `y[0]`; the signal is zero outside.
     ///
-    /// For `n = ceil(len / 2)` librosa 0.11 `resample(y, orig_sr=2, target_sr=1, scale=True)`.
-    pub fn halve<T: Lane>(&self, y: &[T], n: usize) -> Vec<T> {
+    /// For `n = ceil(len / 2)` librosa 0.11 `resample(y, orig_sr=2, target_sr=1, scale=True)`. `at_once` is
+    /// on all threads of the pool.
+    pub fn halve<T: Lane>(&self, y: &[T], n: usize, at_once: bool) -> Vec<T> {
         // Taps at even distances weigh the even samples, the others the odd ones. Both run over
         // contiguous outputs, as convolutions whose inputs start `reach / 2` samples early.
         let tap = |h: &f64| T::of(h * std::f64::consts::SQRT_2);
         let even: Vec<T> = self.taps.iter().step_by(2).map(tap).collect();
         let odd: Vec<T> = self.taps.iter().skip(1).step_by(2).map(tap).collect();
-        let room = n.next_multiple_of(64 * REGISTERS) + self.reach() + 1;
-        let phase = |offset: usize| {
-            let mut samples = vec![T::zero(); room];
-            let values = y.iter().skip(offset).step_by(2);
-            samples[self.reach() / 2..].iter_mut().zip(values).for_each(|(slot, x)| *slot = *x);
-            samples
-        };
         let mut out = vec![T::zero(); n];
-        Arch::new().dispatch(Decimate {
-            even: (&even, &phase(0)),
-            odd: (&odd, &phase(1)),
-            out: &mut out,
-        });
+        let part = |(i, out): (usize, &mut [T])| {
+            // Samples of one phase from `reach / 2` before those under the first output on.
+            let room = out.len().next_multiple_of(64 * REGISTERS) + self.reach() + 1;
+            let early = self.reach() / 2;
+            let skipped = early.saturating_sub(i * PART);
+            let phase = |offset: usize| {
+                let mut samples = vec![T::zero(); room];
+                let first = 2 * (i * PART + skipped - early) + offset;
+                let values = y.get(first..).unwrap_or_default().iter().step_by(2);
+                samples[skipped..].iter_mut().zip(values).for_each(|(slot, x)| *slot = *x);
+                samples
+            };
+            Arch::new().dispatch(Decimate {
+                even: (&even, &phase(0)),
+                odd: (&odd, &phase(1)),
+                out,
+            });
+        };
+        if at_once {
+            out.par_chunks_mut(PART).enumerate().for_each(part);
+        } else {
+            out.chunks_mut(PART).enumerate().for_each(part);
+        }
         out
     }
 }
+
+/// Outputs that one thread makes at a time, a multiple of those of a pass.
+const PART: usize = 1 << 13;
 
 struct Decimate<'a, T> {
     /// Taps and samples `x[2 (i - reach / 2)]`.
@@ -166,9 +182,10 @@ mod tests {
         for stages in 1..=3 {
             let decimator = Decimator::last(stages);
             let (h, reach) = (&decimator.taps, decimator.reach());
-            for n in [1_usize, 2, 3, 200, 389, 1000, 1031] {
+            for n in [1_usize, 2, 3, 200, 389, 1000, 1031, 2 * PART + 1, 4 * PART + 100] {
                 let y: Vec<f64> = (0..n).map(|i| ((i * i) % 17) as f64 - 8.0).collect();
-                let got = decimator.halve(&y, n.div_ceil(2));
+                let got = decimator.halve(&y, n.div_ceil(2), false);
+                assert_eq!(decimator.halve(&y, n.div_ceil(2), true), got);
                 for (m, got) in got.iter().enumerate() {
                     let term = |k: usize| {
                         let i = (2 * m + reach).checked_sub(k).and_then(|i| y.get(i));
@@ -193,7 +210,7 @@ mod tests {
         for stages in [2, 4] {
             let tone: Vec<f64> =
                 (0..4000).map(|i| (2.0 * PI * 0.38 * f64::from(i)).cos()).collect();
-            let y = Decimator::early(stages).halve(&tone, 2000);
+            let y = Decimator::early(stages).halve(&tone, 2000, false);
             assert!(y[500..1500].iter().all(|x| x.abs() < 3e-7));
         }
     }
@@ -204,7 +221,7 @@ mod tests {
             (0..4000).map(|i| (2.0 * PI * f * f64::from(i)).cos() as f32).collect()
         };
         let peak = |f: f64| {
-            let y = Decimator::last(1).halve(&tone(f), 2000);
+            let y = Decimator::last(1).halve(&tone(f), 2000, false);
             y[500..1500].iter().fold(0.0_f32, |m, x| m.max(x.abs()))
         };
         assert!((peak(0.2) - std::f32::consts::SQRT_2).abs() < 3e-3);

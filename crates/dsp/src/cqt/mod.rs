@@ -11,6 +11,7 @@ mod params;
 mod tuning;
 
 use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::Arc;
 
 use ndarray::{Array2, Array3, ArrayView2, Axis};
@@ -45,6 +46,13 @@ struct Octave {
     hop: usize,
     /// Whether the next octave works at half the rate.
     halve: bool,
+}
+
+impl Octave {
+    /// Its bins in the result.
+    fn bins(&self) -> Range<usize> {
+        self.first..self.first + self.basis.rows.len()
+    }
 }
 
 /// Filters and transforms for one set of parameters, shared between recordings and threads.
@@ -157,7 +165,7 @@ impl CqtPlan {
         mut each: impl FnMut(usize, usize, &[T], &[T]),
     ) -> Result<()> {
         let frames = self.n_frames(y.len());
-        let signals = self.signals(y)?;
+        let signals = self.signals(y, false)?;
         for (i, octave) in self.octaves.iter().enumerate() {
             self.octave(octave, of_octave(&signals, i), frames, &mut each)?;
         }
@@ -167,7 +175,7 @@ impl CqtPlan {
     /// As [`transform`](Self::transform), octaves on all threads of the pool.
     fn transform_at_once<T: Lane>(&self, y: &[T]) -> Result<Array2<Complex<T>>> {
         let frames = self.n_frames(y.len());
-        let signals = self.signals(y)?;
+        let signals = self.signals(y, true)?;
         let mut out = Array2::zeros((self.params.n_bins, frames));
         let mut rest = out.as_slice_mut().expect("a new array");
         let mut parts = Vec::with_capacity(self.octaves.len());
@@ -190,19 +198,19 @@ impl CqtPlan {
 
     /// The signals of the octaves, from the highest down; those below the last have its signal, as an odd
     /// hop is not halved.
-    fn signals<'y, T: Lane>(&self, y: &'y [T]) -> Result<Vec<Cow<'y, [T]>>> {
+    fn signals<'y, T: Lane>(&self, y: &'y [T], at_once: bool) -> Result<Vec<Cow<'y, [T]>>> {
         let factor = 1usize << self.early;
         if y.is_empty() || y.len() < factor {
             return Err(DspError::TooShort { name: "y", actual: y.len(), needed: factor });
         }
         let first = match self.early {
             0 => Cow::Borrowed(y),
-            _ => Cow::Owned(self.decimated_early(y)?),
+            _ => Cow::Owned(self.decimated_early(y, at_once)?),
         };
         let mut signals = vec![first];
         let above = self.octaves.split_last().map_or(&[][..], |(_, above)| above);
         for _ in above.iter().take_while(|octave| octave.halve) {
-            let next = self.halved(&signals[signals.len() - 1]);
+            let next = self.halved(&signals[signals.len() - 1], at_once);
             signals.push(Cow::Owned(next));
         }
         Ok(signals)
@@ -224,7 +232,7 @@ impl CqtPlan {
     }
 
     /// The signal of the first octave, where it has a lower rate.
-    fn decimated_early<T: Lane>(&self, y: &[T]) -> Result<Vec<T>> {
+    fn decimated_early<T: Lane>(&self, y: &[T], at_once: bool) -> Result<Vec<T>> {
         let factor = 1usize << self.early;
         if self.params.res_type != ResType::SoxrHq {
             let y = ArrayView2::from_shape((1, y.len()), y).expect("one row");
@@ -239,19 +247,19 @@ impl CqtPlan {
         for level in 1..self.early {
             // The response after the end counts in the later stages.
             let after = n << (self.early - level);
-            signal = Cow::Owned(early.halve(&signal, after + last.reach()));
+            signal = Cow::Owned(early.halve(&signal, after + last.reach(), at_once));
         }
-        let mut signal = last.halve(&signal, n);
+        let mut signal = last.halve(&signal, n, at_once);
         signal.resize(y.len().div_ceil(factor), T::zero());
         Ok(signal)
     }
 
     /// The signal of the next octave.
-    fn halved<T: Lane>(&self, signal: &[T]) -> Vec<T> {
+    fn halved<T: Lane>(&self, signal: &[T], at_once: bool) -> Vec<T> {
         let n = signal.len().div_ceil(2);
         // resampy gives whole samples only, librosa pads to the next larger with a zero.
         let filtered = if self.params.res_type == ResType::SoxrHq { n } else { signal.len() / 2 };
-        let mut halved = self.decimator.halve(signal, filtered);
+        let mut halved = self.decimator.halve(signal, filtered, at_once);
         halved.resize(n, T::zero());
         halved
     }

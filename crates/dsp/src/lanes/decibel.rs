@@ -18,14 +18,22 @@ pub fn power_to_decibel(rows: &mut [Row], amin: f32, offset: f32) {
 }
 
 /// `10 log10(x)` of a normal positive number, within 3 units in the last place (of 1 below 1), in
-/// operations that vectorise: `x = 2^e m` with `m` in `[sqrt(1/2), sqrt(2))`, then the series of the
-/// inverse hyperbolic tangent for `ln(m)`, whose first term left out is 1e-17 of the sum.
+/// operations that vectorise.
 #[inline(always)]
 pub(crate) fn decibel_double(x: f64) -> f64 {
     // 10 log10(2) split so that the product of the first part with an exponent is exact.
     const OCTAVE_HIGH: f64 = 6165.0 / 2048.0;
     const OCTAVE_LOW: f64 = 4.605_038_981_195_214e-5;
     const NEPER: f64 = 4.342_944_819_032_518;
+    let (e, half) = logarithm(x);
+    e * OCTAVE_HIGH + (e * OCTAVE_LOW + 2.0 * NEPER * half)
+}
+
+/// `(e, ln(m) / 2)` of a normal positive number `2^e m` with `m` in `[sqrt(1/2), sqrt(2))`, in operations
+/// that vectorise: the series of the inverse hyperbolic tangent, whose first term left out is 1e-17 of
+/// the sum.
+#[inline(always)]
+pub(crate) fn logarithm(x: f64) -> (f64, f64) {
     const ONE: u64 = 1.0f64.to_bits();
     // 2^52: the bits of its sum with a smaller whole number end with that number.
     const WHOLE: f64 = 4_503_599_627_370_496.0;
@@ -37,8 +45,7 @@ pub(crate) fn decibel_double(x: f64) -> f64 {
     let f = (m - 1.0) / (m + 1.0);
     let square = f * f;
     let tail = (1..=10).rev().fold(0.0, |sum, k| sum * square + 1.0 / f64::from(2 * k + 1));
-    let half = f + f * square * tail;
-    e * OCTAVE_HIGH + (e * OCTAVE_LOW + 2.0 * NEPER * half)
+    (e, f + f * square * tail)
 }
 
 /// `10 log10(x)` of a normal positive number, within 2 units in the last place, in operations that

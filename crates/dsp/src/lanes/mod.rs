@@ -19,7 +19,7 @@ mod weighted;
 
 pub(crate) use convolution::{Change, Convolution};
 pub use decibel::power_to_decibel;
-pub(crate) use decibel::{decibel, decibel_double};
+pub(crate) use decibel::{decibel, decibel_double, logarithm};
 pub use fft::LaneFft;
 pub use gather::{Aligned, Frames, Slots, gather};
 pub(crate) use gather::{gather_double, gather_part};

@@ -3,10 +3,10 @@
 
 mod tracks;
 
-use ndarray::{ArrayView2, ArrayView3, s};
-use rayon::prelude::*;
+use std::ops::Range;
 
-use crate::columns::for_each_column;
+use ndarray::{ArrayView2, ArrayView3};
+
 use crate::error::{DspError, Result};
 use crate::frequency::fft_frequencies;
 use crate::log2::log2;
@@ -83,6 +83,12 @@ impl PitchTracker {
         self.params.n_fft / 2 + 1
     }
 
+    /// Bins that may be a peak: not the first, and the last only has a left neighbour.
+    fn bins(&self) -> Range<usize> {
+        let first = self.first.max(1);
+        first..self.end.max(first)
+    }
+
     /// Calls `each` with the peaks of one spectrum of non-negative magnitudes (or powers), in bin
     /// order. Peaks exceed `reference`, or `threshold` times the maximum where that is `None`.
     ///
@@ -100,8 +106,8 @@ impl PitchTracker {
             );
             T::of(self.params.threshold) * largest
         });
-        // The first bin is never a peak; the last one only has a left neighbour.
-        let (first, end) = (self.first.max(1), self.end.min(magnitude.len()));
+        let Range { start, end } = self.bins();
+        let (first, end) = (start, end.min(magnitude.len()));
         // Most bins are far below the reference: many are looked at together.
         let low = |bins: &[T]| bins.iter().fold(true, |low, s| low & (*s <= reference));
         let blocks = (first..end).step_by(AT_ONCE).map(|k| k..end.min(k + AT_ONCE));
@@ -189,12 +195,15 @@ impl<T: Real> TuningEstimator<T> {
 
     /// Adds the peaks of one spectrum of non-negative magnitudes or powers.
     pub fn push(&mut self, magnitude: &[T], reference: Option<T>) {
-        self.tracker.peaks(magnitude, reference, |peak| {
-            if peak.pitch > T::zero() {
-                self.pitches.push(peak.pitch);
-                self.magnitudes.push(peak.magnitude);
-            }
-        });
+        let tracker = self.tracker.clone();
+        tracker.peaks(magnitude, reference, |peak| self.add(peak));
+    }
+
+    fn add(&mut self, peak: Peak<T>) {
+        if peak.pitch > T::zero() {
+            self.pitches.push(peak.pitch);
+            self.magnitudes.push(peak.magnitude);
+        }
     }
 
     /// Takes over the peaks of `other`, for channels that were tracked separately.
@@ -248,17 +257,7 @@ pub fn estimate_tuning<T: Real>(
 ) -> Result<Option<f64>> {
     let mut estimator = TuningEstimator::new(params)?;
     check(&estimator.tracker, s, reference)?;
-    let channel = |c: usize| {
-        let mut estimator = TuningEstimator::new(params)?;
-        let mut absolute = vec![T::zero(); estimator.tracker.n_bins()];
-        for_each_column(s.slice(s![c..=c, .., ..]), |_, t, spectrum| {
-            absolute.iter_mut().zip(spectrum).for_each(|(a, x)| *a = x.abs());
-            estimator.push(&absolute, reference.map(|given| given[[c, t]]));
-        });
-        Ok(estimator)
-    };
-    let channels: Result<Vec<_>> = (0..s.dim().0).into_par_iter().map(channel).collect();
-    channels?.into_iter().for_each(|channel| estimator.merge(channel));
+    tracks::collect(&mut estimator, s, reference);
     estimator.finish(resolution, bins_per_octave)
 }
 

@@ -1,9 +1,9 @@
 //! Peaks of whole spectrograms, bin by bin.
 
-use ndarray::{Array2, Array3, ArrayView2, ArrayView3, s};
+use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis, s};
 use rayon::prelude::*;
 
-use super::{AT_ONCE, PitchParams, PitchTracker, check};
+use super::{AT_ONCE, Peak, PitchParams, PitchTracker, TuningEstimator, check};
 use crate::error::Result;
 use crate::real::Real;
 use crate::simd::vectorized;
@@ -28,29 +28,84 @@ pub fn piptrack<T: Real>(
         return Ok((pitches, magnitudes));
     }
     let s = s.as_standard_layout();
-    let (_, bins, frames) = s.dim();
-    let references = match reference {
-        Some(given) => given.as_standard_layout().into_owned(),
-        None => thresholds(s.view(), T::of(params.threshold)),
-    };
-    let values = s.as_slice().expect("in C order");
+    let bins = Bins::new(&tracker, s.view(), reference);
+    let frames = bins.frames;
     let pitches_of = pitches.as_slice_mut().expect("made in C order").par_chunks_mut(frames);
     let magnitudes_of = magnitudes.as_slice_mut().expect("made in C order").par_chunks_mut(frames);
     pitches_of.zip(magnitudes_of).enumerate().for_each(|(i, (pitches, magnitudes))| {
-        let (channel, bin) = (i / bins, i % bins);
-        if (tracker.first.max(1)..tracker.end).contains(&bin) {
-            let row = |i: usize| &values[i * frames..(i + 1) * frames];
-            let around = Around {
-                bin,
-                left: row(i - 1),
-                here: row(i),
-                right: (bin + 1 < bins).then(|| row(i + 1)),
-                references: references.row(channel).to_slice().expect("in C order"),
-            };
-            around.peaks(&tracker, pitches, magnitudes);
+        let bin = i % bins.bins;
+        if tracker.bins().contains(&bin) {
+            bins.around(i / bins.bins, bin).peaks(&tracker, |t, peak| {
+                (pitches[t], magnitudes[t]) = (peak.pitch, peak.magnitude);
+            });
         }
     });
     Ok((pitches, magnitudes))
+}
+
+/// Adds all peaks of `s [channels, bins, frames]` to `estimator`; their order plays no part there.
+pub(super) fn collect<T: Real>(
+    estimator: &mut TuningEstimator<T>,
+    s: ArrayView3<T>,
+    reference: Option<ArrayView2<T>>,
+) {
+    if s.is_empty() {
+        return;
+    }
+    let s = s.as_standard_layout();
+    let empty = estimator.clone();
+    let tracker = estimator.tracker();
+    let bins = Bins::new(tracker, s.view(), reference);
+    let (searched, channels) = (tracker.bins(), s.len_of(Axis(0)));
+    let parts = (0..channels * searched.len()).into_par_iter().with_min_len(ROWS);
+    let parts = parts.fold(
+        || empty.clone(),
+        |mut found, i| {
+            let (channel, bin) = (i / searched.len(), searched.start + i % searched.len());
+            bins.around(channel, bin).peaks(tracker, |_, peak| found.add(peak));
+            found
+        },
+    );
+    let parts: Vec<_> = parts.collect();
+    parts.into_iter().for_each(|part| estimator.merge(part));
+}
+
+/// Bins of which one thread takes the peaks at least.
+const ROWS: usize = 16;
+
+/// The bins of a spectrogram, each with its neighbours, and what peaks exceed.
+struct Bins<'a, T> {
+    values: &'a [T],
+    bins: usize,
+    frames: usize,
+    /// `[channels, frames]`.
+    references: Array2<T>,
+}
+
+impl<'a, T: Real> Bins<'a, T> {
+    /// Of a spectrogram in C order that is not empty.
+    fn new(tracker: &PitchTracker, s: ArrayView3<'a, T>, reference: Option<ArrayView2<T>>) -> Self {
+        let (_, bins, frames) = s.dim();
+        let references = match reference {
+            Some(given) => given.as_standard_layout().into_owned(),
+            None => thresholds(s, T::of(tracker.params.threshold)),
+        };
+        Self { values: s.to_slice().expect("in C order"), bins, frames, references }
+    }
+
+    fn around(&self, channel: usize, bin: usize) -> Around<'_, T> {
+        let row = |bin: usize| {
+            let start = (channel * self.bins + bin) * self.frames;
+            &self.values[start..start + self.frames]
+        };
+        Around {
+            bin,
+            left: row(bin - 1),
+            here: row(bin),
+            right: (bin + 1 < self.bins).then(|| row(bin + 1)),
+            references: self.references.row(channel).to_slice().expect("in C order"),
+        }
+    }
 }
 
 /// The share `threshold` of the largest magnitude of every spectrum, `[channels, frames]`.
@@ -91,8 +146,8 @@ struct Around<'a, T> {
 }
 
 impl<T: Real> Around<'_, T> {
-    /// Peaks into `pitches` and `magnitudes`, which are zero.
-    fn peaks(&self, tracker: &PitchTracker, pitches: &mut [T], magnitudes: &mut [T]) {
+    /// Calls `each` with the frames that have a peak in this bin.
+    fn peaks(&self, tracker: &PitchTracker, mut each: impl FnMut(usize, Peak<T>)) {
         let parts = self.here.chunks(AT_ONCE).zip(self.references.chunks(AT_ONCE)).enumerate();
         for (i, (here, references)) in parts {
             // Most frames are far below the reference.
@@ -110,7 +165,7 @@ impl<T: Real> Around<'_, T> {
                 let right = self.right.map(|right| right[t].abs());
                 let magnitude = (self.left[t].abs(), here.abs(), right);
                 if let Some(peak) = tracker.peak(self.bin, magnitude, *reference) {
-                    (pitches[t], magnitudes[t]) = (peak.pitch, peak.magnitude);
+                    each(t, peak);
                 }
             }
         }

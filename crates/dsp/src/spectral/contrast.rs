@@ -205,17 +205,21 @@ fn mean_of_first<T: Real>(
         for (column, x) in columns.iter_mut().zip(rest) {
             *column = first(*column, *x);
         }
+        if count == 1 {
+            return columns.into_iter().reduce(first).unwrap_or(last).wide();
+        }
         let bound = ranked(&[columns], count, last, &before);
-        for block in blocks.iter().map(<[T; AT_ONCE]>::as_slice).chain([rest]) {
+        let mut keep = |x: T| {
+            scratch[found] = x;
+            found += usize::from(!before(bound, x));
+        };
+        for block in blocks {
             // Most blocks hold nothing that may be among the first.
-            if block.iter().fold(true, |none, x| none & before(bound, *x)) {
-                continue;
-            }
-            for x in block {
-                scratch[found] = *x;
-                found += usize::from(!before(bound, *x));
+            if !block.iter().fold(true, |none, x| none & before(bound, *x)) {
+                block.iter().for_each(|x| keep(*x));
             }
         }
+        rest.iter().for_each(|x| keep(*x));
     } else {
         found = values.len();
         scratch[..found].copy_from_slice(values);
@@ -233,9 +237,10 @@ fn mean_of_first<T: Real>(
         *scratch[..found].select_nth_unstable_by(count - 1, order).1
     };
     let (mut sum, mut summed) = (0.0, 0);
-    for x in scratch[..found].iter().filter(|x| before(**x, nth)) {
-        sum += x.wide();
-        summed += 1;
+    for x in &scratch[..found] {
+        let counts = before(*x, nth);
+        sum += if counts { x.wide() } else { 0.0 };
+        summed += usize::from(counts);
     }
     (sum + (count - summed) as f64 * nth.wide()) / count as f64
 }

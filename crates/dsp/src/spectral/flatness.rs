@@ -4,7 +4,9 @@ use ndarray::Array3;
 
 use super::Spectra;
 use crate::error::{DspError, Result};
+use crate::lanes::logarithm;
 use crate::real::Real;
+use crate::simd::vectorized;
 use crate::sums;
 
 /// Parameters of the flatness.
@@ -48,20 +50,40 @@ impl Flatness {
             if power < amin { amin.wide() } else { power.wide() }
         };
         let n = magnitude.len() as f64;
-        // One logarithm for four factors, where their product keeps full precision.
-        let groups = magnitude.chunks_exact(4);
-        let mut logs: f64 = groups.remainder().iter().map(|s| floored(*s).ln()).sum();
-        for group in groups {
-            let product = group.iter().fold(1.0, |p, s| p * floored(*s));
-            logs += if product.is_normal() {
-                product.ln()
-            } else {
-                group.iter().map(|s| floored(*s).ln()).sum()
-            };
-        }
-        T::of((logs / n).exp() / (sums::sum(magnitude, floored) / n))
+        let (blocks, rest) = magnitude.as_chunks::<{ FACTORS * LANES }>();
+        vectorized(
+            #[inline(always)]
+            || {
+                let mut logs: f64 = rest.iter().map(|s| floored(*s).ln()).sum();
+                let (mut exponents, mut halves) = ([0.0; LANES], [0.0; LANES]);
+                for block in blocks {
+                    let mut products = [1.0; LANES];
+                    for factors in block.as_chunks::<LANES>().0 {
+                        products = std::array::from_fn(|l| products[l] * floored(factors[l]));
+                    }
+                    if !products.iter().fold(true, |normal, p| normal & p.is_normal()) {
+                        logs += block.iter().map(|s| floored(*s).ln()).sum::<f64>();
+                        continue;
+                    }
+                    for (l, product) in products.into_iter().enumerate() {
+                        let (exponent, half) = logarithm(product);
+                        exponents[l] += exponent;
+                        halves[l] += half;
+                    }
+                }
+                logs += exponents.iter().sum::<f64>() * std::f64::consts::LN_2;
+                logs += 2.0 * halves.iter().sum::<f64>();
+                T::of((logs / n).exp() / (sums::sum(magnitude, floored) / n))
+            },
+        )
     }
 }
+
+/// Logarithms that are taken together.
+const LANES: usize = 8;
+
+/// Factors of a product of which one logarithm is taken, where the product keeps full precision.
+const FACTORS: usize = 4;
 
 /// Flatness of every frame, `[channels, 1, frames]`.
 ///
