@@ -207,28 +207,33 @@ impl<R: Lanes> OverlapAdd<R> {
 /// zero. A real signal has no imaginary part at zero and at half the sample rate.
 fn load<T: Real, R: Lanes>(spectra: ArrayView2<Complex<T>>, rows: &mut [R]) {
     let n = rows.len();
-    for k in 0..=n / 2 {
-        let (mut low, mut high) = (R::EMPTY, R::EMPTY);
-        if k < spectra.nrows() {
-            let (bin, real) = (spectra.row(k), k == 0 || 2 * k == n);
-            let slots = low.values_mut().iter_mut().zip(high.values_mut());
-            match bin.to_slice() {
-                Some(bin) => vectorized(
-                    #[inline(always)]
-                    || {
-                        for ((low, high), z) in slots.zip(bin) {
-                            (*low, *high) = halves(z, real);
+    vectorized(
+        #[inline(always)]
+        || {
+            for k in 0..=n / 2 {
+                let (mut low, mut high) = (R::EMPTY, R::EMPTY);
+                if k < spectra.nrows() {
+                    let (bin, real) = (spectra.row(k), k == 0 || 2 * k == n);
+                    let slots = low.values_mut().iter_mut().zip(high.values_mut());
+                    match bin.to_slice() {
+                        // A length that is known makes vectors of it.
+                        Some(bin) if bin.len() == R::SLOTS => {
+                            for ((low, high), z) in slots.zip(&bin[..R::SLOTS]) {
+                                (*low, *high) = halves(z, real);
+                            }
                         }
-                    },
-                ),
-                None => slots.zip(bin).for_each(|((low, high), z)| (*low, *high) = halves(z, real)),
+                        _ => slots.zip(bin).for_each(|((low, high), z)| {
+                            (*low, *high) = halves(z, real);
+                        }),
+                    }
+                }
+                rows[k] = low;
+                if k > 0 {
+                    rows[n - k] = high;
+                }
             }
-        }
-        rows[k] = low;
-        if k > 0 {
-            rows[n - k] = high;
-        }
-    }
+        },
+    );
 }
 
 /// What bin `z` and its mirror image become.

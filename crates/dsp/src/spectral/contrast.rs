@@ -174,45 +174,61 @@ const RANKED: usize = 4 * AT_ONCE;
 /// holds as many values, rounded up to whole blocks of [`AT_ONCE`].
 #[inline(always)]
 fn extremes<T: Real>(values: &[T], count: usize, scratch: &mut [T]) -> (f64, f64) {
+    // The first and the last of every column.
+    let (mut low, mut high) = ([T::infinity(); AT_ONCE], [T::neg_infinity(); AT_ONCE]);
+    let mut nans = [false; AT_ONCE];
+    let (blocks, rest) = values.as_chunks::<AT_ONCE>();
+    let smaller = |a: T, b: T| if b < a { b } else { a };
+    let larger = |a: T, b: T| if b > a { b } else { a };
+    for block in blocks {
+        for i in 0..AT_ONCE {
+            low[i] = smaller(low[i], block[i]);
+        }
+        for i in 0..AT_ONCE {
+            high[i] = larger(high[i], block[i]);
+        }
+        for i in 0..AT_ONCE {
+            nans[i] |= block[i].is_nan();
+        }
+    }
+    for (i, x) in rest.iter().enumerate() {
+        (low[i], high[i]) = (smaller(low[i], *x), larger(high[i], *x));
+        nans[i] |= x.is_nan();
+    }
     // Contrast with a NaN is NaN, however the others are ordered.
-    if values.is_empty() || values.iter().fold(false, |any, x| any | x.is_nan()) {
+    if values.is_empty() || nans.contains(&true) {
         return (f64::NAN, f64::NAN);
     }
-    let infinity = T::infinity();
-    let low = mean_of_first(values, count, scratch, infinity, |a, b| a < b);
-    let high = mean_of_first(values, count, scratch, -infinity, |a, b| a > b);
-    (low, high)
+    if count == 1 {
+        let (low, high) = (low.into_iter().reduce(smaller), high.into_iter().reduce(larger));
+        return (low.map_or(f64::NAN, T::wide), high.map_or(f64::NAN, T::wide));
+    }
+    (
+        mean_of_first(values, count, scratch, low, |a, b| a < b),
+        mean_of_first(values, count, scratch, high, |a, b| a > b),
+    )
 }
 
-/// Mean of the first `count` values in the order of `before`, in which nothing follows `last`.
+/// Mean of the first `count` values in the order of `before`, of which `columns` are the first of every column.
 #[inline(always)]
 fn mean_of_first<T: Real>(
     values: &[T],
     count: usize,
     scratch: &mut [T],
-    last: T,
+    columns: [T; AT_ONCE],
     before: impl Fn(T, T) -> bool,
 ) -> f64 {
+    // Nothing follows it.
+    let last = if before(T::zero(), T::infinity()) { T::infinity() } else { T::neg_infinity() };
     let mut found = 0;
     if count <= AT_ONCE {
-        // The first of every column: at least `count` values do not follow the `count`-th of these.
-        let mut columns = [last; AT_ONCE];
-        let (blocks, rest) = values.as_chunks::<AT_ONCE>();
-        let first = |a: T, b: T| if before(b, a) { b } else { a };
-        for block in blocks {
-            columns = std::array::from_fn(|i| first(columns[i], block[i]));
-        }
-        for (column, x) in columns.iter_mut().zip(rest) {
-            *column = first(*column, *x);
-        }
-        if count == 1 {
-            return columns.into_iter().reduce(first).unwrap_or(last).wide();
-        }
+        // At least `count` values do not follow the `count`-th of these.
         let bound = ranked(&[columns], count, last, &before);
         let mut keep = |x: T| {
             scratch[found] = x;
             found += usize::from(!before(bound, x));
         };
+        let (blocks, rest) = values.as_chunks::<AT_ONCE>();
         for block in blocks {
             // Most blocks hold nothing that may be among the first.
             if !block.iter().fold(true, |none, x| none & before(bound, *x)) {
