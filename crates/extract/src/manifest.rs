@@ -130,17 +130,21 @@ impl ManifestColumns {
         Ok(place)
     }
 
-    /// Refuses the names that annotations of events give to times: whole recordings would be computed.
-    fn check_times(&self) -> Result<(), String> {
-        let find = |name: &str| self.places.keys().find(|k| k.eq_ignore_ascii_case(name));
+    /// Refuses the names that annotations of events give to times: whole recordings would be computed. Gives
+    /// the place of one of them.
+    fn check_times(&self) -> Result<(), (usize, String)> {
+        let find = |name: &str| self.places.iter().find(|(k, _)| k.eq_ignore_ascii_case(name));
         match (find("onset"), find("offset").or(find("duration"))) {
-            (Some(onset), Some(other)) if find(START).is_none() && find(END).is_none() => {
-                Err(format!(
+            (Some((onset, place)), Some((other, _)))
+                if find(START).is_none() && find(END).is_none() =>
+            {
+                let reason = format!(
                     "columns {} and {}: the times of stretches are read from columns `{START}` and \
                      `{END}`, in seconds; if these are labels, give them other names",
                     quoted(onset),
                     quoted(other)
-                ))
+                );
+                Err((*place, reason))
             }
             _ => Ok(()),
         }
@@ -210,7 +214,7 @@ fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
         }
         cells.push(index);
     }
-    columns.check_times().map_err(|reason| wrong(path, 1, reason))?;
+    columns.check_times().map_err(|(_, reason)| wrong(path, 1, reason))?;
     if !columns.places.contains_key(PATH) {
         let names: Vec<&str> = columns.labels.iter().map(|(_, name)| name.as_str()).collect();
         let likely = names.iter().find(|name| corsmal_names::names_files(name));
@@ -269,7 +273,10 @@ fn json_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
         rows.push((line, cells));
         require_cells(rows.len(), columns.labels.len()).map_err(|e| wrong(path, line, e))?;
     }
-    columns.check_times().map_err(|reason| wrong(path, 1, reason))?;
+    columns.check_times().map_err(|(place, reason)| {
+        let named = rows.iter().find(|(_, cells)| cells.iter().any(|(own, _)| *own == place));
+        wrong(path, named.map_or(1, |(line, _)| *line), reason)
+    })?;
     let mut values = vec![String::new(); columns.places.len()];
     let entries = rows.into_iter().map(|(line, cells)| {
         values.iter_mut().for_each(String::clear);

@@ -32,7 +32,7 @@ use crate::vector::Lane;
 use crate::window::Window;
 use basis::{Basis, Wavelets};
 use decimate::Decimator;
-use octaves::{Layout, layouts, require_work};
+use octaves::{Layout, early_halvings, layouts, pass_band, require_work};
 
 /// One octave of filters and how its signal comes about.
 struct Octave {
@@ -347,22 +347,6 @@ fn project(basis: &Basis, gains: &[f32], spectrum: &[Row], response: &mut [[Row;
             }
         },
     );
-}
-
-/// Share of the Nyquist frequency that octaves may fill; librosa up to 0.9 took the pass band of its
-/// converter.
-fn pass_band(res_type: ResType) -> f64 {
-    match res_type {
-        ResType::SoxrHq => 1.0,
-        ResType::KaiserBest | ResType::KaiserFast => 0.85,
-    }
-}
-
-/// Halvings of the rate that the highest filter and the hop allow before the first octave.
-fn early_halvings(nyquist: f64, cutoff: f64, hop: usize, n_octaves: usize) -> u32 {
-    let by_rate = ((nyquist / cutoff).log2().ceil() - 2.0).max(0.0) as u32;
-    let by_hop = (hop.trailing_zeros() + 1).saturating_sub(n_octaves as u32);
-    by_rate.min(by_hop)
 }
 
 /// Constant-Q transform `[channels, n_bins, frames]` of `y [channels, samples]`. Channels are

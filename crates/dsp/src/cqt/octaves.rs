@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::CqtParams;
 use super::basis::{Basis, Wavelets};
 use crate::error::{DspError, Result};
+use crate::resample::ResType;
 
 /// Most work for each sample of the signal, in numbers that a frame touches. The default bins take
 /// 200, and 100,000 with a hop of 1.
@@ -26,6 +27,22 @@ pub(super) struct Layout {
     pub n_fft: usize,
     /// Whether the filters of the octave above serve it.
     pub as_above: bool,
+}
+
+/// Share of the Nyquist frequency that octaves may fill; librosa up to 0.9 took the pass band of its
+/// converter.
+pub(super) fn pass_band(res_type: ResType) -> f64 {
+    match res_type {
+        ResType::SoxrHq => 1.0,
+        ResType::KaiserBest | ResType::KaiserFast => 0.85,
+    }
+}
+
+/// Halvings of the rate that the highest filter and the hop allow before the first octave.
+pub(super) fn early_halvings(nyquist: f64, cutoff: f64, hop: usize, n_octaves: usize) -> u32 {
+    let by_rate = ((nyquist / cutoff).log2().ceil() - 2.0).max(0.0) as u32;
+    let by_hop = (hop.trailing_zeros() + 1).saturating_sub(n_octaves as u32);
+    by_rate.min(by_hop)
 }
 
 /// The octaves from the highest down, the first of them at a rate of `base` and with that hop.

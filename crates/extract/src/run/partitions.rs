@@ -48,58 +48,20 @@ impl<'a> PartitionBy<'a> {
             }));
         }
         let by = Self { label, inputs };
-        let values: BTreeSet<String> = by.values().into_iter().collect();
-        if values.len() > MOST {
-            let why =
-                format!("it has {} values, and each is a folder: at most {MOST}", values.len());
+        let count = values(label, inputs).into_iter().collect::<BTreeSet<_>>().len();
+        if count > MOST {
+            let why = format!("it has {count} values, and each is a folder: at most {MOST}");
             return Err(refuse(why));
         }
-        let mut folders = BTreeMap::new();
-        for value in &values {
-            let folder = partition::folder(label, value);
-            if folder.len() > LONGEST {
-                let value = quoted(value);
-                return Err(refuse(format!(
-                    "the value {value} is too long for the name of a folder"
-                )));
-            }
-            // Some systems tell no capital letters apart.
-            if let Some(other) = folders.insert(folder.to_lowercase(), value) {
-                let (a, b) = (quoted(other), quoted(value));
-                return Err(refuse(format!("the values {a} and {b} would share a folder")));
-            }
-        }
-        // Where all values are whole numbers, readers of such folders make them numbers.
-        let written: Option<Vec<(i64, &String)>> = values
-            .iter()
-            .filter(|value| !value.is_empty())
-            .map(|value| Some((value.parse().ok()?, value)))
-            .collect();
-        let mut numbers = BTreeMap::new();
-        for (number, value) in written.unwrap_or_default() {
-            if let Some(other) = numbers.insert(number, value) {
-                let (a, b) = (quoted(other), quoted(value));
-                return Err(refuse(format!(
-                    "the values {a} and {b} would be read as the same number: write both the same \
-                     way"
-                )));
-            }
-        }
+        // Shards end up in one folder: their values are compared, too.
+        let values: BTreeSet<String> = values(label, all).into_iter().collect();
+        check_values(label, &values).map_err(refuse)?;
         Ok(by)
     }
 
     /// The label.
     pub fn label(&self) -> &str {
         self.label
-    }
-
-    /// The value of each input.
-    fn values(&self) -> Vec<String> {
-        let value = |input: &Input| {
-            let found = input.labels.iter().find(|(name, _)| name == self.label);
-            found.map(|(_, value)| value.clone()).unwrap_or_default()
-        };
-        self.inputs.iter().map(value).collect()
     }
 
     /// Writes all parts into a folder beside the output, then gives that its name. `archive` holds the
@@ -120,7 +82,9 @@ impl<'a> PartitionBy<'a> {
         let beside = self.beside(&out).map_err(io(&out))?;
         let (made, replaced) = (beside.path().join("made"), beside.path().join("replaced"));
         fs::create_dir(&made).map_err(io(&made))?;
-        for Partition { part, table } in partition::split(table, self.label, &self.values())? {
+        for Partition { part, table } in
+            partition::split(table, self.label, &values(self.label, self.inputs))?
+        {
             let folder = made.join(partition::folder(&part.label, &part.value));
             fs::create_dir_all(&folder).map_err(io(&folder))?;
             let path = folder.join(FILE);
@@ -176,6 +140,66 @@ pub fn is_ours(out: &Path) -> bool {
     !out.exists() || is_empty || partition::is_partitioned(out)
 }
 
+/// The value of each input.
+fn values(label: &str, inputs: &[Input]) -> Vec<String> {
+    let value = |input: &Input| {
+        let found = input.labels.iter().find(|(name, _)| name == label);
+        found.map(|(_, value)| value.clone()).unwrap_or_default()
+    };
+    inputs.iter().map(value).collect()
+}
+
+/// Refuses values whose folders some systems or readers do not tell apart.
+fn check_values(label: &str, values: &BTreeSet<String>) -> Result<(), String> {
+    let mut folders = BTreeMap::new();
+    for value in values {
+        let folder = partition::folder(label, value);
+        if folder.len() > LONGEST {
+            let value = quoted(value);
+            return Err(format!("the value {value} is too long for the name of a folder"));
+        }
+        // Some systems tell no capital letters apart.
+        if let Some(other) = folders.insert(folder.to_lowercase(), value) {
+            let (a, b) = (quoted(other), quoted(value));
+            return Err(format!("the values {a} and {b} would share a folder"));
+        }
+    }
+    // Where all values are numbers, readers of such folders make them numbers.
+    let written = values.iter().filter(|value| !value.is_empty());
+    let written: Option<Vec<_>> = written.map(|value| Some((Number::of(value)?, value))).collect();
+    let mut numbers = BTreeMap::new();
+    for (number, value) in written.unwrap_or_default() {
+        if let Some(other) = numbers.insert(number, value) {
+            let (a, b) = (quoted(other), quoted(value));
+            return Err(format!(
+                "the values {a} and {b} would be read as the same number: write both the same way"
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// A number that a value stands for.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+enum Number {
+    Whole(i128),
+    /// The bits of any other.
+    Other(u64),
+}
+
+impl Number {
+    fn of(value: &str) -> Option<Self> {
+        /// Above it, not every whole number has a value of its own.
+        const EXACT: f64 = 9_007_199_254_740_992.0;
+        if let Ok(whole) = value.parse() {
+            return Some(Self::Whole(whole));
+        }
+        let number: f64 = value.parse().ok().filter(|number: &f64| number.is_finite())?;
+        let whole = number.fract() == 0.0 && number.abs() < EXACT;
+        Some(if whole { Self::Whole(number as i128) } else { Self::Other(number.to_bits()) })
+    }
+}
+
 /// Makes the names in a folder survive a power cut.
 #[cfg(unix)]
 fn sync(folder: &Path) -> io::Result<()> {
@@ -185,4 +209,41 @@ fn sync(folder: &Path) -> io::Result<()> {
 #[cfg(not(unix))]
 fn sync(_: &Path) -> io::Result<()> {
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inputs::InputSource;
+
+    fn refused(values: &[&str]) -> String {
+        let values = values.iter().map(|value| (*value).to_owned()).collect();
+        check_values("take", &values).err().unwrap_or_default()
+    }
+
+    #[test]
+    fn one_number_in_two_spellings_is_refused() {
+        for [a, b] in [["1", "01"], ["1", "1.0"], ["-2", "-2.00"], ["0.5", "5e-1"], ["1", "+1"]] {
+            assert!(refused(&[a, b, "", "7"]).contains("same number"), "{a} {b}");
+            // Beside a word, all are read as text.
+            assert_eq!(refused(&[a, b, "rice"]), "", "{a} {b}");
+        }
+        assert_eq!(refused(&["9007199254740993", "9007199254740992", "0.1", "0.2"]), "");
+        assert!(refused(&["Rice", "rice"]).contains("share a folder"));
+    }
+
+    #[test]
+    fn values_of_other_shards_count() {
+        let input = |value: &str| Input {
+            id: value.into(),
+            source: InputSource::File(value.into()),
+            start: None,
+            end: None,
+            labels: vec![("take".into(), value.into())],
+        };
+        let all = [input("1"), input("01")];
+        let why = PartitionBy::of("take", &all, &all[..1]).err().map(|e| e.to_string());
+        assert!(why.as_ref().is_some_and(|why| why.contains("same number")), "{why:?}");
+        assert!(PartitionBy::of("take", &all[..1], &all[..1]).is_ok());
+    }
 }

@@ -363,6 +363,24 @@ proptest! {
 }
 
 #[test]
+fn times_of_events_are_refused_where_they_first_stand() {
+    let dir = folder(&["a.wav"]);
+    let refused = |name: &str, lines: &str| {
+        let path = dir.path().join(name);
+        fs::write(&path, lines).unwrap();
+        inputs::collect(&[text(&path)]).err().map(|e| e.to_string()).unwrap_or_default()
+    };
+    let json = "{\"path\": \"a.wav\"}\n\n{\"path\": \"a.wav\", \"onset\": 1, \"offset\": 2}\n";
+    for (name, lines, place) in [
+        ("m.jsonl", json, "m.jsonl, line 3: columns"),
+        ("m.csv", "path,onset,offset\na.wav,1,2\n", "m.csv, line 1: columns"),
+    ] {
+        let why = refused(name, lines);
+        assert!(why.contains(place) && why.contains("onset"), "{why}");
+    }
+}
+
+#[test]
 fn columns_that_look_like_times_are_told() {
     let dir = folder(&["a.wav"]);
     let csv = dir.path().join("m.csv");
