@@ -62,7 +62,7 @@ WORKLOADS = {
     "W1": Workload(
         "log-mel, 8 channels",
         ["--preset", "logmel", "--set", "melspectrogram.joint=true"],
-        *("librosa", "logmel", (1e-3, 0.0)),
+        *("librosa", "logmel", (2e-3, 0.0)),
     ),
     "W2": Workload(
         "20 MFCC and ZCR, 8 channels",

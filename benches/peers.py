@@ -17,6 +17,7 @@ import multiprocessing
 import multiprocessing.synchronize
 import pathlib
 import resource
+import threading
 import time
 import warnings
 from collections.abc import Callable
@@ -152,8 +153,14 @@ def main() -> None:
     try:
         with ProcessPoolExecutor(args.processes, context, _start, arguments) as pool:
             waits = [pool.submit(_wait_for_the_others) for _ in range(args.processes)]
-            for wait in waits:
-                wait.result()
+            try:
+                for wait in waits:
+                    wait.result()
+            except threading.BrokenBarrierError:
+                # The pool would wait for the one that hangs.
+                for process in multiprocessing.active_children():
+                    process.kill()
+                raise SystemExit(f"{args.peer}: not every process was ready in time") from None
             start = time.perf_counter()
             done = list(pool.map(_extract, jobs))
             seconds = time.perf_counter() - start

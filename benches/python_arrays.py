@@ -4,9 +4,8 @@
 
 Both run on the same array in one process. Each makes its calls in a row, after a pause, because the
 BLAS threads behind librosa spin for a while after a call and would take a core from the next one.
-The figures are medians. "Bytes" is what nothing on this machine can be faster than: the time in
-which numpy, with a thread per core, reads the bytes of the argument and writes those of a new
-result.
+The figures are medians. "Bytes" is about the least time that this machine needs: in it
+numpy, with a thread per core, reads the bytes of the argument and writes those of a new result.
 """
 
 from __future__ import annotations

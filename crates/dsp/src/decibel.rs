@@ -167,8 +167,8 @@ fn map<T: Real>(values: &[T], out: &mut [T], of: impl Fn(T) -> T) -> (T, T) {
         #[inline(always)]
         || out.iter_mut().zip(values).for_each(|(slot, value)| *slot = of(*value)),
     );
-    let smaller = |a: T, b: T| if b < a { b } else { a };
-    let larger = |a: T, b: T| if b > a { b } else { a };
+    let least = |a: T, b: T| if b < a { b } else { a };
+    let most = |a: T, b: T| if b > a { b } else { a };
     let infinity = T::infinity();
     vectorized(
         #[inline(always)]
@@ -177,14 +177,14 @@ fn map<T: Real>(values: &[T], out: &mut [T], of: impl Fn(T) -> T) -> (T, T) {
             let (blocks, rest) = out.as_chunks::<LANES>();
             for block in blocks {
                 for l in 0..LANES {
-                    low[l] = smaller(low[l], block[l]);
+                    low[l] = least(low[l], block[l]);
                 }
                 for l in 0..LANES {
-                    high[l] = larger(high[l], block[l]);
+                    high[l] = most(high[l], block[l]);
                 }
             }
             let (low, high) = (low.iter().chain(rest), high.iter().chain(rest));
-            (low.copied().fold(infinity, smaller), high.copied().fold(-infinity, larger))
+            (low.copied().fold(infinity, least), high.copied().fold(-infinity, most))
         },
     )
 }

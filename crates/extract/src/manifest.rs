@@ -131,11 +131,14 @@ impl ManifestColumns {
     }
 
     /// Refuses the names that annotations of events give to times: whole recordings would be computed. Gives
-    /// the place of one of them.
-    fn check_times(&self) -> Result<(), (usize, String)> {
-        let find = |name: &str| self.places.iter().find(|(k, _)| k.eq_ignore_ascii_case(name));
+    /// the places of both.
+    fn check_times(&self) -> Result<(), ([usize; 2], String)> {
+        let find = |name: &str| {
+            let named = self.places.iter().filter(|(k, _)| k.eq_ignore_ascii_case(name));
+            named.min_by_key(|(_, place)| **place)
+        };
         match (find("onset"), find("offset").or(find("duration"))) {
-            (Some((onset, place)), Some((other, _)))
+            (Some((onset, first)), Some((other, second)))
                 if find(START).is_none() && find(END).is_none() =>
             {
                 let reason = format!(
@@ -144,7 +147,7 @@ impl ManifestColumns {
                     quoted(onset),
                     quoted(other)
                 );
-                Err((*place, reason))
+                Err(([*first, *second], reason))
             }
             _ => Ok(()),
         }
@@ -273,9 +276,11 @@ fn json_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
         rows.push((line, cells));
         require_cells(rows.len(), columns.labels.len()).map_err(|e| wrong(path, line, e))?;
     }
-    columns.check_times().map_err(|(place, reason)| {
-        let named = rows.iter().find(|(_, cells)| cells.iter().any(|(own, _)| *own == place));
-        wrong(path, named.map_or(1, |(line, _)| *line), reason)
+    columns.check_times().map_err(|(places, reason)| {
+        let first =
+            |place| rows.iter().find(|(_, cells)| cells.iter().any(|(own, _)| *own == place));
+        let lines = places.into_iter().filter_map(first).map(|(line, _)| *line);
+        wrong(path, lines.max().unwrap_or(1), reason)
     })?;
     let mut values = vec![String::new(); columns.places.len()];
     let entries = rows.into_iter().map(|(line, cells)| {

@@ -168,11 +168,15 @@ impl ChromaCqt {
         Ok(chroma)
     }
 
-    /// [`of_signal`](Self::of_signal) with the same bits, on all threads of the pool and with the whole
-    /// transform in memory.
+    /// [`of_signal`](Self::of_signal) with the same bits, on all threads of the pool, with the whole
+    /// transform in memory unless that is large.
     fn of_signal_at_once<T: Lane>(&self, plan: &CqtPlan, y: &[T]) -> Result<Array2<T>> {
+        let frames = plan.n_frames(y.len());
+        if self.n_input.saturating_mul(frames) > HELD {
+            return self.of_signal(plan, y);
+        }
         let transform = plan.transform_at_once(y)?;
-        let mut chroma = Array2::zeros((self.classes.len(), transform.ncols()));
+        let mut chroma = Array2::zeros((self.classes.len(), frames));
         let rows: Vec<_> = chroma.outer_iter_mut().zip(&self.classes).collect();
         rows.into_par_iter().for_each(|(mut row, class)| {
             let row = row.as_slice_mut().expect("a new array");
@@ -227,6 +231,9 @@ pub fn chroma_cqt<T: Lane>(
     let plan = CqtPlan::new(cqt)?;
     per_channel(y, |y| fold.of_signal_at_once(&plan, y))
 }
+
+/// Most values of a transform that is held whole: 128 MiB in single precision.
+const HELD: usize = 1 << 24;
 
 /// Adds `w` times the magnitudes of `values` (real and imaginary parts) to `row`.
 fn add_magnitudes<T: Real>(row: &mut [T], w: T, values: impl Iterator<Item = (T, T)>) {

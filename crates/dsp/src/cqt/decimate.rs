@@ -101,8 +101,8 @@ impl Decimator {
     /// Every second sample of the low-passed `y`, times `sqrt(2)`: `n` samples, the first one
     /// aligned with `y[0]`; the signal is zero outside.
     ///
-    /// For `n = ceil(len / 2)` librosa 0.11 `resample(y, orig_sr=2, target_sr=1, scale=True)`. `at_once` is
-    /// on all threads of the pool.
+    /// For `n = ceil(len / 2)` librosa 0.11 `resample(y, orig_sr=2, target_sr=1, scale=True)`. `at_once`
+    /// uses all threads of the pool.
     pub fn halve<T: Lane>(&self, y: &[T], n: usize, at_once: bool) -> Vec<T> {
         // Taps at even distances weigh the even samples, the others the odd ones. Both run over
         // contiguous outputs, as convolutions whose inputs start `reach / 2` samples early.

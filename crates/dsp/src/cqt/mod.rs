@@ -379,7 +379,7 @@ fn per_channel<T: Lane, R: Clone>(
     })
 }
 
-/// The signal of octave `i` among those of [`ConstantQ::signals`].
+/// The signal of octave `i` among those of [`CqtPlan::signals`].
 fn of_octave<'s, T: Clone>(signals: &'s [Cow<'_, [T]>], i: usize) -> &'s [T] {
     &signals[i.min(signals.len() - 1)]
 }

@@ -184,8 +184,11 @@ impl<T: Real> TuningEstimator<T> {
     /// # Errors
     /// As [`PitchTracker::new`].
     pub fn new(params: PitchParams) -> Result<Self> {
-        let tracker = PitchTracker::new(params)?;
-        Ok(Self { tracker, pitches: Vec::new(), magnitudes: Vec::new() })
+        Ok(Self::of(PitchTracker::new(params)?))
+    }
+
+    fn of(tracker: PitchTracker) -> Self {
+        Self { tracker, pitches: Vec::new(), magnitudes: Vec::new() }
     }
 
     /// The tracker behind it.
@@ -200,7 +203,8 @@ impl<T: Real> TuningEstimator<T> {
     }
 
     fn add(&mut self, peak: Peak<T>) {
-        if peak.pitch > T::zero() {
+        // A magnitude that is no number has no place among the others.
+        if peak.pitch > T::zero() && !peak.magnitude.is_nan() {
             self.pitches.push(peak.pitch);
             self.magnitudes.push(peak.magnitude);
         }

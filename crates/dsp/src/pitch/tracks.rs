@@ -43,7 +43,7 @@ pub fn piptrack<T: Real>(
     Ok((pitches, magnitudes))
 }
 
-/// Adds all peaks of `s [channels, bins, frames]` to `estimator`; their order plays no part there.
+/// Adds all peaks of `s [channels, bins, frames]` to `estimator`, where their order plays no part.
 pub(super) fn collect<T: Real>(
     estimator: &mut TuningEstimator<T>,
     s: ArrayView3<T>,
@@ -53,13 +53,12 @@ pub(super) fn collect<T: Real>(
         return;
     }
     let s = s.as_standard_layout();
-    let empty = estimator.clone();
     let tracker = estimator.tracker();
     let bins = Bins::new(tracker, s.view(), reference);
     let (searched, channels) = (tracker.bins(), s.len_of(Axis(0)));
     let parts = (0..channels * searched.len()).into_par_iter().with_min_len(ROWS);
     let parts = parts.fold(
-        || empty.clone(),
+        || TuningEstimator::of(tracker.clone()),
         |mut found, i| {
             let (channel, bin) = (i / searched.len(), searched.start + i % searched.len());
             bins.around(channel, bin).peaks(tracker, |_, peak| found.add(peak));

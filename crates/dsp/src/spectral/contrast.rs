@@ -209,7 +209,8 @@ fn extremes<T: Real>(values: &[T], count: usize, scratch: &mut [T]) -> (f64, f64
     )
 }
 
-/// Mean of the first `count` values in the order of `before`, of which `columns` are the first of every column.
+/// Mean of the first `count` values in the order of `before`; `columns[i]` is the first of every 16th value from
+/// the `i`-th on.
 #[inline(always)]
 fn mean_of_first<T: Real>(
     values: &[T],

@@ -113,15 +113,24 @@ mod tests {
         let flatness = Flatness::default();
         for level in [0.0, 1e-30, 1e-4, 1.0, 1e18] {
             assert!((flatness.of(&[level; 7]) - 1.0_f32).abs() < 1e-6, "{level}");
+            assert!((flatness.of(&[level; 71]) - 1.0_f32).abs() < 1e-6, "{level}");
         }
         for level in [1e-200, 1e-4, 1e150] {
             assert!((flatness.of(&[level; 7]) - 1.0_f64).abs() < 1e-12, "{level}");
+            assert!((flatness.of(&[level; 71]) - 1.0_f64).abs() < 1e-12, "{level}");
         }
     }
 
     #[test]
     fn geometric_over_arithmetic() {
-        let got = Flatness { amin: 1e-10, power: 1.0 }.of(&[1.0_f64, 2.0, 4.0, 8.0, 16.0]);
+        let values = [1.0_f64, 2.0, 4.0, 8.0, 16.0].repeat(20);
+        let flatness = Flatness { amin: 1e-10, power: 1.0 };
+        for values in [&values[..5], &values] {
+            assert!((flatness.of(values) - 4.0 / 6.2).abs() < 1e-12);
+        }
+        // Products of four are no normal numbers here.
+        let tiny: Vec<f64> = values.iter().map(|x| x * 1e-90).collect();
+        let got = Flatness { amin: 1e-300, power: 1.0 }.of(&tiny);
         assert!((got - 4.0 / 6.2).abs() < 1e-12);
     }
 }

@@ -164,40 +164,31 @@ fn check_values(label: &str, values: &BTreeSet<String>) -> Result<(), String> {
             return Err(format!("the values {a} and {b} would share a folder"));
         }
     }
-    // Where all values are numbers, readers of such folders make them numbers.
-    let written = values.iter().filter(|value| !value.is_empty());
-    let written: Option<Vec<_>> = written.map(|value| Some((Number::of(value)?, value))).collect();
-    let mut numbers = BTreeMap::new();
-    for (number, value) in written.unwrap_or_default() {
-        if let Some(other) = numbers.insert(number, value) {
-            let (a, b) = (quoted(other), quoted(value));
-            return Err(format!(
-                "the values {a} and {b} would be read as the same number: write both the same way"
-            ));
-        }
+    // Where all values are whole numbers, or all are numbers, readers of such folders make them numbers.
+    let written: Vec<&String> = values.iter().filter(|value| !value.is_empty()).collect();
+    let alike = alike(&written, |value| value.parse::<i128>().ok())
+        .or_else(|| alike(&written, |value| Some((value.parse::<f64>().ok()? + 0.0).to_bits())));
+    if let Some(Some((a, b))) = alike {
+        let (a, b) = (quoted(a), quoted(b));
+        return Err(format!(
+            "the values {a} and {b} would be read as the same number: write both the same way"
+        ));
     }
     Ok(())
 }
 
-/// A number that a value stands for.
-#[derive(PartialEq, Eq, PartialOrd, Ord)]
-enum Number {
-    Whole(i128),
-    /// The bits of any other.
-    Other(u64),
-}
-
-impl Number {
-    fn of(value: &str) -> Option<Self> {
-        /// Above it, not every whole number has a value of its own.
-        const EXACT: f64 = 9_007_199_254_740_992.0;
-        if let Ok(whole) = value.parse() {
-            return Some(Self::Whole(whole));
-        }
-        let number: f64 = value.parse().ok().filter(|number: &f64| number.is_finite())?;
-        let whole = number.fract() == 0.0 && number.abs() < EXACT;
-        Some(if whole { Self::Whole(number as i128) } else { Self::Other(number.to_bits()) })
+/// Two values that `read` makes the same, if there are such; `None` where it cannot read all of them.
+fn alike<'v, N: Ord>(
+    values: &[&'v String],
+    read: impl Fn(&str) -> Option<N>,
+) -> Option<Option<(&'v str, &'v str)>> {
+    let mut known = BTreeMap::new();
+    let mut found = None;
+    for value in values {
+        let other = known.insert(read(value)?, value.as_str());
+        found = found.or(other.map(|other| (other, value.as_str())));
     }
+    Some(found)
 }
 
 /// Makes the names in a folder survive a power cut.
@@ -223,12 +214,25 @@ mod tests {
 
     #[test]
     fn one_number_in_two_spellings_is_refused() {
-        for [a, b] in [["1", "01"], ["1", "1.0"], ["-2", "-2.00"], ["0.5", "5e-1"], ["1", "+1"]] {
+        for [a, b] in [
+            ["1", "01"],
+            ["1", "1.0"],
+            ["-2", "-2.00"],
+            ["0.5", "5e-1"],
+            ["0.0", "-0"],
+            ["1", "+1"],
+            ["10000000000000000", "1e16"],
+        ] {
             assert!(refused(&[a, b, "", "7"]).contains("same number"), "{a} {b}");
             // Beside a word, all are read as text.
             assert_eq!(refused(&[a, b, "rice"]), "", "{a} {b}");
         }
-        assert_eq!(refused(&["9007199254740993", "9007199254740992", "0.1", "0.2"]), "");
+        assert_eq!(refused(&["9007199254740993", "9007199254740992", ""]), "");
+        // Beside a fraction, all are read in double precision.
+        for other in ["0.1", "NaN", "inf"] {
+            let why = refused(&["9007199254740993", "9007199254740992", other]);
+            assert!(why.contains("same number"), "{other}: {why}");
+        }
         assert!(refused(&["Rice", "rice"]).contains("share a folder"));
     }
 

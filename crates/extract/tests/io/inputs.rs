@@ -363,14 +363,14 @@ proptest! {
 }
 
 #[test]
-fn times_of_events_are_refused_where_they_first_stand() {
+fn times_of_events_are_refused_on_the_line_that_has_them() {
     let dir = folder(&["a.wav"]);
     let refused = |name: &str, lines: &str| {
         let path = dir.path().join(name);
         fs::write(&path, lines).unwrap();
         inputs::collect(&[text(&path)]).err().map(|e| e.to_string()).unwrap_or_default()
     };
-    let json = "{\"path\": \"a.wav\"}\n\n{\"path\": \"a.wav\", \"onset\": 1, \"offset\": 2}\n";
+    let json = "{\"path\": \"a.wav\", \"onset\": 1}\n\n{\"path\": \"a.wav\", \"onset\": 1, \"offset\": 2}\n";
     for (name, lines, place) in [
         ("m.jsonl", json, "m.jsonl, line 3: columns"),
         ("m.csv", "path,onset,offset\na.wav,1,2\n", "m.csv, line 1: columns"),
