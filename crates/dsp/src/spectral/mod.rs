@@ -8,6 +8,7 @@
 mod bandwidth;
 mod centroid;
 mod contrast;
+mod extremes;
 mod flatness;
 mod poly;
 mod rolloff;
