@@ -88,8 +88,8 @@ class Bytes:
         self.pool = ThreadPoolExecutor(self.threads)
 
     def move(self, argument: Any, result: int) -> None:
-        """Reads an array once and writes as many bytes as its result has into a new one."""
-        # Of reading, only the speed counts: the largest word needs no more than that.
+        """Reads the argument once and writes `result` bytes of new memory."""
+        # Finding the largest word takes no longer than reading.
         words = np.frombuffer(argument, np.uint64)
         new = np.empty(result // 8, np.uint64)
         list(self.pool.map(np.max, np.array_split(words, self.threads)))
