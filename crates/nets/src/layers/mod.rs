@@ -1,6 +1,7 @@
 //! The layers, a file each.
 
 mod activation;
+mod attention;
 mod batch_norm;
 mod conv;
 pub(crate) mod dropout;
@@ -11,12 +12,13 @@ mod reshape;
 mod residual;
 
 pub use activation::{Relu, Sigmoid, Softmax, softmax};
+pub use attention::Attention;
 pub use batch_norm::BatchNorm;
 pub use conv::Conv2d;
 pub use dropout::Dropout;
 pub use linear::Linear;
 pub use pool::{AveragePool, MaxPool};
-pub use recurrent::Recurrent;
+pub use recurrent::{Bidirectional, Recurrent};
 pub use reshape::{Flatten, FlattenPixels, Join};
 pub use residual::Residual;
 

@@ -1,4 +1,4 @@
-//! What a published network is.
+//! What a network of the table is.
 
 use serde_json::{Map, Value, json};
 
@@ -9,14 +9,14 @@ use crate::network::{Architecture, Input, Network};
 use crate::parameters::Declared;
 use crate::recipe::Recipe;
 
-/// A published network.
+/// A network of the table.
 #[derive(Clone, Copy, Debug)]
 pub struct Definition {
     /// name on the command line; hyphen and underscore are equal
     pub name: &'static str,
     /// one sentence
     pub about: &'static str,
-    /// outputs of the published network
+    /// outputs of the published network; of our own, those for the level
     pub outputs: usize,
     /// whether the outputs are classes, and not one number
     pub classifies: bool,

@@ -1,4 +1,4 @@
-//! The networks of the paper, a file each, and the table that names them.
+//! The networks of the paper and our own, a file each, and the table that names them.
 //!
 //! Adding one: a file here with a [`Definition`], and one line in the list below.
 
@@ -12,7 +12,7 @@ macro_rules! networks {
     ($($module:ident: $($definition:ident),+;)*) => {
         $(mod $module;)*
 
-        /// All published networks.
+        /// All networks.
         pub const NETWORKS: &[Definition] = &[$($($module::$definition),+),*];
     };
 }
@@ -29,6 +29,7 @@ networks! {
     m6: M6_ACTION, M6_POURING, M6_SHAKING;
     vggish: VGGISH;
     resnet18: RESNET18_LEVEL, RESNET18_TYPE;
+    attention_gru: ATTENTION_GRU;
 }
 
 /// The definition of this name.

@@ -3,8 +3,8 @@
 use corsmal_nets::batch::{Batch, Shape};
 use corsmal_nets::layer::Chain;
 use corsmal_nets::layers::{
-    AveragePool, BatchNorm, Conv2d, Dropout, FlattenPixels, Linear, MaxPool, Recurrent, Relu,
-    Residual,
+    Attention, AveragePool, BatchNorm, Bidirectional, Conv2d, Dropout, FlattenPixels, Linear,
+    MaxPool, Recurrent, Relu, Residual,
 };
 use corsmal_nets::loss::{Loss, Targets};
 use corsmal_nets::network::{Architecture, Body, Input, Network};
@@ -143,9 +143,18 @@ fn pixels_are_flattened_in_their_order_and_back() {
 #[test]
 fn recurrent_networks_have_right_gradients_with_lengths() {
     let shape = Shape::Sequence { steps: 0, numbers: 3 };
-    for recurrent in [Recurrent::gru("r", 3, 5, 2), Recurrent::lstm("r", 3, 5, 2)] {
-        let mut network =
-            network(shape, vec![Box::new(recurrent), Box::new(Linear::new("out", 5, 2))]);
+    let chains: [Chain; 3] = [
+        vec![Box::new(Recurrent::gru("r", 3, 5, 2)), Box::new(Linear::new("out", 5, 2))],
+        vec![Box::new(Recurrent::lstm("r", 3, 5, 2)), Box::new(Linear::new("out", 5, 2))],
+        vec![
+            Box::new(Linear::new("in", 3, 4)),
+            Box::new(Bidirectional::gru("r", 4, 3)),
+            Box::new(Attention::new("a", 6)),
+            Box::new(Linear::new("out", 6, 2)),
+        ],
+    ];
+    for chain in chains {
+        let mut network = network(shape, chain);
         let steps = Shape::Sequence { steps: 6, numbers: 3 };
         let mut x = Batch::new(noise(2, 4 * 6 * 3), steps);
         x.lengths = Some(vec![2, 6, 1, 4]);
@@ -155,9 +164,48 @@ fn recurrent_networks_have_right_gradients_with_lengths() {
     }
 }
 
+/// Against the equations of PyTorch's `nn.GRU` in numpy's double precision; parameters and inputs are
+/// `((7 i + 3 k) mod 11 - 5) / 10` for the i-th number of the k-th array.
+#[test]
+fn both_directions_and_attention_follow_their_equations() {
+    let numbers = |k: usize, n: usize| -> Vec<f32> {
+        (0..n).map(|i| ((i * 7 + k * 3) % 11) as f32 / 10.0 - 0.5).collect()
+    };
+    let mut network = network(
+        Shape::Sequence { steps: 0, numbers: 2 },
+        vec![
+            Box::new(Bidirectional::gru("rnn", 2, 2)),
+            Box::new(Attention::new("attention", 4)),
+            Box::new(Linear::new("fc", 4, 2)),
+        ],
+    );
+    let declared =
+        network.parameters().iter().map(|(d, v)| (d.name.clone(), d.shape.clone(), v.len()));
+    let state: Vec<_> =
+        declared.enumerate().map(|(k, (name, shape, n))| (name, shape, numbers(k, n))).collect();
+    assert_eq!(state[5].0, "rnn.weight_hh_l0_reverse");
+    network.load_state(&state).unwrap();
+    let mut values = numbers(11, 6);
+    values.extend(numbers(16, 4));
+    values.extend([-10.0; 2]);
+    let mut x = Batch::new(values, Shape::Sequence { steps: 3, numbers: 2 });
+    x.lengths = Some(vec![3, 2]);
+    let found = network.forward(&[x]).unwrap().values.into_values();
+    let expected = [0.250_773_48, 0.079_708_73, 0.151_421_61, 0.212_745_93];
+    for (got, want) in found.iter().zip(expected) {
+        assert!((got - want).abs() < 1e-6, "{found:?}");
+    }
+}
+
 #[test]
 fn padding_does_not_count_where_lengths_are_known() {
-    let network = networks::named("m5-vggish-level").unwrap().build(None, 5).unwrap();
+    for name in ["m5-vggish-level", "attention-gru"] {
+        padding_does_not_count(name);
+    }
+}
+
+fn padding_does_not_count(name: &str) {
+    let network = networks::named(name).unwrap().build(None, 5).unwrap();
     let (short, long) = (noise(3, 4 * 128), noise(4, 9 * 128));
     let one = |values: &[f32]| {
         let shape = Shape::Sequence { steps: values.len() / 128, numbers: 128 };

@@ -5,6 +5,7 @@
 //! pass over the numbers. What comes after them is the output of the last step: those of other steps are not
 //! unpacked.
 
+mod bidirectional;
 mod cell;
 mod packing;
 mod trace;
@@ -23,6 +24,7 @@ use cell::{Cell, Gradients, States};
 use packing::Packing;
 use trace::LayerTrace;
 
+pub use bidirectional::Bidirectional;
 pub use trace::Trace;
 
 /// GRU or LSTM layers, each over the outputs of the one before; the last step of the last counts.
@@ -34,18 +36,24 @@ pub struct Recurrent {
     hidden: usize,
     layers: usize,
     dropout: f32,
+    /// whether it goes through the steps in reverse, and its names say so
+    reverse: bool,
 }
 
 impl Recurrent {
     /// `name.weight_ih_l0`, `name.weight_hh_l0`, `name.bias_ih_l0`, `name.bias_hh_l0`, …; gates
     /// reset, update, new.
     pub fn gru(name: impl Into<String>, inputs: usize, hidden: usize, layers: usize) -> Self {
-        Self { name: name.into(), cell: Cell::Gru, inputs, hidden, layers, dropout: 0.0 }
+        Self::new(name.into(), Cell::Gru, inputs, hidden, layers)
     }
 
     /// The same names; gates input, forget, cell, output.
     pub fn lstm(name: impl Into<String>, inputs: usize, hidden: usize, layers: usize) -> Self {
-        Self { name: name.into(), cell: Cell::Lstm, inputs, hidden, layers, dropout: 0.0 }
+        Self::new(name.into(), Cell::Lstm, inputs, hidden, layers)
+    }
+
+    fn new(name: String, cell: Cell, inputs: usize, hidden: usize, layers: usize) -> Self {
+        Self { name, cell, inputs, hidden, layers, dropout: 0.0, reverse: false }
     }
 
     /// Dropout between the layers.
@@ -55,7 +63,8 @@ impl Recurrent {
     }
 
     fn key(&self, what: &str, layer: usize) -> String {
-        format!("{}.{what}_l{layer}", self.name)
+        let reverse = if self.reverse { "_reverse" } else { "" };
+        format!("{}.{what}_l{layer}{reverse}", self.name)
     }
 
     fn forward_layer(

@@ -96,6 +96,23 @@ impl Packing {
         out
     }
 
+    /// Packed rows with every sequence in reverse.
+    pub(super) fn reversed(&self, rows: &Matrix) -> Matrix {
+        let n = rows.cols();
+        let mut lengths = vec![0; self.items()];
+        for step in 0..self.steps() {
+            lengths[..self.rows(step).len()].iter_mut().for_each(|length| *length += 1);
+        }
+        let mut out = Vec::with_capacity(rows.values().len());
+        for step in 0..self.steps() {
+            for (place, length) in lengths[..self.rows(step).len()].iter().enumerate() {
+                let from = self.starts[length - 1 - step] + place;
+                out.extend_from_slice(&rows.values()[from * n..(from + 1) * n]);
+            }
+        }
+        Matrix::new(rows.rows(), n, out)
+    }
+
     /// For each item the row of its last step.
     fn ends(&self, mut each: impl FnMut(usize, usize)) {
         for step in 0..self.steps() {
@@ -137,6 +154,10 @@ mod tests {
         assert_eq!(packing.last(packed.values(), 1).values(), [1.0, 7.0, 8.0]);
         let ends = packing.only_last(&[1.0, 2.0, 3.0], 1);
         assert_eq!(ends.values(), [0.0, 0.0, 3.0, 0.0, 1.0, 0.0, 2.0]);
+        // Items 1 (4 to 7), 0 (0, 1), 2 (8).
+        let reversed = packing.reversed(&packed);
+        assert_eq!(reversed.values(), [7.0, 1.0, 8.0, 6.0, 0.0, 5.0, 4.0]);
+        assert_eq!(packing.reversed(&reversed).values(), packed.values());
         let before = packing.states_before(packed.values(), 1).unwrap();
         assert_eq!(before.values(), [4.0, 0.0, 5.0, 6.0]);
         let short = Packing::new(2, 1, None);

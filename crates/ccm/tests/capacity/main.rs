@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod published;
+mod refused;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -10,11 +13,10 @@ use corsmal_ccm::capacity::{
     self, CapacityModel, CapacityOptions, Method, Problem, RegionNetwork, Row, Views,
 };
 use corsmal_ccm::dataset::{
-    Annotations, Container, DataSet, Filling, FillingLevel, FillingType, SequenceName, Subset,
+    Container, DataSet, Filling, FillingLevel, FillingType, SequenceName, Subset,
 };
 use corsmal_ccm::predictions::{Named, read_capacities};
-use corsmal_ccm::scores::{RuleSet, evaluate};
-use corsmal_ccm::submission::{RowKey, Submission, pseudo_random};
+use corsmal_ccm::submission::RowKey;
 use corsmal_ccm::synth::write_views;
 use corsmal_vision::cuboid::Outliers;
 use corsmal_vision::lode::{PRIOR_ML, Variant};
@@ -140,7 +142,7 @@ fn methods_measure_synthetic_views_and_faults_are_rows() {
     assert!(error.to_string().contains("capacity train --method m3"), "{error}");
     let error = capacity::run(&options(root, Method::M2), &|_, _| {}, &stop).unwrap_err();
     assert!(error.to_string().contains("needs its network"), "{error}");
-    impossible_models_are_refused(&root.join("model.json"));
+    refused::impossible_models_are_refused(&root.join("model.json"));
     let m2 = |scale, variant| {
         let network: Arc<dyn RegionNetwork> = Arc::new(Height(scale));
         run(&CapacityOptions { network: Some(network), variant, ..options(root, Method::M2) })
@@ -250,95 +252,6 @@ fn methods_measure_synthetic_views_and_faults_are_rows() {
     );
 }
 
-/// Numbers in a model's file from which no estimate, or any memory, would follow.
-fn impossible_models_are_refused(path: &Path) {
-    let text = std::fs::read_to_string(path).unwrap();
-    let sound: serde_json::Value = serde_json::from_str(&text).unwrap();
-    for (place, value, part) in [
-        ("/fusion/methods/cup/lode/deviation", serde_json::json!(0), "lode of category cup"),
-        ("/fusion/priors/box/0", serde_json::json!(1e6), "prior of category box"),
-        ("/m3/processes/cup/length", serde_json::json!(0.0), "not above 0"),
-        (
-            "/m3/means/glass",
-            serde_json::json!([1.0]),
-            "category glass: a process of 8 sizes and 1 means",
-        ),
-        ("/m3/processes", serde_json::json!({}), "no process"),
-    ] {
-        let mut changed = sound.clone();
-        *changed.pointer_mut(place).unwrap() = value;
-        let file = path.with_extension("changed");
-        std::fs::write(&file, changed.to_string()).unwrap();
-        let error = CapacityModel::read(&file).unwrap_err().to_string();
-        assert!(error.contains(part) && error.contains("model.changed"), "{place}: {error}");
-    }
-}
-
-/// A calibration of another resolution, depth in another unit and a mask of everything: reasons, no numbers.
-#[test]
-fn inputs_of_another_scale_are_rows_with_a_reason() {
-    let dir = tempfile::tempdir().unwrap();
-    let (base, name) = recording(dir.path(), Container::new(1).unwrap(), 0);
-    let put = |path: String, bytes: &[u8]| {
-        let path = base.join(path);
-        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-        std::fs::write(path, bytes).unwrap();
-    };
-    // From the front and from the right, 1 m from the origin.
-    let calibrate = |scale: f64| {
-        let turned = [[[1, 0, 0], [0, 0, -1], [0, 1, 0]], [[0, 1, 0], [0, 0, -1], [-1, 0, 0]]];
-        for (view, rotation) in turned.iter().enumerate() {
-            let (focal, x, y) = (920.0 * scale, 645.0 * scale, 358.0 * scale);
-            let camera = serde_json::json!({
-                "intrinsic": {"rgb": [[focal, 0, x], [0, focal, y], [0, 0, 1]]},
-                "extrinsic": {"rgb": {"rvec": rotation, "tvec": [0, 0, 1]}},
-            });
-            let path = format!("calib/{name}_c{}_calib.json", view + 1);
-            put(path, camera.to_string().as_bytes());
-        }
-    };
-    let of = |x: usize, y: usize| (600..700).contains(&x) && (300..400).contains(&y);
-    let depth = |unit: usize| {
-        let mm = |at: usize| if of(at % 1280, at / 1280) { 350 + at % 1280 } else { 0 };
-        let data = (0..1280 * 720).map(|at| (mm(at) * unit) as u16).collect();
-        let image = Depth { width: 1280, height: 720, data };
-        put(format!("depth/{name}/c1/0000.png"), &image.to_png().unwrap());
-    };
-    let seen = |label: &str, left: usize, right: usize| {
-        serde_json::json!({
-            "frame": 0, "view": 1, "label": label, "score": 0.9, "box": [left, 300, right, 400],
-            "mask": [[left, 300, right, 300, right, 400, left, 400]],
-        })
-    };
-    let table = serde_json::json!([seen("person", 500, 780), seen("cup", 600, 700)]);
-    put(format!("detections/{name}.json"), table.to_string().as_bytes());
-    let row = |method| {
-        let all = run(&CapacityOptions { outliers: Outliers::Kept, ..options(dir.path(), method) });
-        let reason = match &all[0].estimate {
-            Ok(estimate) => estimate.substitute.clone().unwrap_or_default(),
-            Err(Problem::Missing(reason) | Problem::Damaged(reason)) => reason.clone(),
-        };
-        (all[0].status(), reason)
-    };
-    calibrate(1.0);
-    depth(1);
-    assert_eq!(row(Method::M4), ("ok", String::new()));
-    depth(10);
-    let (status, reason) = row(Method::M4);
-    assert!(status == "none" && reason.contains("impossible for a container"), "{reason}");
-    depth(1);
-    calibrate(0.5);
-    let (status, reason) = row(Method::M4);
-    assert!(status == "failed" && reason.contains("about 645 by 358 px"), "{reason}");
-    calibrate(1.0);
-    let all = Mask { width: 1280, height: 720, data: vec![true; 1280 * 720] }.to_png().unwrap();
-    for view in [1, 2] {
-        put(format!("masks/{name}/c{view}/0000.png"), &all);
-    }
-    let (status, reason) = row(Method::M5);
-    assert!(status == "prior" && reason.contains("beyond the heights that are tried"), "{reason}");
-}
-
 #[test]
 fn the_ends_of_a_video_are_those_of_its_images_or_else_of_its_table() {
     let dir = tempfile::tempdir().unwrap();
@@ -376,58 +289,6 @@ fn the_ends_of_a_video_are_those_of_its_images_or_else_of_its_table() {
     images("rgb", 1, 0..30);
     images("rgb", 2, 0..30);
     assert_eq!(ends(), Some((0, 10)));
-}
-
-/// Capacities that the printed scores of two methods imply: inferred, not official.
-const IMPLIED: [(u8, f64); 3] = [(10, 641.0), (11, 469.0), (12, 1668.0)];
-
-#[test]
-fn public_capacity_files_score_as_printed() {
-    let Some(data) = shared() else { return };
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("annotation.csv");
-    let mut text = String::from(
-        "Container ID,Sequence,Scenario,Background,Illumination,Container Capacity [mL],Container mass \
-         [g],Filling type,Filling density [g/mL],Filling level,Filling mass [g]\n",
-    );
-    for (number, capacity) in IMPLIED {
-        for sequence in 0..Container::new(number).unwrap().recordings() {
-            text += &format!("{number},{sequence},s0,b0,l0,{capacity},10,0,0,0,0\n");
-        }
-    }
-    std::fs::write(&path, text).unwrap();
-    let annotations = Annotations::read(&path).unwrap();
-    for (file, printed) in [
-        ("other_predictions/m2_submission_public.csv", [66.02, 69.14, 65.08]),
-        ("m5_predictions/submission_public_test.csv", [60.71, 62.43, 57.71]),
-    ] {
-        let submission = Submission::read(&data.join(file)).unwrap();
-        let stand_in = pseudo_random(&submission.keys, 1);
-        let stand_in = Submission::from_predictions("random", submission.format, &stand_in);
-        for ((container, _), printed) in IMPLIED.into_iter().zip(printed) {
-            let only = [container];
-            let scores =
-                evaluate(&submission, &annotations, &stand_in, RuleSet::Paper, Some(&only))
-                    .unwrap();
-            let score = scores.get("T3").unwrap();
-            assert!((score - printed).abs() < 0.1, "{file}, {container}: {score} not {printed}");
-        }
-    }
-}
-
-#[test]
-fn stored_frames_combine_to_the_published_file() {
-    let Some(data) = shared() else { return };
-    let dir = tempfile::tempdir().unwrap();
-    let file = |name: &str| data.join(format!("m5_predictions/capacity_estimation_{name}.csv"));
-    let out = dir.path().join("combined.csv");
-    let frames = [file("1_public_test"), file("20_public_test")];
-    assert_eq!(capacity::combine_files(&frames, PRIOR_ML, &out).unwrap(), (228, 81));
-    let (own, published) =
-        (read_capacities(&out).unwrap(), read_capacities(&file("combination_public_test")));
-    for (key, value) in published.unwrap() {
-        assert!((own[&key].unwrap() - value.unwrap()).abs() < 1e-9, "{key}");
-    }
 }
 
 /// Ids begin at 0 in every part: a table tells them apart.
@@ -472,18 +333,4 @@ fn ids_of_several_parts_stay_apart() {
         let error = capacity::read(&out).unwrap_err().to_string();
         assert!(error.contains(said), "{error}");
     }
-}
-
-/// Folder `ccm` of the reference data; says so when it is not there.
-fn shared() -> Option<PathBuf> {
-    let root = std::env::var_os("CORSMAL_SHARED").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"),
-        PathBuf::from,
-    );
-    let path = root.join("data/ccm");
-    if !path.exists() {
-        eprintln!("skipped: {} is absent (set CORSMAL_SHARED)", path.display());
-        return None;
-    }
-    Some(path)
 }
