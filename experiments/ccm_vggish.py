@@ -41,6 +41,7 @@ class Recordings:
     patches: Matrix
     offsets: Labels
     container: Labels
+    sequence: list[str]
     #: start and end of the action in seconds, -1 for none
     action: Matrix
     targets: dict[str, Labels]
@@ -65,6 +66,7 @@ class Recordings:
             patches=v["X"].astype(np.float64),
             offsets=v["offsets"].astype(np.int64),
             container=a["container"].astype(np.int64),
+            sequence=a["sequence"].tolist(),
             action=np.array([action[name] for name in names]),
             targets={k: a[k].astype(np.int64) for k in ("type", "level", "joint")},
         )
