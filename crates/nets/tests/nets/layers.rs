@@ -253,8 +253,18 @@ fn train(threads: usize, seed: u64) -> (Vec<f64>, Vec<f32>) {
         let x = [Batch::new(noise(9, 7 * image.len()), image)];
         let targets = Targets::Classes(vec![0, 1, 2, 0, 1, 2, 0]);
         let mut trainer = Trainer::new(&mut network, settings(Some(seed)));
-        let losses = (0..3).map(|_| trainer.step(&x, &targets).unwrap().loss).collect();
-        (losses, network.forward(&x).unwrap().values.into_values())
+        let mut losses: Vec<f64> =
+            (0..3).map(|_| trainer.step(&x, &targets).unwrap().loss).collect();
+        let mut outputs = network.forward(&x).unwrap().values.into_values();
+        let mut network = networks::named("attention_gru").unwrap().build(Some(3), 4).unwrap();
+        let steps = Shape::Sequence { steps: 5, numbers: 128 };
+        let mut x = Batch::new(noise(8, 7 * steps.len()), steps);
+        x.lengths = Some(vec![5, 1, 3, 5, 2, 4, 1]);
+        let x = [x];
+        let mut trainer = Trainer::new(&mut network, settings(Some(seed)));
+        losses.extend((0..3).map(|_| trainer.step(&x, &targets).unwrap().loss));
+        outputs.extend(network.forward(&x).unwrap().values.values());
+        (losses, outputs)
     })
 }
 

@@ -9,10 +9,10 @@ use crate::common::{Recording, read_file, read_pipe};
 use boxes::{Fragment, Movie, boxed, esds, fragment, initial, words};
 
 /// `make_samples.py` wrote them: 9281 frames of two sines in AAC, 5000 of six channels in ALAC.
-pub const AAC: &[u8] = include_bytes!("samples/sines-2ch.aac");
-pub const M4A: &[u8] = include_bytes!("samples/sines-2ch.m4a");
-pub const FRAGMENTS: &[u8] = include_bytes!("samples/sines-2ch-fragments.mp4");
-pub const ALAC: &[u8] = include_bytes!("samples/steps-6ch.m4a");
+pub const AAC: &[u8] = include_bytes!("../samples/sines-2ch.aac");
+pub const M4A: &[u8] = include_bytes!("../samples/sines-2ch.m4a");
+pub const FRAGMENTS: &[u8] = include_bytes!("../samples/sines-2ch-fragments.mp4");
+pub const ALAC: &[u8] = include_bytes!("../samples/steps-6ch.m4a");
 
 /// Samples per channel of a packet; the encoder puts as many before the recording.
 const FRAME: usize = 1024;
