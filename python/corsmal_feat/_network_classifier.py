@@ -1,4 +1,4 @@
-"""A network of the paper as a scikit-learn classifier."""
+"""A network as a scikit-learn classifier."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _Column = tuple[npt.NDArray[np.float32], list[int]]
 
 
 class NetworkClassifier(ClassifierMixin, BaseEstimator):
-    """A network of the paper, trained with its published recipe.
+    """A network of the paper, or `attention_gru`, trained with its published or default recipe.
 
     `X` is an array [items, ...] in the layout of `nets.build(network).forward`, or a list with one
     array per item, which may differ in length: [steps, features] for recurrent networks, and a list
@@ -32,8 +32,7 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
     Parameters
     ----------
     network : one of `nets.names()`
-    recipe : keys of the recipe to change from the published values, such as {"epochs": 3, "batch":
-        8}
+    recipe : keys of the recipe to change, such as {"epochs": 3, "batch": 8}
     random_state : seed; None for that of the recipe
     checkpoint : file to which the training is saved after each epoch, and from which it continues
     progress : called with epochs done, total epochs, last loss, last score and seconds left

@@ -1,4 +1,4 @@
-"""The networks of the paper: built, loaded, run and trained by the Rust side.
+"""The networks of the paper and our own: built, loaded, run and trained by the Rust side.
 
 `build(name)` returns a network as published, with PyTorch's parameter names and layouts in
 `state_dict` and `load_state_dict`. `train` trains a network on recordings, and `load` reads a
@@ -48,7 +48,7 @@ __all__ = [
 
 @refuses
 def names() -> dict[str, str]:
-    """The published networks.
+    """The networks.
 
     Returns
     -------
@@ -65,7 +65,7 @@ def names() -> dict[str, str]:
 
 @refuses
 def build(name: str, *, outputs: int | None = None, seed: int = 0) -> Network:
-    """Builds a published network by name; a hyphen is the same as an underscore.
+    """Builds a network by name; a hyphen is the same as an underscore.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-//! How a network is trained: the published recipe of each, with its defects as switches.
+//! How a network is trained: the published recipe where there is one, with its defects as switches.
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};

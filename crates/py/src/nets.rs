@@ -24,7 +24,7 @@ use crate::teller::Teller;
 #[pyclass(name = "Network", module = "corsmal_feat._core")]
 pub(crate) struct PyNetwork(network::Network);
 
-/// Names and descriptions of the published networks.
+/// Names and descriptions of the networks.
 #[pyfunction]
 pub(crate) fn networks_published() -> Vec<(&'static str, &'static str)> {
     networks::NETWORKS.iter().map(|d| (d.name, d.about)).collect()
@@ -84,7 +84,7 @@ type Arrays<'py> = Vec<PyReadonlyArrayDyn<'py, f32>>;
 
 #[pymethods]
 impl PyNetwork {
-    /// The published network of this name; `outputs` replaces its number of classes.
+    /// The network of this name; `outputs` replaces its number of classes.
     #[staticmethod]
     #[pyo3(signature = (name, outputs, seed))]
     fn build(name: &str, outputs: Option<usize>, seed: u64) -> PyResult<Self> {

@@ -72,7 +72,7 @@ enum Command {
     Compare(compare::Args),
     /// Show the whole workflow on synthetic recordings.
     Demo(demo::Args),
-    /// List and explain the networks of the paper.
+    /// List and explain the networks.
     Nets(nets::Args),
     /// Fit principal components to training features, for `extract --project`.
     Pca(pca::Args),

@@ -1,4 +1,4 @@
-//! `corsmal-feat nets`: the networks of the paper, listed and explained.
+//! `corsmal-feat nets`: the networks, listed and explained.
 
 use std::io::Read;
 use std::path::Path;
