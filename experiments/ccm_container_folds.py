@@ -243,7 +243,10 @@ def main() -> None:
     recordings = Recordings.load(arguments.shared / "data" / "ccm")
     if arguments.check:
         recordings.shuffle_labels()
-    for name in arguments.only.split(","):
+    names = arguments.only.split(",")
+    if unknown := set(names) - {"m5", *PARTS}:
+        parser.error(f"--only knows m5, {', '.join(PARTS)}, not {', '.join(sorted(unknown))}")
+    for name in names:
         start = time.perf_counter()
         print(name, flush=True)
         if name == "m5":

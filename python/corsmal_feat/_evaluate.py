@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from . import _core
 from ._by_name import ByName
-from ._refusals import refuses
+from ._refusals import refuses, seed_of
 from .errors import ParameterError
 
 __all__ = ["Scores", "evaluate"]
@@ -85,8 +85,8 @@ def evaluate(
     (2, 100.0)
     """
     chosen = None if containers is None else [int(container) for container in containers]
-    if seed is not None and not 0 <= int(seed) < 2**64:
-        raise ParameterError(f"seed must be a whole number from 0 to 2**64 - 1, not {seed}")
+    if seed is not None:
+        seed = seed_of(seed)
     for container in chosen or ():
         if not 0 <= container <= 255:
             raise ParameterError(f"containers must be numbers from 0 to 255, not {container}")

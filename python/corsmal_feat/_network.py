@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import Singles, as_array
-from ._refusals import refuses
+from ._refusals import refuses, seed_of
 from .errors import ParameterError
 
 
@@ -157,12 +157,6 @@ def single(value: Any) -> Singles:
 
 def _lengths(lengths: Sequence[int] | None) -> list[int] | None:
     return None if lengths is None else [int(n) for n in lengths]
-
-
-def seed_of(seed: int) -> int:
-    if not 0 <= seed < 1 << 64:
-        raise ParameterError(f"seed must be a whole number from 0 to 2**64 - 1, not {seed}")
-    return int(seed)
 
 
 def plain(value: Any) -> Any:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import as_array
 from ._classifier import class_labels
-from ._refusals import existing, place
+from ._refusals import existing, place, seed_of
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
 from ._validation import labels_of
 from .errors import ParameterError
@@ -79,7 +79,7 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         held = {int(i) for i in watched or ()}
         changes = dict(self.recipe or {})
         if self.random_state is not None:
-            changes["seed"] = int(self.random_state)
+            changes["seed"] = seed_of(self.random_state)
         try:
             recipe = _core.network_recipe(self.network, json.dumps(changes))
         except TypeError as error:

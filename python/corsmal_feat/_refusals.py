@@ -8,6 +8,7 @@ import reprlib
 import types
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
+from numbers import Integral
 from pathlib import Path
 from typing import (
     Any,
@@ -274,3 +275,12 @@ def _words(hint: Any) -> str:
         else:
             words.append(f"a {getattr(found, '__name__', found)}")
     return " or ".join(dict.fromkeys(words))
+
+
+def seed_of(seed: int, limit: int = 1 << 64) -> int:
+    """The seed, a whole number from 0 to `limit` - 1, a power of two less one."""
+    whole = isinstance(seed, Integral)
+    if not whole or not 0 <= seed < limit:
+        power = limit.bit_length() - 1
+        raise ParameterError(f"seed must be a whole number from 0 to 2**{power} - 1, not {seed!r}")
+    return int(seed)

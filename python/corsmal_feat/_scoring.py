@@ -396,6 +396,6 @@ def _value(value: Any) -> str:
 
 
 def _whole(name: str, value: int, limit: int) -> int:
-    if not 0 <= int(value) < limit:
+    if not isinstance(value, int | np.integer) or not 0 <= value < limit:
         raise ParameterError(f"{name} must be a whole number from 0 to {limit - 1}, not {value}")
     return int(value)

@@ -1,6 +1,6 @@
 """The networks of the paper and our own: built, loaded, run and trained by the Rust side.
 
-`build(name)` returns a network as published, with PyTorch's parameter names and layouts in
+`build(name)` returns a network, with PyTorch's parameter names and layouts in
 `state_dict` and `load_state_dict`. `train` trains a network on recordings, and `load` reads a
 trained one: both return a `TrainedNetwork`, which classifies recordings. `embed` computes
 embeddings of recordings. docs/networks.md describes each network and where the published code
@@ -20,8 +20,8 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import Singles, as_array
 from ._features import StrPath
-from ._network import Network, TrainingSteps, plain, seed_of, single
-from ._refusals import refuses
+from ._network import Network, TrainingSteps, plain, single
+from ._refusals import refuses, seed_of
 from ._scoring import CrossValidation, validated
 from ._trained_network import TrainedNetwork, jobs_of, paths_of
 from ._warnings import warn
@@ -72,7 +72,7 @@ def build(name: str, *, outputs: int | None = None, seed: int = 0) -> Network:
     name : str
         One of `names()`.
     outputs : int, optional
-        Number of classes; by default, the published one.
+        Number of classes; by default, the published one (`attention_gru`: 3).
     seed : int
         Seed of the initial parameters.
 

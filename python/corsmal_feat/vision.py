@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import as_array
-from ._refusals import refuses
+from ._refusals import refuses, seed_of
 from ._views import (
     Calibration,
     Camera,
@@ -194,10 +194,8 @@ def cuboid(
     >>> box["points"], (box["high"] - box["low"]).round(2).tolist()
     (5005, [0.06, 0.03, 0.1])
     """
-    if not 0 <= int(seed) < 2**64:
-        raise ParameterError(f"seed must be a whole number from 0 to 2**64 - 1, not {seed}")
     low, high, share, capacity, points = _core.cuboid(
-        depth_pixels(depth), mask_pixels(mask), camera_numbers(calibration), outliers, int(seed)
+        depth_pixels(depth), mask_pixels(mask), camera_numbers(calibration), outliers, seed_of(seed)
     )
     return {
         "capacity": capacity,

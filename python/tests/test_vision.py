@@ -162,3 +162,13 @@ def test_m2_gives_the_published_capacities() -> None:
     assert isinstance(vision.m2_capacity(depth, weights), float)
     with pytest.raises(ParameterError, match="not the weights of M2's capacity network"):
         vision.m2_capacity(depth, data / "weights" / "m2_filling_type_cnn.npz")
+
+
+def test_seeds_are_whole_numbers() -> None:
+    depth, intrinsic = np.zeros((4, 4), np.uint16), [[900.0, 0, 2], [0, 900, 2], [0, 0, 1]]
+    camera = np.array(intrinsic)
+    projection = camera @ np.eye(3, 4)
+    calibration = vision.Calibration(vision.Camera(camera, np.eye(3), np.zeros(3), projection))
+    for seed in (1.5, "1", -1, 2**64):
+        with pytest.raises(ParameterError, match=r"seed must be a whole number from 0 to 2\*\*64"):
+            vision.cuboid(depth, depth > 0, calibration, seed=seed)  # type: ignore[arg-type]

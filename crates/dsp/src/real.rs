@@ -1,8 +1,11 @@
 //! The two sample types, `f32` and `f64`.
 
+use std::sync::Arc;
+
 use ndarray::{ArrayView, Dimension};
 use num_traits::{Float, FromPrimitive, NumAssign};
 use rayon::prelude::*;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::FftNum;
 
 use crate::error::{DspError, Result};
@@ -23,6 +26,10 @@ pub trait Real: Float + FromPrimitive + NumAssign + FftNum + std::iter::Sum + De
     fn as_f32(slice: &[Self]) -> Option<&[f32]>;
     /// As [`as_f32`](Self::as_f32), to write.
     fn as_f32_mut(slice: &mut [Self]) -> Option<&mut [f32]>;
+    /// Plan of a real transform of `n` points. Here, so that only this crate compiles transforms.
+    fn forward_transform(n: usize) -> Arc<dyn RealToComplex<Self>>;
+    /// Plan of its inverse, which is not normalised.
+    fn inverse_transform(n: usize) -> Arc<dyn ComplexToReal<Self>>;
 }
 
 impl Real for f32 {
@@ -41,6 +48,12 @@ impl Real for f32 {
     fn as_f32_mut(slice: &mut [Self]) -> Option<&mut [f32]> {
         Some(slice)
     }
+    fn forward_transform(n: usize) -> Arc<dyn RealToComplex<Self>> {
+        RealFftPlanner::new().plan_fft_forward(n)
+    }
+    fn inverse_transform(n: usize) -> Arc<dyn ComplexToReal<Self>> {
+        RealFftPlanner::new().plan_fft_inverse(n)
+    }
 }
 
 impl Real for f64 {
@@ -58,6 +71,12 @@ impl Real for f64 {
     }
     fn as_f32_mut(_: &mut [Self]) -> Option<&mut [f32]> {
         None
+    }
+    fn forward_transform(n: usize) -> Arc<dyn RealToComplex<Self>> {
+        RealFftPlanner::new().plan_fft_forward(n)
+    }
+    fn inverse_transform(n: usize) -> Arc<dyn ComplexToReal<Self>> {
+        RealFftPlanner::new().plan_fft_inverse(n)
     }
 }
 

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use num_complex::Complex;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use realfft::{ComplexToReal, RealToComplex};
 
 use crate::error::Result;
 use crate::real::Real;
@@ -46,7 +46,7 @@ impl<F: Real> Forward<F> {
             let window = padded_window(&params.window, params.win_length, params.n_fft)?;
             Some(window.into_iter().map(F::of).collect())
         };
-        let fft = RealFftPlanner::new().plan_fft_forward(params.n_fft);
+        let fft = F::forward_transform(params.n_fft);
         Ok(Self { params: params.clone(), window, fft })
     }
 
@@ -137,7 +137,7 @@ impl<F: Real> Inverse<F> {
         // The inverse transform is not normalised; its 1 / n_fft goes with the window.
         let scale = 1.0 / params.n_fft as f64;
         let window = window.into_iter().map(|w| F::of(w * scale)).collect();
-        let fft = RealFftPlanner::new().plan_fft_inverse(params.n_fft);
+        let fft = F::inverse_transform(params.n_fft);
         Ok(Self { params: params.clone(), window, squares, fft })
     }
 

@@ -30,6 +30,14 @@ pub fn average(models: &[ArrayView2<'_, f64>], weights: &[f64]) -> Result<Array2
         return length("classes to average", first.ncols(), other.ncols());
     }
     let total: f64 = weights.iter().sum();
+    if !total.is_finite() {
+        return Err(ModelError::ParameterValue {
+            owner: "average",
+            key: "weights".into(),
+            value: format!("a sum of {total}"),
+            allowed: "positive numbers with a finite sum".into(),
+        });
+    }
     let mut mean = Array2::zeros(first.dim());
     models.iter().zip(weights).for_each(|(m, w)| mean.scaled_add(w / total, m));
     Ok(mean)
@@ -172,6 +180,7 @@ mod tests {
         assert_eq!(mean, array![[0.75, 0.25], [0.375, 0.625]]);
         assert!(average(&[a.view(), b.view()], &[1.0]).is_err());
         assert!(average(&[a.view()], &[f64::NAN]).is_err());
+        assert!(average(&[a.view(), b.view()], &[1e308, 1e308]).is_err());
         assert!(average(&[], &[]).is_err());
     }
 

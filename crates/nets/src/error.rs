@@ -30,6 +30,20 @@ pub enum NetError {
         /// shape given
         actual: String,
     },
+    /// Lengths that do not fit the sequences.
+    #[error(
+        "{network}: lengths needs a number from 1 to {steps} for each of {items} items, not {actual}"
+    )]
+    Lengths {
+        /// the network
+        network: String,
+        /// steps of the sequences
+        steps: usize,
+        /// sequences
+        items: usize,
+        /// what is wrong with the lengths given
+        actual: String,
+    },
     /// Another number of inputs than the network takes.
     #[error("{network} takes {expected} inputs, {actual} were given")]
     InputCount {

@@ -1,7 +1,7 @@
 //! The networks of the benchmark: architectures, training, weights.
 //!
 //! Everything of burn stays in this crate. [`layer::Layer`] is what a network is made of,
-//! [`network::Network`] an architecture with its numbers, [`networks`] the published ones.
+//! [`network::Network`] an architecture with its numbers, [`networks`] their table.
 //!
 //! ```
 //! use corsmal_nets::networks;

@@ -171,7 +171,7 @@ impl Network {
     /// Refuses inputs of other shapes.
     ///
     /// # Errors
-    /// [`NetError::InputShape`], [`NetError::InputCount`].
+    /// [`NetError::InputShape`], [`NetError::InputCount`], [`NetError::Lengths`].
     pub fn check(&self, inputs: &[Batch]) -> Result<()> {
         let expected = self.inputs();
         if inputs.len() != expected.len() {
@@ -186,10 +186,7 @@ impl Network {
                 }
                 (given, wanted) => given == wanted,
             };
-            let lengths = given.lengths.as_ref().is_none_or(|l| {
-                l.len() == given.items() && l.iter().all(|&n| n > 0 && n <= given.shape.places())
-            });
-            if !same || !lengths || given.items() != items || items == 0 {
+            if !same || given.items() != items || items == 0 {
                 return Err(NetError::InputShape {
                     network: self.name.clone(),
                     input: input.name.clone(),
@@ -197,8 +194,20 @@ impl Network {
                     actual: format!("{} x {}", given.items(), given.shape),
                 });
             }
+            self.check_lengths(given)?;
         }
         Ok(())
+    }
+
+    fn check_lengths(&self, given: &Batch) -> Result<()> {
+        let (Some(lengths), steps) = (&given.lengths, given.shape.places()) else { return Ok(()) };
+        let wrong = lengths.iter().position(|&n| n == 0 || n > steps);
+        let actual = match wrong {
+            Some(item) => format!("{} for item {item}", lengths[item]),
+            None if lengths.len() != given.items() => format!("a list of {}", lengths.len()),
+            None => return Ok(()),
+        };
+        Err(NetError::Lengths { network: self.name.clone(), steps, items: given.items(), actual })
     }
 
     /// Arrays in PyTorch's layouts as this network's inputs: `[items, channels, height, width]`,

@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 use crate::error::{NetError, Result};
 use crate::optimiser::OptimiserSpec;
 
-/// Settings of a training. Values are those of the published code unless changed.
+/// Settings of a training. Values are those of the published code, where there is one, unless changed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {

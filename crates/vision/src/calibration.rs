@@ -20,6 +20,9 @@ const TURNED: f64 = 1e-3;
 /// How far a row of 'projMatrix' may be from that of the other parts, as a share of its length: 1 or 2 px. Real
 /// files: 0.
 const PROJECTED: f64 = 1e-3;
+/// Smallest ratio of the two focal lengths, and largest skew as a share of them; real cameras: 0.99 and 0.
+const SQUARE: f64 = 0.8;
+const SKEW: f64 = 0.05;
 /// Least share of an image's size that twice the principal point is, or the other way around; real cameras:
 /// 0.98.
 const OFF_CENTRE: f64 = 0.8;
@@ -73,6 +76,12 @@ impl Camera {
             return Err(format!(
                 "'intrinsic' is not a camera matrix: expected focal lengths and a principal point of at \
                  most {MAX_PX} px over a row 0, 0, 1"
+            ));
+        }
+        if fx.min(fy) < SQUARE * fx.max(fy) || skew.abs() > SKEW * fx {
+            return Err(format!(
+                "'intrinsic' has focal lengths of {fx} and {fy} px and a skew of {skew} px: expected nearly equal ones, \
+                 and nearly no skew"
             ));
         }
         let r = &self.rotation;
@@ -367,6 +376,8 @@ mod tests {
                 "camera 'rgb': 'intrinsic' is not a camera",
             ),
             (&CAMERA.replace("[0,0,1]", "[0,0,0]"), "'intrinsic' is not a camera"),
+            (&CAMERA.replace("900,0,640", "2700,0,640"), "focal lengths of 2700 and 900 px"),
+            (&CAMERA.replace("900,0,640", "900,300,640"), "a skew of 300 px"),
             (&CAMERA.replace("[2]", "[1e39]"), "'tvec' puts the camera more than 100 m away"),
             (
                 &CAMERA.replace("[0,0,0]", "[[1e-39,0,0],[0,1,0],[0,0,1]]"),

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use corsmal_models::predictions::PredictionTable;
-use corsmal_models::scores::{ClassReport, Interval};
+use corsmal_models::scores::{ClassReport, Interval, no_estimate};
 use corsmal_report::Fact;
 use corsmal_report::study::{
     CalibrationBin, ClassCurve, ClassScore, Estimate, Estimates, Prediction, Score, Study,
@@ -56,14 +56,13 @@ pub fn write_estimates(
     measures: Vec<(String, String)>,
 ) -> Result<(), Failure> {
     let number = |text: &str| text.parse::<f64>().ok();
-    let rows = predictions.rows.iter().zip(predictions.truth(target)?).map(|(row, truth)| {
+    let truth = predictions.truth(target)?;
+    let truth: Vec<f64> = truth.iter().map(|text| number(text).unwrap_or(f64::NAN)).collect();
+    let none = no_estimate(&truth);
+    let rows = predictions.rows.iter().zip(&truth).map(|(row, &truth)| {
         let text = row.class.map(|class| predictions.labels[class].as_str());
-        Estimate {
-            id: row.key.0.clone(),
-            truth: number(truth).unwrap_or(f64::NAN),
-            // The benchmark's -1 stands for no estimate.
-            estimate: text.and_then(number).filter(|value| *value > -1.0),
-        }
+        let estimate = text.and_then(number).filter(|value| Some(*value) != none);
+        Estimate { id: row.key.0.clone(), truth, estimate }
     });
     let mut estimates = Estimates {
         title: format!("Scores of {}", file_name(&predictions.path)),

@@ -174,6 +174,9 @@ fn benchmark_runs_what_learned(dir: &Path, m2: &Path) {
     }
     let page = std::fs::read_to_string(report.join("report.html")).unwrap();
     assert!(page.contains("The model of Fused was trained on C1, C2"), "no caution");
+    // What only adds a capacity is not the best at level or type.
+    let glance = std::fs::read_to_string(report.join("tables/glance.csv")).unwrap();
+    assert!(glance.contains("kNN") && !glance.contains("capacity"), "{glance}");
     let wrong = of("m2", &fused);
     let refusal =
         refused(&["benchmark", "-q", "--data", data, "--out", "no-report", "--capacity", &wrong]);

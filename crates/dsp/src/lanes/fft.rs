@@ -80,6 +80,11 @@ impl<R: Lanes> LaneFft<R> {
 
     /// `|X|^2` of the windowed `frames` (`n_fft` rows, overwritten) into `power` (`n_bins` rows).
     pub fn power(&self, frames: &mut [R], power: &mut [R]) {
+        R::power(self, frames, power);
+    }
+
+    /// What [`Lanes::power`] compiles.
+    pub(super) fn power_here(&self, frames: &mut [R], power: &mut [R]) {
         self.first_pass(InPlace, frames);
         self.power_of_passed(frames, power);
     }
@@ -100,6 +105,11 @@ impl<R: Lanes> LaneFft<R> {
     /// The complex spectrum of the windowed `frames` (`n_fft` rows, overwritten): real parts into
     /// the even and imaginary parts into the odd rows of `spectrum` (`2 n_bins` rows).
     pub fn complex(&self, frames: &mut [R], spectrum: &mut [R]) {
+        R::complex(self, frames, spectrum);
+    }
+
+    /// What [`Lanes::complex`] compiles.
+    pub(super) fn complex_here(&self, frames: &mut [R], spectrum: &mut [R]) {
         self.first_pass(InPlace, frames);
         assert_eq!(spectrum.len(), 2 * self.n_bins());
         let out = Complex(spectrum.as_chunks_mut::<2>().0);

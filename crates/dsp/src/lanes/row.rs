@@ -2,6 +2,7 @@
 
 use pulp::Simd;
 
+use super::LaneFft;
 use super::gather::{channel, turned};
 use crate::real::Real;
 
@@ -42,6 +43,10 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     /// Writes `window[n] * signal[slot * hop + n]` into `rows[n]` for every slot: successive frames
     /// of one channel.
     fn gather<T: Real>(signal: &[T], hop: usize, window: &[Self::Value], rows: &mut [Self]);
+    /// [`LaneFft::power`]. Here, so that only this crate compiles it.
+    fn power(plan: &LaneFft<Self>, frames: &mut [Self], power: &mut [Self]);
+    /// [`LaneFft::complex`], likewise.
+    fn complex(plan: &LaneFft<Self>, frames: &mut [Self], spectrum: &mut [Self]);
     /// Registers in a row.
     fn registers<S: Simd>() -> usize;
     /// Register `v` of the row.
@@ -93,6 +98,12 @@ macro_rules! lanes {
             }
             fn gather<T: Real>(signal: &[T], hop: usize, window: &[$value], rows: &mut [Self]) {
                 $gather(signal, hop, window, rows);
+            }
+            fn power(plan: &LaneFft<Self>, frames: &mut [Self], power: &mut [Self]) {
+                plan.power_here(frames, power);
+            }
+            fn complex(plan: &LaneFft<Self>, frames: &mut [Self], spectrum: &mut [Self]) {
+                plan.complex_here(frames, spectrum);
             }
             #[inline(always)]
             fn registers<S: Simd>() -> usize {

@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use num_complex::Complex;
 use num_traits::Float;
-use realfft::{RealFftPlanner, RealToComplex};
+use realfft::RealToComplex;
 
 use super::{Aligned, LaneFft, Lanes, Row, Slots, gather};
 use crate::error::{DspError, Result};
+use crate::real::Real;
 
 /// A real transform of rows: the lane kernel for powers of two, one slot after another (realfft) for every other length.
 pub struct Spectrum<R: Lanes = Row> {
@@ -32,7 +33,7 @@ impl<R: Lanes> Spectrum<R> {
         let kind = if LaneFft::<R>::supports(n_fft) {
             Kind::Lanes(LaneFft::new(n_fft)?)
         } else {
-            Kind::Slots(RealFftPlanner::new().plan_fft_forward(n_fft))
+            Kind::Slots(R::Value::forward_transform(n_fft))
         };
         Ok(Self { n_fft, kind })
     }

@@ -14,7 +14,7 @@ pub(crate) use confusion::Tally;
 pub use confusion::{ClassScores, ConfusionMatrix};
 pub use curves::ClassCurves;
 pub use interval::Interval;
-pub use numeric::NumericScores;
+pub use numeric::{NumericScores, no_estimate};
 pub use reliability::{Reliability, ReliabilityBin};
 pub use report::{ClassReport, ScoreIntervals, ScoreReport, Scoring};
 

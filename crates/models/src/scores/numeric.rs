@@ -27,6 +27,12 @@ pub struct NumericScores {
     pub score_interval: Interval,
 }
 
+/// What stands for no estimate among `truth`: the benchmark's -1, unless a true number is negative, where -1 is a
+/// number like any other.
+pub fn no_estimate(truth: &[f64]) -> Option<f64> {
+    truth.iter().all(|t| *t >= 0.0).then_some(-1.0)
+}
+
 impl NumericScores {
     /// Scores of `estimates` against `truth`, with intervals over rows or whole groups.
     ///
@@ -73,9 +79,33 @@ impl NumericScores {
             mean_absolute_error: mean(&|(t, e)| (e - t).abs()),
             root_mean_squared_error: squared.sqrt(),
             mean_relative_error: relative.iter().sum::<f64>() / relative.len().max(1) as f64,
-            r2: if spread > 0.0 { 1.0 - squared / spread } else { 0.0 },
+            r2: match spread > 0.0 {
+                true => 1.0 - squared / spread,
+                false => f64::from(squared == 0.0),
+            },
             score: score(&all)[0],
             score_interval,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn minus_one_is_no_estimate_only_among_numbers_that_are_not_negative() {
+        assert_eq!(no_estimate(&[0.0, 3.0]), Some(-1.0));
+        assert_eq!(no_estimate(&[-20.5, 3.0]), None);
+    }
+
+    /// As scikit-learn's `r2_score`.
+    #[test]
+    fn a_constant_truth_is_determined_by_right_estimates_alone() {
+        let r2 = |estimates: [f64; 2]| {
+            let estimates = estimates.map(Some);
+            NumericScores::new::<&str>(&[1.5, 1.5], &estimates, None, (0, 0)).unwrap().r2
+        };
+        assert_eq!((r2([1.5, 1.5]), r2([1.5, 2.0])), (1.0, 0.0));
     }
 }

@@ -10,7 +10,7 @@ use super::curves::ClassCurves;
 use super::doubts;
 use super::interval::{Interval, intervals, units};
 use super::reliability::Reliability;
-use super::{NumericScores, Scores, Tally};
+use super::{NumericScores, Scores, Tally, no_estimate};
 use crate::error::ModelError;
 use crate::labels::{Labels, is_missing, missing, positions};
 use crate::predictions::{PredictionError, PredictionTable};
@@ -168,11 +168,11 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
             .enumerate()
             .map(|(row, text)| number(text, row))
             .collect::<Result<_, _>>()?;
+        let none = no_estimate(&truths);
         let estimate = |(at, row): (usize, &crate::predictions::PredictionRow<K>)| {
-            // The benchmark's -1 stands for no estimate.
             let text = row.class.map(|class| self.labels[class].as_str());
             let value = text.map(|text| number(text, at)).transpose()?;
-            Ok(value.filter(|value| *value > -1.0))
+            Ok(value.filter(|value| Some(*value) != none))
         };
         let estimates: Vec<Option<f64>> =
             self.rows.iter().enumerate().map(estimate).collect::<Result<_, PredictionError>>()?;

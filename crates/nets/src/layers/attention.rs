@@ -39,8 +39,8 @@ impl Layer for Attention {
     }
 
     fn kept(&self, input: Shape) -> usize {
-        // The weights and the gradient by the steps.
-        input.places() * (1 + self.inputs) + 2 * self.inputs
+        // The steps, which it changes into the gradient by them, and two numbers for each.
+        input.len() + 2 * input.places() + 2 * self.inputs
     }
 
     fn output(&self, input: Shape) -> Result<Shape> {

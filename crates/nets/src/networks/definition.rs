@@ -27,7 +27,7 @@ pub struct Definition {
     /// how its input comes from a recording; `None` where it takes what other networks give, or
     /// more than sound
     pub front_end: Option<FrontEnd>,
-    /// training as the published code has it, its defects corrected
+    /// training as the published code has it, its defects corrected; of our own, what inner scores chose
     pub recipe: Recipe,
     /// what the paper says where it differs from the code
     pub paper: &'static [(&'static str, f64)],
@@ -66,7 +66,7 @@ impl Definition {
         from.with(&changes)
     }
 
-    /// With initial numbers of this seed and as many outputs as asked for, or as published.
+    /// With initial numbers of this seed and as many outputs as asked for, or its own number.
     ///
     /// # Errors
     /// No outputs, or more than [`MAX_OUTPUTS`].

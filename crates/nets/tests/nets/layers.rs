@@ -294,6 +294,20 @@ fn inputs_and_targets_that_do_not_fit_are_refused() {
     assert!(error.contains("[items, 4, steps, numbers]") && error.contains("[1, 3, 2, 512]"));
     let error = text(&vec![(vec![1, 2, 511], vec![0.0; 1022]); 4]);
     assert!(error.contains("c1") && error.contains("[items, steps, 512]"), "{error}");
+    let own = networks::named("attention_gru").unwrap().build(None, 0).unwrap();
+    let lengths = |lengths: &[usize]| {
+        let mut x = own.batches(&[(vec![2, 3, 128], vec![0.0; 768])]).unwrap();
+        x[0].lengths = Some(lengths.to_vec());
+        own.forward(&x).map(|_| ()).map_err(|e| e.to_string())
+    };
+    assert_eq!(lengths(&[3, 1]), Ok(()));
+    for (wrong, said) in [
+        (&[3, 0][..], "from 1 to 3 for each of 2 items, not 0 for item 1"),
+        (&[4, 3], "not 4 for item 0"),
+        (&[3], "not a list of 1"),
+    ] {
+        assert!(lengths(wrong).unwrap_err().ends_with(said), "{wrong:?}");
+    }
     let x = network.batches(&[(vec![1, 4, 2, 512], vec![0.5; 4096])]).unwrap();
     let run = |targets| network.gradients(&x, &targets, &Loss::CrossEntropy, &[], None);
     let error = run(Targets::Classes(vec![4])).unwrap_err().to_string();

@@ -6,7 +6,7 @@ mod boxes;
 use corsmal_audio::Repair;
 
 use crate::common::{Recording, read_file, read_pipe};
-use boxes::{Fragment, Movie, boxed, esds, fragment, initial, words};
+use boxes::{Fragment, Movie, boxed, esds, fragment, initial};
 
 /// `make_samples.py` wrote them: 9281 frames of two sines in AAC, 5000 of six channels in ALAC.
 pub const AAC: &[u8] = include_bytes!("../samples/sines-2ch.aac");

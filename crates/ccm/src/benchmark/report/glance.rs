@@ -19,7 +19,7 @@ pub(super) fn section(
     let mut lines = Vec::new();
     let corrected: Vec<(&Method, PartScores)> = methods
         .iter()
-        .filter(|m| m.protocol == "corrected")
+        .filter(|m| m.protocol == "corrected" && !m.completes())
         .filter_map(|m| Some((m, m.scores(rows, Part::Training, seed, &|_| true)?)))
         .collect();
     for task in [Task::Level, Task::Type] {

@@ -192,6 +192,12 @@ impl Predictor<'_> {
                 }
             }
         }
+        if self.vote.is_none() && !self.stopped() && windows.is_truncated() {
+            warn(&format!(
+                "{}: truncated: it ends before its header says, so windows are missing at its end",
+                input.id
+            ));
+        }
         let Some(rule) = self.vote.filter(|_| !self.stopped()) else { return Ok(()) };
         let found = match (rule.decide(&votes)?, trouble) {
             (None, Some(error)) => failed(None, error),

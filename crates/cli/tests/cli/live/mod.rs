@@ -292,6 +292,23 @@ fn lengths_unlike_those_of_the_training_are_said() {
     assert!(inspected.contains("Hz, 1 channel, 1 s"), "{inspected}");
 }
 
+/// The missing end of a cut file is said where each window has a line of its own, too.
+#[test]
+fn a_cut_recording_is_said() {
+    let trained = Trained::new(&["--classifier", "knn", "--set", "k=1"]);
+    let (model, wav) = (trained.path("m"), trained.path("cut.wav"));
+    recording(&wav, &[0, 1, 2, 4, 6]);
+    let bytes = std::fs::read(&wav).unwrap();
+    std::fs::write(&wav, &bytes[..44 + 5 * RATE]).unwrap();
+    let windows = ["--window", "1", "--hop", "1"];
+    let output =
+        run(&[&["classify", "-m", text(&model), "--in", text(&wav)], &windows[..]].concat());
+    let table = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(table.lines().count(), 3, "{table}");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(message.contains("cut: truncated: it ends before its header says"), "{message}");
+}
+
 #[test]
 fn what_is_no_window_is_refused() {
     let trained = Trained::new(&["--classifier", "knn"]);

@@ -40,8 +40,8 @@ impl Layer for Bidirectional {
     }
 
     fn kept(&self, input: Shape) -> usize {
-        // The states of both directions, and the gradient by all steps.
-        2 * self.ahead.kept(input) + 2 * input.places() * self.ahead.hidden
+        // States and input of each direction; outputs, their gradients and those of one direction apart.
+        2 * (self.ahead.kept(input) + input.len()) + 8 * input.places() * self.ahead.hidden
     }
 
     fn passing(&self, input: Shape) -> usize {

@@ -2,8 +2,8 @@
 //!
 //! Sequences are packed: step after step, longest sequence first, so that no work is done on
 //! padding. All products by the input are one product for each layer; the gates of a step are one
-//! pass over the numbers. What comes after them is the output of the last step: those of other steps are not
-//! unpacked.
+//! pass over the numbers. After [`Recurrent`] comes the output of the last step, those of other
+//! steps are not unpacked; after [`Bidirectional`] those of all steps.
 
 mod bidirectional;
 mod cell;
