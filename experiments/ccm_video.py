@@ -4,10 +4,11 @@
 
 FOLDER holds the trainings of `m5_r21d_level` by the example `container_folds` (docs/results.md).
 
-Protocol, written down before any score of this average was seen (fusion's were known, and those of the R(2+1)D network of one fold):
+Protocol, written down before any score of this average was seen (fusion's were known, and those of
+the R(2+1)D networks of one fold):
 
-* The networks of the last epoch are used; no score chose them, unlike those of the best epoch on the
-  held-out containers. They predict as M5 does, in batches of 64 that are padded.
+* The networks of the last epoch are used; no score chose them, unlike those of the best epoch on
+  the held-out containers. They predict as M5 does, in batches of 64 that are padded.
 * Three probabilities with equal weights, as in M5's own fusion: `fusion` and the networks on VGGish
   sequences (both in ccm_container_folds.py), and the mean of the R(2+1)D networks over their seeds.
 """
