@@ -214,6 +214,9 @@ def upright_box(
 ) -> UprightBox:
     """Smallest upright box around an object's points, from the depth of several views.
 
+    Masks lose a pixel at their border, and 1 % of the points may lie beyond each face. A side that
+    no camera sees has no points, so the box ends before it.
+
     Parameters
     ----------
     depths, masks, calibrations : sequences
