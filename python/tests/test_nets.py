@@ -46,7 +46,7 @@ def test_m2_sees_that_the_container_of_the_real_recording_is_empty() -> None:
 
 
 def test_names_say_what_there_is() -> None:
-    assert len(nets.names()) == 16
+    assert len(nets.names()) == 17
     assert nets.build("M4_Type").num_parameters == 4_472_580
     assert nets.build("m3-mlp", outputs=4).forward(np.zeros((2, 6193))).shape == (2, 4)
     assert "m6_action" in repr(nets.build("m6_action"))

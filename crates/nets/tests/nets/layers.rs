@@ -191,7 +191,7 @@ fn both_directions_and_attention_follow_their_equations() {
     let mut x = Batch::new(values, Shape::Sequence { steps: 3, numbers: 2 });
     x.lengths = Some(vec![3, 2]);
     let found = network.forward(&[x]).unwrap().values.into_values();
-    let expected = [0.250_773_48, 0.079_708_73, 0.151_421_61, 0.212_745_93];
+    let expected = [0.250_773_5, 0.079_708_73, 0.151_421_6, 0.212_745_93];
     for (got, want) in found.iter().zip(expected) {
         assert!((got - want).abs() < 1e-6, "{found:?}");
     }
