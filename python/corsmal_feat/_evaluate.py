@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from . import _core
+from ._arrays import size
 from ._by_name import ByName
 from ._refusals import refuses, seed_of
 from .errors import ParameterError
@@ -84,7 +85,7 @@ def evaluate(
     >>> scores.recordings, scores["T1"]
     (2, 100.0)
     """
-    chosen = None if containers is None else [int(container) for container in containers]
+    chosen = None if containers is None else [size("containers", c, 0) for c in containers]
     if seed is not None:
         seed = seed_of(seed)
     for container in chosen or ():

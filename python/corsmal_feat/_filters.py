@@ -110,7 +110,8 @@ def get_window(window: Window, Nx: int, *, fftbins: bool = True) -> npt.NDArray[
     """
     if not 0 <= Nx <= _LONGEST:
         raise ParameterError(f"Nx must be 0 to {_LONGEST}, not {Nx}")
-    return _core.get_window(window_spec(window, int(Nx)), int(Nx), bool(fftbins))
+    length = size("Nx", Nx, 0)
+    return _core.get_window(window_spec(window, length), length, bool(fftbins))
 
 
 def mel_params(

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import Singles, as_array
+from ._arrays import Singles, as_array, size
 from ._refusals import refuses, seed_of
 from .errors import ParameterError
 
@@ -156,7 +156,7 @@ def single(value: Any) -> Singles:
 
 
 def _lengths(lengths: Sequence[int] | None) -> list[int] | None:
-    return None if lengths is None else [int(n) for n in lengths]
+    return None if lengths is None else [size("lengths", n, 0) for n in lengths]
 
 
 def plain(value: Any) -> Any:

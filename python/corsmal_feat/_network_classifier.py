@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import as_array
+from ._arrays import as_array, size
 from ._classifier import class_labels
 from ._refusals import existing, place, seed_of
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
@@ -76,7 +76,7 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         columns = self._columns(X)
         count = len(columns[0][1]) - 1
         classes, positions = labels_of(y, count, type(self).__name__)
-        held = {int(i) for i in watched or ()}
+        held = {size("watched", i, 0) for i in watched or ()}
         changes = dict(self.recipe or {})
         if self.random_state is not None:
             changes["seed"] = seed_of(self.random_state)

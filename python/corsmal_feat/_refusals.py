@@ -277,10 +277,8 @@ def _words(hint: Any) -> str:
     return " or ".join(dict.fromkeys(words))
 
 
-def seed_of(seed: int, limit: int = 1 << 64) -> int:
-    """The seed, a whole number from 0 to `limit` - 1, a power of two less one."""
-    whole = isinstance(seed, Integral)
-    if not whole or not 0 <= seed < limit:
-        power = limit.bit_length() - 1
-        raise ParameterError(f"seed must be a whole number from 0 to 2**{power} - 1, not {seed!r}")
+def seed_of(seed: int) -> int:
+    """A seed from the caller: a whole number from 0 to 2**64 - 1."""
+    if not isinstance(seed, Integral) or not 0 <= seed < 1 << 64:
+        raise ParameterError(f"seed must be a whole number from 0 to 2**64 - 1, not {seed!r}")
     return int(seed)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ._arrays import Floats, audio, number
+from ._arrays import Floats, audio, number, size
 from ._refusals import refuses
 from ._warnings import warn
 from .errors import ParameterError
@@ -72,7 +72,7 @@ def yin(
     sr, fmin, fmax = number("sr", sr), number("fmin", fmin), number("fmax", fmax)
     _check(sr, fmin, fmax, frame_length)
     signal = audio(y)
-    hop = frame_length // 4 if hop_length is None else int(hop_length)
+    hop = frame_length // 4 if hop_length is None else size("hop_length", hop_length, 0)
     if pad_mode not in _PADDINGS:
         raise ParameterError(f"pad_mode must be one of {_PADDINGS}, not {pad_mode!r}")
     if center:

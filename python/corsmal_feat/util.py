@@ -74,12 +74,12 @@ def frame(
     if hop_length < 1:
         raise ParameterError(f"hop_length must be at least 1, not {hop_length}")
     windows = np.lib.stride_tricks.sliding_window_view(
-        array, int(frame_length), axis, subok=subok, writeable=writeable
+        array, whole("frame_length", frame_length), axis, subok=subok, writeable=writeable
     )
     # The elements of a frame come before the frames, or after them for an axis from the front.
     windows = np.moveaxis(windows, -1, axis - 1 if axis < 0 else axis + 1)
     steps = [slice(None)] * windows.ndim
-    steps[axis] = slice(0, None, int(hop_length))
+    steps[axis] = slice(0, None, whole("hop_length", hop_length))
     return windows[tuple(steps)]
 
 
