@@ -32,7 +32,7 @@ pub enum NetError {
     },
     /// Lengths that do not fit the sequences.
     #[error(
-        "{network}: lengths needs a number from 1 to {steps} for each of {items} items, not {actual}"
+        "{network}: `lengths` must give a number from 1 to {steps} for each of {items} items, not {actual}"
     )]
     Lengths {
         /// the network

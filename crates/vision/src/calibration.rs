@@ -80,8 +80,8 @@ impl Camera {
         }
         if fx.min(fy) < SQUARE * fx.max(fy) || skew.abs() > SKEW * fx {
             return Err(format!(
-                "'intrinsic' has focal lengths of {fx} and {fy} px and a skew of {skew} px: expected nearly equal ones, \
-                 and nearly no skew"
+                "'intrinsic' has focal lengths of {fx} and {fy} px and a skew of {skew} px: expected nearly equal focal \
+                 lengths and almost no skew"
             ));
         }
         let r = &self.rotation;

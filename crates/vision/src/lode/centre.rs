@@ -66,8 +66,8 @@ pub(super) fn centre(views: [View<'_>; 2], variant: Variant) -> Result<Centre> {
             ),
             None => match exchanged(cameras, middles, residual) {
                 Some(other) => format!(
-                    "the masks fit the cameras of each other's view, to {other:.1} px, better than their own, to \
-                     {residual:.1} px: the views seem to be exchanged"
+                    "each mask fits the camera of the other view (to {other:.1} px) better than its own (to \
+                     {residual:.1} px): the views seem to be exchanged"
                 ),
                 None => return Ok(Centre { point, residual }),
             },

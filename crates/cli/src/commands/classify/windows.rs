@@ -194,7 +194,7 @@ impl Predictor<'_> {
         }
         if self.vote.is_none() && !self.stopped() && windows.is_truncated() {
             warn(&format!(
-                "{}: truncated: it ends before its header says, so windows are missing at its end",
+                "{}: truncated: it ends before its header says; windows beyond its end are missing",
                 input.id
             ));
         }
