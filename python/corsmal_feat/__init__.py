@@ -17,6 +17,7 @@ from . import (
     vision,
 )
 from ._audio import get_duration, get_samplerate, load, stream
+from ._comparison import Comparison, compare_predictions
 from ._core import __version__
 from ._cqt import cqt
 from ._decibels import amplitude_to_db, db_to_amplitude, db_to_power, magphase, power_to_db
@@ -48,15 +49,7 @@ from ._pitches import (
 )
 from ._predictions import Predictions
 from ._resample import resample
-from ._scoring import (
-    Comparison,
-    CrossValidation,
-    ScoreReport,
-    compare_predictions,
-    cross_validate,
-    fuse,
-    score,
-)
+from ._scoring import CrossValidation, ScoreReport, cross_validate, fuse, score
 from ._spectrum import stft
 from ._times import (
     blocks_to_frames,

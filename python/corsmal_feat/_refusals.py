@@ -282,3 +282,10 @@ def seed_of(seed: int) -> int:
     if not isinstance(seed, Integral) or not 0 <= seed < 1 << 64:
         raise ParameterError(f"seed must be a whole number from 0 to 2**64 - 1, not {seed!r}")
     return int(seed)
+
+
+def whole(name: str, value: int, limit: int) -> int:
+    """A whole number from 0 to below `limit`."""
+    if not isinstance(value, int | np.integer) or not 0 <= value < limit:
+        raise ParameterError(f"{name} must be a whole number from 0 to {limit - 1}, not {value}")
+    return int(value)

@@ -1,4 +1,4 @@
-"""Prediction files: cross-validation, fusion, comparison, scores."""
+"""Prediction files: cross-validation, fusion, scores."""
 
 from __future__ import annotations
 
@@ -13,15 +13,13 @@ import numpy as np
 from . import _core
 from ._by_name import ByName
 from ._predictions import Predictions, StrPath, parse
-from ._refusals import existing, refuses
+from ._refusals import existing, refuses, whole
 from ._warnings import warn
 from .errors import ParameterError
 
 __all__ = [
-    "Comparison",
     "CrossValidation",
     "ScoreReport",
-    "compare_predictions",
     "cross_validate",
     "fuse",
     "score",
@@ -54,34 +52,6 @@ class CrossValidation:
     weighted_f1: dict[str, float]
     macro_f1: dict[str, float]
     predictions: Predictions
-    report: dict[str, Any] = field(repr=False)
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Whether two classifiers differ on the same recordings.
-
-    Attributes
-    ----------
-    only_first, only_second : number of recordings that only one of the two got right
-    p_value : p value of McNemar's exact test
-    difference, low, high : weighted F1 of the second minus that of the first, with its 95 %
-        bootstrap interval over recordings
-    report : everything, as `corsmal-feat compare-predictions --json` prints it
-
-    Examples
-    --------
-    >>> compared = corsmal_feat.compare_predictions("rf.csv", "knn.csv")
-    >>> compared.only_first, compared.only_second, compared.p_value
-    (0, 0, 1.0)
-    """
-
-    only_first: int
-    only_second: int
-    p_value: float
-    difference: float
-    low: float
-    high: float
     report: dict[str, Any] = field(repr=False)
 
 
@@ -179,7 +149,7 @@ def cross_validate(
             f"{key}={json.dumps([_plain(value) for value in values])}"
             for key, values in (tune or {}).items()
         ],
-        "seed": _whole("seed", seed, 2**32),
+        "seed": whole("seed", seed, 2**32),
     }
     text, held_out = _core.cross_validate(
         existing(features), target, _labels(labels, id_column, target), groups, plan, recipe
@@ -243,60 +213,8 @@ def fuse(
     if not paths:
         raise ParameterError("predictions must name at least one file")
     chosen = None if weights is None else [float(weight) for weight in weights]
-    least = _whole("least", least, 2**32)
+    least = whole("least", least, 2**32)
     return parse(_core.fuse(paths, chosen, vote, background, least))
-
-
-@refuses
-def compare_predictions(
-    first: StrPath,
-    second: StrPath,
-    *,
-    target: str | None = None,
-    resamples: int = 2000,
-    seed: int = 0,
-) -> Comparison:
-    """Tests whether two classifiers differ, as `corsmal-feat compare-predictions` does.
-
-    Parameters
-    ----------
-    first, second : path
-        Prediction files of the same recordings with true classes.
-    target : str, optional
-        Column of the true classes; `true` by default.
-    resamples, seed : int
-        Number of bootstrap resamples, and the seed.
-
-    Returns
-    -------
-    Comparison
-
-    Raises
-    ------
-    ParameterError
-        Recordings are in only one file, true classes differ, or columns are missing.
-
-    Examples
-    --------
-    >>> comparison = corsmal_feat.compare_predictions("rf.csv", "knn.csv")
-    >>> comparison.only_first, comparison.only_second, comparison.p_value
-    (0, 0, 1.0)
-    """
-    count = _whole("resamples", resamples, 1_000_001)
-    text = _core.compare_predictions(
-        existing(first), existing(second), target, count, _whole("seed", seed, 2**64)
-    )
-    report = json.loads(text)
-    test, interval = report["mcnemar"], report["bootstrap_rows"]
-    return Comparison(
-        test["only_first"],
-        test["only_second"],
-        test["p_value"],
-        interval["difference"],
-        interval["low"],
-        interval["high"],
-        report,
-    )
 
 
 @refuses
@@ -359,8 +277,8 @@ def score(
         groups,
         float(reject),
         bool(numeric),
-        _whole("resamples", resamples, 1_000_001),
-        _whole("seed", seed, 2**64),
+        whole("resamples", resamples, 1_000_001),
+        whole("seed", seed, 2**64),
     )
     report = json.loads(text)
     if report["kind"] == "numbers":
@@ -393,9 +311,3 @@ def _plain(value: Any) -> Any:
 
 def _value(value: Any) -> str:
     return json.dumps(_plain(value))
-
-
-def _whole(name: str, value: int, limit: int) -> int:
-    if not isinstance(value, int | np.integer) or not 0 <= value < limit:
-        raise ParameterError(f"{name} must be a whole number from 0 to {limit - 1}, not {value}")
-    return int(value)

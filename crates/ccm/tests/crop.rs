@@ -160,6 +160,12 @@ fn frames_may_be_in_a_video() {
         }
         Err(other) => panic!("{other:?}"),
     }
+    // A table about frames that the video does not have is another recording's, or counts from 1.
+    write(&base.join(format!("detections/{name}.csv")), table.replace("\n19,", "\n20,").as_bytes());
+    let refused = views(dir.path()).detections().unwrap_err();
+    let expected = "frame 20 of view 1: its video has 20 frames, counted from 0";
+    assert!(matches!(&refused, Problem::Damaged(r) if r.contains(expected)), "{refused:?}");
+    write(&base.join(format!("detections/{name}.csv")), table.as_bytes());
     // Masks have numbers of their own.
     for view in [1, 2] {
         let mask = Mask::empty(40, 30).to_png().unwrap();

@@ -40,9 +40,10 @@ use std::path::Path;
 pub use causes::{Cause, CauseKind};
 pub use compared_file::Refused;
 pub use comparison::{Comparison, FeatureReport, FileReport, Finding, Shapes};
+pub use corsmal_files::settings::Setting;
 pub use difference::{Difference, Extreme, Tolerance};
 pub use error::CompareError;
-pub use settings::{Setting, Settings};
+pub use settings::Settings;
 pub use texts::{TextDifference, TextReport};
 
 use compared_file::ComparedFile;

@@ -53,6 +53,7 @@ pub mod parquet;
 pub mod partition;
 pub mod provenance;
 pub mod quote;
+pub mod settings;
 pub mod shard;
 pub mod spelling;
 pub mod table;

@@ -90,7 +90,10 @@ impl Dataset {
         let shape = array.shape().to_vec();
         let values: Vec<f32> = array.as_standard_layout().iter().copied().collect();
         let ends = match npz.contains("offsets") {
-            true => Some(offsets(&mut npz, shape.first().copied().unwrap_or(0)).map_err(refuse)?),
+            true => {
+                let (raw, rows) = (npz.integers("offsets")?, shape.first().copied().unwrap_or(0));
+                Some(offsets(raw.into_iter(), rows).map_err(refuse)?)
+            }
             false => None,
         };
         let count = ends.as_ref().map_or(shape.first().copied().unwrap_or(0), |e| e.len() - 1);
@@ -177,11 +180,9 @@ impl Dataset {
     }
 }
 
-fn offsets(npz: &mut NpzFile, rows: usize) -> Result<Vec<usize>, String> {
-    let raw = npz.integers("offsets").map_err(|e| e.to_string())?;
+fn offsets(raw: impl Iterator<Item = i128>, rows: usize) -> Result<Vec<usize>, String> {
     let ends: Vec<usize> = raw
-        .iter()
-        .map(|&v| usize::try_from(v).map_err(|_| format!("offsets: {v} is not a row")))
+        .map(|v| usize::try_from(v).map_err(|_| format!("offsets: {v} is not a row")))
         .collect::<Result<_, _>>()?;
     let ascending = ends.windows(2).all(|w| w[0] < w[1]);
     if ends.len() < 2 || ends[0] != 0 || !ascending || ends.last() != Some(&rows) {

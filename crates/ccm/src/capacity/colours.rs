@@ -78,6 +78,27 @@ impl Reader<'_> {
 }
 
 impl Views {
+    /// Refuses detections in frames after the last of their view's video: they are of another recording, or
+    /// count otherwise. Images of frames may be fewer than those that a detector saw.
+    pub(super) fn require_frames(
+        &self,
+        detections: &[Detection],
+    ) -> std::result::Result<(), String> {
+        for view in VIEWS {
+            let of_view = detections.iter().filter(|d| d.view == view);
+            let Some(last) = of_view.map(|d| d.frame).max() else { continue };
+            // A damaged video is said where its pictures are needed.
+            let Ok(Some(video)) = self.video(view) else { continue };
+            if last as usize >= video.len() {
+                return Err(format!(
+                    "frame {last} of view {view}: its video has {} frames, counted from 0",
+                    video.len()
+                ));
+            }
+        }
+        Ok(())
+    }
+
     /// Numbers of the first frame of the side views' video and of the one `from_end` from its end, the last
     /// where there are fewer; `None` where nothing says how long it is.
     ///

@@ -211,7 +211,7 @@ impl Views {
     /// What a detector saw in all views; `None` where there is no table.
     ///
     /// # Errors
-    /// The table is damaged.
+    /// The table is damaged, or about frames that a video does not have.
     pub fn detections(&self) -> Result<Option<Vec<Detection>>, Problem> {
         let own = self.base.join("detections");
         let folder = self.detections.as_ref().unwrap_or(&own);
@@ -222,10 +222,12 @@ impl Views {
         let tables = folders.iter().flat_map(|folder| {
             ["csv", "json"].map(|extension| folder.join(format!("{}.{extension}", self.stem)))
         });
-        match tables.into_iter().find(|path| path.is_file()) {
-            Some(path) => Ok(Some(read_detections(&path)?)),
-            None => Ok(None),
-        }
+        let mut tables = tables.filter(|path| path.is_file());
+        let Some(path) = tables.next() else { return Ok(None) };
+        let detections = read_detections(&path)?;
+        self.require_frames(&detections)
+            .map_err(|reason| Problem::Damaged(format!("{}: {reason}", path.display())))?;
+        Ok(Some(detections))
     }
 
     /// Whether something says where the object is in a frame of a view, as [`Views::edges`] finds it.

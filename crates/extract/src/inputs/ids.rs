@@ -24,8 +24,7 @@ pub(super) fn refusal(id: &str) -> Option<String> {
         format!("must not end in {NPY}")
     } else if id.len() > LONGEST {
         format!("must not be longer than {LONGEST} bytes")
-    } else if id.starts_with('/') || id.split('/').any(|part| part == "..") {
-        // What unpacks the archive would write elsewhere.
+    } else if id.starts_with('/') || climbs(id) {
         "must not be an absolute path or contain ..".to_string()
     } else if id.chars().any(char::is_control) {
         "must not contain control characters".to_string()
@@ -33,6 +32,17 @@ pub(super) fn refusal(id: &str) -> Option<String> {
         return None;
     };
     Some(format!("id {} {reason}", quoted(id)))
+}
+
+/// Why a label cannot be called so: its column becomes a member of an archive, too.
+pub(super) fn label_refusal(labels: &[(String, String)]) -> Option<String> {
+    let (name, _) = labels.iter().find(|(name, _)| climbs(name))?;
+    Some(format!("the label {} must not contain .. as a path does", quoted(name)))
+}
+
+/// Whether what unpacks a member of this name would write elsewhere.
+fn climbs(name: &str) -> bool {
+    name.split(['/', '\\']).any(|part| part == "..")
 }
 
 /// The id of each input: given ones as they are, others from the shortest form of their path that

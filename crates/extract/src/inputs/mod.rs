@@ -253,6 +253,9 @@ impl<'a> Search<'a> {
         }
         let shard = PathBuf::from(path.file_stem().unwrap_or_default());
         for archive::Entry { member, name, labels } in contents.recordings {
+            if let Some(reason) = ids::label_refusal(&labels) {
+                return Err(InputError::Archive { path: path.into(), reason });
+            }
             let naming = Naming::Derived(shard.join(name));
             let source = InputSource::Member(Box::new(member));
             self.found.push(Found { source, naming, start: None, end: None, labels, line: None });
@@ -300,7 +303,8 @@ impl<'a> Search<'a> {
                     }
                 }
             }
-            if let Some(reason) = entry.id.as_deref().and_then(ids::refusal) {
+            let refusal = entry.id.as_deref().and_then(ids::refusal);
+            if let Some(reason) = refusal.or_else(|| ids::label_refusal(&entry.labels)) {
                 return Err(wrong(reason));
             }
             let naming = match (entry.id, &stored) {

@@ -8,7 +8,10 @@ use corsmal_files::identity::{self, Stamp};
 use corsmal_files::npz::NpzError;
 use corsmal_files::partition;
 use corsmal_files::provenance::Provenance;
+use corsmal_files::quote::shown;
+use corsmal_files::settings;
 use corsmal_files::shard::Shard;
+use serde_json::Value;
 
 use super::error::{MergeError, go_on};
 
@@ -88,11 +91,29 @@ pub(super) fn in_order(
         };
         let both = fields(&first).into_iter().zip(fields(&made));
         if let Some(((field, expected), (_, found))) = both.into_iter().find(|(a, b)| a != b) {
+            let found = found + &keys(&first, &made);
             return Err(not_one_run(path, format!("{field} {expected}"), found));
         }
         ordered.push(piece);
     }
     Ok((ordered, Provenance { shard: Shard::default().to_string(), ..first }))
+}
+
+/// The first keys of the configuration that differ.
+fn keys(expected: &Provenance, found: &Provenance) -> String {
+    const NAMED: usize = 3;
+    let differing = settings::differing(&expected.config, &found.config);
+    let text = |value: &Option<Value>| value.as_ref().map_or("absent".into(), Value::to_string);
+    let named: Vec<String> = differing
+        .iter()
+        .take(NAMED)
+        .map(|s| shown(&format!("{}: expected {}, found {}", s.key, text(&s.a), text(&s.b))))
+        .collect();
+    match (differing.len(), differing.len().saturating_sub(NAMED)) {
+        (0, _) => String::new(),
+        (_, 0) => format!(" ({})", named.join("; ")),
+        (_, more) => format!(" ({}; and {more} more)", named.join("; ")),
+    }
 }
 
 pub(super) fn not_one_run(path: &Path, expected: String, actual: String) -> MergeError {

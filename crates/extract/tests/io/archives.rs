@@ -282,6 +282,10 @@ fn labels_that_cannot_be_read_are_refused() {
         let message = collect(&path).unwrap_err();
         assert!(message.contains("\"x.json\"") && message.contains(part), "{message}");
     }
+    // Its column would be a member that is unpacked elsewhere.
+    let climbing = b"{\"../../a\": 1}";
+    let path = archive(&folder, "s.tar", &[("x.wav", &wav(1)), ("x.json", climbing)]);
+    assert!(collect(&path).unwrap_err().contains("the label \"../../a\" must not contain .."));
 }
 
 /// Where all labels of `take` were taken for those of one sample, each recording had the last.

@@ -174,6 +174,16 @@ fn only_the_shards_of_one_run_are_merged() {
         merge(&[path("0.npz"), path("1.npz")], &out, Existing::Keep, &GO).unwrap_err().to_string();
     assert!(error.contains("1.npz: expected configuration "), "{error}");
     assert!(error.ends_with(", found other"), "{error}");
+    // Two hashes help nobody: what differs is named.
+    let config = "{\"n_fft\":1024,\"a\":{\"b\":[1]}}".into();
+    let other = Provenance { config, ..other };
+    let mut writer = NpzWriter::create(&path("1.npz"), Compression::Stored).unwrap();
+    layout::write_table(&mut writer, &table(shard), &other).unwrap();
+    writer.finish().unwrap();
+    let error =
+        merge(&[path("0.npz"), path("1.npz")], &out, Existing::Keep, &GO).unwrap_err().to_string();
+    let expected = "found other (n_fft: expected 512, found 1024; a.b: expected absent, found [1])";
+    assert!(error.ends_with(expected), "{error}");
     assert!(!out.exists());
 }
 

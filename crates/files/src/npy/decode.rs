@@ -35,6 +35,9 @@ pub(crate) type Convert<T> = Box<dyn Fn(&[u8], &mut Vec<T>)>;
 
 /// A type that arrays can be read as.
 pub(crate) trait Element: Copy + Sized + 'static {
+    /// The elements that it can be read from.
+    const EXPECTED: &'static str;
+
     /// How to read elements of `dtype`; `None` for complex numbers and text.
     fn converter(dtype: DType) -> Option<Convert<Self>>;
 }
@@ -71,6 +74,8 @@ macro_rules! whole {
 macro_rules! element {
     ($target:ty) => {
         impl Element for $target {
+            const EXPECTED: &'static str = "real numbers (b, i, u, f)";
+
             fn converter(dtype: DType) -> Option<Convert<Self>> {
                 let big_endian = dtype.big_endian;
                 let half = move |bytes: &[u8], out: &mut Vec<$target>| {
@@ -92,6 +97,8 @@ element!(f64);
 
 /// Whole numbers only, each as it is.
 impl Element for i128 {
+    const EXPECTED: &'static str = "whole numbers (b, i, u)";
+
     fn converter(dtype: DType) -> Option<Convert<Self>> {
         whole!(i128, dtype)
     }
@@ -109,7 +116,7 @@ pub(crate) fn array<T: Element>(
     let too_large = || NpyError::TooLarge { shape: header.shape.clone(), itemsize };
     let count = usize::try_from(header.elements()?).map_err(|_| too_large())?;
     let convert = T::converter(header.dtype).ok_or_else(|| NpyError::Kind {
-        expected: "real numbers (b, i, u, f)",
+        expected: T::EXPECTED,
         actual: format!("{} of shape {:?}", header.dtype, header.shape),
     })?;
     let mut values: Vec<T> = Vec::new();

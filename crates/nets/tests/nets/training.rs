@@ -337,6 +337,24 @@ fn items_of_another_layout_are_refused() {
     refuse("m6_action", &[2, 9216], None, "expected [items, 1, 96, 96]");
 }
 
+/// The error asked for real numbers, found those, and named the file twice.
+#[test]
+fn offsets_that_are_fractions_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.npz");
+    let mut npz = NpzWriter::create(&path, Compression::Stored).unwrap();
+    npz.floats("X", &[2, 128], &[0.5; 256]).unwrap();
+    npz.floats("offsets", &[2], &[0.0, 2.0]).unwrap();
+    npz.finish().unwrap();
+    let network = networks::named("m5_vggish_level").unwrap().build(None, 0).unwrap();
+    let text = Dataset::read(&path, &network).unwrap_err().to_string();
+    assert!(
+        text.contains("offsets") && text.contains("expected whole numbers (b, i, u)"),
+        "{text}"
+    );
+    assert_eq!(text.matches("x.npz").count(), 1, "{text}");
+}
+
 #[test]
 fn a_member_id_names_the_items() {
     let folder = tempfile::tempdir().unwrap();

@@ -5,12 +5,12 @@
 //! in px. A label is a COCO category, by number (of 91) or name. A mask is a PNG beside the table, or a
 //! COCO segmentation (in CSV as JSON text); it may be left out.
 
-use std::fmt;
+mod csv;
+mod json;
+
 use std::path::{Path, PathBuf};
 
-use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
-
-use crate::coco::{self, SegmentationVisitor};
+use crate::coco;
 use crate::error::{Result, VisionError, read};
 use crate::mask::Mask;
 
@@ -49,19 +49,41 @@ impl Detection {
     /// of the image.
     ///
     /// # Errors
-    /// The mask is damaged.
+    /// The mask is damaged, or nowhere in the box.
     pub fn mask(&self, size: Option<(usize, usize)>) -> Result<Option<Mask>> {
-        match &self.mask {
-            Segmentation::None => Ok(None),
-            Segmentation::File(path) => Mask::read(path).map(Some),
-            Segmentation::Coco(segmentation) => match segmentation.mask(size) {
-                Ok(mask) => Ok(Some(mask)),
-                Err(reason) => {
-                    let Self { frame, view, .. } = *self;
-                    Err(VisionError::Mask { frame, view, label: self.label.clone(), reason })
-                }
-            },
+        let mask = match &self.mask {
+            Segmentation::None => return Ok(None),
+            Segmentation::File(path) => Mask::read(path)?,
+            Segmentation::Coco(segmentation) => {
+                segmentation.mask(size).map_err(|reason| self.mask_fault(reason))?
+            }
+        };
+        if let Some(bounds) = mask.bounds().filter(|bounds| !self.overlaps(*bounds)) {
+            let [left, top, right, bottom] = bounds;
+            return Err(self.mask_fault(format!(
+                "its pixels (columns {left} to {}, rows {top} to {}) are all outside the box {:?}; \
+                 expected the mask of the same object, in px of the same image",
+                right - 1,
+                bottom - 1,
+                self.bounds
+            )));
         }
+        Ok(Some(mask))
+    }
+
+    /// Whether the box overlaps a rectangle of pixels (first column and row, those after the last), or
+    /// touches it: detectors round.
+    fn overlaps(&self, [left, top, right, bottom]: [usize; 4]) -> bool {
+        let [x_min, y_min, x_max, y_max] = self.bounds;
+        x_min <= right as f64
+            && y_min <= bottom as f64
+            && x_max >= left as f64
+            && y_max >= top as f64
+    }
+
+    fn mask_fault(&self, reason: String) -> VisionError {
+        let Self { frame, view, .. } = *self;
+        VisionError::Mask { frame, view, label: self.label.clone(), reason }
     }
 
     /// Width and height of the box in px.
@@ -79,189 +101,9 @@ pub fn read_detections(path: &Path) -> Result<Vec<Detection>> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
     // The header of a CSV begins with a letter, whatever the name of the file.
     match bytes.trim_ascii_start().first() {
-        Some(b'[' | b'{') => from_json(bytes, path),
-        _ => from_csv(bytes, path),
+        Some(b'[' | b'{') => json::read(bytes, path),
+        _ => csv::read(bytes, path),
     }
-}
-
-/// An entry of a JSON table.
-#[derive(serde::Deserialize)]
-struct Entry {
-    frame: Text,
-    view: Text,
-    label: Text,
-    score: f64,
-    #[serde(rename = "box")]
-    bounds: [f64; 4],
-    #[serde(default)]
-    mask: EntryMask,
-}
-
-/// A string, or a number as it is written.
-struct Text(String);
-
-impl<'de> Deserialize<'de> for Text {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
-        struct TextVisitor;
-        impl Visitor<'_> for TextVisitor {
-            type Value = Text;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number or a string")
-            }
-
-            fn visit_str<E: Error>(self, text: &str) -> std::result::Result<Text, E> {
-                Ok(Text(text.into()))
-            }
-
-            fn visit_u64<E: Error>(self, number: u64) -> std::result::Result<Text, E> {
-                Ok(Text(number.to_string()))
-            }
-
-            fn visit_i64<E: Error>(self, number: i64) -> std::result::Result<Text, E> {
-                Ok(Text(number.to_string()))
-            }
-
-            fn visit_f64<E: Error>(self, number: f64) -> std::result::Result<Text, E> {
-                Ok(Text(number.to_string()))
-            }
-        }
-        deserializer.deserialize_any(TextVisitor)
-    }
-}
-
-/// A file's name, a COCO segmentation, or nothing.
-#[derive(Default)]
-enum EntryMask {
-    #[default]
-    None,
-    File(String),
-    Coco(coco::Segmentation),
-}
-
-impl<'de> Deserialize<'de> for EntryMask {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
-        struct MaskVisitor;
-        impl<'de> Visitor<'de> for MaskVisitor {
-            type Value = EntryMask;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("the name of a PNG, ")?;
-                SegmentationVisitor.expecting(f)
-            }
-
-            fn visit_unit<E: Error>(self) -> std::result::Result<EntryMask, E> {
-                Ok(EntryMask::None)
-            }
-
-            fn visit_str<E: Error>(self, file: &str) -> std::result::Result<EntryMask, E> {
-                Ok(EntryMask::File(file.into()))
-            }
-
-            fn visit_map<A: MapAccess<'de>>(
-                self,
-                map: A,
-            ) -> std::result::Result<EntryMask, A::Error> {
-                SegmentationVisitor.visit_map(map).map(EntryMask::Coco)
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(
-                self,
-                list: A,
-            ) -> std::result::Result<EntryMask, A::Error> {
-                SegmentationVisitor.visit_seq(list).map(EntryMask::Coco)
-            }
-        }
-        deserializer.deserialize_any(MaskVisitor)
-    }
-}
-
-/// Makes the detections of a JSON list one by one, so that only they are held.
-struct Entries<'a>(&'a Path);
-
-impl<'de> Visitor<'de> for Entries<'_> {
-    type Value = Vec<Detection>;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a list of detections")
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(
-        self,
-        mut list: A,
-    ) -> std::result::Result<Vec<Detection>, A::Error> {
-        let mut detections = Vec::new();
-        while let Some(entry) = list.next_element::<Entry>()? {
-            let number = detections.len() + 1;
-            let fault = |reason: String| A::Error::custom(format!("entry {number}: {reason}"));
-            if number > MAX_DETECTIONS {
-                return Err(fault(format!("a table has at most {MAX_DETECTIONS}")));
-            }
-            let mask = match entry.mask {
-                EntryMask::None => Segmentation::None,
-                EntryMask::File(file) => Segmentation::File(beside(self.0, &file)),
-                EntryMask::Coco(coco) => Segmentation::Coco(coco),
-            };
-            let names = [&entry.frame, &entry.view, &entry.label].map(|t| t.0.as_str());
-            let found = detection(names, entry.score, entry.bounds, mask);
-            detections.push(found.map_err(fault)?);
-        }
-        Ok(detections)
-    }
-}
-
-fn from_json(bytes: &[u8], path: &Path) -> Result<Vec<Detection>> {
-    let mut json = serde_json::Deserializer::from_slice(bytes);
-    let detections = json.deserialize_seq(Entries(path)).and_then(|d| json.end().map(|()| d));
-    detections.map_err(|e| VisionError::file(path, format!("not a JSON list of detections: {e}")))
-}
-
-fn from_csv(bytes: &[u8], path: &Path) -> Result<Vec<Detection>> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
-    let fault = |e: csv::Error| VisionError::file(path, format!("not a readable table: {e}"));
-    let header = reader.headers().map_err(fault)?.clone();
-    let column = |name: &str| header.iter().position(|h| h.eq_ignore_ascii_case(name));
-    for name in ["frame", "view", "label", "score", "x_min", "y_min", "x_max", "y_max"] {
-        if column(name).is_none() {
-            let there: Vec<_> = header.iter().collect();
-            let there = there.join(", ");
-            return Err(VisionError::file(path, format!("no column '{name}'; it has {there}")));
-        }
-        // The first of two would count, whatever the other says.
-        if header.iter().filter(|h| h.eq_ignore_ascii_case(name)).count() > 1 {
-            return Err(VisionError::file(path, format!("two columns are named '{name}'")));
-        }
-    }
-    let mut detections = Vec::new();
-    for row in reader.records() {
-        let row = row.map_err(fault)?;
-        let line = row.position().map_or(0, |p| p.line());
-        let text = |key: &str| column(key).and_then(|c| row.get(c)).unwrap_or_default();
-        let place = |reason: String| VisionError::file(path, format!("line {line}: {reason}"));
-        if detections.len() == MAX_DETECTIONS {
-            return Err(place(format!("a table has at most {MAX_DETECTIONS} detections")));
-        }
-        let mask = match text("mask") {
-            "" => Segmentation::None,
-            json if json.starts_with(['{', '[']) => Segmentation::Coco(
-                serde_json::from_str(json)
-                    .map_err(|e| place(format!("a mask that is not readable as JSON: {e}")))?,
-            ),
-            file => Segmentation::File(beside(path, file)),
-        };
-        let number = |key: &str, what: &str| {
-            let text = text(key);
-            text.parse::<f64>().map_err(|_| place(format!("'{text}' is not {what}")))
-        };
-        let mut bounds = [0.0; 4];
-        for (side, key) in bounds.iter_mut().zip(["x_min", "y_min", "x_max", "y_max"]) {
-            *side = number(key, "an edge of a box in px")?;
-        }
-        let score = number("score", "a score from 0 to 1")?;
-        let names = ["frame", "view", "label"].map(text);
-        detections.push(detection(names, score, bounds, mask).map_err(place)?);
-    }
-    Ok(detections)
 }
 
 fn beside(table: &Path, file: &str) -> PathBuf {
@@ -384,6 +226,26 @@ mod tests {
         ] {
             let error = table("d.json", text).unwrap_err().to_string();
             assert!(error.contains(part), "{text}: {error}");
+        }
+    }
+
+    /// The box of another object, or px of an image of another size.
+    #[test]
+    fn a_mask_outside_its_box_is_refused() {
+        let rle = r#"{""size"":[4,8],""counts"":[0,4,28]}"#;
+        let mask = |bounds: &str| {
+            let row = format!("{HEADER}3,2,cup,1,{bounds},\"{rle}\"\n");
+            let dir = tempfile::tempdir().unwrap();
+            let path = dir.path().join("d.csv");
+            std::fs::write(&path, row).unwrap();
+            read_detections(&path).unwrap()[0].mask(None)
+        };
+        for bounds in ["0,0,1,4", "1,0,5,4", "-9,-9,0,0"] {
+            assert_eq!(mask(bounds).unwrap().unwrap().area(), 4, "{bounds}");
+        }
+        for bounds in ["2,0,5,4", "0,5,1,9", "-9,0,-1,4", "0,-9,1,-1"] {
+            let error = mask(bounds).unwrap_err().to_string();
+            assert!(error.contains("columns 0 to 0, rows 0 to 3"), "{error}");
         }
     }
 

@@ -1,0 +1,50 @@
+//! Configurations of two outputs of ours, key by key.
+
+use serde::Serialize;
+use serde_json::Value;
+
+/// A key in which two configurations differ.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Setting {
+    /// Dotted path.
+    pub key: String,
+    /// Its value in the first; `None` where the key is absent.
+    pub a: Option<Value>,
+    /// Its value in the second.
+    pub b: Option<Value>,
+}
+
+/// The keys in which two configurations differ, as outputs store them. Text that is not JSON has none: the
+/// hash tells them apart.
+pub fn differing(a: &str, b: &str) -> Vec<Setting> {
+    let (a, b) = (flattened(a), flattened(b));
+    let value = |keys: &[(String, Value)], key: &str| {
+        keys.iter().find(|(other, _)| other == key).map(|(_, value)| value.clone())
+    };
+    let only_b = b.iter().filter(|(key, _)| value(&a, key).is_none());
+    let keys = a.iter().chain(only_b).map(|(key, _)| key.clone());
+    keys.map(|key| Setting { a: value(&a, &key), b: value(&b, &key), key })
+        .filter(|setting| setting.a != setting.b)
+        .collect()
+}
+
+/// Every setting with its dotted path.
+fn flattened(config: &str) -> Vec<(String, Value)> {
+    let mut keys = Vec::new();
+    if let Ok(value) = serde_json::from_str(config) {
+        flatten(String::new(), value, &mut keys);
+    }
+    keys
+}
+
+fn flatten(path: String, value: Value, keys: &mut Vec<(String, Value)>) {
+    match value {
+        Value::Object(table) => {
+            for (name, value) in table {
+                let path = if path.is_empty() { name } else { format!("{path}.{name}") };
+                flatten(path, value, keys);
+            }
+        }
+        value => keys.push((path, value)),
+    }
+}

@@ -1,0 +1,54 @@
+//! Tables of detections in CSV.
+
+use std::path::Path;
+
+use super::{Detection, MAX_DETECTIONS, Segmentation, beside, detection};
+use crate::error::{Result, VisionError};
+
+pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Vec<Detection>> {
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
+    let fault = |e: csv::Error| VisionError::file(path, format!("not a readable table: {e}"));
+    let header = reader.headers().map_err(fault)?.clone();
+    let column = |name: &str| header.iter().position(|h| h.eq_ignore_ascii_case(name));
+    for name in ["frame", "view", "label", "score", "x_min", "y_min", "x_max", "y_max"] {
+        if column(name).is_none() {
+            let there: Vec<_> = header.iter().collect();
+            let there = there.join(", ");
+            return Err(VisionError::file(path, format!("no column '{name}'; it has {there}")));
+        }
+        // The first of two would count, whatever the other says.
+        if header.iter().filter(|h| h.eq_ignore_ascii_case(name)).count() > 1 {
+            return Err(VisionError::file(path, format!("two columns are named '{name}'")));
+        }
+    }
+    let mut detections = Vec::new();
+    for row in reader.records() {
+        let row = row.map_err(fault)?;
+        let line = row.position().map_or(0, |p| p.line());
+        let text = |key: &str| column(key).and_then(|c| row.get(c)).unwrap_or_default();
+        let place = |reason: String| VisionError::file(path, format!("line {line}: {reason}"));
+        if detections.len() == MAX_DETECTIONS {
+            return Err(place(format!("a table has at most {MAX_DETECTIONS} detections")));
+        }
+        let mask = match text("mask") {
+            "" => Segmentation::None,
+            json if json.starts_with(['{', '[']) => Segmentation::Coco(
+                serde_json::from_str(json)
+                    .map_err(|e| place(format!("a mask that is not readable as JSON: {e}")))?,
+            ),
+            file => Segmentation::File(beside(path, file)),
+        };
+        let number = |key: &str, what: &str| {
+            let text = text(key);
+            text.parse::<f64>().map_err(|_| place(format!("'{text}' is not {what}")))
+        };
+        let mut bounds = [0.0; 4];
+        for (side, key) in bounds.iter_mut().zip(["x_min", "y_min", "x_max", "y_max"]) {
+            *side = number(key, "an edge of a box in px")?;
+        }
+        let score = number("score", "a score from 0 to 1")?;
+        let names = ["frame", "view", "label"].map(text);
+        detections.push(detection(names, score, bounds, mask).map_err(place)?);
+    }
+    Ok(detections)
+}

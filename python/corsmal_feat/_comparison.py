@@ -1,0 +1,93 @@
+"""Whether two classifiers differ, from their prediction files."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import Any
+
+from . import _core
+from ._predictions import StrPath
+from ._refusals import existing, refuses, whole
+
+__all__ = ["Comparison", "compare_predictions"]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Whether two classifiers differ on the same recordings.
+
+    Attributes
+    ----------
+    only_first, only_second : number of recordings that only one of the two got right
+    p_value : p value of McNemar's exact test
+    difference, low, high : weighted F1 of the second minus that of the first, with its 95 %
+        bootstrap interval over recordings
+    report : everything, as `corsmal-feat compare-predictions --json` prints it
+
+    Examples
+    --------
+    >>> compared = corsmal_feat.compare_predictions("rf.csv", "knn.csv")
+    >>> compared.only_first, compared.only_second, compared.p_value
+    (0, 0, 1.0)
+    """
+
+    only_first: int
+    only_second: int
+    p_value: float
+    difference: float
+    low: float
+    high: float
+    report: dict[str, Any] = field(repr=False)
+
+
+@refuses
+def compare_predictions(
+    first: StrPath,
+    second: StrPath,
+    *,
+    target: str | None = None,
+    resamples: int = 2000,
+    seed: int = 0,
+) -> Comparison:
+    """Tests whether two classifiers differ, as `corsmal-feat compare-predictions` does.
+
+    Parameters
+    ----------
+    first, second : path
+        Prediction files of the same recordings with true classes.
+    target : str, optional
+        Column of the true classes; `true` by default.
+    resamples, seed : int
+        Number of bootstrap resamples, and the seed.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    ParameterError
+        Recordings are in only one file, true classes differ, or columns are missing.
+
+    Examples
+    --------
+    >>> comparison = corsmal_feat.compare_predictions("rf.csv", "knn.csv")
+    >>> comparison.only_first, comparison.only_second, comparison.p_value
+    (0, 0, 1.0)
+    """
+    count = whole("resamples", resamples, 1_000_001)
+    text = _core.compare_predictions(
+        existing(first), existing(second), target, count, whole("seed", seed, 2**64)
+    )
+    report = json.loads(text)
+    test, interval = report["mcnemar"], report["bootstrap_rows"]
+    return Comparison(
+        test["only_first"],
+        test["only_second"],
+        test["p_value"],
+        interval["difference"],
+        interval["low"],
+        interval["high"],
+        report,
+    )
