@@ -287,8 +287,8 @@ mod tests {
             "0,1,person,0.9,200,0,440,480,",
             // Another person, at the edge.
             "0,1,person,0.6,0,0,20,480,",
-            r#"0,1,cup,0.8,200,0,300,9,"{""size"":[1,4],""counts"":[0,4]}""#,
-            r#"0,1,vase,0.7,200,0,300,9,"{""size"":[1,4],""counts"":[0,1,3]}""#,
+            r#"0,1,cup,0.8,200,0,300,9,"{""size"":[1,400],""counts"":[200,4,196]}""#,
+            r#"0,1,vase,0.7,200,0,300,9,"{""size"":[1,400],""counts"":[200,1,199]}""#,
         ];
         let chosen = |order: [usize; 4]| {
             let text: Vec<&str> = order.iter().map(|i| rows[*i]).collect();
@@ -297,7 +297,7 @@ mod tests {
             let path = dir.path().join("d.csv");
             std::fs::write(&path, format!("{header}\n{}\n", text.join("\n"))).unwrap();
             let detections = crate::read_detections(&path).unwrap();
-            choose(&detections, 640.0, (4, 1)).unwrap().map(|c| c.mask.area())
+            choose(&detections, 640.0, (400, 1)).unwrap().map(|c| c.mask.area())
         };
         assert_eq!(chosen([0, 1, 2, 3]), Some(4));
         assert_eq!(chosen([3, 1, 2, 0]), Some(4));

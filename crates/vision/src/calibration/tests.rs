@@ -48,10 +48,7 @@ fn what_is_missing_or_wrong_is_named() {
         (&CAMERA.replace("900,0,640", "900,0"), "'intrinsic' of camera 'rgb' is not 3 by 3"),
         ("no pickle", "byte 1: operation 'n'"),
         // Finite numbers that would leave the range of single precision, or any room.
-        (
-            &CAMERA.replace("900,0,640", "1e39,0,640"),
-            "camera 'rgb': 'intrinsic' is not a camera",
-        ),
+        (&CAMERA.replace("900,0,640", "1e39,0,640"), "camera 'rgb': 'intrinsic' is not a camera"),
         (&CAMERA.replace("[0,0,1]", "[0,0,0]"), "'intrinsic' is not a camera"),
         (&CAMERA.replace("900,0,640", "2700,0,640"), "focal lengths of 2700 and 900 px"),
         (&CAMERA.replace("900,0,640", "900,300,640"), "a skew of 300 px"),
@@ -63,18 +60,9 @@ fn what_is_missing_or_wrong_is_named() {
         (&CAMERA.replace("[0,0,0]", "[[1,0,0],[0,1,0],[0,0,-1]]"), "'rvec' is not a rotation"),
         (&CAMERA.replace("[0,0,0]", "[1e200,0,0]"), "'rvec' is not a rotation"),
         // Of a focal length of 600 px, and of another place.
-        (
-            &projected(600.0, 2.0, 1.0),
-            "'projMatrix' is not 'intrinsic' times 'rvec' and 'tvec'",
-        ),
-        (
-            &projected(900.0, 2.1, 1.0),
-            "'projMatrix' is not 'intrinsic' times 'rvec' and 'tvec'",
-        ),
-        (
-            &projected(900.0, 2.0, 0.0),
-            "'projMatrix' is not 'intrinsic' times 'rvec' and 'tvec'",
-        ),
+        (&projected(600.0, 2.0, 1.0), "'projMatrix' is not 'intrinsic' times 'rvec' and 'tvec'"),
+        (&projected(900.0, 2.1, 1.0), "'projMatrix' is not 'intrinsic' times 'rvec' and 'tvec'"),
+        (&projected(900.0, 2.0, 0.0), "'projMatrix' is not 'intrinsic' times 'rvec' and 'tvec'"),
     ] {
         let error = parse(text).unwrap_err().to_string();
         assert!(error.starts_with("c.json: ") && error.contains(part), "{error}");

@@ -165,8 +165,8 @@ mod tests {
 
     #[test]
     fn csv_and_json_say_the_same() {
-        let csv = format!("{HEADER}0,c1,47,0.9,1,2,3.5,4,m.png\n8,2,Wine Glass,0.5,0,0,1,1,\n");
-        let json = r#"[{"frame":0,"view":1,"label":"cup","score":0.9,"box":[1,2,3.5,4],"mask":"m.png"},
+        let csv = format!("{HEADER}0,c1,47,0.9,0,1,2.5,3,m.png\n8,2,Wine Glass,0.5,0,0,1,1,\n");
+        let json = r#"[{"frame":0,"view":1,"label":"cup","score":0.9,"box":[0,1,2.5,3],"mask":"m.png"},
             {"frame":8,"view":"c2","label":46,"score":0.5,"box":[0,0,1,1]}]"#;
         // With a byte-order mark, too.
         let (a, b) =
