@@ -17,7 +17,7 @@ use crate::weights::{self, State, WeightsError};
 
 const ENTRY: &str = "corsmal-feat-checkpoint";
 
-/// The best epoch so far: score, epoch, parameters.
+/// The best epoch so far: its merit, number, parameters.
 pub(crate) type Best = Option<(f64, usize, Parameters)>;
 
 #[derive(Serialize, Deserialize)]

@@ -85,7 +85,7 @@ pub fn cross_validate(
 /// Items trained on, items that choose the epoch, and the group that these are.
 ///
 /// # Errors
-/// A validation group without groups.
+/// A validation group without groups; a fifth of too few items.
 pub fn watched(
     data: Data<'_>,
     fold: &FoldItems,
@@ -94,6 +94,18 @@ pub fn watched(
     match recipe.select {
         Select::Last => Ok((fold.train.clone(), Vec::new(), None)),
         Select::Published => Ok((fold.train.clone(), fold.test.clone(), None)),
+        Select::Split => {
+            let held = fifth(data, fold, recipe);
+            if held.is_empty() {
+                return Err(NetError::Targets(
+                    "select = split holds out a fifth of the training items of each class: one class needs \
+                     at least 3"
+                        .into(),
+                ));
+            }
+            let train = fold.train.iter().filter(|i| held.binary_search(i).is_err());
+            Ok((train.copied().collect(), held, None))
+        }
         Select::Validation => {
             let refuse = || {
                 NetError::Targets(
@@ -116,4 +128,18 @@ pub fn watched(
             Ok((train, held, Some(chosen.clone())))
         }
     }
+}
+
+/// A random fifth of the training items of each class, ascending.
+fn fifth(data: Data<'_>, fold: &FoldItems, recipe: &Recipe) -> Vec<usize> {
+    let stream = Stream::new(recipe.seed, &format!("fifth of {}", fold.name));
+    let mut held = Vec::new();
+    for class in 0..data.n_classes {
+        let items: Vec<usize> =
+            fold.train.iter().copied().filter(|&i| data.classes[i] == class).collect();
+        let order = stream.part(class as u64).permutation(items.len());
+        held.extend(order.into_iter().take((items.len() + 2) / 5).map(|i| items[i]));
+    }
+    held.sort_unstable();
+    held
 }

@@ -13,8 +13,16 @@ use crate::random::Stream;
 use crate::recipe::{Activation, InitialKind, Recipe, Select};
 use crate::trainer::{StepSettings, Trainer};
 
+/// How good a network is on the watched items.
+pub(crate) struct Rating {
+    /// shown and kept in the history
+    pub score: f64,
+    /// chooses the epoch, more is better
+    pub merit: f64,
+}
+
 /// Trains from initial values of the recipe's seed. `rate` says how good a network is on the
-/// watched items, more is better.
+/// watched items.
 ///
 /// # Errors
 /// As [`crate::fit::fit`].
@@ -23,7 +31,7 @@ pub(crate) fn run(
     network: &mut Network,
     recipe: &Recipe,
     checkpoint: Option<&Path>,
-    rate: impl Fn(&Network) -> Result<f64>,
+    rate: impl Fn(&Network) -> Result<Rating>,
     mut progress: impl FnMut(Progress<'_>) -> bool,
 ) -> Result<History> {
     let memory = memory::of_training(network, course, recipe);
@@ -74,10 +82,10 @@ pub(crate) fn run(
         }
         let mut result = Epoch { loss: sum / steps.len() as f64, score: None };
         if !course.watched.is_empty() {
-            let reached = rate(trainer.network)?;
-            result.score = Some(reached);
-            if recipe.select != Select::Last && best.as_ref().is_none_or(|b| reached > b.0) {
-                best = Some((reached, epoch, trainer.network.parameters().unpacked()));
+            let Rating { score, merit } = rate(trainer.network)?;
+            result.score = Some(score);
+            if recipe.select != Select::Last && best.as_ref().is_none_or(|b| merit > b.0) {
+                best = Some((merit, epoch, trainer.network.parameters().unpacked()));
             }
         }
         epochs.push(result);

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::course::Course;
-use crate::epochs;
+use crate::epochs::{self, Rating};
 use crate::error::{NetError, Result};
 use crate::items::{Items, TOGETHER};
 use crate::layers::softmax;
@@ -51,7 +51,9 @@ pub fn fit(
     let truth: Vec<usize> = task.watched.iter().map(|&r| task.classes[r]).collect();
     let rate = |network: &Network| {
         let proba = probabilities(network, task.items, task.watched, recipe)?;
-        Ok(score(&truth, &labels(&proba)))
+        let score = score(&truth, &labels(&proba));
+        let merit = if recipe.select == Select::Split { -log_loss(&truth, &proba) } else { score };
+        Ok(Rating { score, merit })
     };
     epochs::run(&course, network, recipe, checkpoint, rate, progress)
 }
@@ -112,6 +114,12 @@ pub fn labels(probabilities: &[Vec<f64>]) -> Vec<usize> {
         (1..row.len()).fold(0, |best, class| if row[class] > row[best] { class } else { best })
     };
     probabilities.iter().map(best).collect()
+}
+
+/// Mean cross-entropy; a probability below Keras's 1e-7 counts as that.
+fn log_loss(truth: &[usize], probabilities: &[Vec<f64>]) -> f64 {
+    let losses = truth.iter().zip(probabilities).map(|(&class, row)| -row[class].max(1e-7).ln());
+    losses.sum::<f64>() / truth.len() as f64
 }
 
 fn check(network: &Network, task: Task<'_>, recipe: &Recipe) -> Result<()> {

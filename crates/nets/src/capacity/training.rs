@@ -5,7 +5,7 @@ use std::path::Path;
 use super::estimate::{LARGEST_ML, millilitres_of};
 use super::network::{CapacityNetwork, FORMAT, Header};
 use crate::course::Course;
-use crate::epochs;
+use crate::epochs::{self, Rating};
 use crate::error::{NetError, Result};
 use crate::fit::Progress;
 use crate::items::{Column, Items};
@@ -42,7 +42,7 @@ pub fn recipe(changes: &serde_json::Map<String, serde_json::Value>) -> Result<Re
         ("padding", usual.padding == recipe.padding),
         ("offset", usual.offset == recipe.offset),
         ("activation", usual.activation == recipe.activation),
-        ("select", recipe.select != Select::Published),
+        ("select", matches!(recipe.select, Select::Last | Select::Validation)),
     ];
     let Some((key, _)) = without.into_iter().find(|(_, unchanged)| !unchanged) else {
         return Ok(recipe);
@@ -101,7 +101,8 @@ pub fn train(
             Ok((-(estimate - millilitres).abs() / millilitres).exp())
         };
         let scores: Result<Vec<f64>> = watched.iter().map(score).collect();
-        Ok(scores?.iter().sum::<f64>() / watched.len() as f64)
+        let score = scores?.iter().sum::<f64>() / watched.len() as f64;
+        Ok(Rating { score, merit: score })
     };
     let history = epochs::run(&course, &mut network, recipe, checkpoint, rate, progress)?;
     let header = Header {

@@ -6,6 +6,7 @@ mod golden;
 mod layers;
 mod published;
 mod resnet;
+mod selection;
 mod training;
 mod weights;
 
