@@ -445,7 +445,7 @@ def hear_recordings(
     paths: list[str],
     any_rate: bool,
     jobs: int | None,
-) -> tuple[npt.NDArray[np.float64], list[tuple[str, str]]]: ...
+) -> tuple[npt.NDArray[np.float64], list[tuple[str, str]], str | None]: ...
 def embed_recordings(
     name: str,
     paths: list[str],

@@ -13,10 +13,10 @@ import numpy.typing as npt
 from . import _core
 from ._classifier import class_labels
 from ._extract import extract
-from ._features import GOOD, lengths
+from ._features import GOOD, Features, lengths
 from ._formats import mismatch
 from ._refusals import existing, refuses
-from ._validation import Matrix, features
+from ._validation import Matrix, features, names_of
 from ._warnings import warn
 from .errors import DecodeError, ModelError, ParameterError
 
@@ -75,8 +75,9 @@ class TrainedModel:
 
         Parameters
         ----------
-        X : array [shape=(rows, features)], path, or list of paths
-            Rows of features or, for a model that knows its features, recordings.
+        X : array [shape=(rows, features)], Features, path, or list of paths
+            Rows of features or, for a model that knows its features, what `extract` returned or
+            recordings. Columns of a data frame must have the names of the training.
         any_rate : bool
             Whether to accept recordings with a sample rate or a number of channels that the model
             was not trained on.
@@ -138,6 +139,16 @@ class TrainedModel:
             if strange:
                 raise ParameterError(f"X mixes paths and others: {strange[0]!r} is not a path")
             return self._of_recordings([os.fspath(path) for path in X], any_rate)
+        if isinstance(X, Features):
+            X = self._summary(X, any_rate)
+        names, known = names_of(X), self.header["feature_names"]
+        if names is not None and known and len(names) == len(known):
+            apart = [i for i, name in enumerate(known) if names[i] != name]
+            if apart:
+                raise ParameterError(
+                    f"column {apart[0]} of X must be {known[apart[0]]}, as in the training of"
+                    f" {self.path}, not {names[apart[0]]}"
+                )
         rows = features(X, "TrainedModel")
         if rows.shape[1] != self.n_features_in_:
             raise ParameterError(
@@ -145,6 +156,27 @@ class TrainedModel:
                 f" {self.n_features_in_}"
             )
         return rows
+
+    def _summary(self, given: Features, any_rate: bool) -> npt.NDArray[np.float32]:
+        """The rows of an extraction by the configuration of the training."""
+        if given.summary is None:
+            raise ParameterError("X holds frames, but rows of statistics are needed: see `summary`")
+        if given.config_hash != self.header["feature_config_hash"]:
+            raise ParameterError(
+                f"X was extracted by another configuration than the rows that {self.path} was"
+                " trained on: extract it with config=model.feature_config"
+            )
+        if self.header["feature_names"] not in ([], given.names):
+            raise ParameterError(
+                f"X has other features, or in another order, than {self.path} was trained on"
+            )
+        heard = [outcome for outcome in given.outcomes if outcome["status"] in GOOD]
+        if not any_rate:
+            self._check_formats(heard)
+        strange = self._model.length_warning(lengths(heard))
+        if strange is not None:
+            warn(strange)
+        return given.summary
 
     def _of_recordings(self, paths: list[str], any_rate: bool) -> Matrix:
         if not self.feature_config:

@@ -15,6 +15,7 @@ from . import _core
 from ._extract import MOST_JOBS
 from ._features import StrPath
 from ._refusals import place, refuses
+from ._warnings import warn
 from .errors import DecodeError, ParameterError
 
 
@@ -73,9 +74,13 @@ class TrainedNetwork:
         DecodeError : the network cannot classify a recording
         """
         paths = paths_of(recordings)
-        proba, failed = _core.hear_recordings(self._network, paths, any_rate, jobs_of(jobs))
+        proba, failed, strange = _core.hear_recordings(
+            self._network, paths, any_rate, jobs_of(jobs)
+        )
         if failed:
             raise DecodeError(f"{failed[0][0]}: {failed[0][1]}")
+        if strange is not None:
+            warn(strange)
         return proba
 
     @refuses

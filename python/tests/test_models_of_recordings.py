@@ -62,10 +62,24 @@ def test_a_model_with_its_features_takes_recordings(
         trained = model.header["trained_on"]
         assert (trained["sample_rates"], trained["channels"]) == ([RATE], [1])
         assert model.header["feature_names"] == features.names
+        # Features of another kind or order would be taken for those of the training.
+        frame = pandas.DataFrame(features.summary, columns=features.names)
+        assert model.predict(frame).tolist() == model.predict(features).tolist() == kinds
+        with pytest.raises(cf.ParameterError, match=r"column 0 of X must be mfcc\[0\]\.mean"):
+            model.predict(frame[frame.columns[::-1]])
+        elsewhere = cf.extract(paths, preset="mfcc-zcr", set={"mfcc.n_mels": 40})
+        with pytest.raises(cf.ParameterError, match="another configuration"):
+            model.predict(elsewhere)
+        with pytest.raises(cf.ParameterError, match="holds frames"):
+            model.predict(cf.extract(paths[:1], preset="logmel"))
     other = record(tmp_path / "other.wav", 300, 5, rate=44100)
     with pytest.raises(cf.ParameterError, match=r"44100 Hz, but .* was trained on 16000"):
         model.predict([paths[0], other])
     assert len(model.predict([paths[0], other], any_rate=True)) == 2
+    with pytest.raises(cf.ParameterError, match=r"44100 Hz, but .* was trained on 16000"):
+        model.predict(cf.extract([other], preset="mfcc-zcr"))
+    with pytest.raises(FileNotFoundError, match="gone"):
+        cf.extract([tmp_path / "gone.wav"])
     stereo = record(tmp_path / "stereo.wav", 300, 5, channels=2)
     with pytest.raises(cf.ParameterError, match="channels"):
         model.predict([stereo])

@@ -257,14 +257,14 @@ impl ComparedFile {
     }
 
     /// Recordings of an output of ours for a message; `None` for files of other programs.
-    pub(super) fn recordings(&self) -> Option<String> {
+    pub(super) fn recordings(&self) -> Option<Vec<&String>> {
         self.provenance.as_ref()?;
         let of_arrays = self.arrays.iter().filter_map(|e| e.ours.as_ref()).map(|(id, _)| id);
         let of_table = self.table.iter().filter_map(|table| table.ids.as_ref()).flatten();
         let mut ids: Vec<&String> = of_arrays.chain(of_table).collect();
         ids.sort_unstable();
         ids.dedup();
-        Some(shown(&ids))
+        Some(ids)
     }
 
     /// Names for a message.
@@ -276,7 +276,7 @@ impl ComparedFile {
 }
 
 /// Some of the names, and how many more there are.
-fn shown(names: &[&String]) -> String {
+pub(super) fn shown(names: &[&String]) -> String {
     const SHOWN: usize = 8;
     let more = names.len().saturating_sub(SHOWN);
     let first: Vec<String> = names.iter().take(SHOWN).map(|n| format!("{n:?}")).collect();

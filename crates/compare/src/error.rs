@@ -37,6 +37,21 @@ pub enum CompareError {
         /// Recordings of the second.
         in_b: String,
     },
+    /// Two outputs of ours over the same recordings, of other features or kinds.
+    #[error(
+        "the recordings are the same, but not what is known of them: {a} has {in_a}; {b} has {in_b}. \
+         Compare frames with frames, or statistics with statistics"
+    )]
+    NoFeatureInCommon {
+        /// First file.
+        a: PathBuf,
+        /// Second file.
+        b: PathBuf,
+        /// Arrays of the first.
+        in_a: String,
+        /// Arrays of the second.
+        in_b: String,
+    },
     /// Nothing to compare.
     #[error("no numeric arrays in common: {a} has {in_a}; {b} has {in_b} (--map A=B names a pair)")]
     NothingInCommon {

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::hash::Hash;
 
-use super::compared_file::{ArrayEntry, ComparedFile};
+use super::compared_file::{ArrayEntry, ComparedFile, shown};
 use super::error::CompareError;
 use corsmal_files::parquet::NumericTable;
 
@@ -101,8 +101,13 @@ impl Matching {
         }
         if pairs.is_empty() && matching.tables.is_empty() {
             if let (Some(in_a), Some(in_b)) = (a.recordings(), b.recordings()) {
-                let (a, b) = (a.path().into(), b.path().into());
-                return Err(CompareError::NoRecordingInCommon { a, b, in_a, in_b });
+                let (of_a, of_b) = (a.path().into(), b.path().into());
+                if in_a == in_b {
+                    let (in_a, in_b) = (a.listing(), b.listing());
+                    return Err(CompareError::NoFeatureInCommon { a: of_a, b: of_b, in_a, in_b });
+                }
+                let (in_a, in_b) = (shown(&in_a), shown(&in_b));
+                return Err(CompareError::NoRecordingInCommon { a: of_a, b: of_b, in_a, in_b });
             }
             let (in_a, in_b) = (a.listing(), b.listing());
             let (a, b) = (a.path().into(), b.path().into());

@@ -12,7 +12,7 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use corsmal_files::csv_text;
+use corsmal_files::csv_text::{self, LineFeeds};
 use corsmal_files::quote::{printable, quoted, shown};
 use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor};
 use serde_json::Value;
@@ -188,14 +188,14 @@ impl ManifestColumns {
 }
 
 fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
-    let failed = |error: csv::Error, reader: &csv::Reader<BufReader<Short<File>>>| {
+    let failed = |error: csv::Error, reader: &csv::Reader<LineFeeds<BufReader<Short<File>>>>| {
         // The reader is ahead of the position, but a line that is too long stops it.
         let line = match (error.position(), error.kind()) {
             (Some(position), _) => position.line(),
-            (None, csv::ErrorKind::Io(_)) => reader.get_ref().get_ref().line,
+            (None, csv::ErrorKind::Io(_)) => reader.get_ref().get_ref().get_ref().line,
             (None, _) => 1,
         };
-        wrong(path, line, csv_text::fault(&error))
+        wrong(path, line, csv_text::reason(&error))
     };
     let mut reader = csv_text::reader(open(path)?).map_err(|e| InputError::io(path, e))?;
     let mut columns = ManifestColumns::default();

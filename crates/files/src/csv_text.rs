@@ -2,14 +2,14 @@
 //! without a byte order mark.
 
 use std::collections::HashSet;
-use std::io::{self, BufRead};
+use std::io::{self, BufRead, Read};
 
 /// A reader of the table in `text`, whose first line says what separates its fields: commas where
 /// it has one, else semicolons, else tabs. Space around fields is left out.
 ///
 /// # Errors
 /// Reading fails, or the text is not UTF-8 but UTF-16, a feature file or a model; the error says so.
-pub fn reader<R: BufRead>(mut text: R) -> io::Result<csv::Reader<R>> {
+pub fn reader<R: BufRead>(mut text: R) -> io::Result<csv::Reader<LineFeeds<R>>> {
     let start = text.fill_buf()?;
     let other = |what: &str| Err(io::Error::new(io::ErrorKind::InvalidData, what.to_string()));
     if start.starts_with(b"\xff\xfe") || start.starts_with(b"\xfe\xff") {
@@ -29,16 +29,77 @@ pub fn reader<R: BufRead>(mut text: R) -> io::Result<csv::Reader<R>> {
         text.consume(3);
     }
     let mut builder = csv::ReaderBuilder::new();
+    let text = LineFeeds { inner: text, is_quoted: false, has_return: false };
     Ok(builder.delimiter(delimiter).trim(csv::Trim::All).from_reader(text))
 }
 
-/// What is wrong with a table, and what to do about text that is not UTF-8, such as Excel's `CSV` in
-/// Western Europe.
+/// Text whose lines end by line feeds alone, except in quotation marks. Where they end by CR LF, the csv crate
+/// takes the second for a part of the next line and counts one too few.
+pub struct LineFeeds<R> {
+    inner: R,
+    is_quoted: bool,
+    /// A carriage return was read and not given.
+    has_return: bool,
+}
+
+impl<R> LineFeeds<R> {
+    /// What is read from.
+    pub fn get_ref(&self) -> &R {
+        &self.inner
+    }
+}
+
+impl<R: BufRead> Read for LineFeeds<R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if out.is_empty() {
+            return Ok(0);
+        }
+        loop {
+            let text = self.inner.fill_buf()?;
+            if text.is_empty() {
+                out[0] = b'\r';
+                return Ok(usize::from(std::mem::take(&mut self.has_return)));
+            }
+            let (mut used, mut written) = (0, 0);
+            for &byte in text {
+                if self.has_return && byte != b'\n' && written < out.len() {
+                    out[written] = b'\r';
+                    written += 1;
+                    self.has_return = false;
+                }
+                if written == out.len() {
+                    break;
+                }
+                used += 1;
+                self.is_quoted ^= byte == b'"';
+                self.has_return = byte == b'\r' && !self.is_quoted;
+                if !self.has_return {
+                    out[written] = byte;
+                    written += 1;
+                }
+            }
+            self.inner.consume(used);
+            if written > 0 {
+                return Ok(written);
+            }
+        }
+    }
+}
+
+/// What is wrong with a table and where, and what to do about text that is not UTF-8, such as Excel's `CSV`
+/// in Western Europe.
 pub fn fault(error: &csv::Error) -> String {
     match (error.kind(), error.position()) {
-        (csv::ErrorKind::Utf8 { .. }, position) => {
-            let line = position.map(|p| format!("line {}: ", p.line())).unwrap_or_default();
-            format!("{line}text that is not UTF-8: save the table as \"CSV UTF-8\"")
+        (csv::ErrorKind::Utf8 { .. }, Some(at)) => format!("line {}: {}", at.line(), reason(error)),
+        _ => reason(error),
+    }
+}
+
+/// As [`fault`], without the line of text that is not UTF-8.
+pub fn reason(error: &csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::Utf8 { .. } => {
+            "text that is not UTF-8: save the table as \"CSV UTF-8\"".into()
         }
         _ => error.to_string(),
     }
@@ -62,6 +123,44 @@ mod tests {
         let error = table.records().next().unwrap().unwrap_err();
         let expected = "line 2: text that is not UTF-8: save the table as \"CSV UTF-8\"";
         assert_eq!(fault(&error), expected);
+    }
+
+    /// Messages named the line before.
+    #[test]
+    fn lines_that_end_by_cr_lf_are_counted_as_they_are() {
+        for ending in ["\n", "\r\n"] {
+            let text = "id,note\na,\"x\ny\"\nb,1\n\nd,5\ne,6".replace('\n', ending);
+            for capacity in [8, 9, 10, 11, 64] {
+                let buffered = io::BufReader::with_capacity(capacity, text.as_bytes());
+                let mut table = reader(buffered).unwrap();
+                table.headers().unwrap();
+                let records: Vec<_> = table.records().map(Result::unwrap).collect();
+                let lines: Vec<u64> =
+                    records.iter().map(|r| r.position().unwrap().line()).collect();
+                assert_eq!(lines, [2, 4, 6, 7], "{ending:?}");
+                assert_eq!(records[0][1], format!("x{ending}y"));
+                assert_eq!(&records[3][1], "6");
+            }
+        }
+    }
+
+    /// A lone carriage return ends a line, too, for the csv crate; none is lost.
+    #[test]
+    fn other_carriage_returns_are_kept() {
+        for text in ["a\rb\r", "\r\r\n\"\r\n\"\r", "\r"] {
+            for capacity in [1, 2, 64] {
+                let inner = io::BufReader::with_capacity(capacity, text.as_bytes());
+                let mut plain = LineFeeds { inner, is_quoted: false, has_return: false };
+                let mut found = Vec::new();
+                // One byte at a time.
+                let mut byte = [0];
+                while plain.read(&mut byte).unwrap() > 0 {
+                    found.push(byte[0]);
+                }
+                let expected = text.replace("\r\r\n\"", "\r\n\"");
+                assert_eq!(String::from_utf8(found).unwrap(), expected);
+            }
+        }
     }
 
     #[test]

@@ -199,12 +199,16 @@ pub fn compare(
     let scores = |p: &[usize], path: String| {
         Scores::new(truth, p, labels.len()).map(|scores| Compared { path, scores })
     };
-    let folds = first.column("fold").unwrap_or_default();
+    let (folds, others) = (first.column("fold"), second.column("fold"));
+    let folds_differ = match (&folds, &others) {
+        (Some(folds), Some(others)) => {
+            let mut pairs = first.rows.iter().zip(folds);
+            pairs.any(|(row, fold)| others[places[&row.key]] != *fold)
+        }
+        (one, other) => one.is_some() != other.is_some(),
+    };
+    let folds = folds.unwrap_or_default();
     let n_folds = Labels::of(&folds).0.len();
-    let folds_differ = second.column("fold").is_some_and(|others| {
-        let pairs = first.rows.iter().zip(&folds);
-        pairs.into_iter().any(|(row, fold)| others[places[&row.key]] != *fold)
-    });
     let foldwise = n_folds > 1 && !folds_differ && folds.iter().all(|fold| !fold.is_empty());
     let by_fold = foldwise.then(|| bootstrap(truth, a, b, Some(&folds), resamples, seed));
     Ok(Comparison {

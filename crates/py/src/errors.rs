@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 pyo3::import_exception!(corsmal_feat.errors, ConfigError);
 pyo3::import_exception!(corsmal_feat.errors, DecodeError);
 pyo3::import_exception!(corsmal_feat.errors, ModelError);
+pyo3::import_exception!(corsmal_feat.errors, MissingFileError);
 pyo3::import_exception!(corsmal_feat.errors, ParameterError);
 pyo3::import_exception!(corsmal_feat.errors, RunError);
 

@@ -21,7 +21,7 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
 use crate::arrays::{into_numpy, view2};
-use crate::errors::{ConfigError, RunError, value_error};
+use crate::errors::{ConfigError, MissingFileError, RunError, value_error};
 use crate::pool::{self, compute};
 
 /// How often a run asks whether Python has a signal for us.
@@ -151,6 +151,7 @@ pub(crate) fn extract(
 pub(crate) fn input_error(error: InputError) -> PyErr {
     match error {
         InputError::Stopped => PyKeyboardInterrupt::new_err(error.to_string()),
+        InputError::Missing { .. } => MissingFileError::new_err(error.to_string()),
         error => RunError::new_err(error.to_string()),
     }
 }

@@ -163,8 +163,8 @@ pub(crate) fn cross_validate_network(
     Ok((report, csv(predictions.to_csv())?, warnings, left_out))
 }
 
-/// Probabilities [recordings, classes] that a network gives recordings, the mean of their windows, and
-/// why others have none; these are zero.
+/// Probabilities [recordings, classes] that a network gives recordings, the mean of their windows, why
+/// others have none (these are zero), and a warning about their lengths.
 #[pyfunction]
 pub(crate) fn hear_recordings<'py>(
     py: Python<'py>,
@@ -172,18 +172,19 @@ pub(crate) fn hear_recordings<'py>(
     paths: Vec<String>,
     any_rate: bool,
     jobs: Option<usize>,
-) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Failed)> {
+) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Failed, Option<String>)> {
     let jobs = threads(jobs)?;
     let formats = if any_rate { Formats::Any } else { Formats::AsTrained };
     let classes = network.0.header.labels.len();
-    let (mut proba, mut failed) = (Vec::new(), Vec::new());
-    py.detach(|| {
+    let (mut proba, mut failed, mut unlike) = (Vec::new(), Vec::new(), Vec::new());
+    let warning = py.detach(|| {
         interruptible(
             |stop| {
                 let listener = Listener::new(&network.0, &[], formats, jobs).map_err(error)?;
                 let found = recordings(&paths)?;
                 let vote = Some(VotingRule::Mean);
                 let ended = listener.recordings(&found, vote, stop, &mut |input, verdict| {
+                    unlike.extend(verdict.unlike.map(|s| (input.source.to_string(), s)));
                     let found = verdict.decision.and_then(|(_, proba)| proba);
                     if found.is_none() {
                         let reason = verdict.reason.unwrap_or_default();
@@ -194,14 +195,14 @@ pub(crate) fn hear_recordings<'py>(
                     Ok::<_, SystemError>(true)
                 });
                 match ended.map_err(error)? {
-                    true => Ok(()),
+                    true => Ok(listener.length_warning(&unlike)),
                     false => Err(error(SystemError::Interrupted)),
                 }
             },
             &mut |_| Ok(()),
         )
     })?;
-    Ok((proba.into_pyarray(py).reshape(vec![paths.len(), classes])?, failed))
+    Ok((proba.into_pyarray(py).reshape(vec![paths.len(), classes])?, failed, warning))
 }
 
 /// What a network makes of recordings: by id rows of numbers, and why others have none.

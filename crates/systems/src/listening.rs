@@ -11,7 +11,7 @@ use corsmal_extract::run::Recordings;
 use corsmal_files::outcome::Status;
 use corsmal_models::argmax;
 use corsmal_models::fusion::WindowVotes;
-use corsmal_models::model_file::{FormatRule, TrainedOn};
+use corsmal_models::model_file::{FormatRule, Lengths, TrainedOn};
 use corsmal_models::voting::{Decision, VotingRule};
 use corsmal_nets::NetError;
 use corsmal_nets::front_end::{FrontEnd, Tensor};
@@ -47,12 +47,14 @@ pub struct Answer {
     pub decision: Option<Decision>,
     /// why there is no decision, or one from a part of the windows only
     pub reason: Option<String>,
+    /// the recording's length in seconds, where it is heard as a whole and far from those trained on
+    pub unlike: Option<f64>,
 }
 
 impl Answer {
     fn none(span: Option<(f64, f64)>, trouble: Trouble) -> Self {
         let Trouble { status, reason } = trouble;
-        Self { span, windows: 0, status, decision: None, reason: Some(reason) }
+        Self { span, windows: 0, status, decision: None, reason: Some(reason), unlike: None }
     }
 }
 
@@ -72,6 +74,8 @@ pub struct Listener<'a> {
     front_end: FrontEnd,
     config: Arc<Config>,
     formats: FormatRule,
+    /// of the recordings trained on, where the network hears them as a whole
+    lengths: Option<Lengths>,
     jobs: usize,
     pool: rayon::ThreadPool,
 }
@@ -97,12 +101,19 @@ impl<'a> Listener<'a> {
         let config = Config::from_tree(own.clone(), changes)?;
         let trained: Option<TrainedOn> =
             serde_json::from_value(header.provenance["trained_on"].clone()).unwrap_or_default();
+        let whole = front_end.windows.is_none();
+        let lengths = trained.as_ref().and_then(|trained| trained.seconds).filter(|_| whole);
         let formats = match trained.filter(|_| formats == Formats::AsTrained) {
             Some(trained) => trained.rule(own, &config.to_value())?.of_fixed_features(),
             None => FormatRule::default(),
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build()?;
-        Ok(Self { model, front_end, config: Arc::new(config), formats, jobs, pool })
+        Ok(Self { model, front_end, config: Arc::new(config), formats, lengths, jobs, pool })
+    }
+
+    /// That recordings are far from those trained on, given by name and [`Answer::unlike`], in words.
+    pub fn length_warning(&self, given: &[(String, f64)]) -> Option<String> {
+        self.lengths?.warning(given.iter().map(|(name, seconds)| (name.as_str(), *seconds)))
     }
 
     /// Whether the network takes windows of a recording one by one.
@@ -135,15 +146,20 @@ impl<'a> Listener<'a> {
             }
             let (input, outcome) = (recorded.input, recorded.outcome);
             let fits = self.check(outcome.sample_rate, outcome.channels);
+            let seconds = outcome.seconds();
             let heard = match (recorded.features.map(recordings::tensor), fits) {
                 (None, _) => Err(Trouble { status: outcome.status, reason: outcome.reason }),
                 (Some(_), Err(trouble)) => Err(trouble),
                 (Some(Err(reason)), _) => Err(Trouble { status: Status::Io, reason }),
                 (Some(Ok(tensor)), Ok(())) => self.hear(tensor)?,
             };
+            let apart = |seconds: &f64| self.lengths.is_some_and(|l| l.differ_from(*seconds));
+            let unlike = seconds.filter(apart);
             let status = outcome.status;
-            let answer =
-                |span, windows, decision| Answer { span, windows, status, decision, reason: None };
+            let answer = |span, windows, decision| {
+                let reason = None;
+                Answer { span, windows, status, decision, reason, unlike }
+            };
             let verdicts = match (heard, vote) {
                 (Err(trouble), _) => vec![Answer::none(None, trouble)],
                 (Ok(heard), Some(rule)) => {
@@ -231,7 +247,8 @@ impl<'a> Listener<'a> {
                     (Ok(heard), None) => {
                         let mean = self.votes(&heard)?.mean();
                         let (windows, status) = (heard.len(), Status::Ok);
-                        Answer { span, windows, status, decision: mean.map(decided), reason: None }
+                        let (decision, reason, unlike) = (mean.map(decided), None, None);
+                        Answer { span, windows, status, decision, reason, unlike }
                     }
                 };
                 if !each(input, answer)? {
@@ -255,7 +272,8 @@ impl<'a> Listener<'a> {
                         let windows = if failures == 1 { "window" } else { "windows" };
                         format!("{failures} {windows} failed, the first: {}", trouble.reason)
                     });
-                    Answer { span: None, windows: votes.windows(), status, decision, reason }
+                    let (span, windows, unlike) = (None, votes.windows(), None);
+                    Answer { span, windows, status, decision, reason, unlike }
                 }
             };
             if !each(input, answer)? {

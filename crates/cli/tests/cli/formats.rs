@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use corsmal_files::npz::{Compression, NpzWriter};
+
 use crate::command::{done, refused, run, text};
 
 /// A tone of half a second; class `low` or `high` by its frequency.
@@ -184,4 +186,39 @@ fn a_table_that_another_tool_wrote_is_trained_on() {
     let none = path("none.model");
     let refusal = refused(&["train", text(&other), "--target", "sort", "-o", text(&none)]);
     assert!(refusal.contains("kind"), "{refusal}");
+}
+
+/// Nothing tells whether the columns of such a table are those of the training.
+#[test]
+fn features_without_names_are_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = |name: &str, names: &[&str]| {
+        let path = folder.path().join(name);
+        let x: Vec<f32> = (0..40).map(|i| (i * i % 7) as f32).collect();
+        let mut npz = NpzWriter::create(&path, Compression::Stored).unwrap();
+        npz.floats("X", &[20, 2], &x).unwrap();
+        npz.strings("class", &["a", "b"].repeat(10)).unwrap();
+        if !names.is_empty() {
+            npz.strings("feature_names", names).unwrap();
+        }
+        npz.finish().unwrap();
+        path
+    };
+    let (named, bare) = (table("named.npz", &["low", "high"]), table("bare.npz", &[]));
+    let model = folder.path().join("a.model");
+    done(&["train", text(&named), "--target", "class", "-q", "-o", text(&model)]);
+    let classify = |path: &Path| {
+        let out = run(&["classify", "-m", text(&model), "--features", text(path), "-q", "-o", "-"]);
+        assert!(out.status.success(), "{out:?}");
+        String::from_utf8_lossy(&out.stderr).into_owned()
+    };
+    assert!(!classify(&named).contains("does not name its features"));
+    let told = classify(&bare);
+    assert!(
+        told.contains("bare.npz: it does not name its features")
+            && told.contains("from low to high")
+    );
+    let reversed = table("reversed.npz", &["high", "low"]);
+    let told = refused(&["classify", "-m", text(&model), "--features", text(&reversed), "-o", "-"]);
+    assert!(told.contains("feature 0 must be low, as in training, not high"), "{told}");
 }

@@ -226,6 +226,22 @@ fn windows_are_scored_and_voted_on() {
         done(&vote);
         assert_eq!(std::fs::read_to_string(&voted).unwrap().lines().count(), 1 + 24);
     }
+    // Those of a cross-validation, which have no column of the recording.
+    let held_out = j.path("held_out.csv");
+    let learn = ["--labels", "folders", "--cv", "3", "--set", "trees=5", "-q", "-o"];
+    done(&[&["cross-validate", text(&table)], &learn[..], &[text(&held_out)]].concat());
+    let voted = j.path("voted.csv");
+    let fuse = ["fuse", text(&held_out), "--vote", "mean", "--overwrite", "-o", text(&voted)];
+    let fused = run(&fuse);
+    assert!(String::from_utf8_lossy(&fused.stderr).contains("24 recordings"), "{fused:?}");
+    let scored: Value = serde_json::from_str(&done(&["score", text(&voted), "--json"])).unwrap();
+    assert_eq!(scored["rows"], 24);
+    // Only one of the files has folds.
+    let compared =
+        run(&["compare-predictions", text(&held_out), text(&rows), "--labels", "folders"]);
+    let told = String::from_utf8_lossy(&compared.stderr).into_owned();
+    assert!(told.contains("has folds") && told.contains("unfair"), "{told}");
+    assert!(!String::from_utf8_lossy(&compared.stdout).contains("folds"), "{compared:?}");
     let nothing = run(&["fuse", text(&j.path("voted.csv")), "--vote", "majority", "-o", "-"]);
     let message = String::from_utf8_lossy(&nothing.stderr).into_owned();
     assert!(message.contains("nothing to vote on"), "{message}");

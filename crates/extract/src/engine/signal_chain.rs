@@ -20,7 +20,8 @@ pub fn channels_out(rule: &Channels, channels: usize) -> Result<usize, String> {
         Channels::Mean => Ok(1),
         Channels::Downmix71 if channels == 8 => Ok(1),
         Channels::Downmix71 => Err(format!(
-            "signal.channels = downmix-7.1 needs 8 channels; the recording has {channels}"
+            "signal.channels = downmix-7.1 needs 8 channels; the recording has {channels} \
+             (signal.channels=mean takes any number)"
         )),
         Channels::List(list) => match list.iter().find(|c| **c >= channels) {
             None => Ok(list.len()),

@@ -249,6 +249,7 @@ fn manifest_errors_name_the_line() {
         ("m.csv", "path\na.wav\nb.wav\n", "line 3: "),
         ("m.csv", "path,start\na.wav,soon\n", "line 2: start = \"soon\" is not a time in seconds"),
         ("m.csv", "path,start\na.wav,nan\n", "line 2: start = \"nan\""),
+        ("m.csv", "path,start\r\na.wav,\r\na.wav,x\r\n", "line 3: start = \"x\""),
         ("m.csv", "path,end\na.wav,-1\n", "line 2: end = \"-1\""),
         ("m.csv", "path,start,end\na.wav,2,2\n", "line 2: end = 2 is not after start = 2"),
         ("m.csv", "path,id\n,x\n", "line 2: no path"),

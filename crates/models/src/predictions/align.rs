@@ -245,22 +245,28 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
 
 impl PredictionTable {
     /// The same with the recordings as ids where the rows are windows that `extract --window` made:
-    /// ids `RECORDING@TIMES` beside a column `recording`.
+    /// ids `RECORDING@START`, or `RECORDING@TIMES` beside a column `recording`.
     ///
     /// # Errors
     /// [`PredictionError::Rows`] for a window that occurs twice.
     pub fn windows_by_recording(mut self) -> Result<Self> {
-        let Some(at) = self.position("recording") else { return Ok(self) };
-        let is_window = |row: &PredictionRow<Id>| {
-            let times = row.key.0.strip_prefix(row.cells[at].as_str());
-            times.is_some_and(|times| times.starts_with('@'))
+        let at = self.position("recording");
+        let of_window = |row: &PredictionRow<Id>| {
+            let (recording, start) = row.key.0.rsplit_once('@')?;
+            match at {
+                None => start.parse::<f64>().ok().map(|_| recording.to_owned()),
+                Some(at) => {
+                    let times = row.key.0.strip_prefix(row.cells[at].as_str())?;
+                    times.starts_with('@').then(|| row.cells[at].clone())
+                }
+            }
         };
-        let id = self.position("id");
-        if let Some(id) = id.filter(|_| self.rows.iter().all(is_window)) {
+        let recordings: Option<Vec<String>> = self.rows.iter().map(of_window).collect();
+        if let (Some(recordings), Some(id)) = (recordings, self.position("id")) {
             self.check_once_each()?;
-            for row in &mut self.rows {
-                row.key = Id(row.cells[at].clone());
-                row.cells[id].clone_from(&row.key.0);
+            for (row, recording) in self.rows.iter_mut().zip(recordings) {
+                row.cells[id].clone_from(&recording);
+                row.key = Id(recording);
             }
         }
         Ok(self)

@@ -19,6 +19,7 @@ use super::args::{Args, check_changes, recordings};
 use super::records::{End, Records, delivered, path_of};
 use crate::failure::Failure;
 use crate::networks::is_inputs;
+use crate::recordings::warn;
 
 /// Predicts.
 pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Failure> {
@@ -70,8 +71,9 @@ pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Fail
         found.iter().take(1).flat_map(|f| &f.labels).map(|(column, _)| column.clone()).collect();
     let mut records = args.records(&labels, &model.header.target, unit, &columns)?;
     let stop = crate::interrupt::flag();
-    let mut unread = false;
+    let (mut unread, mut unlike) = (false, Vec::new());
     let mut each = |input: &Input, answer: Answer| -> Result<bool, Failure> {
+        unlike.extend(answer.unlike.map(|seconds| (input.id.clone(), seconds)));
         unread = !write(&mut records, input, answer)?;
         Ok(!unread)
     };
@@ -79,7 +81,9 @@ pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Fail
         None => listener.recordings(&found, vote, stop, &mut each),
         Some(windowing) => listener.windows(&found, (windowing, vote), stop, &mut each),
     };
-    let end = match (heard?, unread) {
+    let heard = heard?;
+    listener.length_warning(&unlike).iter().for_each(|warning| warn(warning));
+    let end = match (heard, unread) {
         (false, _) => End::Interrupted,
         (true, true) => End::Unread,
         (true, false) => End::Done,
@@ -176,7 +180,7 @@ fn of_pictures(
 
 /// Writes a line; `false` where nobody reads any more.
 fn write(records: &mut Records, input: &Input, answer: Answer) -> Result<bool, Failure> {
-    let Answer { span, windows, status, decision, reason } = answer;
+    let Answer { span, windows, status, decision, reason, .. } = answer;
     if let Some(reason) = reason {
         eprintln!("{}: {}: {reason}", input.id, status.name());
     }

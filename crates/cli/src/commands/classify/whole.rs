@@ -79,9 +79,17 @@ pub fn of_features(
     let place = table.path.display();
     if model.check_configuration(&table.config_hash).is_err() {
         let wanted = &model.header().feature_config;
-        let why = match wanted.is_null() || table.config.is_null() {
-            true => "from another program, or the model's were".into(),
-            false => difference(wanted, &table.config),
+        let why = match (wanted.is_null(), table.config.is_null()) {
+            (true, _) => {
+                "the model was trained on a table of another program: give such a table, or \
+                          train on an output of extract"
+                    .into()
+            }
+            (_, true) => "it does not say how they were computed, as an output of extract does (a \
+                          program that writes one again loses that): give that output, or train on \
+                          a table like this"
+                .into(),
+            _ => difference(wanted, &table.config),
         };
         return Err(Failure::new(format!("{place}: not the features of this model: {why}")));
     }
@@ -216,7 +224,17 @@ fn check_features(model: &Model, table: &LabelledTable, meter: &Meter) -> Result
         table.ids.iter().for_each(|id| refuse(meter, id, &reason));
         return Ok(false);
     }
-    let names = model.header().feature_names.iter().zip(&table.feature_names);
+    let wanted = &model.header().feature_names;
+    if !wanted.is_empty() && table.feature_names.is_empty() {
+        warn(&format!(
+            "{}: it does not name its features; they must be those of the training, in the same order, \
+             from {} to {}",
+            table.path.display(),
+            wanted[0],
+            wanted[wanted.len() - 1]
+        ));
+    }
+    let names = wanted.iter().zip(&table.feature_names);
     match names.enumerate().find(|(_, (known, given))| known != given) {
         None => Ok(true),
         Some((at, (known, given))) => Err(Failure::new(format!(

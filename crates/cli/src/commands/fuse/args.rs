@@ -111,8 +111,7 @@ impl Args {
                 table = table.windows_by_recording()?;
                 if table.check_once_each().is_ok() {
                     eprintln!(
-                        "warning: {}: it has one line per recording, so there is nothing to vote \
-                         on",
+                        "warning: {}: each id has one line, so there is nothing to vote on",
                         path.display()
                     );
                 }

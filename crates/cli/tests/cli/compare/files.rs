@@ -279,6 +279,11 @@ fn recordings_of_other_folders_are_paired_by_file_name() {
     again("d.npz", &[]);
     let words = ["no recording in common", "a.npz has \"one\", \"two\"", "d.npz has \"x\""];
     refused(&files.run("a.npz", "d.npz", &[]), &words);
+
+    // The same recordings, and nothing in common that is known of them.
+    extract(&files, "e.npz", &["--preset", "logmel"]);
+    let words = ["the recordings are the same", "e.npz has \"one\"", "Compare frames with frames"];
+    refused(&files.run("a.npz", "e.npz", &[]), &words);
 }
 
 fn text_of(path: &Path) -> &str {
