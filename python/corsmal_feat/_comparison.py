@@ -8,7 +8,7 @@ from typing import Any
 
 from . import _core
 from ._predictions import StrPath
-from ._refusals import existing, refuses, whole
+from ._refusals import existing, refuses, seed_of, whole
 
 __all__ = ["Comparison", "compare_predictions"]
 
@@ -78,7 +78,7 @@ def compare_predictions(
     """
     count = whole("resamples", resamples, 1_000_001)
     text = _core.compare_predictions(
-        existing(first), existing(second), target, count, whole("seed", seed, 2**64)
+        existing(first), existing(second), target, count, seed_of(seed)
     )
     report = json.loads(text)
     test, interval = report["mcnemar"], report["bootstrap_rows"]

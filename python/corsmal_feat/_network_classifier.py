@@ -71,7 +71,8 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         """Trains on `X` and `y`, one label per item.
 
         `watched` are indices of items that are not used for training. Their score after each epoch
-        is in `history_` and, with the recipe's `select`, chooses the epoch to keep.
+        is in `history_`. If the recipe's `select` is not "last", it chooses the epoch to keep; with
+        "split", their loss does.
         """
         columns = self._columns(X)
         count = len(columns[0][1]) - 1

@@ -287,5 +287,5 @@ def seed_of(seed: int) -> int:
 def whole(name: str, value: int, limit: int) -> int:
     """A whole number from 0 to below `limit`."""
     if not isinstance(value, int | np.integer) or not 0 <= value < limit:
-        raise ParameterError(f"{name} must be a whole number from 0 to {limit - 1}, not {value}")
+        raise ParameterError(f"{name} must be a whole number from 0 to {limit - 1}, not {value!r}")
     return int(value)

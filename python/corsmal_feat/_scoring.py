@@ -13,7 +13,7 @@ import numpy as np
 from . import _core
 from ._by_name import ByName
 from ._predictions import Predictions, StrPath, parse
-from ._refusals import existing, refuses, whole
+from ._refusals import existing, refuses, seed_of, whole
 from ._warnings import warn
 from .errors import ParameterError
 
@@ -278,7 +278,7 @@ def score(
         float(reject),
         bool(numeric),
         whole("resamples", resamples, 1_000_001),
-        whole("seed", seed, 2**64),
+        seed_of(seed),
     )
     report = json.loads(text)
     if report["kind"] == "numbers":

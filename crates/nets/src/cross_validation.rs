@@ -82,7 +82,7 @@ pub fn cross_validate(
     Ok(results)
 }
 
-/// Items trained on, items that choose the epoch, and the group that these are.
+/// Items trained on, items that choose the epoch, and the group that these are, where they are one.
 ///
 /// # Errors
 /// A validation group without groups; a fifth of too few items.
@@ -98,8 +98,8 @@ pub fn watched(
             let held = fifth(data, fold, recipe);
             if held.is_empty() {
                 return Err(NetError::Targets(
-                    "select = split holds out a fifth of the training items of each class: one class needs \
-                     at least 3"
+                    "select = split holds out a fifth of the training items of each class: at least \
+                     one class must have 3"
                         .into(),
                 ));
             }

@@ -124,8 +124,8 @@ pub enum Select {
     Validation,
     /// as M5 published it: the best on the test fold, which makes its score too good
     Published,
-    /// as M6 published it: the lowest loss on a random fifth of the training rows of each class, whose groups
-    /// are also trained on
+    /// as M6 published it: the lowest loss on a random fifth of the training items of each class. These are
+    /// not trained on, others of their groups are
     Split,
 }
 

@@ -146,6 +146,7 @@ impl Training<'_> {
     ) -> Result<Trained> {
         let Examples { definition, table, items, heard, .. } = examples;
         let recipe = self.recipe;
+        require_whole(&recipe, examples)?;
         let (labels, classes) = table.classes(self.target)?;
         let y = examples.classes(&classes);
         let groups = self.groups.map(|groups| table.column(groups)).transpose()?;
@@ -214,6 +215,7 @@ impl Training<'_> {
     ) -> Result<Validated> {
         let Examples { definition, table, items, .. } = examples;
         let recipe = self.recipe;
+        require_whole(&recipe, examples)?;
         let (labels, classes) = table.classes(self.target)?;
         let y = examples.classes(&classes);
         let groups = folds.groups().map(|groups| examples.of_items(groups));
@@ -270,6 +272,22 @@ impl Training<'_> {
         let target = self.target.into();
         Ok(Validated { target, folds, labels, classes, result, report, caution })
     }
+}
+
+/// Refuses to choose an epoch by windows of recordings whose other windows are trained on.
+fn require_whole(recipe: &Recipe, examples: &Examples) -> Result<()> {
+    let several = || examples.items_of().iter().any(|items| items.len() > 1);
+    if recipe.select == Select::Split && several() {
+        return Err(NetError::Recipe {
+            key: "select".into(),
+            value: "split".into(),
+            allowed: "last, validation or published: recordings have several windows, and some \
+                      would be on either side of a split"
+                .into(),
+        }
+        .into());
+    }
+    Ok(())
 }
 
 fn weighted_f1(truth: &[usize], found: &[usize], n_classes: usize) -> f64 {

@@ -78,8 +78,8 @@ impl Reader<'_> {
 }
 
 impl Views {
-    /// Refuses detections in frames after the last of their view's video: they are of another recording, or
-    /// count otherwise. Images of frames may be fewer than those that a detector saw.
+    /// Refuses detections in frames after the last of their view's video and images: they are of another
+    /// recording, or count otherwise. Without a video, images may be fewer than the frames that a detector saw.
     pub(super) fn require_frames(
         &self,
         detections: &[Detection],
@@ -89,9 +89,12 @@ impl Views {
             let Some(last) = of_view.map(|d| d.frame).max() else { continue };
             // A damaged video is said where its pictures are needed.
             let Ok(Some(video)) = self.video(view) else { continue };
-            if last as usize >= video.len() {
+            let shown = |kind| self.frames(kind, view).ok()?.last().map(|frame| frame.number);
+            let images = [Kind::Rgb, Kind::Depth, Kind::Masks].into_iter().filter_map(shown).max();
+            if last as usize >= video.len() && images.is_none_or(|image| last > image) {
                 return Err(format!(
-                    "frame {last} of view {view}: its video has {} frames, counted from 0",
+                    "frame {last} of view {view}: its video has {} frames, counted from 0; expected \
+                     the table of this recording, with frames counted from 0",
                     video.len()
                 ));
             }

@@ -205,6 +205,10 @@ fn a_network_learns_from_recordings_and_hears_them() {
     tone(&audio.join("tone/short.wav"), 0, 0.3, 44_100);
     let model = path("type.safetensors");
     let learn = ["train", text(&audio), "--net", "m4-type", "--labels", "folders"];
+    // Windows of one recording would be on both sides.
+    let split = ["--set", "select=split", "-o", "split.model"];
+    let refusal = refused(&[&learn[..], &split[..]].concat());
+    assert!(refusal.contains("recordings have several windows"), "{refusal}");
     let recipe = ["--set", "epochs=4", "--set", "batch=6", "--set", "lr=0.001", "-o", text(&model)];
     let output = run(&[&learn[..], &recipe[..]].concat());
     let message = String::from_utf8_lossy(&output.stderr);

@@ -70,10 +70,10 @@ pub enum InputError {
     /// The caller asked to stop.
     #[error("interrupted")]
     Stopped,
-    /// The manifests together have too many labels.
+    /// The manifests together have too many labels, or one that cannot be called so.
     #[error("{reason}")]
     Labels {
-        /// How many, and how many are allowed.
+        /// How many, and how many are allowed; or which, and why not.
         reason: String,
     },
     /// A recording that cannot be cut into windows.

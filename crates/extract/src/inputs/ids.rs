@@ -40,7 +40,7 @@ pub(super) fn label_refusal(labels: &[(String, String)]) -> Option<String> {
     Some(format!("the label {} must not contain .. as a path does", quoted(name)))
 }
 
-/// Whether what unpacks a member of this name would write elsewhere.
+/// Whether what unpacks a member of this name may write elsewhere.
 fn climbs(name: &str) -> bool {
     name.split(['/', '\\']).any(|part| part == "..")
 }
@@ -144,6 +144,8 @@ fn id_of(path: &Path) -> String {
         })
         .collect();
     let id = parts.join("/").replace(char::is_control, "\u{fffd}");
+    // Parts between backslashes are folders elsewhere.
+    let id = if climbs(&id) { id.replace("..", "_") } else { id };
     if id.starts_with(RESERVED) { format!("./{id}") } else { id }
 }
 

@@ -271,7 +271,12 @@ impl<'a> Search<'a> {
         // A manifest beside the wrong folder, or one with files that are gone, is mended before the run.
         let mut unreadable: Option<(u64, String, usize)> = None;
         let mut stores = HashSet::new();
-        for entry in manifest::read(path)? {
+        let entries = manifest::read(path)?;
+        // All rows have the same labels.
+        if let Some(reason) = entries.first().and_then(|e| ids::label_refusal(&e.labels)) {
+            return Err(InputError::Labels { reason: format!("{}: {reason}", path.display()) });
+        }
+        for entry in entries {
             let wrong =
                 |reason| InputError::Manifest { path: path.into(), line: entry.line, reason };
             let mut stored = None;
@@ -303,8 +308,7 @@ impl<'a> Search<'a> {
                     }
                 }
             }
-            let refusal = entry.id.as_deref().and_then(ids::refusal);
-            if let Some(reason) = refusal.or_else(|| ids::label_refusal(&entry.labels)) {
+            if let Some(reason) = entry.id.as_deref().and_then(ids::refusal) {
                 return Err(wrong(reason));
             }
             let naming = match (entry.id, &stored) {

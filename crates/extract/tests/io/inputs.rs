@@ -257,7 +257,7 @@ fn manifest_errors_name_the_line() {
         ("m.csv", "path,id\na.wav,x.npy\n", "line 2: id \"x.npy\" must not end in .npy"),
         ("m.csv", "path,id\na.wav,../x\n", "line 2: id \"../x\" must not be an absolute path"),
         ("m.csv", "path,id\na.wav,/x\n", "line 2: id \"/x\" must not be an absolute path"),
-        ("m.csv", "path,../../x\na.wav,1\n", "line 2: the label \"../../x\" must not contain .."),
+        ("m.csv", "path,../../x\na.wav,1\n", "m.csv: the label \"../../x\" must not contain .."),
         ("m.csv", "path\n.\n", "is a folder"),
         ("m.jsonl", "{\"path\": \"a.wav\"}\n[1]\n", "line 2: "),
         ("m.jsonl", "{\"path\": \"a.wav\", \"x\": [1]}\n", "line 1: \"x\" must be a string"),

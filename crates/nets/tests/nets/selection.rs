@@ -68,5 +68,5 @@ fn a_fifth_of_too_few_rows_is_refused() {
     let data = Data { items: &items, classes: &classes, n_classes: 3, groups: None, weights: None };
     let fold = FoldItems { name: "f".into(), train: (0..6).collect(), test: vec![] };
     let error = watched(data, &fold, &recipe(1, Select::Split)).unwrap_err();
-    assert!(matches!(&error, NetError::Targets(text) if text.contains("at least 3")), "{error}");
+    assert!(matches!(&error, NetError::Targets(text) if text.contains("must have 3")), "{error}");
 }

@@ -339,7 +339,7 @@ fn items_of_another_layout_are_refused() {
 
 /// The error asked for real numbers, found those, and named the file twice.
 #[test]
-fn offsets_that_are_fractions_are_refused() {
+fn offsets_of_a_floating_point_type_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x.npz");
     let mut npz = NpzWriter::create(&path, Compression::Stored).unwrap();

@@ -49,7 +49,7 @@ impl Detection {
     /// of the image.
     ///
     /// # Errors
-    /// The mask is damaged, or nowhere in the box.
+    /// The mask is damaged, or its extent is outside the box.
     pub fn mask(&self, size: Option<(usize, usize)>) -> Result<Option<Mask>> {
         let mask = match &self.mask {
             Segmentation::None => return Ok(None),
@@ -58,7 +58,10 @@ impl Detection {
                 segmentation.mask(size).map_err(|reason| self.mask_fault(reason))?
             }
         };
-        if let Some(bounds) = mask.bounds().filter(|bounds| !self.overlaps(*bounds)) {
+        // One of another size is refused as that, by who knows the image.
+        let comparable = size.is_none_or(|size| size == (mask.width, mask.height));
+        let outside = mask.bounds().filter(|bounds| comparable && !self.overlaps(*bounds));
+        if let Some(bounds) = outside {
             let [left, top, right, bottom] = bounds;
             return Err(self.mask_fault(format!(
                 "its pixels (columns {left} to {}, rows {top} to {}) are all outside the box {:?}; \
