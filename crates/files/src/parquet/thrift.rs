@@ -2,7 +2,9 @@
 //! parquet crate is given to decode is known to end where it says.
 //!
 //! The crate (60.1) believes the lengths of lists and maps: four thousand bytes keep it busy for
-//! hours. Here every element takes at least one byte, so the walk takes as long as the bytes.
+//! hours. Here every element takes at least one byte, so the walk takes as long as the bytes. Lists and
+//! maps of truth values, which Parquet's metadata do not have, are refused: the crate takes no bytes for
+//! them, and what follows for something else than the walk does.
 
 /// Structures in structures.
 const DEPTH: usize = 32;
@@ -101,10 +103,18 @@ impl Walk<'_> {
         }
     }
 
+    /// A value in a list or a map.
+    fn element(&mut self, kind: u8, depth: usize) -> Result<(), Fault> {
+        match kind {
+            1 | 2 => Err(Fault::Malformed),
+            kind => self.value(kind, depth),
+        }
+    }
+
     fn value(&mut self, kind: u8, depth: usize) -> Result<(), Fault> {
         let depth = depth.checked_sub(1).ok_or(Fault::Malformed)?;
         match kind {
-            1..=3 => self.skip(1),
+            3 => self.skip(1),
             4..=6 => self.varint().map(drop),
             7 => self.skip(8),
             8 => {
@@ -117,14 +127,14 @@ impl Walk<'_> {
                     15 => self.varint()?,
                     count => u64::from(count),
                 };
-                (0..count).try_for_each(|_| self.value(head & 15, depth))
+                (0..count).try_for_each(|_| self.element(head & 15, depth))
             }
             11 => {
                 let count = self.varint()?;
                 let kinds = if count > 0 { self.byte()? } else { 0 };
                 (0..count).try_for_each(|_| {
-                    self.value(kinds >> 4, depth)?;
-                    self.value(kinds & 15, depth)
+                    self.element(kinds >> 4, depth)?;
+                    self.element(kinds & 15, depth)
                 })
             }
             12 => self.structure(depth, None),
@@ -140,8 +150,8 @@ mod tests {
 
     #[test]
     fn structures_end_where_they_say() {
-        // Field 1: i32 -3; field 2: text "ab"; field 4: a list of two truth values; the end.
-        let bytes = [0x15, 5, 0x18, 2, b'a', b'b', 0x29, 0x21, 1, 2, 0, 0xff];
+        // Field 1: i32 -3; field 2: text "ab"; field 4: a list of two bytes; the end.
+        let bytes = [0x15, 5, 0x18, 2, b'a', b'b', 0x29, 0x23, 1, 2, 0, 0xff];
         let walked = structure(&bytes).unwrap();
         assert_eq!((walked.length, walked.numbers), (11, vec![(1, -3)]));
         for end in 0..11 {
@@ -151,13 +161,22 @@ mod tests {
 
     #[test]
     fn lengths_that_nothing_stands_behind_end_the_walk() {
-        // A map of 2^34 truth values, a list of 2^60 structures, a text of 2^63 bytes.
-        let map = [0x1b, 0x80, 0x80, 0x80, 0x80, 0x40, 0x11, 1, 1];
+        // A map of 2^34 bytes, a list of 2^60 structures, a text of 2^63 bytes.
+        let map = [0x1b, 0x80, 0x80, 0x80, 0x80, 0x40, 0x33, 1, 1];
         assert_eq!(structure(&map).err(), Some(Fault::Short));
         let list = [0x19, 0xfc, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x10, 0, 0];
         assert_eq!(structure(&list).err(), Some(Fault::Short));
         let text = [0x18, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 1, b'x'];
         assert_eq!(structure(&text).err(), Some(Fault::Short));
+        // Of truth values, which the crate counts without reading: a list of two, one of 2^31, a map.
+        for bytes in [
+            &[0x19, 0x21, 1, 2, 0][..],
+            &[0x19, 0xf1, 0xff, 0xff, 0xff, 0xff, 7, 1, 2, 0],
+            &[0x1b, 1, 0x13, 1, 1, 0],
+            &[0x1b, 1, 0x32, 1, 1, 0],
+        ] {
+            assert_eq!(structure(bytes).err(), Some(Fault::Malformed), "{bytes:?}");
+        }
         assert_eq!(structure(&[0x1c; 100]).err(), Some(Fault::Malformed), "too deep");
         assert_eq!(structure(&[0x1f]).err(), Some(Fault::Malformed));
     }
