@@ -15,6 +15,7 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 
 use super::error::{ParquetTableError, io as failed, layout};
+use super::fields::{FOOTER, PAGE_HEADER};
 use super::thrift::{self, Fault};
 
 /// Values that a file of any size may hold.
@@ -48,7 +49,7 @@ pub(super) fn check_footer(path: &Path, file: &File) -> Result<(), ParquetTableE
     }
     let mut metadata = vec![0; size as usize];
     read_at(file, length - 8 - size, &mut metadata).map_err(io)?;
-    thrift::structure(&metadata)
+    thrift::structure(&metadata, FOOTER)
         .map(drop)
         .map_err(|_| layout(path, "metadata of a Parquet file", "bytes that contradict themselves"))
 }
@@ -118,7 +119,7 @@ fn walk_pages(
         let walked = loop {
             buffer.resize(size as usize, 0);
             read_at(file, at, &mut buffer).map_err(|e| failed(path, e))?;
-            match thrift::structure(&buffer) {
+            match thrift::structure(&buffer, PAGE_HEADER) {
                 Ok(walked) => break walked,
                 Err(Fault::Short) if size < end - at => size = (8 * size).min(end - at),
                 Err(_) => return Err(damaged()),

@@ -3,6 +3,7 @@
 //! provenance and outcomes are in the file's key-value metadata.
 
 mod error;
+mod fields;
 mod frames;
 mod keys;
 mod levels;

@@ -2,9 +2,12 @@
 //! parquet crate is given to decode is known to end where it says.
 //!
 //! The crate (60.1) believes the lengths of lists and maps: four thousand bytes keep it busy for
-//! hours. Here every element takes at least one byte, so the walk takes as long as the bytes. Lists and
-//! maps of truth values, which Parquet's metadata do not have, are refused: the crate takes no bytes for
-//! them, and what follows for something else than the walk does.
+//! hours. Here every element takes at least one byte, so the walk takes as long as the bytes.
+//!
+//! What the crate would read otherwise is refused: known fields that declare another type, and lists and maps
+//! of truth values, for which it takes no bytes; Parquet's metadata have none.
+
+use super::fields::{Fields, Type};
 
 /// Structures in structures.
 const DEPTH: usize = 32;
@@ -26,11 +29,11 @@ pub(super) enum Fault {
     Malformed,
 }
 
-/// Walks over the structure that `bytes` begin with.
-pub(super) fn structure(bytes: &[u8]) -> Result<Walked, Fault> {
+/// Walks over the structure with these `fields` that `bytes` begin with.
+pub(super) fn structure(bytes: &[u8], fields: &Fields) -> Result<Walked, Fault> {
     let mut walk = Walk { bytes, at: 0 };
     let mut numbers = Vec::new();
-    walk.structure(DEPTH, Some(&mut numbers))?;
+    walk.structure(fields, DEPTH, Some(&mut numbers))?;
     Ok(Walked { length: walk.at, numbers })
 }
 
@@ -76,6 +79,7 @@ impl Walk<'_> {
 
     fn structure(
         &mut self,
+        fields: &Fields,
         depth: usize,
         mut numbers: Option<&mut Vec<(i16, i32)>>,
     ) -> Result<(), Fault> {
@@ -89,6 +93,10 @@ impl Walk<'_> {
                 0 => self.number()? as i16,
                 delta => field.wrapping_add(i16::from(delta)),
             };
+            let known = fields.iter().find(|(number, _)| *number == field).map(|(_, known)| *known);
+            if known.is_some_and(|known| !known.is(head & 15)) {
+                return Err(Fault::Malformed);
+            }
             match head & 15 {
                 // In a structure, truth values are in their type.
                 1 | 2 => {}
@@ -98,20 +106,22 @@ impl Walk<'_> {
                         numbers.push((field, value));
                     }
                 }
-                kind => self.value(kind, depth)?,
+                kind => self.value(kind, known, depth)?,
             }
         }
     }
 
     /// A value in a list or a map.
-    fn element(&mut self, kind: u8, depth: usize) -> Result<(), Fault> {
+    fn element(&mut self, kind: u8, known: Option<Type>, depth: usize) -> Result<(), Fault> {
         match kind {
             1 | 2 => Err(Fault::Malformed),
-            kind => self.value(kind, depth),
+            kind if known.is_some_and(|known| !known.is(kind)) => Err(Fault::Malformed),
+            kind => self.value(kind, known, depth),
         }
     }
 
-    fn value(&mut self, kind: u8, depth: usize) -> Result<(), Fault> {
+    /// A value whose type is `known`, where it is.
+    fn value(&mut self, kind: u8, known: Option<Type>, depth: usize) -> Result<(), Fault> {
         let depth = depth.checked_sub(1).ok_or(Fault::Malformed)?;
         match kind {
             3 => self.skip(1),
@@ -127,17 +137,24 @@ impl Walk<'_> {
                     15 => self.varint()?,
                     count => u64::from(count),
                 };
-                (0..count).try_for_each(|_| self.element(head & 15, depth))
+                let known = match known {
+                    Some(Type::List(of)) => Some(*of),
+                    _ => None,
+                };
+                (0..count).try_for_each(|_| self.element(head & 15, known, depth))
             }
             11 => {
                 let count = self.varint()?;
                 let kinds = if count > 0 { self.byte()? } else { 0 };
                 (0..count).try_for_each(|_| {
-                    self.element(kinds >> 4, depth)?;
-                    self.element(kinds & 15, depth)
+                    self.element(kinds >> 4, None, depth)?;
+                    self.element(kinds & 15, None, depth)
                 })
             }
-            12 => self.structure(depth, None),
+            12 => match known {
+                Some(Type::Struct(fields)) => self.structure(fields, depth, None),
+                _ => self.structure(&[], depth, None),
+            },
             13 => self.skip(16),
             _ => Err(Fault::Malformed),
         }
@@ -146,7 +163,12 @@ impl Walk<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::fields::{FOOTER, PAGE_HEADER};
     use super::*;
+
+    fn structure(bytes: &[u8]) -> Result<Walked, Fault> {
+        super::structure(bytes, &[])
+    }
 
     #[test]
     fn structures_end_where_they_say() {
@@ -179,5 +201,25 @@ mod tests {
         }
         assert_eq!(structure(&[0x1c; 100]).err(), Some(Fault::Malformed), "too deep");
         assert_eq!(structure(&[0x1f]).err(), Some(Fault::Malformed));
+    }
+    /// A footer of 10 KB kept the crate busy for a second: it read a list where the header says binary.
+    #[test]
+    fn known_fields_have_their_types() {
+        // Version 1; no schema; no rows; a row group with no columns, 0 bytes, 0 rows.
+        let sound = [0x15, 2, 0x19, 0, 0x16, 0, 0x19, 0x1c, 0x19, 0x0c, 0x16, 0, 0x16, 0, 0, 0];
+        assert_eq!(super::structure(&sound, FOOTER).unwrap().length, sound.len());
+        // The columns as text; a list of numbers for row groups; the version as a structure.
+        for (at, byte) in [(8, 0x18), (7, 0x15), (0, 0x1c)] {
+            let mut other = sound;
+            other[at] = byte;
+            assert_eq!(super::structure(&other, FOOTER).err(), Some(Fault::Malformed), "{at}");
+        }
+        // A page header: type, two sizes, and a data page whose statistics are a number.
+        let page =
+            [0x15, 0, 0x15, 2, 0x15, 2, 0x2c, 0x15, 2, 0x15, 0, 0x15, 6, 0x15, 6, 0x1c, 0, 0, 0];
+        assert_eq!(super::structure(&page, PAGE_HEADER).unwrap().numbers[1..], [(2, 1), (3, 1)]);
+        let mut other = page;
+        other[15] = 0x15;
+        assert_eq!(super::structure(&other, PAGE_HEADER).err(), Some(Fault::Malformed));
     }
 }
