@@ -24,9 +24,11 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Vec<Detection>> {
     let mut detections = Vec::new();
     for row in reader.records() {
         let row = row.map_err(fault)?;
-        let line = row.position().map_or(0, |p| p.line());
+        let at = row.position().map_or(0, |p| p.byte() as usize);
         let text = |key: &str| column(key).and_then(|c| row.get(c)).unwrap_or_default();
-        let place = |reason: String| VisionError::file(path, format!("line {line}: {reason}"));
+        let place = |reason: String| {
+            VisionError::file(path, format!("line {}: {reason}", line_of(bytes, at)))
+        };
         if detections.len() == MAX_DETECTIONS {
             return Err(place(format!("a table has at most {MAX_DETECTIONS} detections")));
         }
@@ -51,4 +53,12 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Vec<Detection>> {
         detections.push(detection(names, score, bounds, mask).map_err(place)?);
     }
     Ok(detections)
+}
+
+/// The line of the row that begins at a byte. The csv crate takes the line feed after a carriage return, and
+/// empty lines, for a part of the row behind them.
+fn line_of(bytes: &[u8], at: usize) -> usize {
+    let (before, row) = bytes.split_at(at.min(bytes.len()));
+    let ends = row.iter().take_while(|byte| matches!(byte, b'\r' | b'\n'));
+    1 + before.iter().chain(ends).filter(|&&byte| byte == b'\n').count()
 }

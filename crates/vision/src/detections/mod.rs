@@ -208,6 +208,12 @@ mod tests {
             let error = table("d.csv", &format!("{HEADER}{row}\n")).unwrap_err().to_string();
             assert!(error.contains(part), "{error}");
         }
+        // As Excel ends lines, and behind an empty one.
+        let rows = format!("{HEADER}1,1,cup,1,0,0,1,1,m.png\n\n1,5,cup,1,0,0,1,1,\n");
+        for ending in ["\n", "\r\n"] {
+            let error = table("d.csv", &rows.replace('\n', ending)).unwrap_err().to_string();
+            assert!(error.contains("line 4: '5' is not a view"), "{error}");
+        }
         let error = table("d.csv", "frame,view\n1,1\n").unwrap_err().to_string();
         assert!(error.contains("no column 'label'; it has frame, view"), "{error}");
         for (text, part) in [
