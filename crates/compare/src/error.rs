@@ -39,8 +39,8 @@ pub enum CompareError {
     },
     /// Two outputs of ours over the same recordings, of other features or kinds.
     #[error(
-        "the recordings are the same, but not what is known of them: {a} has {in_a}; {b} has {in_b}. \
-         Compare frames with frames, or statistics with statistics"
+        "the recordings are the same, but nothing of them is in both files: {a} has {in_a}; {b} has \
+         {in_b}. Compare frames with frames, or statistics with statistics, of the same features"
     )]
     NoFeatureInCommon {
         /// First file.

@@ -102,7 +102,7 @@ impl Matching {
         if pairs.is_empty() && matching.tables.is_empty() {
             if let (Some(in_a), Some(in_b)) = (a.recordings(), b.recordings()) {
                 let (of_a, of_b) = (a.path().into(), b.path().into());
-                if in_a == in_b {
+                if in_a == in_b && !in_a.is_empty() {
                     let (in_a, in_b) = (a.listing(), b.listing());
                     return Err(CompareError::NoFeatureInCommon { a: of_a, b: of_b, in_a, in_b });
                 }
