@@ -81,14 +81,16 @@ pub fn of_features(
         let wanted = &model.header().feature_config;
         let why = match (wanted.is_null(), table.config.is_null()) {
             (true, _) => {
-                "the model was trained on a table of another program: give such a table, or \
-                          train on an output of extract"
+                "the model was trained on a table of another program: give a table of that \
+                          program, or train on an output of extract"
                     .into()
             }
-            (_, true) => "it does not say how they were computed, as an output of extract does (a \
-                          program that writes one again loses that): give that output, or train on \
-                          a table like this"
-                .into(),
+            (_, true) => {
+                "no configuration says how they were computed, which programs that write a \
+                          table again leave out: give the output of extract, or train on a table \
+                          like this one"
+                    .into()
+            }
             _ => difference(wanted, &table.config),
         };
         return Err(Failure::new(format!("{place}: not the features of this model: {why}")));
