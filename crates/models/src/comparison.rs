@@ -134,7 +134,7 @@ pub struct Comparison {
     pub bootstrap_folds: Option<Bootstrap>,
     /// number of folds of the first file
     pub folds: usize,
-    /// whether a recording has another fold in the second file
+    /// whether a recording has another fold in the second file, or only one of the files has folds
     pub folds_differ: bool,
     /// draws of each bootstrap
     pub resamples: usize,

@@ -52,9 +52,18 @@ pub struct Answer {
 }
 
 impl Answer {
+    fn of(
+        span: Option<(f64, f64)>,
+        windows: usize,
+        status: Status,
+        decision: Option<Decision>,
+    ) -> Self {
+        Self { span, windows, status, decision, reason: None, unlike: None }
+    }
+
     fn none(span: Option<(f64, f64)>, trouble: Trouble) -> Self {
         let Trouble { status, reason } = trouble;
-        Self { span, windows: 0, status, decision: None, reason: Some(reason), unlike: None }
+        Self { reason: Some(reason), ..Self::of(span, 0, status, None) }
     }
 }
 
@@ -155,10 +164,9 @@ impl<'a> Listener<'a> {
             };
             let apart = |seconds: &f64| self.lengths.is_some_and(|l| l.differ_from(*seconds));
             let unlike = seconds.filter(apart);
-            let status = outcome.status;
-            let answer = |span, windows, decision| {
-                let reason = None;
-                Answer { span, windows, status, decision, reason, unlike }
+            let answer = |span, windows, decision| Answer {
+                unlike,
+                ..Answer::of(span, windows, outcome.status, decision)
             };
             let verdicts = match (heard, vote) {
                 (Err(trouble), _) => vec![Answer::none(None, trouble)],
@@ -246,9 +254,7 @@ impl<'a> Listener<'a> {
                     (Err(trouble), None) => Answer::none(span, trouble),
                     (Ok(heard), None) => {
                         let mean = self.votes(&heard)?.mean();
-                        let (windows, status) = (heard.len(), Status::Ok);
-                        let (decision, reason, unlike) = (mean.map(decided), None, None);
-                        Answer { span, windows, status, decision, reason, unlike }
+                        Answer::of(span, heard.len(), Status::Ok, mean.map(decided))
                     }
                 };
                 if !each(input, answer)? {
@@ -272,8 +278,7 @@ impl<'a> Listener<'a> {
                         let windows = if failures == 1 { "window" } else { "windows" };
                         format!("{failures} {windows} failed, the first: {}", trouble.reason)
                     });
-                    let (span, windows, unlike) = (None, votes.windows(), None);
-                    Answer { span, windows, status, decision, reason, unlike }
+                    Answer { reason, ..Answer::of(None, votes.windows(), status, decision) }
                 }
             };
             if !each(input, answer)? {
