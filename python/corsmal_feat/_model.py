@@ -161,21 +161,21 @@ class TrainedModel:
         """The rows of an extraction by the configuration of the training."""
         if given.summary is None:
             raise ParameterError("X holds frames, but rows of statistics are needed: see `summary`")
+        if given.config_hash and not self.feature_config:
+            raise ParameterError(
+                f"{self.path} holds no feature configuration, so nothing says whether X fits it: if"
+                " you know that it does, give the rows alone, X.summary"
+            )
         if given.config_hash != self.header["feature_config_hash"]:
             raise ParameterError(
                 f"X was extracted by another configuration than the rows that {self.path} was"
-                " trained on: extract it with config=model.feature_config"
+                " trained on, or does not say by which: extract with config=model.feature_config"
             )
         if self.header["feature_names"] not in ([], given.names):
             raise ParameterError(
                 f"X has other features, or in another order, than {self.path} was trained on"
             )
-        heard = [outcome for outcome in given.outcomes if outcome["status"] in GOOD]
-        if not any_rate:
-            self._check_formats(heard)
-        strange = self._model.length_warning(lengths(heard))
-        if strange is not None:
-            warn(strange)
+        self._check_heard([row for row in given.outcomes if row["status"] in GOOD], any_rate)
         return given.summary
 
     def _of_recordings(self, paths: list[str], any_rate: bool) -> Matrix:
@@ -195,11 +195,7 @@ class TrainedModel:
         for path, outcome in zip(different, found.outcomes, strict=True):
             if outcome["status"] not in GOOD:
                 raise DecodeError(f"{path}: {outcome['status']}: {outcome['reason']}")
-        if not any_rate:
-            self._check_formats(found.outcomes)
-        strange = self._model.length_warning(lengths(found.outcomes))
-        if strange is not None:
-            warn(strange)
+        self._check_heard(found.outcomes, any_rate)
         if found.summary is None or len(found.names) != self.n_features_in_:
             raise ParameterError(
                 f"X gives {len(found.names)} values per recording, but {self.path} was trained on"
@@ -218,12 +214,15 @@ class TrainedModel:
         row_of = dict(zip(different, found.summary.astype(np.float64), strict=True))
         return np.stack([row_of[path] for path in paths])
 
-    def _check_formats(self, outcomes: list[dict[str, Any]]) -> None:
-        """Refuses recordings in a format that changes their features."""
-        for row in outcomes:
+    def _check_heard(self, outcomes: list[dict[str, Any]], any_rate: bool) -> None:
+        """Refuses recordings in a format that changes their features; warns of strange lengths."""
+        for row in [] if any_rate else outcomes:
             reason = self.refusal(row.get("sample_rate"), row.get("channels"))
             if reason is not None:
                 raise ParameterError(f"{row['path']}: {reason}; any_rate=True accepts it as it is")
+        strange = self._model.length_warning(lengths(outcomes))
+        if strange is not None:
+            warn(strange)
 
 
 @refuses

@@ -72,6 +72,9 @@ def test_a_model_with_its_features_takes_recordings(
             model.predict(elsewhere)
         with pytest.raises(cf.ParameterError, match="holds frames"):
             model.predict(cf.extract(paths[:1], preset="logmel"))
+    of_run.save(tmp_path / "bare")
+    with pytest.raises(cf.ParameterError, match="holds no feature configuration"):
+        cf.load_model(tmp_path / "bare").predict(features)
     other = record(tmp_path / "other.wav", 300, 5, rate=44100)
     with pytest.raises(cf.ParameterError, match=r"44100 Hz, but .* was trained on 16000"):
         model.predict([paths[0], other])
