@@ -181,25 +181,33 @@ impl Input {
     }
 
     /// Drops `n` bytes that may be a wrong claim: false, with nothing dropped, where the input ends
-    /// before. In a pipe that holds up to [`MOST_HELD`] of them; more are dropped as `skip` does.
+    /// before. A pipe is asked for up to [`MOST_HELD`] of them first.
+    ///
+    /// # Errors
+    /// A pipe that ends after more than that, and before `n`: what it had is lost.
     pub(crate) fn pass(&mut self, n: u64) -> Result<bool, AudioError> {
-        if self.len().is_some() || n > MOST_HELD as u64 {
+        if self.len().is_some() {
             return self.skip(n);
         }
-        let n = n as usize;
+        let held = n.min(MOST_HELD as u64) as usize;
         // Grows with what is there, not with what is claimed.
-        let mut wanted = n.min(BUFFER);
+        let mut wanted = held.min(BUFFER);
         loop {
             let shown = self.peek(wanted)?.len();
-            if shown >= n {
-                self.consume(n);
-                return Ok(true);
+            if shown >= held {
+                break;
             }
             if shown < wanted {
                 return Ok(false);
             }
-            wanted = n.min(2 * wanted);
+            wanted = held.min(2 * wanted);
         }
+        let at = self.position;
+        if self.skip(n)? {
+            return Ok(true);
+        }
+        let actual = format!("the end of the stream after {} of {n} bytes", self.position - at);
+        Err(AudioError::corrupt(at, actual, "a tag or block as long as it says; read it from a file"))
     }
 
     /// Keeps all that a pipe still gives, up to `most` bytes: from then on, the input is a file that

@@ -1,6 +1,7 @@
 //! MPEG audio with other bytes between and behind its frames.
 
 use crate::compressed::MP3;
+use crate::common::read_pipe;
 use crate::damage::{mp3_frames, read_both, refusal};
 
 /// Largest sample.
@@ -46,6 +47,22 @@ fn so_many_other_bytes_that_they_may_have_been_frames_are_a_loss() {
         assert_eq!(got.samples.len(), read_both(MP3).samples.len());
         assert!(got.repairs().contains(&"foreign_bytes"));
     }
+}
+
+#[test]
+fn a_tag_longer_than_what_follows_is_passed_over_in_pipes_too() {
+    let frames = mp3_frames();
+    // It claims 127 MiB.
+    let tag = b"ID3\x03\0\0\x3f\x7f\x7f\x7f";
+    let head = [&frames[..9].concat(), &tag[..]].concat();
+    let got = read_both(&[head.as_slice(), &frames[9..].concat()].concat());
+    assert_eq!(got.samples.len(), read_both(MP3).samples.len());
+
+    // More than a pipe is held back for: what follows it is lost, and that is said.
+    let long = [head, slow_frames((17 << 20) / 72)].concat();
+    let error = read_pipe(long).unwrap_err();
+    assert_eq!(error.verdict().name(), "corrupt");
+    assert!(error.to_string().contains("the end of the stream after"), "{error}");
 }
 
 #[test]
