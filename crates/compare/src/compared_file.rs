@@ -12,6 +12,7 @@ use corsmal_files::table::{RESERVED, Table};
 use ndarray::{Array1, ArrayD};
 use serde::Serialize;
 
+use super::pairing::Identities;
 use super::texts::{self, TextColumn};
 
 /// Name under which frame times are compared.
@@ -26,13 +27,31 @@ pub struct Refused {
     pub reason: String,
 }
 
+/// Whose an array of an output of ours is.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) struct Owner {
+    /// The recording's id.
+    pub id: String,
+    /// The feature.
+    pub feature: String,
+    /// Whether it has the times of the frames.
+    pub times: bool,
+}
+
+impl Owner {
+    /// What the array is compared as.
+    pub(super) fn title(&self) -> &str {
+        if self.times { TIMES } else { &self.feature }
+    }
+}
+
 /// An array that can be loaded.
 #[derive(Debug)]
 pub(super) struct ArrayEntry {
     /// Name in the file.
     pub name: String,
     /// The recording and the feature, where the file is ours.
-    pub ours: Option<(String, String)>,
+    pub ours: Option<Owner>,
     /// Element type as numpy writes it.
     pub dtype: String,
 }
@@ -54,6 +73,8 @@ pub(super) struct ComparedFile {
     places: Vec<Place>,
     table: Option<NumericTable>,
     texts: Vec<TextColumn>,
+    /// What is known of the contents of recordings, by id.
+    identities: Identities,
     provenance: Option<Provenance>,
     refused: Vec<Refused>,
 }
@@ -70,11 +91,12 @@ impl ComparedFile {
 
     fn npz(mut npz: NpzFile) -> Result<Self, FeatureFileError> {
         let (mut table, mut provenance, mut features) = (None, None, Vec::new());
-        let mut texts = Vec::new();
+        let (mut texts, mut identities) = (Vec::new(), Identities::default());
         if layout::is_ours(&npz) {
             let (found, made) = layout::read_table(&mut npz)?;
             features = made.features();
             texts = texts::of_table(&found);
+            identities = Identities::new(found.outcomes());
             table = (!found.feature_names().is_empty()).then(|| columns(&found));
             provenance = Some(made);
         }
@@ -113,6 +135,7 @@ impl ComparedFile {
             places: vec![],
             table,
             texts,
+            identities,
             provenance,
             refused,
         })
@@ -129,6 +152,7 @@ impl ComparedFile {
             places: vec![],
             table: None,
             texts: vec![],
+            identities: Identities::default(),
             provenance: None,
             refused: vec![],
         }
@@ -146,22 +170,25 @@ impl ComparedFile {
         let refused = refused.collect();
         // Tables of other tools have no provenance.
         let provenance = parquet.provenance().ok();
-        let texts = match provenance {
-            Some(_) => texts::of_table(&parquet.table()?.0),
-            None => table
-                .texts
-                .iter()
-                .map(|(name, values)| TextColumn {
+        let (texts, identities) = match provenance {
+            Some(_) => {
+                let found = parquet.table()?.0;
+                (texts::of_table(&found), Identities::new(found.outcomes()))
+            }
+            None => {
+                let column = |(name, values): &(String, Vec<String>)| TextColumn {
                     name: name.clone(),
                     ids: table.ids.clone(),
                     shape: vec![values.len() as u64],
                     values: values.clone(),
-                })
-                .collect(),
+                };
+                (table.texts.iter().map(column).collect(), Identities::default())
+            }
         };
         let source = FeatureFile::Parquet(parquet);
         let (arrays, places) = (vec![], vec![]);
-        Ok(Self { source, arrays, places, table: Some(table), texts, provenance, refused })
+        let table = Some(table);
+        Ok(Self { source, arrays, places, table, texts, identities, provenance, refused })
     }
 
     /// The frames of an output of ours, named as in an `.npz`.
@@ -174,20 +201,17 @@ impl ComparedFile {
                 let named = several.then_some(feature.as_str());
                 let frames = layout::frames_name(id, named);
                 let times = layout::times_name(id, named);
-                let owner = frames.clone();
-                for (name, ours, dtype, times) in [
-                    (frames, (id.clone(), feature.clone()), "<f4", false),
-                    (times, (owner, TIMES.into()), "<f8", true),
-                ] {
+                for (name, dtype, times) in [(frames, "<f4", false), (times, "<f8", true)] {
+                    let ours = Owner { id: id.clone(), feature: feature.clone(), times };
                     arrays.push(ArrayEntry { name, ours: Some(ours), dtype: dtype.into() });
                     places.push(Place { row, feature: feature.clone(), times });
                 }
             }
         }
-        let texts = texts::of_table(&found);
+        let (texts, identities) = (texts::of_table(&found), Identities::new(found.outcomes()));
         let source = FeatureFile::Parquet(parquet);
-        let (provenance, refused) = (Some(made), vec![]);
-        Ok(Self { source, arrays, places, table: None, texts, provenance, refused })
+        let (table, provenance, refused) = (None, Some(made), vec![]);
+        Ok(Self { source, arrays, places, table, texts, identities, provenance, refused })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -234,6 +258,11 @@ impl ComparedFile {
         self.provenance.as_ref()
     }
 
+    /// What is known of the contents of the recordings.
+    pub(super) fn identities(&self) -> &Identities {
+        &self.identities
+    }
+
     /// Arrays that are there but cannot be read.
     pub(super) fn refused(&self) -> &[Refused] {
         &self.refused
@@ -259,7 +288,7 @@ impl ComparedFile {
     /// Recordings of an output of ours for a message; `None` for files of other programs.
     pub(super) fn recordings(&self) -> Option<Vec<&String>> {
         self.provenance.as_ref()?;
-        let of_arrays = self.arrays.iter().filter_map(|e| e.ours.as_ref()).map(|(id, _)| id);
+        let of_arrays = self.arrays.iter().filter_map(|e| e.ours.as_ref()).map(|owner| &owner.id);
         let of_table = self.table.iter().filter_map(|table| table.ids.as_ref()).flatten();
         let mut ids: Vec<&String> = of_arrays.chain(of_table).collect();
         ids.sort_unstable();
@@ -288,17 +317,17 @@ pub(super) fn shown(names: &[&String]) -> String {
 }
 
 /// Recording and feature of a frame-level member of an output of ours.
-fn owner(name: &str, features: &[String]) -> Option<(String, String)> {
-    if let Some(rest) = name.strip_prefix(layout::TIMES) {
-        return Some((rest.into(), TIMES.into()));
-    }
-    if name.starts_with(RESERVED) {
-        return None;
-    }
-    match features {
-        [only] => Some((name.into(), only.clone())),
-        _ => name.rsplit_once('/').map(|(id, feature)| (id.into(), feature.into())),
-    }
+fn owner(name: &str, features: &[String]) -> Option<Owner> {
+    let (name, times) = match name.strip_prefix(layout::TIMES) {
+        Some(rest) => (rest, true),
+        None if name.starts_with(RESERVED) => return None,
+        None => (name, false),
+    };
+    let (id, feature) = match features {
+        [only] => (name, only.as_str()),
+        _ => name.rsplit_once('/')?,
+    };
+    Some(Owner { id: id.into(), feature: feature.into(), times })
 }
 
 fn columns(table: &Table) -> NumericTable {

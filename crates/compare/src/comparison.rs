@@ -10,6 +10,7 @@ use super::compared_file::{ArrayEntry, ComparedFile, Refused};
 use super::difference::{Difference, Tolerance};
 use super::matching::{ArrayMatch, Matching, TableMatch};
 use super::pair::{Axes, Pair, index_of};
+use super::pairing::PairedBy;
 use super::settings::Settings;
 use super::texts::{self, TextReport};
 use corsmal_files::parquet::NumericTable;
@@ -24,8 +25,8 @@ pub struct Comparison {
     /// Whether everything that could be compared is equal under the tolerance and nothing in common
     /// was left out.
     pub within: bool,
-    /// Whether recordings were paired by file name, for want of a common id.
-    pub by_file_name: bool,
+    /// What recordings were paired by.
+    pub paired_by: PairedBy,
     /// Configurations, where both files are outputs of ours.
     pub settings: Option<Settings>,
     /// One entry per feature, or per array of files that are not ours.
@@ -225,22 +226,32 @@ impl ComparisonBuilder {
         let mut refused = both(a, b);
         refused.extend(both(b, a).into_iter().filter(|r| !refused_in(a, &r.array)));
         let settings = match (a.provenance(), b.provenance()) {
-            (Some(a), Some(b)) => Some(Settings::new(a, b)),
+            (Some(of_a), Some(of_b)) => {
+                let contents = texts::contents(a.identities(), b.identities(), matching.paired_by);
+                Some(Settings::new(of_a, of_b, contents))
+            }
             _ => None,
         };
         for feature in &mut self.features {
-            let made = settings.as_ref().and_then(|s| causes::of_settings(s, &feature.feature));
-            if feature.differing > 0
-                && feature.causes.is_empty()
-                && let Some(cause) = made
-            {
-                let (arrays, array) = (feature.differing, "the configurations".into());
-                feature.causes.push(Finding { arrays, array, cause });
+            let Some(settings) = &settings else { continue };
+            if feature.differing == 0 || !feature.causes.is_empty() {
+                continue;
             }
+            let arrays = feature.differing;
+            let mut add = |array: &str, cause: Option<Cause>| {
+                let array = array.into();
+                feature.causes.extend(cause.map(|cause| Finding { arrays, array, cause }));
+            };
+            add("the recordings", causes::of_contents(settings));
+            add("the configurations", causes::of_settings(settings, &feature.feature));
         }
         let equal = |f: &FeatureReport| f.differing == 0;
         let mut texts = self.exact;
-        texts.extend(texts::compare(a.texts(), b.texts(), matching.by_file_name));
+        texts.extend(texts::compare(
+            (a.texts(), a.identities()),
+            (b.texts(), b.identities()),
+            matching.paired_by,
+        ));
         Comparison {
             a: FileReport::new(a),
             b: FileReport::new(b),
@@ -249,7 +260,7 @@ impl ComparisonBuilder {
                 && matching.only_a.is_empty()
                 && matching.only_b.is_empty()
                 && refused.is_empty(),
-            by_file_name: matching.by_file_name,
+            paired_by: matching.paired_by,
             settings,
             features: self.features,
             texts,

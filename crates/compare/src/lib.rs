@@ -32,6 +32,7 @@ mod difference;
 mod error;
 mod matching;
 mod pair;
+mod pairing;
 mod settings;
 mod texts;
 
@@ -43,6 +44,7 @@ pub use comparison::{Comparison, FeatureReport, FileReport, Finding, Shapes};
 pub use corsmal_files::settings::Setting;
 pub use difference::{Difference, Extreme, Tolerance};
 pub use error::CompareError;
+pub use pairing::PairedBy;
 pub use settings::Settings;
 pub use texts::{TextDifference, TextReport};
 

@@ -5,6 +5,7 @@ use std::hash::Hash;
 
 use super::compared_file::{ArrayEntry, ComparedFile, shown};
 use super::error::CompareError;
+use super::pairing::PairedBy;
 use corsmal_files::parquet::NumericTable;
 
 /// Two arrays.
@@ -40,13 +41,13 @@ pub(super) struct Matching {
     pub only_a: Vec<String>,
     /// Arrays, columns and rows of the second file only.
     pub only_b: Vec<String>,
-    /// Whether recordings are paired by file name, for want of a common id.
-    pub by_file_name: bool,
+    /// What recordings are paired by.
+    pub paired_by: PairedBy,
 }
 
 impl Matching {
     /// Finds pairs: those of `map`, then equal names, then the same recording and feature of two
-    /// outputs of ours, by id or else by file name, at last the only array of each.
+    /// outputs of ours, by id or else as [`PairedBy`] says, at last the only array of each.
     pub(super) fn new(
         a: &ComparedFile,
         b: &ComparedFile,
@@ -66,30 +67,29 @@ impl Matching {
         let taken: (Vec<usize>, Vec<usize>) = pairs.iter().copied().unzip();
         let mut rest_a = free(a, &taken.0);
         let mut rest_b = free(b, &taken.1);
-        let name = |e: &ArrayEntry| Some((e.name.clone(), String::new()));
+        let name = |e: &ArrayEntry| Some((e.name.clone(), String::new(), false));
         join(
             &mut pairs,
             (&mut rest_a, &mut rest_b),
             |i| name(&a.arrays()[i]),
             |i| name(&b.arrays()[i]),
         );
-        let ours = |e: &ArrayEntry| e.ours.clone();
-        join(
-            &mut pairs,
-            (&mut rest_a, &mut rest_b),
-            |i| ours(&a.arrays()[i]),
-            |i| ours(&b.arrays()[i]),
-        );
         let mut matching = Self::default();
-        if pairs.is_empty() {
-            let by_name = |e: &ArrayEntry| {
-                let (id, feature) = e.ours.as_ref()?;
-                Some((file_name(id).to_owned(), feature.clone()))
+        for by in PairedBy::ALL {
+            // Names of a --map may belong to a few of the recordings.
+            if by != PairedBy::Id && !pairs.is_empty() {
+                break;
+            }
+            let (of_a, of_b) = (|i| owned(by, a, i), |j| owned(by, b, j));
+            let clear = |rest: &[usize], of: &dyn Fn(usize) -> Option<Key>| {
+                by == PairedBy::Id || unique(rest.iter().map(|i| of(*i)))
             };
-            let (of_a, of_b) = (|i| by_name(&a.arrays()[i]), |j| by_name(&b.arrays()[j]));
-            if unique(rest_a.iter().map(|i| of_a(*i))) && unique(rest_b.iter().map(|j| of_b(*j))) {
+            if clear(&rest_a, &of_a) && clear(&rest_b, &of_b) {
+                let before = pairs.len();
                 join(&mut pairs, (&mut rest_a, &mut rest_b), of_a, of_b);
-                matching.by_file_name = !pairs.is_empty();
+                if pairs.len() > before {
+                    matching.paired_by = by;
+                }
             }
         }
         matching.tables(a, b);
@@ -119,8 +119,10 @@ impl Matching {
             .into_iter()
             .map(|(i, j)| {
                 let (x, y) = (&a.arrays()[i], &b.arrays()[j]);
-                let (place, feature) =
-                    x.ours.clone().or(y.ours.clone()).unwrap_or((x.name.clone(), x.name.clone()));
+                let (place, feature) = match x.ours.as_ref().or(y.ours.as_ref()) {
+                    Some(owner) => (owner.id.clone(), owner.title().to_owned()),
+                    None => (x.name.clone(), x.name.clone()),
+                };
                 ArrayMatch { a: i, b: j, feature, place }
             })
             .collect();
@@ -134,9 +136,11 @@ impl Matching {
             (None, Some(y)) => return self.only_b.extend(y.names.iter().cloned()),
             (None, None) => return,
         };
-        let columns = common(&x.names, &y.names, &mut self.only_a, &mut self.only_b);
+        let in_a = (&*x.names, &*by_name(&x.names));
+        let in_b = (&*y.names, &*by_name(&y.names));
+        let columns = common(in_a, in_b, &mut self.only_a, &mut self.only_b);
         let rows = match (&x.ids, &y.ids) {
-            (Some(x), Some(y)) => self.rows(x, y),
+            (Some(x), Some(y)) => self.rows((a, x), (b, y)),
             // Without ids, rows are those of the same number.
             _ => {
                 let (in_a, in_b) = (x.values.nrows(), y.values.nrows());
@@ -168,27 +172,26 @@ impl Matching {
 }
 
 impl Matching {
-    /// Rows of the same id; without any, those of the same file name.
-    fn rows(&mut self, a: &[String], b: &[String]) -> Vec<(usize, usize)> {
-        let known: HashSet<&String> = b.iter().collect();
-        if a.iter().any(|id| known.contains(id)) {
-            return common(a, b, &mut self.only_a, &mut self.only_b);
+    /// Rows of the same id; without any, those of the same file name or content.
+    fn rows(
+        &mut self,
+        (a, in_a): (&ComparedFile, &[String]),
+        (b, in_b): (&ComparedFile, &[String]),
+    ) -> Vec<(usize, usize)> {
+        for by in PairedBy::ALL {
+            let x: Vec<_> = in_a.iter().map(|id| by.key(a.identities(), id)).collect();
+            let y: Vec<_> = in_b.iter().map(|id| by.key(b.identities(), id)).collect();
+            let clear = |keys: &[Option<&str>]| by == PairedBy::Id || unique(keys.iter().copied());
+            let known: HashSet<&str> = y.iter().copied().flatten().collect();
+            if clear(&x) && clear(&y) && x.iter().flatten().any(|key| known.contains(key)) {
+                if by != PairedBy::Id {
+                    self.paired_by = by;
+                }
+                return common((in_a, &x), (in_b, &y), &mut self.only_a, &mut self.only_b);
+            }
         }
-        let names =
-            |ids: &[String]| ids.iter().map(|id| file_name(id).to_owned()).collect::<Vec<String>>();
-        let (x, y) = (names(a), names(b));
-        if !(unique(x.iter().map(Some)) && unique(y.iter().map(Some))) {
-            return Vec::new();
-        }
-        let rows = common(&x, &y, &mut self.only_a, &mut self.only_b);
-        self.by_file_name |= !rows.is_empty();
-        rows
+        Vec::new()
     }
-}
-
-/// The last part of an id.
-pub(super) fn file_name(id: &str) -> &str {
-    id.rsplit('/').next().unwrap_or(id)
 }
 
 /// Whether no key comes twice.
@@ -204,7 +207,15 @@ fn position(file: &ComparedFile, name: &str) -> Result<usize, CompareError> {
     })
 }
 
-type Key = (String, String);
+/// What of a recording, feature, and whether times: what arrays are joined by.
+type Key = (String, String, bool);
+
+/// The key of an array of ours.
+fn owned(by: PairedBy, file: &ComparedFile, index: usize) -> Option<Key> {
+    let owner = file.arrays()[index].ours.as_ref()?;
+    let recording = by.key(file.identities(), &owner.id)?;
+    Some((recording.to_owned(), owner.feature.clone(), owner.times))
+}
 
 /// Moves what has the same key from `rest` to `pairs`.
 fn join(
@@ -227,22 +238,28 @@ fn join(
     pairs.extend(found);
 }
 
-/// Positions of the names that both lists hold; the others are added to `only_a`, `only_b`.
+fn by_name(names: &[String]) -> Vec<Option<&str>> {
+    names.iter().map(|name| Some(name.as_str())).collect()
+}
+
+/// Positions of the keys that both lists hold; the names of the others are added to `only_a`, `only_b`.
 fn common(
-    a: &[String],
-    b: &[String],
+    (in_a, a): (&[String], &[Option<&str>]),
+    (in_b, b): (&[String], &[Option<&str>]),
     only_a: &mut Vec<String>,
     only_b: &mut Vec<String>,
 ) -> Vec<(usize, usize)> {
-    let mut places: HashMap<&String, usize> = b.iter().zip(0..).collect();
+    let mut places: HashMap<&str, usize> =
+        b.iter().zip(0..).filter_map(|(key, j)| Some(((*key)?, j))).collect();
     let mut pairs = Vec::new();
-    for (i, name) in a.iter().enumerate() {
-        match places.remove(name) {
+    for (i, key) in a.iter().enumerate() {
+        match key.and_then(|key| places.remove(key)) {
             Some(j) => pairs.push((i, j)),
-            None => only_a.push(name.clone()),
+            None => only_a.push(in_a[i].clone()),
         }
     }
-    only_b.extend(b.iter().filter(|name| places.contains_key(name)).cloned());
+    let paired: HashSet<usize> = pairs.iter().map(|(_, j)| *j).collect();
+    only_b.extend((0..b.len()).filter(|j| !paired.contains(j)).map(|j| in_b[j].clone()));
     pairs
 }
 

@@ -6,10 +6,13 @@ use std::hash::Hash;
 use corsmal_files::table::Table;
 use serde::Serialize;
 
-use super::matching::file_name;
+use super::pairing::{Identities, PairedBy};
 
 /// Name under which the statuses of recordings are compared.
 const STATUS: &str = "outcome status";
+
+/// Name under which the identities of recordings are compared.
+const CONTENT: &str = "content";
 
 /// A column of texts in one file.
 #[derive(Debug)]
@@ -67,30 +70,48 @@ pub(super) fn of_table(table: &Table) -> Vec<TextColumn> {
 }
 
 /// Compares the columns that both files have, in the rows that both have.
-pub(super) fn compare(a: &[TextColumn], b: &[TextColumn], by_file_name: bool) -> Vec<TextReport> {
+pub(super) fn compare(
+    (a, of_a): (&[TextColumn], &Identities),
+    (b, of_b): (&[TextColumn], &Identities),
+    paired_by: PairedBy,
+) -> Vec<TextReport> {
     let pair = |x: &TextColumn| {
         let y = b.iter().find(|y| y.name == x.name)?;
-        Some(of_columns(x, y, by_file_name))
+        Some(of_columns((x, of_a), (y, of_b), paired_by))
     };
     a.iter().filter_map(pair).collect()
 }
 
-fn of_columns(a: &TextColumn, b: &TextColumn, by_file_name: bool) -> TextReport {
+/// Compares the contents of the recordings that both files have, as far as they are known.
+pub(super) fn contents(of_a: &Identities, of_b: &Identities, paired_by: PairedBy) -> TextReport {
+    let column = |identities: &Identities| {
+        let (ids, values): (Vec<_>, Vec<_>) = identities.iter().unzip();
+        TextColumn { name: CONTENT.into(), shape: vec![ids.len() as u64], ids: Some(ids), values }
+    };
+    of_columns((&column(of_a), of_a), (&column(of_b), of_b), paired_by)
+}
+
+fn of_columns(
+    (a, of_a): (&TextColumn, &Identities),
+    (b, of_b): (&TextColumn, &Identities),
+    paired_by: PairedBy,
+) -> TextReport {
     let mut report = TextReport { name: a.name.clone(), values: 0, differing: 0, first: None };
     if let (Some(in_a), Some(in_b)) = (&a.ids, &b.ids) {
         let known: HashSet<&String> = in_b.iter().collect();
         let both: HashSet<&String> = in_a.iter().filter(|id| known.contains(id)).collect();
-        let key = |id: &String| match by_file_name && !both.contains(id) {
-            true => (true, file_name(id).to_owned()),
-            false => (false, id.clone()),
+        let key = |identities: &Identities, id: &String| match both.contains(id) {
+            true => Some((PairedBy::Id, id.clone())),
+            false => Some((paired_by, paired_by.key(identities, id)?.to_owned())),
         };
-        let (rows_a, rows_b) = (rows(in_a, key), rows(in_b, key));
+        let (rows_a, rows_b) = (rows(in_a, |id| key(of_a, id)), rows(in_b, |id| key(of_b, id)));
         for (row, (id, x)) in in_a.iter().zip(&a.values).enumerate() {
-            // Which of several of one file name belong together is not known.
-            let place = rows_b.get(&key(id)).copied().flatten();
-            if let Some(place) = place
-                && rows_a.get(&key(id)) == Some(&Some(row))
+            // Which of several of one key belong together is not known.
+            if let Some(key) = key(of_a, id)
+                && let Some(Some(place)) = rows_b.get(&key)
+                && rows_a.get(&key) == Some(&Some(row))
             {
+                let place = *place;
                 report.add(|| id.clone(), Some(x), b.values.get(place));
             }
         }
@@ -106,10 +127,15 @@ fn of_columns(a: &TextColumn, b: &TextColumn, by_file_name: bool) -> TextReport 
 }
 
 /// The row of each key; none where several have it.
-fn rows<K: Eq + Hash>(ids: &[String], key: impl Fn(&String) -> K) -> HashMap<K, Option<usize>> {
+fn rows<K: Eq + Hash>(
+    ids: &[String],
+    key: impl Fn(&String) -> Option<K>,
+) -> HashMap<K, Option<usize>> {
     let mut rows = HashMap::new();
     for (row, id) in ids.iter().enumerate() {
-        rows.entry(key(id)).and_modify(|place| *place = None).or_insert(Some(row));
+        if let Some(key) = key(id) {
+            rows.entry(key).and_modify(|place| *place = None).or_insert(Some(row));
+        }
     }
     rows
 }
@@ -155,32 +181,37 @@ mod tests {
         TextColumn { name: "class".into(), ids: ids.map(texts), shape, values: texts(values) }
     }
 
+    fn compared(a: TextColumn, b: TextColumn, paired_by: PairedBy) -> TextReport {
+        let none = Identities::default();
+        compare((&[a], &none), (&[b], &none), paired_by).remove(0)
+    }
+
     #[test]
     fn texts_are_compared_by_id_whatever_their_order() {
         let a = column(Some(&["x/1", "x/2", "x/3"]), &["rain", "dog", "sea"]);
         let b = column(Some(&["x/2", "x/1", "x/4"]), &["dog", "Rain", "sea"]);
-        let found = &compare(&[a], &[b], false)[0];
+        let found = compared(a, b, PairedBy::Id);
         assert_eq!((found.values, found.differing), (2, 1));
         let first = found.first.as_ref().unwrap();
         assert_eq!((&*first.place, &*first.a, &*first.b), ("x/1", "rain", "Rain"));
         let a = column(Some(&["x/1"]), &["rain"]);
         let b = column(Some(&["y/1"]), &["dog"]);
-        assert_eq!(compare(&[a], &[b], true)[0].differing, 1);
+        assert_eq!(compared(a, b, PairedBy::FileName).differing, 1);
         // What has the same id is compared by it, whatever else has its file name.
         let a = column(Some(&["x/1", "y/1", "old/2"]), &["ok", "empty", "ok"]);
         let b = column(Some(&["x/1", "y/1", "new/2"]), &["ok", "ok", "ok"]);
-        let found = &compare(&[a], &[b], true)[0];
+        let found = compared(a, b, PairedBy::FileName);
         assert_eq!((found.values, found.differing), (3, 1));
         // Two of one file name: it is not known which is which.
         let a = column(Some(&["x/1", "y/1"]), &["ok", "empty"]);
         let b = column(Some(&["p/1", "q/1"]), &["ok", "empty"]);
-        assert_eq!(compare(&[a], &[b], true)[0].values, 0);
+        assert_eq!(compared(a, b, PairedBy::FileName).values, 0);
     }
 
     #[test]
     fn lists_of_other_lengths_differ() {
         let (a, b) = (column(None, &["rain", ""]), column(None, &["rain"]));
-        assert_eq!(compare(&[a], &[b], false)[0].differing, 1);
+        assert_eq!(compared(a, b, PairedBy::Id).differing, 1);
     }
 
     #[test]

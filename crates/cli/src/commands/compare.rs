@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use corsmal_compare::{
-    Comparison, Criteria, FeatureReport, Setting, TextDifference, TextReport, Tolerance,
+    Comparison, Criteria, FeatureReport, PairedBy, Setting, TextDifference, TextReport, Tolerance,
 };
 use corsmal_files::quote::quoted;
 use serde_json::Value;
@@ -24,8 +24,8 @@ Examples:
   corsmal-feat compare old.npz new.npz --atol 1e-4 --rtol 1e-5 --json
 
 Files may be outputs of `extract`, any .npz or .npy with numeric arrays, or a Parquet table.
-Arrays are paired by name, outputs of `extract` by recording (id, else file name) and feature,
-tables by id and column; if each file has only one array, they need no name. The last axis is
+Arrays are paired by name, outputs of `extract` by recording (id, else file name, else content) and
+feature, tables by id and column; if each file has only one array, they need no name. The last axis is
 frames, the one before coefficients, the one before that channels (librosa's order). Only two
 arrays are in memory at a time. Labels, statuses and texts that both files have, and integers
 beyond 2^53, are compared exactly.
@@ -101,8 +101,14 @@ fn text(report: &Comparison) -> String {
             version.unwrap_or_default()
         ));
     }
-    if report.by_file_name {
-        lines.push("\nno id in common: recordings are paired by file name".into());
+    match report.paired_by {
+        PairedBy::Id => {}
+        PairedBy::FileName => {
+            lines.push("\nno id in common: recordings are paired by file name".into());
+        }
+        PairedBy::Content => {
+            lines.push("\nno id or file name in common: recordings are paired by content".into());
+        }
     }
     settings(report, &mut lines);
     lines.push(String::new());
@@ -149,6 +155,15 @@ fn settings(report: &Comparison, lines: &mut Vec<String>) {
         if same { "the same" } else { "different" },
         if settings.same_inputs { "the same" } else { "other" }
     ));
+    let contents = &settings.contents;
+    if let Some(first) = &contents.first {
+        lines.push(format!(
+            "  {} of {} recordings have other contents in b than in a, although they are paired; the first is {}",
+            contents.differing,
+            contents.values,
+            quoted(&first.place)
+        ));
+    }
     let shown = |value: &Option<Value>| match value {
         Some(value) => value.to_string(),
         None => "absent".into(),
@@ -229,7 +244,8 @@ fn details(feature: &FeatureReport, lines: &mut Vec<String>) {
     }
     for found in &feature.causes {
         lines.push(format!("  likely cause: {}", found.cause.cause));
-        let whole = ["the table", "the configurations"].contains(&found.array.as_str());
+        let whole =
+            ["the table", "the recordings", "the configurations"].contains(&found.array.as_str());
         let arrays = if feature.arrays > 1 && !whole {
             format!(" ({}; {} of {} arrays)", found.array, found.arrays, feature.arrays)
         } else {

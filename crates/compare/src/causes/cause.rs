@@ -41,6 +41,8 @@ pub enum CauseKind {
     Steps,
     /// HTK's mel scale against Slaney's.
     MelScale,
+    /// Other recordings under the same names.
+    Recordings,
     /// Other values in the configurations.
     Configuration,
 }

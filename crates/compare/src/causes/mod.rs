@@ -2,8 +2,8 @@
 //!
 //! A cause is a change of the first file's values that makes the second's of them (`scale`,
 //! `transform`, `arrangement`, `mel_scale`), or a confinement of the differences to places that one
-//! choice affects (`places`, `floor`). Nothing is guessed from names. Where the values show none, keys
-//! of the configuration that differ are named (`of_settings`).
+//! choice affects (`places`, `floor`). Nothing is guessed from names. Where the values show none, recordings
+//! that differ (`of_contents`) and keys of the configuration that differ (`of_settings`) are named.
 
 mod arrangement;
 mod cause;
@@ -22,6 +22,7 @@ pub use cause::{Cause, CauseKind};
 
 use super::pair::{self, Pair};
 use super::settings::Settings;
+use super::texts::TextReport;
 
 /// Likely causes for two arrays of one shape.
 pub(super) fn of_values(pair: &Pair, dtypes: [&str; 2]) -> Vec<Cause> {
@@ -49,6 +50,17 @@ pub(super) fn of_values(pair: &Pair, dtypes: [&str; 2]) -> Vec<Cause> {
     let rest = confinements(&rest, 2.0 * noise);
     let after = |c: Cause| Cause { evidence: format!("of what that leaves: {}", c.evidence), ..c };
     std::iter::once(cause).chain(rest.into_iter().map(after)).collect()
+}
+
+/// The recordings that both files have, where their bytes are not the same.
+pub(super) fn of_contents(settings: &Settings) -> Option<Cause> {
+    let TextReport { values, differing, .. } = &settings.contents;
+    (*differing > 0).then(|| {
+        let evidence = format!(
+            "the contents of {differing} of {values} recordings differ, and the values show no simpler cause"
+        );
+        Cause::new(CauseKind::Recordings, "b was made of other recordings than a", evidence)
+    })
 }
 
 /// The keys of the configurations that differ and bear on a feature.

@@ -274,8 +274,20 @@ fn recordings_of_other_folders_are_paired_by_file_name() {
     let shown = text(&files.run("b.npz", "c.npz", &[]).stdout);
     assert!(shown.contains("likely cause: the configuration: signal.res_type, mfcc.pad_mode"));
 
-    // Neither ids nor file names in common: the recordings are named, not the columns.
+    // Neither ids nor file names in common: the contents are the same.
     std::fs::write(&listed, format!("id,path\nx,{}\n", audio.join("one.wav").display())).unwrap();
+    again("d.npz", &[]);
+    let report = files.json("a.npz", "d.npz", &[]);
+    assert_eq!((&report["paired_by"], &report["only_a"]), (&json!("content"), &json!(["two"])));
+    assert_eq!(report["features"][0]["differing"], 0);
+    assert_eq!(report["texts"][0]["values"], 1, "the status of one recording");
+    let shown = text(&files.run("d.npz", "a.npz", &[]).stdout);
+    assert!(shown.contains("recordings are paired by content"), "{shown}");
+
+    // Nor the contents: the recordings are named, not the columns.
+    recording(&files.path("other.wav"), 3);
+    let other = files.path("other.wav");
+    std::fs::write(&listed, format!("id,path\nx,{}\n", other.display())).unwrap();
     again("d.npz", &[]);
     let words = ["no recording in common", "a.npz has \"one\", \"two\"", "d.npz has \"x\""];
     refused(&files.run("a.npz", "d.npz", &[]), &words);
@@ -288,6 +300,35 @@ fn recordings_of_other_folders_are_paired_by_file_name() {
 
 fn text_of(path: &Path) -> &str {
     path.to_str().unwrap()
+}
+
+#[test]
+fn other_recordings_under_the_same_names_are_a_cause() {
+    let files = Files::new();
+    let frames = ["--preset", "logmel", "--add", "rms"];
+    extract(&files, "a.npz", &frames);
+    recording(&files.path("audio/two.wav"), 7);
+    extract(&files, "b.npz", &frames);
+    let report = files.json("a.npz", "b.npz", &[]);
+    let contents = &report["settings"]["contents"];
+    assert_eq!((&contents["values"], &contents["differing"]), (&json!(2), &json!(1)));
+    assert_eq!(contents["first"]["place"], "two");
+    assert_eq!(kinds(&report, "rms"), ["recordings"]);
+    let shown = text(&files.run("a.npz", "b.npz", &[]).stdout);
+    let words = "1 of 2 recordings have other contents in b than in a";
+    assert!(shown.contains(words) && !shown.contains("cause unknown"), "{shown}");
+
+    // Frames of several features under other ids.
+    let listed = files.path("listed.csv");
+    let line = |name: &str| {
+        format!("take/{name},{}\n", files.path(&format!("audio/{name}.wav")).display())
+    };
+    std::fs::write(&listed, format!("id,path\n{}{}", line("one"), line("two"))).unwrap();
+    let out = files.path("c.npz");
+    let args = ["extract", text_of(&listed), "-o", text_of(&out), "-q"];
+    assert!(run(&[&args[..], &frames].concat()).status.success());
+    let report = files.json("b.npz", "c.npz", &[]);
+    assert_eq!((&report["paired_by"], &report["within"]), (&json!("file_name"), &json!(true)));
 }
 
 #[test]
