@@ -49,12 +49,10 @@ impl Table {
                 "two columns are named {name:?} (case is ignored); rename one"
             )));
         }
-        let mut rows = Vec::new();
-        for record in reader.records() {
-            let record = record.map_err(|e| fault(e.to_string()))?;
-            let line = record.position().map_or(0, |p| p.line() as usize);
-            rows.push((line, record));
-        }
+        let rows = csv_text::records(&mut reader)
+            .map(|found| found.map(|(line, record)| (line as usize, record)))
+            .collect::<csv::Result<_>>()
+            .map_err(|e| fault(e.to_string()))?;
         Ok(Self { path: path.to_path_buf(), header, rows })
     }
 

@@ -12,6 +12,8 @@ use corsmal_files::quote::printable;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde_json::{Value, json};
 
+use crate::plural::plural;
+
 /// Form of messages.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum LogFormat {
@@ -113,7 +115,8 @@ impl Meter {
                 eprintln!("{line}");
             }
             LogFormat::Text => eprintln!(
-                "{inputs} recordings, configuration {}, nothing was read or written",
+                "{}, configuration {}, nothing was read or written",
+                plural(inputs as u64, "recording"),
                 &config_hash[..12]
             ),
         }
@@ -128,13 +131,19 @@ impl Meter {
         }
     }
 
+    /// Seconds of the recordings that are done.
+    fn audio(&self) -> f64 {
+        *self.seconds.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
     /// What a run has done, for programs.
     pub fn summary(&self, report: &RunReport, out: &Path) -> Value {
         json!({
             "out": out.display().to_string(), "statuses": counts(&report.outcomes),
             "repairs": repairs(&report.outcomes), "resumed": report.resumed,
             "up_to_date": report.up_to_date, "elapsed_s": self.started.elapsed().as_secs_f64(),
-            "audio_s": *self.seconds.lock().unwrap_or_else(|e| e.into_inner()),
+            // Durations of many recordings are summed: what rounding adds is left out.
+            "audio_s": (self.audio() * 1e6).round() / 1e6,
         })
     }
 
@@ -152,7 +161,7 @@ impl Meter {
             return;
         }
         let elapsed = self.started.elapsed();
-        let seconds = *self.seconds.lock().unwrap_or_else(|e| e.into_inner());
+        let seconds = self.audio();
         let statuses = counts(&report.outcomes);
         let repairs = repairs(&report.outcomes);
         if report.up_to_date {

@@ -227,14 +227,10 @@ fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
         return Err(wrong(path, 1, reason + &remedy.unwrap_or_default()));
     }
     let mut rows = Vec::new();
-    let mut record = csv::StringRecord::new();
     loop {
-        match reader.read_record(&mut record) {
-            Ok(true) => {}
-            Ok(false) => return Ok(rows),
-            Err(error) => return Err(failed(error, &reader)),
-        }
-        let line = record.position().map_or(0, csv::Position::line);
+        let found = csv_text::records(&mut reader).next();
+        let Some(found) = found else { return Ok(rows) };
+        let (line, record) = found.map_err(|error| failed(error, &reader))?;
         let cell = |place: usize| record.get(cells[place]).unwrap_or_default().to_owned();
         rows.push(columns.entry(path, line, cell)?);
         require_cells(rows.len(), columns.labels.len()).map_err(|e| wrong(path, line, e))?;

@@ -29,8 +29,24 @@ pub fn reader<R: BufRead>(mut text: R) -> io::Result<csv::Reader<LineFeeds<R>>> 
         text.consume(3);
     }
     let mut builder = csv::ReaderBuilder::new();
-    let text = LineFeeds { inner: text, is_quoted: false, has_return: false };
-    Ok(builder.delimiter(delimiter).trim(csv::Trim::All).from_reader(text))
+    Ok(builder.delimiter(delimiter).trim(csv::Trim::All).from_reader(LineFeeds::new(text)))
+}
+
+/// The records behind the header, each with the number of its line.
+pub fn records<R: BufRead>(
+    reader: &mut csv::Reader<LineFeeds<R>>,
+) -> impl Iterator<Item = csv::Result<(u64, csv::StringRecord)>> {
+    std::iter::from_fn(|| {
+        let mut record = csv::StringRecord::new();
+        match reader.read_record(&mut record) {
+            Ok(true) => {
+                let line = record.position().map_or(0, csv::Position::line);
+                Some(Ok((reader.get_ref().lines.of_record(line), record)))
+            }
+            Ok(false) => None,
+            Err(error) => Some(Err(error)),
+        }
+    })
 }
 
 /// Text whose lines end by line feeds alone, except in quotation marks. Where they end by CR LF, the csv crate
@@ -40,9 +56,52 @@ pub struct LineFeeds<R> {
     is_quoted: bool,
     /// A carriage return was read and not given.
     has_return: bool,
+    lines: Lines,
+}
+
+/// Where empty lines are in text that was read.
+#[derive(Default)]
+struct Lines {
+    /// Lines that ended.
+    ended: u64,
+    is_begun: bool,
+    is_quoted: bool,
+    /// Empty lines that follow each other: the first, and the one behind the last.
+    empty: Vec<[u64; 2]>,
+}
+
+impl Lines {
+    fn add(&mut self, text: &[u8]) {
+        for &byte in text {
+            self.is_quoted ^= byte == b'"';
+            if byte != b'\n' {
+                self.is_begun = true;
+                continue;
+            }
+            self.ended += 1;
+            if !std::mem::take(&mut self.is_begun) && !self.is_quoted {
+                match self.empty.last_mut() {
+                    Some([_, end]) if *end == self.ended => *end += 1,
+                    _ => self.empty.push([self.ended, self.ended + 1]),
+                }
+            }
+        }
+    }
+
+    /// The line on which a record begins that begins on `line` for the csv crate: that counts empty lines before
+    /// a record as part of it.
+    fn of_record(&self, line: u64) -> u64 {
+        let before = self.empty.partition_point(|[first, _]| *first <= line);
+        let last = before.checked_sub(1).map(|at| self.empty[at]);
+        last.map_or(line, |[_, end]| line.max(end))
+    }
 }
 
 impl<R> LineFeeds<R> {
+    fn new(inner: R) -> Self {
+        Self { inner, is_quoted: false, has_return: false, lines: Lines::default() }
+    }
+
     /// What is read from.
     pub fn get_ref(&self) -> &R {
         &self.inner
@@ -79,6 +138,7 @@ impl<R: BufRead> Read for LineFeeds<R> {
                 }
             }
             self.inner.consume(used);
+            self.lines.add(&out[..written]);
             if written > 0 {
                 return Ok(written);
             }
@@ -134,13 +194,24 @@ mod tests {
                 let buffered = io::BufReader::with_capacity(capacity, text.as_bytes());
                 let mut table = reader(buffered).unwrap();
                 table.headers().unwrap();
-                let records: Vec<_> = table.records().map(Result::unwrap).collect();
-                let lines: Vec<u64> =
-                    records.iter().map(|r| r.position().unwrap().line()).collect();
+                let records: Vec<_> = super::records(&mut table).map(Result::unwrap).collect();
+                let lines: Vec<u64> = records.iter().map(|(line, _)| *line).collect();
                 assert_eq!(lines, [2, 4, 5, 6], "{ending:?}");
-                assert_eq!(records[0][1], format!("x{ending}y"));
-                assert_eq!(&records[3][1], "6");
+                assert_eq!(records[0].1[1], format!("x{ending}y"));
+                assert_eq!(&records[3].1[1], "6");
             }
+        }
+    }
+
+    /// Records behind empty lines were said to stand on these.
+    #[test]
+    fn empty_lines_are_counted() {
+        for ending in ["\n", "\r\n"] {
+            let text = "\n\nid,note\n\na,\"x\n\n\ny\"\n\n\n\nb,1\nd,5\n\n".replace('\n', ending);
+            let mut table = reader(text.as_bytes()).unwrap();
+            assert_eq!(&table.headers().unwrap()[1], "note");
+            let lines: Vec<u64> = records(&mut table).map(|r| r.unwrap().0).collect();
+            assert_eq!(lines, [5, 12, 13], "{ending:?}");
         }
     }
 
@@ -150,7 +221,7 @@ mod tests {
         for text in ["a\rb\r", "\r\r\n\"\r\n\"\r", "\r"] {
             for capacity in [1, 2, 64] {
                 let inner = io::BufReader::with_capacity(capacity, text.as_bytes());
-                let mut plain = LineFeeds { inner, is_quoted: false, has_return: false };
+                let mut plain = LineFeeds::new(inner);
                 let mut found = Vec::new();
                 // One byte at a time.
                 let mut byte = [0];

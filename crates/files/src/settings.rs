@@ -1,5 +1,7 @@
 //! Configurations of two outputs of ours, key by key.
 
+use std::collections::HashMap;
+
 use serde::Serialize;
 use serde_json::Value;
 
@@ -17,13 +19,12 @@ pub struct Setting {
 /// The keys in which two configurations differ, as outputs store them. Text that is not JSON has none: the
 /// hash tells them apart.
 pub fn differing(a: &str, b: &str) -> Vec<Setting> {
-    let (a, b) = (flattened(a), flattened(b));
-    let value = |keys: &[(String, Value)], key: &str| {
-        keys.iter().find(|(other, _)| other == key).map(|(_, value)| value.clone())
-    };
-    let only_b = b.iter().filter(|(key, _)| value(&a, key).is_none());
-    let keys = a.iter().chain(only_b).map(|(key, _)| key.clone());
-    keys.map(|key| Setting { a: value(&a, &key), b: value(&b, &key), key })
+    let (in_a, in_b) = (flattened(a), flattened(b));
+    let a: HashMap<String, Value> = in_a.iter().cloned().collect();
+    let b: HashMap<String, Value> = in_b.iter().cloned().collect();
+    let only_b = in_b.into_iter().filter(|(key, _)| !a.contains_key(key));
+    let keys = in_a.into_iter().chain(only_b).map(|(key, _)| key);
+    keys.map(|key| Setting { a: a.get(&key).cloned(), b: b.get(&key).cloned(), key })
         .filter(|setting| setting.a != setting.b)
         .collect()
 }

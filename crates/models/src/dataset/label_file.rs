@@ -103,14 +103,13 @@ impl LabelFile {
         let label_at: Vec<usize> = (0..header.len()).filter(|&i| is_label(i)).collect();
         let mut rows: HashMap<String, Line> = HashMap::new();
         let beside = find("path").filter(|_| key == Key::Id);
-        for record in reader.records() {
-            let record = record.map_err(fault)?;
+        for found in csv_text::records(&mut reader) {
+            let (number, record) = found.map_err(fault)?;
             let line = Line {
-                number: record.position().map_or(0, csv::Position::line),
+                number,
                 values: label_at.iter().map(|&i| record[i].to_string()).collect(),
                 path: beside.map_or("", |i| &record[i]).to_string(),
             };
-            let number = line.number;
             if let Some(Line { number: before, .. }) = rows.insert(record[at].to_string(), line) {
                 let reason = format!("line {number} repeats {:?} of line {before}", &record[at]);
                 return Err(DatasetError::content(path, reason));

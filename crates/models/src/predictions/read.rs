@@ -45,11 +45,8 @@ impl PredictionTable {
             |e: csv::Error| content(path, format!("not a readable table: {}", csv_text::fault(&e)));
         let header: Vec<String> =
             reader.headers().map_err(fault)?.iter().map(String::from).collect();
-        let mut lines = Vec::new();
-        for record in reader.records() {
-            let record = record.map_err(fault)?;
-            lines.push((record.position().map_or(0, csv::Position::line), record));
-        }
+        let lines: Vec<_> =
+            csv_text::records(&mut reader).collect::<csv::Result<_>>().map_err(fault)?;
         if lines.is_empty() {
             return Err(content(path, "has no predictions"));
         }
