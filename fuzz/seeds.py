@@ -223,7 +223,7 @@ def main() -> None:
                 seed(kind, path.name, path.read_bytes())
     for path in SHARED.glob("data/lode/calib/*.pickle"):
         seed("vision", path.name, path.read_bytes())
-    for folder in sorted(CORPUS.iterdir()):
+    for folder in sorted(path for path in CORPUS.iterdir() if path.is_dir()):
         print(folder.name, len(list(folder.iterdir())))
 
 

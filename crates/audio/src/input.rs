@@ -207,7 +207,11 @@ impl Input {
             return Ok(true);
         }
         let actual = format!("the end of the stream after {} of {n} bytes", self.position - at);
-        Err(AudioError::corrupt(at, actual, "a tag or block as long as it says; read it from a file"))
+        Err(AudioError::corrupt(
+            at,
+            actual,
+            "a tag or block as long as it says; read it from a file",
+        ))
     }
 
     /// Keeps all that a pipe still gives, up to `most` bytes: from then on, the input is a file that

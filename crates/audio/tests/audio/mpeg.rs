@@ -1,7 +1,7 @@
 //! MPEG audio with other bytes between and behind its frames.
 
-use crate::compressed::MP3;
 use crate::common::read_pipe;
+use crate::compressed::MP3;
 use crate::damage::{mp3_frames, read_both, refusal};
 
 /// Largest sample.

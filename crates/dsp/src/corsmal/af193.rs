@@ -10,7 +10,7 @@ use ndarray::{Array2, Axis};
 use crate::chroma::{Chroma, ChromaParams, chroma_filter};
 use crate::cqt::{ChromaCqt, ChromaCqtParams, CqtParams, CqtPlan, SignalTuning};
 use crate::decibel::Decibel;
-use crate::error::Result;
+use crate::error::{DspError, Result};
 use crate::frequency::fft_frequencies;
 use crate::hpss::{self, HarmonicPart};
 use crate::lanes::{LANES, Row, power_to_decibel};
@@ -85,13 +85,22 @@ impl Af193 {
     /// As [`Af193::new`].
     pub fn of(sr: f64, librosa: LibrosaVersion) -> Result<Self> {
         let freqs = fft_frequencies(sr, N_FFT)?;
+        let contrast = ContrastParams::default();
+        let highest = contrast.fmin * 2.0_f64.powi(contrast.n_bands as i32 - 1);
+        if highest >= 0.5 * sr {
+            let allowed = format!(
+                "above {} Hz for af193: the highest band of its spectral contrast starts at {highest} Hz",
+                2.0 * highest
+            );
+            return Err(DspError::parameter("sr", sr, allowed));
+        }
         let plan = Self {
             sr,
             librosa,
             harmonic: HarmonicPart::new(librosa)?,
             mel: SparseBank::new(&mel_filter(&MelParams::new(sr, N_FFT))?),
             mfcc: mfcc_matrix(N_MELS, &MfccParams { n_mfcc: N_MFCC, ..MfccParams::default() })?,
-            contrast: Contrast::new(&freqs, sr, &ContrastParams::default())?,
+            contrast: Contrast::new(&freqs, sr, &contrast)?,
             tuning: SignalTuning::padded(sr, librosa.pad_mode())?,
             chroma: ByTuning::default(),
             cqt: ByTuning::default(),

@@ -84,9 +84,15 @@ impl Config {
         place: &str,
         overrides: &[String],
     ) -> Result<Self, ConfigError> {
-        let syntax = |e: toml::de::Error| ConfigError::Syntax {
-            place: place.to_string(),
-            message: e.to_string().trim_end().to_string(),
+        let syntax = |e: toml::de::Error| {
+            let message = match toml.contains("\nConfiguration hash: ") {
+                true => {
+                    "is an explanation, no TOML: `corsmal-feat presets NAME --toml` prints the file"
+                        .into()
+                }
+                false => e.to_string().trim_end().to_string(),
+            };
+            ConfigError::Syntax { place: place.to_string(), message }
         };
         let table: toml::Table = toml::from_str(toml).map_err(syntax)?;
         Self::from_tree(set::to_json(toml::Value::Table(table)), overrides)

@@ -6,22 +6,11 @@ use serde_json::{Map, Value, json};
 
 use super::signal::SignalConfig;
 use crate::features;
-use crate::params::ConfigError;
+use crate::params::{ConfigError, elsewhere};
 use crate::summary::SummaryConfig;
 
 /// Tables beside `features`.
 const TABLES: [&str; 3] = ["signal", "summary", "projection"];
-
-/// What other tools call a key.
-const ELSEWHERE: [(&str, &str); 7] = [
-    ("sr", "signal.sample_rate"),
-    ("rate", "signal.sample_rate"),
-    ("mono", "signal.channels"),
-    ("offset", "signal.start"),
-    ("duration", "signal.length"),
-    ("stat", "summary.stats"),
-    ("statistics", "summary.stats"),
-];
 
 /// Refuses a key that several changes set: the last one would win.
 pub fn check_once_each(changes: &[String]) -> Result<(), ConfigError> {
@@ -64,7 +53,9 @@ pub fn apply(tree: &mut Value, change: &str) -> Result<(), ConfigError> {
         let found = homes(tree, key);
         let message = match found.is_empty() {
             true => "expected a dotted key, such as signal.sample_rate or mfcc.n_mels".to_string(),
-            false => format!("expected a dotted key: did you mean {}?", assigned(&found, text)),
+            false => {
+                format!("expected a dotted key: did you mean {}?", assigned(key, &found, text))
+            }
         };
         return Err(ConfigError::key(key, message));
     }
@@ -138,8 +129,8 @@ fn feature_kind<'t>(tree: &'t Value, name: &str) -> Option<&'t str> {
 
 /// Dotted keys of the tree that end with this one, or else with the one most like it.
 fn homes(tree: &Value, key: &str) -> Vec<String> {
-    if let Some((_, home)) = ELSEWHERE.iter().find(|(other, _)| *other == key) {
-        return vec![(*home).to_string()];
+    if let Some(home) = elsewhere(key) {
+        return vec![home.to_string()];
     }
     let mut all: Vec<(String, String)> = Vec::new();
     let mut table = |prefix: &str, keys: Value| {
@@ -163,8 +154,14 @@ fn homes(tree: &Value, key: &str) -> Vec<String> {
     all.into_iter().filter_map(home).collect()
 }
 
-/// The assignments that may have been meant.
-fn assigned(keys: &[String], text: &str) -> String {
+/// The assignments to these keys that may have been meant by one to `key`.
+fn assigned(key: &str, keys: &[String], text: &str) -> String {
+    // librosa's mono is a truth value.
+    let text = match (key, text) {
+        ("mono", "true" | "True") => "mean",
+        ("mono", _) => "all",
+        _ => text,
+    };
     let assignments: Vec<String> = keys.iter().map(|key| format!("{key}={text}")).collect();
     assignments.join(" or ")
 }
@@ -184,7 +181,7 @@ fn absent(tree: &Value, name: &str, last: &str, text: &str) -> String {
     };
     let adds = features::find(name).is_some();
     match (found.is_empty(), adds) {
-        (false, _) => message += &format!(": did you mean {}?", assigned(&found, text)),
+        (false, _) => message += &format!(": did you mean {}?", assigned(last, &found, text)),
         (true, true) => message.push(';'),
         (true, false) => {}
     }
@@ -268,6 +265,7 @@ mod tests {
             ("sr=16000", "did you mean signal.sample_rate=16000?"),
             ("sample_rate=16000", "did you mean signal.sample_rate=16000?"),
             ("samplerate=16000", "did you mean signal.sample_rate=16000?"),
+            ("mono=true", "did you mean signal.channels=mean?"),
             ("n_mels=64", "did you mean log.n_mels=64?"),
             ("n_mel=64", "did you mean log.n_mels=64?"),
             ("hop_length=64", "did you mean log.hop_length=64 or rms.hop_length=64?"),

@@ -42,6 +42,10 @@ impl<'de> Deserialize<'de> for Channels {
             Some("downmix-7.1") => return Ok(Self::Downmix71),
             _ => {}
         }
+        if let Some(index) = value.as_u64() {
+            let message = format!("expected {CHANNELS}; channel {index} alone is [{index}]");
+            return Err(serde::de::Error::custom(message));
+        }
         match serde_json::from_value::<Vec<usize>>(value) {
             Ok(list) if !list.is_empty() => Ok(Self::List(list)),
             _ => Err(serde::de::Error::custom(format!("expected {CHANNELS}"))),

@@ -174,3 +174,30 @@ fn more_work_than_sensible_time_allows_is_refused() {
     config("[features.cqt]\nhop_length = 1", &[]).unwrap();
     config("[features.hpss]\nkernel_size = 1023", &[]).unwrap();
 }
+
+#[test]
+fn keys_and_words_of_librosa_are_understood_in_refusals() {
+    for (change, says) in [
+        ("signal.mono=true", "did you mean signal.channels?"),
+        ("mfcc.sr=16000", "did you mean signal.sample_rate?"),
+        ("mfcc.top_db=None", "\"none\" in small letters"),
+        ("signal.channels=0", "channel 0 alone is [0]"),
+        ("mfcc.n_mfcc=129", "n_mfcc must be at most n_mels (128), not 129"),
+    ] {
+        let refusal = Config::with_overrides("[features.mfcc]", "here", &[change.into()]);
+        let refusal = refusal.unwrap_err().to_string();
+        assert!(refusal.contains(says), "{change}: {refusal}");
+    }
+    let set = ["mfcc.n_mfcc=128".into(), "mfcc.top_db=none".into()];
+    Config::with_overrides("[features.mfcc]", "here", &set).unwrap();
+    let rate = ["signal.sample_rate=8000".into()];
+    let refusal = Config::with_overrides("[features.af193]", "here", &rate).unwrap_err();
+    assert!(refusal.to_string().contains("sr must be above 12800 Hz for af193"), "{refusal}");
+}
+
+#[test]
+fn an_explained_preset_is_no_configuration() {
+    let text = "A text.\n\nConfiguration hash: 0\n";
+    let refusal = Config::with_overrides(text, "my.toml", &[]).unwrap_err().to_string();
+    assert!(refusal.contains("presets NAME --toml"), "{refusal}");
+}

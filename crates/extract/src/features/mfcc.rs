@@ -1,5 +1,6 @@
 //! `mfcc`: mel-frequency cepstral coefficients.
 
+use corsmal_dsp::DspError;
 use corsmal_dsp::mel::MelNorm;
 use corsmal_dsp::mfcc::{DctNorm, MfccParams, mfcc_matrix};
 use serde::{Deserialize, Serialize};
@@ -192,6 +193,10 @@ impl FeatureKind for Mfcc {
         };
         let mel = self.mel.params(sr, stft.n_fft, self.mel_norm);
         let kernel = MelKernel::new(&mel, Scale::PowerToDb, self.db.decibel(Scale::PowerToDb)?)?;
+        if self.n_mfcc > self.mel.n_mels {
+            let allowed = format!("at most n_mels ({})", self.mel.n_mels);
+            return Err(DspError::parameter("n_mfcc", self.n_mfcc, allowed));
+        }
         let matrix = mfcc_matrix(self.mel.n_mels, &params)?;
         let labels = (0..matrix.nrows()).map(|i| i.to_string()).collect();
         let weights = matrix.iter().map(|w| *w as f32).collect();

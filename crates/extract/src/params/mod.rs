@@ -12,7 +12,7 @@ mod word;
 
 pub use decibel::{DbRef, DbSpec, Scale, TopDb};
 pub use error::ConfigError;
-pub use keys::{Keys, LIBROSA};
+pub use keys::{Keys, LIBROSA, elsewhere};
 pub use limits::{MAX_FRAME, MAX_N_FFT, USUAL_RATE, at_most};
 pub use mel::MelSpec;
 pub use table::typed;

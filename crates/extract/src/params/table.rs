@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use super::error::ConfigError;
+use super::keys::elsewhere;
 
 /// A table of plain values as its typed struct. Unknown keys are refused by comparison with the
 /// keys of the default value, since serde cannot do so across flattened groups.
@@ -19,8 +20,13 @@ where
         _ => Vec::new(),
     };
     if let Some(key) = table.keys().find(|k| !known.contains(k)) {
-        let choices = corsmal_names::choices(key, known.iter().map(String::as_str));
-        let message = format!("is unknown here: {choices}");
+        let message = match elsewhere(key) {
+            Some(here) => format!("is unknown here: did you mean {here}?"),
+            None => {
+                let choices = corsmal_names::choices(key, known.iter().map(String::as_str));
+                format!("is unknown here: {choices}")
+            }
+        };
         return Err(ConfigError::key(format!("{prefix}.{key}"), message));
     }
     let parse = |table: Map<String, Value>| serde_json::from_value::<T>(Value::Object(table));

@@ -22,6 +22,9 @@ pub fn number_or<'de, D: Deserializer<'de>>(d: D, word: &str) -> Result<Option<f
     match Raw::deserialize(d) {
         Ok(Raw::Number(n)) => Ok(Some(n)),
         Ok(Raw::Word(w)) if w == word => Ok(None),
+        Ok(Raw::Word(w)) if w.eq_ignore_ascii_case(word) => {
+            Err(serde::de::Error::custom(format!("expected \"{word}\" in small letters")))
+        }
         _ => Err(serde::de::Error::custom(format!("expected a number or \"{word}\""))),
     }
 }
