@@ -73,11 +73,13 @@ pub(crate) fn run(
     for epoch in resumed..recipe.epochs {
         let mut sum = 0.0;
         let steps = steps_of(course.train, recipe, epoch);
+        let all = (recipe.epochs * steps.len()) as u64;
         for (step, rows) in steps.iter().enumerate() {
             tell(&epochs, Some(step))?;
             let chance = Stream::new(recipe.seed, "offset").part(epoch as u64);
             let inputs = course.items.laid(trainer.network, rows, recipe, chance);
             let targets = course.targets.pick(rows, trainer.network.outputs());
+            trainer.optimiser.share = recipe.schedule.share(trainer.optimiser.steps, all);
             sum += trainer.step(&inputs, &targets)?.loss;
         }
         let mut result = Epoch { loss: sum / steps.len() as f64, score: None };

@@ -42,19 +42,50 @@ impl Tensor {
 }
 
 /// Equal stretches of frames that a network takes one by one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stretches {
     /// frames of a window
     pub frames: usize,
     /// frames from one window to the next
     pub step: usize,
+    /// seconds from one frame to the next
+    pub hop: f64,
+    /// decibels that take the place of missing frames where a recording is shorter than a stretch; `None`: it is
+    /// refused
+    pub fill: Option<f32>,
+    /// stretches so many decibels quieter than the loudest are left out; values are decibels then
+    pub quiet: Option<f32>,
 }
 
 impl Stretches {
+    /// Stretches of 10 ms frames, all that are whole.
+    pub const fn whole(frames: usize, step: usize) -> Self {
+        Self { frames, step, hop: 0.01, fill: None, quiet: None }
+    }
+
     /// The whole windows of so many frames.
     pub fn of(self, frames: usize) -> impl Iterator<Item = Range<usize>> {
         let count = frames.checked_sub(self.frames).map_or(0, |rest| rest / self.step + 1);
         (0..count).map(move |w| w * self.step..w * self.step + self.frames)
+    }
+
+    /// Of these stretches of a tensor, those that are not quiet.
+    fn heard(self, tensor: &Tensor) -> Vec<Range<usize>> {
+        let all: Vec<Range<usize>> = self.of(tensor.frames).collect();
+        let Some(quiet) = self.quiet else { return all };
+        let power = |frame: usize| -> f64 {
+            tensor.frame(frame).iter().map(|v| 10.0_f64.powf(f64::from(*v) / 10.0)).sum()
+        };
+        let powers: Vec<f64> = (0..tensor.frames).map(power).collect();
+        let sums: Vec<f64> = all.iter().map(|w| powers[w.clone()].iter().sum()).collect();
+        let loudest = sums.iter().copied().fold(0.0, f64::max);
+        let least = loudest * 10.0_f64.powf(-f64::from(quiet) / 10.0);
+        all.into_iter().zip(sums).filter(|(_, sum)| *sum >= least).map(|(w, _)| w).collect()
+    }
+
+    /// Seconds of a recording before this frame.
+    pub fn seconds(self, frame: usize) -> f64 {
+        frame as f64 * self.hop
     }
 }
 
@@ -65,7 +96,7 @@ pub struct FrontEnd {
     pub preset: &'static str,
     /// keys of it that are changed
     pub set: &'static [&'static str],
-    /// stretches of 10 ms frames that are items of their own; `None`: a recording is one item
+    /// stretches of frames that are items of their own; `None`: a recording is one item
     pub windows: Option<Stretches>,
     /// the numbers of an item from a recording, or a window of it
     pub item: fn(Tensor) -> Vec<f32>,
@@ -91,8 +122,14 @@ impl FrontEnd {
     /// # Errors
     /// [`NetError::InputShape`] for features of another shape, such as those of another number of
     /// channels; [`NetError::TooShort`].
-    pub fn items(&self, network: &Network, tensor: Tensor) -> Result<Vec<Item>> {
+    pub fn items(&self, network: &Network, mut tensor: Tensor) -> Result<Vec<Item>> {
         let Tensor { channels, coefficients, frames, .. } = tensor;
+        if let Some(Stretches { frames: needed, fill: Some(fill), .. }) = self.windows
+            && (1..needed).contains(&frames)
+        {
+            tensor.values.resize(needed * channels * coefficients, fill);
+            tensor.frames = needed;
+        }
         let items: Vec<Item> = match self.windows {
             None => vec![Item { frames: None, values: (self.item)(tensor) }],
             Some(windows) => {
@@ -102,7 +139,7 @@ impl FrontEnd {
                     let window = Tensor { channels, coefficients, frames: span.len(), values };
                     Item { frames: Some(span), values: (self.item)(window) }
                 };
-                windows.of(frames).map(item).collect()
+                windows.heard(&tensor).into_iter().map(item).collect()
             }
         };
         let input = &network.inputs()[0];
@@ -133,7 +170,7 @@ mod tests {
 
     #[test]
     fn windows_are_whole() {
-        let windows = Stretches { frames: 64, step: 16 };
+        let windows = Stretches::whole(64, 16);
         let starts = |frames| windows.of(frames).map(|w| w.start).collect::<Vec<_>>();
         assert!(starts(63).is_empty());
         assert_eq!(starts(64), [0]);
@@ -154,6 +191,7 @@ mod tests {
             ("m6_pouring", (1, 9216, 1)),
             ("m6_shaking", (1, 9216, 1)),
             ("vggish", (1, 64, 192)),
+            ("mel_cnn", (1, 64, 300)),
         ];
         for definition in networks::NETWORKS {
             let shape = shapes.iter().find(|(name, _)| *name == definition.name);
@@ -175,6 +213,32 @@ mod tests {
             let refused = front_end.items(&network, Tensor { values, ..other });
             assert!(matches!(refused, Err(NetError::InputShape { .. })), "{}", definition.name);
         }
+    }
+
+    #[test]
+    fn stretches_are_filled_up_and_quiet_ones_left_out() {
+        let definition = networks::named("mel_cnn").unwrap();
+        let (network, front_end) =
+            (definition.build(None, 0).unwrap(), definition.front_end.unwrap());
+        let Stretches { frames, step, .. } = front_end.windows.unwrap();
+        let tensor = |levels: &[f32]| Tensor {
+            channels: 1,
+            coefficients: 64,
+            frames: levels.len(),
+            values: levels.iter().flat_map(|level| [*level; 64]).collect(),
+        };
+        // Sound at the start, silence, and 30 dB less at the end.
+        let mut levels = vec![-80.0; 5 * frames];
+        levels[..frames].fill(0.0);
+        levels[4 * frames..].fill(-30.0);
+        let items = front_end.items(&network, tensor(&levels)).unwrap();
+        let starts: Vec<usize> = items.iter().map(|i| i.frames.clone().unwrap().start).collect();
+        let expected = (0..=4 * frames).step_by(step).filter(|s| *s < frames || *s > 3 * frames);
+        assert_eq!(starts, expected.collect::<Vec<_>>());
+        let short = front_end.items(&network, tensor(&[0.0; 3])).unwrap();
+        assert_eq!((short.len(), short[0].values.len()), (1, 64 * frames));
+        assert!(short[0].values[3 * 64..].iter().all(|v| *v == -1.0), "silence");
+        assert!(front_end.items(&network, tensor(&[])).is_err());
     }
 
     #[test]

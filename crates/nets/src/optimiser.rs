@@ -44,6 +44,8 @@ const PIECE: usize = 1 << 15;
 #[derive(Clone, Debug)]
 pub struct Optimiser {
     spec: OptimiserSpec,
+    /// share of the learning rate that the next step takes
+    pub share: f64,
     /// steps done
     pub steps: u64,
     /// moments of each trained parameter, in the order of the parameters
@@ -60,7 +62,7 @@ impl Optimiser {
                 [vec![0.0; d.len()], vec![0.0; second]]
             })
             .collect();
-        Self { spec, steps: 0, moments }
+        Self { spec, share: 1.0, steps: 0, moments }
     }
 
     /// Changes the parameters by their gradients.
@@ -74,10 +76,11 @@ impl Optimiser {
             match self.spec {
                 OptimiserSpec::Sgd { lr, momentum, weight_decay } => {
                     let first = self.steps == 1;
-                    let settings = (lr as f32, momentum as f32, weight_decay as f32);
+                    let settings = ((self.share * lr) as f32, momentum as f32, weight_decay as f32);
                     sgd(values, gradient.values(), &mut moments[0], settings, first);
                 }
                 OptimiserSpec::Adam { lr, weight_decay } => {
+                    let lr = self.share * lr;
                     adam(values, gradient.values(), moments, lr, weight_decay as f32, self.steps);
                 }
             }

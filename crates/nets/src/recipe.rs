@@ -20,6 +20,9 @@ pub struct Recipe {
     pub weight_decay: f64,
     /// largest common norm of the gradients; 0: no clipping
     pub clip_grad_norm: f64,
+    /// how the learning rate changes from step to step
+    #[serde(default)]
+    pub schedule: Schedule,
     /// items of a step
     pub batch: usize,
     /// times through all items
@@ -53,6 +56,29 @@ pub enum OptimizerKind {
     Adam,
     /// stochastic gradient descent
     Sgd,
+}
+
+/// How the learning rate changes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Schedule {
+    /// it does not
+    #[default]
+    Constant,
+    /// it falls along half a cosine to zero at the end
+    Cosine,
+}
+
+impl Schedule {
+    /// The share of the learning rate after so many of all steps.
+    pub fn share(self, done: u64, all: u64) -> f64 {
+        match self {
+            Self::Constant => 1.0,
+            Self::Cosine => {
+                0.5 * (1.0 + (std::f64::consts::PI * done as f64 / all.max(1) as f64).cos())
+            }
+        }
+    }
 }
 
 /// First values.
@@ -138,6 +164,7 @@ impl Recipe {
             momentum: 0.0,
             weight_decay: 0.0,
             clip_grad_norm: 0.0,
+            schedule: Schedule::Constant,
             batch,
             epochs,
             drop_last: false,

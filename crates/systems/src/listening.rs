@@ -22,9 +22,6 @@ use corsmal_nets::networks;
 use crate::error::{Result, SystemError};
 use crate::recordings;
 
-/// Seconds from one frame of a windowed network to the next.
-const FRAME: f64 = 0.01;
-
 /// Which recordings a network is applied to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Formats {
@@ -177,7 +174,8 @@ impl<'a> Listener<'a> {
                 }
                 (Ok(heard), None) => {
                     let start = input.start.unwrap_or(0.0);
-                    let second = |frame: usize| start + frame as f64 * FRAME;
+                    let windows = self.front_end.windows;
+                    let second = |frame: usize| start + windows.map_or(0.0, |w| w.seconds(frame));
                     let one = |(frames, proba): Heard| {
                         let span = frames.map(|f| (second(f.start), second(f.end)));
                         answer(span, usize::from(span.is_some()), Some(decided(proba)))

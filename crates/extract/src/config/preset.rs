@@ -35,6 +35,7 @@ pub const PRESETS: &[Preset] = presets![
     "m5-vggish",
     "m6-code",
     "m6-paper",
+    "mel-cnn",
 ];
 
 impl Preset {

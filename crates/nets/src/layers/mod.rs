@@ -17,7 +17,7 @@ pub use batch_norm::BatchNorm;
 pub use conv::Conv2d;
 pub use dropout::Dropout;
 pub use linear::Linear;
-pub use pool::{AveragePool, MaxPool};
+pub use pool::{AveragePool, FramePool, MaxPool};
 pub use recurrent::{Bidirectional, Recurrent};
 pub use reshape::{Flatten, FlattenPixels, Join};
 pub use residual::Residual;

@@ -155,6 +155,69 @@ fn larger(new: f32, old: f32) -> (f32, bool) {
     (if better { new } else { old }, better)
 }
 
+/// The mean of every channel over the columns, and of these the largest and the mean over the rows, added: what an
+/// image of frames and bands has somewhere, and all along (as PANNs, Kong et al. 2020).
+#[derive(Clone, Copy, Debug)]
+pub struct FramePool;
+
+impl Layer for FramePool {
+    fn describe(&self) -> String {
+        "mean of the columns, largest and mean of the rows".into()
+    }
+
+    fn output(&self, input: Shape) -> Result<Shape> {
+        match input {
+            // The row is kept in a byte.
+            Shape::Image { height: 1..=256, channels, .. } => Ok(Shape::Vector(channels)),
+            _ => Err(NetError::layer(self.describe(), "an image of up to 256 rows", input)),
+        }
+    }
+
+    fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch {
+        let Shape::Image { height, width, channels } = input.shape else {
+            unreachable!("shapes were checked")
+        };
+        let mut out = Vec::with_capacity(input.items() * channels);
+        let mut chosen = vec![0; input.items() * channels];
+        let images = input.values.values().chunks_exact(input.shape.len());
+        for (image, chosen) in images.zip(chosen.chunks_exact_mut(channels)) {
+            let mut largest = vec![f32::NEG_INFINITY; channels];
+            let mut sums = vec![0.0; channels];
+            for (y, row) in image.chunks_exact(width * channels).enumerate() {
+                let row = crate::kernels::column_sums(row, channels);
+                for (c, sum) in row.iter().enumerate() {
+                    let (best, is_new) = larger((sum / width as f64) as f32, largest[c]);
+                    largest[c] = best;
+                    chosen[c] = if is_new { y as u8 } else { chosen[c] };
+                    sums[c] += sum;
+                }
+            }
+            let mean = |sum: f64| (sum / (height * width) as f64) as f32;
+            out.extend(largest.iter().zip(sums).map(|(largest, sum)| largest + mean(sum)));
+        }
+        pass.save(|| Saved::Bytes(chosen, input.shape));
+        Batch::new(out, Shape::Vector(channels))
+    }
+
+    fn backward(&self, gradient: Batch, pass: &mut Backward<'_>) -> Batch {
+        let Saved::Bytes(chosen, shape) = pass.saved() else { unreachable!("saves its choice") };
+        let Shape::Image { height, width, channels } = shape else { unreachable!("pools images") };
+        let mut values = Vec::with_capacity(gradient.items() * shape.len());
+        let rows = gradient.values.values().chunks_exact(channels);
+        for (gradient, chosen) in rows.zip(chosen.chunks_exact(channels)) {
+            for y in 0..height {
+                let share = |(g, &k): (&f32, &u8)| {
+                    let mean = g / (height * width) as f32;
+                    if usize::from(k) == y { mean + g / width as f32 } else { mean }
+                };
+                let one: Vec<f32> = gradient.iter().zip(chosen).map(share).collect();
+                (0..width).for_each(|_| values.extend_from_slice(&one));
+            }
+        }
+        Batch::new(values, shape)
+    }
+}
+
 /// The mean of every channel over the whole image.
 #[derive(Clone, Copy, Debug)]
 pub struct AveragePool;

@@ -24,7 +24,7 @@ pub(super) const M4_TYPE: Definition = Definition {
 const FRONT_END: FrontEnd = FrontEnd {
     preset: "m4-code",
     set: &[],
-    windows: Some(Stretches { frames: 64, step: 16 }),
+    windows: Some(Stretches::whole(64, 16)),
     item: |tensor| {
         let scale = |v: f32| ((f64::from(v) - MIN) / (MAX - MIN)) as f32;
         tensor.values.into_iter().map(scale).collect()

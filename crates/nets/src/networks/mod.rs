@@ -30,6 +30,7 @@ networks! {
     vggish: VGGISH;
     resnet18: RESNET18_LEVEL, RESNET18_TYPE;
     attention_gru: ATTENTION_GRU;
+    mel_cnn: MEL_CNN;
 }
 
 /// The definition of this name.

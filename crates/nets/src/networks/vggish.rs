@@ -16,7 +16,7 @@ pub(super) const VGGISH: Definition = Definition {
     paper: &[],
     takes: "log-mel patches of 96 x 64",
     front_end: Some(FrontEnd {
-        windows: Some(Stretches { frames: 96, step: 96 }),
+        windows: Some(Stretches::whole(96, 96)),
         ..FrontEnd::of("m5-vggish")
     }),
     // Never trained in the benchmark; for those who go on with its weights.

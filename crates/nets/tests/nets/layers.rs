@@ -3,8 +3,8 @@
 use corsmal_nets::batch::{Batch, Shape};
 use corsmal_nets::layer::Chain;
 use corsmal_nets::layers::{
-    Attention, AveragePool, BatchNorm, Bidirectional, Conv2d, Dropout, FlattenPixels, Linear,
-    MaxPool, Recurrent, Relu, Residual,
+    Attention, AveragePool, BatchNorm, Bidirectional, Conv2d, Dropout, FlattenPixels, FramePool,
+    Linear, MaxPool, Recurrent, Relu, Residual,
 };
 use corsmal_nets::loss::{Loss, Targets};
 use corsmal_nets::network::{Architecture, Body, Input, Network};
@@ -89,6 +89,26 @@ fn a_residual_network_has_right_gradients() {
             Box::new(Residual::new(vec![Box::new(Conv2d::same3("c", 6, 6))], vec![])),
             Box::new(AveragePool),
             Box::new(Linear::new("out", 6, 3)),
+        ],
+    );
+    check_gradients(&mut network, &Batch::new(noise(1, 5 * image.len()), image));
+}
+
+#[test]
+fn frames_are_pooled_by_their_largest_and_their_mean() {
+    let image = Shape::Image { height: 3, width: 2, channels: 1 };
+    let pooled = network(image, vec![Box::new(FramePool)]);
+    let x = Batch::new(vec![1.0, 3.0, 0.0, 8.0, -1.0, 1.0], image);
+    // Means of the columns: 2, 4, 0.
+    assert_eq!(pooled.forward(&[x]).unwrap().values.into_values(), [6.0]);
+    let image = Shape::Image { height: 5, width: 4, channels: 2 };
+    let mut network = network(
+        image,
+        vec![
+            Box::new(Conv2d::same3("a", 2, 4).unbiased()),
+            Box::new(BatchNorm::new("bn", 4)),
+            Box::new(FramePool),
+            Box::new(Linear::new("out", 4, 3)),
         ],
     );
     check_gradients(&mut network, &Batch::new(noise(1, 5 * image.len()), image));
