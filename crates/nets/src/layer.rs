@@ -118,7 +118,7 @@ impl<'a> Pass<'a> {
     }
 
     /// Rows of numbers times the transposed weights of this name, plus the bias of that name. In training the product
-    /// is burn's: losses after some steps depend on the order of sums, and burn's is near PyTorch's.
+    /// is burn's: weights that change with every step would have to be packed every time.
     pub(crate) fn product(&self, rows: &Matrix, weight: &str, bias: &str) -> Matrix {
         let bias = self.parameters.get(bias).values();
         if self.training.is_none() {
