@@ -245,6 +245,7 @@ def extract(
     paths: list[str],
     config: tuple[str, str],
     overrides: list[str],
+    window: tuple[float, float] | None,
     places: tuple[str, str | None, str | None],
     jobs: int | None,
     resume: bool,

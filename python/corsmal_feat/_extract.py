@@ -35,6 +35,8 @@ def extract(
     preset: str | None = None,
     config: Config | None = None,
     set: Mapping[str, Any] | None = None,
+    window: float | None = None,
+    hop: float | None = None,
     jobs: int | None = None,
     out: StrPath | None = None,
     work: StrPath | None = None,
@@ -51,6 +53,9 @@ def extract(
     preset : name of a configuration that comes with the package; "logmel" by default
     config : instead of a preset, a TOML file, TOML text, or the tables as a dict
     set : single keys to change, such as {"mfcc.n_mels": 64, "signal.channels": "mean"}
+    window : seconds; recordings are cut into windows of this length, each with a row or arrays of
+        its own. The label "recording" has the id of the recording
+    hop : seconds from the start of one window to the start of the next; half a window by default
     jobs : worker threads; by default one per core
     out : where to write the output, `.npz` or `.parquet`, a file or an object in a store
         ("s3://bucket/features.npz"); by default a temporary file, which is removed once it is
@@ -91,9 +96,15 @@ def extract(
     jobs = None if jobs is None else size("jobs", jobs)
     if jobs is not None and jobs > MOST_JOBS:
         raise ParameterError(f"jobs must be 1 to {MOST_JOBS}, not {jobs}")
+    if window is None and hop is not None:
+        raise ParameterError("hop needs window: the length of the windows in seconds")
+    span = None
+    if window is not None:
+        length = float(window)
+        span = (length, length / 2 if hop is None else float(hop))
     if out is not None:
         places = (os.fspath(out), None if work is None else os.fspath(work), partition_by)
-        return _run(inputs, chosen, overrides, places, jobs, resume, overwrite, progress)
+        return _run(inputs, chosen, overrides, span, places, jobs, resume, overwrite, progress)
     if resume or overwrite or work is not None or partition_by is not None:
         raise ParameterError(
             "resume, overwrite, work and partition_by need out: nothing is kept without it"
@@ -101,7 +112,7 @@ def extract(
     with tempfile.TemporaryDirectory(prefix="corsmal_feat_") as folder:
         temporary = str(Path(folder, "features.npz"))
         places = (temporary, None, None)
-        features = _run(inputs, chosen, overrides, places, jobs, False, False, progress)
+        features = _run(inputs, chosen, overrides, span, places, jobs, False, False, progress)
         # The file goes with its folder.
         features.arrays, features.times = dict(features.arrays), dict(features.times)
         return features
@@ -111,6 +122,7 @@ def _run(
     inputs: list[str],
     config: tuple[str, str],
     overrides: list[str],
+    window: tuple[float, float] | None,
     places: tuple[str, str | None, str | None],
     jobs: int | None,
     resume: bool,
@@ -122,7 +134,7 @@ def _run(
         raise ParameterError(f"progress must be True, False or a function, not {progress!r}")
     if progress in (True,):
         tell = _to_stderr
-    found = _core.extract(inputs, config, overrides, places, jobs, resume, overwrite, tell)
+    found = _core.extract(inputs, config, overrides, window, places, jobs, resume, overwrite, tell)
     if tell is _to_stderr:
         print(file=sys.stderr)
     for message in found:

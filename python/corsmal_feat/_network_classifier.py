@@ -23,7 +23,7 @@ _Column = tuple[npt.NDArray[np.float32], list[int]]
 
 
 class NetworkClassifier(ClassifierMixin, BaseEstimator):
-    """A network of the paper, or `attention_gru`, trained with its published or default recipe.
+    """A network of the paper, or one of our own, trained with its published or default recipe.
 
     `X` is an array [items, ...] in the layout of `nets.build(network).forward`, or a list with one
     array per item, which may differ in length: [steps, features] for recurrent networks, and a list

@@ -72,7 +72,7 @@ def build(name: str, *, outputs: int | None = None, seed: int = 0) -> Network:
     name : str
         One of `names()`.
     outputs : int, optional
-        Number of classes; by default, the published one (`attention_gru`: 3).
+        Number of classes; by default, the published one (`attention_gru`: 3, `mel_cnn`: 4).
     seed : int
         Seed of the initial parameters.
 

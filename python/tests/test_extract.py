@@ -107,6 +107,20 @@ def test_round_trip(folder: Path, tmp_path: Path, out: str):
     assert len(cf.extract(listed, preset="esc26", out=path, overwrite=True).names) == 26
 
 
+def test_windows_are_rows_of_their_own(folder: Path):
+    found = cf.extract(folder, preset="esc26", window=0.2)
+    assert found.ids[:4] == ["r0@0", "r0@0.1", "r0@0.2", "r0@0.3"]
+    assert found.labels["recording"].tolist() == ["r0"] * 4 + ["r1"] * 4 + ["r2"] * 4
+    apart = cf.extract(folder, preset="esc26", window=0.2, hop=0.2)
+    assert apart.ids[:2] == ["r0@0", "r0@0.2"]
+    np.testing.assert_array_equal(apart.summary[1], found.summary[2])
+    for wrong in ({"hop": 1}, {"window": 0}, {"window": 1, "hop": -1}, {"window": float("nan")}):
+        with pytest.raises(cf.ParameterError, match=r"window|hop"):
+            cf.extract(folder, **wrong)
+    with pytest.raises(cf.ParameterError):
+        cf.extract(folder, window="long")
+
+
 def test_a_bad_file_is_an_outcome(folder: Path):
     (folder / "bad.wav").write_bytes(b"RIFF and nothing else")
     found = cf.extract(folder, preset="esc26")

@@ -30,7 +30,7 @@ def test_all_eleven_networks_give_pytorchs_numbers() -> None:
     assert len(cases) == 11, run.stdout + run.stderr
     if passed == "11 of 11":
         return
-    # m4_type's losses after steps depend on the processor; crates/nets/tests/nets/golden.rs says why.
+    # Losses of m4_type depend on the processor; crates/nets/tests/nets/golden.rs says why.
     (failed,) = (line for line in cases if not line.endswith(" ok"))
     found = re.fullmatch(
         r"m4_type +losses ([\d.]+) x tolerance(?:; outputs after the steps ([\d.]+) x tolerance)?",

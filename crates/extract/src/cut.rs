@@ -1,6 +1,7 @@
 //! Recordings cut into windows or stretches, each an input of its own.
 
 use std::collections::HashMap;
+use std::ops::RangeInclusive;
 use std::path::absolute;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,6 +15,9 @@ use crate::survey::{headers, lengths};
 pub const RECORDING: &str = "recording";
 /// Most windows of a run.
 const MOST: u64 = 50_000_000;
+
+/// Seconds that a window or hop can have.
+pub const WINDOW_SECONDS: RangeInclusive<f64> = 1e-3..=1e6;
 
 /// Length of windows and distance from one to the next, in seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]

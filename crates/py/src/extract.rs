@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use corsmal_extract::config::{Config, Preset};
-use corsmal_extract::cut::name_recordings;
+use corsmal_extract::cut::{WINDOW_SECONDS, WindowSpan, into_windows, name_recordings};
 use corsmal_extract::engine::{FeatureArray, Features, Signal, Signals};
 use corsmal_extract::inputs::{self, InputError};
 use corsmal_extract::projection::Projection;
@@ -96,6 +96,7 @@ pub(crate) fn extract(
     paths: Vec<String>,
     config: (String, String),
     overrides: Vec<String>,
+    window: Option<(f64, f64)>,
     places: (PathBuf, Option<PathBuf>, Option<String>),
     jobs: Option<usize>,
     resume: bool,
@@ -108,6 +109,13 @@ pub(crate) fn extract(
         Some(jobs) => jobs,
         None => pool::jobs()?,
     };
+    let span = window.map(|(window, hop)| WindowSpan { window, hop });
+    for (name, seconds) in span.iter().flat_map(|s| [("window", s.window), ("hop", s.hop)]) {
+        if !WINDOW_SECONDS.contains(&seconds) {
+            let message = format!("{name} must be 0.001 to 1000000 seconds, not {seconds}");
+            return Err(value_error(message));
+        }
+    }
     let compression = Compression::Stored;
     let shard = "0/1".parse::<Shard>().map_err(value_error)?;
     let (out, work, partition_by) = places;
@@ -128,7 +136,10 @@ pub(crate) fn extract(
         if let Some(skipped) = found.warning() {
             told.warning(&skipped);
         }
-        let inputs = name_recordings(found.inputs);
+        let inputs = match span {
+            None => name_recordings(found.inputs),
+            Some(span) => into_windows(found.inputs, span, stop).map_err(input_error)?,
+        };
         run::run(&inputs, &config, &options, &told, stop).map_err(|error| match error {
             run::RunError::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
             other => RunError::new_err(other.to_string()),

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use corsmal_extract::config::Config;
-use corsmal_extract::cut::{WindowSpan, into_windows, name_recordings};
+use corsmal_extract::cut::{WINDOW_SECONDS, WindowSpan, into_windows, name_recordings};
 use corsmal_extract::inputs::InputError;
 use corsmal_extract::run::{self, Progress, RunError, RunOptions};
 use corsmal_extract::survey::Survey;
@@ -221,7 +221,7 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
 /// Seconds of a window or from one to the next.
 fn window_seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(seconds) if (1e-3..=1e6).contains(&seconds) => Ok(seconds),
+        Ok(seconds) if WINDOW_SECONDS.contains(&seconds) => Ok(seconds),
         _ => Err("expected seconds, 0.001 to 1000000".into()),
     }
 }
