@@ -25,7 +25,7 @@ import csv
 import pathlib
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import corsmal_feat
 import numpy as np
@@ -99,26 +99,27 @@ class Windows:
         return np.stack([proba[owner == clip].mean(axis=0) for clip in test])
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--shared", default="../shared", type=pathlib.Path)
-    parser.add_argument("--check", action="store_true", help="shuffle the labels")
-    arguments = parser.parse_args()
-    data = arguments.shared / "data" / "esc10"
-    with open(data / "meta.csv", newline="") as file:
-        clips = list(csv.DictReader(file))
-    y = np.array([int(clip["class_id"]) for clip in clips])
-    folds = np.array([int(clip["fold"]) for clip in clips])
-    if arguments.check:
-        y = np.random.default_rng(0).permutation(y)
+class Clips:
+    """Folder, rows of `meta.csv`, and the class and fold of each clip."""
+
+    def __init__(self, shared: pathlib.Path) -> None:
+        self.data = shared / "data" / "esc10"
+        with open(self.data / "meta.csv", newline="") as file:
+            self.rows = list(csv.DictReader(file))
+        self.y = np.array([int(clip["class_id"]) for clip in self.rows])
+        self.folds = np.array([int(clip["fold"]) for clip in self.rows])
+
+
+def mixtures(clips: Clips) -> Iterator[tuple[int, Matrix]]:
+    """Every published fold, and the weighted mean of the candidates for its clips."""
+    data, y, folds = clips.data, clips.y, clips.folds
     start = time.perf_counter()
-    windows = {length: Windows(data, clips, length) for length in WINDOWS}
+    windows = {length: Windows(data, clips.rows, length) for length in WINDOWS}
     for length, own in windows.items():
         print(f"windows of {length or 'all'} s: {own.x.shape}", flush=True)
     print(f"features {time.perf_counter() - start:.0f} s", flush=True)
     names = [f"{length or 'clip'} {learner}" for length in WINDOWS for learner in LEARNERS]
     candidates = [(windows[length], make) for length in WINDOWS for make in LEARNERS.values()]
-    scores = []
     for fold in np.unique(folds):
         train, test = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
         inner = [
@@ -126,9 +127,24 @@ def main() -> None:
             for w, m in candidates
         ]
         w = weights(inner, y[train])
-        proba = mixture([own.predict(make, y, train, test) for own, make in candidates], w)
-        scores.append(100 * float(np.mean(proba.argmax(axis=1) == y[test])))
-        print(f"fold {fold}: {scores[-1]:.2f} % ({shown(names, w)})", flush=True)
+        print(f"fold {fold}: {shown(names, w)}", flush=True)
+        yield fold, mixture([own.predict(make, y, train, test) for own, make in candidates], w)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--shared", default="../shared", type=pathlib.Path)
+    parser.add_argument("--check", action="store_true", help="shuffle the labels")
+    arguments = parser.parse_args()
+    clips = Clips(arguments.shared)
+    if arguments.check:
+        clips.y = np.random.default_rng(0).permutation(clips.y)
+    start = time.perf_counter()
+    scores = []
+    for fold, proba in mixtures(clips):
+        right = proba.argmax(axis=1) == clips.y[clips.folds == fold]
+        scores.append(100 * float(np.mean(right)))
+        print(f"fold {fold}: {scores[-1]:.2f} %", flush=True)
     print(
         f"mean accuracy {np.mean(scores):.2f} % ± {np.std(scores, ddof=1):.2f} over folds, "
         f"{time.perf_counter() - start:.0f} s"
