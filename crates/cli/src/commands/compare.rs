@@ -158,7 +158,7 @@ fn settings(report: &Comparison, lines: &mut Vec<String>) {
     let contents = &settings.contents;
     if let Some(first) = &contents.first {
         lines.push(format!(
-            "  {} of {} recordings have other contents in b than in a, although they are paired; the first is {}",
+            "  {} of {} paired recordings differ in content; the first is {}",
             contents.differing,
             contents.values,
             quoted(&first.place)

@@ -288,9 +288,9 @@ fn recordings_of_other_folders_are_paired_by_file_name() {
     recording(&files.path("other.wav"), 3);
     let other = files.path("other.wav");
     std::fs::write(&listed, format!("id,path\nx,{}\n", other.display())).unwrap();
-    again("d.npz", &[]);
-    let words = ["no recording in common", "a.npz has \"one\", \"two\"", "d.npz has \"x\""];
-    refused(&files.run("a.npz", "d.npz", &[]), &words);
+    again("f.npz", &[]);
+    let words = ["no recording in common", "a.npz has \"one\", \"two\"", "f.npz has \"x\""];
+    refused(&files.run("a.npz", "f.npz", &[]), &words);
 
     // The same recordings, and nothing in common that is known of them.
     extract(&files, "e.npz", &["--preset", "logmel"]);
@@ -315,7 +315,7 @@ fn other_recordings_under_the_same_names_are_a_cause() {
     assert_eq!(contents["first"]["place"], "two");
     assert_eq!(kinds(&report, "rms"), ["recordings"]);
     let shown = text(&files.run("a.npz", "b.npz", &[]).stdout);
-    let words = "1 of 2 recordings have other contents in b than in a";
+    let words = "1 of 2 paired recordings differ in content; the first is \"two\"";
     assert!(shown.contains(words) && !shown.contains("cause unknown"), "{shown}");
 
     // Frames of several features under other ids.
