@@ -51,7 +51,7 @@ impl Table {
         }
         let rows = csv_text::records(&mut reader)
             .map(|found| found.map(|(line, record)| (line as usize, record)))
-            .collect::<csv::Result<_>>()
+            .collect::<std::result::Result<_, csv_text::Fault>>()
             .map_err(|e| fault(e.to_string()))?;
         Ok(Self { path: path.to_path_buf(), header, rows })
     }

@@ -163,7 +163,6 @@ impl Meter {
         let elapsed = self.started.elapsed();
         let seconds = self.audio();
         let statuses = counts(&report.outcomes);
-        let repairs = repairs(&report.outcomes);
         if report.up_to_date {
             eprintln!("{}: up to date, nothing to do", out.display());
             return;
@@ -185,10 +184,8 @@ impl Meter {
                 String::new()
             },
         );
-        if !repairs.is_empty() {
-            let repaired = report.outcomes.iter().filter(|o| !o.repairs.is_empty()).count();
-            let each: Vec<_> = repairs.iter().map(|(name, n)| format!("{n} {name}")).collect();
-            eprintln!("{}: {repaired} repaired: {}", out.display(), each.join(", "));
+        if let Some(repaired) = repaired(report.outcomes.iter().map(|o| &o.repairs)) {
+            eprintln!("{}: {repaired}", out.display());
         }
     }
 }
@@ -266,6 +263,17 @@ pub fn counts(outcomes: &[Outcome]) -> BTreeMap<&'static str, usize> {
         *counts.entry(outcome.status.name()).or_default() += 1;
     }
     counts
+}
+
+/// How many inputs were repaired, and how, given the repairs of each; `None` where none was.
+pub fn repaired<'r>(each: impl Iterator<Item = &'r Vec<String>>) -> Option<String> {
+    let (mut inputs, mut counts) = (0, BTreeMap::<&str, usize>::new());
+    for repairs in each.filter(|repairs| !repairs.is_empty()) {
+        inputs += 1;
+        repairs.iter().for_each(|name| *counts.entry(name).or_default() += 1);
+    }
+    let named: Vec<_> = counts.iter().map(|(name, n)| format!("{n} {name}")).collect();
+    (inputs > 0).then(|| format!("{inputs} repaired: {}", named.join(", ")))
 }
 
 /// Number of inputs by repair.

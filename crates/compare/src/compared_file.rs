@@ -296,6 +296,11 @@ impl ComparedFile {
         Some(ids)
     }
 
+    /// The same, or the ids of a table of another program.
+    pub(super) fn rows_or_recordings(&self) -> Option<Vec<&String>> {
+        self.recordings().or_else(|| Some(self.table.as_ref()?.ids.as_ref()?.iter().collect()))
+    }
+
     /// Names for a message.
     pub(super) fn listing(&self) -> String {
         let arrays = self.arrays.iter().filter(|e| !e.name.starts_with(RESERVED)).map(|e| &e.name);

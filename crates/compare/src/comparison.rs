@@ -120,15 +120,24 @@ impl ComparisonBuilder {
         let tolerance = self.tolerance;
         let feature = self.feature(&found.feature, dtypes);
         feature.arrays += 1;
-        let shape = x.shape().to_vec();
+        let (shape, other) = (x.shape().to_vec(), y.shape().to_vec());
+        // The parts of complex numbers are no channels, which causes are looked for in.
+        let complex = dtypes.map(is_complex);
         let pair = match Pair::new(x, y) {
-            Ok(pair) => pair,
-            Err(arrays) => {
-                let [x, y] = *arrays;
+            Ok(pair) if complex[0] == complex[1] => pair,
+            arrays => {
+                let [x, y] = match arrays {
+                    Ok(Pair { a, b, .. }) => [a.into_dyn(), b.into_dyn()],
+                    Err(arrays) => *arrays,
+                };
                 let array = found.place.clone();
-                feature.shapes.push(Shapes { array, a: shape, b: y.shape().to_vec() });
+                let own = |shape: &[usize], complex| shape[usize::from(complex)..].to_vec();
+                let (a, b) = (own(&shape, complex[0]), own(&other, complex[1]));
+                feature.shapes.push(Shapes { array, a, b });
                 feature.differing += 1;
-                feature.causes(causes::of_shapes(x, y), &found.place);
+                if complex == [false; 2] {
+                    feature.causes(causes::of_shapes(x, y), &found.place);
+                }
                 return;
             }
         };
@@ -143,7 +152,7 @@ impl ComparisonBuilder {
         feature.difference.add(pair.values(), limit, locate);
         let apart = feature.difference.values - feature.difference.within;
         feature.differing += usize::from(apart > before);
-        if feature.difference.values - feature.difference.equal > equal {
+        if feature.difference.values - feature.difference.equal > equal && !complex[0] {
             feature.causes(causes::of_values(&pair, dtypes), &found.place);
         }
     }
@@ -308,6 +317,11 @@ impl FileReport {
             tool_version: file.provenance().map(|p| p.tool_version.clone()),
         }
     }
+}
+
+/// Whether numpy's name of a type is one of complex numbers.
+pub fn is_complex(dtype: &str) -> bool {
+    dtype.contains('c')
 }
 
 /// A place in words: by the names of our axes, else the index.

@@ -24,7 +24,7 @@ pub enum CompareError {
     },
     /// Two outputs of ours over other recordings.
     #[error(
-        "no recording in common, by id or file name: {a} has {in_a}; {b} has {in_b}. Name pairs of \
+        "no recording in common, by id, file name or content: {a} has {in_a}; {b} has {in_b}. Name pairs of \
          arrays with --map, or extract the same recordings"
     )]
     NoRecordingInCommon {
@@ -37,9 +37,20 @@ pub enum CompareError {
         /// Recordings of the second.
         in_b: String,
     },
+    /// An id that names several rows, which are paired by it.
+    #[error(
+        "{path}: the id {id:?} names several rows, but rows are paired by their ids: make them \
+         different, or leave the column out"
+    )]
+    RepeatedId {
+        /// The file.
+        path: PathBuf,
+        /// The id.
+        id: String,
+    },
     /// Two outputs of ours over the same recordings, of other features or kinds.
     #[error(
-        "the recordings are the same, but nothing of them is in both files: {a} has {in_a}; {b} has \
+        "recordings are the same, but nothing of them is in both files: {a} has {in_a}; {b} has \
          {in_b}. Compare frames with frames, or statistics with statistics, of the same features"
     )]
     NoFeatureInCommon {

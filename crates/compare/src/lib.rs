@@ -40,7 +40,7 @@ use std::path::Path;
 
 pub use causes::{Cause, CauseKind};
 pub use compared_file::Refused;
-pub use comparison::{Comparison, FeatureReport, FileReport, Finding, Shapes};
+pub use comparison::{Comparison, FeatureReport, FileReport, Finding, Shapes, is_complex};
 pub use corsmal_files::settings::Setting;
 pub use difference::{Difference, Extreme, Tolerance};
 pub use error::CompareError;

@@ -80,19 +80,20 @@ impl Matching {
             if by != PairedBy::Id && !pairs.is_empty() {
                 break;
             }
-            let (of_a, of_b) = (|i| owned(by, a, i), |j| owned(by, b, j));
-            let clear = |rest: &[usize], of: &dyn Fn(usize) -> Option<Key>| {
-                by == PairedBy::Id || unique(rest.iter().map(|i| of(*i)))
-            };
-            if clear(&rest_a, &of_a) && clear(&rest_b, &of_b) {
-                let before = pairs.len();
-                join(&mut pairs, (&mut rest_a, &mut rest_b), of_a, of_b);
-                if pairs.len() > before {
-                    matching.paired_by = by;
-                }
+            let unclear_a = repeated(rest_a.iter().filter_map(|i| owned(by, a, *i)));
+            let unclear_b = repeated(rest_b.iter().filter_map(|j| owned(by, b, *j)));
+            let before = pairs.len();
+            join(
+                &mut pairs,
+                (&mut rest_a, &mut rest_b),
+                |i| owned(by, a, i).filter(|key| !unclear_a.contains(key)),
+                |j| owned(by, b, j).filter(|key| !unclear_b.contains(key)),
+            );
+            if pairs.len() > before {
+                matching.paired_by = by;
             }
         }
-        matching.tables(a, b);
+        matching.tables(a, b)?;
         if let (true, [only_a], [only_b]) =
             (pairs.is_empty() && matching.tables.is_empty(), &rest_a[..], &rest_b[..])
         {
@@ -100,9 +101,9 @@ impl Matching {
             (rest_a, rest_b) = (Vec::new(), Vec::new());
         }
         if pairs.is_empty() && matching.tables.is_empty() {
-            if let (Some(in_a), Some(in_b)) = (a.recordings(), b.recordings()) {
+            if let (Some(in_a), Some(in_b)) = (a.rows_or_recordings(), b.rows_or_recordings()) {
                 let (of_a, of_b) = (a.path().into(), b.path().into());
-                if in_a == in_b && !in_a.is_empty() {
+                if in_a.iter().any(|id| in_b.contains(id)) {
                     let (in_a, in_b) = (a.listing(), b.listing());
                     return Err(CompareError::NoFeatureInCommon { a: of_a, b: of_b, in_a, in_b });
                 }
@@ -129,18 +130,23 @@ impl Matching {
         Ok(matching)
     }
 
-    fn tables(&mut self, a: &ComparedFile, b: &ComparedFile) {
+    fn tables(&mut self, a: &ComparedFile, b: &ComparedFile) -> Result<(), CompareError> {
         let (x, y) = match (a.table(), b.table()) {
             (Some(x), Some(y)) => (x, y),
-            (Some(x), None) => return self.only_a.extend(x.names.iter().cloned()),
-            (None, Some(y)) => return self.only_b.extend(y.names.iter().cloned()),
-            (None, None) => return,
+            (x, y) => {
+                let names = |table: Option<&NumericTable>| -> Vec<String> {
+                    table.map_or_else(Vec::new, |table| table.names.clone())
+                };
+                self.only_a.extend(names(x));
+                self.only_b.extend(names(y));
+                return Ok(());
+            }
         };
         let in_a = (&*x.names, &*by_name(&x.names));
         let in_b = (&*y.names, &*by_name(&y.names));
         let columns = common(in_a, in_b, &mut self.only_a, &mut self.only_b);
         let rows = match (&x.ids, &y.ids) {
-            (Some(x), Some(y)) => self.rows((a, x), (b, y)),
+            (Some(x), Some(y)) => self.rows((a, x), (b, y))?,
             // Without ids, rows are those of the same number.
             _ => {
                 let (in_a, in_b) = (x.values.nrows(), y.values.nrows());
@@ -152,7 +158,7 @@ impl Matching {
             }
         };
         if rows.is_empty() {
-            return;
+            return Ok(());
         }
         let ours = a.provenance().is_some() || b.provenance().is_some();
         let mut features: Vec<String> = Vec::new();
@@ -168,6 +174,7 @@ impl Matching {
             let columns = groups.remove(&feature).unwrap_or_default();
             self.tables.push(TableMatch { feature, columns, rows: rows.clone() });
         }
+        Ok(())
     }
 }
 
@@ -177,27 +184,42 @@ impl Matching {
         &mut self,
         (a, in_a): (&ComparedFile, &[String]),
         (b, in_b): (&ComparedFile, &[String]),
-    ) -> Vec<(usize, usize)> {
+    ) -> Result<Vec<(usize, usize)>, CompareError> {
         for by in PairedBy::ALL {
-            let x: Vec<_> = in_a.iter().map(|id| by.key(a.identities(), id)).collect();
-            let y: Vec<_> = in_b.iter().map(|id| by.key(b.identities(), id)).collect();
-            let clear = |keys: &[Option<&str>]| by == PairedBy::Id || unique(keys.iter().copied());
-            let known: HashSet<&str> = y.iter().copied().flatten().collect();
-            if clear(&x) && clear(&y) && x.iter().flatten().any(|key| known.contains(key)) {
-                if by != PairedBy::Id {
-                    self.paired_by = by;
+            let mut x: Vec<_> = in_a.iter().map(|id| by.key(a.identities(), id)).collect();
+            let mut y: Vec<_> = in_b.iter().map(|id| by.key(b.identities(), id)).collect();
+            let in_both = |x: &[Option<&str>], y: &[Option<&str>]| {
+                let known: HashSet<&str> = y.iter().copied().flatten().collect();
+                x.iter().flatten().any(|key| known.contains(key))
+            };
+            let is_common = in_both(&x, &y);
+            for (file, keys) in [(a, &mut x), (b, &mut y)] {
+                let unclear = repeated(keys.iter().copied().flatten());
+                if let (true, PairedBy::Id, Some(id)) = (is_common, by, unclear.iter().min()) {
+                    let (path, id) = (file.path().into(), (*id).to_owned());
+                    return Err(CompareError::RepeatedId { path, id });
                 }
-                return common((in_a, &x), (in_b, &y), &mut self.only_a, &mut self.only_b);
+                for key in keys.iter_mut() {
+                    *key = key.filter(|key| !unclear.contains(key));
+                }
             }
+            if !in_both(&x, &y) {
+                continue;
+            }
+            let pairs = common((in_a, &x), (in_b, &y), &mut self.only_a, &mut self.only_b);
+            if by != PairedBy::Id {
+                self.paired_by = by;
+            }
+            return Ok(pairs);
         }
-        Vec::new()
+        Ok(Vec::new())
     }
 }
 
-/// Whether no key comes twice.
-fn unique<K: Eq + Hash>(keys: impl Iterator<Item = Option<K>>) -> bool {
+/// Keys that come more than once: what they belong to is not known.
+fn repeated<K: Eq + Hash + Clone>(keys: impl Iterator<Item = K>) -> HashSet<K> {
     let mut seen = HashSet::new();
-    keys.flatten().all(|key| seen.insert(key))
+    keys.filter(|key| !seen.insert(key.clone())).collect()
 }
 
 fn position(file: &ComparedFile, name: &str) -> Result<usize, CompareError> {

@@ -116,8 +116,7 @@ fn of_recording(
 ) -> Result<(), InputError> {
     let rate = f64::from(sample_rate);
     let frames = |seconds: f64| ((seconds * rate).round() as u64).max(1);
-    // The frame that a time names: the last one that does not begin later.
-    let at = |seconds: f64| (seconds * rate + 1e-3) as u64;
+    let at = |seconds: f64| frame_at(seconds, rate);
     let base = input.start.map_or(0, at);
     let end = input.end.map_or(there, at).min(there);
     let (window, hop) = (frames(span.window), frames(span.hop));
@@ -143,13 +142,37 @@ fn of_recording(
     Ok(())
 }
 
-/// Seconds of a frame, to the microsecond and as short as can be.
+/// Seconds of a frame as short as can be: to the microsecond, or the nanosecond where that names another frame.
 fn seconds(frame: u64, rate: f64) -> f64 {
-    (frame as f64 / rate * 1e6).round() / 1e6
+    let to = |digits: f64| (frame as f64 / rate * digits).round() / digits;
+    let short = to(1e6);
+    if frame_at(short, rate) == frame { short } else { to(1e9) }
+}
+
+/// The frame that a time names: the last one that does not begin later.
+fn frame_at(seconds: f64, rate: f64) -> u64 {
+    (seconds * rate + 1e-3) as u64
 }
 
 fn labelled(input: &Input, id: String, start: Option<f64>, end: Option<f64>) -> Input {
     let mut labels = input.labels.clone();
     labels.push((RECORDING.into(), input.id.clone()));
     Input { id, source: input.source.clone(), start, end, labels }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A manifest made of ids began a frame earlier.
+    #[test]
+    fn the_time_in_an_id_names_the_frame() {
+        for rate in [8000.0, 22_050.0, 44_100.0, 192_000.0] {
+            for frame in (0..500_000).step_by(61).chain([5_513, 10_000_000_001]) {
+                assert_eq!(frame_at(seconds(frame, rate), rate), frame, "{frame} at {rate}");
+            }
+        }
+        assert_eq!(seconds(22_050, 44_100.0).to_string(), "0.5");
+        assert_eq!(seconds(5_513, 44_100.0).to_string(), "0.125011338");
+    }
 }

@@ -12,7 +12,7 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use corsmal_files::csv_text::{self, LineFeeds};
+use corsmal_files::csv_text::{self, Fault, LineFeeds};
 use corsmal_files::quote::{printable, quoted, shown};
 use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor};
 use serde_json::Value;
@@ -188,20 +188,16 @@ impl ManifestColumns {
 }
 
 fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
-    let failed = |error: csv::Error, reader: &csv::Reader<LineFeeds<BufReader<Short<File>>>>| {
+    let failed = |fault: Fault, reader: &csv::Reader<LineFeeds<BufReader<Short<File>>>>| {
         // The reader is ahead of the position, but a line that is too long stops it.
-        let line = match (error.position(), error.kind()) {
-            (Some(position), _) => position.line(),
-            (None, csv::ErrorKind::Io(_)) => reader.get_ref().get_ref().get_ref().line,
-            (None, _) => 1,
-        };
-        wrong(path, line, csv_text::reason(&error))
+        let line = fault.line.unwrap_or_else(|| reader.get_ref().get_ref().get_ref().line);
+        wrong(path, line, fault.reason)
     };
     let mut reader = csv_text::reader(open(path)?).map_err(|e| InputError::io(path, e))?;
     let mut columns = ManifestColumns::default();
     let names = match reader.headers().cloned() {
         Ok(names) => names,
-        Err(error) => return Err(failed(error, &reader)),
+        Err(error) => return Err(failed(error.into(), &reader)),
     };
     // Where in a record each column is.
     let mut cells = Vec::new();
@@ -230,7 +226,7 @@ fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
     loop {
         let found = csv_text::records(&mut reader).next();
         let Some(found) = found else { return Ok(rows) };
-        let (line, record) = found.map_err(|error| failed(error, &reader))?;
+        let (line, record) = found.map_err(|fault| failed(fault, &reader))?;
         let cell = |place: usize| record.get(cells[place]).unwrap_or_default().to_owned();
         rows.push(columns.entry(path, line, cell)?);
         require_cells(rows.len(), columns.labels.len()).map_err(|e| wrong(path, line, e))?;

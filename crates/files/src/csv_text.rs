@@ -35,7 +35,7 @@ pub fn reader<R: BufRead>(mut text: R) -> io::Result<csv::Reader<LineFeeds<R>>> 
 /// The records behind the header, each with the number of its line.
 pub fn records<R: BufRead>(
     reader: &mut csv::Reader<LineFeeds<R>>,
-) -> impl Iterator<Item = csv::Result<(u64, csv::StringRecord)>> {
+) -> impl Iterator<Item = Result<(u64, csv::StringRecord), Fault>> {
     std::iter::from_fn(|| {
         let mut record = csv::StringRecord::new();
         match reader.read_record(&mut record) {
@@ -44,7 +44,11 @@ pub fn records<R: BufRead>(
                 Some(Ok((reader.get_ref().lines.of_record(line), record)))
             }
             Ok(false) => None,
-            Err(error) => Some(Err(error)),
+            Err(error) => {
+                let mut fault = Fault::from(error);
+                fault.line = fault.line.map(|line| reader.get_ref().lines.of_record(line));
+                Some(Err(fault))
+            }
         }
     })
 }
@@ -146,22 +150,38 @@ impl<R: BufRead> Read for LineFeeds<R> {
     }
 }
 
-/// What is wrong with a table and where, and what to do about text that is not UTF-8, such as Excel's `CSV`
-/// in Western Europe.
-pub fn fault(error: &csv::Error) -> String {
-    match (error.kind(), error.position()) {
-        (csv::ErrorKind::Utf8 { .. }, Some(at)) => format!("line {}: {}", at.line(), reason(error)),
-        _ => reason(error),
+/// What is wrong with a table, and where.
+#[derive(Debug)]
+pub struct Fault {
+    /// The line, where that is known: not where reading failed.
+    pub line: Option<u64>,
+    /// What is wrong, and what to do about text that is not UTF-8, such as Excel's `CSV` in Western Europe.
+    pub reason: String,
+}
+
+impl std::fmt::Display for Fault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.line {
+            Some(line) => write!(f, "line {line}: {}", self.reason),
+            None => f.write_str(&self.reason),
+        }
     }
 }
 
-/// As [`fault`], without the line of text that is not UTF-8.
-pub fn reason(error: &csv::Error) -> String {
-    match error.kind() {
-        csv::ErrorKind::Utf8 { .. } => {
-            "text that is not UTF-8: save the table as \"CSV UTF-8\"".into()
-        }
-        _ => error.to_string(),
+impl From<csv::Error> for Fault {
+    fn from(error: csv::Error) -> Self {
+        let line = error.position().map(csv::Position::line);
+        let reason = match error.kind() {
+            csv::ErrorKind::Utf8 { .. } => {
+                "text that is not UTF-8: save the table as \"CSV UTF-8\"".into()
+            }
+            csv::ErrorKind::UnequalLengths { expected_len, len, .. } => format!(
+                "{len} fields, but the first line has {expected_len}: is a quotation mark or a \
+                 separator missing?"
+            ),
+            _ => error.to_string(),
+        };
+        Self { line, reason }
     }
 }
 
@@ -180,9 +200,9 @@ mod tests {
     fn text_of_older_encodings_is_refused_with_advice() {
         let mut table = reader(&b"id,class\n1,caf\xe9\n"[..]).unwrap();
         table.headers().unwrap();
-        let error = table.records().next().unwrap().unwrap_err();
+        let fault = records(&mut table).next().unwrap().unwrap_err();
         let expected = "line 2: text that is not UTF-8: save the table as \"CSV UTF-8\"";
-        assert_eq!(fault(&error), expected);
+        assert_eq!(fault.to_string(), expected);
     }
 
     /// Messages named the line before.
@@ -212,6 +232,10 @@ mod tests {
             assert_eq!(&table.headers().unwrap()[1], "note");
             let lines: Vec<u64> = records(&mut table).map(|r| r.unwrap().0).collect();
             assert_eq!(lines, [5, 12, 13], "{ending:?}");
+            let text = "id,note\n\n\na,b,c\n".replace('\n', ending);
+            let mut table = reader(text.as_bytes()).unwrap();
+            let fault = records(&mut table).next().unwrap().unwrap_err().to_string();
+            assert!(fault.starts_with("line 4: 3 fields, but the first line has 2"), "{fault}");
         }
     }
 

@@ -155,7 +155,8 @@ pub struct Compared {
 /// `true`. A line without a prediction is wrong.
 ///
 /// # Errors
-/// Recordings that one file has and the other has not, other true classes, recordings that occur twice.
+/// Recordings that one file has and the other has not, other true classes, recordings that occur twice; numbers with
+/// fractions, which are no classes.
 pub fn compare(
     first: &PredictionTable,
     second: &PredictionTable,
@@ -192,6 +193,15 @@ pub fn compare(
         b.push(name(second, second.rows[at].class));
     }
     let truth: Vec<String> = truth.into_iter().map(String::from).collect();
+    let number = |text: &String| text.parse::<f64>().ok().filter(|value| value.is_finite());
+    let mut all = truth.iter().chain(&a).chain(&b).filter(|text| !text.is_empty());
+    if all.clone().all(|text| number(text).is_some())
+        && all.any(|text| number(text).is_some_and(|value| value.fract() != 0.0))
+    {
+        let reason = "has numbers, but classes are compared here: `score --numeric` measures the \
+                      errors of each file";
+        return Err(first.content(reason));
+    }
     let (labels, all) = Labels::of(&[&truth[..], &a, &b].concat());
     let (truth, rest) = all.split_at(truth.len());
     let (a, b) = rest.split_at(truth.len());

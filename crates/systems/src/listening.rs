@@ -44,8 +44,10 @@ pub struct Answer {
     pub decision: Option<Decision>,
     /// why there is no decision, or one from a part of the windows only
     pub reason: Option<String>,
-    /// the recording's length in seconds, where it is heard as a whole and far from those trained on
+    /// the length in seconds of the recording, or its first window, that is far from those trained on
     pub unlike: Option<f64>,
+    /// names of the repairs that its reader made; of a stream they are not known
+    pub repairs: Vec<String>,
 }
 
 impl Answer {
@@ -55,7 +57,7 @@ impl Answer {
         status: Status,
         decision: Option<Decision>,
     ) -> Self {
-        Self { span, windows, status, decision, reason: None, unlike: None }
+        Self { span, windows, status, decision, reason: None, unlike: None, repairs: Vec::new() }
     }
 
     fn none(span: Option<(f64, f64)>, trouble: Trouble) -> Self {
@@ -107,14 +109,25 @@ impl<'a> Listener<'a> {
         let config = Config::from_tree(own.clone(), changes)?;
         let trained: Option<TrainedOn> =
             serde_json::from_value(header.provenance["trained_on"].clone()).unwrap_or_default();
-        let whole = front_end.windows.is_none();
-        let lengths = trained.as_ref().and_then(|trained| trained.seconds).filter(|_| whole);
+        let hears_short = front_end.windows.is_none_or(|windows| windows.fill.is_some());
+        let lengths = trained.as_ref().and_then(|trained| trained.seconds).filter(|_| hears_short);
         let formats = match trained.filter(|_| formats == Formats::AsTrained) {
             Some(trained) => trained.rule(own, &config.to_value())?.of_fixed_features(),
             None => FormatRule::default(),
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build()?;
         Ok(Self { model, front_end, config: Arc::new(config), formats, lengths, jobs, pool })
+    }
+
+    /// Whether a recording of this length is far from those trained on: for a network that takes windows, so much
+    /// shorter that most of a window is filled up.
+    fn is_unlike(&self, seconds: f64) -> bool {
+        let is_short = |lengths: Lengths| {
+            self.front_end.windows.is_none_or(|windows| {
+                2.0 * seconds < windows.seconds(windows.frames).min(lengths.shortest)
+            })
+        };
+        self.lengths.is_some_and(|lengths| lengths.differ_from(seconds) && is_short(lengths))
     }
 
     /// That recordings are far from those trained on, given by name and [`Answer::unlike`], in words.
@@ -159,8 +172,7 @@ impl<'a> Listener<'a> {
                 (Some(Err(reason)), _) => Err(Trouble { status: Status::Io, reason }),
                 (Some(Ok(tensor)), Ok(())) => self.hear(tensor)?,
             };
-            let apart = |seconds: &f64| self.lengths.is_some_and(|l| l.differ_from(*seconds));
-            let unlike = seconds.filter(apart);
+            let unlike = seconds.filter(|seconds| self.is_unlike(*seconds));
             let answer = |span, windows, decision| Answer {
                 unlike,
                 ..Answer::of(span, windows, outcome.status, decision)
@@ -176,14 +188,19 @@ impl<'a> Listener<'a> {
                     let start = input.start.unwrap_or(0.0);
                     let windows = self.front_end.windows;
                     let second = |frame: usize| start + windows.map_or(0.0, |w| w.seconds(frame));
+                    // A window may be filled up behind the end.
+                    let end = seconds.map_or(f64::INFINITY, |seconds| start + seconds);
                     let one = |(frames, proba): Heard| {
-                        let span = frames.map(|f| (second(f.start), second(f.end)));
+                        let span = frames.map(|f| (second(f.start), second(f.end).min(end)));
                         answer(span, usize::from(span.is_some()), Some(decided(proba)))
                     };
                     heard.into_iter().map(one).collect()
                 }
             };
+            let mut repairs = outcome.repairs;
             for answer in verdicts {
+                // With the first answer of the recording.
+                let answer = Answer { repairs: std::mem::take(&mut repairs), ..answer };
                 if !each(input, answer)? {
                     return Ok(true);
                 }
@@ -226,6 +243,8 @@ impl<'a> Listener<'a> {
             };
             let mut votes = WindowVotes::new(self.model.header.labels.len());
             let (mut trouble, mut failures) = (None, 0);
+            // Of a recording, the first window that is far from the recordings trained on.
+            let mut unlike = None;
             for window in &mut windows {
                 if stopped() {
                     return Ok(false);
@@ -234,6 +253,9 @@ impl<'a> Listener<'a> {
                     Ok(window) => (Some((window.start, window.end)), window.features),
                     Err(e) => (None, Err(e)),
                 };
+                let seconds = span.map(|(start, end)| end - start).filter(|_| unlike.is_none());
+                let first = seconds.filter(|s| self.takes_windows() && self.is_unlike(*s));
+                unlike = unlike.or(first);
                 let heard = match features.map(recordings::tensor) {
                     Err(e) => Err(Trouble { status: e.status, reason: e.reason }),
                     Ok(Err(reason)) => Err(Trouble { status: Status::Io, reason }),
@@ -252,7 +274,11 @@ impl<'a> Listener<'a> {
                     (Err(trouble), None) => Answer::none(span, trouble),
                     (Ok(heard), None) => {
                         let mean = self.votes(&heard)?.mean();
-                        Answer::of(span, heard.len(), Status::Ok, mean.map(decided))
+                        let decision = mean.map(decided);
+                        Answer {
+                            unlike: first,
+                            ..Answer::of(span, heard.len(), Status::Ok, decision)
+                        }
                     }
                 };
                 if !each(input, answer)? {
@@ -276,7 +302,7 @@ impl<'a> Listener<'a> {
                         let windows = if failures == 1 { "window" } else { "windows" };
                         format!("{failures} {windows} failed, the first: {}", trouble.reason)
                     });
-                    Answer { reason, ..Answer::of(None, votes.windows(), status, decision) }
+                    Answer { reason, unlike, ..Answer::of(None, votes.windows(), status, decision) }
                 }
             };
             if !each(input, answer)? {

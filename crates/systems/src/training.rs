@@ -1,5 +1,6 @@
 //! Networks trained on labelled items, and validated on items that they were not trained on.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use corsmal_models::argmax;
@@ -15,6 +16,7 @@ use corsmal_nets::cross_validation::{self, Data, FoldItems};
 use corsmal_nets::fit::{self, Progress, Task};
 use corsmal_nets::model::{Header, NetModel};
 use corsmal_nets::network::Network;
+use corsmal_nets::networks::Definition;
 use corsmal_nets::recipe::{Recipe, Select};
 use corsmal_nets::weights::{self, State};
 use ndarray::Array2;
@@ -44,6 +46,8 @@ pub struct Weights {
     path: PathBuf,
     identity: String,
     state: State,
+    /// the classes of its outputs, where it is a trained model
+    labels: Option<Vec<String>>,
 }
 
 impl Weights {
@@ -54,12 +58,23 @@ impl Weights {
     pub fn read(path: &Path) -> Result<Self> {
         let identity = corsmal_files::identity::of_file(path)
             .map_err(|source| SystemError::Io { path: path.into(), source })?;
-        Ok(Self { path: path.into(), identity, state: weights::read(path)? })
+        let labels = NetModel::load(path).ok().map(|model| model.header.labels);
+        Ok(Self { path: path.into(), identity, state: weights::read(path)?, labels })
     }
 
     /// The file.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// The numbers for these classes: outputs of a model for other ones start anew.
+    fn state_for(&self, definition: &Definition, labels: &Labels) -> Cow<'_, State> {
+        match &self.labels {
+            Some(own) if own != labels.names() => {
+                Cow::Owned(definition.without_outputs(&self.state))
+            }
+            _ => Cow::Borrowed(&self.state),
+        }
     }
 
     /// Lets the trainings of a network begin with them.
@@ -152,14 +167,15 @@ impl Training<'_> {
         let groups = self.groups.map(|groups| table.column(groups)).transpose()?;
         let groups = groups.map(|groups| examples.of_items(&groups));
         let groups = groups.as_deref();
-        let state = self.weights.map(|weights| &weights.state);
-        let data = Data { items, classes: &y, n_classes: labels.len(), groups, weights: state };
+        let state = self.weights.map(|weights| weights.state_for(definition, &labels));
+        let weights = state.as_deref();
+        let data = Data { items, classes: &y, n_classes: labels.len(), groups, weights };
         let all = FoldItems { name: "all".into(), train: (0..y.len()).collect(), test: Vec::new() };
         let (train, watched, validation_group) = cross_validation::watched(data, &all, &recipe)?;
         let task = Task { items, classes: &y, train: &train, watched: &watched };
         let mut network = definition.build(Some(labels.len()), recipe.seed)?;
-        if let Some(weights) = self.weights {
-            weights.begin(&mut network)?;
+        if let (Some(weights), Some(state)) = (self.weights, &state) {
+            network.begin_with(state).map_err(|e| weights.refusal(e))?;
         }
         let checkpoint = self.checkpoints.map(|folder| folder.join("training.safetensors"));
         let score = |truth: &[usize], found: &[usize]| weighted_f1(truth, found, labels.len());
@@ -220,8 +236,9 @@ impl Training<'_> {
         let y = examples.classes(&classes);
         let groups = folds.groups().map(|groups| examples.of_items(groups));
         let groups = groups.as_deref();
-        let state = self.weights.map(|weights| &weights.state);
-        let data = Data { items, classes: &y, n_classes: labels.len(), groups, weights: state };
+        let state = self.weights.map(|weights| weights.state_for(definition, &labels));
+        let weights = state.as_deref();
+        let data = Data { items, classes: &y, n_classes: labels.len(), groups, weights };
         let items_of = examples.items_of();
         let of_rows = |rows: &[usize]| -> Vec<usize> {
             rows.iter().flat_map(|&row| items_of[row].iter().copied()).collect()

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use corsmal_compare::{
     Comparison, Criteria, FeatureReport, PairedBy, Setting, TextDifference, TextReport, Tolerance,
+    is_complex,
 };
 use corsmal_files::quote::quoted;
 use serde_json::Value;
@@ -240,7 +241,11 @@ fn details(feature: &FeatureReport, lines: &mut Vec<String>) {
         lines.push(format!("  {} values are finite, or a number, on only one side", d.one_sided));
     }
     if feature.causes.is_empty() {
-        lines.push("  cause unknown".into());
+        let unknown = match feature.dtypes.iter().any(|dtype| is_complex(dtype)) {
+            true => "  complex values: causes are looked for in real ones only",
+            false => "  cause unknown",
+        };
+        lines.push(unknown.into());
     }
     for found in &feature.causes {
         lines.push(format!("  likely cause: {}", found.cause.cause));

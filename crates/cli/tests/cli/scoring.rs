@@ -109,6 +109,16 @@ fn the_only_label_column_has_the_true_classes() {
     assert_eq!(compared["first"]["scores"]["accuracy"], 0.0);
 }
 
+/// Estimates had an accuracy of 0.
+#[test]
+fn numbers_are_not_compared_as_classes() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("numbers.csv");
+    std::fs::write(&file, "id,true,predicted\na,1,1.5\nb,2,2\n").unwrap();
+    let message = refused(&["compare-predictions", text(&file), text(&file)]);
+    assert!(message.contains("score --numeric"), "{message}");
+}
+
 /// Label columns of these names hid the ids.
 #[test]
 fn ids_name_recordings_before_container_and_sequence_do() {

@@ -63,13 +63,18 @@ fn forward(
     if from.iter().any(|&v| v < 0.0) {
         return None;
     }
-    // Logarithms of zero are infinite, and so left out of the fit.
+    // Logarithms of zero are infinite, and so left out of the fit: the other side has its lowest values there.
     let changed = from.mapv(change.of);
+    let finite = || changed.iter().zip(to).filter(|(x, _)| x.is_finite());
+    let lowest = finite().map(|(_, y)| *y).fold(f64::INFINITY, f64::min);
+    let is_low = |(x, y): (&f64, &f64)| x.is_finite() || *y <= lowest + noise;
+    if finite().count() * 10 < to.len() || !changed.iter().zip(to).all(is_low) {
+        return None;
+    }
     let found = fit(&changed, to, noise, Group::Whole, change.model).or_else(|| {
         // The same thing exactly has no differences left to fit.
-        let apart =
-            changed.iter().zip(to).filter(|(x, y)| x.is_finite() && (*x - *y).abs() > noise);
-        (apart.count() * 10 < to.len()).then(Fit::identity)
+        let apart = finite().filter(|(x, y)| (*x - *y).abs() > noise).count();
+        (apart * 10 < finite().count()).then(Fit::identity)
     })?;
     let [slope, offset] = found.lines[0];
     let name = change.name;

@@ -65,7 +65,7 @@ pub fn apply(tree: &mut Value, change: &str) -> Result<(), ConfigError> {
     let value = toml::from_str::<toml::Table>(&format!("value = {text}"))
         .ok()
         .and_then(|mut table| table.remove("value"))
-        .map_or_else(|| Value::String(text.to_string()), to_json);
+        .map_or_else(|| plain(text), to_json);
     if let ["features", name, last, ..] = parts[..]
         && feature_kind(tree, name).is_none()
     {
@@ -84,6 +84,19 @@ pub fn apply(tree: &mut Value, change: &str) -> Result<(), ConfigError> {
         None => return Err(ConfigError::key(key, "is not in a table")),
     };
     Ok(())
+}
+
+/// A value that is not TOML: a number such as `.5`, or a plain string.
+fn plain(text: &str) -> Value {
+    let is_digit = |c: char| c.is_ascii_digit();
+    match text.parse::<f64>() {
+        Ok(number)
+            if number.is_finite() && text.starts_with(|c| c == '.' || c == '-' || is_digit(c)) =>
+        {
+            json!(number)
+        }
+        _ => Value::String(text.to_string()),
+    }
 }
 
 /// Adds the feature `NAME` or `NAME=KIND`.
@@ -283,6 +296,19 @@ mod tests {
         ] {
             let refusal = refused(change);
             assert!(refusal.ends_with(says), "{change}: {refusal}");
+        }
+    }
+
+    #[test]
+    fn numbers_may_begin_with_a_point() {
+        let mut tree = json!({"features": {"mfcc": {}}});
+        for (text, value) in [(".5", json!(0.5)), ("-.5", json!(-0.5)), ("1e-3", json!(1e-3))] {
+            apply(&mut tree, &format!("mfcc.fmin={text}")).unwrap();
+            assert_eq!(tree["features"]["mfcc"]["fmin"], value);
+        }
+        for word in ["inf", "nan", "-", ".", "infinity", "1 2"] {
+            apply(&mut tree, &format!("mfcc.x={word}")).unwrap();
+            assert!(!tree["features"]["mfcc"]["x"].is_number(), "{word}");
         }
     }
 

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use corsmal_files::csv_text;
+use corsmal_files::csv_text::{self, Fault};
 
 use super::error::{DatasetError, Result};
 use crate::words::count;
@@ -64,11 +64,11 @@ impl LabelFile {
     /// [`DatasetError::Content`] for a file that is not a table, has no such column, names a column
     /// twice, or names a recording twice.
     pub fn read(path: &Path, key: Option<&str>) -> Result<Self> {
-        let fault = |e: csv::Error| DatasetError::content(path, csv_text::fault(&e));
+        let fault = |fault: Fault| DatasetError::content(path, fault.to_string());
         let other = |e: std::io::Error| DatasetError::content(path, e.to_string());
         let text = BufReader::new(File::open(path).map_err(other)?);
         let mut reader = csv_text::reader(text).map_err(other)?;
-        let header = reader.headers().map_err(fault)?.clone();
+        let header = reader.headers().map_err(|e| fault(e.into()))?.clone();
         let find = |wanted: &str| header.iter().position(|h| h == wanted);
         let (key, at) = match (key, find("id"), find("path")) {
             (Some(name), ..) => match find(name) {

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use corsmal_files::csv_text;
+use corsmal_files::csv_text::{self, Fault};
 
 use super::{
     Id, KEYS, MAX_BYTES, PredictionError, PredictionRow, PredictionTable, Result, SUM_TOLERANCE,
@@ -41,12 +41,12 @@ impl PredictionTable {
             return Err(content(path, reason));
         }
         let mut reader = csv_text::reader(bytes).map_err(|e| content(path, e.to_string()))?;
-        let fault =
-            |e: csv::Error| content(path, format!("not a readable table: {}", csv_text::fault(&e)));
+        let fault = |fault: Fault| content(path, format!("not a readable table: {fault}"));
         let header: Vec<String> =
-            reader.headers().map_err(fault)?.iter().map(String::from).collect();
-        let lines: Vec<_> =
-            csv_text::records(&mut reader).collect::<csv::Result<_>>().map_err(fault)?;
+            reader.headers().map_err(|e| fault(e.into()))?.iter().map(String::from).collect();
+        let lines: Vec<_> = csv_text::records(&mut reader)
+            .collect::<std::result::Result<_, Fault>>()
+            .map_err(fault)?;
         if lines.is_empty() {
             return Err(content(path, "has no predictions"));
         }

@@ -7,7 +7,8 @@ use crate::error::{NetError, Result};
 use crate::front_end::FrontEnd;
 use crate::network::{Architecture, Input, Network};
 use crate::parameters::Declared;
-use crate::recipe::Recipe;
+use crate::recipe::{Activation, Offset, OptimizerKind, Padding, Recipe};
+use crate::weights::State;
 
 /// A network of the table.
 #[derive(Clone, Copy, Debug)]
@@ -41,7 +42,7 @@ impl Definition {
     /// the default, or paper, which the other keys go on from.
     ///
     /// # Errors
-    /// As [`Recipe::with`].
+    /// As [`Recipe::with`]; a value that does nothing for this network.
     pub fn recipe_with(&self, changes: &Map<String, Value>) -> Result<Recipe> {
         let mut changes = changes.clone();
         let from = match changes.remove("recipe") {
@@ -63,7 +64,42 @@ impl Definition {
                 });
             }
         };
-        from.with(&changes)
+        let recipe = from.with(&changes)?;
+        self.refuse_unused(&changes, &recipe)?;
+        Ok(recipe)
+    }
+
+    /// Refuses changes that would change nothing: the model would record them as if they did.
+    fn refuse_unused(&self, changes: &Map<String, Value>, recipe: &Recipe) -> Result<()> {
+        let layers = (self.architecture)(self.outputs);
+        let is_sequence = |input: &Input| matches!(input.shape, Shape::Sequence { .. });
+        let takes_sequences = layers.inputs.iter().any(is_sequence);
+        let unused = [
+            (
+                recipe.optimizer == OptimizerKind::Adam && recipe.momentum != 0.0,
+                ("momentum", recipe.momentum.to_string(), "0 with optimizer=adam"),
+            ),
+            (
+                recipe.activation == Activation::Double && !layers.activation,
+                ("activation", "double".into(), "corrected: the network has no output activation"),
+            ),
+            (
+                recipe.padding == Padding::Published && !takes_sequences,
+                ("padding", "published".into(), "masked: the network takes no sequences"),
+            ),
+            (
+                recipe.offset == Offset::Random && !takes_sequences,
+                ("offset", "random".into(), "start: the network takes no sequences"),
+            ),
+        ];
+        let found =
+            unused.into_iter().find(|(unused, (key, ..))| *unused && changes.contains_key(*key));
+        match found {
+            None => Ok(()),
+            Some((_, (key, value, allowed))) => {
+                Err(NetError::Recipe { key: key.into(), value, allowed: allowed.into() })
+            }
+        }
     }
 
     /// With initial numbers of this seed and as many outputs as asked for, or its own number.
@@ -81,6 +117,22 @@ impl Definition {
     pub(crate) fn declared(&self, outputs: usize) -> Result<Vec<Declared>> {
         let layers = self.layers(Some(outputs))?;
         Ok(layers.body.layers().flat_map(|layer| layer.parameters()).collect())
+    }
+
+    /// These weights without the numbers of the last layer, which then starts anew; see
+    /// [`Network::begin_with`].
+    pub fn without_outputs(&self, state: &State) -> State {
+        let layer = |name: &str| name.rsplit_once('.').map(|(layer, _)| layer.to_owned());
+        let declared = self.declared(self.outputs).unwrap_or_default();
+        let last = declared.last().and_then(|d| layer(&d.name));
+        let mut state = state.clone();
+        for (_, shape, values) in state.iter_mut().filter(|(name, ..)| layer(name) == last) {
+            values.clear();
+            if let Some(outputs) = shape.first_mut() {
+                *outputs = 0;
+            }
+        }
+        state
     }
 
     /// What an item is: name and shape of each input.

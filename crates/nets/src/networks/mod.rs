@@ -73,4 +73,22 @@ mod tests {
         assert_eq!(with("m1", r#"{"recipe": "paper"}"#).unwrap(), code);
         assert!(with("m1", r#"{"recipe": "other"}"#).is_err());
     }
+
+    #[test]
+    fn what_would_change_nothing_is_refused() {
+        for (name, key, value, used_by) in [
+            ("m1", "momentum", "0.9", "m2_type"),
+            ("m6_action", "activation", "\"double\"", "m4_type"),
+            ("mel_cnn", "padding", "\"published\"", "m5_vggish_level"),
+            ("m4_type", "offset", "\"random\"", "m4_level"),
+        ] {
+            let with = |name: &str| {
+                let changes = serde_json::from_str(&format!("{{\"{key}\": {value}}}")).unwrap();
+                named(name).unwrap().recipe_with(&changes)
+            };
+            let refusal = with(name).unwrap_err().to_string();
+            assert!(refusal.contains(key), "{refusal}");
+            assert!(with(used_by).is_ok(), "{used_by}");
+        }
+    }
 }

@@ -128,6 +128,20 @@ fn a_training_begins_with_weights_of_other_classes() {
     assert!(of(&network, "layer3.0.conv1.weight") == convolution);
     assert!(of(&network, "fc.weight") != random);
 
+    // As many classes, but other ones.
+    let definition = networks::named("resnet18_level").unwrap();
+    let mut other = definition.build(None, 8).unwrap();
+    let random = of(&other, "fc.weight");
+    let own: Vec<_> = network
+        .parameters()
+        .iter()
+        .map(|(d, values)| (d.name.clone(), d.shape.clone(), values.to_vec()))
+        .collect();
+    let left = definition.without_outputs(&own);
+    assert_eq!(other.begin_with(&left).unwrap(), ["fc.weight", "fc.bias"]);
+    assert!(of(&other, "fc.weight") == random);
+    assert!(of(&other, "layer3.0.conv1.weight") == convolution);
+
     state.retain(|(name, ..)| name != "layer1.0.bn1.bias");
     state[0].1 = vec![64, 3, 7, 8];
     let error = network.begin_with(&state).unwrap_err().to_string();

@@ -19,6 +19,7 @@ use super::args::{Args, check_changes, recordings};
 use super::records::{End, Records, delivered, path_of};
 use crate::failure::Failure;
 use crate::networks::is_inputs;
+use crate::progress::repaired;
 use crate::recordings::warn;
 
 /// Predicts.
@@ -71,8 +72,9 @@ pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Fail
         found.iter().take(1).flat_map(|f| &f.labels).map(|(column, _)| column.clone()).collect();
     let mut records = args.records(&labels, &model.header.target, unit, &columns)?;
     let stop = crate::interrupt::flag();
-    let (mut unread, mut unlike) = (false, Vec::new());
+    let (mut unread, mut unlike, mut repairs) = (false, Vec::new(), Vec::new());
     let mut each = |input: &Input, answer: Answer| -> Result<bool, Failure> {
+        repairs.push(answer.repairs.clone());
         unlike.extend(answer.unlike.map(|seconds| (input.id.clone(), seconds)));
         unread = !write(&mut records, input, answer)?;
         Ok(!unread)
@@ -82,6 +84,9 @@ pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Fail
         Some(windowing) => listener.windows(&found, (windowing, vote), stop, &mut each),
     };
     let heard = heard?;
+    if let Some(repaired) = repaired(repairs.iter()) {
+        warn(&format!("recordings: {repaired}"));
+    }
     listener.length_warning(&unlike).iter().for_each(|warning| warn(warning));
     let end = match (heard, unread) {
         (false, _) => End::Interrupted,

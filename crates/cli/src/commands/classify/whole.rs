@@ -19,7 +19,7 @@ use super::records::{End, Records, delivered};
 use crate::configuration::difference;
 use crate::failure::Failure;
 use crate::plural::plural;
-use crate::progress::{LogFormat, Meter};
+use crate::progress::{LogFormat, Meter, repaired};
 use crate::recordings::warn;
 
 /// Extracts into memory, then predicts.
@@ -103,6 +103,9 @@ pub fn of_features(
     let meter = Meter::new(LogFormat::Text, args.quiet);
     let predictions = predictions(model, table, &formats, (args, &meter))?;
     meter.rest();
+    if let Some(repaired) = repaired(table.outcomes.iter().map(|outcome| &outcome.repairs)) {
+        warn(&format!("recordings: {repaired}"));
+    }
     let columns: Vec<String> = table.columns().iter().map(|(name, _)| name.clone()).collect();
     let header = model.header();
     let mut records = args.records(&header.labels, &header.target, Unit::Recording, &columns)?;

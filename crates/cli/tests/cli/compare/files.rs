@@ -332,6 +332,53 @@ fn other_recordings_under_the_same_names_are_a_cause() {
 }
 
 #[test]
+fn what_is_in_both_files_is_paired_although_other_names_come_twice() {
+    let files = Files::new();
+    extract(&files, "a.npz", &["--preset", "esc26"]);
+    let listed = files.path("listed.csv");
+    let (one, two) = (files.path("audio/one.wav"), files.path("audio/two.wav"));
+    let rows = format!("id,path\np/one,{0}\nq/one,{0}\nr/two,{1}\n", one.display(), two.display());
+    std::fs::write(&listed, rows).unwrap();
+    let out = files.path("b.npz");
+    let args = ["extract", text_of(&listed), "-o", text_of(&out), "--preset", "esc26", "-q"];
+    assert!(run(&args).status.success());
+    let report = files.json("a.npz", "b.npz", &[]);
+    assert_eq!(report["paired_by"], "file_name");
+    assert_eq!(report["features"][0]["arrays"], 1);
+    assert_eq!(report["only_b"], json!(["p/one", "q/one"]));
+
+    // Statistics of some of the recordings, frames of all.
+    std::fs::write(&listed, format!("id,path\none,{}\nx,{}\n", one.display(), two.display()))
+        .unwrap();
+    let out = files.path("c.npz");
+    let args = ["extract", text_of(&listed), "-o", text_of(&out), "--preset", "logmel", "-q"];
+    assert!(run(&args).status.success());
+    refused(&files.run("a.npz", "c.npz", &[]), &["recordings are the same", "Compare frames"]);
+}
+
+#[test]
+fn zeros_and_complex_numbers_have_no_cause_that_is_not_theirs() {
+    let files = Files::new();
+    let truth = levels().mapv(|v| f32::from(v > -40.0));
+    npz(&files.path("a.npz"), &[("x", &truth)]);
+    npz(&files.path("b.npz"), &[("x", &truth.mapv(|v| 1.0 - v))]);
+    npz(&files.path("c.npz"), &[("x", &truth.mapv(|_| 0.0))]);
+    for other in ["b.npz", "c.npz"] {
+        let found = kinds(&files.json("a.npz", other, &[]), "x");
+        assert!(!found.contains(&"transform".to_owned()), "{other}: {found:?}");
+    }
+
+    let complex = ["--preset", "logmel", "--add", "stft", "--set", "stft.output=complex"];
+    extract(&files, "d.npz", &complex);
+    extract(&files, "e.npz", &[&complex[..], &["--set", "signal.preemphasis=0.5"]].concat());
+    let report = files.json("d.npz", "e.npz", &[]);
+    let features = report["features"].as_array().unwrap();
+    let stft = features.iter().find(|f| f["feature"] == "stft").unwrap();
+    assert!(stft["differing"].as_u64().unwrap() > 0);
+    assert_eq!(kinds(&report, "stft"), ["configuration"]);
+}
+
+#[test]
 fn a_projection_keeps_what_there_is_by_default() {
     let files = Files::new();
     extract(&files, "a.npz", &["--preset", "esc26"]);
