@@ -32,13 +32,9 @@ def test_all_eleven_networks_give_pytorchs_numbers() -> None:
         return
     # Losses of m4_type depend on the processor; crates/nets/tests/nets/golden.rs says why.
     (failed,) = (line for line in cases if not line.endswith(" ok"))
-    found = re.fullmatch(
-        r"m4_type +losses ([\d.]+) x tolerance(?:; outputs after the steps ([\d.]+) x tolerance)?",
-        failed,
-    )
+    found = re.fullmatch(r"m4_type +losses ([\d.]+) x tolerance", failed)
     assert found, run.stdout
-    losses, after = (float(n or 0) for n in found.groups())
-    assert losses * 2.19e-4 < 3e-3 and after * 2.97e-4 < 3e-3, failed
+    assert float(found[1]) * 2.19e-4 < 3e-3, failed
 
 
 def test_m2_sees_that_the_container_of_the_real_recording_is_empty() -> None:

@@ -101,11 +101,14 @@ pub(super) struct ComparisonBuilder {
     exact: Vec<TextReport>,
     features: Vec<FeatureReport>,
     places: HashMap<String, usize>,
+    /// Recordings in which each feature differs, in the order of the features.
+    differing: Vec<Vec<String>>,
 }
 
 impl ComparisonBuilder {
     pub(super) fn new(tolerance: Tolerance) -> Self {
-        Self { tolerance, exact: Vec::new(), features: Vec::new(), places: HashMap::new() }
+        let (exact, features, differing) = (Vec::new(), Vec::new(), Vec::new());
+        Self { tolerance, exact, features, places: HashMap::new(), differing }
     }
 
     /// Compares two arrays.
@@ -138,6 +141,7 @@ impl ComparisonBuilder {
                 if complex == [false; 2] {
                     feature.causes(causes::of_shapes(x, y), &found.place);
                 }
+                self.differs(&found.feature, [found.place.clone()]);
                 return;
             }
         };
@@ -152,8 +156,16 @@ impl ComparisonBuilder {
         feature.difference.add(pair.values(), limit, locate);
         let apart = feature.difference.values - feature.difference.within;
         feature.differing += usize::from(apart > before);
-        if feature.difference.values - feature.difference.equal > equal && !complex[0] {
-            feature.causes(causes::of_values(&pair, dtypes), &found.place);
+        if feature.difference.values - feature.difference.equal > equal {
+            let mut found_causes = causes::of_values(&pair, dtypes);
+            if complex[0] {
+                let of_channels = |text: &str| text.contains("channel");
+                found_causes.retain(|c| !of_channels(&c.cause) && !of_channels(&c.evidence));
+            }
+            feature.causes(found_causes, &found.place);
+        }
+        if apart > before {
+            self.differs(&found.feature, [found.place.clone()]);
         }
     }
 
@@ -197,7 +209,9 @@ impl ComparisonBuilder {
             let column = |side: &Array3<f64>| side.slice(ndarray::s![0, .., row]).to_owned();
             column(&pair.a).iter().zip(&column(&pair.b)).any(|(x, y)| !limit.holds(*x, *y))
         };
-        feature.differing += (0..rows.len()).filter(|&row| differs(row)).count();
+        let apart: Vec<String> =
+            (0..rows.len()).filter(|&row| differs(row)).map(|row| rows[row].clone()).collect();
+        feature.differing += apart.len();
         let locate = |ordinal| {
             let index = index_of(ordinal, &[shape.1, shape.2]);
             let column = &a.names[found.columns[index[0]].0];
@@ -206,6 +220,14 @@ impl ComparisonBuilder {
         feature.difference.add(pair.values(), limit, locate);
         if feature.difference.equal < feature.difference.values {
             feature.causes(causes::of_values(&pair, ["table", "table"]), "the table");
+        }
+        self.differs(&found.feature, apart);
+    }
+
+    /// Notes recordings in which a feature differs.
+    fn differs(&mut self, feature: &str, places: impl IntoIterator<Item = String>) {
+        if let Some(at) = self.places.get(feature) {
+            self.differing[*at].extend(places);
         }
     }
 
@@ -241,18 +263,20 @@ impl ComparisonBuilder {
             }
             _ => None,
         };
-        for feature in &mut self.features {
+        let others = a.identities().other(b.identities(), matching.paired_by);
+        for (feature, differing) in self.features.iter_mut().zip(&self.differing) {
             let Some(settings) = &settings else { continue };
             if feature.differing == 0 || !feature.causes.is_empty() {
                 continue;
             }
-            let arrays = feature.differing;
-            let mut add = |array: &str, cause: Option<Cause>| {
+            let mut add = |array: &str, arrays: usize, cause: Option<Cause>| {
                 let array = array.into();
                 feature.causes.extend(cause.map(|cause| Finding { arrays, array, cause }));
             };
-            add("the recordings", causes::of_contents(settings));
-            add("the configurations", causes::of_settings(settings, &feature.feature));
+            let other = differing.iter().filter(|place| others.contains(*place)).count();
+            add("the recordings", other, causes::of_contents(other, differing.len()));
+            let of_settings = causes::of_settings(settings, &feature.feature);
+            add("the configurations", differing.len(), of_settings);
         }
         let equal = |f: &FeatureReport| f.differing == 0;
         let mut texts = self.exact;
@@ -283,6 +307,7 @@ impl ComparisonBuilder {
         let next = self.features.len();
         let place = *self.places.entry(name.to_string()).or_insert(next);
         if place == next {
+            self.differing.push(Vec::new());
             self.features.push(FeatureReport {
                 feature: name.into(),
                 arrays: 0,

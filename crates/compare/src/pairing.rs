@@ -1,8 +1,7 @@
 //! What tells that a recording of one file is one of the other.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 
-use corsmal_files::identity;
 use corsmal_files::outcome::Outcome;
 use serde::Serialize;
 
@@ -15,7 +14,7 @@ pub enum PairedBy {
     Id,
     /// The last parts of their ids, where no id is in both files.
     FileName,
-    /// The identities of their contents, where no file name is in both either.
+    /// The identities of their files, as far as they are whole files, where no file name is in both either.
     Content,
 }
 
@@ -28,29 +27,56 @@ impl PairedBy {
         match self {
             Self::Id => Some(id),
             Self::FileName => id.rsplit('/').next(),
-            Self::Content => identities.of(id),
+            Self::Content => identities.of_whole(id),
         }
     }
 }
 
 /// Identities of the contents of recordings, as far as they are known.
 #[derive(Debug, Default)]
-pub(super) struct Identities(BTreeMap<String, String>);
+pub(super) struct Identities(BTreeMap<String, FileIdentity>);
+
+#[derive(Debug)]
+struct FileIdentity {
+    hash: String,
+    /// Whether the recording is known to be the whole file, and not a stretch of it.
+    is_whole: bool,
+}
 
 impl Identities {
     pub(super) fn new(outcomes: &[Outcome]) -> Self {
-        let known = |o: &&Outcome| !o.identity.is_empty() && o.identity != identity::STREAM;
-        let identity = |o: &Outcome| (o.id.clone(), o.identity.clone());
-        Self(outcomes.iter().filter(known).map(identity).collect())
+        // Objects of stores have identities of other kinds, which say nothing beside a hash.
+        let is_hash = |o: &&Outcome| {
+            let hash = o.identity.split_once(':').map(|(_, hash)| hash);
+            hash.is_some_and(|hash| hash.len() == 64 && hash.bytes().all(|b| b.is_ascii_hexdigit()))
+        };
+        let file = |o: &Outcome| {
+            let is_whole = o.declared_frames == Some(o.decoded_frames);
+            (o.id.clone(), FileIdentity { hash: o.identity.clone(), is_whole })
+        };
+        Self(outcomes.iter().filter(is_hash).map(file).collect())
+    }
+
+    /// The recordings whose paired ones have another content, by their ids.
+    pub(super) fn other(&self, paired: &Self, by: PairedBy) -> HashSet<String> {
+        let theirs: HashMap<&str, &str> = paired
+            .0
+            .iter()
+            .filter_map(|(id, file)| Some((by.key(paired, id)?, file.hash.as_str())))
+            .collect();
+        let is_other = |id: &str, file: &FileIdentity| {
+            by.key(self, id).and_then(|key| theirs.get(key)).is_some_and(|hash| *hash != file.hash)
+        };
+        self.0.iter().filter(|(id, file)| is_other(id, file)).map(|(id, _)| id.clone()).collect()
     }
 
     /// Every recording and its identity.
     pub(super) fn iter(&self) -> impl Iterator<Item = (String, String)> + '_ {
-        self.0.iter().map(|(id, identity)| (id.clone(), identity.clone()))
+        self.0.iter().map(|(id, file)| (id.clone(), file.hash.clone()))
     }
 
-    /// The identity of a recording.
-    pub(super) fn of(&self, id: &str) -> Option<&str> {
-        self.0.get(id).map(String::as_str)
+    /// The identity of a recording that is a whole file.
+    fn of_whole(&self, id: &str) -> Option<&str> {
+        self.0.get(id).filter(|file| file.is_whole).map(|file| file.hash.as_str())
     }
 }

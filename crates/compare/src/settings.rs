@@ -16,7 +16,7 @@ pub struct Settings {
     pub hash_b: String,
     /// Whether both are over the same list of inputs.
     pub same_inputs: bool,
-    /// Identities of the recordings that both have: whether they were made of the same bytes.
+    /// Identities of the files of the recordings that both have.
     pub contents: TextReport,
     /// Keys that differ.
     pub differences: Vec<Setting>,

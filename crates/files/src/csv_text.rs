@@ -22,7 +22,8 @@ pub fn reader<R: BufRead>(mut text: R) -> io::Result<csv::Reader<LineFeeds<R>>> 
         return other("a Parquet file, but a CSV table is expected");
     }
     let marked = start.starts_with(b"\xef\xbb\xbf");
-    let line = start.split(|&byte| byte == b'\n').next().unwrap_or_default();
+    let mut lines = start.split(|&byte| byte == b'\n');
+    let line = lines.find(|line| !line.trim_ascii().is_empty()).unwrap_or_default();
     let delimiter =
         [b',', b';', b'\t'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b',');
     if marked {
@@ -79,7 +80,7 @@ impl Lines {
         for &byte in text {
             self.is_quoted ^= byte == b'"';
             if byte != b'\n' {
-                self.is_begun = true;
+                self.is_begun |= byte != b'\r';
                 continue;
             }
             self.ended += 1;
@@ -232,6 +233,9 @@ mod tests {
             assert_eq!(&table.headers().unwrap()[1], "note");
             let lines: Vec<u64> = records(&mut table).map(|r| r.unwrap().0).collect();
             assert_eq!(lines, [5, 12, 13], "{ending:?}");
+            let text = "\n\nid;note\n1,5;b\n".replace('\n', ending);
+            let mut table = reader(text.as_bytes()).unwrap();
+            assert_eq!(&table.headers().unwrap()[1], "note");
             let text = "id,note\n\n\na,b,c\n".replace('\n', ending);
             let mut table = reader(text.as_bytes()).unwrap();
             let fault = records(&mut table).next().unwrap().unwrap_err().to_string();

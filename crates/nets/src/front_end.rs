@@ -80,7 +80,9 @@ impl Stretches {
         let sums: Vec<f64> = all.iter().map(|w| powers[w.clone()].iter().sum()).collect();
         let loudest = sums.iter().copied().fold(0.0, f64::max);
         let least = loudest * 10.0_f64.powf(-f64::from(quiet) / 10.0);
-        all.into_iter().zip(sums).filter(|(_, sum)| *sum >= least).map(|(w, _)| w).collect()
+        // What is not a number is refused later, and said.
+        let is_heard = |sum: f64| sum.is_nan() || sum >= least;
+        all.into_iter().zip(sums).filter(|(_, sum)| is_heard(*sum)).map(|(w, _)| w).collect()
     }
 
     /// Seconds of a recording before this frame.
@@ -125,10 +127,16 @@ impl FrontEnd {
     pub fn items(&self, network: &Network, mut tensor: Tensor) -> Result<Vec<Item>> {
         let Tensor { channels, coefficients, frames, .. } = tensor;
         if let Some(Stretches { frames: needed, fill: Some(fill), .. }) = self.windows
-            && (1..needed).contains(&frames)
+            && let Some(&first) = tensor.values.first()
         {
-            tensor.values.resize(needed * channels * coefficients, fill);
-            tensor.frames = needed;
+            // Silence, whose decibels below its own maximum are 0.
+            if tensor.values.iter().all(|value| *value == first) {
+                tensor.values.fill(fill);
+            }
+            if frames < needed {
+                tensor.values.resize(needed * channels * coefficients, fill);
+                tensor.frames = needed;
+            }
         }
         let items: Vec<Item> = match self.windows {
             None => vec![Item { frames: None, values: (self.item)(tensor) }],
@@ -235,10 +243,14 @@ mod tests {
         let starts: Vec<usize> = items.iter().map(|i| i.frames.clone().unwrap().start).collect();
         let expected = (0..=4 * frames).step_by(step).filter(|s| *s < frames || *s > 3 * frames);
         assert_eq!(starts, expected.collect::<Vec<_>>());
-        let short = front_end.items(&network, tensor(&[0.0; 3])).unwrap();
+        let short = front_end.items(&network, tensor(&[0.0, -1.0, 0.0])).unwrap();
         assert_eq!((short.len(), short[0].values.len()), (1, 64 * frames));
         assert!(short[0].values[3 * 64..].iter().all(|v| *v == -1.0), "silence");
         assert!(front_end.items(&network, tensor(&[])).is_err());
+        let silent = front_end.items(&network, tensor(&vec![0.0; 2 * frames])).unwrap();
+        assert!(silent.iter().all(|item| item.values.iter().all(|v| *v == -1.0)));
+        let broken = front_end.items(&network, tensor(&vec![f32::NAN; frames])).unwrap();
+        assert!(broken[0].values[0].is_nan(), "left for the check of inputs");
     }
 
     #[test]

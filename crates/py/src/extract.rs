@@ -112,7 +112,9 @@ pub(crate) fn extract(
     let span = window.map(|(window, hop)| WindowSpan { window, hop });
     for (name, seconds) in span.iter().flat_map(|s| [("window", s.window), ("hop", s.hop)]) {
         if !WINDOW_SECONDS.contains(&seconds) {
-            let message = format!("{name} must be 0.001 to 1000000 seconds, not {seconds}");
+            let message = format!(
+                "{name} must be 0.001 to 1000000 seconds, not {seconds} (hop is half of window by default)"
+            );
             return Err(value_error(message));
         }
     }

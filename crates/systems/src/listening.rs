@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use corsmal_extract::config::Config;
+use corsmal_extract::config::{Config, ConfigError};
 use corsmal_extract::engine::{Signals, Windowing, Windows};
 use corsmal_extract::inputs::Input;
 use corsmal_extract::run::Recordings;
@@ -107,6 +107,13 @@ impl<'a> Listener<'a> {
             return Err(SystemError::TrainedOnInputs { network: header.network.clone() });
         }
         let config = Config::from_tree(own.clone(), changes)?;
+        let rate = own["signal"]["sample_rate"].as_f64().filter(|rate| *rate > 0.0);
+        if let Some(rate) = rate.filter(|rate| *rate != config.signal.sample_rate)
+            && front_end.windows.is_some()
+        {
+            let message = format!("must be {rate} as in training: windows have a fixed duration");
+            return Err(ConfigError::key("signal.sample_rate", message).into());
+        }
         let trained: Option<TrainedOn> =
             serde_json::from_value(header.provenance["trained_on"].clone()).unwrap_or_default();
         let hears_short = front_end.windows.is_none_or(|windows| windows.fill.is_some());

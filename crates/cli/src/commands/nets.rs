@@ -15,8 +15,9 @@ Examples:
   corsmal-feat nets m4
 
 `corsmal-feat benchmark --methods` runs systems, m1 to m6; `train --net` trains the networks that
-they consist of, and `attention-gru`, our own. Recipes are those of the published code with its
-defects corrected; docs/networks.md says where paper, code and this tool differ.")]
+they consist of, and our own: `mel-cnn` on recordings of any kind, `attention-gru` on embeddings.
+Recipes are those of the published code with its defects corrected; docs/networks.md says where
+paper, code and this tool differ.")]
 pub struct Args {
     /// Show the layers and the recipe of one network, or the parts of one system.
     #[arg(value_name = "NAME")]

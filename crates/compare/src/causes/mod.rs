@@ -22,7 +22,6 @@ pub use cause::{Cause, CauseKind};
 
 use super::pair::{self, Pair};
 use super::settings::Settings;
-use super::texts::TextReport;
 
 /// Likely causes for two arrays of one shape.
 pub(super) fn of_values(pair: &Pair, dtypes: [&str; 2]) -> Vec<Cause> {
@@ -52,14 +51,14 @@ pub(super) fn of_values(pair: &Pair, dtypes: [&str; 2]) -> Vec<Cause> {
     std::iter::once(cause).chain(rest.into_iter().map(after)).collect()
 }
 
-/// The recordings that both files have, where their bytes are not the same.
-pub(super) fn of_contents(settings: &Settings) -> Option<Cause> {
-    let TextReport { values, differing, .. } = &settings.contents;
-    (*differing > 0).then(|| {
+/// That so many of the recordings in which a feature differs were made of other files.
+pub(super) fn of_contents(other: usize, differing: usize) -> Option<Cause> {
+    (other > 0).then(|| {
         let evidence = format!(
-            "the contents of {differing} of {values} recordings differ, and the values show no simpler cause"
+            "{other} of the {differing} that differ have another content, and the values show no \
+             simpler cause"
         );
-        Cause::new(CauseKind::Recordings, "b was made of other recordings than a", evidence)
+        Cause::new(CauseKind::Recordings, "recordings of b are not those of a", evidence)
     })
 }
 

@@ -87,7 +87,7 @@ impl Config {
         let syntax = |e: toml::de::Error| {
             let message = match toml.contains("\nConfiguration hash: ") {
                 true => {
-                    "is an explanation, no TOML: `corsmal-feat presets NAME --toml` prints the file"
+                    "is an explanation, not TOML: `corsmal-feat presets NAME --toml` prints the file"
                         .into()
                 }
                 false => e.to_string().trim_end().to_string(),

@@ -88,8 +88,8 @@ fn wide(batch: &Batch) -> Vec<f64> {
     batch.values.values().iter().map(|&v| f64::from(v)).collect()
 }
 
-/// How far losses after steps are apart where weights differ by less than single precision holds. The manifest has ten
-/// times the difference of one run. PyTorch in double precision, with weights moved by up to half a unit in their last place,
+/// How far the last loss may be from PyTorch's where rounding of the weights decides. The manifest allows ten times the
+/// difference of one run. PyTorch in double precision, with weights moved by up to half a unit in their last place,
 /// is up to 2.2e-3 from its own third loss; a network that does not learn is 9e-3 from it.
 const SPREAD: [(&str, f64); 1] = [("m4_type", 3e-3)];
 
@@ -146,9 +146,16 @@ fn check(case: &Value) {
         first.get_or_insert(step.norms);
     }
     let (want, atol) = expect("losses");
-    near(&format!("{name} first loss"), &losses[..1], &want[..1], atol.unwrap(), 0.0);
+    let (last, before) = losses.split_last().unwrap();
+    near(&format!("{name} losses"), before, &want[..before.len()], atol.unwrap(), 0.0);
     let spread = SPREAD.iter().find(|(spread, _)| *spread == name).map(|(_, atol)| *atol);
-    near(&format!("{name} losses"), &losses, &want, spread.or(atol).unwrap(), 0.0);
+    near(
+        &format!("{name} last loss"),
+        &[*last],
+        &want[before.len()..],
+        spread.or(atol).unwrap(),
+        0.0,
+    );
     let first = first.unwrap();
     let rtol = case["gradient_norms"]["rtol"].as_f64().unwrap();
     for (key, want) in case["gradient_norms"]["values"].as_object().unwrap() {
@@ -157,7 +164,7 @@ fn check(case: &Value) {
     }
     let (want, atol) = expect("outputs_after");
     let after = trainer.network.forward(&x).unwrap();
-    near(&format!("{name} after"), &wide(&after), &want, spread.or(atol).unwrap(), 0.0);
+    near(&format!("{name} after"), &wide(&after), &want, atol.unwrap(), 0.0);
 }
 
 macro_rules! golden {

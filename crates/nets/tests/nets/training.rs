@@ -15,7 +15,7 @@ use corsmal_nets::model::{self, NetModel};
 use corsmal_nets::network::Network;
 use corsmal_nets::networks;
 use corsmal_nets::random::Stream;
-use corsmal_nets::recipe::Recipe;
+use corsmal_nets::recipe::{Recipe, Schedule};
 use corsmal_nets::trainer::{StepSettings, Trainer};
 use serde_json::{Value, json};
 
@@ -77,6 +77,26 @@ fn a_network_learns_what_tells_classes_apart() {
 }
 
 #[test]
+fn a_learning_rate_falls_along_a_cosine() {
+    let shares = [0, 2, 4].map(|done| Schedule::Cosine.share(done, 4));
+    let near = shares.iter().zip([1.0, 0.5, 0.0]).all(|(got, want)| (got - want).abs() < 1e-12);
+    assert!(near, "{shares:?}");
+    assert_eq!(Schedule::Constant.share(3, 4), 1.0);
+    let (items, classes) = vectors(12);
+    let with = |schedule: &str| {
+        let recipe = recipe(json!({"epochs": 2, "batch": 4, "lr": 1e-4, "schedule": schedule}));
+        run(&items, &classes, &recipe).1.epochs
+    };
+    let (constant, cosine) = (with("constant"), with("cosine"));
+    assert_ne!(constant[1].loss, cosine[1].loss);
+
+    // Recipes of before there were schedules.
+    let mut old = serde_json::to_value(recipe(json!({}))).unwrap();
+    old.as_object_mut().unwrap().remove("schedule");
+    assert_eq!(serde_json::from_value::<Recipe>(old).unwrap(), recipe(json!({})));
+}
+
+#[test]
 fn the_epoch_that_did_best_is_kept_where_the_recipe_says_so() {
     let (items, classes) = vectors(12);
     let changes = json!({"epochs": 3, "batch": 4, "lr": 1e-4, "select": "validation"});
@@ -110,7 +130,9 @@ fn progress_tells_the_time_and_can_end_the_training() {
 #[test]
 fn a_training_that_was_stopped_goes_on_to_the_same_bytes() {
     let (items, classes) = vectors(9);
-    let recipe = recipe(json!({"epochs": 4, "batch": 4, "lr": 1e-4, "select": "validation"}));
+    let recipe = recipe(json!({
+        "epochs": 4, "batch": 4, "lr": 1e-4, "select": "validation", "schedule": "cosine"
+    }));
     let (train, watched): (Vec<usize>, Vec<usize>) = ((0..6).collect(), (6..9).collect());
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("training.safetensors");
