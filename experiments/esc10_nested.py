@@ -131,14 +131,20 @@ def mixtures(clips: Clips) -> Iterator[tuple[int, Matrix]]:
         yield fold, mixture([own.predict(make, y, train, test) for own, make in candidates], w)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def clips_by_arguments(description: str) -> Clips:
+    """The clips in --shared; --check shuffles their labels."""
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--shared", default="../shared", type=pathlib.Path)
     parser.add_argument("--check", action="store_true", help="shuffle the labels")
     arguments = parser.parse_args()
     clips = Clips(arguments.shared)
     if arguments.check:
         clips.y = np.random.default_rng(0).permutation(clips.y)
+    return clips
+
+
+def main() -> None:
+    clips = clips_by_arguments(__doc__.splitlines()[0])
     start = time.perf_counter()
     scores = []
     for fold, proba in mixtures(clips):

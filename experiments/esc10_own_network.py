@@ -20,13 +20,11 @@ fold 1 was not used. The weight of one half was fixed, not tried.
 
 from __future__ import annotations
 
-import argparse
-import pathlib
 import time
 
 import numpy as np
 from corsmal_feat import nets
-from esc10_nested import Clips, mixtures
+from esc10_nested import Clips, clips_by_arguments, mixtures
 from stacking import Labels, Matrix
 
 SEEDS = (0, 1, 2)
@@ -50,13 +48,7 @@ def accuracy(proba: Matrix, y: Labels) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--shared", default="../shared", type=pathlib.Path)
-    parser.add_argument("--check", action="store_true", help="shuffle the labels")
-    arguments = parser.parse_args()
-    clips = Clips(arguments.shared)
-    if arguments.check:
-        clips.y = np.random.default_rng(0).permutation(clips.y)
+    clips = clips_by_arguments(__doc__.splitlines()[0])
     start = time.perf_counter()
     names = ["configuration", "network, seed 0", "network, three seeds", "both"]
     scores = []
