@@ -76,7 +76,7 @@ impl Matching {
         );
         let mut matching = Self::default();
         for by in PairedBy::ALL {
-            // Names of a --map may belong to a few of the recordings.
+            // What --map or names have left over is not paired by less.
             if by != PairedBy::Id && !pairs.is_empty() {
                 break;
             }
@@ -229,7 +229,7 @@ fn position(file: &ComparedFile, name: &str) -> Result<usize, CompareError> {
     })
 }
 
-/// What of a recording, feature, and whether times: what arrays are joined by.
+/// The recording, the feature, and whether the array holds times: arrays of equal keys belong together.
 type Key = (String, String, bool);
 
 /// The key of an array of ours.

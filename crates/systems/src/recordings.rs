@@ -171,4 +171,20 @@ mod tests {
             assert_eq!(config.features.len(), 1, "{}", front_end.preset);
         }
     }
+
+    /// Times of windows are computed from it.
+    #[test]
+    fn the_hop_of_windows_is_that_of_the_preset() {
+        let mut checked = 0;
+        for front_end in NETWORKS.iter().filter_map(|d| d.front_end) {
+            let config = configuration(&front_end).unwrap().to_value();
+            let rate = config["signal"]["sample_rate"].as_f64().unwrap();
+            let hop = config["features"]["melspectrogram"]["hop_length"].as_f64();
+            if let (Some(hop), Some(windows)) = (hop, front_end.windows) {
+                assert_eq!(windows.hop, hop / rate, "{}", front_end.preset);
+                checked += 1;
+            }
+        }
+        assert_eq!(checked, 1, "mel-cnn");
+    }
 }

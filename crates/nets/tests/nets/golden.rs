@@ -88,7 +88,7 @@ fn wide(batch: &Batch) -> Vec<f64> {
     batch.values.values().iter().map(|&v| f64::from(v)).collect()
 }
 
-/// How far the last loss may be from PyTorch's where rounding of the weights decides. The manifest allows ten times the
+/// How far the last loss may be from PyTorch's where the rounding of weights decides it. The manifest allows ten times the
 /// difference of one run. PyTorch in double precision, with weights moved by up to half a unit in their last place,
 /// is up to 2.2e-3 from its own third loss; a network that does not learn is 9e-3 from it.
 const SPREAD: [(&str, f64); 1] = [("m4_type", 3e-3)];
