@@ -56,6 +56,9 @@ pub struct AudioSpec {
     pub declared_frames: Option<u64>,
 }
 
+/// Samples read at a time where they are only passed, all channels together.
+const PASSED: usize = 1 << 16;
+
 /// Samples of one recording, block by block.
 pub trait BlockSource: Send {
     /// Format, rate, channels.
@@ -78,6 +81,30 @@ pub trait BlockSource: Send {
     /// # Errors
     /// The source cannot seek, or the system refuses.
     fn seek(&mut self, frame: u64) -> Result<(), AudioError>;
+
+    /// Continues at `frame`, as [`seek`](Self::seek) or by reading what lies before it.
+    ///
+    /// # Errors
+    /// Reading or seeking failed; the frame was passed in a source that cannot seek.
+    fn go_to(&mut self, frame: u64) -> Result<(), AudioError> {
+        let read = self.health().decoded_frames;
+        if self.seekable() {
+            // Nothing that was fetched with the header is fetched again.
+            return if frame == 0 && read == 0 { Ok(()) } else { self.seek(frame) };
+        }
+        let mut left = frame.checked_sub(read).ok_or(AudioError::NotSeekable)?;
+        let channels = usize::from(self.spec().channels);
+        let most = left.min((PASSED / channels) as u64);
+        let mut block = vec![0.0; most as usize * channels];
+        while left > 0 {
+            let wanted = left.min(most) as usize * channels;
+            match self.read(&mut block[..wanted])? {
+                0 => break,
+                frames => left -= frames as u64,
+            }
+        }
+        Ok(())
+    }
 
     /// Frames that are there at most, as far as known without reading them: what the header says,
     /// and where the format allows it no more than the file has bytes for.

@@ -7,6 +7,7 @@
 //! or spans begin. [`Signals`] computes what is pushed from memory, [`Windows`] stretches of a
 //! recording or of an endless stream.
 
+mod decoders;
 mod extractor;
 mod failed;
 mod held;
@@ -25,6 +26,7 @@ mod watch;
 mod windows;
 mod workspace;
 
+pub use decoders::{Decoders, Reader};
 pub use extractor::{Extractor, Refused, Span};
 pub use failed::{Failed, FinishError};
 pub use plan::{Plan, PlannedFeature};

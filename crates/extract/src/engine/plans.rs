@@ -10,7 +10,7 @@ use corsmal_dsp::resample::MAX_EXPANSION;
 use super::plan::Plan;
 use super::signal_chain::channels_out;
 use super::workspace::Workspaces;
-use crate::config::Config;
+use crate::config::{Config, SignalConfig};
 
 /// What a recording is computed with.
 #[derive(Clone)]
@@ -53,6 +53,11 @@ impl<'a> Plans<'a> {
     pub fn new(config: Arc<Config>, warn: impl Fn(&str) + Send + Sync + 'a) -> Self {
         let (state, workspaces) = (Mutex::default(), Arc::default());
         Self { config, warn: Box::new(warn), state, workspaces }
+    }
+
+    /// How the configuration makes the signal.
+    pub fn signal(&self) -> &SignalConfig {
+        &self.config.signal
     }
 
     /// The plan for recordings like this one.

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use corsmal_audio::BlockSource;
+use corsmal_audio::{AudioSpec, BlockSource};
 use corsmal_files::outcome::{Outcome, Status};
 
 use super::extractor::Span;
@@ -114,7 +114,7 @@ pub fn compute(
     let mut pass = Pass::new(source, planned, crop_and_span)?;
     let mut each_of = |_: usize, span: Span| each(span);
     *decoded += pass.passed();
-    skip_to(source, pass.reads().start)?;
+    source.go_to(pass.reads().start)?;
     let mut block = Vec::new();
     let mut ended = false;
     while !ended && pass.wanted() > 0 {
@@ -148,27 +148,6 @@ pub(super) fn unread(
         Some(most) => planned.plan.unread(most.min(crop.end).saturating_sub(crop.start)),
         None => 0,
     }
-}
-
-/// Goes to a frame, by reading where the source cannot seek.
-pub(super) fn skip_to(source: &mut dyn BlockSource, frame: u64) -> Result<(), Failed> {
-    if frame == 0 {
-        return Ok(());
-    }
-    if source.seekable() {
-        return Ok(source.seek(frame)?);
-    }
-    let channels = usize::from(source.spec().channels);
-    let mut block = vec![0.0; BLOCK / channels * channels];
-    let mut left = frame;
-    while left > 0 {
-        let wanted = (left.min((BLOCK / channels) as u64)) as usize * channels;
-        match source.read(&mut block[..wanted])? {
-            0 => break,
-            frames => left -= frames as u64,
-        }
-    }
-    Ok(())
 }
 
 /// Refuses samples that features cannot be computed of; `position` is that of the first frame, and
@@ -215,12 +194,16 @@ pub fn check_stretch(
     Ok(())
 }
 
-/// Fills an outcome with what the reader knows.
-pub fn describe(outcome: &mut Outcome, source: &dyn BlockSource) {
-    let spec = source.spec();
+/// Fills an outcome with the format of a recording.
+pub fn describe_format(outcome: &mut Outcome, spec: &AudioSpec) {
     outcome.declared_frames = spec.declared_frames;
     outcome.sample_rate = Some(spec.sample_rate);
     outcome.channels = Some(u32::from(spec.channels));
+}
+
+/// Fills an outcome with what the reader knows.
+pub fn describe(outcome: &mut Outcome, source: &dyn BlockSource) {
+    describe_format(outcome, source.spec());
     let report = source.health();
     for repair in &report.repairs {
         if !outcome.repairs.iter().any(|r| r == repair.name()) {

@@ -9,7 +9,7 @@ use corsmal_audio::BlockSource;
 use super::failed::Failed;
 use super::pass::Pass;
 use super::plans::Planned;
-use super::reading::{BLOCK, WHOLE, skip_to};
+use super::reading::{BLOCK, WHOLE};
 use super::recording::Recording;
 
 /// What is to be computed of a recording.
@@ -69,7 +69,7 @@ pub fn compute(
     let most = BLOCK / channels;
     let mut block = vec![0.0; most * channels];
     let mut position = open.iter().map(|shared| shared.pass.reads().start).min().unwrap_or(0);
-    let mut read = skip_to(source, position).map(|()| 0);
+    let mut read = source.go_to(position).map(|()| 0).map_err(Failed::from);
     let mut ended = false;
     loop {
         let failed = read.as_ref().err().map(Failed::same);
@@ -107,7 +107,7 @@ pub fn compute(
         }
         // Nobody wants what lies before.
         if first > position {
-            read = skip_to(source, first).map(|()| 0);
+            read = source.go_to(first).map(|()| 0).map_err(Failed::from);
             position = first;
             continue;
         }

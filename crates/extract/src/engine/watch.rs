@@ -9,11 +9,14 @@ use super::failed::Failed;
 use crate::inputs::stored::{Pin, identity_of_read};
 use crate::inputs::{Input, InputSource};
 
+/// A file as it was when it was looked at.
+pub type Seen = (InputSource, Stamp);
+
 /// A look at a file before it is read, to be compared with one after the last read.
 #[derive(Debug, Clone)]
 pub struct Watch {
     /// Streams and devices cannot be looked at twice.
-    seen: Option<(InputSource, Stamp)>,
+    seen: Option<Seen>,
     /// Whether a change could keep the stamp, so that only the content tells.
     fresh: bool,
     /// Objects of stores are not looked at: every answer says of which version it is.
@@ -31,6 +34,11 @@ impl Watch {
         let pin = input.source.pin();
         let stored = pin.is_some().then(|| input.source.clone());
         Self { seen, fresh, pin: pin.unwrap_or_default(), stored }
+    }
+
+    /// The file, where every change of it is seen later.
+    pub(crate) fn lasting(&self) -> Option<&Seen> {
+        self.seen.as_ref().filter(|_| !self.fresh)
     }
 
     /// Keeps reads of an object to one version.

@@ -22,7 +22,7 @@ use super::output::{Finished, Output};
 use super::queue::{Partial, Queue, Work};
 use super::work::{self, Parts, SpanJob, broken, outcome_of};
 use crate::config::Config;
-use crate::engine::{Failed, Planned, Plans, Recording, Watch, reading};
+use crate::engine::{Decoders, Failed, Planned, Plans, Recording, Watch, reading};
 use crate::inputs::Input;
 use crate::survey::Survey;
 
@@ -45,6 +45,7 @@ pub struct Collector<'a> {
     progress: &'a dyn Progress,
     stop: &'a Arc<AtomicBool>,
     plans: Plans<'a>,
+    decoders: Decoders,
     /// Folder of temporary files: that of the output.
     folder: PathBuf,
     queue: Mutex<Queue>,
@@ -72,6 +73,7 @@ impl<'a> Collector<'a> {
             progress,
             stop,
             plans: Plans::new(config.clone(), |warning| progress.warning(warning)),
+            decoders: Decoders::default(),
             folder,
             queue: Mutex::new(queue),
             output: Mutex::new(output),
@@ -152,14 +154,15 @@ impl<'a> Collector<'a> {
         let input = &self.inputs[index];
         let watch = Watch::begin(input);
         let mut outcome = outcome_of(input);
-        let opened = work::open(input, &watch, (&self.plans, self.survey), self.stop, &mut outcome);
-        let opened = match opened {
+        let (with, by) = ((&watch, Some(&self.decoders)), (&self.plans, self.survey));
+        let opened = match work::open(input, with, by, self.stop, &mut outcome) {
             Ok(opened) => opened,
             Err(failed) => return self.fail(index, outcome, failed),
         };
         let planned = opened.planned.clone();
         if opened.spans.len() == 1 {
-            return match work::whole(opened, &watch, &self.folder, self.stop, &mut outcome) {
+            let with = (&watch, &self.decoders);
+            return match work::whole(opened, with, &self.folder, self.stop, &mut outcome) {
                 Ok(None) => {}
                 Ok(Some(recording)) => {
                     self.complete(index, outcome, (&planned, &watch), Ok(recording));

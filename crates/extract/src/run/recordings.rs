@@ -17,7 +17,7 @@ use super::error::RunError;
 use super::output::other_width;
 use super::work::{self, broken, outcome_of};
 use crate::config::Config;
-use crate::engine::{Failed, FeatureArray, Features, Plan, Planned, Plans, Watch};
+use crate::engine::{Decoders, Failed, FeatureArray, Features, Plan, Planned, Plans, Watch};
 use crate::inputs::Input;
 use crate::survey::Survey;
 
@@ -111,10 +111,12 @@ impl Recordings {
                 Some(channels) => Survey::of_channels(channels, &self.config),
                 None => Survey::of(inputs, &self.config, stop),
             };
+            // They do not outlive the call: a process that is forked later must not share their files.
+            let decoders = Decoders::default();
             let each = inputs.par_iter().enumerate();
             each.map(|(i, input)| {
                 let piece = pieces.get(i).and_then(Option::as_ref);
-                self.recording((input, piece), &survey, stop)
+                self.recording((input, piece), (&survey, &decoders), stop)
             })
             .collect()
         });
@@ -135,19 +137,20 @@ impl Recordings {
         let pool = pool(jobs)?;
         let survey = pool.install(|| Survey::of(inputs, &self.config, stop));
         let ready = VecDeque::new();
-        Ok(InOrder { recordings: self, rest: inputs, ready, pool, survey, stop })
+        let decoders = Decoders::default();
+        Ok(InOrder { recordings: self, rest: inputs, ready, pool, survey, decoders, stop })
     }
 
     fn recording(
         &self,
         (input, piece): (&Input, Option<&Range<u64>>),
-        survey: &Survey,
+        with: (&Survey, &Decoders),
         stop: &Arc<AtomicBool>,
     ) -> Result<(Outcome, Computed), RunError> {
         let watch = Watch::begin(input);
         let mut outcome = outcome_of(input);
         let computed = catch_unwind(AssertUnwindSafe(|| {
-            self.features((input, piece), &watch, survey, stop, &mut outcome)
+            self.features((input, piece), &watch, with, stop, &mut outcome)
         }));
         match computed.unwrap_or_else(|_| Err(broken())) {
             Ok(None) => Err(RunError::Interrupted),
@@ -169,17 +172,20 @@ impl Recordings {
         &self,
         (input, piece): (&Input, Option<&Range<u64>>),
         watch: &Watch,
-        survey: &Survey,
+        (survey, decoders): (&Survey, &Decoders),
         stop: &Arc<AtomicBool>,
         outcome: &mut Outcome,
     ) -> Result<Computed, Failed> {
-        let opened = work::open(input, watch, (&self.plans, survey), stop, outcome)?;
+        // A piece ends before its stretch, and its reader tells nothing of what lies behind.
+        let usable = piece.is_none().then_some(decoders);
+        let opened = work::open(input, (watch, usable), (&self.plans, survey), stop, outcome)?;
         let planned = opened.planned.clone();
         if let Some(piece) = piece {
             let found = work::piece(opened, piece, (watch, &self.folder), stop, outcome)?;
             return Ok(found.map(|features| (planned.plan, features)));
         }
-        let Some(recording) = work::whole(opened, watch, &self.folder, stop, outcome)? else {
+        let with = (watch, decoders);
+        let Some(recording) = work::whole(opened, with, &self.folder, stop, outcome)? else {
             return Ok(None);
         };
         let (features, _) = work::complete(input, (&planned, watch), Ok(recording), outcome)?;
@@ -252,6 +258,7 @@ pub struct InOrder<'a> {
     ready: VecDeque<Recorded<'a>>,
     pool: rayon::ThreadPool,
     survey: Survey,
+    decoders: Decoders,
     stop: &'a Arc<AtomicBool>,
 }
 
@@ -275,8 +282,8 @@ impl<'a> Iterator for InOrder<'a> {
             let (part, rest) = self.rest.split_at(together);
             self.rest = rest;
             let compute = |input: &'a Input| {
-                let (outcome, found) =
-                    self.recordings.recording((input, None), &self.survey, self.stop)?;
+                let with = (&self.survey, &self.decoders);
+                let (outcome, found) = self.recordings.recording((input, None), with, self.stop)?;
                 let features = found.map(|(_, features)| features);
                 Ok(Recorded { input, outcome, features })
             };

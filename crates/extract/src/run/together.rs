@@ -18,7 +18,7 @@ use super::recordings::pool;
 use super::work::{self, broken, known_outcome_of, outcome_of};
 use crate::engine::reading::{self, Part};
 use crate::engine::together::{self as engine, Computed};
-use crate::engine::{Failed, Features, Planned, Plans, Recording, Watch};
+use crate::engine::{Decoders, Failed, Features, Planned, Plans, Recording, Watch};
 use crate::inputs::{Input, InputSource};
 use crate::survey::Survey;
 
@@ -50,7 +50,8 @@ pub fn together(
                 let plans = Plans::new(config.clone(), |warning| progress.warning(warning));
                 let (folder, warned) = (ending.folder(), AtomicBool::new(false));
                 outputs.push((output, ending, reports.len()));
-                members.push(Member { inputs, survey, plans, folder, progress, warned });
+                let decoders = Decoders::default();
+                members.push(Member { inputs, survey, plans, decoders, folder, progress, warned });
                 reports.push(None);
             }
         }
@@ -129,6 +130,7 @@ struct Member<'a> {
     inputs: &'a [Input],
     survey: Survey,
     plans: Plans<'a>,
+    decoders: Decoders,
     folder: PathBuf,
     progress: &'a dyn Progress,
     /// Whether a recording shorter than a transform was met.
@@ -295,10 +297,11 @@ fn alone(
     if !input.source.is_stored() {
         outcome.identity = input.source.identity();
     }
-    let opened = work::open(input, &watch, (&by.plans, &by.survey), stop, outcome);
+    let with = (&watch, Some(&by.decoders));
+    let opened = work::open(input, with, (&by.plans, &by.survey), stop, outcome);
     let computed = opened.and_then(|opened| {
         let planned = opened.planned.clone();
-        let recording = work::whole(opened, &watch, &by.folder, stop, outcome)?;
+        let recording = work::whole(opened, (&watch, &by.decoders), &by.folder, stop, outcome)?;
         Ok(recording.map(|recording| (planned, recording)))
     });
     let (planned, recording) = match computed.transpose()? {

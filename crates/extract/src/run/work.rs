@@ -12,7 +12,9 @@ use corsmal_files::outcome::{Outcome, Status};
 use super::output::Member;
 use crate::engine::reading::Part;
 use crate::engine::together::Wanted;
-use crate::engine::{Failed, Features, Plan, Planned, Plans, Recording, Span, Watch, reading};
+use crate::engine::{
+    Decoders, Failed, Features, Plan, Planned, Plans, Reader, Recording, Span, Watch, reading,
+};
 use crate::inputs::Input;
 use crate::survey::Survey;
 
@@ -32,30 +34,44 @@ pub(super) fn known_outcome_of(input: &Input, identity: String) -> Outcome {
 
 /// A recording that is open, and how it is cut.
 pub(super) struct Opened {
-    pub source: Box<dyn BlockSource>,
+    pub reader: Reader,
     pub planned: Planned,
     /// The frames that are wanted.
     pub crop: Range<u64>,
     pub spans: Vec<Range<u64>>,
 }
 
-/// Opens a recording that the run takes.
+/// Opens a recording that the run takes, or goes on with one of the `decoders` where that gives the same.
 pub(super) fn open(
     input: &Input,
-    watch: &Watch,
+    (watch, decoders): (&Watch, Option<&Decoders>),
     (plans, survey): (&Plans<'_>, &Survey),
     stop: &Arc<AtomicBool>,
     outcome: &mut Outcome,
 ) -> Result<Opened, Failed> {
-    let opened = watch.settle(reading::open(input, watch, Part::Whole, stop));
-    if let Some(identity) = watch.identity() {
-        outcome.identity = identity;
-    }
-    let source = opened?;
-    reading::describe(outcome, source.as_ref());
-    let Wanted { planned, crop } = wanted(input, source.as_ref(), (plans, survey))?;
-    let spans = reading::spans(source.as_ref(), &planned, &crop);
-    Ok(Opened { source, planned, crop, spans })
+    let times = (input.start, input.end);
+    let stretch = |rate| reading::crop(plans.signal(), times, rate);
+    let mut reader = match decoders.and_then(|decoders| decoders.take(watch, stretch)) {
+        Some(replay) => {
+            // What it has met is told at the end of the stretch, as if it had begun.
+            reading::describe_format(outcome, replay.spec());
+            Reader::Again(replay)
+        }
+        None => {
+            let opened = watch.settle(reading::open(input, watch, Part::Whole, stop));
+            if let Some(identity) = watch.identity() {
+                outcome.identity = identity;
+            }
+            let source = opened?;
+            reading::describe(outcome, source.as_ref());
+            let others = decoders.is_some() && times != (None, None);
+            Reader::new(source, others)
+        }
+    };
+    let source = &*reader.source();
+    let Wanted { planned, crop } = wanted(input, source, (plans, survey))?;
+    let spans = reading::spans(source, &planned, &crop);
+    Ok(Opened { reader, planned, crop, spans })
 }
 
 /// What is to be computed of a recording that is open.
@@ -74,23 +90,28 @@ pub(super) fn wanted(
 }
 
 /// Computes a recording as one span; `None` where the run was stopped. Adds to `outcome` what the
-/// reader has learned.
+/// reader has learned; it waits among the `decoders` for the next stretch.
 pub(super) fn whole(
-    mut opened: Opened,
-    watch: &Watch,
+    opened: Opened,
+    (watch, decoders): (&Watch, &Decoders),
     folder: &Path,
     stop: &AtomicBool,
     outcome: &mut Outcome,
 ) -> Result<Option<Recording>, Failed> {
-    let Opened { source, planned, crop, .. } = &mut opened;
+    let Opened { mut reader, planned, crop, .. } = opened;
+    let source = reader.source();
     let mut recording = Recording::new(planned.plan.clone(), folder);
     let decoded = &mut outcome.decoded_frames;
-    let span = (&*crop, &reading::WHOLE);
-    let computed = reading::compute(source.as_mut(), planned, span, stop, decoded, |part| {
+    let span = (&crop, &reading::WHOLE);
+    let computed = reading::compute(source, &planned, span, stop, decoded, |part| {
         recording.add(part).map_err(Failed::temporary)
     });
-    reading::describe(outcome, source.as_ref());
-    Ok(watch.settle(computed)?.then_some(recording))
+    reading::describe(outcome, source);
+    if !watch.settle(computed)? {
+        return Ok(None);
+    }
+    decoders.put(watch, reader);
+    Ok(Some(recording))
 }
 
 /// Computes the frames of a piece of a recording, those anchored at the samples `piece`; the same as the
@@ -102,7 +123,8 @@ pub(super) fn piece(
     stop: &AtomicBool,
     outcome: &mut Outcome,
 ) -> Result<Option<Features>, Failed> {
-    let Opened { source, planned, crop, .. } = &mut opened;
+    let Opened { reader, planned, crop, .. } = &mut opened;
+    let source = reader.source();
     let resampled = planned.resample.is_some().then_some("the recording is resampled");
     let refusal = planned.plan.piece_refusal().or(resampled.map(String::from));
     if let Some(reason) = refusal {
@@ -111,11 +133,10 @@ pub(super) fn piece(
     }
     let mut recording = Recording::new(planned.plan.clone(), folder);
     let decoded = &mut outcome.decoded_frames;
-    let computed =
-        reading::compute(source.as_mut(), planned, (&*crop, piece), stop, decoded, |part| {
-            recording.add(part).map_err(Failed::temporary)
-        });
-    reading::describe(outcome, source.as_ref());
+    let computed = reading::compute(source, planned, (&*crop, piece), stop, decoded, |part| {
+        recording.add(part).map_err(Failed::temporary)
+    });
+    reading::describe(outcome, source);
     if !watch.settle(computed)? {
         return Ok(None);
     }

@@ -3,8 +3,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use corsmal_extract::config::Config;
 use corsmal_extract::cut::{WindowSpan, into_windows, name_recordings};
 use corsmal_extract::inputs::{Input, InputSource};
+use corsmal_extract::run::{Batch, Recordings};
 
 /// 30,000 frames at 44.1 kHz.
 const MP3: &[u8] = include_bytes!("../../../audio/tests/audio/samples/sine-1ch.mp3");
@@ -65,4 +67,73 @@ fn stretches_are_named_after_their_file_however_it_is_written() {
     assert!(unnamed(vec![others[1].clone(), others[1].clone()]));
     let own = Input { labels: recording("mine"), ..x.clone() };
     assert_eq!(named(vec![own.clone(), own]), [recording("mine"), recording("mine")]);
+}
+
+/// Seconds of a recording.
+fn length(path: &Path) -> f64 {
+    let mut source = corsmal_audio::open(path).unwrap();
+    source.go_to(u64::MAX).unwrap();
+    source.health().decoded_frames as f64 / f64::from(source.spec().sample_rate)
+}
+
+/// Decoders go on from one stretch to the next; nothing may tell.
+#[test]
+fn stretches_together_are_as_stretches_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let samples = Path::new("../audio/tests/audio/samples");
+    // In lengths of the recording: one behind the other, inside of others, backwards, one twice, over the end,
+    // behind it.
+    let mut times: Vec<(f64, Option<f64>)> =
+        (0..14).map(|i| (f64::from(i) * 0.07, Some(f64::from(i) * 0.07 + 0.15))).collect();
+    times.extend([(0.3, Some(0.9)), (0.4, Some(0.6)), (0.1, Some(0.3)), (0.1, Some(0.3))]);
+    times.extend([(0.7, None), (0.9, Some(3.0)), (0.9, Some(0.95)), (4.0, Some(5.0))]);
+    for name in [
+        "sine-1ch.mp3",
+        "bursts-2ch-cbr.mp3",
+        "steps-2ch-blocks.flac",
+        "sines-2ch.ogg",
+        "levels-8ch.opus",
+        "sines-2ch.m4a",
+        "sines-2ch.aac",
+    ] {
+        let plain = std::fs::read(samples.join(name)).unwrap();
+        let length = length(&samples.join(name));
+        let (mut hurt, middle) = (plain.clone(), plain.len() / 2);
+        hurt[middle..middle + 64].fill(0x55);
+        let cut = plain[..plain.len() * 2 / 3].to_vec();
+        for (damage, bytes) in [("none", plain), ("hurt", hurt), ("cut", cut)] {
+            let path = folder.path().join(format!("{damage}-{name}"));
+            std::fs::write(&path, bytes).unwrap();
+            // A file of just now could change unseen, so that nothing of it is kept.
+            let file = std::fs::File::options().append(true).open(&path).unwrap();
+            let hour = std::time::Duration::from_secs(3600);
+            file.set_modified(std::time::SystemTime::now() - hour).unwrap();
+            let stretch = |(i, (start, end)): (usize, &(f64, Option<f64>))| Input {
+                id: i.to_string(),
+                start: Some(start * length),
+                end: end.map(|end| end * length),
+                ..input(&path)
+            };
+            let inputs: Vec<Input> = times.iter().enumerate().map(stretch).collect();
+            let of = |inputs: &[Input], jobs: usize| -> Batch {
+                let config = Arc::new(Config::preset("esc26").unwrap());
+                let stop = Arc::default();
+                Recordings::new(config).extract((inputs, &[]), None, jobs, &stop).unwrap()
+            };
+            let told = |batch: &Batch| {
+                let outcomes = batch.outcomes.iter();
+                outcomes.map(|o| serde_json::to_string(o).unwrap()).collect::<Vec<_>>()
+            };
+            let alone: Vec<Batch> = inputs.chunks(1).map(|one| of(one, 1)).collect();
+            let values: Vec<f32> = alone.iter().flat_map(|b| b.values.iter().copied()).collect();
+            let outcomes: Vec<String> = alone.iter().flat_map(&told).collect();
+            let whole = outcomes.iter().filter(|o| o.contains("\"status\":\"ok\"")).count();
+            assert!(whole > 4 || damage != "none", "{name}: {outcomes:#?}");
+            for jobs in [1, 2, 3] {
+                let together = of(&inputs, jobs);
+                assert_eq!(told(&together), outcomes, "{damage} {name}, {jobs} jobs");
+                assert_eq!(together.values, values, "{damage} {name}, {jobs} jobs");
+            }
+        }
+    }
 }

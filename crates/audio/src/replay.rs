@@ -1,0 +1,198 @@
+//! Goes back a little in a recording whose format cannot seek.
+
+use crate::error::AudioError;
+use crate::report::ReadReport;
+use crate::source::{AudioSpec, BlockSource};
+
+/// Most samples kept (16 MiB).
+const MOST: usize = 1 << 22;
+
+/// Keeps the last samples of a source, so that stretches that overlap are decoded once.
+pub struct Replay {
+    source: Box<dyn BlockSource>,
+    /// Interleaved; behind them the source goes on.
+    kept: Vec<f32>,
+    /// The frame that is read next.
+    position: u64,
+}
+
+impl Replay {
+    /// Reads `source`, of which nothing was read.
+    pub fn new(source: Box<dyn BlockSource>) -> Self {
+        Self { source, kept: Vec::new(), position: 0 }
+    }
+
+    /// The first frame that was never read: what [`health`](BlockSource::health) tells is known up to it.
+    pub fn reached(&self) -> u64 {
+        self.source.health().decoded_frames
+    }
+
+    /// The first frame to which [`go_to`](BlockSource::go_to) can go back.
+    pub fn oldest(&self) -> u64 {
+        self.reached() - (self.kept.len() / self.channels()) as u64
+    }
+
+    fn channels(&self) -> usize {
+        usize::from(self.source.spec().channels)
+    }
+
+    fn keep(&mut self, samples: &[f32]) {
+        let channels = self.channels();
+        let room = MOST / channels * channels;
+        if self.kept.len() + samples.len() > room {
+            // Half of them at once, so that the rest is seldom moved.
+            let excess = (self.kept.len() + samples.len()).saturating_sub(room / 2);
+            self.kept.drain(..excess.div_ceil(channels).min(self.kept.len() / channels) * channels);
+        }
+        self.kept.extend_from_slice(&samples[samples.len().saturating_sub(room)..]);
+    }
+}
+
+impl BlockSource for Replay {
+    fn spec(&self) -> &AudioSpec {
+        self.source.spec()
+    }
+
+    fn read(&mut self, out: &mut [f32]) -> Result<usize, AudioError> {
+        let channels = self.channels();
+        let again = (self.reached() - self.position) as usize * channels;
+        let frames = if again > 0 {
+            let samples = again.min(out.len() / channels * channels);
+            let begin = self.kept.len() - again;
+            out[..samples].copy_from_slice(&self.kept[begin..begin + samples]);
+            samples / channels
+        } else {
+            let frames = self.source.read(out)?;
+            self.keep(&out[..frames * channels]);
+            frames
+        };
+        self.position += frames as u64;
+        Ok(frames)
+    }
+
+    fn seekable(&self) -> bool {
+        false
+    }
+
+    fn seek(&mut self, _: u64) -> Result<(), AudioError> {
+        Err(AudioError::NotSeekable)
+    }
+
+    /// Goes back to a frame that is kept, or on; what lies before it is forgotten.
+    fn go_to(&mut self, frame: u64) -> Result<(), AudioError> {
+        let oldest = self.oldest();
+        if frame < oldest {
+            return Err(AudioError::NotSeekable);
+        }
+        self.position = frame.min(self.reached());
+        self.kept.drain(..(self.position - oldest) as usize * self.channels());
+        if frame > self.position {
+            self.source.go_to(frame)?;
+            self.position = self.reached();
+        }
+        Ok(())
+    }
+
+    fn most_frames(&self) -> Option<u64> {
+        self.source.most_frames()
+    }
+
+    fn health(&self) -> &ReadReport {
+        self.source.health()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::SampleEncoding;
+    use crate::stream::{Next, Stream, StreamSource};
+
+    /// Two channels that count frames, in packets of 5.
+    struct Counting(u64);
+
+    impl Stream for Counting {
+        fn next(&mut self, samples: &mut Vec<f32>, _: &mut ReadReport) -> Result<Next, AudioError> {
+            let end = (self.0 + 5).min(LENGTH);
+            samples.extend((self.0..end).flat_map(|frame| [frame as f32, -(frame as f32)]));
+            self.0 = end;
+            Ok(if samples.is_empty() { Next::End } else { Next::Samples })
+        }
+    }
+
+    const LENGTH: u64 = 3_000_000;
+
+    fn replay() -> Replay {
+        let spec = AudioSpec {
+            sample_rate: 8000,
+            channels: 2,
+            format: "test".into(),
+            encoding: SampleEncoding::Lossy,
+            declared_frames: None,
+        };
+        Replay::new(Box::new(StreamSource::new(Counting(0), spec, ReadReport::default())))
+    }
+
+    /// Reads frames `from..from + frames` in blocks and checks them; how many there were.
+    fn read(replay: &mut Replay, from: u64, frames: u64, block: usize) -> u64 {
+        let (mut buffer, mut read) = (vec![0.0; 2 * block], 0);
+        while read < frames {
+            let wanted = (frames - read).min(block as u64) as usize;
+            // A sample that makes no frame is left alone.
+            let n = replay.read(&mut buffer[..(2 * wanted + 1).min(2 * block)]).unwrap();
+            for (i, pair) in (from + read..).zip(buffer[..2 * n].chunks(2)) {
+                assert_eq!(pair, [i as f32, -(i as f32)]);
+            }
+            read += n as u64;
+            if n == 0 {
+                break;
+            }
+        }
+        read
+    }
+
+    #[test]
+    fn stretches_that_overlap_are_decoded_once() {
+        let mut replay = replay();
+        for begin in (0..1000).step_by(30) {
+            replay.go_to(begin).unwrap();
+            assert_eq!(read(&mut replay, begin, 100, 7), 100);
+            assert_eq!((replay.oldest(), replay.reached()), (begin, begin + 100));
+        }
+        // Further than what was read, then back within the stretch only.
+        replay.go_to(5000).unwrap();
+        assert_eq!(read(&mut replay, 5000, 10, 100), 10);
+        replay.go_to(5000).unwrap();
+        assert_eq!(read(&mut replay, 5000, 20, 3), 20);
+        assert!(matches!(replay.go_to(4999), Err(AudioError::NotSeekable)));
+    }
+
+    #[test]
+    fn the_end_comes_again() {
+        let mut replay = replay();
+        for begin in [LENGTH - 50, LENGTH - 20, LENGTH - 1] {
+            replay.go_to(begin).unwrap();
+            assert_eq!(read(&mut replay, begin, 100, 16), LENGTH - begin);
+        }
+        replay.go_to(LENGTH + 7).unwrap();
+        assert_eq!(read(&mut replay, LENGTH, 1, 1), 0);
+        assert_eq!(replay.reached(), LENGTH);
+    }
+
+    #[test]
+    fn what_is_kept_is_bounded() {
+        let mut replay = replay();
+        assert_eq!(read(&mut replay, 0, LENGTH, 1 << 15), LENGTH);
+        assert!(replay.kept.len() <= MOST && replay.kept.len() >= MOST / 4);
+        let oldest = replay.oldest();
+        assert!(replay.go_to(oldest - 1).is_err());
+        replay.go_to(oldest).unwrap();
+        assert_eq!(read(&mut replay, oldest, LENGTH, 1 << 15), LENGTH - oldest);
+        // One read of more than is kept.
+        let mut replay = self::replay();
+        let mut all = vec![0.0; 2 * LENGTH as usize];
+        assert_eq!(replay.read(&mut all).unwrap() as u64, LENGTH);
+        assert_eq!(replay.kept.len(), MOST);
+        assert_eq!(replay.kept[MOST - 1], -((LENGTH - 1) as f32));
+    }
+}
