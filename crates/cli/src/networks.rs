@@ -1,5 +1,6 @@
 //! `train --net` and `cross-validate --net`.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::Ordering;
 
@@ -18,6 +19,7 @@ use serde_json::{Value, json};
 use crate::args::{DatasetArgs, NetworkArgs, PipelineArgs};
 use crate::failure::Failure;
 use crate::plural::plural;
+use crate::progress::repaired;
 use crate::{interrupt, recordings};
 
 /// What both commands are given.
@@ -41,6 +43,26 @@ struct Loaded {
     target: String,
 }
 
+/// What has no items: for each reason the first, and how many there are.
+#[derive(Default)]
+struct LeftOut(BTreeMap<String, (String, usize)>);
+
+impl LeftOut {
+    fn add(&mut self, id: &str, reason: &str) {
+        self.0.entry(reason.into()).or_insert_with(|| (id.into(), 0)).1 += 1;
+    }
+
+    fn tell(self) {
+        for (reason, (id, count)) in self.0 {
+            let others = match count - 1 {
+                0 => String::new(),
+                others => format!(", and {} for the same reason", plural(others, "other")),
+            };
+            eprintln!("warning: {id}: {reason}: left out of training{others}");
+        }
+    }
+}
+
 impl Request<'_> {
     fn load(&self, name: &str) -> Result<Loaded, Failure> {
         let definition = networks::classifier(name)?;
@@ -53,10 +75,12 @@ impl Request<'_> {
             members.refuse()?;
             // Only the labels given by --labels count.
             let own = !self.dataset.has_labels();
+            let mut left_out = LeftOut::default();
             let seen =
                 Examples::of_pictures(definition, (path, own), interrupt::flag(), |id, reason| {
-                    eprintln!("warning: {id}: {reason}: left out of training");
+                    left_out.add(id, reason);
                 });
+            left_out.tell();
             match seen {
                 Err(SystemError::Interrupted) => {
                     return Err(Failure::interrupted("interrupted; nothing was written"));
@@ -66,21 +90,25 @@ impl Request<'_> {
         } else {
             members.refuse()?;
             let found = recordings::named(&[path], recordings::warn)?;
+            let mut left_out = LeftOut::default();
             let heard = Examples::of_recordings(
                 definition,
                 (path, &found),
                 self.jobs,
                 interrupt::flag(),
-                |input, reason| {
-                    eprintln!("warning: {}: {reason}: left out of training", input.id);
-                },
+                |input, reason| left_out.add(&input.id, reason),
             );
-            match heard {
+            left_out.tell();
+            let heard = match heard {
                 Err(SystemError::Interrupted) => {
                     return Err(Failure::interrupted("interrupted; nothing was written"));
                 }
                 heard => heard?,
+            };
+            if let Some(repaired) = repaired(heard.table.outcomes.iter().map(|o| &o.repairs)) {
+                recordings::warn(&format!("recordings: {repaired}"));
             }
+            heard
         };
         // Networks are named after what they tell.
         let usual = ["level", "type"]

@@ -135,11 +135,19 @@ pub fn folder(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Refuses a path in whose folder no file can be made. What it makes to find out is gone again.
+/// Refuses the name of a folder, and a path in whose folder no file can be made. What it makes to find out is gone
+/// again.
 ///
 /// # Errors
 /// The path and the reason.
 pub fn check_place(path: &Path) -> io::Result<()> {
+    if path.as_os_str().to_string_lossy().ends_with(std::path::is_separator) {
+        let reason = "ends like the name of a folder: a file is written";
+        return Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            format!("{}: {reason}", path.display()),
+        ));
+    }
     tempfile::tempfile_in(folder(path)).map(drop).map_err(|error| refused(path, &error))
 }
 
@@ -183,6 +191,11 @@ mod tests {
     fn a_folder_that_takes_no_file_is_named_and_its_draft_is_not() {
         let folder = tempfile::tempdir().unwrap();
         check_place(&folder.path().join("a.npz")).unwrap();
+        let error = check_place(&folder.path().join("a.npz/")).unwrap_err().to_string();
+        assert!(
+            error.ends_with("a.npz/: ends like the name of a folder: a file is written"),
+            "{error}"
+        );
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
         let gone = folder.path().join("gone");
         let path = gone.join("a.npz");

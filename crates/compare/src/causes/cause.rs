@@ -11,6 +11,8 @@ pub enum CauseKind {
     Rounding,
     /// One side was stored with fewer digits.
     Precision,
+    /// One side has the same value everywhere.
+    Constant,
     /// The same values in another order of axes.
     Axes,
     /// The same channels in another order.

@@ -7,6 +7,7 @@
 
 mod arrangement;
 mod cause;
+mod constant;
 mod factor;
 mod fit;
 mod floor;
@@ -27,6 +28,9 @@ use super::settings::Settings;
 pub(super) fn of_values(pair: &Pair, dtypes: [&str; 2]) -> Vec<Cause> {
     let noise = pair.noise();
     if let Some(cause) = precision::detect(pair, dtypes, noise) {
+        return vec![cause];
+    }
+    if let Some(cause) = constant::detect(pair) {
         return vec![cause];
     }
     if let Some(cause) = arrangement::same_shape(pair, noise) {

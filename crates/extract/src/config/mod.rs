@@ -55,6 +55,20 @@ struct Raw {
     projection: Option<Value>,
 }
 
+/// What to write in place of Python's word at a byte of a TOML text.
+fn python_word(toml: &str, at: usize) -> Option<&'static str> {
+    let rest = toml.get(at..)?;
+    let is =
+        |word: &str| rest.strip_prefix(word).is_some_and(|r| !r.starts_with(char::is_alphanumeric));
+    [
+        ("None", "leave the key out for Python's None"),
+        ("True", "TOML writes true"),
+        ("False", "TOML writes false"),
+    ]
+    .into_iter()
+    .find_map(|(word, hint)| is(word).then_some(hint))
+}
+
 impl Config {
     /// The configuration of a preset.
     ///
@@ -90,7 +104,11 @@ impl Config {
                     "is an explanation, not TOML: `corsmal-feat presets NAME --toml` prints the file"
                         .into()
                 }
-                false => e.to_string().trim_end().to_string(),
+                false => {
+                    let message = e.to_string().trim_end().to_string();
+                    let python = e.span().and_then(|span| python_word(toml, span.start));
+                    python.map_or(message.clone(), |hint| format!("{message}; {hint}"))
+                }
             };
             ConfigError::Syntax { place: place.to_string(), message }
         };

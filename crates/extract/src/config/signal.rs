@@ -117,10 +117,10 @@ impl SignalConfig {
                 ))
             }
         };
-        let seconds = "0 or more seconds";
-        range("start", self.start, 0.0, 1e9, seconds)?;
-        range("end", self.end, 0.0, 1e9, seconds)?;
-        range("length", self.length, 0.0, 1e6, seconds)?;
+        let place = "0 to 1000000000 seconds";
+        range("start", self.start, 0.0, 1e9, place)?;
+        range("end", self.end, 0.0, 1e9, place)?;
+        range("length", self.length, 0.0, 1e6, "0 to 1000000 seconds")?;
         range("preemphasis", self.preemphasis, -1.0, 1.0, "-1 to 1 (0 for none)")?;
         if self.sample_rate != 0.0 {
             range(

@@ -96,6 +96,15 @@ fn the_switch_is_what_it_spells_out() {
 }
 
 #[test]
+fn pythons_words_are_explained() {
+    let refused =
+        |value: &str| config(&format!("[features.mfcc]\nfmax = {value}"), &[]).unwrap_err();
+    assert!(refused("None").ends_with("; leave the key out for Python's None"));
+    assert!(refused("True # yes").ends_with("; TOML writes true"));
+    assert!(!refused("Nonesuch").contains("Python"));
+}
+
+#[test]
 fn what_a_configuration_says_itself_stays() {
     let text = "librosa = '0.8'\n[features.m]\nkind = 'mfcc'\npad_mode = 'edge'";
     assert_eq!(config(text, &[]).unwrap().to_value()["features"]["m"]["pad_mode"], "edge");

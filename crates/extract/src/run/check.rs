@@ -168,7 +168,9 @@ fn check_output(
     if !folder.is_dir() {
         return refuse(format!("there is no folder {}", folder.display()));
     }
-    draft::check_place(&target).map_err(RunError::Folder)?;
+    // A partitioned output may be named like the folder that it is.
+    let place = if partitioned { target.components().collect() } else { target };
+    draft::check_place(&place).map_err(RunError::Folder)?;
     Ok(format)
 }
 

@@ -161,7 +161,11 @@ fn check_values(label: &str, values: &BTreeSet<String>) -> Result<(), String> {
         // Some systems tell no capital letters apart.
         if let Some(other) = folders.insert(folder.to_lowercase(), value) {
             let (a, b) = (quoted(other), quoted(value));
-            return Err(format!("the values {a} and {b} would share a folder"));
+            let case = match other.to_lowercase() == value.to_lowercase() {
+                true => " where a system does not tell capital letters apart",
+                false => "",
+            };
+            return Err(format!("the values {a} and {b} would share a folder{case}"));
         }
     }
     // Where all values are whole numbers, or all are numbers, readers of such folders make them numbers.
@@ -233,7 +237,10 @@ mod tests {
             let why = refused(&["9007199254740993", "9007199254740992", other]);
             assert!(why.contains("same number"), "{other}: {why}");
         }
-        assert!(refused(&["Rice", "rice"]).contains("share a folder"));
+        assert!(
+            refused(&["Rice", "rice"])
+                .ends_with("share a folder where a system does not tell capital letters apart")
+        );
     }
 
     #[test]

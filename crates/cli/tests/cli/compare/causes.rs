@@ -109,6 +109,18 @@ fn half_precision_is_recognised() {
 }
 
 #[test]
+fn a_side_without_a_sound() {
+    let a = levels();
+    expect(
+        &a,
+        &a.mapv(|_| 0.0),
+        "constant",
+        &["b has the same value", "values of b are 0, those of a"],
+    );
+    expect(&a.mapv(|_| -100.0), &a, "constant", &["a has the same value", "of a are -100"]);
+}
+
+#[test]
 fn offsets() {
     let a = levels();
     expect(&a, &a.mapv(|v| v + 90.308_99), "offset", &["the square of 32768", "b - a = 90.30"]);
