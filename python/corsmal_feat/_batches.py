@@ -24,6 +24,7 @@ _OUTCOME = {
     "status": "string",
     "reason": "string",
     "byte_offset": "int64",
+    "start_frame": "int64",
     "declared_frames": "int64",
     "decoded_frames": "int64",
     "sample_rate": "int64",

@@ -76,6 +76,9 @@ pub struct Outcome {
     /// Byte in the file at which the trouble was met, where known.
     #[serde(default)]
     pub byte_offset: Option<u64>,
+    /// Frame of the file at which the stretch begins, where only a stretch is taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start_frame: Option<u64>,
     /// Frames (samples per channel) that the header promises, where it does.
     #[serde(default)]
     pub declared_frames: Option<u64>,
@@ -111,6 +114,7 @@ impl Outcome {
             status,
             reason: reason.into(),
             byte_offset: None,
+            start_frame: None,
             declared_frames: None,
             decoded_frames: 0,
             sample_rate: None,

@@ -257,7 +257,7 @@ fn shared(
     let mut wanted = Vec::with_capacity(asked.len());
     let mut plan = |(Asked { by, input, .. }, outcome): (&Asked<'_>, &mut Outcome)| {
         reading::describe(outcome, source.as_ref());
-        let one = work::wanted(input, source.as_ref(), (&by.plans, &by.survey))?;
+        let one = work::wanted(input, source.as_ref(), (&by.plans, &by.survey), outcome)?;
         let planned = one.planned.clone();
         wanted.push(one);
         Ok(planned)

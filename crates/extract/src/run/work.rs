@@ -69,16 +69,17 @@ pub(super) fn open(
         }
     };
     let source = &*reader.source();
-    let Wanted { planned, crop } = wanted(input, source, (plans, survey))?;
+    let Wanted { planned, crop } = wanted(input, source, (plans, survey), outcome)?;
     let spans = reading::spans(source, &planned, &crop);
     Ok(Opened { reader, planned, crop, spans })
 }
 
-/// What is to be computed of a recording that is open.
+/// What is to be computed of a recording that is open. Notes in `outcome` where a stretch begins.
 pub(super) fn wanted(
     input: &Input,
     source: &dyn BlockSource,
     (plans, survey): (&Plans<'_>, &Survey),
+    outcome: &mut Outcome,
 ) -> Result<Wanted, Failed> {
     if let Some(reason) = survey.refusal(source.spec().channels) {
         return Err(Failed::new(Status::Mismatch, reason));
@@ -86,6 +87,7 @@ pub(super) fn wanted(
     let planned = plans.of(source.spec()).map_err(|e| Failed::new(Status::Unsupported, e))?;
     let signal = &planned.plan.config.signal;
     let crop = reading::crop(signal, (input.start, input.end), source.spec().sample_rate);
+    outcome.start_frame = (input.start.is_some() || input.end.is_some()).then_some(crop.start);
     Ok(Wanted { planned, crop })
 }
 

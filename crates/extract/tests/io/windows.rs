@@ -126,6 +126,11 @@ fn stretches_together_are_as_stretches_alone() {
             };
             let alone: Vec<Batch> = inputs.chunks(1).map(|one| of(one, 1)).collect();
             let values: Vec<f32> = alone.iter().flat_map(|b| b.values.iter().copied()).collect();
+            for (input, batch) in inputs.iter().zip(&alone) {
+                let outcome = &batch.outcomes[0];
+                let first = |rate| (input.start.unwrap() * f64::from(rate) + 1e-3) as u64;
+                assert_eq!(outcome.start_frame, outcome.sample_rate.map(first), "{outcome:?}");
+            }
             let outcomes: Vec<String> = alone.iter().flat_map(&told).collect();
             let whole = outcomes.iter().filter(|o| o.contains("\"status\":\"ok\"")).count();
             assert!(whole > 4 || damage != "none", "{name}: {outcomes:#?}");
