@@ -1,11 +1,10 @@
 //! Goes back a little in a recording whose format cannot seek.
 
+use std::ops::Range;
+
 use crate::error::AudioError;
 use crate::report::ReadReport;
 use crate::source::{AudioSpec, BlockSource};
-
-/// Most samples kept (16 MiB).
-const MOST: usize = 1 << 22;
 
 /// Keeps the last samples of a source, so that stretches that overlap are decoded once.
 pub struct Replay {
@@ -14,22 +13,39 @@ pub struct Replay {
     kept: Vec<f32>,
     /// The frame that is read next.
     position: u64,
+    /// Whether the source was asked for more than it has.
+    ended: bool,
 }
 
 impl Replay {
+    /// Most samples kept (16 MiB).
+    pub const MOST: usize = 1 << 22;
+
     /// Reads `source`, of which nothing was read.
     pub fn new(source: Box<dyn BlockSource>) -> Self {
-        Self { source, kept: Vec::new(), position: 0 }
+        Self { source, kept: Vec::new(), position: 0, ended: false }
     }
 
-    /// The first frame that was never read: what [`health`](BlockSource::health) tells is known up to it.
+    /// The first frame that was never read.
     pub fn reached(&self) -> u64 {
         self.source.health().decoded_frames
     }
 
-    /// The first frame to which [`go_to`](BlockSource::go_to) can go back.
-    pub fn oldest(&self) -> u64 {
+    /// Whether a stretch can be read as by a reader that begins: it can be gone to, and
+    /// [`health`](BlockSource::health) will know what reading this far tells, and no more.
+    pub fn serves(&self, stretch: &Range<u64>) -> bool {
+        let known = if self.ended { self.reached() + 1 } else { self.reached() };
+        self.oldest() <= stretch.start && known <= stretch.end
+    }
+
+    /// The first frame to which it can go back.
+    fn oldest(&self) -> u64 {
         self.reached() - (self.kept.len() / self.channels()) as u64
+    }
+
+    /// Samples kept.
+    pub fn kept(&self) -> usize {
+        self.kept.len()
     }
 
     fn channels(&self) -> usize {
@@ -38,7 +54,7 @@ impl Replay {
 
     fn keep(&mut self, samples: &[f32]) {
         let channels = self.channels();
-        let room = MOST / channels * channels;
+        let room = Self::MOST / channels * channels;
         if self.kept.len() + samples.len() > room {
             // Half of them at once, so that the rest is seldom moved.
             let excess = (self.kept.len() + samples.len()).saturating_sub(room / 2);
@@ -63,6 +79,7 @@ impl BlockSource for Replay {
             samples / channels
         } else {
             let frames = self.source.read(out)?;
+            self.ended |= frames == 0 && out.len() >= channels;
             self.keep(&out[..frames * channels]);
             frames
         };
@@ -89,6 +106,7 @@ impl BlockSource for Replay {
         if frame > self.position {
             self.source.go_to(frame)?;
             self.position = self.reached();
+            self.ended |= self.position < frame;
         }
         Ok(())
     }
@@ -158,6 +176,9 @@ mod tests {
             replay.go_to(begin).unwrap();
             assert_eq!(read(&mut replay, begin, 100, 7), 100);
             assert_eq!((replay.oldest(), replay.reached()), (begin, begin + 100));
+            assert!(replay.serves(&(begin + 7..begin + 100)));
+            assert!(!replay.serves(&(begin..begin + 99)));
+            assert!(begin == 0 || !replay.serves(&(begin - 1..begin + 200)));
         }
         // Further than what was read, then back within the stretch only.
         replay.go_to(5000).unwrap();
@@ -177,13 +198,15 @@ mod tests {
         replay.go_to(LENGTH + 7).unwrap();
         assert_eq!(read(&mut replay, LENGTH, 1, 1), 0);
         assert_eq!(replay.reached(), LENGTH);
+        // Another reader would not know yet that this is the end.
+        assert!(!replay.serves(&(LENGTH..LENGTH)) && replay.serves(&(LENGTH..LENGTH + 1)));
     }
 
     #[test]
     fn what_is_kept_is_bounded() {
         let mut replay = replay();
         assert_eq!(read(&mut replay, 0, LENGTH, 1 << 15), LENGTH);
-        assert!(replay.kept.len() <= MOST && replay.kept.len() >= MOST / 4);
+        assert!(replay.kept() <= Replay::MOST && replay.kept() >= Replay::MOST / 4);
         let oldest = replay.oldest();
         assert!(replay.go_to(oldest - 1).is_err());
         replay.go_to(oldest).unwrap();
@@ -192,7 +215,7 @@ mod tests {
         let mut replay = self::replay();
         let mut all = vec![0.0; 2 * LENGTH as usize];
         assert_eq!(replay.read(&mut all).unwrap() as u64, LENGTH);
-        assert_eq!(replay.kept.len(), MOST);
-        assert_eq!(replay.kept[MOST - 1], -((LENGTH - 1) as f32));
+        assert_eq!(replay.kept(), Replay::MOST);
+        assert_eq!(replay.kept[Replay::MOST - 1], -((LENGTH - 1) as f32));
     }
 }

@@ -1,6 +1,7 @@
 //! What was odd about a recording that was read nevertheless.
 
 use std::fmt;
+use std::ops::Range;
 
 use serde::Serialize;
 
@@ -163,21 +164,51 @@ pub struct ReadReport {
     pub truncated: bool,
     /// Deviations worked around, in the order met, each kind of cause once.
     pub repairs: Vec<Repair>,
+    /// The frames of [`Repair::LostFrames`] that were met last.
+    #[serde(skip)]
+    pub(crate) lost: Vec<Range<u64>>,
 }
+
+/// Most ranges of lost frames that are kept: more of them can be known ahead of what was read in one packet
+/// only.
+const MOST_LOST: usize = 16;
 
 impl ReadReport {
     /// The deviation by which samples are missing, or may be.
     pub fn loss(&self) -> Option<&Repair> {
-        let is_lost = |repair: &&Repair| match repair {
+        self.repairs.iter().find(|repair| self.is_loss(repair))
+    }
+
+    fn is_loss(&self, repair: &Repair) -> bool {
+        match repair {
             Repair::Truncated { .. } | Repair::LostFrames { .. } => true,
             Repair::ForeignBytes { .. } => self.truncated,
             _ => false,
-        };
-        self.repairs.iter().find(is_lost)
+        }
+    }
+
+    /// Whether a deviation concerns a stretch of the recording that was read to its end, and no further.
+    pub fn concerns(&self, repair: &Repair, stretch: &Range<u64>) -> bool {
+        match repair {
+            Repair::Truncated { actual, .. } => stretch.end > *actual,
+            Repair::LostFrames { .. } => {
+                self.lost.iter().any(|lost| lost.start < stretch.end && stretch.start < lost.end)
+            }
+            _ => true,
+        }
+    }
+
+    /// As [`loss`](Self::loss), for such a stretch.
+    pub fn loss_in(&self, stretch: &Range<u64>) -> Option<&Repair> {
+        let mut losses = self.repairs.iter().filter(|repair| self.is_loss(repair));
+        losses.find(|repair| self.concerns(repair, stretch))
     }
 
     /// Notes a deviation; of its kind the first place and the sum of frames or bytes are kept.
     pub(crate) fn note(&mut self, repair: Repair) {
+        if let Repair::LostFrames { first, count } = repair {
+            self.lose(first..first.saturating_add(count));
+        }
         let kind = std::mem::discriminant(&repair);
         let old = self.repairs.iter_mut().find(|old| std::mem::discriminant(*old) == kind);
         match (old, repair) {
@@ -194,6 +225,18 @@ impl ReadReport {
                 *count = count.saturating_add(more);
             }
             (Some(_), _) => {}
+        }
+    }
+
+    fn lose(&mut self, frames: Range<u64>) {
+        match self.lost.last_mut().filter(|last| last.end == frames.start) {
+            Some(last) => last.end = frames.end,
+            None => {
+                if self.lost.len() == MOST_LOST {
+                    self.lost.remove(0);
+                }
+                self.lost.push(frames);
+            }
         }
     }
 

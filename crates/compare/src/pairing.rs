@@ -51,8 +51,7 @@ impl Identities {
             hash.is_some_and(|hash| hash.len() == 64 && hash.bytes().all(|b| b.is_ascii_hexdigit()))
         };
         let file = |o: &Outcome| {
-            let is_whole =
-                o.start_frame.is_none() && o.declared_frames == Some(o.decoded_frames);
+            let is_whole = o.start_frame.is_none() && o.declared_frames == Some(o.decoded_frames);
             (o.id.clone(), FileIdentity { hash: o.identity.clone(), is_whole })
         };
         Self(outcomes.iter().filter(is_hash).map(file).collect())

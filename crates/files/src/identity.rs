@@ -69,6 +69,8 @@ pub struct Stamp {
 
 /// Within this time of a change, another one may give the same time stamp.
 const CLOCK: Duration = Duration::from_secs(2);
+/// A file system's clock is not further ahead of ours.
+const SKEW: Duration = Duration::from_hours(24);
 
 impl Stamp {
     /// The stamp of a file; `None` for pipes and devices.
@@ -87,9 +89,12 @@ impl Stamp {
     /// Whether the file has changed so lately that a further change might keep the stamp: the clock
     /// of a file system is coarse.
     pub fn is_fresh(&self) -> bool {
-        let age = self.modified.map(|modified| modified.elapsed());
-        // A time in the future is as good as none.
-        !matches!(age, Some(Ok(age)) if age > CLOCK)
+        let Some(modified) = self.modified else { return true };
+        match modified.elapsed() {
+            Ok(age) => age <= CLOCK,
+            // The clock of a server may be ahead. What lies further ahead was not written now.
+            Err(ahead) => ahead.duration() <= SKEW,
+        }
     }
 }
 
@@ -139,6 +144,9 @@ mod tests {
         File::options().write(true).open(&path).unwrap().set_modified(long_ago).unwrap();
         let old = stamp();
         assert!(old != first && !old.is_fresh());
+        let at = |time| Stamp { modified: Some(time), ..old };
+        assert!(at(SystemTime::now() + Duration::from_hours(1)).is_fresh());
+        assert!(!at(SystemTime::now() + Duration::from_hours(1000)).is_fresh());
         std::fs::write(&path, b"two").unwrap();
         assert!(stamp().modified != old.modified && stamp().file == old.file);
         std::fs::write(folder.path().join("b"), b"two").unwrap();

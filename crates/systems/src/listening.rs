@@ -42,7 +42,7 @@ pub struct Answer {
     pub status: Status,
     /// class and probabilities; `None` where the reason says why
     pub decision: Option<Decision>,
-    /// why there is no decision, or one from a part of the windows only
+    /// why there is no decision, one from a part of the windows only, or one of damaged samples
     pub reason: Option<String>,
     /// the length in seconds of the recording, or its first window, that is far from those trained on
     pub unlike: Option<f64>,
@@ -249,17 +249,18 @@ impl<'a> Listener<'a> {
                 },
             };
             let mut votes = WindowVotes::new(self.model.header.labels.len());
-            let (mut trouble, mut failures) = (None, 0);
+            let (mut trouble, mut failures, mut is_told) = (None, 0, false);
             // Of a recording, the first window that is far from the recordings trained on.
             let mut unlike = None;
             for window in &mut windows {
                 if stopped() {
                     return Ok(false);
                 }
-                let (span, features) = match window {
-                    Ok(window) => (Some((window.start, window.end)), window.features),
-                    Err(e) => (None, Err(e)),
+                let (span, loss, features) = match window {
+                    Ok(window) => (Some((window.start, window.end)), window.loss, window.features),
+                    Err(e) => (None, None, Err(e)),
                 };
+                let status = if loss.is_some() { Status::Truncated } else { Status::Ok };
                 let seconds = span.map(|(start, end)| end - start).filter(|_| unlike.is_none());
                 let first = seconds.filter(|s| self.takes_windows() && self.is_unlike(*s));
                 unlike = unlike.or(first);
@@ -282,9 +283,12 @@ impl<'a> Listener<'a> {
                     (Ok(heard), None) => {
                         let mean = self.votes(&heard)?.mean();
                         let decision = mean.map(decided);
+                        // Said once of a recording.
+                        let reason = loss.filter(|_| !std::mem::replace(&mut is_told, true));
                         Answer {
                             unlike: first,
-                            ..Answer::of(span, heard.len(), Status::Ok, decision)
+                            reason,
+                            ..Answer::of(span, heard.len(), status, decision)
                         }
                     }
                 };
@@ -302,7 +306,7 @@ impl<'a> Listener<'a> {
                 (decision, trouble) => {
                     let status = match &trouble {
                         Some(trouble) => trouble.status,
-                        None if windows.is_truncated() => Status::Truncated,
+                        None if windows.loss().is_some() => Status::Truncated,
                         None => Status::Ok,
                     };
                     let reason = trouble.map(|trouble| {

@@ -74,7 +74,7 @@ pub(crate) fn open(
         declared_frames,
     };
     let truncated = header.repairs.iter().any(|r| matches!(r, Repair::Truncated { .. }));
-    let report = ReadReport { decoded_frames: 0, truncated, repairs: header.repairs.clone() };
+    let report = ReadReport { truncated, repairs: header.repairs.clone(), ..ReadReport::default() };
     if let Encoding::Adpcm(adpcm) = format.encoding {
         let left = header.extent.len;
         let more: adpcm::More = |input, size| wav::more_data(input, size, Endian::Little);

@@ -192,7 +192,10 @@ fn what_cannot_be_learned_from_is_refused() {
         (format!("id,kind\n{}", &all[5..]), "no line for recording \"r0\""),
         (format!("id,kind\n{all}r3,1\n"), "line 42 repeats \"r3\" of line 5"),
         (format!("id,kind\n{}", all.replace(",1", ",1.0")), "kind = \"1.0\" is a decimal number"),
-        (format!("id,kind\n{}", all.replace("r1,1", "r1,")), "r1: label kind = \"\" is empty"),
+        (
+            format!("id,kind\n{}", all.replace("r1,1", "r1,")),
+            "labels.csv: r1: label kind = \"\" is empty",
+        ),
         (format!("id,kind\n{}", all.replace("r1,1", "r1,2")), "class 2 of kind has 1 row"),
         (format!("id,kind\n{}", all.replace(",1", ",0")), "at least 2 classes are needed"),
         (format!("id,other\n{all}"), "no label column \"kind\""),

@@ -37,37 +37,40 @@ impl Reader {
     }
 }
 
-/// Decoders of a run that wait, one for each thread at most.
+/// Most decoders that wait, besides one for each thread: recordings whose stretches take turns. Each has its
+/// file open.
+const MOST: usize = 16;
+
+/// Decoders of a run that wait.
 #[derive(Default)]
 pub struct Decoders {
+    /// Those that have waited longest come first.
     waiting: Mutex<Vec<(Seen, Replay)>>,
 }
 
 impl Decoders {
     /// One of the recording that `watch` looks at, for the frames that `stretch` gives for its sample rate:
-    /// the one that has come furthest. None has gone beyond the end, so that it tells of the recording
-    /// what a decoder that begins would tell.
+    /// the one that has come furthest.
     pub fn take(&self, watch: &Watch, stretch: impl Fn(u32) -> Range<u64>) -> Option<Replay> {
         let seen = watch.lasting()?;
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
-        let fits = |replay: &Replay| {
-            let Range { start, end } = stretch(replay.spec().sample_rate);
-            replay.oldest() <= start && replay.reached() <= end
-        };
+        let fits = |replay: &Replay| replay.serves(&stretch(replay.spec().sample_rate));
         let usable = waiting.iter().enumerate().filter(|(_, (of, one))| of == seen && fits(one));
         let place = usable.max_by_key(|(_, (_, replay))| replay.reached())?.0;
-        Some(waiting.swap_remove(place).1)
+        Some(waiting.remove(place).1)
     }
 
     /// Lets the reader of a stretch wait, where it can go on and a change of its file would be seen.
     pub fn put(&self, watch: &Watch, reader: Reader) {
         let (Reader::Again(replay), Some(seen)) = (reader, watch.lasting()) else { return };
+        let threads = rayon::current_num_threads();
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
-        // Those of recordings that are done make room.
-        if waiting.len() >= rayon::current_num_threads() {
-            let place = waiting.iter().position(|(of, _)| of != seen).unwrap_or(0);
-            waiting.remove(place);
-        }
         waiting.push((seen.clone(), replay));
+        // Those that nobody has wanted for long make room: most are of recordings that are done.
+        let kept =
+            |waiting: &[(Seen, Replay)]| waiting.iter().map(|(_, r)| r.kept()).sum::<usize>();
+        while waiting.len() > MOST + threads || kept(&waiting) > threads * Replay::MOST {
+            waiting.remove(0);
+        }
     }
 }

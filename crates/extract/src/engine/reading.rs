@@ -183,6 +183,13 @@ pub fn check_stretch(
 ) -> Result<(), Failed> {
     let Some(rate) = outcome.sample_rate else { return Ok(()) };
     let crop = crop(signal, (input.start, input.end), rate);
+    if crop.is_empty() && crop.start > 0 {
+        let reason = match signal.start > 0.0 {
+            true => format!("signal.start = {} s leaves nothing of the stretch", signal.start),
+            false => format!("the stretch has no frame at {rate} Hz"),
+        };
+        return Err(Failed::new(Status::Empty, reason));
+    }
     if let Some(start) = input.start.filter(|_| crop.start > 0 && outcome.decoded_frames == 0) {
         let reason = format!("the stretch begins at {start} s, after the end of the recording");
         return Err(Failed::new(Status::Empty, reason));
@@ -201,16 +208,16 @@ pub fn describe_format(outcome: &mut Outcome, spec: &AudioSpec) {
     outcome.channels = Some(u32::from(spec.channels));
 }
 
-/// Fills an outcome with what the reader knows.
-pub fn describe(outcome: &mut Outcome, source: &dyn BlockSource) {
+/// Fills an outcome with what the reader knows of a stretch.
+pub fn describe(outcome: &mut Outcome, source: &dyn BlockSource, stretch: &Range<u64>) {
     describe_format(outcome, source.spec());
     let report = source.health();
-    for repair in &report.repairs {
+    for repair in report.repairs.iter().filter(|repair| report.concerns(repair, stretch)) {
         if !outcome.repairs.iter().any(|r| r == repair.name()) {
             outcome.repairs.push(repair.name().to_string());
         }
     }
-    if let Some(loss) = report.loss().filter(|_| outcome.status == Status::Ok) {
+    if let Some(loss) = report.loss_in(stretch).filter(|_| outcome.status == Status::Ok) {
         outcome.status = Status::Truncated;
         outcome.reason = loss.to_string();
     }

@@ -38,6 +38,8 @@ pub struct Window {
     pub start: f64,
     /// Where it ends.
     pub end: f64,
+    /// By what samples of it are missing, in words.
+    pub loss: Option<String>,
     /// What a recording of these samples alone has.
     pub features: Result<Features, SignalError>,
 }
@@ -97,9 +99,10 @@ impl<'a> Windows<'a> {
         })
     }
 
-    /// Whether samples of the recording are missing, once all windows are there.
-    pub fn is_truncated(&self) -> bool {
-        self.source.health().loss().is_some()
+    /// By what samples of the recording are missing, in words; known once all windows are there.
+    pub fn loss(&self) -> Option<String> {
+        let stretch = self.base..self.limit;
+        self.source.health().loss_in(&stretch).map(ToString::to_string)
     }
 
     /// Sample rate in Hz and channels of the recording.
@@ -160,8 +163,9 @@ impl<'a> Windows<'a> {
             signal.finish()
         });
         let seconds = |frame: u64| frame as f64 / f64::from(sample_rate);
+        let loss = self.source.health().loss_in(&(self.first..wanted)).map(ToString::to_string);
         let (start, end) = (seconds(self.first), seconds(self.first + frames as u64));
-        Ok(Some(Window { start, end, features }))
+        Ok(Some(Window { start, end, loss, features }))
     }
 }
 

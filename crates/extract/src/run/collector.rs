@@ -197,8 +197,8 @@ impl<'a> Collector<'a> {
         let Some(done) = job.compute(&self.inputs[job.input], self.stop) else { return };
         let mut queue = self.lock();
         if let Some(partial) = queue.partial.get_mut(&job.input) {
-            if let Some(source) = done.source {
-                reading::describe(&mut partial.outcome, source.as_ref());
+            if let Some((source, crop)) = done.source {
+                reading::describe(&mut partial.outcome, source.as_ref(), &crop);
             }
             partial.outcome.decoded_frames += done.decoded;
             partial.early.insert(job.index, done.parts);

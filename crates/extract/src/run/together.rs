@@ -256,7 +256,9 @@ fn shared(
     }
     let mut wanted = Vec::with_capacity(asked.len());
     let mut plan = |(Asked { by, input, .. }, outcome): (&Asked<'_>, &mut Outcome)| {
-        reading::describe(outcome, source.as_ref());
+        let (times, rate) = ((input.start, input.end), source.spec().sample_rate);
+        let crop = reading::crop(by.plans.signal(), times, rate);
+        reading::describe(outcome, source.as_ref(), &crop);
         let one = work::wanted(input, source.as_ref(), (&by.plans, &by.survey), outcome)?;
         let planned = one.planned.clone();
         wanted.push(one);
@@ -270,7 +272,7 @@ fn shared(
         |number: usize, Computed { recording, decoded }: Computed, source: &dyn BlockSource| {
             let place = places[number];
             outcomes[place].decoded_frames += decoded;
-            reading::describe(&mut outcomes[place], source);
+            reading::describe(&mut outcomes[place], source, &wanted[number].crop);
             computed[place] = Some(watch.settle(recording));
         };
     if !engine::compute(source.as_mut(), &wanted, &first.by.folder, stop, done)? {

@@ -51,6 +51,7 @@ pub(super) fn open(
 ) -> Result<Opened, Failed> {
     let times = (input.start, input.end);
     let stretch = |rate| reading::crop(plans.signal(), times, rate);
+    let mut begins = false;
     let mut reader = match decoders.and_then(|decoders| decoders.take(watch, stretch)) {
         Some(replay) => {
             // What it has met is told at the end of the stretch, as if it had begun.
@@ -62,13 +63,14 @@ pub(super) fn open(
             if let Some(identity) = watch.identity() {
                 outcome.identity = identity;
             }
-            let source = opened?;
-            reading::describe(outcome, source.as_ref());
-            let others = decoders.is_some() && times != (None, None);
-            Reader::new(source, others)
+            begins = true;
+            Reader::new(opened?, decoders.is_some() && times != (None, None))
         }
     };
     let source = &*reader.source();
+    if begins {
+        reading::describe(outcome, source, &stretch(source.spec().sample_rate));
+    }
     let Wanted { planned, crop } = wanted(input, source, (plans, survey), outcome)?;
     let spans = reading::spans(source, &planned, &crop);
     Ok(Opened { reader, planned, crop, spans })
@@ -108,7 +110,7 @@ pub(super) fn whole(
     let computed = reading::compute(source, &planned, span, stop, decoded, |part| {
         recording.add(part).map_err(Failed::temporary)
     });
-    reading::describe(outcome, source);
+    reading::describe(outcome, source, &crop);
     if !watch.settle(computed)? {
         return Ok(None);
     }
@@ -138,7 +140,7 @@ pub(super) fn piece(
     let computed = reading::compute(source, planned, (&*crop, piece), stop, decoded, |part| {
         recording.add(part).map_err(Failed::temporary)
     });
-    reading::describe(outcome, source);
+    reading::describe(outcome, source, crop);
     if !watch.settle(computed)? {
         return Ok(None);
     }
@@ -157,7 +159,8 @@ pub(super) struct SpanJob {
 
 /// What computing a span gave.
 pub(super) struct SpanDone {
-    pub source: Option<Box<dyn BlockSource>>,
+    /// With the frames of the recording that are wanted.
+    pub source: Option<(Box<dyn BlockSource>, Range<u64>)>,
     /// Frames decoded for it.
     pub decoded: u64,
     pub parts: Result<Vec<Span>, Failed>,
@@ -174,9 +177,9 @@ impl SpanJob {
             self.watch.check()?;
             let signal = &self.planned.plan.config.signal;
             let crop = reading::crop(signal, (input.start, input.end), source.spec().sample_rate);
-            let source = last.insert(source).as_mut();
-            let (span, decoded) = ((&crop, &self.span), &mut decoded);
-            reading::compute(source, &self.planned, span, stop, decoded, |part| {
+            let (source, crop) = last.insert((source, crop));
+            let (span, decoded) = ((&*crop, &self.span), &mut decoded);
+            reading::compute(source.as_mut(), &self.planned, span, stop, decoded, |part| {
                 parts.push(part);
                 Ok(())
             })

@@ -3,10 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use corsmal_audio::Repair;
 use corsmal_extract::config::Config;
 use corsmal_extract::cut::{WindowSpan, into_windows, name_recordings};
+use corsmal_extract::engine::{Signals, Window, Windowing, Windows};
 use corsmal_extract::inputs::{Input, InputSource};
 use corsmal_extract::run::{Batch, Recordings};
+use corsmal_files::outcome::Outcome;
 
 /// 30,000 frames at 44.1 kHz.
 const MP3: &[u8] = include_bytes!("../../../audio/tests/audio/samples/sine-1ch.mp3");
@@ -69,10 +72,10 @@ fn stretches_are_named_after_their_file_however_it_is_written() {
     assert_eq!(named(vec![own.clone(), own]), [recording("mine"), recording("mine")]);
 }
 
-/// Seconds of a recording.
+/// Seconds of a recording, up to what cannot be read.
 fn length(path: &Path) -> f64 {
-    let mut source = corsmal_audio::open(path).unwrap();
-    source.go_to(u64::MAX).unwrap();
+    let Ok(mut source) = corsmal_audio::open(path) else { return 1.0 };
+    let _ = source.go_to(u64::MAX);
     source.health().decoded_frames as f64 / f64::from(source.spec().sample_rate)
 }
 
@@ -87,6 +90,8 @@ fn stretches_together_are_as_stretches_alone() {
         (0..14).map(|i| (f64::from(i) * 0.07, Some(f64::from(i) * 0.07 + 0.15))).collect();
     times.extend([(0.3, Some(0.9)), (0.4, Some(0.6)), (0.1, Some(0.3)), (0.1, Some(0.3))]);
     times.extend([(0.7, None), (0.9, Some(3.0)), (0.9, Some(0.95)), (4.0, Some(5.0))]);
+    // Only one that asks for more learns that a file ends too early.
+    times.extend([(0.8, Some(1.5)), (0.8, Some(1.0)), (0.5, Some(1.0))]);
     for name in [
         "sine-1ch.mp3",
         "bursts-2ch-cbr.mp3",
@@ -97,7 +102,6 @@ fn stretches_together_are_as_stretches_alone() {
         "sines-2ch.aac",
     ] {
         let plain = std::fs::read(samples.join(name)).unwrap();
-        let length = length(&samples.join(name));
         let (mut hurt, middle) = (plain.clone(), plain.len() / 2);
         hurt[middle..middle + 64].fill(0x55);
         let cut = plain[..plain.len() * 2 / 3].to_vec();
@@ -108,6 +112,7 @@ fn stretches_together_are_as_stretches_alone() {
             let file = std::fs::File::options().append(true).open(&path).unwrap();
             let hour = std::time::Duration::from_secs(3600);
             file.set_modified(std::time::SystemTime::now() - hour).unwrap();
+            let length = length(&path);
             let stretch = |(i, (start, end)): (usize, &(f64, Option<f64>))| Input {
                 id: i.to_string(),
                 start: Some(start * length),
@@ -141,4 +146,75 @@ fn stretches_together_are_as_stretches_alone() {
             }
         }
     }
+}
+
+#[test]
+fn only_stretches_with_a_gap_are_truncated() {
+    let folder = tempfile::tempdir().unwrap();
+    let samples = Path::new("../audio/tests/audio/samples");
+    let mut gaps = 0;
+    for (name, tenth) in ["bursts-2ch-cbr.mp3", "sines-2ch.ogg", "levels-8ch.opus", "sines-2ch.m4a"]
+        .into_iter()
+        .flat_map(|name| [4, 5, 6, 7].map(|tenth| (name, tenth)))
+    {
+        let mut bytes = std::fs::read(samples.join(name)).unwrap();
+        let at = bytes.len() * tenth / 10;
+        bytes[at..at + 16].fill(0x55);
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        let mut source = corsmal_audio::open(&path).unwrap();
+        source.go_to(u64::MAX).unwrap();
+        let (report, rate) = (source.health(), f64::from(source.spec().sample_rate));
+        let lost = report.repairs.iter().find_map(|repair| match repair {
+            Repair::LostFrames { first, count } => Some((*first, first + count)),
+            _ => None,
+        });
+        let total = report.decoded_frames;
+        let inside = |(first, end): &(u64, u64)| *first > 100 && *end + 100 < total;
+        let Some((first, end)) = lost.filter(inside) else { continue };
+        gaps += 1;
+        let stretches = [(0, first), (first - 1, first + 1), (end - 1, total), (end, total)];
+        let stretch = |(from, to): (u64, u64)| Input {
+            id: from.to_string(),
+            start: Some(from as f64 / rate),
+            end: Some(to as f64 / rate),
+            ..input(&path)
+        };
+        let inputs: Vec<Input> = stretches.into_iter().map(stretch).collect();
+        let engine = Recordings::new(Arc::new(Config::preset("esc26").unwrap()));
+        let batch = engine.extract((&inputs, &[]), None, 1, &Arc::default()).unwrap();
+        let status: Vec<&str> = batch.outcomes.iter().map(|o| o.status.name()).collect();
+        assert_eq!(status, ["ok", "truncated", "truncated", "ok"], "{name}: {:#?}", batch.outcomes);
+        let told = |o: &Outcome| o.repairs.iter().any(|repair| repair == "lost_frames");
+        let told: Vec<bool> = batch.outcomes.iter().map(told).collect();
+        assert_eq!(told, [false, true, true, false], "{name}");
+        let signals = Signals::new(Arc::new(Config::preset("esc26").unwrap()));
+        let windowing = Windowing::new(0.03, 0.02).unwrap();
+        let windows = Windows::open(&input(&path), &signals, windowing, &Arc::default()).unwrap();
+        for window in windows {
+            let Window { start, end: until, loss, .. } = window.unwrap();
+            let frame = |seconds: f64| (seconds * rate).round() as u64;
+            let is_hurt = frame(start) < end && first < frame(until);
+            assert_eq!(loss.is_some(), is_hurt, "{name}, {start} s: {loss:?}");
+        }
+    }
+    assert!(gaps > 3, "{gaps}");
+}
+
+#[test]
+fn a_start_of_the_signal_behind_a_stretch_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.mp3");
+    std::fs::write(&path, MP3).unwrap();
+    let of = |changes: &[String], end: f64| {
+        let base = Config::preset("esc26").unwrap().to_value();
+        let config = Config::from_tree(base, changes).unwrap();
+        let input = Input { start: Some(0.1), end: Some(end), ..input(&path) };
+        let engine = Recordings::new(Arc::new(config));
+        let batch = engine.extract((&[input], &[]), None, 1, &Arc::default()).unwrap();
+        (batch.outcomes[0].status.name(), batch.outcomes[0].reason.clone())
+    };
+    let reason = "signal.start = 0.3 s leaves nothing of the stretch";
+    assert_eq!(of(&["signal.start=0.3".into()], 0.2), ("empty", reason.into()));
+    assert_eq!(of(&[], 0.100001), ("empty", "the stretch has no frame at 44100 Hz".into()));
 }

@@ -102,6 +102,7 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
         columns,
         unread,
         numbered,
+        added: Vec::new(),
     })
 }
 
@@ -191,6 +192,7 @@ pub(super) fn read_parquet(
         columns: texts,
         unread: skipped.into_iter().map(|name| (name, UNREAD.into())).collect(),
         numbered,
+        added: Vec::new(),
     })
 }
 

@@ -39,6 +39,8 @@ pub struct LabelledTable {
     pub(super) unread: Vec<(String, String)>,
     /// whether the ids are only the numbers of the rows
     pub(super) numbered: bool,
+    /// label columns of other files, with these
+    pub(super) added: Vec<(String, PathBuf)>,
 }
 
 impl LabelledTable {
@@ -55,6 +57,7 @@ impl LabelledTable {
             columns,
             unread: Vec::new(),
             numbered: false,
+            added: Vec::new(),
         }
     }
 
@@ -86,6 +89,7 @@ impl LabelledTable {
             columns: table.labels().map(|(name, c)| (name.to_string(), c.to_vec())).collect(),
             unread: Vec::new(),
             numbered: false,
+            added: Vec::new(),
         })
     }
 
@@ -142,6 +146,10 @@ impl LabelledTable {
         };
         let there = |name: &&String| self.columns.iter().any(|(column, _)| column == *name);
         let hidden = columns.iter().map(|(name, _)| name).filter(there).cloned().collect();
+        if let LabelSource::File { path, .. } = source {
+            let added = columns.iter().map(|(name, _)| (name.clone(), path.clone()));
+            self.added.splice(0..0, added);
+        }
         self.columns.splice(0..0, columns);
         Ok(hidden)
     }
@@ -221,6 +229,12 @@ impl LabelledTable {
         Err(DatasetError::content(&self.path, format!("no label column {name:?}: {choices}")))
     }
 
+    /// The file that a label column comes from.
+    fn file_of(&self, name: &str) -> &Path {
+        let added = self.added.iter().find(|(column, _)| column == name);
+        added.map_or(&self.path, |(_, path)| path)
+    }
+
     /// The classes of a label column. Empty and decimal values are no labels.
     ///
     /// # Errors
@@ -229,23 +243,24 @@ impl LabelledTable {
         let values = self.column(name)?;
         for (id, value) in self.ids.iter().zip(&values) {
             let why = if value.is_empty() {
-                "is empty"
+                "is empty: give it a value, or leave the recording out"
             } else if value.parse::<f64>().is_ok() && value.parse::<i128>().is_err() {
                 "is a decimal number; classes are whole numbers or names (score measures estimates of numbers)"
             } else {
                 continue;
             };
             let reason = format!("{id}: label {name} = {value:?} {why}");
-            return Err(DatasetError::content(&self.path, reason));
+            return Err(DatasetError::content(self.file_of(name), reason));
         }
         let (labels, indices) = Labels::of(&values);
         if labels.len() < 2 {
             let only = labels.names().join(", ");
             let reason = format!("all rows have {name} = {only}; at least 2 classes are needed");
-            return Err(DatasetError::content(&self.path, reason));
+            return Err(DatasetError::content(self.file_of(name), reason));
         }
-        require_few(labels.len())
-            .map_err(|e| DatasetError::content(&self.path, format!("label column {name}: {e}")))?;
+        require_few(labels.len()).map_err(|e| {
+            DatasetError::content(self.file_of(name), format!("label column {name}: {e}"))
+        })?;
         let classes = Classes::new(indices, labels.len())?;
         Ok((labels, classes))
     }

@@ -37,7 +37,7 @@ pub fn run(args: &Args, model: &Model) -> Result<(End, Option<Records>), Failure
         draft::folder(&args.out).to_path_buf()
     };
     let stop = crate::interrupt::flag();
-    let mut predictions = HashMap::new();
+    let (mut predictions, mut damage) = (HashMap::new(), None);
     if !accepted.is_empty() {
         let extracted = run::table(&accepted, &config, (args.jobs.count(), &folder), &meter, stop);
         let table = match extracted {
@@ -49,8 +49,12 @@ pub fn run(args: &Args, model: &Model) -> Result<(End, Option<Records>), Failure
         let place = Path::new("the recordings");
         let table = LabelledTable::of_extraction(place, &table, config.to_value(), config.hash())?;
         predictions = self::predictions(model, &table, &formats, (args, &meter))?;
+        damage = repaired(table.outcomes.iter().map(|outcome| &outcome.repairs));
     }
     meter.rest();
+    if let Some(repaired) = damage {
+        warn(&format!("recordings: {repaired}"));
+    }
     let header = model.header();
     let mut records = args.records(&header.labels, &header.target, Unit::Recording, &columns)?;
     for input in &found {

@@ -162,12 +162,14 @@ impl Predictor<'_> {
             if self.stopped() {
                 return Ok(());
             }
-            let (span, features) = match window {
+            let (span, status, features) = match window {
                 Ok(window) => {
                     self.check_length(&input.id, window.end - window.start);
-                    (Some((window.start, window.end)), window.features)
+                    let whole = window.loss.is_none();
+                    let status = if whole { Status::Ok } else { Status::Truncated };
+                    (Some((window.start, window.end)), status, window.features)
                 }
-                Err(error) => (None, Err(error)),
+                Err(error) => (None, error.status, Err(error)),
             };
             match (features.and_then(|f| self.row(f)), self.vote) {
                 (Err(error), Some(_)) => {
@@ -185,18 +187,16 @@ impl Predictor<'_> {
                         votes.add(class, proba.as_deref())?;
                         continue;
                     }
-                    let record = record(span, 1, Status::Ok, Some((class, proba)));
+                    let record = record(span, 1, status, Some((class, proba)));
                     if !each(Line { record, reason: None })? {
                         return Ok(());
                     }
                 }
             }
         }
-        if self.vote.is_none() && !self.stopped() && windows.is_truncated() {
-            warn(&format!(
-                "{}: truncated: it ends before its header says; windows beyond its end are missing",
-                input.id
-            ));
+        let loss = windows.loss().filter(|_| !self.stopped());
+        if let Some(loss) = &loss {
+            warn(&format!("{}: truncated: {loss}", input.id));
         }
         let Some(rule) = self.vote.filter(|_| !self.stopped()) else { return Ok(()) };
         let found = match (rule.decide(&votes)?, trouble) {
@@ -208,8 +208,7 @@ impl Predictor<'_> {
                 Line { record, reason: Some(reason) }
             }
             (decision, None) => {
-                let truncated = windows.is_truncated();
-                let status = if truncated { Status::Truncated } else { Status::Ok };
+                let status = if loss.is_some() { Status::Truncated } else { Status::Ok };
                 Line { record: record(None, votes.windows(), status, decision), reason: None }
             }
         };

@@ -306,7 +306,7 @@ fn a_cut_recording_is_said() {
     let table = String::from_utf8(output.stdout).unwrap();
     assert_eq!(table.lines().count(), 3, "{table}");
     let message = String::from_utf8_lossy(&output.stderr);
-    assert!(message.contains("cut: truncated: it ends before its header says"), "{message}");
+    assert!(message.contains("cut: truncated: the file ends after "), "{message}");
 }
 
 #[test]
