@@ -1,10 +1,11 @@
-//! Recordings of every format: blocks of any length, a pipe, and a place reached by seeking give the
-//! same samples.
+//! Recordings of every format: blocks of any length, a pipe, a place reached by seeking, and a stretch read
+//! after another give the same samples.
 #![no_main]
 
 use std::io::Cursor;
+use std::ops::Range;
 
-use corsmal_audio::{BlockSource, SampleEncoding, from_reader, from_seekable};
+use corsmal_audio::{BlockSource, Replay, SampleEncoding, from_reader, from_seekable};
 
 /// Frames that are compared.
 const MOST: usize = 1 << 16;
@@ -25,6 +26,27 @@ fn drain(source: &mut dyn BlockSource, block: usize) -> (Vec<u32>, bool) {
     (bits, true)
 }
 
+/// The samples of a stretch, as far as they can be read.
+fn stretch(source: &mut dyn BlockSource, frames: &Range<u64>) -> Vec<u32> {
+    let channels = usize::from(source.spec().channels);
+    let mut bits = Vec::new();
+    if source.go_to(frames.start).is_err() {
+        return bits;
+    }
+    let mut left = (frames.end - frames.start) as usize;
+    let mut buffer = vec![0.0; 100 * channels];
+    while left > 0 {
+        match source.read(&mut buffer[..left.min(100) * channels]) {
+            Ok(0) | Err(_) => break,
+            Ok(read) => {
+                bits.extend(buffer[..read * channels].iter().map(|x| x.to_bits()));
+                left -= read;
+            }
+        }
+    }
+    bits
+}
+
 libfuzzer_sys::fuzz_target!(init: corsmal_fuzz::ours_only(), |bytes: &[u8]| {
     let file = Cursor::new(bytes.to_vec());
     let Ok(mut source) = from_seekable(file.clone()) else { return };
@@ -40,12 +62,27 @@ libfuzzer_sys::fuzz_target!(init: corsmal_fuzz::ours_only(), |bytes: &[u8]| {
         assert!(!compressed || piped == (whole.clone(), sound), "a pipe");
     }
     let frames = whole.len() / channels;
-    let mut there = from_seekable(file).expect("it opened before");
-    if sound && frames < MOST && there.seekable() {
+    if !sound || frames == MOST {
+        return;
+    }
+    let mut there = from_seekable(file.clone()).expect("it opened before");
+    if there.seekable() {
         let at = frames / 3;
         if there.seek(at as u64).is_ok() {
             let (rest, sound) = drain(there.as_mut(), 100);
             assert!(!sound || rest == whole[at * channels..], "a seek to frame {at} of {frames}");
+        }
+        return;
+    }
+    let frames = frames as u64;
+    let mut replay = Replay::new(there);
+    stretch(&mut replay, &(0..frames / 2));
+    for next in [frames / 4..frames / 2 + 1, frames / 2..frames, frames / 2..frames + 9] {
+        if replay.serves(&next) {
+            let mut alone = from_seekable(file.clone()).expect("it opened before");
+            let (found, expected) = (stretch(&mut replay, &next), stretch(alone.as_mut(), &next));
+            assert!(found == expected, "frames {next:?} of {frames} after others");
+            assert_eq!(replay.health(), alone.health(), "frames {next:?} of {frames}");
         }
     }
 });
