@@ -60,7 +60,9 @@ pub fn run(
     let limits = Limits { jobs, max_errors, compression: ending.compression() };
     let (folder, told) = (ending.folder(), (progress, stop));
     let collector = Collector::new(inputs, config, limits, &survey, folder, told, output);
-    ending.publish(collector.work()?, stop)
+    let report = ending.publish(collector.work()?, stop)?;
+    report.mixed().iter().for_each(|warning| progress.warning(warning));
+    Ok(report)
 }
 
 /// Extracts the statistics of `inputs` into a table in memory. `stop` ends the run early. Long

@@ -1,5 +1,6 @@
 //! How to run, and what a run tells.
 
+use std::collections::{BTreeSet, HashMap};
 use std::path::PathBuf;
 
 use corsmal_files::npz::Compression;
@@ -47,6 +48,27 @@ impl RunReport {
     /// Inputs without features.
     pub fn failed(&self) -> usize {
         self.outcomes.iter().filter(|o| !o.status.has_features()).count()
+    }
+
+    /// That stretches of one recording are of several contents, in words: it was replaced during the run.
+    pub(super) fn mixed(&self) -> Option<String> {
+        let mut seen: HashMap<&str, &str> = HashMap::new();
+        let mut mixed = BTreeSet::new();
+        for outcome in &self.outcomes {
+            let Outcome { path, identity, status, start_frame, .. } = outcome;
+            let is_read = status.has_features() && start_frame.is_some() && !identity.is_empty();
+            if is_read && *seen.entry(path).or_insert(identity) != identity {
+                mixed.insert(path.as_str());
+            }
+        }
+        let first = mixed.first()?;
+        let others = match mixed.len() - 1 {
+            0 => String::new(),
+            others => format!(" (and {others} more)"),
+        };
+        Some(format!(
+            "{first}{others} was replaced during the run: its rows are of several contents; extract it again"
+        ))
     }
 }
 

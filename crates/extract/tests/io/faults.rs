@@ -159,6 +159,44 @@ fn hostile_headers_take_neither_memory_nor_time() {
     }
 }
 
+/// Replaces a recording once its first stretch is done, and keeps what it is warned of.
+struct Replacing<'a>(&'a Path, Mutex<Vec<String>>);
+
+impl Progress for Replacing<'_> {
+    fn start(&self, _: usize, _: usize) {}
+    fn done(&self, outcome: &Outcome) {
+        if outcome.id == "0" {
+            let other = self.0.with_extension("other");
+            wav(&other, 8000, 9000);
+            std::fs::rename(other, self.0).unwrap();
+        }
+    }
+    fn warning(&self, message: &str) {
+        self.1.lock().unwrap().push(message.into());
+    }
+}
+
+#[test]
+fn stretches_of_several_contents_are_said() {
+    let folder = folder();
+    let path = folder.path().join("audio/a.wav");
+    wav(&path, 8000, 8000);
+    let stretch = |i: u32| Input {
+        id: i.to_string(),
+        source: inputs::InputSource::File(path.clone()),
+        start: Some(f64::from(i) * 0.4),
+        end: Some(f64::from(i) * 0.4 + 0.4),
+        labels: Vec::new(),
+    };
+    let found = [0, 1].map(stretch);
+    let progress = Replacing(&path, Mutex::default());
+    let report = run_on(&found, folder.path(), "esc26", &progress, |o| o.jobs = 1).unwrap();
+    assert_eq!(statuses(&report), [Status::Ok; 2]);
+    let warned = progress.1.into_inner().unwrap();
+    let said = |line: &String| line.contains("a.wav was replaced during the run");
+    assert_eq!(warned.iter().filter(|line| said(line)).count(), 1, "{warned:?}");
+}
+
 /// Does something to a recording once it is open: between its header and its samples there is a warning
 /// of mel bands without bins.
 struct Meanwhile<'a>(Mutex<Option<Box<dyn FnOnce() + Send + 'a>>>);
