@@ -15,6 +15,8 @@ pub struct Replay {
     position: u64,
     /// Whether the source was asked for more than it has.
     ended: bool,
+    /// What was met behind the frames that were given last.
+    failed: Option<AudioError>,
 }
 
 impl Replay {
@@ -23,7 +25,7 @@ impl Replay {
 
     /// Reads `source`, of which nothing was read.
     pub fn new(source: Box<dyn BlockSource>) -> Self {
-        Self { source, kept: Vec::new(), position: 0, ended: false }
+        Self { source, kept: Vec::new(), position: 0, ended: false, failed: None }
     }
 
     /// The first frame that was never read.
@@ -43,9 +45,15 @@ impl Replay {
         self.reached() - (self.kept.len() / self.channels()) as u64
     }
 
-    /// Samples kept.
+    /// Room that is taken by what is kept, in samples.
     pub fn kept(&self) -> usize {
-        self.kept.len()
+        self.kept.capacity()
+    }
+
+    /// Keeps nothing of what was read: only stretches behind it are served.
+    pub fn forget(&mut self) {
+        self.kept = Vec::new();
+        self.position = self.reached();
     }
 
     fn channels(&self) -> usize {
@@ -70,19 +78,31 @@ impl BlockSource for Replay {
     }
 
     fn read(&mut self, out: &mut [f32]) -> Result<usize, AudioError> {
+        if let Some(error) = self.failed.take() {
+            return Err(error);
+        }
         let channels = self.channels();
+        let whole = out.len() / channels * channels;
+        let out = &mut out[..whole];
         let again = (self.reached() - self.position) as usize * channels;
-        let frames = if again > 0 {
-            let samples = again.min(out.len() / channels * channels);
-            let begin = self.kept.len() - again;
-            out[..samples].copy_from_slice(&self.kept[begin..begin + samples]);
-            samples / channels
-        } else {
-            let frames = self.source.read(out)?;
-            self.ended |= frames == 0 && out.len() >= channels;
-            self.keep(&out[..frames * channels]);
-            frames
+        let (old, new) = out.split_at_mut(again.min(out.len()));
+        let begin = self.kept.len() - again;
+        old.copy_from_slice(&self.kept[begin..begin + old.len()]);
+        // Blocks are as long as those of a reader that begins.
+        let read = if new.is_empty() { Ok(0) } else { self.source.read(new) };
+        let frames = match read {
+            Ok(frames) => {
+                self.ended |= frames < new.len() / channels;
+                self.keep(&new[..frames * channels]);
+                frames
+            }
+            Err(error) if old.is_empty() => return Err(error),
+            Err(error) => {
+                self.failed = Some(error);
+                0
+            }
         };
+        let frames = old.len() / channels + frames;
         self.position += frames as u64;
         Ok(frames)
     }
@@ -104,15 +124,20 @@ impl BlockSource for Replay {
         self.position = frame.min(self.reached());
         self.kept.drain(..(self.position - oldest) as usize * self.channels());
         if frame > self.position {
-            self.source.go_to(frame)?;
+            let gone = self.source.go_to(frame);
             self.position = self.reached();
             self.ended |= self.position < frame;
+            gone?;
         }
         Ok(())
     }
 
     fn most_frames(&self) -> Option<u64> {
         self.source.most_frames()
+    }
+
+    fn byte_of(&self, frame: u64) -> Option<u64> {
+        self.source.byte_of(frame)
     }
 
     fn health(&self) -> &ReadReport {
@@ -188,6 +213,22 @@ mod tests {
         assert!(matches!(replay.go_to(4999), Err(AudioError::NotSeekable)));
     }
 
+    /// How many samples of a block are not finite is told, so blocks count.
+    #[test]
+    fn blocks_are_full_across_the_border_of_what_is_kept() {
+        let mut replay = replay();
+        let mut block = vec![0.0; 2 * 64];
+        assert_eq!(replay.read(&mut block).unwrap(), 64);
+        replay.go_to(50).unwrap();
+        assert_eq!(replay.read(&mut block).unwrap(), 64);
+        assert_eq!((block[0], block[126]), (50.0, 113.0));
+        assert_eq!((replay.reached(), replay.oldest()), (114, 50));
+        replay.forget();
+        assert_eq!((replay.kept(), replay.oldest()), (0, 114));
+        replay.go_to(120).unwrap();
+        assert_eq!(read(&mut replay, 120, 9, 4), 9);
+    }
+
     #[test]
     fn the_end_comes_again() {
         let mut replay = replay();
@@ -206,7 +247,7 @@ mod tests {
     fn what_is_kept_is_bounded() {
         let mut replay = replay();
         assert_eq!(read(&mut replay, 0, LENGTH, 1 << 15), LENGTH);
-        assert!(replay.kept() <= Replay::MOST && replay.kept() >= Replay::MOST / 4);
+        assert!(replay.kept.len() <= Replay::MOST && replay.kept.len() >= Replay::MOST / 4);
         let oldest = replay.oldest();
         assert!(replay.go_to(oldest - 1).is_err());
         replay.go_to(oldest).unwrap();
@@ -215,7 +256,7 @@ mod tests {
         let mut replay = self::replay();
         let mut all = vec![0.0; 2 * LENGTH as usize];
         assert_eq!(replay.read(&mut all).unwrap() as u64, LENGTH);
-        assert_eq!(replay.kept(), Replay::MOST);
+        assert_eq!(replay.kept.len(), Replay::MOST);
         assert_eq!(replay.kept[Replay::MOST - 1], -((LENGTH - 1) as f32));
     }
 }

@@ -169,9 +169,8 @@ pub struct ReadReport {
     pub(crate) lost: Vec<Range<u64>>,
 }
 
-/// Most ranges of lost frames that are kept: more of them can be known ahead of what was read in one packet
-/// only.
-const MOST_LOST: usize = 16;
+/// Most ranges of lost frames that are kept.
+const MOST_LOST: usize = 1024;
 
 impl ReadReport {
     /// The deviation by which samples are missing, or may be.
@@ -198,10 +197,21 @@ impl ReadReport {
         }
     }
 
-    /// As [`loss`](Self::loss), for such a stretch.
-    pub fn loss_in(&self, stretch: &Range<u64>) -> Option<&Repair> {
+    /// As [`loss`](Self::loss), for such a stretch, and with the frames that it lacks.
+    pub fn loss_in(&self, stretch: &Range<u64>) -> Option<Repair> {
         let mut losses = self.repairs.iter().filter(|repair| self.is_loss(repair));
-        losses.find(|repair| self.concerns(repair, stretch))
+        let loss = *losses.find(|repair| self.concerns(repair, stretch))?;
+        let Repair::LostFrames { .. } = loss else { return Some(loss) };
+        let inside = self.lost.iter().map(|lost| {
+            let first = lost.start.max(stretch.start);
+            first..lost.end.min(stretch.end).max(first)
+        });
+        let (mut first, mut count) = (None, 0);
+        for lost in inside.filter(|lost| !lost.is_empty()) {
+            first = first.or(Some(lost.start));
+            count += lost.end - lost.start;
+        }
+        Some(Repair::LostFrames { first: first?, count })
     }
 
     /// Notes a deviation; of its kind the first place and the sum of frames or bytes are kept.
@@ -244,5 +254,28 @@ impl ReadReport {
     pub(crate) fn note_truncated(&mut self, declared: Option<u64>, actual: u64) {
         self.truncated = true;
         self.note(Repair::Truncated { declared, actual });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stretch_has_the_losses_that_lie_in_it() {
+        let mut report = ReadReport::default();
+        for (first, count) in [(100, 10), (110, 5), (300, 50)] {
+            report.note(Repair::LostFrames { first, count });
+        }
+        report.note_truncated(Some(1000), 900);
+        let of = |stretch: Range<u64>| report.loss_in(&stretch);
+        let lost = |first, count| Some(Repair::LostFrames { first, count });
+        assert_eq!(of(0..100), None);
+        assert_eq!(of(0..101), lost(100, 1));
+        assert_eq!(of(105..320), lost(105, 10 + 20));
+        assert_eq!((of(115..300), of(350..900)), (None, None));
+        assert_eq!(of(350..901), Some(Repair::Truncated { declared: Some(1000), actual: 900 }));
+        assert_eq!(of(0..u64::MAX), lost(100, 65));
+        assert_eq!(report.loss(), lost(100, 65).as_ref());
     }
 }

@@ -43,25 +43,34 @@ struct Loaded {
     target: String,
 }
 
-/// What has no items: for each reason the first, and how many there are.
+/// What has no items, by the kind of the reason: the first reason, and who has one.
 #[derive(Default)]
-struct LeftOut(BTreeMap<String, (String, usize)>);
+struct LeftOut(BTreeMap<String, (String, Vec<String>)>);
 
 impl LeftOut {
     fn add(&mut self, id: &str, reason: &str) {
-        self.0.entry(reason.into()).or_insert_with(|| (id.into(), 0)).1 += 1;
+        // Behind it are figures of the one recording.
+        let kind = reason.split_once(": ").map_or(reason, |(kind, _)| kind);
+        let known = self.0.entry(kind.into()).or_insert_with(|| (reason.into(), Vec::new()));
+        known.1.push(id.into());
     }
 
     fn tell(self) {
-        for (reason, (id, count)) in self.0 {
-            let others = match count - 1 {
-                0 => String::new(),
-                others => format!(", and {} for the same reason", plural(others, "other")),
-            };
-            eprintln!("warning: {id}: {reason}: left out of training{others}");
+        for (kind, (reason, ids)) in self.0 {
+            let [first, others @ ..] = &ids[..] else { continue };
+            eprintln!("warning: {first}: {reason}: left out of training");
+            if !others.is_empty() {
+                let named: Vec<&str> = others.iter().take(NAMED).map(String::as_str).collect();
+                let more = if others.len() > NAMED { ", …" } else { "" };
+                let count = plural(others.len(), "other");
+                eprintln!("warning: {count} left out, too ({kind}): {}{more}", named.join(", "));
+            }
         }
     }
 }
+
+/// Most that are named for one kind of reason.
+const NAMED: usize = 10;
 
 impl Request<'_> {
     fn load(&self, name: &str) -> Result<Loaded, Failure> {

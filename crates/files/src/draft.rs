@@ -142,7 +142,7 @@ pub fn folder(path: &Path) -> &Path {
 /// The path and the reason.
 pub fn check_place(path: &Path) -> io::Result<()> {
     if path.as_os_str().to_string_lossy().ends_with(std::path::is_separator) {
-        let reason = "ends like the name of a folder: a file is written";
+        let reason = "ends in a separator, but the output is a file";
         return Err(io::Error::new(
             io::ErrorKind::InvalidInput,
             format!("{}: {reason}", path.display()),
@@ -193,7 +193,7 @@ mod tests {
         check_place(&folder.path().join("a.npz")).unwrap();
         let error = check_place(&folder.path().join("a.npz/")).unwrap_err().to_string();
         assert!(
-            error.ends_with("a.npz/: ends like the name of a folder: a file is written"),
+            error.ends_with("a.npz/: ends in a separator, but the output is a file"),
             "{error}"
         );
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);

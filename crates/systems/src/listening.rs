@@ -1,8 +1,8 @@
 //! Classes of recordings by a trained network, from all of a recording or window by window.
 
 use std::ops::Range;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use corsmal_extract::config::{Config, ConfigError};
 use corsmal_extract::engine::{Signals, Windowing, Windows};
@@ -42,7 +42,7 @@ pub struct Answer {
     pub status: Status,
     /// class and probabilities; `None` where the reason says why
     pub decision: Option<Decision>,
-    /// why there is no decision, one from a part of the windows only, or one of damaged samples
+    /// why there is no decision, or one from a part of the windows only
     pub reason: Option<String>,
     /// the length in seconds of the recording, or its first window, that is far from those trained on
     pub unlike: Option<f64>,
@@ -86,6 +86,7 @@ pub struct Listener<'a> {
     lengths: Option<Lengths>,
     jobs: usize,
     pool: rayon::ThreadPool,
+    losses: Mutex<Vec<(String, String)>>,
 }
 
 impl<'a> Listener<'a> {
@@ -123,7 +124,8 @@ impl<'a> Listener<'a> {
             None => FormatRule::default(),
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build()?;
-        Ok(Self { model, front_end, config: Arc::new(config), formats, lengths, jobs, pool })
+        let (config, losses) = (Arc::new(config), Mutex::default());
+        Ok(Self { model, front_end, config, formats, lengths, jobs, pool, losses })
     }
 
     /// Whether a recording of this length is far from those trained on: for a network that takes windows, so much
@@ -140,6 +142,11 @@ impl<'a> Listener<'a> {
     /// That recordings are far from those trained on, given by name and [`Answer::unlike`], in words.
     pub fn length_warning(&self, given: &[(String, f64)]) -> Option<String> {
         self.lengths?.warning(given.iter().map(|(name, seconds)| (name.as_str(), *seconds)))
+    }
+
+    /// The ids of recordings that were heard in windows and lack samples, and why.
+    pub fn losses(&self) -> Vec<(String, String)> {
+        self.losses.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Whether the network takes windows of a recording one by one.
@@ -249,7 +256,7 @@ impl<'a> Listener<'a> {
                 },
             };
             let mut votes = WindowVotes::new(self.model.header.labels.len());
-            let (mut trouble, mut failures, mut is_told) = (None, 0, false);
+            let (mut trouble, mut failures) = (None, 0);
             // Of a recording, the first window that is far from the recordings trained on.
             let mut unlike = None;
             for window in &mut windows {
@@ -283,13 +290,7 @@ impl<'a> Listener<'a> {
                     (Ok(heard), None) => {
                         let mean = self.votes(&heard)?.mean();
                         let decision = mean.map(decided);
-                        // Said once of a recording.
-                        let reason = loss.filter(|_| !std::mem::replace(&mut is_told, true));
-                        Answer {
-                            unlike: first,
-                            reason,
-                            ..Answer::of(span, heard.len(), status, decision)
-                        }
+                        Answer { unlike: first, ..Answer::of(span, heard.len(), status, decision) }
                     }
                 };
                 if !each(input, answer)? {
@@ -299,6 +300,11 @@ impl<'a> Listener<'a> {
             if stopped() {
                 return Ok(false);
             }
+            let loss = windows.loss();
+            let is_truncated = loss.is_some();
+            let mut losses = self.losses.lock().unwrap_or_else(PoisonError::into_inner);
+            losses.extend(loss.map(|loss| (input.id.clone(), loss)));
+            drop(losses);
             let Some(rule) = vote else { continue };
             let decision = rule.decide(&votes).map_err(SystemError::from)?;
             let answer = match (decision, trouble) {
@@ -306,7 +312,7 @@ impl<'a> Listener<'a> {
                 (decision, trouble) => {
                     let status = match &trouble {
                         Some(trouble) => trouble.status,
-                        None if windows.loss().is_some() => Status::Truncated,
+                        None if is_truncated => Status::Truncated,
                         None => Status::Ok,
                     };
                     let reason = trouble.map(|trouble| {

@@ -27,9 +27,7 @@ pub(super) fn detect(pair: &Pair) -> Option<Cause> {
         (false, true) => ("b", b.0, "a", a),
         _ => return None,
     };
-    let cause = format!(
-        "{side} has the same value everywhere: of silence, or of an array that was never filled"
-    );
+    let cause = format!("{side} has one value everywhere: silence, or an array never filled");
     let all = pair.a.len();
     let evidence =
         format!("all {all} values of {side} are {value}, those of {other} {least:.4} to {most:.4}");

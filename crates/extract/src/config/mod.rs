@@ -61,7 +61,7 @@ fn python_word(toml: &str, at: usize) -> Option<&'static str> {
     let is =
         |word: &str| rest.strip_prefix(word).is_some_and(|r| !r.starts_with(char::is_alphanumeric));
     [
-        ("None", "leave the key out for Python's None"),
+        ("None", "TOML has no None: leave the key out"),
         ("True", "TOML writes true"),
         ("False", "TOML writes false"),
     ]

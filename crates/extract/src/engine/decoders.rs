@@ -19,9 +19,9 @@ pub enum Reader {
 }
 
 impl Reader {
-    /// A source of which nothing was read; `is_stretch` says that others of its recording may follow.
-    pub fn new(source: Box<dyn BlockSource>, is_stretch: bool) -> Self {
-        if is_stretch && !source.seekable() {
+    /// A source of which nothing was read, and whether it may be wanted for other stretches.
+    pub fn new(source: Box<dyn BlockSource>, again: bool) -> Self {
+        if again && !source.seekable() {
             Self::Again(Replay::new(source))
         } else {
             Self::Once(source)
@@ -67,10 +67,89 @@ impl Decoders {
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
         waiting.push((seen.clone(), replay));
         // Those that nobody has wanted for long make room: most are of recordings that are done.
-        let kept =
-            |waiting: &[(Seen, Replay)]| waiting.iter().map(|(_, r)| r.kept()).sum::<usize>();
-        while waiting.len() > MOST + threads || kept(&waiting) > threads * Replay::MOST {
-            waiting.remove(0);
+        let many = waiting.len().saturating_sub(MOST + threads);
+        let gone: Vec<_> = waiting.drain(..many).collect();
+        let mut kept: usize = waiting.iter().map(|(_, replay)| replay.kept()).sum();
+        for (_, replay) in waiting.iter_mut() {
+            if kept <= threads * Replay::MOST {
+                break;
+            }
+            kept -= replay.kept();
+            replay.forget();
         }
+        drop(waiting);
+        drop(gone);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::time::{Duration, SystemTime};
+
+    use super::*;
+    use crate::inputs::{Input, InputSource};
+
+    const OGG: &[u8] = include_bytes!("../../../audio/tests/audio/samples/sines-2ch.ogg");
+
+    fn recording(path: &Path, age: u64) -> Watch {
+        std::fs::write(path, OGG).unwrap();
+        let file = std::fs::File::options().append(true).open(path).unwrap();
+        file.set_modified(SystemTime::now() - Duration::from_secs(age)).unwrap();
+        let source = InputSource::File(path.into());
+        let id = String::new();
+        Watch::begin(&Input { id, source, start: None, end: None, labels: Vec::new() })
+    }
+
+    fn read(path: &Path, frames: usize) -> Reader {
+        let mut reader = Reader::new(corsmal_audio::open(path).unwrap(), true);
+        let channels = usize::from(reader.source().spec().channels);
+        assert_eq!(reader.source().read(&mut vec![0.0; frames * channels]).unwrap(), frames);
+        reader
+    }
+
+    #[test]
+    fn the_one_that_has_come_furthest_goes_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.ogg");
+        let watch = recording(&path, 3600);
+        let decoders = Decoders::default();
+        for frames in [100, 300, 200] {
+            decoders.put(&watch, read(&path, frames));
+        }
+        let take = |watch: &Watch, stretch: Range<u64>| {
+            decoders.take(watch, |_| stretch.clone()).map(|replay| replay.reached())
+        };
+        assert_eq!(take(&watch, 50..250), Some(200));
+        assert_eq!(take(&watch, 50..250), Some(100));
+        assert_eq!(take(&watch, 50..250), None, "the one of 300 frames is beyond the end");
+        let changed = recording(&path, 7200);
+        assert_eq!(take(&changed, 50..400), None, "another content");
+        assert_eq!(take(&watch, 50..400), Some(300));
+        let fresh = recording(&path, 0);
+        decoders.put(&fresh, read(&path, 100));
+        assert_eq!(take(&fresh, 50..400), None, "a change could go unseen");
+    }
+
+    #[test]
+    fn recordings_take_turns_and_few_wait() {
+        let folder = tempfile::tempdir().unwrap();
+        let decoders = Decoders::default();
+        let paths: Vec<_> = (0..MOST + 200).map(|i| folder.path().join(format!("{i}"))).collect();
+        let watches: Vec<Watch> = paths.iter().map(|path| recording(path, 3600)).collect();
+        for turn in 0..3u64 {
+            for (path, watch) in paths.iter().zip(&watches).take(MOST) {
+                let stretch = turn * 100..turn * 100 + 100;
+                let found = decoders.take(watch, |_| stretch.clone());
+                assert_eq!(found.is_some(), turn > 0);
+                let mut reader = found.map_or_else(|| read(path, 1), Reader::Again);
+                reader.source().go_to(stretch.start).unwrap();
+                reader.source().read(&mut [0.0; 200]).unwrap();
+                decoders.put(watch, reader);
+            }
+        }
+        paths.iter().zip(&watches).for_each(|(path, watch)| decoders.put(watch, read(path, 9)));
+        let waiting = decoders.waiting.into_inner().unwrap();
+        assert_eq!(waiting.len(), MOST + rayon::current_num_threads());
     }
 }

@@ -183,9 +183,12 @@ pub fn check_stretch(
 ) -> Result<(), Failed> {
     let Some(rate) = outcome.sample_rate else { return Ok(()) };
     let crop = crop(signal, (input.start, input.end), rate);
-    if crop.is_empty() && crop.start > 0 {
-        let reason = match signal.start > 0.0 {
-            true => format!("signal.start = {} s leaves nothing of the stretch", signal.start),
+    if crop.is_empty() {
+        let start = frame_at(input.start.unwrap_or(0.0), rate);
+        let has_frames = input.end.is_none_or(|end| frame_at(end, rate) > start);
+        let of = if (input.start, input.end) == (None, None) { "recording" } else { "stretch" };
+        let reason = match has_frames {
+            true => format!("signal.start and signal.end leave nothing of the {of}"),
             false => format!("the stretch has no frame at {rate} Hz"),
         };
         return Err(Failed::new(Status::Empty, reason));
@@ -217,7 +220,8 @@ pub fn describe(outcome: &mut Outcome, source: &dyn BlockSource, stretch: &Range
             outcome.repairs.push(repair.name().to_string());
         }
     }
-    if let Some(loss) = report.loss_in(stretch).filter(|_| outcome.status == Status::Ok) {
+    let known = matches!(outcome.status, Status::Ok | Status::Truncated);
+    if let Some(loss) = report.loss_in(stretch).filter(|_| known) {
         outcome.status = Status::Truncated;
         outcome.reason = loss.to_string();
     }

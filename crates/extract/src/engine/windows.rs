@@ -38,7 +38,7 @@ pub struct Window {
     pub start: f64,
     /// Where it ends.
     pub end: f64,
-    /// By what samples of it are missing, in words.
+    /// Why samples of it are missing.
     pub loss: Option<String>,
     /// What a recording of these samples alone has.
     pub features: Result<Features, SignalError>,
@@ -99,10 +99,10 @@ impl<'a> Windows<'a> {
         })
     }
 
-    /// By what samples of the recording are missing, in words; known once all windows are there.
+    /// Why samples of the recording are missing; known once all windows are there.
     pub fn loss(&self) -> Option<String> {
         let stretch = self.base..self.limit;
-        self.source.health().loss_in(&stretch).map(ToString::to_string)
+        self.source.health().loss_in(&stretch).map(|loss| loss.to_string())
     }
 
     /// Sample rate in Hz and channels of the recording.
@@ -163,7 +163,7 @@ impl<'a> Windows<'a> {
             signal.finish()
         });
         let seconds = |frame: u64| frame as f64 / f64::from(sample_rate);
-        let loss = self.source.health().loss_in(&(self.first..wanted)).map(ToString::to_string);
+        let loss = self.source.health().loss_in(&(self.first..wanted)).map(|loss| loss.to_string());
         let (start, end) = (seconds(self.first), seconds(self.first + frames as u64));
         Ok(Some(Window { start, end, loss, features }))
     }

@@ -162,7 +162,7 @@ fn check_values(label: &str, values: &BTreeSet<String>) -> Result<(), String> {
         if let Some(other) = folders.insert(folder.to_lowercase(), value) {
             let (a, b) = (quoted(other), quoted(value));
             let case = match other.to_lowercase() == value.to_lowercase() {
-                true => " where a system does not tell capital letters apart",
+                true => " on systems that ignore case",
                 false => "",
             };
             return Err(format!("the values {a} and {b} would share a folder{case}"));
@@ -237,10 +237,7 @@ mod tests {
             let why = refused(&["9007199254740993", "9007199254740992", other]);
             assert!(why.contains("same number"), "{other}: {why}");
         }
-        assert!(
-            refused(&["Rice", "rice"])
-                .ends_with("share a folder where a system does not tell capital letters apart")
-        );
+        assert!(refused(&["Rice", "rice"]).ends_with("share a folder on systems that ignore case"));
     }
 
     #[test]

@@ -53,25 +53,26 @@ pub(super) fn open(
     let stretch = |rate| reading::crop(plans.signal(), times, rate);
     let mut begins = false;
     let mut reader = match decoders.and_then(|decoders| decoders.take(watch, stretch)) {
-        Some(replay) => {
-            // What it has met is told at the end of the stretch, as if it had begun.
-            reading::describe_format(outcome, replay.spec());
-            Reader::Again(replay)
-        }
+        Some(replay) => Reader::Again(replay),
         None => {
             let opened = watch.settle(reading::open(input, watch, Part::Whole, stop));
             if let Some(identity) = watch.identity() {
                 outcome.identity = identity;
             }
             begins = true;
-            Reader::new(opened?, decoders.is_some() && times != (None, None))
+            let is_watched = decoders.is_some() && watch.lasting().is_some();
+            Reader::new(opened?, is_watched && times != (None, None))
         }
     };
     let source = &*reader.source();
-    if begins {
+    let wanted = wanted(input, source, (plans, survey), outcome);
+    // What a decoder has met is told at the end of a stretch, in the order of the recording.
+    if begins && (times == (None, None) || wanted.is_err()) {
         reading::describe(outcome, source, &stretch(source.spec().sample_rate));
+    } else {
+        reading::describe_format(outcome, source.spec());
     }
-    let Wanted { planned, crop } = wanted(input, source, (plans, survey), outcome)?;
+    let Wanted { planned, crop } = wanted?;
     let spans = reading::spans(source, &planned, &crop);
     Ok(Opened { reader, planned, crop, spans })
 }
@@ -89,7 +90,9 @@ pub(super) fn wanted(
     let planned = plans.of(source.spec()).map_err(|e| Failed::new(Status::Unsupported, e))?;
     let signal = &planned.plan.config.signal;
     let crop = reading::crop(signal, (input.start, input.end), source.spec().sample_rate);
-    outcome.start_frame = (input.start.is_some() || input.end.is_some()).then_some(crop.start);
+    let is_stretch = input.start.is_some() || input.end.is_some();
+    // Readers of tables have signed integers.
+    outcome.start_frame = Some(crop.start).filter(|&at| is_stretch && at <= i64::MAX as u64);
     Ok(Wanted { planned, crop })
 }
 

@@ -196,6 +196,8 @@ fn only_stretches_with_a_gap_are_truncated() {
             let frame = |seconds: f64| (seconds * rate).round() as u64;
             let is_hurt = frame(start) < end && first < frame(until);
             assert_eq!(loss.is_some(), is_hurt, "{name}, {start} s: {loss:?}");
+            let count = end.min(frame(until)).saturating_sub(first.max(frame(start)));
+            assert!(loss.is_none_or(|loss| loss.starts_with(&format!("{count} damaged"))));
         }
     }
     assert!(gaps > 3, "{gaps}");
@@ -214,7 +216,7 @@ fn a_start_of_the_signal_behind_a_stretch_is_said() {
         let batch = engine.extract((&[input], &[]), None, 1, &Arc::default()).unwrap();
         (batch.outcomes[0].status.name(), batch.outcomes[0].reason.clone())
     };
-    let reason = "signal.start = 0.3 s leaves nothing of the stretch";
+    let reason = "signal.start and signal.end leave nothing of the stretch";
     assert_eq!(of(&["signal.start=0.3".into()], 0.2), ("empty", reason.into()));
     assert_eq!(of(&[], 0.100001), ("empty", "the stretch has no frame at 44100 Hz".into()));
 }

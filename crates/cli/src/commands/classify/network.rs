@@ -87,6 +87,9 @@ pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Fail
     if let Some(repaired) = repaired(repairs.iter()) {
         warn(&format!("recordings: {repaired}"));
     }
+    for (id, loss) in listener.losses() {
+        warn(&format!("{id}: truncated: {loss}"));
+    }
     listener.length_warning(&unlike).iter().for_each(|warning| warn(warning));
     let end = match (heard, unread) {
         (false, _) => End::Interrupted,

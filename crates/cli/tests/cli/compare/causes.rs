@@ -111,13 +111,8 @@ fn half_precision_is_recognised() {
 #[test]
 fn a_side_without_a_sound() {
     let a = levels();
-    expect(
-        &a,
-        &a.mapv(|_| 0.0),
-        "constant",
-        &["b has the same value", "values of b are 0, those of a"],
-    );
-    expect(&a.mapv(|_| -100.0), &a, "constant", &["a has the same value", "of a are -100"]);
+    expect(&a, &a.mapv(|_| 0.0), "constant", &["b has one value", "values of b are 0, those of a"]);
+    expect(&a.mapv(|_| -100.0), &a, "constant", &["a has one value", "of a are -100"]);
 }
 
 #[test]
