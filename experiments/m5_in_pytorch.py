@@ -3,11 +3,11 @@
     python experiments/m5_in_pytorch.py [--shared ../shared] [--seeds 1337,1,2,3,4]
 
 Needs torch and scikit-learn. Not a protocol of ours: it asks whether the published score repeats,
-and how much it changes from seed to seed. Recipe and random numbers are those of the published run (PyTorch
-1.6): one seed for initial values and shuffles, set anew for each fold. With seed 1337 the first
-epoch has the loss of M5's log (1.4438; filling_type/r21d_rgb/main.ipynb of v-iashin/CORSMAL at
-2cf06cb). Prints the weighted F1 of the best epoch on the held-out containers, which M5 reports,
-and of the last one.
+and how much it changes from seed to seed. Recipe and random numbers are those of the published
+run (PyTorch 1.6): one seed for initial values and shuffles, set anew for each fold. With seed 1337
+the first epoch has the loss of M5's log (1.4438; filling_type/r21d_rgb/main.ipynb of
+v-iashin/CORSMAL at 2cf06cb). Prints the weighted F1 of the best epoch on the held-out containers,
+which M5 reports, and of the last one.
 """
 
 from __future__ import annotations
