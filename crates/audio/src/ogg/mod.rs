@@ -242,10 +242,13 @@ impl OggStream {
         let decoded = self.link.decode(bytes, samples);
         let decoded = decoded.map_err(|refusal| refusal.at(self.page.offset, EXPECTED))?;
         let wanted = length as usize * channels;
+        let skip = self.place.skip.min(kept.into());
         if decoded == Decoded::Damaged {
             samples.clear();
             self.ahead.clear();
-            report.note(Repair::LostFrames { first: self.given, count: kept.into() });
+            // What is skipped is missed by nobody, but what follows may suffer.
+            let count = (u64::from(kept) - skip).max(1);
+            report.note(Repair::LostFrames { first: self.given, count });
         }
         if samples.len() != wanted || !self.ahead.is_empty() {
             self.ahead.append(samples);
@@ -253,7 +256,6 @@ impl OggStream {
         }
         samples.resize(wanted, 0.0);
         samples.truncate(kept as usize * channels);
-        let skip = self.place.skip.min(kept.into());
         self.place.skip -= skip;
         samples.drain(..skip as usize * channels);
         self.given += u64::from(kept) - skip;
