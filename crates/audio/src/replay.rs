@@ -37,7 +37,7 @@ impl Replay {
     /// [`health`](BlockSource::health) will know what reading this far tells, and no more.
     pub fn serves(&self, stretch: &Range<u64>) -> bool {
         let known = if self.ended { self.reached() + 1 } else { self.reached() };
-        self.oldest() <= stretch.start && known <= stretch.end
+        self.failed.is_none() && self.oldest() <= stretch.start && known <= stretch.end
     }
 
     /// The first frame to which it can go back.
@@ -68,7 +68,12 @@ impl Replay {
             let excess = (self.kept.len() + samples.len()).saturating_sub(room / 2);
             self.kept.drain(..excess.div_ceil(channels).min(self.kept.len() / channels) * channels);
         }
-        self.kept.extend_from_slice(&samples[samples.len().saturating_sub(room)..]);
+        let samples = &samples[samples.len().saturating_sub(room)..];
+        let needed = self.kept.len() + samples.len();
+        if needed > self.kept.capacity() {
+            self.kept.reserve_exact((2 * needed).min(room) - self.kept.len());
+        }
+        self.kept.extend_from_slice(samples);
     }
 }
 
@@ -243,11 +248,39 @@ mod tests {
         assert!(!replay.serves(&(LENGTH..LENGTH)) && replay.serves(&(LENGTH..LENGTH + 1)));
     }
 
+    /// Five frames, then a fault.
+    struct Faulty(bool);
+
+    impl Stream for Faulty {
+        fn next(&mut self, samples: &mut Vec<f32>, _: &mut ReadReport) -> Result<Next, AudioError> {
+            if std::mem::replace(&mut self.0, true) {
+                return Err(AudioError::corrupt(7, "a fault", "none"));
+            }
+            samples.extend([0.0; 10]);
+            Ok(Next::Samples)
+        }
+    }
+
+    #[test]
+    fn frames_before_a_fault_are_given_first() {
+        let spec = replay().spec().clone();
+        let source = StreamSource::new(Faulty(false), spec, ReadReport::default());
+        let mut replay = Replay::new(Box::new(source));
+        let mut block = [0.0; 12];
+        assert_eq!(replay.read(&mut block[..10]).unwrap(), 5);
+        replay.go_to(2).unwrap();
+        assert_eq!(replay.read(&mut block).unwrap(), 3);
+        assert!(!replay.serves(&(2..9)), "the fault is not told yet");
+        assert_eq!(replay.read(&mut block).unwrap_err().offset(), Some(7));
+        assert_eq!(replay.read(&mut block).unwrap(), 0);
+    }
+
     #[test]
     fn what_is_kept_is_bounded() {
         let mut replay = replay();
-        assert_eq!(read(&mut replay, 0, LENGTH, 1 << 15), LENGTH);
-        assert!(replay.kept.len() <= Replay::MOST && replay.kept.len() >= Replay::MOST / 4);
+        // A length that does not divide the room.
+        assert_eq!(read(&mut replay, 0, LENGTH, 30_105), LENGTH);
+        assert!(replay.kept() <= Replay::MOST && replay.kept.len() >= Replay::MOST / 4);
         let oldest = replay.oldest();
         assert!(replay.go_to(oldest - 1).is_err());
         replay.go_to(oldest).unwrap();

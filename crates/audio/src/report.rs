@@ -132,6 +132,9 @@ impl fmt::Display for Repair {
             Self::MissingPadding { offset } => {
                 write!(f, "odd-sized chunk without padding at byte {offset}")
             }
+            Self::LostFrames { first, count: 1 } => {
+                write!(f, "1 damaged or missing frame, frame {first}, is silence")
+            }
             Self::LostFrames { first, count } => {
                 write!(f, "{count} damaged or missing frames, from frame {first} on, are silence")
             }
@@ -197,19 +200,29 @@ impl ReadReport {
         }
     }
 
-    /// As [`loss`](Self::loss), for such a stretch, and with the frames that it lacks.
+    /// As [`loss`](Self::loss), for such a stretch, and with the frames that it lacks: of very many gaps
+    /// inside of it, those that were met last.
     pub fn loss_in(&self, stretch: &Range<u64>) -> Option<Repair> {
-        let mut losses = self.repairs.iter().filter(|repair| self.is_loss(repair));
-        let loss = *losses.find(|repair| self.concerns(repair, stretch))?;
-        let Repair::LostFrames { .. } = loss else { return Some(loss) };
-        let inside = self.lost.iter().map(|lost| {
-            let first = lost.start.max(stretch.start);
-            first..lost.end.min(stretch.end).max(first)
-        });
+        let losses = self.repairs.iter().filter(|repair| self.is_loss(repair));
+        losses.filter(|repair| self.concerns(repair, stretch)).find_map(|loss| match *loss {
+            Repair::LostFrames { first, count } => self.lost_in(stretch, (first, count)),
+            loss => Some(loss),
+        })
+    }
+
+    /// The part of all lost frames, which begin at `first` and are `count`, that lies in a stretch.
+    fn lost_in(&self, stretch: &Range<u64>, (first, count): (u64, u64)) -> Option<Repair> {
+        let end = self.lost.last()?.end;
+        if stretch.start <= first && end <= stretch.end {
+            return Some(Repair::LostFrames { first, count });
+        }
         let (mut first, mut count) = (None, 0);
-        for lost in inside.filter(|lost| !lost.is_empty()) {
-            first = first.or(Some(lost.start));
-            count += lost.end - lost.start;
+        for lost in &self.lost {
+            let inside = lost.start.max(stretch.start)..lost.end.min(stretch.end);
+            if !inside.is_empty() {
+                first = first.or(Some(inside.start));
+                count += inside.end - inside.start;
+            }
         }
         Some(Repair::LostFrames { first: first?, count })
     }
@@ -268,14 +281,23 @@ mod tests {
             report.note(Repair::LostFrames { first, count });
         }
         report.note_truncated(Some(1000), 900);
-        let of = |stretch: Range<u64>| report.loss_in(&stretch);
+        let of = |report: &ReadReport, stretch: Range<u64>| report.loss_in(&stretch);
         let lost = |first, count| Some(Repair::LostFrames { first, count });
-        assert_eq!(of(0..100), None);
-        assert_eq!(of(0..101), lost(100, 1));
-        assert_eq!(of(105..320), lost(105, 10 + 20));
-        assert_eq!((of(115..300), of(350..900)), (None, None));
-        assert_eq!(of(350..901), Some(Repair::Truncated { declared: Some(1000), actual: 900 }));
-        assert_eq!(of(0..u64::MAX), lost(100, 65));
+        assert_eq!(of(&report, 0..100), None);
+        assert_eq!(of(&report, 0..101), lost(100, 1));
+        assert_eq!(of(&report, 105..320), lost(105, 10 + 20));
+        assert_eq!((of(&report, 115..300), of(&report, 350..900)), (None, None));
+        assert_eq!(
+            of(&report, 350..901),
+            Some(Repair::Truncated { declared: Some(1000), actual: 900 })
+        );
+        assert_eq!(of(&report, 0..u64::MAX), lost(100, 65));
         assert_eq!(report.loss(), lost(100, 65).as_ref());
+        for gap in 1..=MOST_LOST as u64 + 1 {
+            report.note(Repair::LostFrames { first: 1000 * gap, count: 2 });
+        }
+        let all = 65 + 2 * (MOST_LOST as u64 + 1);
+        assert_eq!(of(&report, 0..u64::MAX), lost(100, all));
+        assert_eq!(of(&report, 1_000_000..1_000_001), lost(1_000_000, 1));
     }
 }

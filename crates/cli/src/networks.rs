@@ -61,9 +61,12 @@ impl LeftOut {
             eprintln!("warning: {first}: {reason}: left out of training");
             if !others.is_empty() {
                 let named: Vec<&str> = others.iter().take(NAMED).map(String::as_str).collect();
-                let more = if others.len() > NAMED { ", …" } else { "" };
-                let count = plural(others.len(), "other");
-                eprintln!("warning: {count} left out, too ({kind}): {}{more}", named.join(", "));
+                let more = match others.len().saturating_sub(NAMED) {
+                    0 => String::new(),
+                    more => format!(" and {more} more"),
+                };
+                let (count, named) = (others.len(), named.join(", "));
+                eprintln!("warning: {count} more left out ({kind}): {named}{more}");
             }
         }
     }

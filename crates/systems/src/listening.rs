@@ -261,7 +261,7 @@ impl<'a> Listener<'a> {
             let mut unlike = None;
             for window in &mut windows {
                 if stopped() {
-                    return Ok(false);
+                    break;
                 }
                 let (span, loss, features) = match window {
                     Ok(window) => (Some((window.start, window.end)), window.loss, window.features),
@@ -297,14 +297,14 @@ impl<'a> Listener<'a> {
                     return Ok(true);
                 }
             }
-            if stopped() {
-                return Ok(false);
-            }
             let loss = windows.loss();
             let is_truncated = loss.is_some();
             let mut losses = self.losses.lock().unwrap_or_else(PoisonError::into_inner);
             losses.extend(loss.map(|loss| (input.id.clone(), loss)));
             drop(losses);
+            if stopped() {
+                return Ok(false);
+            }
             let Some(rule) = vote else { continue };
             let decision = rule.decide(&votes).map_err(SystemError::from)?;
             let answer = match (decision, trouble) {

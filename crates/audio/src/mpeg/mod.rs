@@ -239,7 +239,7 @@ impl MpegStream {
         self.part.frames += 1;
         if decoded.map_err(|refusal| refusal.at(at, EXPECTED))? == Decoded::Damaged {
             self.scratch.resize(header.samples * self.channels(), 0.0);
-            // What is skipped is missed by nobody, but what follows may suffer.
+            // Where all of it is skipped, what follows may suffer.
             let count = header.samples.saturating_sub(self.part.skip).max(1) as u64;
             report.note(Repair::LostFrames { first: self.position(), count });
         } else {

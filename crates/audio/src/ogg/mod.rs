@@ -192,7 +192,7 @@ impl OggStream {
                 let late =
                     u64::try_from(granule).map_or(0, |granule| granule.saturating_sub(count));
                 if is_lost && (1..=longest).contains(&late) {
-                    let first = (self.given + queued(&self.steps)).saturating_sub(place.skip);
+                    let first = self.given + queued(&self.steps).saturating_sub(place.skip);
                     report.note(Repair::LostFrames { first, count: late });
                     self.steps.push_back(Step::Silence(late));
                 } else {
@@ -212,7 +212,7 @@ impl OggStream {
                 let end = position.saturating_add(samples);
                 let difference = granule.abs_diff(end);
                 let longest = LONGEST_GAP * u64::from(self.link.sample_rate);
-                let at = (self.given + queued(&self.steps)).saturating_sub(place.skip);
+                let at = self.given + queued(&self.steps).saturating_sub(place.skip);
                 if granule > end && is_lost && difference <= longest {
                     report.note(Repair::LostFrames { first: at, count: difference });
                     self.steps.push_back(Step::Silence(difference));
@@ -246,9 +246,11 @@ impl OggStream {
         if decoded == Decoded::Damaged {
             samples.clear();
             self.ahead.clear();
-            // What is skipped is missed by nobody, but what follows may suffer.
-            let count = (u64::from(kept) - skip).max(1);
-            report.note(Repair::LostFrames { first: self.given, count });
+            if kept > 0 {
+                // Where all of it is skipped, what follows may suffer.
+                let count = (u64::from(kept) - skip).max(1);
+                report.note(Repair::LostFrames { first: self.given, count });
+            }
         }
         if samples.len() != wanted || !self.ahead.is_empty() {
             self.ahead.append(samples);

@@ -51,6 +51,29 @@ fn a_chain_is_said_to_be_several_recordings() {
     assert!(got.report.loss().is_none());
 }
 
+#[test]
+fn a_gap_begins_where_its_silence_does() {
+    let is_page = |(at, word): (usize, &[u8])| (word == b"OggS").then_some(at);
+    let pages: Vec<usize> = OGG.windows(4).enumerate().filter_map(is_page).collect();
+    // Neither the page with which the recording begins nor that with which it ends.
+    let hurt = [&OGG[..pages[3]], &OGG[pages[4]..]].concat();
+    let once = read_both(OGG);
+    let length = (once.samples.len() / once.channels) as u64;
+    let gap = |bytes: &[u8]| {
+        let got = read_both(bytes);
+        got.report.repairs.iter().find_map(|repair| match repair {
+            Repair::LostFrames { first, count } => Some((*first, *count)),
+            _ => None,
+        })
+    };
+    let (first, count) = gap(&hurt).unwrap();
+    assert!(first + count < length);
+    assert_eq!(gap(&[OGG, &hurt].concat()), Some((length + first, count)));
+    let (channels, got) = (once.channels, read_both(&hurt).samples);
+    let silent = &got[first as usize * channels..(first + count) as usize * channels];
+    assert!(silent.iter().all(|x| *x == 0.0));
+}
+
 /// Packets of more than 1500 bytes, and peaks beyond full scale, which are kept.
 #[test]
 fn loud_noise_in_opus_is_read_whole_and_not_clipped() {

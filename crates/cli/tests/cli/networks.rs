@@ -222,7 +222,7 @@ fn a_network_learns_from_recordings_and_hears_them() {
     assert!(output.status.success(), "{message}");
     let told = |words: &str| message.lines().filter(|line| line.contains(words)).count();
     assert_eq!(told("short: too short: "), 1, "{message}");
-    assert_eq!(told("1 other left out, too (too short): tone/short"), 1, "{message}");
+    assert_eq!(told("1 more left out (too short): tone/short"), 1, "{message}");
     assert!(message.contains("warning: recordings: 1 repaired: 1 data_size_zero"), "{message}");
 
     // A line for each window of a recording, and the reason for the one that has none.

@@ -66,20 +66,30 @@ impl Decoders {
         let threads = rayon::current_num_threads();
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
         waiting.push((seen.clone(), replay));
-        // Those that nobody has wanted for long make room: most are of recordings that are done.
-        let many = waiting.len().saturating_sub(MOST + threads);
-        let gone: Vec<_> = waiting.drain(..many).collect();
-        let mut kept: usize = waiting.iter().map(|(_, replay)| replay.kept()).sum();
-        for (_, replay) in waiting.iter_mut() {
-            if kept <= threads * Replay::MOST {
-                break;
-            }
-            kept -= replay.kept();
-            replay.forget();
-        }
+        let gone = make_room(&mut waiting, MOST + threads, threads * Replay::MOST);
         drop(waiting);
         drop(gone);
     }
+}
+
+/// Those that nobody has wanted for long make room, as most are of recordings that are done: gives the ones
+/// above `most`, and empties others until the rest keeps at most so many samples.
+fn make_room(
+    waiting: &mut Vec<(Seen, Replay)>,
+    most: usize,
+    samples: usize,
+) -> Vec<(Seen, Replay)> {
+    let many = waiting.len().saturating_sub(most);
+    let gone = waiting.drain(..many).collect();
+    let mut kept: usize = waiting.iter().map(|(_, replay)| replay.kept()).sum();
+    for (_, replay) in waiting.iter_mut() {
+        if kept <= samples {
+            break;
+        }
+        kept -= replay.kept();
+        replay.forget();
+    }
+    gone
 }
 
 #[cfg(test)]
@@ -135,10 +145,10 @@ mod tests {
     fn recordings_take_turns_and_few_wait() {
         let folder = tempfile::tempdir().unwrap();
         let decoders = Decoders::default();
-        let paths: Vec<_> = (0..MOST + 200).map(|i| folder.path().join(format!("{i}"))).collect();
+        let paths: Vec<_> = (0..MOST).map(|i| folder.path().join(format!("{i}"))).collect();
         let watches: Vec<Watch> = paths.iter().map(|path| recording(path, 3600)).collect();
         for turn in 0..3u64 {
-            for (path, watch) in paths.iter().zip(&watches).take(MOST) {
+            for (path, watch) in paths.iter().zip(&watches) {
                 let stretch = turn * 100..turn * 100 + 100;
                 let found = decoders.take(watch, |_| stretch.clone());
                 assert_eq!(found.is_some(), turn > 0);
@@ -148,8 +158,15 @@ mod tests {
                 decoders.put(watch, reader);
             }
         }
-        paths.iter().zip(&watches).for_each(|(path, watch)| decoders.put(watch, read(path, 9)));
-        let waiting = decoders.waiting.into_inner().unwrap();
-        assert_eq!(waiting.len(), MOST + rayon::current_num_threads());
+        let mut waiting = decoders.waiting.into_inner().unwrap();
+        assert_eq!(waiting.len(), MOST);
+        let oldest = |waiting: &[(Seen, Replay)]| waiting[0].0.0.to_string();
+        let first = oldest(&waiting);
+        let gone = make_room(&mut waiting, MOST - 2, usize::MAX);
+        assert_eq!((gone.len(), waiting.len(), oldest(&gone)), (2, MOST - 2, first));
+        let one = waiting[0].1.kept();
+        make_room(&mut waiting, MOST, (MOST - 4) * one);
+        let kept = waiting.iter().map(|(_, replay)| replay.kept() > 0);
+        assert_eq!(kept.collect::<Vec<_>>(), (0..MOST - 2).map(|i| i > 1).collect::<Vec<_>>());
     }
 }

@@ -32,6 +32,7 @@ use output::Output;
 pub use begun::Begun;
 pub use check::{Checked, check};
 pub use error::RunError;
+use options::mixed;
 pub use options::{MAX_JOBS, Progress, Quiet, RunOptions, RunReport};
 pub use recordings::{Batch, InOrder, Piece, Recorded, Recordings};
 pub use stored::{StoredOutput, fetch_to};
@@ -61,7 +62,7 @@ pub fn run(
     let (folder, told) = (ending.folder(), (progress, stop));
     let collector = Collector::new(inputs, config, limits, &survey, folder, told, output);
     let report = ending.publish(collector.work()?, stop)?;
-    report.mixed().iter().for_each(|warning| progress.warning(warning));
+    mixed(&report.outcomes).iter().for_each(|warning| progress.warning(warning));
     Ok(report)
 }
 
@@ -93,5 +94,6 @@ pub fn table(
     if stop.load(Ordering::Relaxed) {
         return Err(RunError::Interrupted);
     }
+    mixed(output.outcomes()).iter().for_each(|warning| progress.warning(warning));
     Ok(output.into_table())
 }

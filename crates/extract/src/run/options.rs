@@ -49,27 +49,27 @@ impl RunReport {
     pub fn failed(&self) -> usize {
         self.outcomes.iter().filter(|o| !o.status.has_features()).count()
     }
+}
 
-    /// That stretches of one recording are of several contents, in words: it was replaced during the run.
-    pub(super) fn mixed(&self) -> Option<String> {
-        let mut seen: HashMap<&str, &str> = HashMap::new();
-        let mut mixed = BTreeSet::new();
-        for outcome in &self.outcomes {
-            let Outcome { path, identity, status, start_frame, .. } = outcome;
-            let is_read = status.has_features() && start_frame.is_some() && !identity.is_empty();
-            if is_read && *seen.entry(path).or_insert(identity) != identity {
-                mixed.insert(path.as_str());
-            }
+/// That stretches of one recording are of several contents, in words: it was replaced during the run.
+pub(super) fn mixed(outcomes: &[Outcome]) -> Option<String> {
+    let mut seen: HashMap<&str, &str> = HashMap::new();
+    let mut mixed = BTreeSet::new();
+    for outcome in outcomes {
+        let Outcome { path, identity, status, start_frame, .. } = outcome;
+        let is_read = status.has_features() && start_frame.is_some() && !identity.is_empty();
+        if is_read && *seen.entry(path).or_insert(identity) != identity {
+            mixed.insert(path.as_str());
         }
-        let first = mixed.first()?;
-        let others = match mixed.len() - 1 {
-            0 => String::new(),
-            others => format!(" (and {others} more)"),
-        };
-        Some(format!(
-            "{first}{others} was replaced during the run: its rows are of several contents; extract it again"
-        ))
     }
+    let first = mixed.first()?;
+    let replaced = match mixed.len() {
+        1 => format!("{first} was replaced during the run: its rows come"),
+        n => {
+            format!("{n} recordings were replaced during the run, {first} for one: their rows come")
+        }
+    };
+    Some(format!("{replaced} from different versions of the file; extract again"))
 }
 
 /// Told what goes on, from several threads.

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::begun::{Begun, Ending, Open};
 use super::error::RunError;
-use super::options::{Progress, RunReport};
+use super::options::{Progress, RunReport, mixed};
 use super::output::{Finished, Output};
 use super::recordings::pool;
 use super::work::{self, broken, known_outcome_of, outcome_of};
@@ -81,7 +81,9 @@ pub fn together(
     pool.install(|| (next..all).par_bridge().try_for_each(compute))?;
     let Writer { outputs, .. } = writer.into_inner().unwrap_or_else(|e| e.into_inner());
     for (output, ending, place) in outputs {
-        reports[place] = Some(ending.publish(output, stop)?);
+        let report = ending.publish(output, stop)?;
+        mixed(&report.outcomes).iter().for_each(|warning| progress.warning(warning));
+        reports[place] = Some(report);
     }
     Ok(reports.into_iter().flatten().collect())
 }

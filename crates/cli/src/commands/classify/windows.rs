@@ -160,7 +160,7 @@ impl Predictor<'_> {
         let mut failures = 0;
         for window in &mut windows {
             if self.stopped() {
-                return Ok(());
+                break;
             }
             let (span, status, features) = match window {
                 Ok(window) => {
@@ -194,7 +194,7 @@ impl Predictor<'_> {
                 }
             }
         }
-        let loss = windows.loss().filter(|_| !self.stopped());
+        let loss = windows.loss();
         if let Some(loss) = &loss {
             warn(&format!("{}: truncated: {loss}", input.id));
         }
