@@ -80,20 +80,8 @@ impl PyRecording {
     fn skip(&self, py: Python<'_>, frames: u64) -> PyResult<()> {
         let work = || {
             let mut source = self.source();
-            if source.seekable() {
-                let at = source.health().decoded_frames.saturating_add(frames);
-                return source.seek(at);
-            }
-            let (mut left, mut dropped) = (frames, Vec::new());
-            while left > 0 {
-                let piece = usize::try_from(left).unwrap_or(BLOCK).min(BLOCK);
-                dropped.clear();
-                match read_into(&mut **source, piece, &mut dropped)? {
-                    0 => break,
-                    read => left -= read as u64,
-                }
-            }
-            Ok(())
+            let at = source.health().decoded_frames.saturating_add(frames);
+            source.go_to(at)
         };
         py.detach(work).map_err(decode_error)
     }
