@@ -183,7 +183,8 @@ pub fn check_stretch(
 ) -> Result<(), Failed> {
     let Some(rate) = outcome.sample_rate else { return Ok(()) };
     let crop = crop(signal, (input.start, input.end), rate);
-    if crop.is_empty() {
+    // A start beyond all frames is behind the end.
+    if crop.is_empty() && crop.start < u64::MAX {
         let start = frame_at(input.start.unwrap_or(0.0), rate);
         let has_frames = input.end.is_none_or(|end| frame_at(end, rate) > start);
         let of = if (input.start, input.end) == (None, None) { "recording" } else { "stretch" };

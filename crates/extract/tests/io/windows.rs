@@ -212,14 +212,17 @@ fn a_start_of_the_signal_behind_a_stretch_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x.mp3");
     std::fs::write(&path, MP3).unwrap();
-    let of = |changes: &[String], end: f64| {
+    let of_stretch = |changes: &[String], (start, end): (f64, f64)| {
         let base = Config::preset("esc26").unwrap().to_value();
         let config = Config::from_tree(base, changes).unwrap();
-        let input = Input { start: Some(0.1), end: Some(end), ..input(&path) };
+        let input = Input { start: Some(start), end: Some(end), ..input(&path) };
         let engine = Recordings::new(Arc::new(config));
         let batch = engine.extract((&[input], &[]), None, 1, &Arc::default()).unwrap();
         (batch.outcomes[0].status.name(), batch.outcomes[0].reason.clone())
     };
+    let of = |changes: &[String], end: f64| of_stretch(changes, (0.1, end));
+    let behind = of_stretch(&[], (1e18, 2e18)).1;
+    assert!(behind.ends_with("s, after the end of the recording"), "{behind}");
     let reason = "signal.start and signal.end leave nothing of the stretch";
     assert_eq!(of(&["signal.start=0.3".into()], 0.2), ("empty", reason.into()));
     assert_eq!(of(&[], 0.100001), ("empty", "the stretch has no frame at 44100 Hz".into()));
