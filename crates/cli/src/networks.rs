@@ -8,6 +8,7 @@ use corsmal_files::format::Content;
 use corsmal_models::folds::CvPlan;
 use corsmal_models::labels::alike;
 use corsmal_nets::NetError;
+use corsmal_nets::device::Device;
 use corsmal_nets::fit::Progress;
 use corsmal_nets::networks;
 use corsmal_nets::recipe::Recipe;
@@ -137,6 +138,7 @@ impl Request<'_> {
 
     /// Trains on all items.
     pub fn train(&self, name: &str) -> Result<Trained, Failure> {
+        let device = device(&self.network.device)?;
         let Loaded { examples, recipe, target } = self.load(name)?;
         for warning in alike(&examples.table.classes(&target)?.0) {
             eprintln!("warning: {warning}");
@@ -149,7 +151,7 @@ impl Request<'_> {
             (false, None) => self.dataset.provenance()?,
         };
         let weights = self.weights()?;
-        let training = self.training(&target, recipe, weights.as_ref())?;
+        let training = self.training(&target, recipe, weights.as_ref(), device)?;
         let progress = |told: Progress<'_>| tell(examples.definition.name, told, self.quiet, F1);
         training.train(&examples, files, progress).map_err(|e| self.stopped(e))
     }
@@ -163,9 +165,10 @@ impl Request<'_> {
         if let Some(path) = &self.network.weights {
             refuse_own("--weights", path)?;
         }
+        let device = device(&self.network.device)?;
         let Loaded { examples, recipe, target } = self.load(name)?;
         let weights = self.weights()?;
-        let training = self.training(&target, recipe, weights.as_ref())?;
+        let training = self.training(&target, recipe, weights.as_ref(), device)?;
         let (folds, warnings) = training.folds(&examples, plan, self.pipeline.seed())?;
         for warning in warnings {
             eprintln!("warning: {warning}");
@@ -181,9 +184,10 @@ impl Request<'_> {
         target: &'t str,
         recipe: Recipe,
         weights: Option<&'t Weights>,
+        device: Device,
     ) -> Result<Training<'t>, Failure> {
         let groups = self.dataset.groups.as_deref();
-        Ok(Training { target, groups, recipe, checkpoints: self.folder()?, weights })
+        Ok(Training { target, groups, recipe, checkpoints: self.folder()?, weights, device })
     }
 
     fn weights(&self) -> Result<Option<Weights>, Failure> {
@@ -208,6 +212,15 @@ impl Request<'_> {
             _ => error.into(),
         }
     }
+}
+
+/// The device of this name; a GPU is named to the user.
+pub fn device(name: &str) -> Result<Device, Failure> {
+    let device = Device::named(name)?;
+    if let Some(gpu) = device.gpu_name() {
+        eprintln!("networks train on {gpu}");
+    }
+    Ok(device)
 }
 
 /// Refuses weights that a training of this tool made, where scores of recordings are wanted that it may have

@@ -55,5 +55,6 @@ pub mod provenance;
 pub mod quote;
 pub mod settings;
 pub mod shard;
+pub mod shield;
 pub mod spelling;
 pub mod table;

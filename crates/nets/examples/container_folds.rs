@@ -13,6 +13,7 @@ use std::path::Path;
 
 use corsmal_nets::cross_validation::{Data, FoldItems, cross_validate};
 use corsmal_nets::dataset::Dataset;
+use corsmal_nets::device::Device;
 use corsmal_nets::networks;
 use serde_json::{Map, Value};
 
@@ -59,6 +60,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         n_classes: definition.outputs,
         groups: Some(containers),
         weights: None,
+        device: &Device::Cpu,
     };
     println!("{name}, {} recordings, {recipe:?}", data.ids.len());
     let mut means = Vec::new();

@@ -30,13 +30,16 @@ struct Text {
     best: Option<(f64, usize)>,
 }
 
-/// Says which training this is: recipe, network, items, targets, rows, what it begins with.
+/// Says which training this is: recipe, network, GPU, items, targets, rows, what it begins with.
 pub(crate) fn key(network: &Network, course: &Course<'_>, recipe: &Recipe) -> String {
     let mut hash = blake3::Hasher::new();
     // Checkpoints from before there were schedules go on.
     let recipe = serde_json::to_string(recipe).unwrap_or_default();
     let recipe = recipe.replace(r#""schedule":"constant","#, "");
     hash.update(format!("{} {recipe}", network.name()).as_bytes());
+    if let Some(gpu) = network.device().gpu_name() {
+        hash.update(gpu.as_bytes());
+    }
     let (classes, numbers): (&[usize], &[f32]) = match course.targets {
         Targets::Classes(classes) => (classes, &[]),
         Targets::Numbers(numbers) => (&[], numbers),

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::device::Device;
 use crate::error::{NetError, Result};
 use crate::fit::{self, History, Progress, Task};
 use crate::items::Items;
@@ -49,6 +50,8 @@ pub struct Data<'a> {
     pub groups: Option<&'a [String]>,
     /// what trainings begin with instead of random numbers; see [`crate::network::Network::begin_with`]
     pub weights: Option<&'a State>,
+    /// where trainings compute
+    pub device: &'a Device,
 }
 
 /// Trains a network for each fold and classifies what the fold holds out, in its order. Checkpoints
@@ -68,6 +71,7 @@ pub fn cross_validate(
     let mut results = Vec::new();
     for (number, fold) in folds.iter().enumerate() {
         let mut network = definition.build(Some(data.n_classes), recipe.seed)?;
+        network.run_on(data.device.clone());
         data.weights.map(|state| network.begin_with(state)).transpose()?;
         let (train, watched, validation) = watched(data, fold, recipe)?;
         let task =

@@ -175,6 +175,24 @@ pub enum NetError {
         /// the key that was probably meant, and the known ones
         choices: String,
     },
+    /// A device that this build or machine does not have.
+    #[error("device {name}: {reason}")]
+    NoDevice {
+        /// the name given
+        name: String,
+        /// why not
+        reason: String,
+    },
+    /// A GPU that failed: out of memory, or its driver.
+    #[error(
+        "GPU {name}: {reason}: a smaller batch needs less of its memory; --device cpu does without it"
+    )]
+    Gpu {
+        /// what it calls itself
+        name: String,
+        /// what its driver says
+        reason: String,
+    },
     /// Something asked of a network that it does not have.
     #[error("{network} has no {what}: {hint}")]
     Missing {

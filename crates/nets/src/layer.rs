@@ -5,6 +5,8 @@ use std::fmt::Debug;
 
 use crate::batch::{Batch, Shape};
 use crate::error::Result;
+#[cfg(any(test, feature = "gpu"))]
+use crate::gpu;
 use crate::kernels;
 use crate::matrix::Matrix;
 use crate::packed::Packed;
@@ -44,6 +46,10 @@ pub trait Layer: Debug + Send + Sync {
     /// From the gradient by its output to the gradient by its input; gradients by its parameters go
     /// to `pass`.
     fn backward(&self, gradient: Batch, pass: &mut Backward<'_>) -> Batch;
+
+    /// The way forward on a GPU, from which the way back follows.
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, pass: &mut gpu::Pass<'_>) -> gpu::Flow;
 }
 
 /// Layers one after another.
@@ -133,6 +139,16 @@ impl<'a> Pass<'a> {
     /// Through all layers of a chain.
     pub fn chain(&mut self, layers: &[Box<dyn Layer>], input: Batch) -> Batch {
         layers.iter().fold(input, |x, layer| layer.forward(x, self))
+    }
+
+    /// Through the layers of each input; the sum of what comes after them.
+    pub(crate) fn network(&mut self, inputs: &[Batch], chains: &[&[Box<dyn Layer>]]) -> Batch {
+        let mut out = self.chain(chains[0], inputs[0].clone());
+        for (layers, input) in chains.iter().zip(inputs).skip(1) {
+            let more = self.chain(layers, input.clone());
+            kernels::add(out.values.values_mut(), more.values.values());
+        }
+        out
     }
 }
 

@@ -23,10 +23,13 @@ mod checkpoint;
 mod course;
 pub mod cross_validation;
 pub mod dataset;
+pub mod device;
 mod epochs;
 pub mod error;
 pub mod fit;
 pub mod front_end;
+#[cfg(any(test, feature = "gpu"))]
+pub mod gpu;
 mod history;
 mod input;
 pub mod items;

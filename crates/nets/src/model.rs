@@ -34,6 +34,9 @@ pub struct Header {
     pub target: String,
     /// how it was trained
     pub recipe: Recipe,
+    /// the GPU that it was trained on; none: the processor
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gpu: Option<String>,
     /// what became of the training
     pub history: History,
     /// configuration of the features it was trained on; null when they came from elsewhere

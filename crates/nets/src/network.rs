@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use crate::batch::{Batch, Shape};
+use crate::device::Device;
 use crate::error::{NetError, Result};
 use crate::layer::{Backward, Chain, Layer, Pass, Training, kept_by, passing_by};
 use crate::loss::{Loss, Targets};
@@ -56,6 +57,7 @@ pub struct Network {
     architecture: Architecture,
     outputs: usize,
     parameters: Parameters,
+    device: Device,
     through_activation: bool,
     /// what trainings begin with; `None`: random numbers
     beginning: Option<State>,
@@ -102,6 +104,7 @@ impl Network {
             architecture,
             outputs,
             parameters,
+            device: Device::Cpu,
             through_activation: true,
             beginning: None,
         })
@@ -210,77 +213,30 @@ impl Network {
         Err(NetError::Lengths { network: self.name.clone(), steps, items: given.items(), actual })
     }
 
-    /// Arrays in PyTorch's layouts as this network's inputs: `[items, channels, height, width]`,
-    /// `[items, steps, numbers]`, `[items, numbers]`. Several inputs of one kind may come as one
-    /// array whose second axis counts them.
-    ///
-    /// # Errors
-    /// [`NetError::InputShape`], [`NetError::InputCount`].
-    pub fn batches(&self, arrays: &[(Vec<usize>, Vec<f32>)]) -> Result<Vec<Batch>> {
-        let inputs = self.inputs();
-        let refusal = |input: &str, expected: String, actual: &[usize]| NetError::InputShape {
-            network: self.name.clone(),
-            input: input.into(),
-            expected,
-            actual: format!("{actual:?}"),
-        };
-        if let ([(shape, values)], true) = (arrays, inputs.len() > 1) {
-            let [items, count, steps, numbers] = shape[..] else {
-                let expected = format!("[items, {}, steps, numbers]", inputs.len());
-                return Err(refusal("array", expected, shape));
-            };
-            if count != inputs.len()
-                || values.len() != shape.iter().product::<usize>()
-                || steps == 0
-            {
-                let expected = format!("[items, {}, steps, numbers]", inputs.len());
-                return Err(refusal("array", expected, shape));
-            }
-            let each = steps * numbers;
-            let view = |v: usize| {
-                let items = (0..items).map(|i| &values[(i * count + v) * each..][..each]);
-                (vec![shape[0], steps, numbers], items.flatten().copied().collect())
-            };
-            return self.batches(&(0..count).map(view).collect::<Vec<_>>());
-        }
-        if arrays.len() != inputs.len() {
-            let (network, expected, actual) = (self.name.clone(), inputs.len(), arrays.len());
-            return Err(NetError::InputCount { network, expected, actual });
-        }
-        let one = |(input, (shape, values)): (&Input, &(Vec<usize>, Vec<f32>))| {
-            let fits = input.takes(shape.get(1..).unwrap_or_default());
-            if !fits || values.len() != shape.iter().product::<usize>() || values.is_empty() {
-                return Err(refusal(&input.name, input.layout(), shape));
-            }
-            Ok(match input.shape {
-                Shape::Image { .. } => Batch::from_channels_first(values, input.shape),
-                Shape::Sequence { numbers, .. } => {
-                    Batch::new(values.clone(), Shape::Sequence { steps: shape[1], numbers })
-                }
-                Shape::Vector(_) => Batch::new(values.clone(), input.shape),
-            })
-        };
-        inputs.iter().zip(arrays).map(one).collect()
+    /// Lets it compute on this device.
+    pub fn run_on(&mut self, device: Device) {
+        self.device = device;
+    }
+
+    /// Where it computes.
+    pub fn device(&self) -> &Device {
+        &self.device
     }
 
     /// Outputs `[items, outputs]` in evaluation mode.
     ///
     /// # Errors
-    /// Inputs of other shapes.
+    /// Inputs of other shapes; a device that fails.
     pub fn forward(&self, inputs: &[Batch]) -> Result<Batch> {
-        self.check(inputs)?;
-        let mut pass = Pass::evaluate(&self.parameters, &inputs[1..]);
-        Ok(self.run(inputs, &mut pass, true))
+        self.evaluate(inputs, &self.chains(true))
     }
 
     /// The same without the activation of the outputs.
     ///
     /// # Errors
-    /// Inputs of other shapes.
+    /// As [`Network::forward`].
     pub fn logits(&self, inputs: &[Batch]) -> Result<Batch> {
-        self.check(inputs)?;
-        let mut pass = Pass::evaluate(&self.parameters, &inputs[1..]);
-        Ok(self.run(inputs, &mut pass, false))
+        self.evaluate(inputs, &self.chains(false))
     }
 
     /// Whether the loss sees the outputs after their activation, as some published code has it.
@@ -291,32 +247,32 @@ impl Network {
     /// The numbers that the network's last layers work on.
     ///
     /// # Errors
-    /// Inputs of other shapes; a network without such a place.
+    /// As [`Network::forward`]; a network without such a place.
     pub fn features(&self, inputs: &[Batch]) -> Result<Batch> {
-        self.check(inputs)?;
         let Some(layers) = self.architecture.features else {
             let hint = "m4_type has them".into();
             return Err(NetError::Missing { network: self.name.clone(), what: "features", hint });
         };
-        let mut pass = Pass::evaluate(&self.parameters, &inputs[1..]);
-        let chain = &self.architecture.body.chains()[0][..layers];
-        Ok(pass.chain(chain, inputs[0].clone()))
+        self.evaluate(inputs, &[&self.architecture.body.chains()[0][..layers]])
     }
 
-    /// The layers of a chain, with or without the activation at its end.
-    fn layers<'a>(&self, chain: &'a Chain, activation: bool) -> &'a [Box<dyn Layer>] {
+    /// The layers of each chain, with or without the activation at its end.
+    fn chains(&self, activation: bool) -> Vec<&[Box<dyn Layer>]> {
         let last = usize::from(self.architecture.activation && !activation);
-        &chain[..chain.len() - last]
+        let chains = self.architecture.body.chains().iter();
+        chains.map(|chain| &chain[..chain.len() - last]).collect()
     }
 
-    fn run(&self, inputs: &[Batch], pass: &mut Pass<'_>, activation: bool) -> Batch {
-        let chains = self.architecture.body.chains();
-        let mut out = pass.chain(self.layers(&chains[0], activation), inputs[0].clone());
-        for (chain, input) in chains.iter().zip(inputs).skip(1) {
-            let more = pass.chain(self.layers(chain, activation), input.clone());
-            crate::kernels::add(out.values.values_mut(), more.values.values());
+    fn evaluate(&self, inputs: &[Batch], chains: &[&[Box<dyn Layer>]]) -> Result<Batch> {
+        self.check(inputs)?;
+        match &self.device {
+            Device::Cpu => {
+                let mut pass = Pass::evaluate(&self.parameters, &inputs[1..]);
+                Ok(pass.network(inputs, chains))
+            }
+            #[cfg(any(test, feature = "gpu"))]
+            Device::Gpu(gpu) => gpu.outputs(&self.parameters, inputs, chains),
         }
-        out
     }
 
     /// Loss and gradients of a batch in training mode; `dropout`: its random numbers, or off.
@@ -332,18 +288,26 @@ impl Network {
         dropout: Option<Stream>,
     ) -> Result<Gradients> {
         self.check(inputs)?;
+        let chains = self.chains(self.through_activation);
+        match &self.device {
+            Device::Cpu => {}
+            #[cfg(any(test, feature = "gpu"))]
+            Device::Gpu(gpu) => {
+                let loss = |outputs: &Batch| loss.of(outputs, targets, class_weights);
+                return gpu.gradients(&self.parameters, inputs, &chains, dropout, loss);
+            }
+        }
         let mut pass = Pass {
             parameters: &self.parameters,
             others: &inputs[1..],
             training: Some(Training::new(dropout)),
         };
-        let outputs = self.run(inputs, &mut pass, self.through_activation);
+        let outputs = pass.network(inputs, &chains);
         let (loss, gradient) = loss.of(&outputs, targets, class_weights)?;
         let Some(mut training) = pass.training else { unreachable!("set above") };
         let running = std::mem::take(&mut training.running);
         let mut backward = Backward::new(&self.parameters, training);
-        for chain in self.architecture.body.chains().iter().rev() {
-            let layers = self.layers(chain, self.through_activation);
+        for layers in chains.iter().rev() {
             backward.chain(layers, gradient.clone(), false);
         }
         Ok(Gradients { loss, by_parameter: backward.gradients, running, outputs })

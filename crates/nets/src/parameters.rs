@@ -6,6 +6,8 @@ use std::sync::{Arc, OnceLock};
 use rayon::prelude::*;
 
 use crate::error::{NetError, Result};
+#[cfg(any(test, feature = "gpu"))]
+use crate::gpu::Uploaded;
 use crate::matrix::Matrix;
 use crate::packed::Packed;
 use crate::random::Stream;
@@ -64,6 +66,9 @@ pub struct Parameters {
     /// the same as products read them, until they change
     packed: Vec<OnceLock<Arc<Packed>>>,
     index: HashMap<String, usize>,
+    /// the same on a GPU, until they change
+    #[cfg(any(test, feature = "gpu"))]
+    uploaded: OnceLock<Arc<Uploaded>>,
 }
 
 impl Parameters {
@@ -81,8 +86,19 @@ impl Parameters {
             })
             .collect();
         let index = declared.iter().enumerate().map(|(i, d)| (d.name.clone(), i)).collect();
+        Self::of(declared, values, index)
+    }
+
+    fn of(declared: Vec<Declared>, values: Vec<Matrix>, index: HashMap<String, usize>) -> Self {
         let packed = vec![OnceLock::new(); declared.len()];
-        Self { declared, values, packed, index }
+        Self {
+            declared,
+            values,
+            packed,
+            index,
+            #[cfg(any(test, feature = "gpu"))]
+            uploaded: OnceLock::new(),
+        }
     }
 
     /// What each parameter is.
@@ -112,14 +128,36 @@ impl Parameters {
 
     /// A copy without the packed weights.
     pub(crate) fn unpacked(&self) -> Self {
-        let packed = vec![OnceLock::new(); self.declared.len()];
-        let (declared, values) = (self.declared.clone(), self.values.clone());
-        Self { declared, values, packed, index: self.index.clone() }
+        Self::of(self.declared.clone(), self.values.clone(), self.index.clone())
+    }
+
+    /// The same on a GPU, sent by `upload` at the first call after they changed.
+    #[cfg(any(test, feature = "gpu"))]
+    pub(crate) fn uploaded(&self, upload: impl FnOnce() -> Uploaded) -> Arc<Uploaded> {
+        self.uploaded.get_or_init(|| Arc::new(upload())).clone()
+    }
+
+    /// Whether training changes the parameter of this name by its gradient.
+    #[cfg(any(test, feature = "gpu"))]
+    pub(crate) fn is_trained(&self, name: &str) -> bool {
+        self.declared[self.index[name]].trained
+    }
+
+    /// To be called when numbers change: what was made of them is made anew.
+    fn forget_copies(&mut self, i: Option<usize>) {
+        match i {
+            Some(i) => self.packed[i] = OnceLock::new(),
+            None => self.packed.fill(OnceLock::new()),
+        }
+        #[cfg(any(test, feature = "gpu"))]
+        {
+            self.uploaded = OnceLock::new();
+        }
     }
 
     pub(crate) fn get_mut(&mut self, name: &str) -> &mut Matrix {
         let i = self.index[name];
-        self.packed[i] = OnceLock::new();
+        self.forget_copies(Some(i));
         &mut self.values[i]
     }
 
@@ -187,7 +225,7 @@ impl Parameters {
         for (d, value) in self.declared.iter().zip(&mut self.values) {
             *value = matrix_of(d, given[d.name.as_str()].to_vec());
         }
-        self.packed.fill(OnceLock::new());
+        self.forget_copies(None);
         Ok(())
     }
 }

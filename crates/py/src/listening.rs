@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use corsmal_extract::inputs::{self, Input};
 use corsmal_models::validation;
 use corsmal_models::voting::VotingRule;
+use corsmal_nets::device::Device;
 use corsmal_nets::networks;
 use corsmal_systems::SystemError;
 use corsmal_systems::embedding::Embedder;
@@ -102,7 +103,7 @@ fn training<'t>(
 ) -> PyResult<Training<'t>> {
     let recipe = serde_json::from_str(recipe).map_err(value_error)?;
     let groups = rows.iter().any(|(.., group)| group.is_some()).then_some(GROUPS);
-    Ok(Training { target: TARGET, groups, recipe, checkpoints, weights: None })
+    Ok(Training { target: TARGET, groups, recipe, checkpoints, weights: None, device: Device::Cpu })
 }
 
 /// A network trained on recordings, and the recordings that were left out; `kind` is what the labels

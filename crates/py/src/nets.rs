@@ -252,6 +252,7 @@ impl PyTrainedNetwork {
             labels,
             target: "y".into(),
             recipe,
+            gpu: None,
             history: fitted.map_err(value_error)?,
             feature_config: serde_json::Value::Null,
             provenance,

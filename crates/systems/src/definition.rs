@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use corsmal_ccm::benchmark::System;
+use corsmal_nets::device::Device;
 
 use crate::training::Weights;
 
@@ -17,6 +18,8 @@ pub struct Settings {
     pub embeddings: Vec<(String, PathBuf)>,
     /// Weights that networks begin with instead of random ones, by name.
     pub weights: Vec<(String, Arc<Weights>)>,
+    /// Where networks compute.
+    pub device: Device,
 }
 
 /// A system of the paper.

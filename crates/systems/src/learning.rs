@@ -170,6 +170,10 @@ impl<'a> Learning<'a> {
             e => self.fault(&format!("{}: {e}", definition.name)),
         };
         let mut net = definition.build(Some(outputs), recipe.seed).map_err(refuse)?;
+        net.run_on(self.settings.device.clone());
+        if let Some(gpu) = self.settings.device.gpu_name() {
+            self.note(format!("Networks were trained on a GPU ({gpu})."));
+        }
         if let Some((_, weights)) = self.settings.weights.iter().find(|(name, _)| name == network) {
             weights.begin(&mut net).map_err(|e| self.fault(&e))?;
             self.note(format!("{network} started from {}.", weights.path().display()));

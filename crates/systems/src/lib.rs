@@ -10,6 +10,7 @@
 //!
 //! use corsmal_extract::inputs;
 //! use corsmal_models::dataset::LabelSource;
+//! use corsmal_nets::device::Device;
 //! use corsmal_nets::networks;
 //! use corsmal_nets::recipe::Recipe;
 //! use corsmal_systems::SystemError;
@@ -44,7 +45,8 @@
 //! examples.table.add_labels(&LabelSource::Folders { column: "class".into() })?;
 //!
 //! let recipe = Recipe { epochs: 20, ..network.recipe };
-//! let training = Training { target: "class", groups: None, recipe, checkpoints: None, weights: None };
+//! let (device, target) = (Device::Cpu, "class");
+//! let training = Training { target, groups: None, recipe, checkpoints: None, weights: None, device };
 //! let Trained { model, .. } = training.train(&examples, serde_json::Value::Null, |_| true)?;
 //!
 //! let listener = Listener::new(&model, &[], Formats::AsTrained, jobs)?;

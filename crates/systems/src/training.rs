@@ -13,6 +13,7 @@ use corsmal_models::scores::{ClassReport, Scores};
 use corsmal_models::targets::Classes;
 use corsmal_nets::NetError;
 use corsmal_nets::cross_validation::{self, Data, FoldItems};
+use corsmal_nets::device::Device;
 use corsmal_nets::fit::{self, Progress, Task};
 use corsmal_nets::model::{Header, NetModel};
 use corsmal_nets::network::Network;
@@ -38,6 +39,8 @@ pub struct Training<'a> {
     pub checkpoints: Option<&'a Path>,
     /// what it begins with instead of random numbers
     pub weights: Option<&'a Weights>,
+    /// where the network computes
+    pub device: Device,
 }
 
 /// Weights that a training begins with; see [`corsmal_nets::network::Network::begin_with`].
@@ -169,11 +172,13 @@ impl Training<'_> {
         let groups = groups.as_deref();
         let state = self.weights.map(|weights| weights.state_for(definition, &labels));
         let weights = state.as_deref();
-        let data = Data { items, classes: &y, n_classes: labels.len(), groups, weights };
+        let device = &self.device;
+        let data = Data { items, classes: &y, n_classes: labels.len(), groups, weights, device };
         let all = FoldItems { name: "all".into(), train: (0..y.len()).collect(), test: Vec::new() };
         let (train, watched, validation_group) = cross_validation::watched(data, &all, &recipe)?;
         let task = Task { items, classes: &y, train: &train, watched: &watched };
         let mut network = definition.build(Some(labels.len()), recipe.seed)?;
+        network.run_on(device.clone());
         if let (Some(weights), Some(state)) = (self.weights, &state) {
             network.begin_with(state).map_err(|e| weights.refusal(e))?;
         }
@@ -187,6 +192,7 @@ impl Training<'_> {
             labels: labels.names().to_vec(),
             target: self.target.into(),
             recipe,
+            gpu: device.gpu_name().map(str::to_owned),
             history,
             feature_config: heard.as_ref().map_or(Value::Null, |heard| heard.config.to_value()),
             provenance: json!({
@@ -238,7 +244,8 @@ impl Training<'_> {
         let groups = groups.as_deref();
         let state = self.weights.map(|weights| weights.state_for(definition, &labels));
         let weights = state.as_deref();
-        let data = Data { items, classes: &y, n_classes: labels.len(), groups, weights };
+        let device = &self.device;
+        let data = Data { items, classes: &y, n_classes: labels.len(), groups, weights, device };
         let items_of = examples.items_of();
         let of_rows = |rows: &[usize]| -> Vec<usize> {
             rows.iter().flat_map(|&row| items_of[row].iter().copied()).collect()
@@ -264,11 +271,14 @@ impl Training<'_> {
         let histories = found.iter().map(
             |f| json!({"fold": f.name, "validation_group": f.validation, "history": f.history}),
         );
-        let report = json!({
+        let mut report = json!({
             "network": definition.name,
             "recipe": recipe,
             "folds": histories.collect::<Vec<_>>(),
         });
+        if let Some(gpu) = device.gpu_name() {
+            report["gpu"] = gpu.into();
+        }
         let mut by_fold = Vec::with_capacity(found.len());
         for (found, fold) in found.into_iter().zip(&folds.outer) {
             let mut proba = Array2::zeros((fold.test.len(), labels.len()));

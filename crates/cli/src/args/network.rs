@@ -10,8 +10,9 @@ pub struct NetworkArgs {
     #[arg(long, value_name = "NAME")]
     #[arg(conflicts_with_all = ["classifier", "standardize", "pca", "tune"])]
     pub net: Option<String>,
-    /// Where the network runs: cpu, the only device of this build.
-    #[arg(long, value_name = "DEVICE", default_value = "cpu", requires = "net", value_parser = device)]
+    /// Where the network trains: cpu, or gpu in a build with the feature `gpu`.
+    #[arg(long, value_name = "DEVICE", default_value = "cpu", requires = "net")]
+    #[arg(value_parser = ["cpu", "gpu"])]
     pub device: String,
     /// Start from these weights instead of random numbers: .pth, .npz or .safetensors with the
     /// network's names, such as torchvision's for ResNet-18. The last layer may have had other classes.
@@ -20,15 +21,4 @@ pub struct NetworkArgs {
     /// Folder in which to save the training after each epoch; the next run continues from it.
     #[arg(long, value_name = "FOLDER", requires = "net")]
     pub checkpoints: Option<PathBuf>,
-}
-
-fn device(name: &str) -> Result<String, String> {
-    match name {
-        "cpu" => Ok(name.into()),
-        _ => Err(
-            "no such device in this build: networks run only on the cpu, on every core (--jobs); \
-             docs/networks.md says why"
-                .into(),
-        ),
-    }
 }

@@ -53,6 +53,10 @@ pub struct Args {
     /// torchvision's for resnet18-level and resnet18-type.
     #[arg(long, value_parser = named_file, value_name = "NETWORK=FILE", requires = "methods")]
     weights: Vec<(String, PathBuf)>,
+    /// Where the networks of the systems train: cpu, or gpu in a build with the feature `gpu`.
+    #[arg(long, value_name = "DEVICE", default_value = "cpu", requires = "methods")]
+    #[arg(value_parser = ["cpu", "gpu"])]
+    device: String,
     /// Predictions of another method to add to the tables: a submission in an official format, or
     /// capacity estimates by file name.
     #[arg(long, value_parser = named_file, value_name = "NAME=CSV")]
@@ -221,14 +225,15 @@ fn systems(args: &Args) -> Result<Vec<Box<dyn System>>, Failure> {
     }
     let epochs = args.epochs.map(|n| n as usize);
     let embeddings = args.embeddings.clone();
-    let settings = corsmal_systems::Settings { epochs, embeddings, weights };
+    let device = crate::networks::device(&args.device)?;
+    let settings = corsmal_systems::Settings { epochs, embeddings, weights, device };
     Ok(methods.into_iter().map(|method| method.make(&settings)).collect())
 }
 
 #[cfg(not(feature = "nets"))]
 fn systems(args: &Args) -> Result<Vec<Box<dyn System>>, Failure> {
     // What these say is for the systems.
-    let Args { epochs: _, embeddings: _, weights: _, .. } = args;
+    let Args { epochs: _, embeddings: _, weights: _, device: _, .. } = args;
     if args.methods.is_empty() { Ok(Vec::new()) } else { Err(super::nets::absent()) }
 }
 

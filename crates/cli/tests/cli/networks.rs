@@ -151,7 +151,11 @@ fn what_a_network_cannot_learn_from_is_refused() {
     refuse(&[&level[..], &["--set", "lr=-1"]].concat(), "above 0");
     refuse(&[&level[..], &["--set", "select=validation"]].concat(), "groups");
     refuse(&[&level[..], &["--set", "recipe=book"]].concat(), "code or paper");
-    refuse(&[&level[..], &["--device", "cuda"]].concat(), "only on the cpu");
+    refuse(&[&level[..], &["--device", "cuda"]].concat(), "[possible values: cpu, gpu]");
+    if !cfg!(feature = "gpu") {
+        let refusal = "device gpu: this build has no GPU support: build it with --features gpu";
+        refuse(&[&level[..], &["--device", "gpu"]].concat(), refusal);
+    }
     refuse(&[&level[..], &["--x", "OTHER"]].concat(), "no member OTHER");
     refuse(&[&level[..], &["--ids", "names"]].concat(), "no member names");
     refuse(&[&level[..], &["--seed", "1", "--set", "seed=1"]].concat(), "give one");

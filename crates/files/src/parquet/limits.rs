@@ -3,12 +3,9 @@
 //! A few bytes of run lengths or of a dictionary can stand for any number of values, and a page says
 //! itself how large it will be.
 
-use std::cell::Cell;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
-use std::panic::{self, AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use std::sync::Once;
 
 use parquet::basic::Compression;
 use parquet::errors::ParquetError;
@@ -17,6 +14,7 @@ use parquet::file::metadata::ParquetMetaData;
 use super::error::{ParquetTableError, io as failed, layout};
 use super::fields::{FOOTER, PAGE_HEADER};
 use super::thrift::{self, Fault};
+use crate::shield;
 
 /// Values that a file of any size may hold.
 pub const MAX_VALUES: u64 = 1 << 23;
@@ -163,27 +161,12 @@ pub(super) fn require_rows(found: usize, rows: usize) -> Result<(), ParquetError
     }
 }
 
-thread_local! {
-    static SHIELDED: Cell<bool> = const { Cell::new(false) };
-}
-
 /// The decoders of the parquet crate (60.1) assert what damaged pages do not keep, so their panics
 /// end here as errors, and are not printed.
 pub(super) fn shielded<T>(
     path: &Path,
     read: impl FnOnce() -> Result<T, ParquetTableError>,
 ) -> Result<T, ParquetTableError> {
-    static HOOK: Once = Once::new();
-    HOOK.call_once(|| {
-        let others = panic::take_hook();
-        panic::set_hook(Box::new(move |info| {
-            if !SHIELDED.get() {
-                others(info);
-            }
-        }));
-    });
-    let before = SHIELDED.replace(true);
-    let read = catch_unwind(AssertUnwindSafe(read));
-    SHIELDED.set(before);
+    let read = shield::shielded(read);
     read.unwrap_or_else(|_| Err(layout(path, "sound Parquet pages", "damaged ones")))
 }

@@ -4,6 +4,8 @@ use rayon::prelude::*;
 
 use crate::batch::{Batch, Shape};
 use crate::error::Result;
+#[cfg(any(test, feature = "gpu"))]
+use crate::gpu;
 use crate::kernels;
 use crate::layer::{Backward, Layer, Pass, Saved};
 
@@ -31,6 +33,11 @@ impl Layer for Relu {
         kernels::relu_backward(gradient.values.values_mut(), output.values.values());
         gradient
     }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, _: &mut gpu::Pass<'_>) -> gpu::Flow {
+        input.map(burn_tensor::activation::relu)
+    }
 }
 
 /// Logistic function.
@@ -57,6 +64,11 @@ impl Layer for Sigmoid {
         let both = gradient.values.values_mut().iter_mut().zip(output.values.values());
         both.for_each(|(g, y)| *g *= y * (1.0 - y));
         gradient
+    }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, _: &mut gpu::Pass<'_>) -> gpu::Flow {
+        input.map(burn_tensor::activation::sigmoid)
     }
 }
 
@@ -88,6 +100,16 @@ impl Layer for Softmax {
             g.iter_mut().zip(y).for_each(|(g, y)| *g = y * (*g - dot));
         }
         gradient
+    }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, _: &mut gpu::Pass<'_>) -> gpu::Flow {
+        use burn_tensor::activation::softmax;
+        match input {
+            gpu::Flow::Vector(x) => gpu::Flow::Vector(softmax(x, 1)),
+            gpu::Flow::Image(x) => gpu::Flow::Image(softmax(x, 1)),
+            gpu::Flow::Sequence(x, lengths) => gpu::Flow::Sequence(softmax(x, 2), lengths),
+        }
     }
 }
 

@@ -5,6 +5,8 @@ use rayon::prelude::*;
 use super::uniform_by;
 use crate::batch::{Batch, Shape};
 use crate::error::{NetError, Result};
+#[cfg(any(test, feature = "gpu"))]
+use crate::gpu;
 use crate::kernels;
 use crate::layer::{Backward, Layer, Pass, Saved};
 use crate::matrix::Matrix;
@@ -115,6 +117,26 @@ impl Layer for Attention {
             }
         });
         input
+    }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, pass: &mut gpu::Pass<'_>) -> gpu::Flow {
+        let gpu::Flow::Sequence(x, lengths) = input else { unreachable!("shapes were checked") };
+        let [items, steps, n] = x.dims();
+        let score = pass.parameter(&self.weight(), [1, 1, n]);
+        let scores: burn_tensor::Tensor<2> = (x.clone() * score).sum_dim(2).squeeze_dim(2);
+        let scores = match lengths {
+            None => scores,
+            Some(lengths) => {
+                // So low that its softmax is zero.
+                let padding =
+                    |length: usize| (0..steps).map(move |s| if s < length { 0.0 } else { -1e30 });
+                let padding = lengths.iter().flat_map(|&l| padding(l.clamp(1, steps))).collect();
+                scores + pass.tensor(padding, [items, steps])
+            }
+        };
+        let weights = burn_tensor::activation::softmax(scores, 1).unsqueeze_dim::<3>(2);
+        gpu::Flow::Vector((x * weights).sum_dim(1).squeeze_dim(1))
     }
 }
 

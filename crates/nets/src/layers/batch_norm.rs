@@ -2,11 +2,15 @@
 
 use crate::batch::{Batch, Shape};
 use crate::error::{NetError, Result};
+#[cfg(any(test, feature = "gpu"))]
+use crate::gpu;
 use crate::kernels;
 use crate::layer::{Backward, Layer, Pass, Saved};
 use crate::layers::linear::column;
 use crate::matrix::Matrix;
 use crate::parameters::{Declared, Initial};
+#[cfg(any(test, feature = "gpu"))]
+use burn_tensor::{Tensor, module};
 use rayon::prelude::*;
 
 const EPSILON: f64 = 1e-5;
@@ -29,6 +33,27 @@ impl BatchNorm {
     fn key(&self, what: &str) -> String {
         format!("{}.{what}", self.name)
     }
+
+    /// `[items, channels, …]`
+    #[cfg(any(test, feature = "gpu"))]
+    fn normal<const D: usize>(&self, x: Tensor<D>, pass: &mut gpu::Pass<'_>) -> Tensor<D> {
+        let [weight, bias, mean, variance] = ["weight", "bias", "running_mean", "running_var"]
+            .map(|what| pass.parameter(&self.key(what), [self.channels]));
+        if !pass.is_training() {
+            return module::batch_norm(x, weight, bias, mean, variance, EPSILON);
+        }
+        let n = (x.dims().iter().product::<usize>() / self.channels) as f64;
+        let found = module::batch_norm_train(x, weight, bias, EPSILON);
+        pass.statistic(self.key("running_mean"), found.mean, 1.0);
+        pass.statistic(self.key("running_var"), found.variance, n / (n - 1.0).max(1.0));
+        found.output
+    }
+}
+
+/// A running statistic after a batch whose own is `new`.
+pub(crate) fn moved(old: &[f32], new: impl Fn(usize) -> f64) -> Vec<f32> {
+    let one = |(c, &old): (usize, &f32)| (1.0 - MOMENTUM) * f64::from(old) + MOMENTUM * new(c);
+    old.iter().enumerate().map(|each| one(each) as f32).collect()
 }
 
 impl Layer for BatchNorm {
@@ -71,13 +96,9 @@ impl Layer for BatchNorm {
         let mut mean = kernels::column_sums(input.values.values(), self.channels);
         mean.iter_mut().for_each(|m| *m /= n);
         let squares = kernels::column_squares(input.values.values(), &mean);
-        let moved = |old: &[f32], new: &dyn Fn(usize) -> f64| -> Vec<f32> {
-            let one = |c: usize| (1.0 - MOMENTUM) * f64::from(old[c]) + MOMENTUM * new(c);
-            (0..self.channels).map(|c| one(c) as f32).collect()
-        };
         let unbiased = |c: usize| squares[c] / (n - 1.0).max(1.0);
-        training.running.push((self.key("running_mean"), moved(old_mean, &|c| mean[c])));
-        training.running.push((self.key("running_var"), moved(old_var, &unbiased)));
+        training.running.push((self.key("running_mean"), moved(old_mean, |c| mean[c])));
+        training.running.push((self.key("running_var"), moved(old_var, unbiased)));
         let inverse: Vec<f32> =
             squares.iter().map(|s| (1.0 / (s / n + EPSILON).sqrt()) as f32).collect();
         let shift: Vec<f32> =
@@ -119,6 +140,19 @@ impl Layer for BatchNorm {
         pass.add(self.key("weight"), column(products));
         pass.add(self.key("bias"), column(sums));
         gradient
+    }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, pass: &mut gpu::Pass<'_>) -> gpu::Flow {
+        match input {
+            gpu::Flow::Vector(x) => gpu::Flow::Vector(self.normal(x, pass)),
+            gpu::Flow::Image(x) => gpu::Flow::Image(self.normal(x, pass)),
+            gpu::Flow::Sequence(x, lengths) => {
+                let dims = x.dims();
+                let flat = self.normal(x.flatten::<2>(0, 1), pass);
+                gpu::Flow::Sequence(flat.reshape(dims), lengths)
+            }
+        }
     }
 }
 

@@ -4,6 +4,8 @@ use rayon::prelude::*;
 
 use crate::batch::{Batch, Shape};
 use crate::error::Result;
+#[cfg(any(test, feature = "gpu"))]
+use crate::gpu;
 use crate::layer::{Backward, Layer, Pass, Saved};
 use crate::random::Stream;
 
@@ -41,6 +43,11 @@ impl Layer for Dropout {
             apply(gradient.values.values_mut(), &kept, self.0);
         }
         gradient
+    }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, pass: &mut gpu::Pass<'_>) -> gpu::Flow {
+        pass.drop(input, self.0)
     }
 }
 

@@ -3,6 +3,8 @@
 use super::uniform_by;
 use crate::batch::{Batch, Shape};
 use crate::error::{NetError, Result};
+#[cfg(any(test, feature = "gpu"))]
+use crate::gpu;
 use crate::kernels;
 use crate::layer::{Backward, Layer, Pass, Saved};
 use crate::matrix::Matrix;
@@ -64,6 +66,22 @@ impl Layer for Linear {
         }
         let values = gradient.values.dot(pass.parameters.get(&weight));
         Batch { values, shape: input.shape, lengths: input.lengths }
+    }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, pass: &mut gpu::Pass<'_>) -> gpu::Flow {
+        let (weight, bias) = (format!("{}.weight", self.name), format!("{}.bias", self.name));
+        let weight = pass.parameter(&weight, [self.outputs, self.inputs]).transpose();
+        let bias = pass.parameter(&bias, [1, self.outputs]);
+        match input {
+            gpu::Flow::Vector(x) => gpu::Flow::Vector(x.matmul(weight) + bias),
+            gpu::Flow::Sequence(x, lengths) => {
+                let [items, steps, _] = x.dims();
+                let out = x.reshape([items * steps, self.inputs]).matmul(weight) + bias;
+                gpu::Flow::Sequence(out.reshape([items, steps, self.outputs]), lengths)
+            }
+            gpu::Flow::Image(_) => unreachable!("shapes were checked"),
+        }
     }
 }
 

@@ -14,6 +14,8 @@ mod residual;
 pub use activation::{Relu, Sigmoid, Softmax, softmax};
 pub use attention::Attention;
 pub use batch_norm::BatchNorm;
+#[cfg(any(test, feature = "gpu"))]
+pub(crate) use batch_norm::moved;
 pub use conv::Conv2d;
 pub use dropout::Dropout;
 pub use linear::Linear;

@@ -1,9 +1,13 @@
 //! Pooling over images.
 
+#[cfg(any(test, feature = "gpu"))]
+use burn_tensor::ops::MaxPoolOptions;
 use rayon::prelude::*;
 
 use crate::batch::{Batch, Shape};
 use crate::error::{NetError, Result};
+#[cfg(any(test, feature = "gpu"))]
+use crate::gpu;
 use crate::layer::{Backward, Layer, Pass, Saved};
 use crate::matrix::Matrix;
 
@@ -146,6 +150,15 @@ impl Layer for MaxPool {
             });
         Batch { values, shape, lengths: None }
     }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, _: &mut gpu::Pass<'_>) -> gpu::Flow {
+        let gpu::Flow::Image(x) = input else { unreachable!("shapes were checked") };
+        let (size, stride, padding) = (self.size, self.stride, self.padding);
+        let options =
+            MaxPoolOptions::new([size; 2]).with_stride([stride; 2]).with_padding([padding; 2]);
+        gpu::Flow::Image(burn_tensor::module::max_pool2d(x, options))
+    }
 }
 
 /// The larger number, and whether it is the new one; what is not a number wins.
@@ -216,6 +229,14 @@ impl Layer for FramePool {
         }
         Batch::new(values, shape)
     }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, _: &mut gpu::Pass<'_>) -> gpu::Flow {
+        let gpu::Flow::Image(x) = input else { unreachable!("shapes were checked") };
+        let rows: burn_tensor::Tensor<3> = x.mean_dim(3).squeeze_dim(3);
+        let both = rows.clone().max_dim(2) + rows.mean_dim(2);
+        gpu::Flow::Vector(both.squeeze_dim(2))
+    }
 }
 
 /// The mean of every channel over the whole image.
@@ -254,5 +275,14 @@ impl Layer for AveragePool {
             (0..places).for_each(|_| values.extend_from_slice(&one));
         }
         Batch::new(values, shape)
+    }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, _: &mut gpu::Pass<'_>) -> gpu::Flow {
+        let gpu::Flow::Image(x) = input else { unreachable!("shapes were checked") };
+        let [items, channels, ..] = x.dims();
+        gpu::Flow::Vector(
+            x.reshape([items as i64, channels as i64, -1]).mean_dim(2).squeeze_dim::<2>(2),
+        )
     }
 }

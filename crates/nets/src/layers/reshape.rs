@@ -2,6 +2,8 @@
 
 use crate::batch::{Batch, Shape};
 use crate::error::{NetError, Result};
+#[cfg(any(test, feature = "gpu"))]
+use crate::gpu;
 use crate::layer::{Backward, Layer, Pass, Saved};
 use crate::matrix::Matrix;
 
@@ -32,6 +34,12 @@ impl Layer for Flatten {
         let Saved::Shape(shape, _) = pass.saved() else { unreachable!("flatten saves its shape") };
         Batch::from_channels_first(gradient.values.values(), shape)
     }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, _: &mut gpu::Pass<'_>) -> gpu::Flow {
+        let gpu::Flow::Image(x) = input else { unreachable!("shapes were checked") };
+        gpu::Flow::Vector(x.flatten(1, 3))
+    }
 }
 
 /// Images become vectors pixel by pixel: row, column, channel.
@@ -58,6 +66,12 @@ impl Layer for FlattenPixels {
         let Saved::Shape(shape, _) = pass.saved() else { unreachable!("flatten saves its shape") };
         let rows = gradient.values.rows() * shape.places();
         Batch { values: gradient.values.reshaped(rows, shape.numbers()), shape, lengths: None }
+    }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, _: &mut gpu::Pass<'_>) -> gpu::Flow {
+        let gpu::Flow::Image(x) = input else { unreachable!("shapes were checked") };
+        gpu::Flow::Vector(x.permute([0, 2, 3, 1]).flatten(1, 3))
     }
 }
 
@@ -98,5 +112,14 @@ impl Layer for Join {
         let rows = gradient.values.values().chunks_exact(n);
         let kept = rows.flat_map(|row| &row[..n - self.numbers]).copied().collect();
         Batch::new(kept, Shape::Vector(n - self.numbers))
+    }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, pass: &mut gpu::Pass<'_>) -> gpu::Flow {
+        let gpu::Flow::Vector(x) = input else { unreachable!("shapes were checked") };
+        let gpu::Flow::Vector(added) = pass.others[self.other].clone() else {
+            unreachable!("appends vectors")
+        };
+        gpu::Flow::Vector(burn_tensor::Tensor::cat(vec![x, added], 1))
     }
 }

@@ -2,6 +2,8 @@
 
 use crate::batch::{Batch, Shape};
 use crate::error::{NetError, Result};
+#[cfg(any(test, feature = "gpu"))]
+use crate::gpu;
 use crate::kernels;
 use crate::layer::{Backward, Chain, Layer, Pass, kept_by};
 use crate::parameters::Declared;
@@ -60,5 +62,11 @@ impl Layer for Residual {
             kernels::add(main.values.values_mut(), short.values.values());
         }
         main
+    }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, pass: &mut gpu::Pass<'_>) -> gpu::Flow {
+        let short = pass.chain(&self.shortcut, input.clone());
+        pass.chain(&self.main, input).zip(short, |main, short| main + short)
     }
 }

@@ -2,6 +2,7 @@
 
 use corsmal_nets::NetError;
 use corsmal_nets::cross_validation::{Data, FoldItems, cross_validate, watched};
+use corsmal_nets::device::Device;
 use corsmal_nets::fit::{Task, fit, probabilities};
 use corsmal_nets::items::{Column, Items};
 use corsmal_nets::networks;
@@ -27,7 +28,14 @@ fn recipe(epochs: usize, select: Select) -> Recipe {
 fn the_lowest_loss_on_a_fifth_of_the_training_rows_chooses_the_epoch() {
     let (items, classes) = noise(36);
     let definition = networks::named("m1").unwrap();
-    let data = Data { items: &items, classes: &classes, n_classes: 3, groups: None, weights: None };
+    let data = Data {
+        items: &items,
+        classes: &classes,
+        n_classes: 3,
+        groups: None,
+        weights: None,
+        device: &Device::Cpu,
+    };
     let fold = FoldItems { name: "f".into(), train: (0..30).collect(), test: (30..36).collect() };
     let recipes = |epochs| recipe(epochs, Select::Split);
     let (train, held, group) = watched(data, &fold, &recipes(5)).unwrap();
@@ -65,7 +73,14 @@ fn the_lowest_loss_on_a_fifth_of_the_training_rows_chooses_the_epoch() {
 #[test]
 fn a_fifth_of_too_few_rows_is_refused() {
     let (items, classes) = noise(6);
-    let data = Data { items: &items, classes: &classes, n_classes: 3, groups: None, weights: None };
+    let data = Data {
+        items: &items,
+        classes: &classes,
+        n_classes: 3,
+        groups: None,
+        weights: None,
+        device: &Device::Cpu,
+    };
     let fold = FoldItems { name: "f".into(), train: (0..6).collect(), test: vec![] };
     let error = watched(data, &fold, &recipe(1, Select::Split)).unwrap_err();
     assert!(matches!(&error, NetError::Targets(text) if text.contains("must have 3")), "{error}");

@@ -8,6 +8,7 @@ use corsmal_files::npz::{Compression, NpzWriter};
 use corsmal_nets::NetError;
 use corsmal_nets::cross_validation::{Data, FoldItems, cross_validate};
 use corsmal_nets::dataset::Dataset;
+use corsmal_nets::device::Device;
 use corsmal_nets::fit::{History, Task, fit, labels, probabilities};
 use corsmal_nets::items::{Column, Items};
 use corsmal_nets::loss::{Loss, Targets};
@@ -167,7 +168,14 @@ fn folds_are_scored_on_what_they_hold_out() {
     let definition = networks::named("m3_mlp").unwrap();
     let run = |select: &str, groups: Option<&[String]>| {
         let recipe = recipe(json!({"epochs": 2, "batch": 3, "lr": 1e-4, "select": select}));
-        let data = Data { items: &items, classes: &classes, n_classes: 3, groups, weights: None };
+        let data = Data {
+            items: &items,
+            classes: &classes,
+            n_classes: 3,
+            groups,
+            weights: None,
+            device: &Device::Cpu,
+        };
         cross_validate(definition, data, &folds, &recipe, None, accuracy, |_, _| true)
     };
     let found = run("validation", Some(&groups)).unwrap();
@@ -225,6 +233,7 @@ fn a_model_file_gives_back_the_network() {
         labels: vec!["a".into(), "b".into(), "c".into()],
         target: "level".into(),
         recipe,
+        gpu: None,
         history,
         feature_config: Value::Null,
         provenance: json!({"rows": 6}),

@@ -2,11 +2,15 @@
 
 mod geometry;
 
+#[cfg(any(test, feature = "gpu"))]
+use burn_tensor::ops::ConvOptions;
 use rayon::prelude::*;
 
 use super::uniform_by;
 use crate::batch::{Batch, Shape};
 use crate::error::{NetError, Result};
+#[cfg(any(test, feature = "gpu"))]
+use crate::gpu;
 use crate::kernels;
 use crate::layer::{Backward, Layer, Pass, Saved};
 use crate::layers::linear::column;
@@ -266,5 +270,15 @@ impl Layer for Conv2d {
             Some(values) => Batch { values, shape: input.shape, lengths: None },
             None => gradient,
         }
+    }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, pass: &mut gpu::Pass<'_>) -> gpu::Flow {
+        let gpu::Flow::Image(x) = input else { unreachable!("shapes were checked") };
+        let shape = [self.outputs, self.inputs, self.kernel.0, self.kernel.1];
+        let weight = pass.parameter(&self.key("weight"), shape);
+        let bias = self.bias.then(|| pass.parameter(&self.key("bias"), [self.outputs]));
+        let options = ConvOptions::new([self.stride; 2], [self.padding; 2], [1; 2], 1);
+        gpu::Flow::Image(burn_tensor::module::conv2d(x, weight, bias, options))
     }
 }

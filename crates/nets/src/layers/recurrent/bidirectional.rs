@@ -1,10 +1,14 @@
 //! A recurrent layer in both directions.
 
+#[cfg(any(test, feature = "gpu"))]
+use super::on_gpu;
 use super::packing::Packing;
 use super::trace::{LayerTrace, Trace};
 use super::{Layer, Recurrent};
 use crate::batch::{Batch, Shape};
 use crate::error::{NetError, Result};
+#[cfg(any(test, feature = "gpu"))]
+use crate::gpu;
 use crate::kernels;
 use crate::layer::{Backward, Pass, Saved};
 use crate::matrix::Matrix;
@@ -96,6 +100,12 @@ impl Layer for Bidirectional {
         kernels::add(sum.values_mut(), packing.reversed(&by_back).values());
         let values = packing.unpack(sum.values(), self.ahead.inputs);
         Batch { values, shape: trace.shape, lengths: trace.lengths }
+    }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, pass: &mut gpu::Pass<'_>) -> gpu::Flow {
+        let [ahead, back] = self.directions();
+        on_gpu::both(ahead, back, input, pass)
     }
 }
 

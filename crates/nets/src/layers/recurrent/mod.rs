@@ -7,12 +7,16 @@
 
 mod bidirectional;
 mod cell;
+#[cfg(any(test, feature = "gpu"))]
+mod on_gpu;
 mod packing;
 mod trace;
 
 use super::uniform_by;
 use crate::batch::{Batch, Shape};
 use crate::error::{NetError, Result};
+#[cfg(any(test, feature = "gpu"))]
+use crate::gpu;
 use crate::kernels;
 use crate::layer::{Backward, Layer, Pass, Saved};
 use crate::layers::dropout;
@@ -231,5 +235,10 @@ impl Layer for Recurrent {
         }
         let values = packing.unpack(values.values(), self.inputs);
         Batch { values, shape: trace.shape, lengths: trace.lengths }
+    }
+
+    #[cfg(any(test, feature = "gpu"))]
+    fn on_gpu(&self, input: gpu::Flow, pass: &mut gpu::Pass<'_>) -> gpu::Flow {
+        self.last_on_gpu(input, pass)
     }
 }
