@@ -5,24 +5,48 @@ use std::collections::VecDeque;
 use ndarray::{Array1, ArrayView1, ArrayViewMut1};
 
 /// When to stop.
-pub(crate) struct Stopping {
-    /// largest absolute component of the gradient
+pub(crate) struct Stopping<S> {
+    /// how far a gradient is from that of a minimum
+    pub slope: S,
+    /// the slope that is near enough
     pub tol: f64,
     /// most steps
     pub max_iter: usize,
+}
+
+/// Why the search stopped.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum End {
+    /// the slope is near enough
+    Converged,
+    /// rounding hides what further steps would gain
+    Stalled,
+    /// after the most steps
+    OutOfSteps,
+}
+
+/// Where the search stopped.
+pub(crate) struct Minimum {
+    pub x: Array1<f64>,
+    pub gradient: Array1<f64>,
+    pub end: End,
+    /// steps taken
+    pub steps: usize,
 }
 
 /// Pairs of steps and gradient changes remembered.
 const MEMORY: usize = 10;
 const SUFFICIENT: f64 = 1e-4;
 const CURVATURE: f64 = 0.9;
+/// Steps in a row that gain no more than rounding.
+const STALLED: usize = 5;
 
 /// Minimises `f`, which returns the value and writes the gradient.
 pub(crate) fn minimise(
     start: Array1<f64>,
-    stopping: &Stopping,
+    stopping: &Stopping<impl Fn(ArrayView1<'_, f64>) -> f64>,
     mut f: impl FnMut(ArrayView1<'_, f64>, ArrayViewMut1<'_, f64>) -> f64,
-) -> Array1<f64> {
+) -> Minimum {
     let mut evaluate = |x: Array1<f64>| {
         let mut gradient = Array1::zeros(x.len());
         let value = f(x.view(), gradient.view_mut());
@@ -30,9 +54,16 @@ pub(crate) fn minimise(
     };
     let mut now = evaluate(start);
     let mut memory: VecDeque<(Array1<f64>, Array1<f64>)> = VecDeque::with_capacity(MEMORY);
-    for _ in 0..stopping.max_iter {
-        if now.gradient.iter().all(|g| g.abs() <= stopping.tol) {
-            break;
+    let (mut steps, mut idle) = (0, 0);
+    let end = loop {
+        if (stopping.slope)(now.gradient.view()) <= stopping.tol {
+            break End::Converged;
+        }
+        if idle == STALLED {
+            break End::Stalled;
+        }
+        if steps == stopping.max_iter {
+            break End::OutOfSteps;
         }
         let mut direction = towards(&now.gradient, &memory);
         if direction.dot(&now.gradient) >= 0.0 {
@@ -41,7 +72,11 @@ pub(crate) fn minimise(
         }
         let length = now.gradient.dot(&now.gradient).sqrt();
         let first = if memory.is_empty() { (1.0 / length).min(1.0) } else { 1.0 };
-        let Some(next) = line_search(&now, &direction, first, &mut evaluate) else { break };
+        let Some(next) = line_search(&now, &direction, first, &mut evaluate) else {
+            break End::Stalled;
+        };
+        let gained = now.value - next.value > f64::EPSILON * now.value.abs();
+        idle = if gained { 0 } else { idle + 1 };
         let (step, change) = (&next.x - &now.x, &next.gradient - &now.gradient);
         if step.dot(&change) > f64::EPSILON * change.dot(&change) {
             if memory.len() == MEMORY {
@@ -50,8 +85,9 @@ pub(crate) fn minimise(
             memory.push_back((step, change));
         }
         now = next;
-    }
-    now.x
+        steps += 1;
+    };
+    Minimum { x: now.x, gradient: now.gradient, end, steps }
 }
 
 struct Point {

@@ -214,3 +214,46 @@ fn trees_answer_for_rows_they_have_not_seen() {
     let refused = ClassifierSpec::new("et", &key_values(&["oob_score=true"]).unwrap());
     assert!(refused.unwrap_err().to_string().contains("bootstrap=true"));
 }
+
+#[test]
+fn logistic_regression_finds_the_same_in_any_unit() {
+    let (x, y) = clouds(90, 4, 3, 5);
+    let of = |x: &Array2<f64>, settings: &[&str]| {
+        let model = spec("logistic", settings).train(x.view(), &y, 3).unwrap();
+        model.predict_proba(x.view()).unwrap()
+    };
+    // A weak penalty, so that units hardly matter to the minimum either.
+    let weak = ["C=1e16"];
+    let expected = of(&x, &weak);
+    for (unit, shift) in [(1e4, 0.0), (1e-4, 0.0), (1e7, 3e9), (1e-2, 50.0)] {
+        let mut other = &x * unit + shift;
+        other.column_mut(0).mapv_inplace(|v| v / unit);
+        let found = of(&other, &weak);
+        for (found, expected) in found.iter().zip(&expected) {
+            assert!((found - expected).abs() < 1e-3, "{unit}: {found} for {expected}");
+        }
+    }
+    // Large features leave no penalty to speak of: rows that can be told apart are.
+    let mut apart = x.clone();
+    apart.column_mut(1).iter_mut().zip(&y).for_each(|(v, &class)| *v += 9.0 * class as f64);
+    for unit in [1.0, 1e7, 1e10, 1e100] {
+        let x = &apart * unit;
+        let model = spec("logistic", &[]).train(x.view(), &y, 3).unwrap();
+        assert_eq!(model.predict(x.view()).unwrap(), y, "{unit}");
+    }
+}
+
+#[test]
+fn logistic_regression_that_finds_no_minimum_is_refused() {
+    let (x, y) = clouds(90, 4, 3, 5);
+    let refusal = |x: &Array2<f64>, settings: &[&str]| {
+        let model = spec("logistic", settings).train(x.view(), &y, 3);
+        model.map(|_| ()).unwrap_err().to_string()
+    };
+    let few = refusal(&x, &["max_iter=2"]);
+    assert!(few.contains("no minimum found: the largest slope is"), "{few}");
+    assert!(few.contains("after 2 steps, tol is 1e-8; standardise the features"), "{few}");
+    assert!(spec("logistic", &["max_iter=2", "tol=1"]).train(x.view(), &y, 3).is_ok());
+    let huge = refusal(&(&x * 1e300), &[]);
+    assert!(huge.contains("standardise the features first"), "{huge}");
+}

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Classify, Train};
 use crate::error::{ModelError, Result};
-use crate::lbfgs;
+use crate::lbfgs::{self, End};
 use crate::params::{ClassWeight, Parameters, parameters};
 
 parameters! {
@@ -69,24 +69,32 @@ impl LogisticParams {
         if let Some(weights) = weights {
             row_weights.iter_mut().zip(weights).for_each(|(row, weight)| *row *= weight);
         }
-        let objective = Objective {
-            x,
-            y,
-            penalty: 1.0 / self.C / row_weights.iter().sum::<f64>(),
-            total: row_weights.iter().sum(),
-            row_weights,
-            outputs,
-        };
+        let total: f64 = row_weights.iter().sum();
+        let penalty = 1.0 / self.C / total;
+        let scale = Scale::of(x, &row_weights, penalty).ok_or_else(too_large)?;
+        let objective = Objective { x, y, row_weights, total, penalty, outputs, scale };
         let start = Array1::zeros(outputs * (x.ncols() + 1));
-        let stopping = lbfgs::Stopping { tol: self.tol, max_iter: self.max_iter };
+        let slope = |gradient: ArrayView1<'_, f64>| objective.slope(gradient);
+        let stopping = lbfgs::Stopping { slope, tol: self.tol, max_iter: self.max_iter };
         let found = lbfgs::minimise(start, &stopping, |at, gradient| objective.at(at, gradient));
-        if !found.iter().all(|v| v.is_finite()) {
+        let scaled = largest(found.gradient.iter().copied());
+        let near = if found.end == End::Stalled { self.tol.max(ROUNDING) } else { self.tol };
+        let weights = objective.unscaled(found.x);
+        if !weights.iter().all(|v| v.is_finite()) {
+            return Err(too_large());
+        }
+        // Where features are large, rounding alone makes slopes by their weights.
+        if found.end != End::Converged && !(scaled <= near) {
+            let (steps, slope, tol) = (found.steps, slope(found.gradient.view()), self.tol);
             return Err(ModelError::Numerical {
                 owner: Self::OWNER,
-                reason: "the weights overflowed: standardise the features first".into(),
+                reason: format!(
+                    "no minimum found: the largest slope is {slope:.1e} after {steps} steps, tol is \
+                     {tol:.0e}; standardise the features, or raise max_iter or tol"
+                ),
             });
         }
-        let table = found
+        let table = weights
             .into_shape_with_order((outputs, x.ncols() + 1))
             .map_err(|e| ModelError::Inconsistent(e.to_string()))?;
         Ok(Logistic {
@@ -97,7 +105,38 @@ impl LogisticParams {
     }
 }
 
-/// Mean loss plus penalty, as a function of `[outputs, features + 1]` (intercept last).
+/// A slope of the mean loss, over features of unit deviation, that rounding may leave.
+const ROUNDING: f64 = 1e-6;
+
+/// Coordinates in which every feature matters alike, so that the search needs few steps whatever the features'
+/// units: weights times `deviations`, the intercept where features are `means`.
+struct Scale {
+    means: Array1<f64>,
+    deviations: Array1<f64>,
+}
+
+impl Scale {
+    /// `None` when features are too large for their squares.
+    fn of(x: ArrayView2<'_, f64>, row_weights: &[f64], penalty: f64) -> Option<Self> {
+        let total: f64 = row_weights.iter().sum();
+        let mean = |column: ArrayView1<'_, f64>| {
+            column.iter().zip(row_weights).map(|(v, w)| w / total * v).sum::<f64>()
+        };
+        let means: Array1<f64> = x.columns().into_iter().map(mean).collect();
+        let deviation = |(column, &mean): (ArrayView1<'_, f64>, &f64)| {
+            let squares =
+                column.iter().zip(row_weights).map(|(v, w)| w / total * (v - mean).powi(2));
+            // The penalty bends the loss as data of this variance would.
+            let deviation = (squares.sum::<f64>() + 4.0 * penalty).sqrt();
+            if deviation > 0.0 { deviation } else { 1.0 }
+        };
+        let deviations: Array1<f64> = x.columns().into_iter().zip(&means).map(deviation).collect();
+        let finite = means.iter().chain(&deviations).all(|v| v.is_finite());
+        finite.then_some(Self { means, deviations })
+    }
+}
+
+/// Mean loss plus penalty, as a function of `[outputs, features + 1]` (intercept last) in the coordinates of `scale`.
 struct Objective<'a, 'y> {
     x: ArrayView2<'a, f64>,
     y: &'y [usize],
@@ -105,15 +144,34 @@ struct Objective<'a, 'y> {
     total: f64,
     penalty: f64,
     outputs: usize,
+    scale: Scale,
 }
 
 impl Objective<'_, '_> {
+    fn table<'t>(&self, flat: ArrayView1<'t, f64>) -> ArrayView2<'t, f64> {
+        let shape = (self.outputs, self.x.ncols() + 1);
+        flat.into_shape_with_order(shape).expect("the shape minimised over")
+    }
+
+    /// In the coordinates of the features.
+    fn unscaled(&self, at: Array1<f64>) -> Array1<f64> {
+        let features = self.x.ncols();
+        let mut table = self.table(at.view()).to_owned();
+        for mut row in table.rows_mut() {
+            let (mut weights, mut intercept) = row.view_mut().split_at(Axis(0), features);
+            weights /= &self.scale.deviations;
+            intercept[0] -= weights.dot(&self.scale.means);
+        }
+        table.into_iter().collect()
+    }
+
     fn at(&self, at: ArrayView1<'_, f64>, mut gradient: ArrayViewMut1<'_, f64>) -> f64 {
         let features = self.x.ncols();
-        let shape = (self.outputs, features + 1);
-        let table = at.to_shape(shape).expect("the shape minimised over");
-        let weights = table.slice(s![.., ..features]);
-        let mut scores = self.x.dot(&weights.t()) + table.column(features);
+        let Scale { means, deviations } = &self.scale;
+        let table = self.table(at);
+        let weights = &table.slice(s![.., ..features]) / deviations;
+        let intercepts = &table.column(features) - &weights.dot(means);
+        let mut scores = self.x.dot(&weights.t()) + intercepts;
         let mut loss = 0.0;
         for ((mut row, &class), weight) in
             scores.outer_iter_mut().zip(self.y).zip(&self.row_weights)
@@ -122,13 +180,37 @@ impl Objective<'_, '_> {
             loss += weight * slopes(row.view_mut(), class);
             row *= weight / self.total;
         }
-        let mut slope = Array2::zeros(shape);
-        slope.slice_mut(s![.., ..features]).assign(&scores.t().dot(&self.x));
-        slope.slice_mut(s![.., ..features]).scaled_add(self.penalty, &weights);
-        slope.column_mut(features).assign(&scores.sum_axis(Axis(0)));
+        let mut slope = Array2::zeros((self.outputs, features + 1));
+        let by_intercepts = scores.sum_axis(Axis(0));
+        let mut by_weights = scores.t().dot(&self.x);
+        for (mut row, by_intercept) in by_weights.rows_mut().into_iter().zip(&by_intercepts) {
+            row.scaled_add(-by_intercept, means);
+        }
+        by_weights.scaled_add(self.penalty, &weights);
+        by_weights /= deviations;
+        slope.slice_mut(s![.., ..features]).assign(&by_weights);
+        slope.column_mut(features).assign(&by_intercepts);
         gradient.iter_mut().zip(&slope).for_each(|(to, &from)| *to = from);
         loss / self.total + 0.5 * self.penalty * weights.iter().map(|w| w * w).sum::<f64>()
     }
+
+    /// The largest slope by a weight or an intercept.
+    fn slope(&self, gradient: ArrayView1<'_, f64>) -> f64 {
+        let features = self.x.ncols();
+        let Scale { means, deviations } = &self.scale;
+        let of_row = |row: ArrayView1<'_, f64>| {
+            let by_intercept = row[features];
+            let own = row.into_iter().zip(deviations).zip(means);
+            let by_weights = own.map(|((g, d), m)| g * d + m * by_intercept);
+            largest(by_weights.chain([by_intercept]))
+        };
+        largest(self.table(gradient).rows().into_iter().map(of_row))
+    }
+}
+
+/// The largest size among numbers; what is not a number wins.
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.map(f64::abs).fold(0.0, |most, v| if v > most || v.is_nan() { v } else { most })
 }
 
 /// Loss of one row; its scores are replaced by the loss's derivatives.
@@ -157,6 +239,13 @@ fn soften(mut scores: ArrayViewMut1<'_, f64>) -> (f64, f64) {
     let sum = scores.sum();
     scores /= sum;
     (top, sum)
+}
+
+fn too_large() -> ModelError {
+    ModelError::Numerical {
+        owner: LogisticParams::OWNER,
+        reason: "the weights overflowed: standardise the features first".into(),
+    }
 }
 
 fn overflow() -> ModelError {
