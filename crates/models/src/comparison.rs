@@ -140,6 +140,8 @@ pub struct Comparison {
     pub resamples: usize,
     /// its seed
     pub seed: u64,
+    /// names of the classes, in the order of the scores
+    pub labels: Labels,
 }
 
 /// One of two files.
@@ -185,16 +187,16 @@ pub fn compare(
                 row.key.0, other_truth[at]
             )));
         }
-        // A class that no row has stands for no prediction.
         let name = |table: &PredictionTable, class: Option<usize>| {
-            class.map_or(String::new(), |class| table.labels[class].clone())
+            class.map(|class| table.labels[class].clone())
         };
         a.push(name(first, row.class));
         b.push(name(second, second.rows[at].class));
     }
     let truth: Vec<String> = truth.into_iter().map(String::from).collect();
     let number = |text: &String| text.parse::<f64>().ok().filter(|value| value.is_finite());
-    let mut all = truth.iter().chain(&a).chain(&b).filter(|text| !text.is_empty());
+    let predicted = a.iter().chain(&b).flatten();
+    let mut all = truth.iter().chain(predicted.clone());
     if all.clone().all(|text| number(text).is_some())
         && all.any(|text| number(text).is_some_and(|value| value.fract() != 0.0))
     {
@@ -202,13 +204,25 @@ pub fn compare(
                       errors of each file";
         return Err(first.content(reason));
     }
-    let (labels, all) = Labels::of(&[&truth[..], &a, &b].concat());
-    let (truth, rest) = all.split_at(truth.len());
-    let (a, b) = rest.split_at(truth.len());
-    let refuse = |e: ModelError| first.model(e);
-    let scores = |p: &[usize], path: String| {
-        Scores::new(truth, p, labels.len()).map(|scores| Compared { path, scores })
+    let named: Vec<&String> = truth.iter().chain(predicted).collect();
+    let (labels, all) = Labels::of(&named);
+    let truth = &all[..truth.len()];
+    let mut named = all[truth.len()..].iter().copied();
+    let mut classes = |of: &[Option<String>]| -> Vec<Option<usize>> {
+        of.iter().map(|name| name.as_ref().and_then(|_| named.next())).collect()
     };
+    let (a, b) = (classes(&a), classes(&b));
+    let refuse = |e: ModelError| first.model(e);
+    let scores = |p: &[Option<usize>], path: String| {
+        Scores::with_unknown(truth, p.iter().copied(), labels.len())
+            .map(|scores| Compared { path, scores })
+    };
+    let (one_scores, two_scores) = (scores(&a, one.to_string()), scores(&b, two.to_string()));
+    // To the tests, a class that no row has stands for no prediction.
+    let all = |p: Vec<Option<usize>>| -> Vec<usize> {
+        p.into_iter().map(|class| class.unwrap_or(labels.len())).collect()
+    };
+    let (a, b) = (&all(a)[..], &all(b)[..]);
     let (folds, others) = (first.column("fold"), second.column("fold"));
     let folds_differ = match (&folds, &others) {
         (Some(folds), Some(others)) => {
@@ -223,8 +237,8 @@ pub fn compare(
     let by_fold = foldwise.then(|| bootstrap(truth, a, b, Some(&folds), resamples, seed));
     Ok(Comparison {
         rows: truth.len(),
-        first: scores(a, one.to_string()).map_err(refuse)?,
-        second: scores(b, two.to_string()).map_err(refuse)?,
+        first: one_scores.map_err(refuse)?,
+        second: two_scores.map_err(refuse)?,
         mcnemar: mcnemar(truth, a, b).map_err(refuse)?,
         bootstrap_rows: bootstrap::<&str>(truth, a, b, None, resamples, seed).map_err(refuse)?,
         bootstrap_folds: by_fold.transpose().map_err(refuse)?,
@@ -232,6 +246,7 @@ pub fn compare(
         folds_differ,
         resamples,
         seed,
+        labels,
     })
 }
 

@@ -1,6 +1,9 @@
 //! Submissions, models and pictures beside the report.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::fs::{DirEntry, Metadata};
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use corsmal_models::labels::Labels;
 use corsmal_models::model_file::{Model, ModelHeader};
@@ -16,14 +19,49 @@ use crate::dataset::{Filling, Subset};
 use crate::error::{CcmError, Result};
 use crate::submission::{Format, RowKey, Submission, pseudo_random};
 
-/// Makes the folders, so that a wrong path fails before the work.
-pub(super) fn prepare(out: &Path) -> Result<()> {
+/// Files of a run before, with the time at which each was written.
+pub(super) struct Earlier(BTreeMap<PathBuf, SystemTime>);
+
+/// Folders of results.
+const RESULTS: [&str; 4] = ["submissions", "models", "figures", "tables"];
+
+/// Makes the folders, so that a wrong path fails before the work, and notes what is in them.
+pub(super) fn prepare(out: &Path) -> Result<Earlier> {
     for folder in ["features", "submissions", "models", "figures"] {
         let path = out.join(folder);
         std::fs::create_dir_all(&path).map_err(|e| CcmError::io(&path, e))?;
     }
-    Ok(())
+    Ok(Earlier::of(out))
 }
+
+impl Earlier {
+    fn of(out: &Path) -> Self {
+        let folders = RESULTS.iter().filter_map(|folder| out.join(folder).read_dir().ok());
+        let written = |file: DirEntry| {
+            let about = file.metadata().ok().filter(Metadata::is_file)?;
+            Some((file.path(), about.modified().ok()?))
+        };
+        Self(folders.flatten().flatten().filter_map(written).collect())
+    }
+
+    /// Says which of them this run has not written, as names below the output folder.
+    pub(super) fn caution(&self, out: &Path) -> Option<String> {
+        let now = Self::of(out);
+        let same = |(path, written): &(&PathBuf, &SystemTime)| now.0.get(*path) == Some(*written);
+        let left =
+            self.0.iter().filter(same).map(|(path, _)| path.strip_prefix(out).unwrap_or(path));
+        let left: Vec<String> = left.map(|path| path.display().to_string()).collect();
+        let named = left.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+        match left.len() {
+            0 => None,
+            count @ 1..=NAMED => Some(format!("{count} files are not of this run: {named}")),
+            count => Some(format!("{count} files are not of this run: {named}, …")),
+        }
+    }
+}
+
+/// Most files that are named.
+const NAMED: usize = 10;
 
 /// Writes the submissions of a baseline.
 pub(super) fn write_outcome(out: &Path, outcome: &BaselineResult, rows: &Rows) -> Result<()> {

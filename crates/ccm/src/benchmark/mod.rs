@@ -149,7 +149,7 @@ pub fn run(
     let cautions: Vec<String> =
         options.capacities.iter().filter_map(CapacityTable::caution).collect();
     cautions.iter().for_each(|caution| progress(caution));
-    files::prepare(&options.out)?;
+    let earlier = files::prepare(&options.out)?;
     let jobs = options.jobs;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build();
     let pool = pool.map_err(|e| CcmError::Request(format!("{jobs} threads: {e}")))?;
@@ -182,6 +182,9 @@ pub fn run(
         report::report(&set, &rows, &predicted, seed, made)
     })?;
     report.write(&options.out)?;
+    if let Some(caution) = earlier.caution(&options.out) {
+        progress(&format!("warning: {}: {caution}", options.out.display()));
+    }
     Ok(report)
 }
 

@@ -72,8 +72,8 @@ impl Submission {
         for (name, column) in [("type", &submission.kind), ("level", &submission.level)] {
             if column.float && column.addressed() {
                 submission.notes.push(format!(
-                    "filling {name} is written as floating-point numbers; the official evaluators \
-                     compare labels as text, where '1.0' never equals '1'"
+                    "filling {name} is written as floating-point numbers; by the rules of the \
+                     official evaluators labels are compared as text, where '1.0' never equals '1'"
                 ));
             }
         }
@@ -203,8 +203,7 @@ fn read_estimates(table: &Table, name: &str, labels: bool) -> Result<Estimates> 
                 ));
             }
         }
-        estimates.float |=
-            !table.text(row, column).bytes().all(|b| b.is_ascii_digit() || b == b'-');
+        estimates.float |= table.text(row, column).parse::<i64>().is_err();
         estimates.values.push(value);
     }
     Ok(estimates)
@@ -256,5 +255,9 @@ mod tests {
         assert_eq!(s.notes.len(), 1);
         let s = submission(&format!("{HEADER}1,0,-1.0,1,9.5\n")).unwrap();
         assert!(s.notes.is_empty());
+        // pandas reads these as whole numbers.
+        let s = submission(&format!("{HEADER}1,0,+1,02,9.5\n")).unwrap();
+        assert!(!s.kind.float && !s.level.float);
+        assert_eq!((s.kind.values[0], s.level.values[0]), (1.0, 2.0));
     }
 }

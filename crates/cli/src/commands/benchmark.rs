@@ -264,7 +264,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let quiet = args.quiet;
     let stop = crate::interrupt::flag();
     let progress = |step: &str| {
-        if !quiet {
+        if !quiet || step.starts_with("warning: ") {
             eprintln!("{step}");
         }
     };

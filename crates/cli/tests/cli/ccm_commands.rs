@@ -34,6 +34,16 @@ fn from_synthetic_recordings_to_the_report() {
     assert!(lines(&reported.stdout).contains("SYNTHETIC"));
     assert!(out.join("report.html").exists());
 
+    // Files of a run before stay, and are named.
+    let again =
+        run(&["benchmark", "--data", data, "--out", out_dir, "-q", "--baselines", names[1]]);
+    let said = lines(&again.stderr);
+    assert!(
+        again.status.success() && said.contains("files are not of this run: models/"),
+        "{said}"
+    );
+    assert!(said.contains("models/zcr-mfcc-knn-") && !said.contains("zcr-mfcc-rf"), "{said}");
+
     // Its models take recordings, its features are training files.
     let (model, folder) =
         (out.join("models/zcr-mfcc-rf-corrected.model"), format!("{data}/train/2"));

@@ -105,6 +105,17 @@ fn submissions_are_checked_before_they_are_written() {
     assert_eq!(lines[1], zero);
     assert!(lines[2].starts_with("1,-1,-1,-1,0.100000,0.200000,0.600000,0.100000,2,0.100000"));
     std::fs::remove_file(&out).unwrap();
+    // Levels were taken for types in silence.
+    put("numbers.csv", "Object,Sequence,p0,p1,p2\n1,0,0.5,0.4,0.1\n1,1,0.2,0.4,0.4\n");
+    let numbers = at("numbers.csv");
+    let to = ["--format", "2020", "--out", text(&out)];
+    let said = |task| {
+        let output = run(&[&["fuse", task, text(&numbers)], &to[..]].concat());
+        std::fs::remove_file(&out).unwrap();
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    assert!(said("--type").contains("is this a table of levels?"));
+    assert!(!said("--level").contains("table of levels"));
     for (extra, message) in [
         (&["--format", "2020"][..], "id 0 does not fit this format"),
         (&["--format", "2022", "--part", "public"], "missing rows: id 2"),

@@ -119,6 +119,29 @@ fn numbers_are_not_compared_as_classes() {
     assert!(message.contains("score --numeric"), "{message}");
 }
 
+/// They made a class without a name, which lowered macro F1.
+#[test]
+fn lines_without_a_prediction_are_compared_as_score_counts_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let one = put("1.csv", "id,true,predicted\n1,x,x\n2,y,y\n3,x,y\n4,y,y\n5,x,x\n");
+    let two = put("2.csv", "id,true,predicted\n5,x,y\n1,x,y\n2,y,y\n3,x,x\n4,y,\n");
+    let compared = done(&["compare-predictions", text(&one), text(&two), "--json"]);
+    let compared: Value = serde_json::from_str(&compared).unwrap();
+    assert_eq!(compared["labels"], serde_json::json!(["x", "y"]));
+    let scored = done(&["score", text(&two), "--json"]);
+    let scored: Value = serde_json::from_str(&scored).unwrap();
+    for what in ["accuracy", "weighted_f1", "macro_f1", "classes", "confusion", "unknown"] {
+        assert_eq!(compared["second"]["scores"][what], scored["scores"][what], "{what}");
+    }
+    assert_eq!(scored["scores"]["unknown"], serde_json::json!([0, 1]));
+    assert_eq!(compared["mcnemar"]["only_first"], 3);
+}
+
 /// Label columns of these names hid the ids.
 #[test]
 fn ids_name_recordings_before_container_and_sequence_do() {

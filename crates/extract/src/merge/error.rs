@@ -38,6 +38,12 @@ pub enum MergeError {
         /// The output or its ledger.
         path: PathBuf,
     },
+    /// The result would take the place of a shard.
+    #[error("{path} is one of the shards: give the merged output another name")]
+    IsShard {
+        /// The output.
+        path: PathBuf,
+    },
     /// The result must have another name.
     #[error(transparent)]
     Name(#[from] FormatError),

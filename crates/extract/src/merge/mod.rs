@@ -67,6 +67,9 @@ pub fn merge(
 ) -> Result<(), MergeError> {
     let mut format = OutputFormat::of_name(out, Compression::Stored)?;
     let out = &draft::destination(out);
+    if shards.iter().any(|shard| shard == out || draft::same(shard, out)) {
+        return Err(MergeError::IsShard { path: out.clone() });
+    }
     let pending = Ledger::is_pending(out).then(|| ledger_path(out));
     let taken = if out.exists() { Some(out.clone()) } else { pending };
     match (taken, existing) {
@@ -282,6 +285,23 @@ mod tests {
             Merge { ledger, shards: &pieces, provenance: &provenance, format, stop: &GO };
         let refused = merge.write(Vec::new()).unwrap_err();
         assert!(refused.to_string().contains("0.npz was changed"), "{refused}");
+    }
+
+    /// The merged file took the place of shard 0, which then no merge could use.
+    #[test]
+    fn a_shard_is_no_output() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let shards: Vec<PathBuf> = (0..2).map(|i| path(&format!("{i}.npz"))).collect();
+        for (index, file) in shards.iter().enumerate() {
+            shard(file, Compression::Stored, Shard { index, count: 2 });
+        }
+        let other_name = folder.path().join(".").join("1.npz");
+        for out in [&shards[0], &other_name] {
+            let error = merge(&shards, out, Existing::Overwrite, &GO).unwrap_err();
+            assert!(error.to_string().contains("is one of the shards"), "{error}");
+        }
+        merge(&shards, &path("out.npz"), Existing::Keep, &GO).unwrap();
     }
 
     #[test]

@@ -23,6 +23,9 @@ pub fn merge(
     existing: Existing,
     stop: &Arc<AtomicBool>,
 ) -> Result<(), MergeError> {
+    if shards.iter().any(|shard| shard == out) {
+        return Err(MergeError::IsShard { path: out.into() });
+    }
     // Apart from an output of `extract` that has not reached its store.
     let stored = StoredOutput::of(out, work, None)?.map(|stored| stored.kept_apart("merged"));
     if let Some(stored) = &stored

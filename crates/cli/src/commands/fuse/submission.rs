@@ -29,6 +29,13 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
     let joint = fused(&args.joint, &args.weights)?;
     let kind = fused(&args.kind, &args.type_weights)?;
     let level = fused(&args.level, &args.level_weights)?;
+    for table in kind.iter().filter(|table| table.labels == ["0", "1", "2"]) {
+        eprintln!(
+            "warning: {}: the classes of the type are 0, 1 and 2, without 3 (water): is this a \
+             table of levels?",
+            table.path.display()
+        );
+    }
     let rule = match (options.feasible, options.dry_boxes) {
         (false, _) => Rule::Separate,
         (true, false) => Rule::Joint,
