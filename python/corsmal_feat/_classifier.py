@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import size
+from ._class_labels import class_labels, label_kind, require_kept
 from ._fingerprints import Fingerprints, check_rows, fingerprints
 from ._refusals import existing, place
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
@@ -102,7 +103,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
             raise ParameterError(
                 f"{owner} needs at least 2 classes, but y has only one class, {classes[0]!r}"
             )
-        provenance = {"rows": len(x), "rows_per_class": counts, "label_kind": classes.dtype.kind}
+        provenance = {"rows": len(x), "rows_per_class": counts, "label_kind": label_kind(classes)}
         try:
             self._model = _core.TrainedModel.fit(
                 json.dumps(pipeline),
@@ -175,6 +176,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
         """
         if not hasattr(self, "_model"):
             raise not_fitted(self)
+        require_kept(self.classes_)
         self._model.save(place(path), None if features is None else self._made_of(features))
 
     def _made_of(self, features: Features | FeatureExtractor) -> str:
@@ -242,17 +244,3 @@ def _seed(value: Any) -> int:
     if isinstance(value, np.random.RandomState):
         return int(value.randint(2**31 - 1))
     return size("random_state", value, 0)
-
-
-def class_labels(header: dict[str, Any]) -> npt.NDArray[Any]:
-    """Labels in the type that they had in training."""
-    names = np.asarray(header["labels"], dtype=object)
-    provenance = header["provenance"]
-    kind = provenance.get("label_kind", "") if isinstance(provenance, dict) else ""
-    if kind == "b":
-        return np.asarray(names == "True")
-    if kind in ("i", "u"):
-        return names.astype(np.int64)
-    if kind == "f":
-        return names.astype(np.float64)
-    return names.astype(str)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._classifier import class_labels
+from ._class_labels import class_labels
 from ._extract import extract
 from ._features import GOOD, Features, lengths
 from ._formats import mismatch

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import as_array, size
-from ._classifier import class_labels
+from ._class_labels import class_labels, label_kind, require_kept
 from ._refusals import existing, place, seed_of
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
 from ._validation import labels_of
@@ -94,7 +94,7 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
             [str(c) for c in classes.tolist()],
             recipe,
             None if self.checkpoint is None else os.fspath(self.checkpoint),
-            json.dumps({"rows": count - len(held), "label_kind": classes.dtype.kind}),
+            json.dumps({"rows": count - len(held), "label_kind": label_kind(classes)}),
             self.progress,
         )
         self.classes_ = classes
@@ -122,6 +122,7 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         """Writes the model file, completely or not at all. It is a safetensors file."""
         if not hasattr(self, "_model"):
             raise not_fitted(self)
+        require_kept(self.classes_)
         self._model.save(place(path))
 
     @classmethod

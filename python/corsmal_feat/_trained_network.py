@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterable
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _core
+from ._class_labels import class_labels
 from ._extract import MOST_JOBS
 from ._features import StrPath
 from ._refusals import place, refuses
@@ -41,9 +41,7 @@ class TrainedNetwork:
     def __init__(self, network: _core.TrainedNetwork) -> None:
         self._network = network
         self.header: dict[str, Any] = json.loads(network.header())
-        # With scikit-learn, whose import takes a second.
-        labels = import_module("._classifier", __package__).class_labels
-        self.classes_: npt.NDArray[Any] = labels(self.header)
+        self.classes_: npt.NDArray[Any] = class_labels(self.header)
 
     @refuses
     def predict_proba(

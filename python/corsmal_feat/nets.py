@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import Singles, as_array
+from ._class_labels import label_kind
 from ._features import StrPath
 from ._network import Network, TrainingSteps, plain, single
 from ._refusals import refuses, seed_of
@@ -329,7 +330,7 @@ def _rows(
             )
     names = [str(label) for label in labels.tolist()]
     parts = [None] * len(paths) if of_group is None else [str(g) for g in of_group.tolist()]
-    return list(zip(paths, names, parts, strict=True)), labels.dtype.kind
+    return list(zip(paths, names, parts, strict=True)), label_kind(labels)
 
 
 def _recipe(name: str, recipe: Mapping[str, Any] | None) -> str:

@@ -125,6 +125,20 @@ def test_bytes_are_no_labels() -> None:
             classifiers.KNN(1).fit(x, y)
 
 
+def test_saved_labels_come_back_in_their_type(tmp_path: Path) -> None:
+    x, y = clouds(12, (3, 1, 2))
+    model = classifiers.KNN(1)
+    for labels in (y, y.astype(object), y > 1, (y > 1).astype(object), y.astype(str)):
+        model.fit(x, labels).save(tmp_path / "a.model")
+        found = classifiers.KNN.load(tmp_path / "a.model").predict(x)
+        np.testing.assert_array_equal(found, labels)
+        (tmp_path / "a.model").unlink()
+    for other in (y.astype("datetime64[D]"), np.array([(int(v),) for v in y] + [None])[:-1]):
+        model.fit(x, other)
+        with pytest.raises(ParameterError, match="a model file keeps classes that are texts"):
+            model.save(tmp_path / "a.model")
+
+
 def test_parameters_must_be_finite() -> None:
     x, y = clouds()
     with pytest.raises(ParameterError, match="SVC: C must be a finite number, not nan"):

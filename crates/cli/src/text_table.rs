@@ -1,6 +1,7 @@
 //! Tables on a terminal.
 
 use comfy_table::{CellAlignment, Table, presets};
+use corsmal_models::predictions::UNKNOWN;
 
 /// Columns of a plain terminal: wider tables change their form.
 pub use crate::paragraphs::WIDTH;
@@ -67,7 +68,9 @@ pub fn confusion(names: &[String], rows: &[Vec<u64>], unknown: &[u64]) -> String
     let some_unknown = unknown.iter().any(|n| *n > 0);
     let heads =
         (0..names.len()).map(|at| if fits { names[at].clone() } else { (at + 1).to_string() });
-    let unknown_head = some_unknown.then(|| "unknown".to_string());
+    let is_class = names.iter().any(|name| name == UNKNOWN);
+    let head = if is_class { "no prediction" } else { UNKNOWN };
+    let unknown_head = some_unknown.then(|| head.to_string());
     let mut table = TextTable::new(
         ["true, predicted".to_string()].into_iter().chain(heads).chain(unknown_head),
     );
@@ -92,5 +95,7 @@ mod tests {
         assert!(text.contains("10 a long class name 9"), "{text}");
         let text = confusion(&["a".into(), "b".into()], &[vec![1, 2], vec![3, 4]], &[0, 5]);
         assert!(text.starts_with("true, predicted  a  b  unknown"), "{text}");
+        let text = confusion(&["a".into(), UNKNOWN.into()], &[vec![1, 2], vec![3, 4]], &[0, 5]);
+        assert!(text.starts_with("true, predicted  a  unknown  no prediction"), "{text}");
     }
 }

@@ -114,8 +114,14 @@ fn trial(
     let rows = &steps_of(course.train, recipe, 0)[0];
     let inputs = course.items.laid(network, rows, recipe, Stream::new(recipe.seed, "offset"));
     let targets = course.targets.pick(rows, network.outputs());
+    let step =
+        || network.gradients(&inputs, &targets, &settings.loss, &settings.class_weights, None);
+    if network.device().gpu_name().is_some() {
+        // The first step translates the layers for the GPU.
+        step()?;
+    }
     let began = Instant::now();
-    network.gradients(&inputs, &targets, &settings.loss, &settings.class_weights, None)?;
+    step()?;
     let work = |rows: &[usize]| rows.iter().map(|&r| course.items.work(r)).sum::<usize>() as f64;
     // Evaluation takes about a third of a step.
     let all = (work(course.train) + work(course.watched) / 3.0) / work(rows).max(1.0);

@@ -47,13 +47,25 @@ pub struct Args {
     #[arg(long, value_name = "CSV", num_args = 1.., conflicts_with = "predictions")]
     pub(super) joint: Vec<PathBuf>,
     /// Weight of each file of --predictions or --joint; equal by default.
-    #[arg(long, value_name = "W,…", value_delimiter = ',', conflicts_with_all = ["kind", "level"])]
+    #[arg(long, value_name = "W,…", value_delimiter = ',', allow_hyphen_values = true, conflicts_with_all = ["kind", "level"])]
     pub(super) weights: Option<Vec<f64>>,
     /// Weight of each file of --type.
-    #[arg(long, value_name = "W,…", value_delimiter = ',', requires = "kind")]
+    #[arg(
+        long,
+        value_name = "W,…",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        requires = "kind"
+    )]
     pub(super) type_weights: Option<Vec<f64>>,
     /// Weight of each file of --level.
-    #[arg(long, value_name = "W,…", value_delimiter = ',', requires = "level")]
+    #[arg(
+        long,
+        value_name = "W,…",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        requires = "level"
+    )]
     pub(super) level_weights: Option<Vec<f64>>,
     #[command(flatten)]
     pub(super) vote: VoteArgs,

@@ -63,6 +63,9 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
             None => output::inspect(path, args.json),
             Some(_) => Err(Failure::new("--picture: name one of the files in the folder")),
         },
+        [path] if path == Path::new("-") => {
+            Err(Failure::new("-: inspect reads files, not standard input: name a file"))
+        }
         [path] if !path.is_dir() => single(path, picture.as_ref(), args.json),
         paths => {
             if picture.is_some() {

@@ -1,0 +1,46 @@
+"""Class labels in model files, which hold texts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import ParameterError
+
+__all__ = ["class_labels", "label_kind", "require_kept"]
+
+#: numpy's letters of the types that come back as they were
+_KEPT = "biufU"
+
+
+def label_kind(classes: npt.NDArray[Any]) -> str:
+    """numpy's letter for the type of the classes; of objects, the type that they all have."""
+    if classes.dtype != object:
+        return str(classes.dtype.kind)
+    kinds = {np.asarray(label).dtype.kind if np.ndim(label) == 0 else "O" for label in classes}
+    return str(kinds.pop()) if len(kinds) == 1 else "O"
+
+
+def require_kept(classes: npt.NDArray[Any]) -> None:
+    """Refuses to keep classes that would come back as text."""
+    if label_kind(classes) not in _KEPT:
+        raise ParameterError(
+            "a model file keeps classes that are texts, whole numbers or booleans, not "
+            f"{classes.dtype} ({classes[0]!r}): fit with such labels"
+        )
+
+
+def class_labels(header: dict[str, Any]) -> npt.NDArray[Any]:
+    """Labels in the type that they had in training."""
+    names = np.asarray(header["labels"], dtype=object)
+    provenance = header["provenance"]
+    kind = provenance.get("label_kind", "") if isinstance(provenance, dict) else ""
+    if kind == "b":
+        return np.asarray(names == "True")
+    if kind in ("i", "u"):
+        return names.astype(np.int64)
+    if kind == "f":
+        return names.astype(np.float64)
+    return names.astype(str)
