@@ -14,7 +14,7 @@ from . import _core
 from ._arrays import size
 from ._class_labels import class_labels, label_kind, require_kept
 from ._fingerprints import Fingerprints, check_rows, fingerprints
-from ._refusals import existing, place
+from ._refusals import destination, existing
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
 from ._validation import Matrix, features, labels_of, names_of, weights_of
 from .errors import ModelError, ParameterError
@@ -161,7 +161,11 @@ class Classifier(ClassifierMixin, BaseEstimator):
         return values[:, 0] if values.shape[1] == 1 else values
 
     def save(
-        self, path: str | os.PathLike[str], *, features: Features | FeatureExtractor | None = None
+        self,
+        path: str | os.PathLike[str],
+        *,
+        features: Features | FeatureExtractor | None = None,
+        overwrite: bool = True,
     ) -> None:
         """Writes the model file, completely or not at all.
 
@@ -173,11 +177,18 @@ class Classifier(ClassifierMixin, BaseEstimator):
             Where the rows come from that the model was fitted on, unchanged: scaled rows are
             refused. With it, the model also takes recordings:
             `load_model(path).predict(["a.wav"])`, `corsmal-feat classify`.
+        overwrite : bool
+            Replace an existing file, as `numpy.save` does; False refuses it, as the command does.
         """
         if not hasattr(self, "_model"):
             raise not_fitted(self)
+<<<<<<< HEAD
         require_kept(self.classes_)
         self._model.save(place(path), None if features is None else self._made_of(features))
+=======
+        target = destination(path, overwrite)
+        self._model.save(target, None if features is None else self._made_of(features))
+>>>>>>> small
 
     def _made_of(self, features: Features | FeatureExtractor) -> str:
         """What a model file says about its features, as JSON."""

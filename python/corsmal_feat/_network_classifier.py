@@ -13,7 +13,7 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import as_array, size
 from ._class_labels import class_labels, label_kind, require_kept
-from ._refusals import existing, place, seed_of
+from ._refusals import destination, existing, seed_of
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
 from ._validation import labels_of
 from .errors import ParameterError
@@ -118,12 +118,15 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
             raise not_fitted(self)
         return self._model.state()
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the model file, completely or not at all. It is a safetensors file."""
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = True) -> None:
+        """Writes the model file, completely or not at all. It is a safetensors file.
+
+        An existing file is replaced; `overwrite=False` refuses it.
+        """
         if not hasattr(self, "_model"):
             raise not_fitted(self)
         require_kept(self.classes_)
-        self._model.save(place(path))
+        self._model.save(destination(path, overwrite))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ._refusals import place, refuses
+from ._refusals import destination, refuses
 
 StrPath = str | os.PathLike[str]
 
@@ -51,9 +51,12 @@ class Predictions:
         return len(self.predicted)
 
     @refuses
-    def save(self, path: StrPath) -> None:
-        """Writes a prediction file: a CSV that `score`, `fuse` and the command read."""
-        Path(place(path)).write_text(self._text, encoding="utf-8", newline="")
+    def save(self, path: StrPath, *, overwrite: bool = True) -> None:
+        """Writes a prediction file: a CSV that `score`, `fuse` and the command read.
+
+        An existing file is replaced; `overwrite=False` refuses it.
+        """
+        Path(destination(path, overwrite)).write_text(self._text, encoding="utf-8", newline="")
 
 
 def parse(text: str) -> Predictions:

@@ -112,6 +112,14 @@ def place(path: Any) -> str:
     return os.fsdecode(path)
 
 
+def destination(path: Any, overwrite: bool) -> str:
+    """The path of a file to write, as text."""
+    name = place(path)
+    if not overwrite and os.path.exists(name):
+        raise ParameterError(f"path = {name!r} already exists: overwrite=True replaces it")
+    return name
+
+
 def existing(path: Any) -> str:
     """The path of an existing file or folder, as text."""
     name = place(path)

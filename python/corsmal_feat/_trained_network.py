@@ -14,7 +14,7 @@ from . import _core
 from ._class_labels import class_labels
 from ._extract import MOST_JOBS
 from ._features import StrPath
-from ._refusals import place, refuses
+from ._refusals import destination, refuses
 from ._warnings import warn
 from .errors import DecodeError, ParameterError
 
@@ -105,9 +105,12 @@ class TrainedNetwork:
         return labels
 
     @refuses
-    def save(self, path: StrPath) -> None:
-        """Writes the model file, completely or not at all; `corsmal-feat classify` reads it."""
-        self._network.save(place(path))
+    def save(self, path: StrPath, *, overwrite: bool = True) -> None:
+        """Writes the model file, completely or not at all; `corsmal-feat classify` reads it.
+
+        An existing file is replaced; `overwrite=False` refuses it.
+        """
+        self._network.save(destination(path, overwrite))
 
     def __reduce__(self) -> tuple[Callable[[bytes], TrainedNetwork], tuple[bytes]]:
         return _of_bytes, (self._network.to_bytes(),)

@@ -44,6 +44,11 @@ def test_fit_predict_save_load_pickle(estimator, classes, tmp_path: Path):
     np.testing.assert_allclose(proba.sum(axis=1), 1)
     path = tmp_path / "model"
     model.save(path)
+    model.save(path)  # replaces the file, as numpy.save does
+    with pytest.raises(ParameterError, match=r"model' already exists: overwrite=True replaces it"):
+        model.save(path, overwrite=False)
+    model.save(tmp_path / "new", overwrite=False)
+    assert (tmp_path / "new").read_bytes() == path.read_bytes()
     for back in (
         type(model).load(path),
         classifiers.load_model(path),

@@ -126,6 +126,8 @@ def test_a_network_is_an_estimator(tmp_path: Path) -> None:
 
     path = tmp_path / "level.safetensors"
     model.save(path)
+    with pytest.raises(ParameterError, match="already exists"):
+        model.save(path, overwrite=False)
     back = nets.NetworkClassifier.load(path)
     assert np.array_equal(back.predict_proba(x), proba)
     assert np.array_equal(pickle.loads(pickle.dumps(back)).predict_proba(x), proba)

@@ -157,6 +157,9 @@ def test_cross_validation_gives_scores_and_predictions(table: Path, tmp_path: Pa
     assert result.report["result"]["pooled"]["accuracy"] == pytest.approx(right)
     out = tmp_path / "held-out.csv"
     result.predictions.save(out)
+    result.predictions.save(out)
+    with pytest.raises(ParameterError, match="already exists"):
+        result.predictions.save(out, overwrite=False)
     assert corsmal_feat.score(out)["accuracy"] == pytest.approx(right)
     tuned = corsmal_feat.cross_validate(table, "kind", cv=3, classifier="knn", tune={"k": [1, 5]})
     assert len(tuned.report["candidates"]) == 2

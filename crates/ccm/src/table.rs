@@ -34,12 +34,8 @@ impl Table {
     pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
         let fault = |reason: String| CcmError::Table { path: path.to_path_buf(), reason };
         let mut reader = csv_text::reader(bytes).map_err(|e| fault(e.to_string()))?;
-        let header: Vec<String> = reader
-            .headers()
-            .map_err(|e| fault(e.to_string()))?
-            .iter()
-            .map(str::to_string)
-            .collect();
+        let header = csv_text::header(&mut reader).map_err(|e| fault(e.to_string()))?;
+        let header: Vec<String> = header.iter().map(str::to_string).collect();
         if header.iter().all(String::is_empty) {
             return Err(fault("it is empty; a header line is needed".into()));
         }

@@ -197,6 +197,27 @@ fn frames_may_be_in_a_video() {
     assert_eq!(views(dir.path()).colours(3).unwrap().numbers(), [4]);
 }
 
+/// `detections`, `ends` and `colours` each read them again.
+#[test]
+fn the_index_of_a_video_is_read_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let (base, name) = recording(dir.path(), 3);
+    let shades = Path::new(env!("CARGO_MANIFEST_DIR")).join("../vision/tests/shades.mp4");
+    let shades = std::fs::read(shades).unwrap();
+    let video = |view: u8| base.join(format!("rgb/{name}_c{view}.mp4"));
+    (1..=2).for_each(|view| write(&video(view), &shades));
+    let table = "frame,view,label,score,x_min,y_min,x_max,y_max\n19,1,cup,0.9,2,3,10,20\n\
+                 19,2,cup,0.9,2,3,10,20\n";
+    write(&base.join(format!("detections/{name}.csv")), table.as_bytes());
+    let all = views(dir.path());
+    assert_eq!(all.detections().unwrap().unwrap().len(), 2);
+    (1..=2).for_each(|view| std::fs::remove_file(video(view)).unwrap());
+    assert_eq!(all.ends(&[], 19).unwrap(), Some((0, 1)));
+    assert_eq!(all.colours(1).unwrap().numbers().len(), 20);
+    assert_eq!(all.clone().colours(2).unwrap().numbers().len(), 20);
+    assert!(views(dir.path()).colours(1).unwrap().numbers().is_empty());
+}
+
 /// In a folder of their own, tables lie by container, or by part where that is not known.
 #[test]
 fn tables_are_found_in_a_folder_of_their_own() {

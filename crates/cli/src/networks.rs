@@ -44,22 +44,27 @@ struct Loaded {
     target: String,
 }
 
-/// What has no items, by the kind of the reason: the first reason, and who has one.
+/// What has no items, by the kind of the reason: what is said of the first, and the ids of the others.
 #[derive(Default)]
 struct LeftOut(BTreeMap<String, (String, Vec<String>)>);
 
 impl LeftOut {
-    fn add(&mut self, id: &str, reason: &str) {
+    /// `name` is what the first of a kind is called: its file, or its id.
+    fn add(&mut self, (id, name): (&str, &str), reason: &str) {
         // Behind it are figures of the one recording.
         let kind = reason.split_once(": ").map_or(reason, |(kind, _)| kind);
-        let known = self.0.entry(kind.into()).or_insert_with(|| (reason.into(), Vec::new()));
-        known.1.push(id.into());
+        match self.0.get_mut(kind) {
+            Some((_, others)) => others.push(id.into()),
+            None => {
+                let first = format!("{name}: {reason}");
+                self.0.insert(kind.into(), (first, Vec::new()));
+            }
+        }
     }
 
     fn tell(self) {
-        for (kind, (reason, ids)) in self.0 {
-            let [first, others @ ..] = &ids[..] else { continue };
-            eprintln!("warning: {first}: {reason}: left out of training");
+        for (kind, (first, others)) in self.0 {
+            eprintln!("warning: {first}: left out of training");
             if !others.is_empty() {
                 let named: Vec<&str> = others.iter().take(NAMED).map(String::as_str).collect();
                 let more = match others.len().saturating_sub(NAMED) {
@@ -89,10 +94,12 @@ impl Request<'_> {
             // Only the labels given by --labels count.
             let own = !self.dataset.has_labels();
             let mut left_out = LeftOut::default();
-            let seen =
-                Examples::of_pictures(definition, (path, own), interrupt::flag(), |id, reason| {
-                    left_out.add(id, reason);
-                });
+            let seen = Examples::of_pictures(
+                definition,
+                (path, own),
+                interrupt::flag(),
+                |id, file, reason| left_out.add((id, file), reason),
+            );
             left_out.tell();
             match seen {
                 Err(SystemError::Interrupted) => {
@@ -109,7 +116,7 @@ impl Request<'_> {
                 (path, &found),
                 self.jobs,
                 interrupt::flag(),
-                |input, reason| left_out.add(&input.id, reason),
+                |input, reason| left_out.add((&input.id, &input.id), reason),
             );
             left_out.tell();
             let heard = match heard {

@@ -1,25 +1,47 @@
-//! Where lines go that are written as they come.
+//! Where tables go: standard output, a device, or a file that appears when it is whole.
 
+use std::fs::File;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use corsmal_files::draft::Draft;
+use corsmal_files::draft::{self, Draft};
 
 use crate::failure::Failure;
 
-/// Standard output, line by line, or a file that appears when it is whole.
+/// Names of standard output beside `-`.
+const STDOUT: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
+
+/// Whether a path stands for standard output.
+pub fn is_stdout(path: &Path) -> bool {
+    path == Path::new("-") || (cfg!(unix) && STDOUT.iter().any(|name| path == Path::new(name)))
+}
+
+/// Writes a table.
+pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    if is_stdout(path) {
+        print!("{}", String::from_utf8_lossy(bytes));
+        return Ok(());
+    }
+    draft::write(path, bytes)
+}
+
+/// Where lines go that are written as they come.
 pub enum Output {
     /// Standard output.
     Stdout(io::Stdout),
+    /// A device.
+    Device(PathBuf, File),
     /// A file.
     File(Draft),
 }
 
 impl Output {
-    /// `-` is standard output.
+    /// Begins it.
     pub fn open(path: &Path) -> Result<Self, Failure> {
-        if path == Path::new("-") {
+        if is_stdout(path) {
             Ok(Self::Stdout(io::stdout()))
+        } else if draft::is_device(path) {
+            Ok(Self::Device(path.into(), draft::open_device(path)?))
         } else {
             Ok(Self::File(Draft::create(path)?))
         }
@@ -28,7 +50,7 @@ impl Output {
     /// Gives a file its name.
     pub fn publish(self) -> io::Result<()> {
         match self {
-            Self::Stdout(_) => Ok(()),
+            Self::Stdout(_) | Self::Device(..) => Ok(()),
             Self::File(draft) => draft.publish(),
         }
     }
@@ -38,6 +60,9 @@ impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match self {
             Self::Stdout(out) => out.write(bytes),
+            Self::Device(path, device) => device
+                .write(bytes)
+                .map_err(|e| io::Error::new(e.kind(), format!("{}: {e}", path.display()))),
             Self::File(draft) => draft.write(bytes),
         }
     }
@@ -45,8 +70,8 @@ impl Write for Output {
     fn flush(&mut self) -> io::Result<()> {
         match self {
             Self::Stdout(out) => out.flush(),
-            // A file is read when it has its name.
-            Self::File(_) => Ok(()),
+            // A device has them already; a file is read when it has its name.
+            Self::Device(..) | Self::File(_) => Ok(()),
         }
     }
 }

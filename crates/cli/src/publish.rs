@@ -2,13 +2,27 @@
 
 use std::path::Path;
 
-use corsmal_files::draft::{check_place, folder};
+use corsmal_files::draft::{check_place, folder, is_device};
 
 use crate::failure::Failure;
+
+/// As [`check`] for a table, which a device takes as well.
+pub fn check_table(path: &Path, overwrite: bool) -> Result<(), Failure> {
+    match is_device(path) {
+        true => Ok(()),
+        false => check(path, overwrite),
+    }
+}
 
 /// Refuses a name that is taken, unless it is of a file that may be replaced, and a folder that is
 /// not there or takes no files.
 pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
+    if is_device(path) {
+        return Err(Failure::new(format!(
+            "{} is a device; this output gets its name when it is whole: name a file",
+            path.display()
+        )));
+    }
     if path.exists() && !path.is_file() {
         return Err(Failure::new(format!("{} exists and is not a regular file", path.display())));
     }

@@ -13,6 +13,7 @@ use ndarray::{Array1, ArrayD};
 use serde::Serialize;
 
 use super::pairing::Identities;
+use super::rows;
 use super::texts::{self, TextColumn};
 
 /// Name under which frame times are compared.
@@ -73,6 +74,8 @@ pub(super) struct ComparedFile {
     places: Vec<Place>,
     table: Option<NumericTable>,
     texts: Vec<TextColumn>,
+    /// Ids of the rows of arrays, in an archive of another program.
+    row_ids: Option<Vec<String>>,
     /// What is known of the contents of recordings, by id.
     identities: Identities,
     provenance: Option<Provenance>,
@@ -129,12 +132,14 @@ impl ComparedFile {
             let ours = provenance.as_ref().and_then(|_| owner(&name, &features));
             arrays.push(ArrayEntry { name, ours, dtype: header.dtype.to_string() });
         }
+        let row_ids = if provenance.is_none() { rows::ids(&mut npz) } else { None };
         Ok(Self {
             source: FeatureFile::Npz(npz),
             arrays,
             places: vec![],
             table,
             texts,
+            row_ids,
             identities,
             provenance,
             refused,
@@ -152,6 +157,7 @@ impl ComparedFile {
             places: vec![],
             table: None,
             texts: vec![],
+            row_ids: None,
             identities: Identities::default(),
             provenance: None,
             refused: vec![],
@@ -188,7 +194,8 @@ impl ComparedFile {
         let source = FeatureFile::Parquet(parquet);
         let (arrays, places) = (vec![], vec![]);
         let table = Some(table);
-        Ok(Self { source, arrays, places, table, texts, identities, provenance, refused })
+        let row_ids = None;
+        Ok(Self { source, arrays, places, table, texts, row_ids, identities, provenance, refused })
     }
 
     /// The frames of an output of ours, named as in an `.npz`.
@@ -210,8 +217,8 @@ impl ComparedFile {
         }
         let (texts, identities) = (texts::of_table(&found), Identities::new(found.outcomes()));
         let source = FeatureFile::Parquet(parquet);
-        let (table, provenance, refused) = (None, Some(made), vec![]);
-        Ok(Self { source, arrays, places, table, texts, identities, provenance, refused })
+        let (table, row_ids, provenance, refused) = (None, None, Some(made), vec![]);
+        Ok(Self { source, arrays, places, table, texts, row_ids, identities, provenance, refused })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -239,6 +246,18 @@ impl ComparedFile {
     /// Labels and statuses of an output of ours, texts of another file.
     pub(super) fn texts(&self) -> &[TextColumn] {
         &self.texts
+    }
+
+    /// Ids of the rows of arrays, in an archive of another program.
+    pub(super) fn row_ids(&self) -> Option<&[String]> {
+        self.row_ids.as_deref()
+    }
+
+    /// Names the rows of its texts by the ids.
+    pub(super) fn name_rows(&mut self) {
+        let Some(ids) = &self.row_ids else { return };
+        let of_rows = |text: &&mut TextColumn| text.shape == [ids.len() as u64];
+        self.texts.iter_mut().filter(of_rows).for_each(|text| text.ids = Some(ids.clone()));
     }
 
     /// The values of an array of 64-bit integers; `None` of any other.

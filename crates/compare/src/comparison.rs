@@ -27,6 +27,9 @@ pub struct Comparison {
     pub within: bool,
     /// What recordings were paired by.
     pub paired_by: PairedBy,
+    /// How many rows of arrays of other programs were paired by arrays `id` or `ids` beside them; 0 where these have
+    /// nothing in common, null where rows of the same number belong together.
+    pub paired_rows: Option<usize>,
     /// Configurations, where both files are outputs of ours.
     pub settings: Option<Settings>,
     /// One entry per feature, or per array of files that are not ours.
@@ -147,7 +150,10 @@ impl ComparisonBuilder {
         };
         let ours = a.ours.is_some() || b.ours.is_some();
         let locate = |ordinal| {
-            let index = index_of(ordinal, &shape);
+            let mut index = index_of(ordinal, &shape);
+            if let Some(place) = index.get_mut(usize::from(complex[0])) {
+                *place = found.rows.get(*place).copied().unwrap_or(*place);
+            }
             (found.place.clone(), position(&index, ours), index)
         };
         let limit = tolerance.limit(pair.largest());
@@ -294,6 +300,7 @@ impl ComparisonBuilder {
                 && matching.only_b.is_empty()
                 && refused.is_empty(),
             paired_by: matching.paired_by,
+            paired_rows: matching.paired_rows,
             settings,
             features: self.features,
             texts,

@@ -33,6 +33,7 @@ mod error;
 mod matching;
 mod pair;
 mod pairing;
+mod rows;
 mod settings;
 mod texts;
 
@@ -68,16 +69,32 @@ pub struct Criteria {
 /// [`CompareError`]: a file cannot be read, or they have nothing in common.
 pub fn compare(a: &Path, b: &Path, criteria: &Criteria) -> Result<Comparison, CompareError> {
     let (mut a, mut b) = (ComparedFile::open(a)?, ComparedFile::open(b)?);
-    let matching = Matching::new(&a, &b, &criteria.map)?;
+    let mut matching = Matching::new(&a, &b, &criteria.map)?;
     let mut builder = ComparisonBuilder::new(criteria.tolerance);
-    for found in &matching.arrays {
-        let values = (a.load(found.a)?, b.load(found.b)?);
+    if matching.rows.is_some() {
+        [&mut a, &mut b].into_iter().for_each(ComparedFile::name_rows);
+    }
+    for mut found in std::mem::take(&mut matching.arrays) {
+        let found = &mut found;
+        let mut values = (a.load(found.a)?, b.load(found.b)?);
+        let dtypes = [&a.arrays()[found.a].dtype, &b.arrays()[found.b].dtype];
+        let complex = dtypes.map(|dtype| is_complex(dtype));
+        if let Some(rows) = &matching.rows
+            && let Some(taken) = rows.taken(&values, complex)
+        {
+            values = taken;
+            found.rows = rows.pairs.iter().map(|(row, _)| *row).collect();
+        }
         if beyond_doubles(&values.0)
             && beyond_doubles(&values.1)
             && let (Some(x), Some(y)) = (a.integers(found.a), b.integers(found.b))
-            && builder.integers(found, &x, &y)
         {
-            continue;
+            let whole = (x, y);
+            let taken = matching.rows.as_ref().and_then(|rows| rows.taken(&whole, complex));
+            let (x, y) = taken.unwrap_or(whole);
+            if builder.integers(found, &x, &y) {
+                continue;
+            }
         }
         builder.arrays(found, &a.arrays()[found.a], &b.arrays()[found.b], values);
     }

@@ -6,6 +6,7 @@ use std::hash::Hash;
 use super::compared_file::{ArrayEntry, ComparedFile, shown};
 use super::error::CompareError;
 use super::pairing::PairedBy;
+use super::rows::RowPairs;
 use corsmal_files::parquet::NumericTable;
 
 /// Two arrays.
@@ -19,6 +20,8 @@ pub(super) struct ArrayMatch {
     pub feature: String,
     /// The recording, or the array's name.
     pub place: String,
+    /// The rows of the first file that are compared, where they are paired by ids.
+    pub rows: Vec<usize>,
 }
 
 /// NumericTable and rows of two tables, of one feature.
@@ -43,6 +46,10 @@ pub(super) struct Matching {
     pub only_b: Vec<String>,
     /// What recordings are paired by.
     pub paired_by: PairedBy,
+    /// Rows of arrays of other programs, where their ids say that these are not those of the same number.
+    pub rows: Option<RowPairs>,
+    /// How many of these there are, 0 where no id is in both files.
+    pub paired_rows: Option<usize>,
 }
 
 impl Matching {
@@ -114,6 +121,7 @@ impl Matching {
             let (a, b) = (a.path().into(), b.path().into());
             return Err(CompareError::NothingInCommon { a, b, in_a, in_b });
         }
+        matching.rows_of_arrays(a, b)?;
         matching.only_a.extend(rest_a.iter().map(|&i| a.arrays()[i].name.clone()));
         matching.only_b.extend(rest_b.iter().map(|&i| b.arrays()[i].name.clone()));
         matching.arrays = pairs
@@ -124,7 +132,7 @@ impl Matching {
                     Some(owner) => (owner.id.clone(), owner.title().to_owned()),
                     None => (x.name.clone(), x.name.clone()),
                 };
-                ArrayMatch { a: i, b: j, feature, place }
+                ArrayMatch { a: i, b: j, feature, place, rows: Vec::new() }
             })
             .collect();
         Ok(matching)
@@ -179,6 +187,18 @@ impl Matching {
 }
 
 impl Matching {
+    /// Pairs the rows of arrays of other programs, if their files have other ids, or in another order.
+    fn rows_of_arrays(&mut self, a: &ComparedFile, b: &ComparedFile) -> Result<(), CompareError> {
+        let (Some(in_a), Some(in_b)) = (a.row_ids(), b.row_ids()) else { return Ok(()) };
+        if in_a != in_b {
+            let pairs = self.rows((a, in_a), (b, in_b))?;
+            self.paired_rows = Some(pairs.len());
+            let of = (in_a.len(), in_b.len());
+            self.rows = (!pairs.is_empty()).then_some(RowPairs { pairs, of });
+        }
+        Ok(())
+    }
+
     /// Rows of the same id; without any, those of the same file name or content.
     fn rows(
         &mut self,

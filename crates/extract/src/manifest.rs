@@ -195,10 +195,7 @@ fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
     };
     let mut reader = csv_text::reader(open(path)?).map_err(|e| InputError::io(path, e))?;
     let mut columns = ManifestColumns::default();
-    let names = match reader.headers().cloned() {
-        Ok(names) => names,
-        Err(error) => return Err(failed(error.into(), &reader)),
-    };
+    let names = csv_text::header(&mut reader).map_err(|fault| failed(fault, &reader))?;
     // Where in a record each column is.
     let mut cells = Vec::new();
     for (index, name) in names.iter().enumerate().filter(|(_, name)| !is_index(name)) {

@@ -106,11 +106,37 @@ fn remove_left(folder: &Path) {
     }
 }
 
-/// Writes a file, whole or not at all.
+/// Whether a path leads to a device that takes a stream of bytes, such as `/dev/null`: nothing is made beside it,
+/// and nothing replaces it.
+pub fn is_device(path: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        std::fs::metadata(path).is_ok_and(|found| found.file_type().is_char_device())
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = path;
+        false
+    }
+}
+
+/// Opens such a device.
+///
+/// # Errors
+/// It cannot be written; the error names it.
+pub fn open_device(path: &Path) -> io::Result<File> {
+    File::options().write(true).open(path).map_err(|e| named(path, &e))
+}
+
+/// Writes a file, whole or not at all; a device takes the bytes as they are.
 ///
 /// # Errors
 /// As those of [`Draft`].
 pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    if is_device(path) {
+        return open_device(path)?.write_all(bytes).map_err(|e| named(path, &e));
+    }
     let mut draft = Draft::create(path)?;
     draft.write_all(bytes)?;
     draft.publish()

@@ -88,3 +88,37 @@ fn names_of_members_are_refused_for_our_own_files() {
     assert!(folder.to_string().contains("--preset mfcc-zcr"), "{folder}");
     assert!(LabelledTable::read(Path::new("none.npz"), &MemberNames::default()).is_err());
 }
+
+#[test]
+fn faults_of_joint_classes_name_the_file_of_their_part() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, csv) = (folder.path().join("x.npz"), folder.path().join("l.csv"));
+    let refused = |own: &[(&str, [&str; 3])], labels: &str| {
+        let mut npz = NpzWriter::create(&path, Compression::Stored).unwrap();
+        npz.floats("X", &[3, 1], &[0.0, 1.0, 2.0]).unwrap();
+        npz.strings("id", &["a", "b", "c"]).unwrap();
+        for (name, values) in own {
+            npz.strings(name, values).unwrap();
+        }
+        npz.finish().unwrap();
+        std::fs::write(&csv, labels).unwrap();
+        let mut table = LabelledTable::read(&path, &MemberNames::default()).unwrap();
+        table.add_labels(&LabelSource::File { path: csv.clone(), key: None }).unwrap();
+        table.classes("joint").unwrap_err().to_string()
+    };
+    let (features, labels) = (path.display().to_string(), csv.display().to_string());
+    for (own, lines, file, what) in [
+        (&[][..], "id,type,level\na,1,2\nb,1,\nc,1,2\n", &labels, "b: label level = \"\" is empty"),
+        (&[], "id,type,level\na,1,2\nb,1,2\nc,1,2\n", &labels, "all rows have joint = 1-2"),
+        (
+            &[("type", ["1", "", "2"])],
+            "id,level\na,1\nb,1\nc,1\n",
+            &features,
+            "b: label type = \"\" is empty",
+        ),
+        (&[("type", ["1"; 3])], "id,level\na,1\nb,1\nc,1\n", &labels, "all rows have joint = 1-1"),
+    ] {
+        let message = refused(own, lines);
+        assert!(message.starts_with(&format!("{file}: {what}")), "{message}");
+    }
+}

@@ -112,8 +112,8 @@ impl Examples {
         Ok(Self { definition, table, items, row_of, heard, seen: None })
     }
 
-    /// Pictures in a folder; `left_out` is told each that cannot be read, and why. With `own_labels` a file
-    /// [`LABEL_FILE`] among them gives their label columns.
+    /// Pictures in a folder; `left_out` is told the id and the file of each that cannot be read, and why. With
+    /// `own_labels` a file [`LABEL_FILE`] among them gives their label columns.
     ///
     /// # Errors
     /// As [`Pictures::find`]; more pictures than memory holds; labels of other pictures;
@@ -122,7 +122,7 @@ impl Examples {
         definition: &'static Definition,
         (folder, own_labels): (&Path, bool),
         stop: &AtomicBool,
-        mut left_out: impl FnMut(&str, &str),
+        mut left_out: impl FnMut(&str, &str, &str),
     ) -> Result<Self> {
         let pictures = Pictures::find(definition, folder)?;
         pictures.require_memory(corsmal_files::memory::available())?;
@@ -136,14 +136,14 @@ impl Examples {
                     Ok(_) => (Status::Ok, String::new()),
                     Err(reason) => (Status::Corrupt, reason.clone()),
                 };
-                let outcome = Outcome::new(&id, place, status, &reason);
+                let outcome = Outcome::new(&id, &place, status, &reason);
                 outcomes.push(Outcome { identity, ..outcome });
                 match item {
                     Ok(item) => {
                         column.push(&item);
                         ids.push(id);
                     }
-                    Err(_) => left_out(&id, &reason),
+                    Err(_) => left_out(&id, &place, &reason),
                 }
             }
         }

@@ -30,7 +30,7 @@ pub struct Picture {
     pub path: PathBuf,
     /// [`corsmal_files::identity`] of the file; empty where it cannot be read
     pub identity: String,
-    /// what the network takes of it, or why it cannot be read
+    /// what the network takes of it, or why it cannot be read, without its path
     pub item: std::result::Result<Vec<f32>, String>,
 }
 
@@ -131,7 +131,7 @@ impl Pictures {
             let (item, identity) = match bytes(path) {
                 Err(reason) => (Err(reason), String::new()),
                 Ok(bytes) => {
-                    let image = Rgb::from_bytes(&bytes, path).map_err(|e| e.to_string());
+                    let image = Rgb::from_bytes(&bytes, path).map_err(|e| e.reason());
                     let item = image.map(|image| picture::item(&image.resized(width, height).data));
                     (item, identity::of_bytes(&bytes))
                 }
@@ -146,7 +146,7 @@ impl Pictures {
 fn bytes(path: &Path) -> std::result::Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     let read = File::open(path).and_then(|f| f.take(Rgb::MAX_BYTES + 1).read_to_end(&mut bytes));
-    read.map_err(|e| format!("{}: {e}", path.display()))?;
+    read.map_err(|e| e.to_string())?;
     Ok(bytes)
 }
 

@@ -63,6 +63,18 @@ impl VisionError {
         Self::Io { path: path.into(), source }
     }
 
+    /// What is wrong, without the path of the file, for a message that names it otherwise.
+    pub fn reason(&self) -> String {
+        match self {
+            Self::Io { source, .. } => source.to_string(),
+            Self::File { reason, .. } => reason.clone(),
+            Self::Limit { what, actual, limit, .. } => {
+                format!("{what} is {actual}; the limit is {limit}")
+            }
+            Self::Mask { .. } | Self::Conflict(_) | Self::Request(_) => self.to_string(),
+        }
+    }
+
     /// A fault in the content of the file at `path`.
     pub fn file(path: &Path, reason: impl Into<String>) -> Self {
         Self::File { path: path.into(), reason: reason.into() }

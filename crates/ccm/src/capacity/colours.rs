@@ -14,7 +14,7 @@ pub struct Colours<'v>(Source<'v>);
 
 enum Source<'v> {
     Images(&'v [Frame]),
-    Video(Video),
+    Video(&'v Video),
 }
 
 impl<'v> Colours<'v> {
@@ -22,7 +22,7 @@ impl<'v> Colours<'v> {
         Self(Source::Images(images))
     }
 
-    pub(super) fn of_video(video: Video) -> Self {
+    pub(super) fn of_video(video: &'v Video) -> Self {
         Self(Source::Video(video))
     }
 

@@ -34,6 +34,8 @@ pub struct Views {
     group: String,
     /// Frames by kind and view, once they have been asked for.
     frames: [[Listing; 4]; 3],
+    /// The video of each view, once it has been asked for.
+    videos: [OnceLock<Result<Option<Video>, Problem>>; 4],
 }
 
 /// The frames of a kind and view, listed when they are first asked for.
@@ -107,6 +109,7 @@ impl Views {
                 None => recording.part.name().replace(' ', "-"),
             },
             frames: Default::default(),
+            videos: Default::default(),
         }
     }
 
@@ -140,10 +143,7 @@ impl Views {
     /// # Errors
     /// The folder cannot be read, or `view` is not 1 to 4.
     pub fn frames(&self, kind: Kind, view: u8) -> Result<&[Frame], Problem> {
-        let of_kind = &self.frames[kind as usize];
-        let list = of_kind
-            .get(usize::from(view.wrapping_sub(1)))
-            .ok_or_else(|| Problem::Missing(format!("no view {view}; views are 1 to 4")))?;
+        let list = of_view(&self.frames[kind as usize], view)?;
         match list.get_or_init(|| self.list(kind.folder(), view)) {
             Ok(frames) => Ok(frames),
             Err(problem) => Err(problem.clone()),
@@ -185,15 +185,21 @@ impl Views {
         Ok(frames)
     }
 
-    /// The video of a view, where there is one.
-    pub(super) fn video(&self, view: u8) -> Result<Option<Video>, Problem> {
+    /// The video of a view, where there is one. Its index is read once.
+    pub(super) fn video(&self, view: u8) -> Result<Option<&Video>, Problem> {
         let Self { base, stem, .. } = self;
-        let videos = [
-            base.join(format!("rgb/{stem}_c{view}.mp4")),
-            base.join(format!("view{view}/rgb/{stem}.mp4")),
-        ];
-        let found = videos.into_iter().find(|path| path.is_file());
-        Ok(found.map(|path| Video::open(&path)).transpose()?)
+        let open = || {
+            let videos = [
+                base.join(format!("rgb/{stem}_c{view}.mp4")),
+                base.join(format!("view{view}/rgb/{stem}.mp4")),
+            ];
+            let found = videos.into_iter().find(|path| path.is_file());
+            Ok(found.map(|path| Video::open(&path)).transpose()?)
+        };
+        match of_view(&self.videos, view)?.get_or_init(open) {
+            Ok(video) => Ok(video.as_ref()),
+            Err(problem) => Err(problem.clone()),
+        }
     }
 
     /// The colour frames of a view: its images or, where there are none, its video.
@@ -345,6 +351,12 @@ impl Views {
         }
         Ok(common.unwrap_or_default())
     }
+}
+
+/// What there is of a view, 1 to 4.
+fn of_view<T>(all: &[T; 4], view: u8) -> Result<&T, Problem> {
+    let place = all.get(usize::from(view.wrapping_sub(1)));
+    place.ok_or_else(|| Problem::Missing(format!("no view {view}; views are 1 to 4")))
 }
 
 /// The most confident detection among `labels` in a frame with at least `score`, of equals the first, as

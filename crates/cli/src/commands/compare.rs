@@ -11,6 +11,7 @@ use corsmal_files::quote::quoted;
 use serde_json::Value;
 
 use crate::failure::Failure;
+use crate::plural::plural;
 
 /// Exit code when the files differ by more than the tolerance.
 const DIFFER: u8 = 1;
@@ -26,7 +27,8 @@ Examples:
 
 Files may be outputs of `extract`, any .npz or .npy with numeric arrays, or a Parquet table.
 Arrays are paired by name, outputs of `extract` by recording (id, else file name, else content) and
-feature, tables by id and column; if each file has only one array, they need no name. The last axis is
+feature, tables by id and column, rows of other arrays by an array `id` or `ids` in both files, else by
+number; if each file has only one array, they need no name. The last axis is
 frames, the one before coefficients, the one before that channels (librosa's order). Only two
 arrays are in memory at a time. Labels, statuses and texts that both files have, and integers
 beyond 2^53, are compared exactly.
@@ -109,6 +111,14 @@ fn text(report: &Comparison) -> String {
         }
         PairedBy::Content => {
             lines.push("\nno id or file name in common: recordings are paired by content".into());
+        }
+    }
+    match report.paired_rows {
+        None => {}
+        Some(0) => lines.push("\nno id in common: rows are paired by number".into()),
+        Some(rows) => {
+            let ids = if report.paired_by == PairedBy::Id { " by their ids" } else { "" };
+            lines.push(format!("\n{} paired{ids}", plural(rows, "row")));
         }
     }
     settings(report, &mut lines);

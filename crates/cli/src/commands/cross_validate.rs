@@ -84,7 +84,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 
 fn cross_validate(args: &Args) -> Result<ExitCode, Failure> {
     if let Some(path) = &args.predictions {
-        publish::check(path, args.overwrite)?;
+        publish::check_table(path, args.overwrite)?;
     }
     if let Some(folder) = &args.report {
         study::prepare(folder, args.overwrite)?;

@@ -188,6 +188,41 @@ fn a_table_that_another_tool_wrote_is_trained_on() {
     assert!(refusal.contains("kind"), "{refusal}");
 }
 
+/// Rows of one name would be taken for each other.
+#[test]
+fn a_parquet_table_whose_ids_come_twice_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let mut manifest = "path,kind,kx\n".to_string();
+    for n in 0..6 {
+        tone(&path(&format!("{n}.wav")), 16_000, 1, 300.0 + 500.0 * n as f32);
+        manifest += &format!("{n}.wav,{},r{}\n", ["low", "high"][n / 3], n % 5);
+    }
+    let (list, ours, other) = (path("list.csv"), path("ours.parquet"), path("other.parquet"));
+    std::fs::write(&list, manifest).unwrap();
+    done(&["extract", "--in", text(&list), "--out", text(&ours), "--preset", "mfcc-zcr", "-q"]);
+    let mut bytes = std::fs::read(&ours).unwrap();
+    // As another program writes it, with the column kx as id: the length of a name stands before it.
+    for (mark, by) in [
+        (&b"corsmal-feat"[..], &b"parquet-cpp-"[..]),
+        (b"\x02id", b"\x02iq"),
+        (b"\x02kx", b"\x02id"),
+    ] {
+        let found = bytes.windows(mark.len()).enumerate().filter(|(_, window)| *window == mark);
+        let places: Vec<usize> = found.map(|(at, _)| at).collect();
+        assert!(!places.is_empty());
+        places.iter().for_each(|at| bytes[*at..at + mark.len()].copy_from_slice(by));
+    }
+    std::fs::write(&other, bytes).unwrap();
+    let model = path("m.model");
+    let learn = [text(&other), "--target", "kind", "--classifier", "knn"];
+    for words in [&["train", "-o", text(&model)][..], &["cross-validate", "--cv", "2"]] {
+        let refusal = refused(&[words, &learn].concat());
+        assert!(refusal.contains("other.parquet: id \"r0\" occurs twice"), "{refusal}");
+    }
+    assert!(!model.exists());
+}
+
 /// Nothing tells whether the columns of such a table are those of the training.
 #[test]
 fn features_without_names_are_warned_of() {

@@ -195,7 +195,48 @@ fn prediction_files_are_averaged_by_id() {
     let output = run(&fuse);
     assert_eq!(output.status.code(), Some(1), "one recording has no prediction");
     let table = String::from_utf8(output.stdout).unwrap();
-    assert_eq!(table, "id,path,predicted,p_x,p_y\nr,r.wav,y,0.375,0.625\ns,s.wav,,,\n");
+    assert_eq!(
+        table,
+        "id,path,status,predicted,p_x,p_y\nr,r.wav,ok,y,0.375,0.625\ns,s.wav,corrupt,,,\n"
+    );
+}
+
+/// A recording that lacked samples looked whole.
+#[test]
+fn the_worst_status_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let windows = put(
+        "w.csv",
+        "id,start,end,status,predicted,p_x,p_y\na,0,1,ok,x,0.75,0.25\na,1,2,truncated,y,0.25,0.75\n\
+         a,2,3,ok,x,0.75,0.25\nb,0,1,ok,x,1,0\nb,1,2,ok,x,1,0\nc,0,1,truncated,x,1,0\nc,1,2,too_short,,,\n",
+    );
+    let vote = ["fuse", text(&windows), "--vote", "majority", "-o"];
+    let voted = folder.path().join("voted.csv");
+    done(&[&vote[..], &[text(&voted)]].concat());
+    let table = std::fs::read_to_string(&voted).unwrap();
+    let lines: Vec<&str> = table.lines().collect();
+    assert_eq!(lines[0], "id,status,predicted,p_x,p_y");
+    for (line, begins) in lines[1..].iter().zip(["a,truncated,x,", "b,ok,x,", "c,too_short,x,"]) {
+        assert!(line.starts_with(begins), "{table}");
+    }
+    // Of files, too, whichever comes first and whether or not the others say any.
+    let bare = put("bare.csv", "id,predicted,p_x,p_y\na,x,1,0\nb,x,1,0\nc,x,1,0\n");
+    let other =
+        put("o.csv", "id,status,predicted,p_x,p_y\na,ok,x,1,0\nb,truncated,x,1,0\nc,ok,x,1,0\n");
+    for files in [[&bare, &other, &voted], [&voted, &bare, &other]] {
+        let files = files.map(|path| text(path));
+        let fused = done(&[&["fuse", "-o", "-"], &files[..]].concat());
+        let of = |id: &str| fused.lines().find(|line| line.starts_with(id)).unwrap().to_owned();
+        assert!(of("a,").starts_with("a,truncated,x,"), "{fused}");
+        assert!(of("b,").starts_with("b,truncated,x,"), "{fused}");
+        assert!(of("c,").starts_with("c,too_short,x,"), "{fused}");
+    }
+    assert!(done(&["fuse", text(&other), "-o", "-"]).contains("\nb,truncated,x,"));
 }
 
 /// The first file, or window, had the last word.

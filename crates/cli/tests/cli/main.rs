@@ -8,6 +8,8 @@ mod ccm_commands;
 mod command;
 mod compare;
 mod compat;
+#[cfg(target_os = "linux")]
+mod devices;
 mod extract;
 mod formats;
 mod fusion;

@@ -109,7 +109,7 @@ fn from_recordings_to_predictions() {
 }
 
 /// Forty rows in two classes and four groups, told apart by the first of three features.
-fn small_table(path: &Path, change: impl FnOnce(&mut Vec<f32>, &mut Vec<String>)) {
+pub fn small_table(path: &Path, change: impl FnOnce(&mut Vec<f32>, &mut Vec<String>)) {
     let class = |row: usize| row % 2;
     let mut x: Vec<f32> = (0..40)
         .flat_map(|row| [class(row) as f32 + (row % 5) as f32 * 0.1, (row % 7) as f32, 1.0])
@@ -201,6 +201,10 @@ fn what_cannot_be_learned_from_is_refused() {
         (format!("id,other\n{all}"), "no label column \"kind\""),
         (format!("name,kind\n{all}"), "needs a column id or path"),
         ("id,kind\nr0\n".to_string(), "labels.csv"),
+        (
+            format!("id,kind\n{}", all.replace("r1,1", "r1,\"1")),
+            "labels.csv: line 3: a quotation mark opens here and is never closed",
+        ),
     ] {
         let found = labelled(&lines);
         assert!(found.contains(message), "{found}");

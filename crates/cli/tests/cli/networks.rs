@@ -255,6 +255,26 @@ fn a_network_learns_from_recordings_and_hears_them() {
     let live = String::from_utf8(output.stdout).unwrap();
     assert_eq!(live.lines().count(), 5, "{live}");
 
+    // What is missing at the end of a file is said, for windows of either kind and for votes.
+    let cut = path("cut.wav");
+    let bytes = std::fs::read(&wav).unwrap();
+    std::fs::write(&cut, &bytes[..bytes.len() - bytes.len() / 20]).unwrap();
+    let classify = ["classify", "-m", text(&model), text(&cut)];
+    let windows = ["--window", "0.7", "--hop", "0.1"];
+    for more in [&windows[..], &[&windows[..], &["--vote", "majority"]].concat(), &[]] {
+        let output = run(&[&classify[..], more].concat());
+        let message = String::from_utf8_lossy(&output.stderr);
+        let table = String::from_utf8(output.stdout).unwrap();
+        assert!(output.status.success(), "{more:?}: {message}");
+        // Windows that end before what is missing are whole.
+        let is_cut = table.contains(",truncated,");
+        assert_eq!(is_cut, more != windows, "{more:?}: {table}");
+        if !more.is_empty() {
+            let warned = "warning: cut: truncated: the file ends after ";
+            assert_eq!(message.matches(warned).count(), 1, "{more:?}: {message}");
+        }
+    }
+
     // Other formats are refused file by file.
     let other = path("other.wav");
     tone(&other, 0, 1.0, 22_050);

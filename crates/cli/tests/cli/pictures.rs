@@ -57,10 +57,10 @@ fn crops_train_a_network_that_classifies_pictures() {
             .concat());
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
-    assert!(
-        said.contains("6_s0_fi3_fu2_b0_l0_c2: ") && said.contains("left out of training"),
-        "{said}"
-    );
+    let file = crops.join("6_s0_fi3_fu2_b0_l0_c2.png");
+    let line = said.lines().find(|line| line.contains(text(&file))).unwrap();
+    assert!(line.ends_with(": left out of training"), "{said}");
+    assert_eq!(said.matches(text(&file)).count(), 1, "{said}");
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&report["items"], &report["target"]), (&10.into(), &"level".into()));
     assert_eq!(report["labels"], serde_json::json!(["full", "half", "opaque"]));
@@ -121,6 +121,21 @@ fn crops_train_a_network_that_classifies_pictures() {
     let named = ["--labels", text(&labels), "--target", "held", "--set", "epochs=1", "--json"];
     let report: Value = serde_json::from_str(&done(&[&words[..], &named].concat())).unwrap();
     assert_eq!(report["labels"], serde_json::json!(["left", "right"]));
+
+    // Several with the same fault share a line, and the file of the first is named once.
+    std::fs::write(few.join("more.jpg"), b"no picture").unwrap();
+    std::fs::create_dir(few.join("sub")).unwrap();
+    for name in ["again.png", "once.png"] {
+        std::fs::write(few.join("sub").join(name), b"no picture").unwrap();
+    }
+    let output = run(&[&words[..], &named, &["--overwrite"]].concat());
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let lines: Vec<&str> = said.lines().filter(|line| line.contains("left out")).collect();
+    assert_eq!(lines.len(), 2, "{said}");
+    assert!(lines[0].starts_with(&format!("warning: {}: ", text(&few.join("more.jpg")))), "{said}");
+    assert!(lines[1].starts_with("warning: 2 more left out ("), "{said}");
+    assert!(lines[1].ends_with("): sub/again, sub/once"), "{said}");
 
     let refuse = |words: &[&str], expected: &str| {
         let message = refused(words);

@@ -134,6 +134,11 @@ fn check_output(
     config: &Config,
 ) -> Result<OutputFormat, RunError> {
     let refuse = |why: String| Err(RunError::Format { path: out.into(), why });
+    if draft::is_device(out) {
+        let why =
+            "is a device; an output gets its name when it is whole: name a file, .npz or .parquet";
+        return refuse(why.into());
+    }
     let partitioned = options.partition_by.is_some();
     let format = match partitioned {
         false => OutputFormat::of_name(out, options.compression)?,

@@ -68,7 +68,7 @@ impl LabelFile {
         let other = |e: std::io::Error| DatasetError::content(path, e.to_string());
         let text = BufReader::new(File::open(path).map_err(other)?);
         let mut reader = csv_text::reader(text).map_err(other)?;
-        let header = reader.headers().map_err(|e| fault(e.into()))?.clone();
+        let header = csv_text::header(&mut reader).map_err(fault)?;
         let find = |wanted: &str| header.iter().position(|h| h == wanted);
         let (key, at) = match (key, find("id"), find("path")) {
             (Some(name), ..) => match find(name) {

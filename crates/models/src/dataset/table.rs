@@ -17,6 +17,9 @@ use crate::formats::TrainedOn;
 use crate::labels::{Labels, require_few};
 use crate::targets::Classes;
 
+/// What the column `joint` is put together from, where there is no such column.
+const JOINT: [&str; 2] = ["type", "level"];
+
 /// A feature file in memory.
 #[derive(Clone, Debug)]
 pub struct LabelledTable {
@@ -209,8 +212,8 @@ impl LabelledTable {
         {
             return Ok(paths);
         }
-        if name == "joint"
-            && let (Some((_, kind)), Some((_, level))) = (find("type"), find("level"))
+        if let [kind, level] = self.parts_of(name)
+            && let (Some((_, kind)), Some((_, level))) = (find(kind), find(level))
         {
             let joint = |(t, l): (&String, &String)| match t.is_empty() || l.is_empty() {
                 true => String::new(),
@@ -229,10 +232,29 @@ impl LabelledTable {
         Err(DatasetError::content(&self.path, format!("no label column {name:?}: {choices}")))
     }
 
-    /// The file that a label column comes from.
+    /// The columns that one is put together from, none where it is a column itself.
+    fn parts_of(&self, name: &str) -> &'static [&'static str] {
+        let has = |name: &str| self.columns.iter().any(|(column, _)| column == name);
+        match name == "joint" && !has(name) && JOINT.into_iter().all(has) {
+            true => &JOINT,
+            false => &[],
+        }
+    }
+
+    /// The file that a label column comes from; for one put together, the label file of a part.
     fn file_of(&self, name: &str) -> &Path {
-        let added = self.added.iter().find(|(column, _)| column == name);
+        let of = |name: &str| self.added.iter().find(|(column, _)| column == name);
+        let added = of(name).or_else(|| self.parts_of(name).iter().find_map(|part| of(part)));
         added.map_or(&self.path, |(_, path)| path)
+    }
+
+    /// The part without a value in a row of a column that is put together, else the column.
+    fn empty_part<'n>(&self, name: &'n str, row: usize) -> &'n str {
+        let empty = |part: &str| {
+            let column = self.columns.iter().find(|(column, _)| column == part);
+            column.is_some_and(|(_, values)| values[row].is_empty())
+        };
+        self.parts_of(name).iter().copied().find(|part| empty(part)).unwrap_or(name)
     }
 
     /// The classes of a label column. Empty and decimal values are no labels.
@@ -241,8 +263,10 @@ impl LabelledTable {
     /// [`DatasetError::Content`] naming the recording, or fewer than two classes.
     pub fn classes(&self, name: &str) -> Result<(Labels, Classes)> {
         let values = self.column(name)?;
-        for (id, value) in self.ids.iter().zip(&values) {
+        for (row, (id, value)) in self.ids.iter().zip(&values).enumerate() {
+            let mut name = name;
             let why = if value.is_empty() {
+                name = self.empty_part(name, row);
                 "is empty: give it a value, or leave the recording out"
             } else if value.parse::<f64>().is_ok() && value.parse::<i128>().is_err() {
                 "is a decimal number; classes are whole numbers or names (score measures estimates of numbers)"

@@ -4,9 +4,12 @@ use std::collections::{HashMap, HashSet};
 use std::fmt::Display;
 use std::hash::Hash;
 
+use corsmal_files::outcome::Status;
 use ndarray::Array2;
 
-use super::{Id, OF_LINES, PredictionError, PredictionRow, PredictionTable, Result, content};
+use super::{
+    Id, OF_LINES, PredictionError, PredictionRow, PredictionTable, Result, STATUS, content,
+};
 use crate::fusion::{self, WindowVotes};
 use crate::table::argmax;
 use crate::voting::VotingRule;
@@ -15,7 +18,8 @@ use crate::voting::VotingRule;
 const AGREED: [&str; 3] = ["true", "fold", "group"];
 
 impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
-    /// Makes the windows of each recording one decision, in the order in which recordings appear.
+    /// Makes the windows of each recording one decision, in the order in which recordings appear. Its status is
+    /// the worst of theirs.
     ///
     /// # Errors
     /// What the rule refuses; a window that occurs twice, windows of a recording that contradict each
@@ -25,6 +29,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
             return Err(fault);
         }
         let agreed = AGREED.map(|name| Some((name, self.position(name)?)));
+        let status = self.position(STATUS);
         let mut at: HashMap<&K, usize> = HashMap::new();
         let mut recordings: Vec<(PredictionRow<K>, WindowVotes)> = Vec::new();
         for row in &self.rows {
@@ -46,6 +51,10 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
                     )));
                 }
             }
+            if let Some(at) = status {
+                let worst = worse(&recording.cells[at], &row.cells[at]).to_owned();
+                recording.cells[at] = worst;
+            }
             if let Some(class) = row.class {
                 votes.add(class, row.proba.as_deref()).map_err(|e| self.model(e))?;
             }
@@ -61,7 +70,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
 
     /// Weighted mean of tables over the same recordings, in the order of the first. A recording
     /// without a prediction in one of them has none; one that some table lacks is allowed where the
-    /// others have no prediction of it either.
+    /// others have no prediction of it either. Its status is the worst that a table gives.
     ///
     /// # Errors
     /// [`PredictionError`] for no tables, weights that are not one positive number per table, other
@@ -88,6 +97,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         }
         let aligned = tables.iter().map(|t| t.aligned_to(&first)).collect::<Result<Vec<_>>>()?;
         first.agree_with(tables)?;
+        first.take_worst_status(tables);
         let equal = vec![1.0; tables.len()];
         let views: Vec<_> = aligned.iter().map(|(values, _)| values.view()).collect();
         let mean =
@@ -173,7 +183,33 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         Ok(())
     }
 
-    /// The same without the columns that tell how a single line came about: times, status, windows.
+    /// Gives each recording the worst status that a table has of it.
+    fn take_worst_status(&mut self, tables: &[Self]) {
+        let mut worst: HashMap<&K, &str> = HashMap::new();
+        for table in tables {
+            let Some(at) = table.position(STATUS) else { continue };
+            for row in &table.rows {
+                let known = worst.entry(&row.key).or_default();
+                *known = worse(known, &row.cells[at]);
+            }
+        }
+        if worst.is_empty() {
+            return;
+        }
+        let at = self.position(STATUS).unwrap_or_else(|| {
+            // Where `classify` has it.
+            self.columns.insert(self.naming, STATUS.into());
+            self.rows.iter_mut().for_each(|row| row.cells.insert(self.naming, String::new()));
+            self.naming
+        });
+        for row in &mut self.rows {
+            if let Some(status) = worst.get(&row.key) {
+                row.cells[at] = (*status).to_string();
+            }
+        }
+    }
+
+    /// The same without the columns that tell how a single line came about: times, number of windows.
     pub fn of_recordings(self) -> Self {
         let keep: Vec<usize> = (0..self.columns.len())
             .filter(|&at| at < self.naming || !OF_LINES.contains(&self.columns[at].as_str()))
@@ -241,6 +277,17 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
             expected: format!("the {} lines of {}", other.rows.len(), other.path.display()),
         }
     }
+}
+
+/// Of two statuses the one that more was lost by, the first of equals.
+fn worse<'s>(one: &'s str, two: &'s str) -> &'s str {
+    let rank = |status: &str| match status {
+        "" => 0,
+        status if status == Status::Ok.name() => 1,
+        status if status == Status::Truncated.name() => 2,
+        _ => 3,
+    };
+    if rank(two) > rank(one) { two } else { one }
 }
 
 impl PredictionTable {

@@ -45,7 +45,9 @@ pub const UNKNOWN: &str = "unknown";
 const KEYS: [&str; 3] = ["id", "Configuration ID", "path"];
 
 /// Columns of windows and of how a line came about: a decision over several lines has none of its own.
-const OF_LINES: [&str; 4] = ["start", "end", "status", "windows"];
+const OF_LINES: [&str; 3] = ["start", "end", "windows"];
+/// What became of the recording: a decision over several lines has the worst of theirs.
+const STATUS: &str = "status";
 
 /// What can be wrong with prediction files.
 #[derive(Debug, Error)]

@@ -42,8 +42,8 @@ impl PredictionTable {
         }
         let mut reader = csv_text::reader(bytes).map_err(|e| content(path, e.to_string()))?;
         let fault = |fault: Fault| content(path, format!("not a readable table: {fault}"));
-        let header: Vec<String> =
-            reader.headers().map_err(|e| fault(e.into()))?.iter().map(String::from).collect();
+        let header = csv_text::header(&mut reader).map_err(fault)?;
+        let header: Vec<String> = header.iter().map(String::from).collect();
         let lines: Vec<_> = csv_text::records(&mut reader)
             .collect::<std::result::Result<_, Fault>>()
             .map_err(fault)?;

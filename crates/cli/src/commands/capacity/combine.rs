@@ -39,7 +39,7 @@ pub struct Args {
 
 /// Combines and writes.
 pub fn run(args: &Args) -> Result<ExitCode, Failure> {
-    publish::check(&args.out, args.overwrite)?;
+    publish::check_table(&args.out, args.overwrite)?;
     let (rows, without) = combine_files(&args.inputs, args.prior, &args.out)?;
     args.told.tell(
         || json!({ "out": args.out, "recordings": rows, "prior": without }),

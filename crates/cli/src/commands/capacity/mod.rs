@@ -136,7 +136,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 }
 
 fn estimate(args: Estimate) -> Result<ExitCode, Failure> {
-    publish::check(&args.out, args.overwrite)?;
+    publish::check_table(&args.out, args.overwrite)?;
     let method = args.method.method();
     let mut options = args.source.options(method, args.variant);
     if let Some(outliers) = args.outliers {

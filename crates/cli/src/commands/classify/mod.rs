@@ -7,7 +7,6 @@ mod records;
 mod whole;
 mod windows;
 
-use std::path::Path;
 use std::process::ExitCode;
 
 use corsmal_models::dataset::LabelledTable;
@@ -17,13 +16,14 @@ pub use args::Args;
 
 use super::nets::is_model;
 use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
+use crate::output::is_stdout;
 use crate::publish;
 use records::{End, Records};
 
 /// Predicts and writes the table.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
-    if args.out != Path::new("-") {
-        publish::check(&args.out, args.overwrite)?;
+    if !is_stdout(&args.out) {
+        publish::check_table(&args.out, args.overwrite)?;
     }
     let place = args.model.display();
     if is_model(&args.model) {

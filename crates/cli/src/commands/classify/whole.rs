@@ -18,6 +18,7 @@ use super::args::{Args, configuration, recordings};
 use super::records::{End, Records, delivered};
 use crate::configuration::difference;
 use crate::failure::Failure;
+use crate::output::is_stdout;
 use crate::plural::plural;
 use crate::progress::{LogFormat, Meter, repaired};
 use crate::recordings::warn;
@@ -31,7 +32,7 @@ pub fn run(args: &Args, model: &Model) -> Result<(End, Option<Records>), Failure
         found.iter().take(1).flat_map(|f| &f.labels).map(|(column, _)| column.clone()).collect();
     let meter = Meter::new(LogFormat::Text, args.quiet);
     let accepted = by_format(&found, &formats, &meter);
-    let folder = if args.out == Path::new("-") {
+    let folder = if is_stdout(&args.out) || draft::is_device(&args.out) {
         std::env::temp_dir()
     } else {
         draft::folder(&args.out).to_path_buf()

@@ -5,21 +5,20 @@ mod submission;
 
 use std::process::ExitCode;
 
-use corsmal_files::draft;
-
 pub use args::Args;
 
 use crate::failure::{FAILED_FILES, Failure};
+use crate::output::{self, is_stdout};
 use crate::publish;
 
 /// Fuses and writes.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
-    let to_stdout = args.out.as_os_str() == "-";
+    let to_stdout = is_stdout(&args.out);
     if to_stdout && args.told.json {
-        return Err(Failure::new("--json: --out - has the predictions on standard output"));
+        return Err(Failure::new("--json: --out has the predictions on standard output"));
     }
     if !to_stdout {
-        publish::check(&args.out, args.overwrite)?;
+        publish::check_table(&args.out, args.overwrite)?;
     }
     let paths = if args.predictions.is_empty() { &args.files } else { &args.predictions };
     if paths.is_empty() {
@@ -27,12 +26,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     }
     args.submission.refuse_without_submission()?;
     let fused = args.fused(paths, args.weights.as_deref())?;
-    let bytes = fused.to_csv()?;
-    if to_stdout {
-        print!("{}", String::from_utf8_lossy(&bytes));
-    } else {
-        draft::write(&args.out, &bytes)?;
-    }
+    output::write(&args.out, &fused.to_csv()?)?;
     let (recordings, failed) = (fused.rows.len(), fused.without_prediction());
     args.tell(recordings, failed, "a prediction")?;
     Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })

@@ -12,12 +12,16 @@ use corsmal_ccm::submission::{self, RowKey, Submission, SubmissionRow, official_
 
 use super::args::{Args, Format, Part};
 use crate::failure::{FAILED_FILES, Failure};
+use crate::output::is_stdout;
 
 /// Decides, checks and writes.
 pub fn run(args: &Args) -> Result<ExitCode, Failure> {
     let options = &args.submission;
-    if args.out.as_os_str() == "-" {
-        return Err(Failure::new("--out - is not possible for a submission: name a file"));
+    if is_stdout(&args.out) {
+        let out = args.out.display();
+        return Err(Failure::new(format!(
+            "--out {out} is not possible for a submission: name a file"
+        )));
     }
     let fused = |paths: &[PathBuf], weights: &Option<Vec<f64>>| {
         let some = !paths.is_empty();

@@ -6,7 +6,7 @@ use std::io::BufReader;
 use std::path::Path;
 use std::process::ExitCode;
 
-use corsmal_files::csv_text;
+use corsmal_files::csv_text::{self, Fault};
 use corsmal_models::predictions::PredictionTable;
 use corsmal_models::scores::{ScoreReport, Scoring};
 use serde::Serialize;
@@ -135,12 +135,14 @@ pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
     }
 }
 
-fn read(path: &Path) -> Result<Contents, csv::Error> {
-    let mut reader = csv_text::reader(BufReader::new(File::open(path)?))?;
-    let columns: Vec<String> = reader.headers()?.iter().map(str::to_owned).collect();
+fn read(path: &Path) -> Result<Contents, Fault> {
+    let io = |error: std::io::Error| Fault { line: None, reason: error.to_string() };
+    let mut reader = csv_text::reader(BufReader::new(File::open(path).map_err(io)?)).map_err(io)?;
+    let header = csv_text::header(&mut reader)?;
+    let columns: Vec<String> = header.iter().map(str::to_owned).collect();
     let mut counter = Counter::new(columns.clone());
-    for record in reader.records() {
-        let record = record?;
+    for found in csv_text::records(&mut reader) {
+        let (_, record) = found?;
         let place = |column: &str| columns.iter().position(|c| c == column);
         counter.add(|column| {
             place(column).and_then(|at| record.get(at)).unwrap_or_default().to_owned()

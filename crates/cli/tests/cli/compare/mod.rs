@@ -2,4 +2,5 @@
 
 mod causes;
 mod files;
+mod rows;
 mod support;

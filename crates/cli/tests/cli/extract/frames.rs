@@ -6,7 +6,7 @@ use corsmal_files::layout;
 use corsmal_files::npz::NpzFile;
 use corsmal_files::parquet::ParquetFile;
 
-use super::support::{ended, extract, folder, table, wav};
+use super::support::{ended, extract, folder, spec, table, wav};
 use crate::command::{names, tool};
 
 /// Every array and every time of frame of an `.npz` is in the Parquet file, and nothing else is.
@@ -71,6 +71,50 @@ fn parquet_holds_the_frames_of_the_npz() {
     let refused = ended(tool().arg("train").arg(at("1.parquet"))).code;
     assert_eq!(refused, Some(2), "frames are no rows of statistics");
     assert!(names(folder.path()).iter().all(|n| !n.contains(".part") && !n.contains("unfinished")));
+}
+
+/// What a stretch holds, not only how much: the numbers of a recording of nothing else.
+#[test]
+fn stretches_of_a_manifest_hold_what_a_recording_of_them_holds() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let whole = wav(&at("whole.wav"), 2, 24_000, 3);
+    let samples: Vec<i16> =
+        hound::WavReader::open(&whole).unwrap().samples().map(Result::unwrap).collect();
+    let mut list = String::from("id,path,start,end\n");
+    // From the start, from within, and to the end.
+    let stretches =
+        [("a", 0, 6000), ("b", 4000, 12_000), ("c", 8008, 16_024), ("d", 16_000, 24_000)];
+    for (id, first, end) in stretches {
+        let seconds = |frame: usize| frame as f64 / 16_000.0;
+        let end_of = if end == 24_000 { String::new() } else { seconds(end).to_string() };
+        list += &format!("{id},whole.wav,{},{end_of}\n", seconds(first));
+        std::fs::create_dir_all(at("cut")).unwrap();
+        let path = at(&format!("cut/{id}.wav"));
+        let mut writer = hound::WavWriter::create(path, spec(2)).unwrap();
+        samples[2 * first..2 * end].iter().for_each(|s| writer.write_sample(*s).unwrap());
+        writer.finalize().unwrap();
+    }
+    std::fs::write(at("list.csv"), list).unwrap();
+    for (name, more) in [("frames", &["--add", "rms"][..]), ("table", &["--preset", "esc26"])] {
+        let (stretched, cut) = (at(&format!("{name}.npz")), at(&format!("{name}-cut.npz")));
+        extract(&at("list.csv"), &stretched, more).with(0);
+        extract(&at("cut"), &cut, more).with(0);
+        let (mut one, mut two) = (NpzFile::open(&stretched).unwrap(), NpzFile::open(&cut).unwrap());
+        let ((one_table, made), (two_table, _)) =
+            (layout::read_table(&mut one).unwrap(), layout::read_table(&mut two).unwrap());
+        assert_eq!(one_table.ids(), ["a", "b", "c", "d"]);
+        assert_eq!(one_table.ids(), two_table.ids());
+        assert_eq!(one_table.values(), two_table.values());
+        for feature in made.features().iter().filter(|_| name == "frames") {
+            for (id, ..) in stretches {
+                let frames = layout::frames_name(id, Some(feature));
+                let values = one.f32(&frames).unwrap();
+                assert!(values.iter().any(|v| *v != values[[0, 0, 0]]), "{frames}");
+                assert_eq!(values, two.f32(&frames).unwrap(), "{frames}");
+            }
+        }
+    }
 }
 
 #[test]

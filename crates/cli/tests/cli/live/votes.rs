@@ -33,10 +33,10 @@ fn windows_are_voted_on() {
     done(&[&classify[..], &windows, &["--out", text(&out)]].concat());
     let fuse = ["fuse", "--out", "-", "--predictions", text(&out), "--vote", "majority"];
     let fused = done(&fuse);
-    assert_eq!(fused.lines().next(), Some("id,path,predicted,p_noise,p_tone"));
-    assert_eq!(rows(&fused), [["tone", "0.2", "0.8"], ["noise", "0.75", "0.25"]]);
+    assert_eq!(fused.lines().next(), Some("id,path,status,predicted,p_noise,p_tone"));
+    assert_eq!(rows(&fused), [["ok", "tone", "0.2", "0.8"], ["ok", "noise", "0.75", "0.25"]]);
     let fused = done(&[&fuse[..], &["--background", "tone", "--least", "1"]].concat());
-    assert_eq!(rows(&fused)[0][0], "noise");
+    assert_eq!(rows(&fused)[0][1], "noise");
 }
 
 /// A vote over what is left of a recording is told from one over all of it.

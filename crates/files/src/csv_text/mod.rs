@@ -1,8 +1,12 @@
 //! CSV as spreadsheets and other programs write it: separated by commas, semicolons or tabs, with or
 //! without a byte order mark.
 
+mod lines;
+
 use std::collections::HashSet;
-use std::io::{self, BufRead, Read};
+use std::io::{self, BufRead};
+
+pub use lines::LineFeeds;
 
 /// A reader of the table in `text`, whose first line says what separates its fields: commas where
 /// it has one, else semicolons, else tabs. Space around fields is left out.
@@ -30,7 +34,33 @@ pub fn reader<R: BufRead>(mut text: R) -> io::Result<csv::Reader<LineFeeds<R>>> 
         text.consume(3);
     }
     let mut builder = csv::ReaderBuilder::new();
-    Ok(builder.delimiter(delimiter).trim(csv::Trim::All).from_reader(LineFeeds::new(text)))
+    let text = LineFeeds::new(text, delimiter);
+    Ok(builder.delimiter(delimiter).trim(csv::Trim::All).from_reader(text))
+}
+
+/// The names of the columns.
+///
+/// # Errors
+/// As those of records.
+pub fn header<R: BufRead>(
+    reader: &mut csv::Reader<LineFeeds<R>>,
+) -> Result<csv::StringRecord, Fault> {
+    let header = reader.headers().cloned();
+    match unclosed(reader) {
+        Some(fault) => Err(fault),
+        None => Ok(header?),
+    }
+}
+
+/// That the record which was read last goes on to the end of the text, since a quotation mark in it is never
+/// closed.
+fn unclosed<R: BufRead>(reader: &csv::Reader<LineFeeds<R>>) -> Option<Fault> {
+    let lines = reader.get_ref().lines();
+    // The text is read ahead of the records.
+    let line = lines.opened().filter(|_| reader.position().byte() == lines.bytes())?;
+    let reason = "a quotation mark opens here and is never closed: close it, or write it twice inside \
+                  quotation marks if it belongs to the text";
+    Some(Fault { line: Some(line), reason: reason.into() })
 }
 
 /// The records behind the header, each with the number of its line.
@@ -39,116 +69,23 @@ pub fn records<R: BufRead>(
 ) -> impl Iterator<Item = Result<(u64, csv::StringRecord), Fault>> {
     std::iter::from_fn(|| {
         let mut record = csv::StringRecord::new();
-        match reader.read_record(&mut record) {
+        let read = reader.read_record(&mut record);
+        if let (Ok(true) | Err(_), Some(fault)) = (&read, unclosed(reader)) {
+            return Some(Err(fault));
+        }
+        match read {
             Ok(true) => {
                 let line = record.position().map_or(0, csv::Position::line);
-                Some(Ok((reader.get_ref().lines.of_record(line), record)))
+                Some(Ok((reader.get_ref().lines().of_record(line), record)))
             }
             Ok(false) => None,
             Err(error) => {
                 let mut fault = Fault::from(error);
-                fault.line = fault.line.map(|line| reader.get_ref().lines.of_record(line));
+                fault.line = fault.line.map(|line| reader.get_ref().lines().of_record(line));
                 Some(Err(fault))
             }
         }
     })
-}
-
-/// Text whose lines end by line feeds alone, except in quotation marks. Where they end by CR LF, the csv crate
-/// takes the second for a part of the next line and counts one too few.
-pub struct LineFeeds<R> {
-    inner: R,
-    is_quoted: bool,
-    /// A carriage return was read and not given.
-    has_return: bool,
-    lines: Lines,
-}
-
-/// Where empty lines are in text that was read.
-#[derive(Default)]
-struct Lines {
-    /// Lines that ended.
-    ended: u64,
-    is_begun: bool,
-    is_quoted: bool,
-    /// Empty lines that follow each other: the first, and the one behind the last.
-    empty: Vec<[u64; 2]>,
-}
-
-impl Lines {
-    fn add(&mut self, text: &[u8]) {
-        for &byte in text {
-            self.is_quoted ^= byte == b'"';
-            if byte != b'\n' {
-                self.is_begun |= byte != b'\r';
-                continue;
-            }
-            self.ended += 1;
-            if !std::mem::take(&mut self.is_begun) && !self.is_quoted {
-                match self.empty.last_mut() {
-                    Some([_, end]) if *end == self.ended => *end += 1,
-                    _ => self.empty.push([self.ended, self.ended + 1]),
-                }
-            }
-        }
-    }
-
-    /// The line on which a record begins that begins on `line` for the csv crate: that counts empty lines before
-    /// a record as part of it.
-    fn of_record(&self, line: u64) -> u64 {
-        let before = self.empty.partition_point(|[first, _]| *first <= line);
-        let last = before.checked_sub(1).map(|at| self.empty[at]);
-        last.map_or(line, |[_, end]| line.max(end))
-    }
-}
-
-impl<R> LineFeeds<R> {
-    fn new(inner: R) -> Self {
-        Self { inner, is_quoted: false, has_return: false, lines: Lines::default() }
-    }
-
-    /// What is read from.
-    pub fn get_ref(&self) -> &R {
-        &self.inner
-    }
-}
-
-impl<R: BufRead> Read for LineFeeds<R> {
-    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        if out.is_empty() {
-            return Ok(0);
-        }
-        loop {
-            let text = self.inner.fill_buf()?;
-            if text.is_empty() {
-                out[0] = b'\r';
-                return Ok(usize::from(std::mem::take(&mut self.has_return)));
-            }
-            let (mut used, mut written) = (0, 0);
-            for &byte in text {
-                if self.has_return && byte != b'\n' && written < out.len() {
-                    out[written] = b'\r';
-                    written += 1;
-                    self.has_return = false;
-                }
-                if written == out.len() {
-                    break;
-                }
-                used += 1;
-                self.is_quoted ^= byte == b'"';
-                self.has_return = byte == b'\r' && !self.is_quoted;
-                if !self.has_return {
-                    out[written] = byte;
-                    written += 1;
-                }
-            }
-            self.inner.consume(used);
-            self.lines.add(&out[..written]);
-            if written > 0 {
-                return Ok(written);
-            }
-        }
-    }
 }
 
 /// What is wrong with a table, and where.
@@ -195,6 +132,8 @@ pub fn repeated<S: AsRef<str>>(header: impl IntoIterator<Item = S>) -> Option<St
 
 #[cfg(test)]
 mod tests {
+    use std::io::Read;
+
     use super::*;
 
     #[test]
@@ -243,13 +182,48 @@ mod tests {
         }
     }
 
+    /// What swallowed the rest of the table was said to be a line with too few fields, or nothing at all.
+    #[test]
+    fn quotation_marks_that_stay_open_are_found() {
+        let fault = |text: &str, capacity: usize| {
+            let mut table =
+                reader(io::BufReader::with_capacity(capacity, text.as_bytes())).unwrap();
+            match header(&mut table) {
+                Err(fault) => Some(fault.to_string()),
+                Ok(_) => records(&mut table).find_map(Result::err).map(|fault| fault.to_string()),
+            }
+        };
+        for ending in ["\n", "\r\n"] {
+            for capacity in [16, 8192] {
+                for (text, line) in [
+                    ("id,note\na,x\n\nb,\"y\nc,z\nd,z\n", 4),
+                    ("id,note\na,x\nb,\"y", 3),
+                    ("id,note\na,\"x\ny\",\"", 3),
+                    ("id,note\na,x\n\"b,y\nc,z\n", 3),
+                    ("id,\"note\na,x\n", 1),
+                    ("id;note\na;\"x \"\"y\"\"\nb;c\n", 2),
+                ] {
+                    let found = fault(&text.replace('\n', ending), capacity).unwrap();
+                    let expected = format!("line {line}: a quotation mark opens here");
+                    assert!(found.starts_with(&expected), "{text:?}: {found}");
+                }
+                // Within a field they are text, and two of them between two others.
+                for text in
+                    ["id,note\na,5\" pipe\nb,\"5\"\" pipe\"\nc,\"\"\nd,\"x\ny\"\n", "a\n\"b\""]
+                {
+                    assert_eq!(fault(&text.replace('\n', ending), capacity), None, "{text:?}");
+                }
+            }
+        }
+    }
+
     /// A lone carriage return ends a line, too, for the csv crate; none is lost.
     #[test]
     fn other_carriage_returns_are_kept() {
         for text in ["a\rb\r", "\r\r\n\"\r\n\"\r", "\r"] {
             for capacity in [1, 2, 64] {
                 let inner = io::BufReader::with_capacity(capacity, text.as_bytes());
-                let mut plain = LineFeeds::new(inner);
+                let mut plain = LineFeeds::new(inner, b',');
                 let mut found = Vec::new();
                 // One byte at a time.
                 let mut byte = [0];

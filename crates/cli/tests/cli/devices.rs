@@ -1,0 +1,35 @@
+//! Outputs that are no files.
+
+use crate::command::{done, names, refused, text};
+use crate::models::small_table;
+
+/// Tables go to devices as they are; what gets its name when it is whole says why it does not.
+#[test]
+fn devices_take_tables() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let (file, model, csv) = (at("x.npz"), at("m"), at("p.csv"));
+    small_table(&file, |_, _| {});
+    let learn = ["--features", text(&file), "--target", "type", "--classifier", "knn"];
+    done(&[&["train"], &learn[..], &["-o", text(&model), "-q"]].concat());
+    let classify = ["classify", "--model", text(&model), "--features", text(&file), "-o"];
+    let table = done(&[&classify[..], &["-"]].concat());
+    done(&[&classify[..], &[text(&csv)]].concat());
+    let held_out = [&["cross-validate"], &learn[..], &["-q", "-o"]].concat();
+    let fuse = ["fuse", text(&csv), "-o"];
+    for words in [&classify[..], &held_out, &fuse] {
+        done(&[words, &["/dev/null"]].concat());
+        let found = refused(&[words, &["/dev/full"]].concat());
+        assert!(found.contains("/dev/full: No space left"), "{found}");
+    }
+    assert_eq!(done(&[&classify[..], &["/dev/stdout"]].concat()), table);
+    assert_eq!(done(&[&classify[..], &["/dev/null", "--format", "jsonl"]].concat()), "");
+    assert!(done(&[&fuse[..], &["/dev/stdout"]].concat()).starts_with("id,path,status,"));
+    let found = refused(&[&["train"], &learn[..], &["-o", "/dev/null"]].concat());
+    assert!(found.contains("/dev/null is a device; this output gets its name when"), "{found}");
+    let wav = at("a.wav");
+    std::fs::write(&wav, "RIFF").unwrap();
+    let found = refused(&["extract", text(&wav), "--preset", "esc26", "-o", "/dev/null"]);
+    assert!(found.contains("/dev/null: is a device"), "{found}");
+    assert_eq!(names(folder.path()), ["a.wav", "m", "p.csv", "x.npz"]);
+}

@@ -1,0 +1,147 @@
+//! The text of a table as it is read, and where its lines and quotation marks are.
+
+use std::io::{self, BufRead, Read};
+
+/// Text whose lines end by line feeds alone, except in quotation marks. Where they end by CR LF, the csv crate
+/// takes the second for a part of the next line and counts one too few.
+pub struct LineFeeds<R> {
+    inner: R,
+    is_quoted: bool,
+    /// A carriage return was read and not given.
+    has_return: bool,
+    lines: Lines,
+}
+
+/// Where empty lines and quotation marks are in text that was read.
+pub(super) struct Lines {
+    delimiter: u8,
+    /// Bytes of the text.
+    bytes: u64,
+    /// Lines that ended.
+    ended: u64,
+    is_begun: bool,
+    place: Place,
+    /// The line on which quotation marks were last opened.
+    opened: u64,
+    /// Empty lines that follow each other: the first, and the one behind the last.
+    empty: Vec<[u64; 2]>,
+}
+
+/// What the next byte is, as the csv crate sees it.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Place {
+    /// The first of a field.
+    Begin,
+    /// Of a field without quotation marks, where they are text.
+    Plain,
+    /// Between quotation marks.
+    Quoted,
+    /// Behind a quotation mark that ends a field, unless another one follows.
+    Closed,
+}
+
+impl Lines {
+    fn new(delimiter: u8) -> Self {
+        let (place, empty) = (Place::Begin, Vec::new());
+        Self { delimiter, bytes: 0, ended: 0, is_begun: false, place, opened: 0, empty }
+    }
+
+    /// Bytes of the text.
+    pub(super) fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// The line on which the quotation marks were opened that are still open.
+    pub(super) fn opened(&self) -> Option<u64> {
+        (self.place == Place::Quoted).then_some(self.opened)
+    }
+
+    fn add(&mut self, text: &[u8]) {
+        self.bytes += text.len() as u64;
+        for &byte in text {
+            self.place = match (self.place, byte) {
+                (Place::Begin, b'"') => {
+                    self.opened = self.ended + 1;
+                    Place::Quoted
+                }
+                (Place::Quoted, b'"') => Place::Closed,
+                (Place::Quoted, _) | (Place::Closed, b'"') => Place::Quoted,
+                (_, b'\n' | b'\r') => Place::Begin,
+                (_, byte) if byte == self.delimiter => Place::Begin,
+                _ => Place::Plain,
+            };
+            if byte != b'\n' {
+                self.is_begun |= byte != b'\r';
+                continue;
+            }
+            self.ended += 1;
+            if !std::mem::take(&mut self.is_begun) && self.place != Place::Quoted {
+                match self.empty.last_mut() {
+                    Some([_, end]) if *end == self.ended => *end += 1,
+                    _ => self.empty.push([self.ended, self.ended + 1]),
+                }
+            }
+        }
+    }
+
+    /// The line on which a record begins that begins on `line` for the csv crate: that counts empty lines before
+    /// a record as part of it.
+    pub(super) fn of_record(&self, line: u64) -> u64 {
+        let before = self.empty.partition_point(|[first, _]| *first <= line);
+        let last = before.checked_sub(1).map(|at| self.empty[at]);
+        last.map_or(line, |[_, end]| line.max(end))
+    }
+}
+
+impl<R> LineFeeds<R> {
+    pub(super) fn new(inner: R, delimiter: u8) -> Self {
+        Self { inner, is_quoted: false, has_return: false, lines: Lines::new(delimiter) }
+    }
+
+    pub(super) fn lines(&self) -> &Lines {
+        &self.lines
+    }
+
+    /// What is read from.
+    pub fn get_ref(&self) -> &R {
+        &self.inner
+    }
+}
+
+impl<R: BufRead> Read for LineFeeds<R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if out.is_empty() {
+            return Ok(0);
+        }
+        loop {
+            let text = self.inner.fill_buf()?;
+            if text.is_empty() {
+                out[0] = b'\r';
+                return Ok(usize::from(std::mem::take(&mut self.has_return)));
+            }
+            let (mut used, mut written) = (0, 0);
+            for &byte in text {
+                if self.has_return && byte != b'\n' && written < out.len() {
+                    out[written] = b'\r';
+                    written += 1;
+                    self.has_return = false;
+                }
+                if written == out.len() {
+                    break;
+                }
+                used += 1;
+                self.is_quoted ^= byte == b'"';
+                self.has_return = byte == b'\r' && !self.is_quoted;
+                if !self.has_return {
+                    out[written] = byte;
+                    written += 1;
+                }
+            }
+            self.inner.consume(used);
+            self.lines.add(&out[..written]);
+            if written > 0 {
+                return Ok(written);
+            }
+        }
+    }
+}
