@@ -182,13 +182,9 @@ class Classifier(ClassifierMixin, BaseEstimator):
         """
         if not hasattr(self, "_model"):
             raise not_fitted(self)
-<<<<<<< HEAD
         require_kept(self.classes_)
-        self._model.save(place(path), None if features is None else self._made_of(features))
-=======
         target = destination(path, overwrite)
         self._model.save(target, None if features is None else self._made_of(features))
->>>>>>> small
 
     def _made_of(self, features: Features | FeatureExtractor) -> str:
         """What a model file says about its features, as JSON."""

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use corsmal_files::draft::{check_place, folder, is_device};
+use corsmal_files::draft::{check_place, folder, is_device, same};
 
 use crate::failure::Failure;
 
@@ -33,4 +33,15 @@ pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
         return Ok(check_place(path)?);
     }
     Err(Failure::new(format!("{}: there is no folder {}", path.display(), folder(path).display())))
+}
+
+/// Refuses an output that would take the place of something that the command reads.
+pub fn spare<'a>(out: &Path, read: impl IntoIterator<Item = &'a Path>) -> Result<(), Failure> {
+    match read.into_iter().any(|input| same(input, out)) {
+        true => Err(Failure::new(format!(
+            "{}: the output would replace an input: give it another name",
+            out.display()
+        ))),
+        false => Ok(()),
+    }
 }

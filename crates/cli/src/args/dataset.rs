@@ -157,6 +157,11 @@ impl DatasetArgs {
         given.into_iter().flatten().next().map_or(Path::new(""), PathBuf::as_path)
     }
 
+    /// All files that are read.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        [self.path()].into_iter().chain(self.labels.file())
+    }
+
     /// Reads features and labels, refuses what cannot be learned from, warns of what is odd. Gives
     /// the name of the column to learn, too.
     pub fn load(&self) -> Result<(LabelledTable, String), Failure> {

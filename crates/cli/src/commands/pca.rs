@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use corsmal_extract::projection::Projection;
-use corsmal_files::draft;
 use corsmal_files::format::require_npz;
 use serde_json::json;
 
@@ -48,9 +47,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     require_npz(&args.out)?;
     publish::check(&args.out, args.overwrite)?;
     let features = args.features.or(args.named).unwrap_or_default();
-    if draft::same(&features, &args.out) {
-        return Err(Failure::new(format!("{}: would replace the features", args.out.display())));
-    }
+    publish::spare(&args.out, [features.as_path()])?;
     let projection = Projection::fit(&features, args.n_components)?;
     projection.save(&args.out)?;
     let (from, to) = (projection.n_inputs(), projection.n_components());

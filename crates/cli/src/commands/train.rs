@@ -62,6 +62,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 
 fn train(args: &Args) -> Result<ExitCode, Failure> {
     publish::check(&args.out, args.overwrite)?;
+    publish::spare(&args.out, args.dataset.files().chain(args.network.weights.as_deref()))?;
     if let Some(name) = &args.network.net {
         return train_network(args, name);
     }

@@ -341,3 +341,27 @@ fn two_classifiers_are_tested_on_the_same_rows() {
         assert!(found.contains(message), "{found}");
     }
 }
+
+/// The output took the place of a table that it was made of.
+#[test]
+fn outputs_do_not_replace_what_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("p.csv");
+    let rows = "id,true,predicted\na,x,x\nb,y,y\n";
+    std::fs::write(&file, rows).unwrap();
+    let file = text(&file);
+    for words in [
+        vec!["fuse", file, "-o", file],
+        vec!["fuse", "--type", file, "-o", file],
+        vec!["train", file, "-o", file],
+        vec!["train", "x.npz", "--labels", file, "-o", file],
+        vec!["cross-validate", file, "--predictions", file],
+        vec!["classify", "-m", file, "x.wav", "-o", file],
+        vec!["classify", "-m", "x.model", file, "-o", file],
+        vec!["capacity", "combine", file, "-o", file],
+    ] {
+        let message = refused(&[&words[..], &["--overwrite"]].concat());
+        assert!(message.contains("the output would replace an input"), "{words:?}: {message}");
+    }
+    assert_eq!(std::fs::read_to_string(file).unwrap(), rows);
+}

@@ -40,6 +40,7 @@ pub struct Args {
 /// Combines and writes.
 pub fn run(args: &Args) -> Result<ExitCode, Failure> {
     publish::check_table(&args.out, args.overwrite)?;
+    publish::spare(&args.out, args.inputs.iter().map(PathBuf::as_path))?;
     let (rows, without) = combine_files(&args.inputs, args.prior, &args.out)?;
     args.told.tell(
         || json!({ "out": args.out, "recordings": rows, "prior": without }),

@@ -7,6 +7,7 @@ mod records;
 mod whole;
 mod windows;
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use corsmal_models::dataset::LabelledTable;
@@ -24,6 +25,9 @@ use records::{End, Records};
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     if !is_stdout(&args.out) {
         publish::check_table(&args.out, args.overwrite)?;
+        let recordings = args.names().iter().map(Path::new);
+        let read = [args.model.as_path()].into_iter().chain(args.features.as_deref());
+        publish::spare(&args.out, read.chain(recordings))?;
     }
     let place = args.model.display();
     if is_model(&args.model) {

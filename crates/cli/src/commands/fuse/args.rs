@@ -1,6 +1,6 @@
 //! What the command line says.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use corsmal_ccm::predictions::{self, RecordingPredictions};
@@ -93,6 +93,12 @@ pub(super) enum Format {
 }
 
 impl Args {
+    /// All tables that are read.
+    pub(super) fn tables(&self) -> impl Iterator<Item = &Path> {
+        let all = [&self.predictions, &self.files, &self.kind, &self.level, &self.joint];
+        all.into_iter().flatten().map(PathBuf::as_path)
+    }
+
     /// Says what was written; on standard error, since predictions may be on standard output.
     pub(super) fn tell(&self, recordings: usize, failed: usize, what: &str) -> Result<(), Failure> {
         let out = &self.out;

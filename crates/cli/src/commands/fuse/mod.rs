@@ -19,6 +19,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     }
     if !to_stdout {
         publish::check_table(&args.out, args.overwrite)?;
+        publish::spare(&args.out, args.tables())?;
     }
     let paths = if args.predictions.is_empty() { &args.files } else { &args.predictions };
     if paths.is_empty() {
