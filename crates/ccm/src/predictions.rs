@@ -334,7 +334,11 @@ mod tests {
             assert_eq!(mean.rows.len(), 2);
             assert_eq!((mean.rows[1].class, &mean.rows[1].proba), (None, &None));
             assert_eq!(mean.rows[0].proba, Some(vec![0.5, 0.5]));
-            assert!(!mean.columns.contains(&"status".to_string()), "of the line, not the mean");
+            let status = mean.columns.iter().position(|column| column == "status").unwrap();
+            assert_eq!(
+                (&*mean.rows[0].cells[status], &*mean.rows[1].cells[status]),
+                ("ok", "corrupt")
+            );
         }
     }
 

@@ -358,7 +358,7 @@ fn outputs_do_not_replace_what_is_read() {
         vec!["cross-validate", file, "--predictions", file],
         vec!["classify", "-m", file, "x.wav", "-o", file],
         vec!["classify", "-m", "x.model", file, "-o", file],
-        vec!["capacity", "combine", file, "-o", file],
+        vec!["capacity", "combine", "--in", file, "-o", file],
     ] {
         let message = refused(&[&words[..], &["--overwrite"]].concat());
         assert!(message.contains("the output would replace an input"), "{words:?}: {message}");

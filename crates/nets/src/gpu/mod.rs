@@ -53,8 +53,10 @@ impl Gpu {
                 shielded(|| device.identity())?.map_or("GPU".into(), |identity| identity.name);
             Ok(Self { device, name: name.to_string() })
         });
-        let refusal =
-            |reason: &String| NetError::NoDevice { name: "gpu".into(), reason: reason.clone() };
+        let refusal = |reason: &String| NetError::NoDevice {
+            name: "gpu".into(),
+            reason: format!("{reason}; --device cpu needs none"),
+        };
         opened.as_ref().map(Clone::clone).map_err(refusal)
     }
 
