@@ -138,7 +138,9 @@ def test_saved_labels_come_back_in_their_type(tmp_path: Path) -> None:
         found = classifiers.KNN.load(tmp_path / "a.model").predict(x)
         np.testing.assert_array_equal(found, labels)
         (tmp_path / "a.model").unlink()
-    for other in (y.astype("datetime64[D]"), np.array([(int(v),) for v in y] + [None])[:-1]):
+    pairs = np.empty(len(y), dtype=object)
+    pairs[:] = [(int(v), "of 3") for v in y]
+    for other in (y.astype("datetime64[D]"), pairs):
         model.fit(x, other)
         with pytest.raises(ParameterError, match="a model file keeps classes that are texts"):
             model.save(tmp_path / "a.model")
