@@ -8,7 +8,7 @@ mod common;
 use common::clouds;
 use corsmal_models::classifiers::{Classifier, ClassifierSpec};
 use corsmal_models::params::key_values;
-use ndarray::{Array2, ArrayView1, Axis, s};
+use ndarray::{Array1, Array2, ArrayView1, Axis, s};
 
 fn spec(name: &str, parameters: &[&str]) -> ClassifierSpec {
     ClassifierSpec::new(name, &key_values(parameters).unwrap()).unwrap()
@@ -223,15 +223,31 @@ fn logistic_regression_finds_the_same_in_any_unit() {
         model.predict_proba(x.view()).unwrap()
     };
     // A weak penalty, so that units hardly matter to the minimum either.
-    let weak = ["C=1e16"];
-    let expected = of(&x, &weak);
-    for (unit, shift) in [(1e4, 0.0), (1e-4, 0.0), (1e7, 3e9), (1e-2, 50.0)] {
+    let expected = of(&x, &["C=1e16"]);
+    let near = |other: &Array2<f64>, settings: &[&str], what: &str| {
+        for (found, expected) in of(other, settings).iter().zip(&expected) {
+            assert!((found - expected).abs() < 1e-4, "{what}: {found} for {expected}");
+        }
+    };
+    for (unit, shift) in [(1e4, 0.0), (1e-4, 0.0), (1e7, 3e9), (1e-2, 50.0), (1e-6, 0.0)] {
         let mut other = &x * unit + shift;
         other.column_mut(0).mapv_inplace(|v| v / unit);
-        let found = of(&other, &weak);
-        for (found, expected) in found.iter().zip(&expected) {
-            assert!((found - expected).abs() < 1e-3, "{unit}: {found} for {expected}");
-        }
+        near(&other, &["C=1e20"], &format!("{unit}"));
+    }
+    // Slopes by the weights of small features are small from the start.
+    near(&(&x * 1e-9), &["C=1e34"], "small");
+    // A constant has no weight.
+    for constant in [440.0, 44100.0, 1e8] {
+        let mut more = Array2::from_elem((x.nrows(), 5), constant);
+        more.slice_mut(s![.., ..4]).assign(&x);
+        near(&more, &["C=1e16"], &format!("{constant}"));
+    }
+    // More features than rows, as they come.
+    let (wide, classes) = clouds(60, 400, 3, 7);
+    let wide = &wide * &Array1::from_shape_fn(400, |f| f64::from(f as u32 % 7 + 1).powi(3)) + 90.0;
+    for settings in [&["C=1e6"][..], &[]] {
+        let model = spec("logistic", settings).train(wide.view(), &classes, 3).unwrap();
+        assert_eq!(model.predict(wide.view()).unwrap(), classes);
     }
     // Large features leave no penalty to speak of: rows that can be told apart are.
     let mut apart = x.clone();

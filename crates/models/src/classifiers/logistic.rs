@@ -1,7 +1,9 @@
 //! Logistic regression: the softmax (two classes: the logistic function) of linear scores, with an
 //! L2 penalty on the weights, the intercepts free. Same objective as scikit-learn 1.9.
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut1, Axis, s};
+use ndarray::{
+    Array1, Array2, ArrayBase, ArrayView1, ArrayView2, ArrayViewMut1, Axis, Data, Dimension, s,
+};
 use serde::{Deserialize, Serialize};
 
 use super::{Classify, Train};
@@ -16,7 +18,7 @@ parameters! {
         C: f64 = 1.0, "a positive number", "inverse of the penalty's strength";
         class_weight: ClassWeight = ClassWeight::Equal,
             "null, balanced, or one positive number per class in label order", "weight of each class";
-        tol: f64 = 1e-8, "a positive number", "largest slope of the mean loss at the end";
+        tol: f64 = 1e-8, "a positive number", "largest slope of the mean loss at the end, for features in their own unit and of unit deviation";
         max_iter: usize = 10_000, "a whole number of at least 1", "most steps";
     }
     check(this) {
@@ -72,46 +74,56 @@ impl LogisticParams {
         let total: f64 = row_weights.iter().sum();
         let penalty = 1.0 / self.C / total;
         let scale = Scale::of(x, &row_weights, penalty).ok_or_else(too_large)?;
-        let objective = Objective { x, y, row_weights, total, penalty, outputs, scale };
+        let z = scale.rows(x);
+        let penalties = scale.deviations.mapv(|d| penalty / d / d);
+        let objective = Objective { z, y, row_weights, total, penalties, outputs };
         let start = Array1::zeros(outputs * (x.ncols() + 1));
-        let slope = |gradient: ArrayView1<'_, f64>| objective.slope(gradient);
+        let units = scale.deviations.mapv(|d| if d.is_finite() { d } else { 0.0 });
+        let own = |gradient: ArrayView1<'_, f64>| {
+            largest(&(&objective.table(gradient).slice(s![.., ..x.ncols()]) * &units))
+        };
+        // In either unit: large features make their own the finer one, small features the other.
+        let slope = |gradient: ArrayView1<'_, f64>| own(gradient).max(largest(&gradient));
         let stopping = lbfgs::Stopping { slope, tol: self.tol, max_iter: self.max_iter };
         let found = lbfgs::minimise(start, &stopping, |at, gradient| objective.at(at, gradient));
-        let scaled = largest(found.gradient.iter().copied());
-        let near = if found.end == End::Stalled { self.tol.max(ROUNDING) } else { self.tol };
-        let weights = objective.unscaled(found.x);
+        let left = largest(&found.gradient);
+        let weights = scale.unscaled(objective.table(found.x.view()).to_owned());
         if !weights.iter().all(|v| v.is_finite()) {
             return Err(too_large());
         }
         // Where features are large, rounding alone makes slopes by their weights.
-        if found.end != End::Converged && !(scaled <= near) {
-            let (steps, slope, tol) = (found.steps, slope(found.gradient.view()), self.tol);
+        if found.end != End::Converged && !(left <= self.tol.max(ROUNDING)) {
+            let advice = match found.end {
+                End::OutOfSteps => "standardise the features, or raise max_iter or tol",
+                _ => "standardise the features, or raise tol",
+            };
+            let (steps, tol) = (found.steps, self.tol);
             return Err(ModelError::Numerical {
                 owner: Self::OWNER,
                 reason: format!(
-                    "no minimum found: the largest slope is {slope:.1e} after {steps} steps, tol is \
-                     {tol:.0e}; standardise the features, or raise max_iter or tol"
+                    "no minimum found: the largest slope is {left:.1e} after {steps} steps, tol is \
+                     {tol:.0e}; {advice}"
                 ),
             });
         }
-        let table = weights
-            .into_shape_with_order((outputs, x.ncols() + 1))
-            .map_err(|e| ModelError::Inconsistent(e.to_string()))?;
         Ok(Logistic {
             n_classes,
-            weights: table.slice(s![.., ..x.ncols()]).to_owned(),
-            intercepts: table.column(x.ncols()).to_owned(),
+            weights: weights.slice(s![.., ..x.ncols()]).to_owned(),
+            intercepts: weights.column(x.ncols()).to_owned(),
         })
     }
 }
 
-/// A slope of the mean loss, over features of unit deviation, that rounding may leave.
+/// A slope that rounding may leave.
 const ROUNDING: f64 = 1e-6;
+/// Deviation, as a share of the mean, below which rounding of the mean is all that varies.
+const CONSTANT: f64 = 8.0 * f64::EPSILON;
 
 /// Coordinates in which every feature matters alike, so that the search needs few steps whatever the features'
 /// units: weights times `deviations`, the intercept where features are `means`.
 struct Scale {
     means: Array1<f64>,
+    /// infinite for a constant feature, whose weight stays zero
     deviations: Array1<f64>,
 }
 
@@ -123,55 +135,61 @@ impl Scale {
             column.iter().zip(row_weights).map(|(v, w)| w / total * v).sum::<f64>()
         };
         let means: Array1<f64> = x.columns().into_iter().map(mean).collect();
-        let deviation = |(column, &mean): (ArrayView1<'_, f64>, &f64)| {
+        let variance = |(column, &mean): (ArrayView1<'_, f64>, &f64)| {
             let squares =
                 column.iter().zip(row_weights).map(|(v, w)| w / total * (v - mean).powi(2));
-            // The penalty bends the loss as data of this variance would.
-            let deviation = (squares.sum::<f64>() + 4.0 * penalty).sqrt();
-            if deviation > 0.0 { deviation } else { 1.0 }
+            squares.sum::<f64>()
         };
-        let deviations: Array1<f64> = x.columns().into_iter().zip(&means).map(deviation).collect();
-        let finite = means.iter().chain(&deviations).all(|v| v.is_finite());
-        finite.then_some(Self { means, deviations })
+        let mut deviations: Array1<f64> =
+            x.columns().into_iter().zip(&means).map(variance).collect();
+        if !means.iter().chain(&deviations).all(|v| v.is_finite()) {
+            return None;
+        }
+        for (d, mean) in deviations.iter_mut().zip(&means) {
+            let is_constant = d.sqrt() <= CONSTANT * mean.abs();
+            // The penalty bends the loss as data of this variance would.
+            *d = if is_constant { f64::INFINITY } else { (*d + 4.0 * penalty).sqrt() };
+        }
+        Some(Self { means, deviations })
+    }
+
+    fn rows(&self, x: ArrayView2<'_, f64>) -> Array2<f64> {
+        (&x - &self.means) / &self.deviations
+    }
+
+    /// `[outputs, features + 1]` in the coordinates of the features.
+    fn unscaled(&self, mut table: Array2<f64>) -> Array2<f64> {
+        for mut row in table.rows_mut() {
+            let (mut weights, mut intercept) = row.view_mut().split_at(Axis(0), self.means.len());
+            weights /= &self.deviations;
+            intercept[0] -= weights.dot(&self.means);
+        }
+        table
     }
 }
 
-/// Mean loss plus penalty, as a function of `[outputs, features + 1]` (intercept last) in the coordinates of `scale`.
-struct Objective<'a, 'y> {
-    x: ArrayView2<'a, f64>,
+/// Mean loss plus penalty, as a function of `[outputs, features + 1]` (intercept last).
+struct Objective<'y> {
+    z: Array2<f64>,
     y: &'y [usize],
     row_weights: Vec<f64>,
     total: f64,
-    penalty: f64,
+    /// of the square of each feature's weights
+    penalties: Array1<f64>,
     outputs: usize,
-    scale: Scale,
 }
 
-impl Objective<'_, '_> {
+impl Objective<'_> {
     fn table<'t>(&self, flat: ArrayView1<'t, f64>) -> ArrayView2<'t, f64> {
-        let shape = (self.outputs, self.x.ncols() + 1);
+        let shape = (self.outputs, self.z.ncols() + 1);
         flat.into_shape_with_order(shape).expect("the shape minimised over")
     }
 
-    /// In the coordinates of the features.
-    fn unscaled(&self, at: Array1<f64>) -> Array1<f64> {
-        let features = self.x.ncols();
-        let mut table = self.table(at.view()).to_owned();
-        for mut row in table.rows_mut() {
-            let (mut weights, mut intercept) = row.view_mut().split_at(Axis(0), features);
-            weights /= &self.scale.deviations;
-            intercept[0] -= weights.dot(&self.scale.means);
-        }
-        table.into_iter().collect()
-    }
-
     fn at(&self, at: ArrayView1<'_, f64>, mut gradient: ArrayViewMut1<'_, f64>) -> f64 {
-        let features = self.x.ncols();
-        let Scale { means, deviations } = &self.scale;
+        let features = self.z.ncols();
         let table = self.table(at);
-        let weights = &table.slice(s![.., ..features]) / deviations;
-        let intercepts = &table.column(features) - &weights.dot(means);
-        let mut scores = self.x.dot(&weights.t()) + intercepts;
+        let weights = table.slice(s![.., ..features]);
+        let mut scores = self.z.dot(&weights.t()) + table.column(features);
         let mut loss = 0.0;
         for ((mut row, &class), weight) in
             scores.outer_iter_mut().zip(self.y).zip(&self.row_weights)
@@ -180,37 +198,19 @@ impl Objective<'_, '_> {
             loss += weight * slopes(row.view_mut(), class);
             row *= weight / self.total;
         }
+        let penalised = &weights * &self.penalties;
         let mut slope = Array2::zeros((self.outputs, features + 1));
-        let by_intercepts = scores.sum_axis(Axis(0));
-        let mut by_weights = scores.t().dot(&self.x);
-        for (mut row, by_intercept) in by_weights.rows_mut().into_iter().zip(&by_intercepts) {
-            row.scaled_add(-by_intercept, means);
-        }
-        by_weights.scaled_add(self.penalty, &weights);
-        by_weights /= deviations;
-        slope.slice_mut(s![.., ..features]).assign(&by_weights);
-        slope.column_mut(features).assign(&by_intercepts);
+        slope.slice_mut(s![.., ..features]).assign(&(scores.t().dot(&self.z) + &penalised));
+        slope.column_mut(features).assign(&scores.sum_axis(Axis(0)));
         gradient.iter_mut().zip(&slope).for_each(|(to, &from)| *to = from);
-        loss / self.total + 0.5 * self.penalty * weights.iter().map(|w| w * w).sum::<f64>()
-    }
-
-    /// The largest slope by a weight or an intercept.
-    fn slope(&self, gradient: ArrayView1<'_, f64>) -> f64 {
-        let features = self.x.ncols();
-        let Scale { means, deviations } = &self.scale;
-        let of_row = |row: ArrayView1<'_, f64>| {
-            let by_intercept = row[features];
-            let own = row.into_iter().zip(deviations).zip(means);
-            let by_weights = own.map(|((g, d), m)| g * d + m * by_intercept);
-            largest(by_weights.chain([by_intercept]))
-        };
-        largest(self.table(gradient).rows().into_iter().map(of_row))
+        loss / self.total + 0.5 * (&penalised * &weights).sum()
     }
 }
 
 /// The largest size among numbers; what is not a number wins.
-fn largest(values: impl Iterator<Item = f64>) -> f64 {
-    values.map(f64::abs).fold(0.0, |most, v| if v > most || v.is_nan() { v } else { most })
+fn largest<D: Dimension>(values: &ArrayBase<impl Data<Elem = f64>, D>) -> f64 {
+    let larger = |most: f64, v: &f64| if v.abs() > most || v.is_nan() { v.abs() } else { most };
+    values.iter().fold(0.0, larger)
 }
 
 /// Loss of one row; its scores are replaced by the loss's derivatives.
