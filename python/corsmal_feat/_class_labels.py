@@ -12,7 +12,7 @@ from .errors import ParameterError
 __all__ = ["class_labels", "label_kind", "require_kept"]
 
 #: numpy's letters of the types that come back as they were
-_KEPT = "biufU"
+_KEPT = "biufUT"
 
 
 def label_kind(classes: npt.NDArray[Any]) -> str:
@@ -25,11 +25,14 @@ def label_kind(classes: npt.NDArray[Any]) -> str:
 
 def require_kept(classes: npt.NDArray[Any]) -> None:
     """Refuses to keep classes that would come back as text."""
-    if label_kind(classes) not in _KEPT:
+    kind = label_kind(classes)
+    if kind not in _KEPT:
         raise ParameterError(
-            "a model file keeps classes that are texts, whole numbers or booleans, not "
+            "a model file keeps classes that are texts, numbers or booleans, not "
             f"{classes.dtype} ({classes[0]!r}): fit with such labels"
         )
+    if kind in "iu" and any(not -(2**63) <= int(label) < 2**63 for label in classes):
+        raise ParameterError("a model file keeps whole numbers up to 2**63 - 1: fit with texts")
 
 
 def class_labels(header: dict[str, Any]) -> npt.NDArray[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, TypedDict
 
@@ -157,6 +158,17 @@ def single(value: Any) -> Singles:
 
 def _lengths(lengths: Sequence[int] | None) -> list[int] | None:
     return None if lengths is None else [size("lengths", n, 0) for n in lengths]
+
+
+def settings(recipe: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Changes of a recipe in plain values."""
+    if recipe is not None and not isinstance(recipe, Mapping):
+        raise ParameterError(f"recipe must be a mapping of keys to values, not {recipe!r}")
+    changes: dict[str, Any] = json.loads(json.dumps(dict(recipe or {}), default=plain))
+    for key, value in changes.items():
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ParameterError(f"recipe: {key} must be a finite number, not {value}")
+    return changes
 
 
 def plain(value: Any) -> Any:

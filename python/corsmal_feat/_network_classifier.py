@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import as_array, size
+from ._arrays import as_array
 from ._class_labels import class_labels, label_kind, require_kept
+from ._network import settings
 from ._refusals import destination, existing, seed_of
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
 from ._validation import labels_of
@@ -67,7 +68,7 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
     def __sklearn_is_fitted__(self) -> bool:
         return hasattr(self, "_model")
 
-    def fit(self, X: Any, y: Any, *, watched: Sequence[int] | None = None) -> Self:
+    def fit(self, X: Any, y: Any, *, watched: Sequence[int] | npt.NDArray[Any] | None = None) -> Self:
         """Trains on `X` and `y`, one label per item.
 
         `watched` are indices of items that are not used for training. Their score after each epoch
@@ -77,14 +78,11 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         columns = self._columns(X)
         count = len(columns[0][1]) - 1
         classes, positions = labels_of(y, count, type(self).__name__)
-        held = {size("watched", i, 0) for i in watched or ()}
-        changes = dict(self.recipe or {})
+        held = _watched(watched, count)
+        changes = settings(self.recipe)
         if self.random_state is not None:
             changes["seed"] = seed_of(self.random_state)
-        try:
-            recipe = _core.network_recipe(self.network, json.dumps(changes))
-        except TypeError as error:
-            raise ParameterError(f"recipe: {error}") from error
+        recipe = _core.network_recipe(self.network, json.dumps(changes))
         self._model = _core.TrainedNetwork.fit(
             self.network,
             columns,
@@ -109,7 +107,8 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
 
     def predict(self, X: Any) -> npt.NDArray[Any]:
         """The label of each item of `X`."""
-        labels: npt.NDArray[Any] = self.classes_[self.predict_proba(X).argmax(axis=1)]
+        chosen = self.predict_proba(X).argmax(axis=1)
+        labels: npt.NDArray[Any] = self.classes_[chosen]
         return labels
 
     def state_dict(self) -> dict[str, npt.NDArray[np.float32]]:
@@ -165,6 +164,20 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         if "_model" in state:
             state = state | {"_model": _core.TrainedNetwork.from_bytes(state["_model"])}
         self.__dict__.update(state)
+
+
+def _watched(watched: Sequence[int] | npt.NDArray[Any] | None, count: int) -> set[int]:
+    """Indices of items, as a list or an array."""
+    if watched is None:
+        return set()
+    given = np.asarray(watched)
+    if given.size == 0:
+        return set()
+    if given.ndim != 1 or given.dtype.kind not in "iu":
+        raise ParameterError(f"watched must hold indices of items, not {watched!r}")
+    if given.min() < 0 or given.max() >= count:
+        raise ParameterError(f"watched must hold indices from 0 to {count - 1}, not {watched!r}")
+    return set(given.tolist())
 
 
 def _column(items: list[Any], place: str, shape: str) -> _Column:

@@ -21,7 +21,7 @@ from . import _core
 from ._arrays import Singles, as_array
 from ._class_labels import label_kind
 from ._features import StrPath
-from ._network import Network, TrainingSteps, plain, single
+from ._network import Network, TrainingSteps, settings, single
 from ._refusals import refuses, seed_of
 from ._scoring import CrossValidation, validated
 from ._trained_network import TrainedNetwork, jobs_of, paths_of
@@ -334,7 +334,7 @@ def _rows(
 
 
 def _recipe(name: str, recipe: Mapping[str, Any] | None) -> str:
-    return _core.network_recipe(name, json.dumps(dict(recipe or {}), default=plain))
+    return _core.network_recipe(name, json.dumps(settings(recipe)))
 
 
 def _folder(checkpoints: StrPath | None) -> str | None:

@@ -194,6 +194,7 @@ impl Request<'_> {
         device: Device,
     ) -> Result<Training<'t>, Failure> {
         let groups = self.dataset.groups.as_deref();
+        tell_device(&device, self.quiet);
         Ok(Training { target, groups, recipe, checkpoints: self.folder()?, weights, device })
     }
 
@@ -221,13 +222,16 @@ impl Request<'_> {
     }
 }
 
-/// The device of this name; a GPU is named to the user.
+/// The device of this name.
 pub fn device(name: &str) -> Result<Device, Failure> {
-    let device = Device::named(name)?;
-    if let Some(gpu) = device.gpu_name() {
+    Ok(Device::named(name)?)
+}
+
+/// Names a GPU to the user.
+pub fn tell_device(device: &Device, quiet: bool) {
+    if let (Some(gpu), false) = (device.gpu_name(), quiet) {
         eprintln!("networks train on {gpu}");
     }
-    Ok(device)
 }
 
 /// Refuses weights that a training of this tool made, where scores of recordings are wanted that it may have

@@ -36,8 +36,8 @@ pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
 }
 
 /// Refuses an output that would take the place of something that the command reads.
-pub fn spare<'a>(out: &Path, read: impl IntoIterator<Item = &'a Path>) -> Result<(), Failure> {
-    match read.into_iter().any(|input| same(input, out)) {
+pub fn spare<P: AsRef<Path>>(out: &Path, read: impl IntoIterator<Item = P>) -> Result<(), Failure> {
+    match read.into_iter().any(|input| same(input.as_ref(), out)) {
         true => Err(Failure::new(format!(
             "{}: the output would replace an input: give it another name",
             out.display()

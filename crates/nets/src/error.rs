@@ -185,7 +185,8 @@ pub enum NetError {
     },
     /// A GPU that failed: out of memory, or its driver.
     #[error(
-        "GPU {name}: {reason}: a smaller batch needs less of its memory; --device cpu does without it"
+        "GPU {name}: {reason}; if its memory is full, a smaller batch needs less; --device cpu does \
+         without it"
     )]
     Gpu {
         /// what it calls itself

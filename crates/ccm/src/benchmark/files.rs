@@ -54,7 +54,8 @@ impl Earlier {
         let named = left.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
         match left.len() {
             0 => None,
-            count @ 1..=NAMED => Some(format!("{count} files are not of this run: {named}")),
+            1 => Some(format!("1 file is not of this run: {named}")),
+            count @ 2..=NAMED => Some(format!("{count} files are not of this run: {named}")),
             count => Some(format!("{count} files are not of this run: {named}, …")),
         }
     }

@@ -158,8 +158,10 @@ impl DatasetArgs {
     }
 
     /// All files that are read.
-    pub fn files(&self) -> impl Iterator<Item = &Path> {
-        [self.path()].into_iter().chain(self.labels.file())
+    pub fn files(&self) -> Vec<PathBuf> {
+        let own = self.crops.as_ref().map(|folder| folder.join("labels.csv"));
+        let given = [Some(self.path()), self.labels.file()].into_iter().flatten();
+        given.map(Path::to_path_buf).chain(own).collect()
     }
 
     /// Reads features and labels, refuses what cannot be learned from, warns of what is odd. Gives

@@ -118,7 +118,8 @@ fn text(report: &Comparison) -> String {
         Some(0) => lines.push("\nno id in common: rows are paired by number".into()),
         Some(rows) => {
             let ids = if report.paired_by == PairedBy::Id { " by their ids" } else { "" };
-            lines.push(format!("\n{} paired{ids}", plural(rows, "row")));
+            let rows = plural(rows, "row");
+            lines.push(format!("\n{rows} paired{ids}, in every array with one for each id"));
         }
     }
     settings(report, &mut lines);

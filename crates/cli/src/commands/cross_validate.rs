@@ -85,7 +85,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 fn cross_validate(args: &Args) -> Result<ExitCode, Failure> {
     if let Some(path) = &args.predictions {
         publish::check_table(path, args.overwrite)?;
-        publish::spare(path, args.dataset.files())?;
+        publish::spare(path, args.dataset.files().into_iter().chain(args.network.weights.clone()))?;
     }
     if let Some(folder) = &args.report {
         study::prepare(folder, args.overwrite)?;

@@ -60,9 +60,14 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     args.jobs.pool()?.install(|| train(&args))
 }
 
+/// All files that are read.
+fn files(args: &Args) -> Vec<PathBuf> {
+    args.dataset.files().into_iter().chain(args.network.weights.clone()).collect()
+}
+
 fn train(args: &Args) -> Result<ExitCode, Failure> {
     publish::check(&args.out, args.overwrite)?;
-    publish::spare(&args.out, args.dataset.files().chain(args.network.weights.as_deref()))?;
+    publish::spare(&args.out, files(args))?;
     if let Some(name) = &args.network.net {
         return train_network(args, name);
     }

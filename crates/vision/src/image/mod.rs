@@ -193,7 +193,9 @@ pub(crate) fn check_size(width: usize, height: usize, path: &Path) -> Result<()>
 }
 
 fn decode_jpeg(bytes: &[u8], path: &Path) -> Result<Rgb> {
+    // Strict: a picture that ends early is no picture, not one with grey below.
     let options = DecoderOptions::new_safe()
+        .set_strict_mode(true)
         .set_max_width(MAX_SIDE)
         .set_max_height(MAX_SIDE)
         .jpeg_set_out_colorspace(ColorSpace::RGB);

@@ -138,6 +138,16 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 fn estimate(args: Estimate) -> Result<ExitCode, Failure> {
     publish::check_table(&args.out, args.overwrite)?;
     let method = args.method.method();
+    let learns = matches!(method, Method::M2 | Method::M3 | Method::Fused);
+    if args.model.is_some() && !learns {
+        return Err(unused("--model", "m2, m3 and fused", method));
+    }
+    if args.weights.is_some() && method != Method::M2 {
+        return Err(unused("--weights", "m2", method));
+    }
+    if args.outliers.is_some() && !matches!(method, Method::M4 | Method::Fused) {
+        return Err(unused("--outliers", "m4 and fused", method));
+    }
     let mut options = args.source.options(method, args.variant);
     if let Some(outliers) = args.outliers {
         options.outliers = match outliers {
@@ -181,6 +191,10 @@ fn estimate(args: Estimate) -> Result<ExitCode, Failure> {
 }
 
 /// Reads what a method learned into its options; the containers that a model learned from.
+fn unused(option: &str, methods: &str, given: Method) -> Failure {
+    Failure::new(format!("{option} is for {methods}; --method is {}", given.name()))
+}
+
 pub(super) fn read_learned(
     options: &mut CapacityOptions,
     model: Option<&Path>,

@@ -174,6 +174,9 @@ impl Contents {
                     score.unwrap_or_default()
                 );
             }
+            if let Some(gpu) = word("gpu") {
+                text += &format!("; on {gpu}");
+            }
             line("training", &text);
         }
         for (label, key) in
