@@ -246,4 +246,17 @@ def load_model(path: str | os.PathLike[str]) -> TrainedModel:
     >>> model.predict(["rice.wav", "water.wav"]).tolist()
     ['rice', 'water']
     """
-    return TrainedModel(path)
+    try:
+        return TrainedModel(path)
+    except ModelError as error:
+        if _holds_network(path):
+            raise ModelError(f"{os.fspath(path)} holds a network: use nets.load") from error
+        raise
+
+
+def _holds_network(path: str | os.PathLike[str]) -> bool:
+    try:
+        _core.TrainedNetwork.load(os.fspath(path))
+    except (ParameterError, ModelError, OSError):
+        return False
+    return True

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import as_array
+from ._arrays import as_array, size
 from ._class_labels import class_labels, label_kind, require_kept
 from ._network import settings
 from ._refusals import destination, existing, seed_of
@@ -170,14 +170,10 @@ def _watched(watched: Sequence[int] | npt.NDArray[Any] | None, count: int) -> se
     """Indices of items, as a list or an array."""
     if watched is None:
         return set()
-    given = np.asarray(watched)
-    if given.size == 0:
-        return set()
-    if given.ndim != 1 or given.dtype.kind not in "iu":
-        raise ParameterError(f"watched must hold indices of items, not {watched!r}")
-    if given.min() < 0 or given.max() >= count:
-        raise ParameterError(f"watched must hold indices from 0 to {count - 1}, not {watched!r}")
-    return set(given.tolist())
+    held = {size("watched", i, 0) for i in np.asarray(watched).ravel().tolist()}
+    if held and max(held) >= count:
+        raise ParameterError(f"watched must hold indices of {count} items, not {max(held)}")
+    return held
 
 
 def _column(items: list[Any], place: str, shape: str) -> _Column:

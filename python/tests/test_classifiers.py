@@ -144,6 +144,9 @@ def test_saved_labels_come_back_in_their_type(tmp_path: Path) -> None:
         model.fit(x, other)
         with pytest.raises(ParameterError, match="a model file keeps classes that are texts"):
             model.save(tmp_path / "a.model")
+    model.fit(x, y.astype("u8") + np.uint64(2**63))
+    with pytest.raises(ParameterError, match=r"whole numbers up to 2\*\*63 - 1"):
+        model.save(tmp_path / "a.model")
 
 
 def test_parameters_must_be_finite() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from corsmal_feat import corsmal, nets
-from corsmal_feat.errors import DecodeError, ParameterError
+from corsmal_feat.errors import DecodeError, NotFittedError, ParameterError
 
 SHARED = Path(os.environ.get("CORSMAL_SHARED", Path(__file__).parents[3] / "shared"))
 
@@ -35,6 +35,33 @@ def test_all_eleven_networks_give_pytorchs_numbers() -> None:
     found = re.fullmatch(r"m4_type +losses ([\d.]+) x tolerance", failed)
     assert found, run.stdout
     assert float(found[1]) * 2.19e-4 < 3e-3, failed
+
+
+def test_watched_items_may_be_an_array() -> None:
+    """`[0]` as an array was ignored, and others were a ValueError of numpy."""
+    rng = np.random.default_rng(0)
+    x = [rng.standard_normal((4, 128), dtype=np.float32) for _ in range(12)]
+    y = ["a", "b"] * 6
+
+    def history(watched: object) -> dict[str, object]:
+        net = nets.NetworkClassifier("attention_gru", recipe={"epochs": np.int64(1)})
+        return net.fit(x, y, watched=watched).history_  # type: ignore[arg-type]
+
+    for watched in ([0], [1, 2]):
+        expected = history(watched)
+        assert history(np.array(watched)) == expected
+        assert expected["epochs"][0]["score"] is not None  # type: ignore[index]
+    assert history(np.array([], dtype=int)) == history(None)
+    for wrong, message in (([12], "indices of 12 items, not 12"), ([-1], "watched must be 0 to")):
+        with pytest.raises(ParameterError, match=message):
+            history(wrong)
+    net = nets.NetworkClassifier("attention_gru", recipe={"lr": float("nan")})
+    with pytest.raises(ParameterError, match="recipe: lr must be a finite number, not nan"):
+        net.fit(x, y)
+    with pytest.raises(ParameterError, match="recipe must be a mapping"):
+        nets.NetworkClassifier("attention_gru", recipe=[1]).fit(x, y)  # type: ignore[arg-type]
+    with pytest.raises(NotFittedError):
+        net.predict(x)
 
 
 def test_m2_sees_that_the_container_of_the_real_recording_is_empty() -> None:

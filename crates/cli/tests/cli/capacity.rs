@@ -197,3 +197,18 @@ fn what_an_estimate_needs_is_said() {
         assert!(message.contains(missing), "{given:?}: {message}");
     }
 }
+
+/// They were ignored.
+#[test]
+fn options_of_other_methods_are_refused() {
+    let of = ["capacity", "--data", "x", "-o", "none.csv", "--method"];
+    for (words, message) in [
+        (["m5", "--model", "a"], "--model is for m2, m3 and fused; --method is m5"),
+        (["m4", "--model", "a"], "--model is for m2, m3 and fused; --method is m4"),
+        (["m3", "--weights", "a"], "--weights is for m2; --method is m3"),
+        (["m5", "--outliers", "kept"], "--outliers is for m4 and fused; --method is m5"),
+    ] {
+        let found = refused(&[&of[..], &words].concat());
+        assert!(found.contains(message), "{found}");
+    }
+}

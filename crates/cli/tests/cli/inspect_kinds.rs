@@ -216,3 +216,16 @@ fn predictions_are_as_right_as_their_score() {
     assert!(text.contains("and 5 more"), "{text}");
     assert_eq!(json["counts"]["predicted"].as_object().unwrap().len(), 25);
 }
+
+/// It was said to be no audio, in "0 recordings: -0.00 s".
+#[test]
+fn files_of_other_kinds_are_inspected_one_at_a_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("a.npz");
+    std::fs::write(&file, b"PK\x03\x04 and so on").unwrap();
+    let out = inspect(&[&file, folder.path()]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(text(&out.stderr).contains("a.npz: no recording: files of other kinds"));
+    let out = inspect(&["-".as_ref()]);
+    assert!(text(&out.stderr).contains("inspect reads files, not standard input"));
+}

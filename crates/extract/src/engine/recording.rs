@@ -103,7 +103,14 @@ impl Recording {
     pub fn complete(self) -> Result<Features, Failed> {
         let total = self.total();
         if total == 0 {
-            return Err(Failed::new(Status::Empty, "no samples"));
+            let start = self.plan.config.signal.start;
+            return Err(Failed::new(
+                Status::Empty,
+                match start > 0.0 {
+                    true => format!("no samples from signal.start = {start} s on"),
+                    false => "no samples".into(),
+                },
+            ));
         }
         if let Some(feature) = self.without_frames() {
             let needed = self.plan.shortest();

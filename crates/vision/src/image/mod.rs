@@ -238,6 +238,30 @@ mod tests {
     use super::*;
     use crate::mask::Mask;
 
+    /// 16 x 16 pixels of noise.
+    const JPEG: &str = concat!(
+        "ffd8ffe000104a46494600010100000100010000ffdb0043001b12141714111b1716171e1c1b2028422b2825",
+        "2528513a3d3042605565645f555d5b6a7899816a7190735b5d85b586909ea3abadab6780bcc9baa6c799a8ab",
+        "a4ffc0000b080010001001011100ffc400160001010100000000000000000000000000020001ffc4001f1000",
+        "0202020105000000000000000000000102112100122231516171e1ffda0008010100003f0068e54927954fbc",
+        "008dae366300cc464eaea00d88f24f5fb98cc1ae8f69179fffd9",
+    );
+
+    /// What was missing became grey, and the picture was classified.
+    #[test]
+    fn a_jpeg_that_ends_early_is_refused() {
+        let byte = |at: usize| u8::from_str_radix(&JPEG[at..at + 2], 16).unwrap();
+        let bytes: Vec<u8> = (0..JPEG.len()).step_by(2).map(byte).collect();
+        let path = Path::new("a.jpg");
+        let whole = decode_jpeg(&bytes, path).unwrap();
+        assert_eq!((whole.width, whole.height), (16, 16));
+        // Only the marker at the end may be missing.
+        for length in 0..bytes.len() - 2 {
+            let error = decode_jpeg(&bytes[..length], path).unwrap_err().to_string();
+            assert!(error.contains("a.jpg: not a readable JPEG"), "{length}: {error}");
+        }
+    }
+
     /// A few KB that claim the most pixels, and pixels beyond.
     #[test]
     fn headers_that_promise_too_much_take_no_memory() {

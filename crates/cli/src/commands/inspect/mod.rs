@@ -73,9 +73,24 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
                     "--picture: name one file to draw, not a folder or several",
                 ));
             }
+            if let Some(other) = paths.iter().find(|path| is_other(path)) {
+                return Err(Failure::new(format!(
+                    "{}: no recording: files of other kinds are inspected one at a time",
+                    other.display()
+                )));
+            }
             several::inspect(paths, args.json)
         }
     }
+}
+
+/// Whether a file is of a known kind that is no recording.
+fn is_other(path: &Path) -> bool {
+    path.is_file()
+        && (Content::of(path).is_ok_and(|content| content != Content::Other)
+            || kind::of(path).is_ok_and(|kind| {
+                kind.is_some_and(|kind| !matches!(kind, Kind::Table | Kind::Json))
+            }))
 }
 
 fn single(path: &Path, picture: Option<&Picture>, json: bool) -> Result<ExitCode, Failure> {

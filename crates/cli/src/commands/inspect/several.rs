@@ -153,7 +153,7 @@ fn summary(lines: &[Line]) -> String {
     let shortest = sounds.iter().map(|s| s.seconds).fold(f64::INFINITY, f64::min);
     let longest = sounds.iter().map(|s| s.seconds).fold(0.0, f64::max);
     let noted = sounds.iter().filter(|s| !s.notes.is_empty()).count();
-    let mut out = format!("{}: {}", plural(sounds.len(), "recording"), length(total));
+    let mut out = format!("{}: {}", plural(sounds.len(), "recording"), length(total + 0.0));
     if sounds.len() > 1 {
         let (shortest, longest) = (length(shortest), length(longest));
         match shortest == longest {
