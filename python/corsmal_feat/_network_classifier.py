@@ -68,7 +68,9 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
     def __sklearn_is_fitted__(self) -> bool:
         return hasattr(self, "_model")
 
-    def fit(self, X: Any, y: Any, *, watched: Sequence[int] | npt.NDArray[Any] | None = None) -> Self:
+    def fit(
+        self, X: Any, y: Any, *, watched: Sequence[int] | npt.NDArray[Any] | None = None
+    ) -> Self:
         """Trains on `X` and `y`, one label per item.
 
         `watched` are indices of items that are not used for training. Their score after each epoch
