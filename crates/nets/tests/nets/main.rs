@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod dataset;
 mod golden;
 mod layers;
 mod published;

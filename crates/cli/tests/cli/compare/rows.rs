@@ -26,7 +26,12 @@ fn rows_of_other_programs_are_paired_by_their_ids() {
     write("b.npz", &["r3", "r1", "r4", "r2"], &same);
     let out = files.run("a.npz", "b.npz", &[]);
     assert_eq!(out.status.code(), Some(0), "{}", text(&out.stdout));
-    assert!(text(&out.stdout).contains("\n4 rows paired by their ids\n"), "{}", text(&out.stdout));
+    assert!(
+        text(&out.stdout)
+            .contains("\n4 rows paired by their ids, in every array with one for each id\n"),
+        "{}",
+        text(&out.stdout)
+    );
 
     // Of some rows: the others are named, and a difference has its place in the first file.
     write("c.npz", &["r4", "r9", "r2"], &|at| {
