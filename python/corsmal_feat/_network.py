@@ -164,11 +164,16 @@ def settings(recipe: Mapping[str, Any] | None) -> dict[str, Any]:
     """Changes of a recipe in plain values."""
     if recipe is not None and not isinstance(recipe, Mapping):
         raise ParameterError(f"recipe must be a mapping of keys to values, not {recipe!r}")
-    changes: dict[str, Any] = json.loads(json.dumps(dict(recipe or {}), default=plain))
+    changes = dict(recipe or {})
     for key, value in changes.items():
-        if isinstance(value, float) and not math.isfinite(value):
+        if isinstance(value, float | np.floating) and not math.isfinite(value):
             raise ParameterError(f"recipe: {key} must be a finite number, not {value}")
-    return changes
+    try:
+        text = json.dumps(changes, default=plain, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise ParameterError(f"recipe: {error}") from error
+    plainly: dict[str, Any] = json.loads(text)
+    return plainly
 
 
 def plain(value: Any) -> Any:

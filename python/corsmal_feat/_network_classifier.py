@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any, Self
 
 import numpy as np
@@ -69,7 +69,7 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         return hasattr(self, "_model")
 
     def fit(
-        self, X: Any, y: Any, *, watched: Sequence[int] | npt.NDArray[Any] | None = None
+        self, X: Any, y: Any, *, watched: Iterable[int] | npt.NDArray[Any] | None = None
     ) -> Self:
         """Trains on `X` and `y`, one label per item.
 
@@ -168,11 +168,14 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         self.__dict__.update(state)
 
 
-def _watched(watched: Sequence[int] | npt.NDArray[Any] | None, count: int) -> set[int]:
+def _watched(watched: Iterable[int] | npt.NDArray[Any] | None, count: int) -> set[int]:
     """Indices of items, as a list or an array."""
     if watched is None:
         return set()
-    held = {size("watched", i, 0) for i in np.asarray(watched).ravel().tolist()}
+    given = watched.tolist() if isinstance(watched, np.ndarray) else watched
+    if not isinstance(given, Iterable) or isinstance(given, str):
+        raise ParameterError(f"watched must hold indices of items, not {watched!r}")
+    held = {size("watched", i, 0) for i in given}
     if held and max(held) >= count:
         raise ParameterError(f"watched must hold indices of {count} items, not {max(held)}")
     return held

@@ -236,12 +236,37 @@ fn logistic_regression_finds_the_same_in_any_unit() {
     }
     // Slopes by the weights of small features are small from the start.
     near(&(&x * 1e-9), &["C=1e34"], "small");
-    // A constant has no weight.
-    for constant in [440.0, 44100.0, 1e8] {
-        let mut more = Array2::from_elem((x.nrows(), 5), constant);
-        more.slice_mut(s![.., ..4]).assign(&x);
-        near(&more, &["C=1e16"], &format!("{constant}"));
+    // A constant has no weight, also where it is another later, and sums of it are not exact.
+    let (many, of_many) = clouds(1000, 3, 2, 4);
+    for constant in [0.1, 440.1, 44100.0, 1e8] {
+        let with = |constant: f64| {
+            let mut more = Array2::from_elem((many.nrows(), 4), constant);
+            more.slice_mut(s![.., ..3]).assign(&many);
+            more
+        };
+        let model = spec("logistic", &["C=1e12"]).train(with(constant).view(), &of_many, 2);
+        let model = model.unwrap();
+        let found =
+            [constant, 1.1 * constant].map(|c| model.predict_proba(with(c).view()).unwrap());
+        assert_eq!(found[0], found[1], "{constant}");
     }
+    // A wild row matters to nothing but itself.
+    let wild = |size: f64| {
+        let mut x = many.clone();
+        x.row_mut(0).fill(size);
+        let model = spec("logistic", &[]).train(x.view(), &of_many, 2).unwrap();
+        model.predict_proba(x.slice(s![1.., ..])).unwrap()
+    };
+    let expected = wild(1e3);
+    for size in [1e6, 1e7, 1e8, 1e10] {
+        for (found, expected) in wild(size).iter().zip(&expected) {
+            assert!((found - expected).abs() < 0.01, "{size}: {found} for {expected}");
+        }
+    }
+    let heavy = ["class_weight=[1e308,1e308]"];
+    let heavy = spec("logistic", &heavy).train(many.view(), &of_many, 2).unwrap();
+    let plain = spec("logistic", &["C=1e16"]).train(many.view(), &of_many, 2).unwrap();
+    assert_eq!(heavy.predict(many.view()).unwrap(), plain.predict(many.view()).unwrap());
     // More features than rows, as they come.
     let (wide, classes) = clouds(60, 400, 3, 7);
     let wide = &wide * &Array1::from_shape_fn(400, |f| f64::from(f as u32 % 7 + 1).powi(3)) + 90.0;

@@ -18,7 +18,7 @@ parameters! {
         C: f64 = 1.0, "a positive number", "inverse of the penalty's strength";
         class_weight: ClassWeight = ClassWeight::Equal,
             "null, balanced, or one positive number per class in label order", "weight of each class";
-        tol: f64 = 1e-8, "a positive number", "largest slope of the mean loss at the end, for features in their own unit and of unit deviation";
+        tol: f64 = 1e-8, "a positive number", "slope of the mean loss that ends the search; a search that rounding or max_iter end must be below 1e-6";
         max_iter: usize = 10_000, "a whole number of at least 1", "most steps";
     }
     check(this) {
@@ -71,8 +71,17 @@ impl LogisticParams {
         if let Some(weights) = weights {
             row_weights.iter_mut().zip(weights).for_each(|(row, weight)| *row *= weight);
         }
+        // Sums of weights of any size stay within range.
+        let heaviest = row_weights.iter().copied().fold(0.0, f64::max);
+        row_weights.iter_mut().for_each(|weight| *weight /= heaviest);
         let total: f64 = row_weights.iter().sum();
-        let penalty = 1.0 / self.C / total;
+        let penalty = 1.0 / self.C / heaviest / total;
+        if !(total.is_finite() && penalty.is_finite()) {
+            return Err(ModelError::Numerical {
+                owner: Self::OWNER,
+                reason: "C or the weights of the rows are too small".into(),
+            });
+        }
         let scale = Scale::of(x, &row_weights, penalty).ok_or_else(too_large)?;
         let z = scale.rows(x);
         let penalties = scale.deviations.mapv(|d| penalty / d / d);
@@ -116,53 +125,56 @@ impl LogisticParams {
 
 /// A slope that rounding may leave.
 const ROUNDING: f64 = 1e-6;
-/// Deviation, as a share of the mean, below which rounding of the mean is all that varies.
-const CONSTANT: f64 = 8.0 * f64::EPSILON;
-
 /// Coordinates in which every feature matters alike, so that the search needs few steps whatever the features'
-/// units: weights times `deviations`, the intercept where features are `means`.
+/// units: weights times `deviations`, the intercept where features are `centres`. A few wild rows have no say.
 struct Scale {
-    means: Array1<f64>,
-    /// infinite for a constant feature, whose weight stays zero
+    /// medians
+    centres: Array1<f64>,
+    /// half of what two thirds of the rows span; infinite for a constant feature, whose weight stays zero
     deviations: Array1<f64>,
 }
 
 impl Scale {
     /// `None` when features are too large for their squares.
     fn of(x: ArrayView2<'_, f64>, row_weights: &[f64], penalty: f64) -> Option<Self> {
-        let total: f64 = row_weights.iter().sum();
-        let mean = |column: ArrayView1<'_, f64>| {
-            column.iter().zip(row_weights).map(|(v, w)| w / total * v).sum::<f64>()
-        };
-        let means: Array1<f64> = x.columns().into_iter().map(mean).collect();
-        let variance = |(column, &mean): (ArrayView1<'_, f64>, &f64)| {
-            let squares =
-                column.iter().zip(row_weights).map(|(v, w)| w / total * (v - mean).powi(2));
-            squares.sum::<f64>()
-        };
-        let mut deviations: Array1<f64> =
-            x.columns().into_iter().zip(&means).map(variance).collect();
-        if !means.iter().chain(&deviations).all(|v| v.is_finite()) {
-            return None;
+        let (mut centres, mut deviations) = (Vec::new(), Vec::new());
+        for column in x.columns() {
+            let some = column.iter().zip(row_weights).filter(|(_, weight)| **weight > 0.0);
+            let mut values: Vec<f64> = some.map(|(v, _)| *v).collect();
+            let last = values.len().checked_sub(1)?;
+            let mut at = |share: f64| {
+                let place = (share * last as f64).round() as usize;
+                *values.select_nth_unstable_by(place, f64::total_cmp).1
+            };
+            let (low, centre, high) = (at(1.0 / 6.0), at(0.5), at(5.0 / 6.0));
+            let mut deviation = (high - low) / 2.0;
+            if deviation == 0.0 {
+                let squares: f64 = values.iter().map(|v| (v - centre).powi(2)).sum();
+                deviation = (squares / values.len() as f64).sqrt();
+            }
+            if !(deviation * deviation).is_finite() {
+                return None;
+            }
+            centres.push(centre);
+            // The penalty bends the loss as data of this deviation would.
+            deviations.push(match deviation > 0.0 {
+                true => deviation.hypot(2.0 * penalty.sqrt()),
+                false => f64::INFINITY,
+            });
         }
-        for (d, mean) in deviations.iter_mut().zip(&means) {
-            let is_constant = d.sqrt() <= CONSTANT * mean.abs();
-            // The penalty bends the loss as data of this variance would.
-            *d = if is_constant { f64::INFINITY } else { (*d + 4.0 * penalty).sqrt() };
-        }
-        Some(Self { means, deviations })
+        Some(Self { centres: centres.into(), deviations: deviations.into() })
     }
 
     fn rows(&self, x: ArrayView2<'_, f64>) -> Array2<f64> {
-        (&x - &self.means) / &self.deviations
+        (&x - &self.centres) / &self.deviations
     }
 
     /// `[outputs, features + 1]` in the coordinates of the features.
     fn unscaled(&self, mut table: Array2<f64>) -> Array2<f64> {
         for mut row in table.rows_mut() {
-            let (mut weights, mut intercept) = row.view_mut().split_at(Axis(0), self.means.len());
+            let (mut weights, mut intercept) = row.view_mut().split_at(Axis(0), self.centres.len());
             weights /= &self.deviations;
-            intercept[0] -= weights.dot(&self.means);
+            intercept[0] -= weights.dot(&self.centres);
         }
         table
     }

@@ -190,11 +190,11 @@ fn estimate(args: Estimate) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Reads what a method learned into its options; the containers that a model learned from.
 fn unused(option: &str, methods: &str, given: Method) -> Failure {
     Failure::new(format!("{option} is for {methods}; --method is {}", given.name()))
 }
 
+/// Reads what a method learned into its options; the containers that a model learned from.
 pub(super) fn read_learned(
     options: &mut CapacityOptions,
     model: Option<&Path>,
