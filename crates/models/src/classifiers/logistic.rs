@@ -125,10 +125,16 @@ impl LogisticParams {
 
 /// A slope that rounding may leave.
 const ROUNDING: f64 = 1e-6;
+/// Shares of the weight of all rows below the values that make a feature's scale: those of a normal distribution's
+/// deviations, and a middle that is not just between two rows of equal weight, so that rounding has no say.
+const LOW: f64 = 0.1587;
+const MIDDLE: f64 = 0.4991;
+const HIGH: f64 = 0.8413;
+
 /// Coordinates in which every feature matters alike, so that the search needs few steps whatever the features'
 /// units: weights times `deviations`, the intercept where features are `centres`. A few wild rows have no say.
 struct Scale {
-    /// medians
+    /// medians, nearly
     centres: Array1<f64>,
     /// half of what two thirds of the rows span; infinite for a constant feature, whose weight stays zero
     deviations: Array1<f64>,
@@ -139,18 +145,24 @@ impl Scale {
     fn of(x: ArrayView2<'_, f64>, row_weights: &[f64], penalty: f64) -> Option<Self> {
         let (mut centres, mut deviations) = (Vec::new(), Vec::new());
         for column in x.columns() {
-            let some = column.iter().zip(row_weights).filter(|(_, weight)| **weight > 0.0);
-            let mut values: Vec<f64> = some.map(|(v, _)| *v).collect();
-            let last = values.len().checked_sub(1)?;
-            let mut at = |share: f64| {
-                let place = (share * last as f64).round() as usize;
-                *values.select_nth_unstable_by(place, f64::total_cmp).1
-            };
-            let (low, centre, high) = (at(1.0 / 6.0), at(0.5), at(5.0 / 6.0));
+            let some = column.iter().copied().zip(row_weights.iter().copied());
+            let mut some: Vec<(f64, f64)> = some.filter(|(_, weight)| *weight > 0.0).collect();
+            some.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+            let total: f64 = some.iter().map(|(_, weight)| weight).sum();
+            let (mut centre, mut low, mut high) =
+                (some.first()?.0, some.first()?.0, some.last()?.0);
+            let mut before = 0.0;
+            for (value, weight) in &some {
+                let within = |share: f64| (before..before + weight).contains(&(share * total));
+                low = if within(LOW) { *value } else { low };
+                centre = if within(MIDDLE) { *value } else { centre };
+                high = if within(HIGH) { *value } else { high };
+                before += weight;
+            }
             let mut deviation = (high - low) / 2.0;
             if deviation == 0.0 {
-                let squares: f64 = values.iter().map(|v| (v - centre).powi(2)).sum();
-                deviation = (squares / values.len() as f64).sqrt();
+                let squares = some.iter().map(|(v, weight)| weight / total * (v - centre).powi(2));
+                deviation = squares.sum::<f64>().sqrt();
             }
             if !(deviation * deviation).is_finite() {
                 return None;
