@@ -101,7 +101,8 @@ impl LogisticParams {
             return Err(too_large());
         }
         // Where features are large, rounding alone makes slopes by their weights.
-        if found.end != End::Converged && !(left <= self.tol.max(ROUNDING)) {
+        let is_near = left <= self.tol.max(ROUNDING);
+        if found.end != End::Converged && !is_near {
             let advice = match found.end {
                 End::OutOfSteps => "standardise the features, or raise max_iter or tol",
                 _ => "standardise the features, or raise tol",
