@@ -8,7 +8,7 @@ use ndarray::{Array1, ArrayView1, ArrayViewMut1};
 pub(crate) struct Stopping<S> {
     /// how far a gradient is from that of a minimum
     pub slope: S,
-    /// the slope that is near enough
+    /// the slope, or the value, that is near enough
     pub tol: f64,
     /// most steps
     pub max_iter: usize,
@@ -41,7 +41,7 @@ const CURVATURE: f64 = 0.9;
 /// Steps in a row that gain no more than rounding.
 const STALLED: usize = 5;
 
-/// Minimises `f`, which returns the value and writes the gradient.
+/// Minimises `f`, which returns the value, at least 0, and writes the gradient.
 pub(crate) fn minimise(
     start: Array1<f64>,
     stopping: &Stopping<impl Fn(ArrayView1<'_, f64>) -> f64>,
@@ -56,7 +56,8 @@ pub(crate) fn minimise(
     let mut memory: VecDeque<(Array1<f64>, Array1<f64>)> = VecDeque::with_capacity(MEMORY);
     let (mut steps, mut idle) = (0, 0);
     let end = loop {
-        if (stopping.slope)(now.gradient.view()) <= stopping.tol {
+        // Nothing is below zero, so that no more than the value is left to gain.
+        if now.value <= stopping.tol || (stopping.slope)(now.gradient.view()) <= stopping.tol {
             break End::Converged;
         }
         if idle == STALLED {
