@@ -263,6 +263,16 @@ fn logistic_regression_finds_the_same_in_any_unit() {
             assert!((found - expected).abs() < 0.01, "{size}: {found} for {expected}");
         }
     }
+    // Tails of many magnitudes: rounding ends the search near the minimum, which is not refused.
+    let tails = many.mapv(|v| (5.0 * v).exp());
+    let found = |unit: f64, settings: &str| {
+        let x = &tails * unit;
+        let model = spec("logistic", &[settings]).train(x.view(), &of_many, 2).unwrap();
+        model.predict_proba(x.view()).unwrap()
+    };
+    for (one, other) in found(1.0, "C=1").iter().zip(&found(1e4, "C=1e-8")) {
+        assert!((one - other).abs() < 1e-5, "{one} and {other}");
+    }
     let heavy = ["class_weight=[1e308,1e308]"];
     let heavy = spec("logistic", &heavy).train(many.view(), &of_many, 2).unwrap();
     let plain = spec("logistic", &["C=1e16"]).train(many.view(), &of_many, 2).unwrap();

@@ -18,7 +18,7 @@ parameters! {
         C: f64 = 1.0, "a positive number", "inverse of the penalty's strength";
         class_weight: ClassWeight = ClassWeight::Equal,
             "null, balanced, or one positive number per class in label order", "weight of each class";
-        tol: f64 = 1e-8, "a positive number", "slope of the mean loss that ends the search; a search that rounding or max_iter end must be below 1e-6";
+        tol: f64 = 1e-8, "a positive number", "slope of the mean loss, or the loss itself, at which the search ends; if rounding or max_iter end it first, less than about 1e-10 may be left to gain";
         max_iter: usize = 10_000, "a whole number of at least 1", "most steps";
     }
     check(this) {
@@ -95,13 +95,14 @@ impl LogisticParams {
         let slope = |gradient: ArrayView1<'_, f64>| own(gradient).max(largest(&gradient));
         let stopping = lbfgs::Stopping { slope, tol: self.tol, max_iter: self.max_iter };
         let found = lbfgs::minimise(start, &stopping, |at, gradient| objective.at(at, gradient));
-        let left = largest(&found.gradient);
+        let left = slope(found.gradient.view());
+        // Where features are large, rounding alone makes slopes by their weights.
+        let gain = objective.gain(found.x.view(), found.gradient.view());
         let weights = scale.unscaled(objective.table(found.x.view()).to_owned());
         if !weights.iter().all(|v| v.is_finite()) {
             return Err(too_large());
         }
-        // Where features are large, rounding alone makes slopes by their weights.
-        let is_near = left <= self.tol.max(ROUNDING);
+        let is_near = gain <= ROUNDING;
         if found.end != End::Converged && !is_near {
             let advice = match found.end {
                 End::OutOfSteps => "standardise the features, or raise max_iter or tol",
@@ -124,8 +125,8 @@ impl LogisticParams {
     }
 }
 
-/// A slope that rounding may leave.
-const ROUNDING: f64 = 1e-6;
+/// What rounding may leave to gain.
+const ROUNDING: f64 = 1e-10;
 /// Shares of the weight of all rows below the values that make a feature's scale: those of a normal distribution's
 /// deviations, and a middle that is not just between two rows of equal weight, so that rounding has no say.
 const LOW: f64 = 0.1587;
@@ -229,6 +230,31 @@ impl Objective<'_> {
         slope.column_mut(features).assign(&scores.sum_axis(Axis(0)));
         gradient.iter_mut().zip(&slope).for_each(|(to, &from)| *to = from);
         loss / self.total + 0.5 * (&penalised * &weights).sum()
+    }
+}
+
+impl Objective<'_> {
+    /// What a Newton step by each number alone would gain, all together: whatever the units of the features are.
+    fn gain(&self, at: ArrayView1<'_, f64>, gradient: ArrayView1<'_, f64>) -> f64 {
+        let features = self.z.ncols();
+        let table = self.table(at);
+        let mut bends = self.z.dot(&table.slice(s![.., ..features]).t()) + table.column(features);
+        for (mut row, weight) in bends.outer_iter_mut().zip(&self.row_weights) {
+            match row.len() {
+                1 => row.mapv_inplace(logistic),
+                _ => _ = soften(row.view_mut()),
+            }
+            row.mapv_inplace(|p| weight / self.total * p * (1.0 - p));
+        }
+        let by_weights = bends.t().dot(&self.z.mapv(|v| v * v)) + &self.penalties;
+        let by_intercepts = bends.sum_axis(Axis(0));
+        let gradient = self.table(gradient);
+        let gain =
+            |slope: &f64, bend: &f64| if *slope == 0.0 { 0.0 } else { slope * slope / bend / 2.0 };
+        let weights = gradient.slice(s![.., ..features]);
+        let of_weights = weights.iter().zip(&by_weights).map(|(g, h)| gain(g, h));
+        let of_intercepts = gradient.column(features).into_iter().zip(&by_intercepts);
+        of_weights.chain(of_intercepts.map(|(g, h)| gain(g, h))).sum()
     }
 }
 
