@@ -8,6 +8,7 @@ use crate::error::Result;
 #[cfg(any(test, feature = "gpu"))]
 use crate::gpu;
 use crate::kernels;
+use crate::layers::dropout::Draws;
 use crate::matrix::Matrix;
 use crate::packed::Packed;
 use crate::parameters::{Declared, Parameters};
@@ -89,24 +90,21 @@ pub struct Pass<'a> {
 /// What training keeps of a way through the network.
 #[derive(Debug)]
 pub struct Training {
-    /// random numbers of dropout in this step; none: dropout is off
-    pub dropout: Option<Stream>,
-    dropouts: u64,
+    dropout: Draws,
     tape: Vec<Saved>,
     /// new running statistics
     pub running: Vec<(String, Vec<f32>)>,
 }
 
 impl Training {
-    /// An empty tape.
+    /// An empty tape. `dropout`: its random numbers in this step, or off.
     pub fn new(dropout: Option<Stream>) -> Self {
-        Self { dropout, dropouts: 0, tape: Vec::new(), running: Vec::new() }
+        Self { dropout: Draws::new(dropout), tape: Vec::new(), running: Vec::new() }
     }
 
     /// Random numbers of the next dropout layer, when dropout is on.
     pub fn next_dropout(&mut self) -> Option<Stream> {
-        self.dropouts += 1;
-        self.dropout.map(|d| d.part(self.dropouts))
+        self.dropout.next_layer()
     }
 }
 

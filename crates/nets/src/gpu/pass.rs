@@ -5,7 +5,8 @@ use burn_tensor::{Device, Tensor, TensorData};
 use super::{Chains, Flow, Uploaded};
 use crate::batch::Batch;
 use crate::layer::Layer;
-use crate::layers::{dropout, moved};
+use crate::layers::dropout::{self, Draws};
+use crate::layers::moved;
 use crate::parameters::Parameters;
 use crate::random::Stream;
 
@@ -21,9 +22,7 @@ pub struct Pass<'a> {
 
 #[derive(Debug)]
 struct Training {
-    /// random numbers of dropout in this step; none: dropout is off
-    dropout: Option<Stream>,
-    dropouts: u64,
+    dropout: Draws,
     statistics: Vec<Statistic>,
 }
 
@@ -54,7 +53,7 @@ impl<'a> Pass<'a> {
     ) -> Self {
         let others = inputs.iter().skip(1).map(|batch| Flow::of(batch, device)).collect();
         let training =
-            training.map(|dropout| Training { dropout, dropouts: 0, statistics: Vec::new() });
+            training.map(|step| Training { dropout: Draws::new(step), statistics: Vec::new() });
         Self { device, tensors, others, training }
     }
 
@@ -98,18 +97,14 @@ impl<'a> Pass<'a> {
 
     /// Random numbers of the next dropout layer, when dropout is on.
     pub(crate) fn next_dropout(&mut self) -> Option<Stream> {
-        let training = self.training.as_mut()?;
-        training.dropouts += 1;
-        training.dropout.map(|d| d.part(training.dropouts))
+        self.training.as_mut()?.dropout.next_layer()
     }
 
     /// Drops numbers as the CPU does.
     pub(crate) fn drop(&mut self, input: Flow, probability: f32) -> Flow {
         let Some(stream) = self.next_dropout() else { return input };
         let (items, shape) = input.shape();
-        let mut factors = vec![1.0; items * shape.len()];
-        let kept = dropout::kept(stream, probability, factors.len());
-        dropout::apply(&mut factors, &kept, probability);
+        let factors = dropout::factors(stream, probability, items * shape.len());
         let factors = Flow::new(factors, shape, None, self.device);
         input.zip(factors, |x, factors| x * factors)
     }

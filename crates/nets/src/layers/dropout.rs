@@ -51,6 +51,34 @@ impl Layer for Dropout {
     }
 }
 
+/// Random numbers of the dropout layers in a step, in the order of the layers.
+#[derive(Debug)]
+pub(crate) struct Draws {
+    step: Option<Stream>,
+    layers: u64,
+}
+
+impl Draws {
+    /// Those of a step; none: dropout is off.
+    pub(crate) fn new(step: Option<Stream>) -> Self {
+        Self { step, layers: 0 }
+    }
+
+    /// Those of the next layer, when dropout is on.
+    pub(crate) fn next_layer(&mut self) -> Option<Stream> {
+        self.layers += 1;
+        self.step.map(|step| step.part(self.layers))
+    }
+}
+
+/// What `n` numbers are multiplied by.
+#[cfg(any(test, feature = "gpu"))]
+pub(crate) fn factors(stream: Stream, probability: f32, n: usize) -> Vec<f32> {
+    let mut factors = vec![1.0; n];
+    apply(&mut factors, &kept(stream, probability, n), probability);
+    factors
+}
+
 /// Which of `n` numbers are kept, a byte each.
 pub(crate) fn kept(stream: Stream, probability: f32, n: usize) -> Vec<u8> {
     (0..n)

@@ -47,9 +47,8 @@ impl Recurrent {
             {
                 // The CPU draws them for packed rows.
                 let packing = Packing::new(items, padded, lengths.as_deref());
-                let mut factors = vec![1.0; packing.total() * self.hidden];
-                let kept = dropout::kept(stream, self.dropout, factors.len());
-                dropout::apply(&mut factors, &kept, self.dropout);
+                let numbers = packing.total() * self.hidden;
+                let factors = dropout::factors(stream, self.dropout, numbers);
                 let factors = packing.unpack(&factors, self.hidden).into_values();
                 let factors = pass.tensor(factors, [items, padded, self.hidden]);
                 for (step, x) in steps.each.iter_mut().enumerate() {
