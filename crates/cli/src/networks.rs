@@ -145,7 +145,7 @@ impl Request<'_> {
 
     /// Trains on all items.
     pub fn train(&self, name: &str) -> Result<Trained, Failure> {
-        let device = device(&self.network.device)?;
+        let device = Device::named(&self.network.device)?;
         let Loaded { examples, recipe, target } = self.load(name)?;
         for warning in alike(&examples.table.classes(&target)?.0) {
             eprintln!("warning: {warning}");
@@ -172,7 +172,7 @@ impl Request<'_> {
         if let Some(path) = &self.network.weights {
             refuse_own("--weights", path)?;
         }
-        let device = device(&self.network.device)?;
+        let device = Device::named(&self.network.device)?;
         let Loaded { examples, recipe, target } = self.load(name)?;
         let weights = self.weights()?;
         let training = self.training(&target, recipe, weights.as_ref(), device)?;
@@ -220,11 +220,6 @@ impl Request<'_> {
             _ => error.into(),
         }
     }
-}
-
-/// The device of this name.
-pub fn device(name: &str) -> Result<Device, Failure> {
-    Ok(Device::named(name)?)
 }
 
 /// Names a GPU to the user.

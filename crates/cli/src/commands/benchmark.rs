@@ -225,7 +225,7 @@ fn systems(args: &Args) -> Result<Vec<Box<dyn System>>, Failure> {
     }
     let epochs = args.epochs.map(|n| n as usize);
     let embeddings = args.embeddings.clone();
-    let device = crate::networks::device(&args.device)?;
+    let device = corsmal_nets::device::Device::named(&args.device)?;
     crate::networks::tell_device(&device, args.quiet);
     let settings = corsmal_systems::Settings { epochs, embeddings, weights, device };
     Ok(methods.into_iter().map(|method| method.make(&settings)).collect())
