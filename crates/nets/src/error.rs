@@ -185,8 +185,7 @@ pub enum NetError {
     },
     /// A GPU that failed: out of memory, or its driver.
     #[error(
-        "GPU {name}: {reason}; if its memory is full, a smaller batch needs less; --device cpu does \
-         without it"
+        "GPU {name}: {reason}; if its memory is full, try a smaller batch; --device cpu needs no GPU"
     )]
     Gpu {
         /// what it calls itself

@@ -55,7 +55,7 @@ impl Gpu {
         });
         let refusal = |reason: &String| NetError::NoDevice {
             name: "gpu".into(),
-            reason: format!("{reason}; --device cpu needs none"),
+            reason: format!("{reason}; --device cpu needs no GPU"),
         };
         opened.as_ref().map(Clone::clone).map_err(refusal)
     }

@@ -181,6 +181,6 @@ fn a_panic_of_the_driver_is_an_error_that_names_it() {
     let error = gpu.failure(super::shielded(|| -> () { panic!("device lost") }).unwrap_err());
     assert_eq!(
         error.to_string(),
-        "GPU stand-in: device lost; if its memory is full, a smaller batch needs less; --device cpu does without it"
+        "GPU stand-in: device lost; if its memory is full, try a smaller batch; --device cpu needs no GPU"
     );
 }
