@@ -14,6 +14,7 @@ from . import _core
 from ._arrays import size
 from ._class_labels import class_labels, label_kind, require_kept
 from ._fingerprints import Fingerprints, check_rows, fingerprints
+from ._model import read_model
 from ._refusals import destination, existing
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
 from ._validation import Matrix, features, labels_of, names_of, weights_of
@@ -202,7 +203,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """Reads a model file of this kind of classifier (`load_model` reads any)."""
-        model = _core.TrainedModel.load(existing(path))
+        model = read_model(existing(path))
         header = json.loads(model.header())
         pipeline = header["pipeline"]
         spec = pipeline["classifier"]

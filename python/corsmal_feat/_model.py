@@ -44,7 +44,7 @@ class TrainedModel:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = existing(path)
-        self._model = _core.TrainedModel.load(self.path)
+        self._model = read_model(self.path)
         self.header: dict[str, Any] = json.loads(self._model.header())
         self.classes_ = class_labels(self.header)
         self.n_features_in_ = self._model.n_features()
@@ -246,17 +246,22 @@ def load_model(path: str | os.PathLike[str]) -> TrainedModel:
     >>> model.predict(["rice.wav", "water.wav"]).tolist()
     ['rice', 'water']
     """
+    return TrainedModel(path)
+
+
+def read_model(path: str) -> _core.TrainedModel:
+    """What the extension module makes of a model file; one of a network is told apart."""
     try:
-        return TrainedModel(path)
+        return _core.TrainedModel.load(path)
     except ModelError as error:
         if _holds_network(path):
-            raise ModelError(f"{os.fspath(path)} holds a network: use nets.load") from error
+            raise ModelError(f"{path} holds a network: use nets.load") from error
         raise
 
 
-def _holds_network(path: str | os.PathLike[str]) -> bool:
+def _holds_network(path: str) -> bool:
     try:
-        _core.TrainedNetwork.load(os.fspath(path))
+        _core.TrainedNetwork.load(path)
     except (ParameterError, ModelError, OSError):
         return False
     return True

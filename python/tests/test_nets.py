@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from corsmal_feat import corsmal, nets
-from corsmal_feat.errors import DecodeError, NotFittedError, ParameterError
+from corsmal_feat import classifiers, corsmal, load_model, nets
+from corsmal_feat.errors import DecodeError, ModelError, NotFittedError, ParameterError
 
 SHARED = Path(os.environ.get("CORSMAL_SHARED", Path(__file__).parents[3] / "shared"))
 
@@ -225,6 +225,9 @@ def test_a_network_learns_from_recordings_and_hears_them(tmp_path: Path) -> None
     assert np.array_equal(back.predict_proba(paths), proba)
     assert np.array_equal(pickle.loads(pickle.dumps(back)).predict_proba(paths), proba)
     assert back.header["provenance"]["recordings"] == 6
+    for load in (load_model, classifiers.KNN.load):
+        with pytest.raises(ModelError, match=r"tone\.safetensors holds a network: use nets\.load"):
+            load(tmp_path / "tone.safetensors")
 
     groups = ["a", "b", "c"] * 2
     recipe = {"epochs": 20}

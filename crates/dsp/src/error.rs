@@ -87,6 +87,9 @@ pub fn room_for<T>(name: &'static str, shape: &[usize]) -> Result<()> {
     Err(DspError::Shape { name, expected, actual: shape.to_vec() })
 }
 
+/// Digits of a value that are shown.
+const LONGEST: usize = 24;
+
 impl DspError {
     /// Shorthand for [`DspError::Parameter`].
     pub fn parameter(
@@ -94,6 +97,27 @@ impl DspError {
         value: impl std::fmt::Display,
         allowed: impl Into<String>,
     ) -> Self {
-        Self::Parameter { name, value: value.to_string(), allowed: allowed.into() }
+        let text = value.to_string();
+        // 1e300 would be shown with all of its digits.
+        let value = match text.parse::<f64>() {
+            Ok(number) if text.len() > LONGEST => format!("{number:e}"),
+            _ => text,
+        };
+        Self::Parameter { name, value, allowed: allowed.into() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short() {
+        for (value, shown) in
+            [(1e300, "1e300"), (-2.5e-7, "-0.00000025"), (-1e-300, "-1e-300"), (0.1, "0.1")]
+        {
+            let error = DspError::parameter("sr", value, "above 0 Hz").to_string();
+            assert!(error.contains(&format!(" {shown}")) && error.len() < 60, "{error}");
+        }
     }
 }

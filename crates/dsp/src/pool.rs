@@ -1,4 +1,4 @@
-//! Working memory that recordings hand on to each other.
+//! Working memory that recordings, and parts of one, hand on to each other.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -12,10 +12,10 @@ impl<W> Default for Pool<W> {
     }
 }
 
-impl<W: Default> Pool<W> {
-    /// Memory in any state, or new.
-    pub fn take(&self) -> W {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
+impl<W> Pool<W> {
+    /// Memory in any state.
+    pub fn take(&self) -> Option<W> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).pop()
     }
 
     /// Keeps `work` for the next.

@@ -1,7 +1,5 @@
 //! `[channels, rows, frames]` arrays written in parallel, a few frames of a channel at a time.
 
-use std::sync::{Mutex, PoisonError};
-
 use ndarray::{
     Array2, ArrayView2, ArrayViewMut1, ArrayViewMut2, ArrayViewMut3, Axis, CowArray, Ix2,
 };
@@ -10,6 +8,7 @@ use rayon::prelude::*;
 
 use crate::error::Result;
 use crate::lanes::{LANES, Lanes, Spectrum, square_roots};
+use crate::pool::Pool;
 use crate::real::Real;
 use crate::stft::StftParams;
 use crate::window::padded_window;
@@ -48,14 +47,12 @@ pub(crate) fn for_each_tile<T: Send, S: Send>(
         let rest = tiles.split_off(share.min(tiles.len()));
         shares.push(std::mem::replace(&mut tiles, rest));
     }
-    // Fresh memory is dear: as many states as there are threads at work.
-    let idle = Mutex::new(Vec::new());
-    let idle = || idle.lock().unwrap_or_else(PoisonError::into_inner);
+    // As many states as there are threads at work.
+    let idle = Pool::default();
     shares.into_par_iter().for_each(|share| {
-        let known = idle().pop();
-        let mut state = known.unwrap_or_else(&state);
+        let mut state = idle.take().unwrap_or_else(&state);
         share.into_iter().for_each(|tile| each(&mut state, tile));
-        idle().push(state);
+        idle.give_back(state);
     });
 }
 

@@ -9,7 +9,7 @@ use crate::error::{ModelError, Result};
 pub const MOST_COMBINATIONS: usize = 10_000;
 
 /// Every combination of `grid` (parameter → values to try) over `base`, the last key varying
-/// fastest.
+/// fastest; none twice.
 ///
 /// # Errors
 /// A parameter without values, too many combinations, unknown parameters or impossible values.
@@ -34,5 +34,13 @@ pub fn combinations(
         parameters =
             parameters.iter().flat_map(|p| values.iter().map(move |v| with(p, v))).collect();
     }
-    parameters.iter().map(|p| ClassifierSpec::new(base.name(), p)).collect()
+    let mut found: Vec<ClassifierSpec> = Vec::new();
+    for parameters in &parameters {
+        let spec = ClassifierSpec::new(base.name(), parameters)?;
+        // Values that were listed twice would be trained twice.
+        if !found.contains(&spec) {
+            found.push(spec);
+        }
+    }
+    Ok(found)
 }

@@ -153,6 +153,8 @@ fn grids_multiply_and_refuse() {
     let specs = combinations(&base, &grid).unwrap();
     assert_eq!(specs.len(), 6);
     assert_eq!(specs[1].parameters()["gamma"], 0.1);
+    let repeated = [("C".into(), vec![json!(1), json!(10), json!(1.0)])];
+    assert_eq!(combinations(&base, &repeated).unwrap(), combinations(&base, &grid[..1]).unwrap());
     assert!(combinations(&base, &[("C".into(), vec![])]).is_err());
     assert!(combinations(&base, &[("C".into(), vec![json!(-1)])]).is_err());
     assert!(combinations(&base, &[("tol".into(), vec![json!(1e-3); 10_001])]).is_err());

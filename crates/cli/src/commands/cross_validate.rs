@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use corsmal_files::draft;
 use corsmal_models::cross_validation::CrossValidation;
 use corsmal_models::dataset::LabelledTable;
 use corsmal_models::folds::{CvPlan, Folds};
@@ -18,6 +17,7 @@ use serde::Serialize;
 use super::score::{print_classes, print_overall};
 use crate::args::{DatasetArgs, Jobs, NetworkArgs, PipelineArgs};
 use crate::failure::Failure;
+use crate::output::{self, is_stdout};
 use crate::publish;
 use crate::study::{self, Explained, HeldOut};
 use crate::text_table::{TextTable, percent};
@@ -54,7 +54,7 @@ pub struct Args {
     /// Print everything as JSON instead of tables.
     #[arg(long)]
     json: bool,
-    /// Write the predictions of the held-out rows to this CSV.
+    /// Write the predictions of the held-out rows to this CSV; '-', with --quiet, is standard output.
     #[arg(long, short = 'o', value_name = "CSV")]
     predictions: Option<PathBuf>,
     /// Write a report into this folder: report.html with scores, confusion matrix, curves, errors
@@ -83,7 +83,16 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 }
 
 fn cross_validate(args: &Args) -> Result<ExitCode, Failure> {
-    if let Some(path) = &args.predictions {
+    if let Some(path) = args.predictions.as_deref().filter(|path| is_stdout(path)) {
+        if args.json || !args.quiet {
+            let message = format!(
+                "--predictions {}: the scores go to standard output; name a file, or have no scores with --quiet and \
+                 without --json",
+                path.display()
+            );
+            return Err(Failure::new(message));
+        }
+    } else if let Some(path) = &args.predictions {
         publish::check_table(path, args.overwrite)?;
         publish::spare(path, args.dataset.files().into_iter().chain(args.network.weights.clone()))?;
     }
@@ -105,7 +114,7 @@ fn cross_validate(args: &Args) -> Result<ExitCode, Failure> {
     let predictions =
         validation.predictions(&table.ids, args.predictions.as_deref().unwrap_or(held_out));
     if let Some(path) = &args.predictions {
-        draft::write(path, &predictions.to_csv()?)?;
+        output::write(path, &predictions.to_csv()?)?;
     }
     let others = (1..args.seeds).map(|more| args.pipeline.seed().wrapping_add(more));
     let others = others.map(|seed| {
@@ -262,7 +271,7 @@ fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
     let predictions = found.predictions(ids, held_out);
     let scores = corsmal_models::validation::held_out(&predictions)?;
     if let Some(path) = &args.predictions {
-        draft::write(path, &predictions.to_csv()?)?;
+        output::write(path, &predictions.to_csv()?)?;
     }
     if let Some(caution) = found.caution.filter(|_| args.json || quiet) {
         eprintln!("warning: {caution}");

@@ -25,6 +25,11 @@ fn devices_take_tables() {
     assert_eq!(done(&[&classify[..], &["/dev/stdout"]].concat()), table);
     assert_eq!(done(&[&classify[..], &["/dev/null", "--format", "jsonl"]].concat()), "");
     assert!(done(&[&fuse[..], &["/dev/stdout"]].concat()).starts_with("id,path,status,"));
+    // A file called `-` was written.
+    let printed = done(&[&held_out[..], &["-"]].concat());
+    assert_eq!(printed.lines().count(), table.lines().count());
+    let found = refused(&[&["cross-validate"], &learn[..], &["-o", "-"]].concat());
+    assert!(found.contains("--predictions -: the scores go to standard output"), "{found}");
     let found = refused(&[&["train"], &learn[..], &["-o", "/dev/null"]].concat());
     assert!(found.contains("/dev/null is a device; this output gets its name when"), "{found}");
     let wav = at("a.wav");

@@ -29,5 +29,3 @@ mod scoring;
 mod stores;
 #[cfg(feature = "nets")]
 mod systems;
-#[cfg(not(feature = "nets"))]
-mod without_networks;

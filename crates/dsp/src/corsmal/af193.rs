@@ -117,7 +117,7 @@ impl Af193 {
     /// No samples, or samples that are not finite.
     pub fn compute(&self, y: &[f32]) -> Result<[f32; LENGTH]> {
         require_finite("y", y)?;
-        let mut work = self.works.take();
+        let mut work = self.works.take().unwrap_or_default();
         let vector = self.compute_in(&mut work, y);
         self.works.give_back(work);
         vector

@@ -118,7 +118,7 @@ impl<R: Lanes> OverlapAdd<R> {
         let start = part * self.own;
         let from = start.saturating_sub(self.ahead);
         let end = spectra.ncols().min(start + self.own);
-        let mut memory = self.memory.take();
+        let mut memory = self.memory.take().unwrap_or_default();
         let Memory { rows, spectrum, sums } = &mut memory;
         rows.resize(self.params.n_fft, R::EMPTY);
         spectrum.resize(2 * self.params.n_bins(), R::EMPTY);

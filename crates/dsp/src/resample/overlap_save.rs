@@ -210,7 +210,7 @@ impl OverlapSave {
         let pairs = self.pairs(&out);
         let start = (self.input_range(&out).start - input.start) as usize * channels;
         let signal = &input.data[start..];
-        let mut work = memory.take();
+        let mut work = memory.take().unwrap_or_default();
         work.circle.resize(convolution.rows(), [Row::ZERO; 2]);
         for slots in Slots::blocks((pairs.end - pairs.start) as usize, channels) {
             let circle = &mut work.circle[..window.len()];

@@ -113,7 +113,7 @@ impl SignalConfig {
             } else {
                 Err(ConfigError::key(
                     format!("signal.{key}"),
-                    format!("must be {allowed}, not {value}"),
+                    format!("must be {allowed}, not {value:?}"),
                 ))
             }
         };

@@ -3,11 +3,10 @@
 use std::io::{self, BufRead, Read};
 
 /// Text whose lines end by line feeds alone, except in quotation marks. Where they end by CR LF, the csv crate
-/// takes the second for a part of the next line and counts one too few.
+/// takes the second for a part of the next line and counts one too few; where they end by CR, it counts none.
 pub struct LineFeeds<R> {
     inner: R,
-    is_quoted: bool,
-    /// A carriage return was read and not given.
+    /// A carriage return that ends a line was read and not given.
     has_return: bool,
     lines: Lines,
 }
@@ -56,30 +55,28 @@ impl Lines {
         (self.place == Place::Quoted).then_some(self.opened)
     }
 
-    fn add(&mut self, text: &[u8]) {
-        self.bytes += text.len() as u64;
-        for &byte in text {
-            self.place = match (self.place, byte) {
-                (Place::Begin, b'"') => {
-                    self.opened = self.ended + 1;
-                    Place::Quoted
-                }
-                (Place::Quoted, b'"') => Place::Closed,
-                (Place::Quoted, _) | (Place::Closed, b'"') => Place::Quoted,
-                (_, b'\n' | b'\r') => Place::Begin,
-                (_, byte) if byte == self.delimiter => Place::Begin,
-                _ => Place::Plain,
-            };
-            if byte != b'\n' {
-                self.is_begun |= byte != b'\r';
-                continue;
+    fn add(&mut self, byte: u8) {
+        self.bytes += 1;
+        self.place = match (self.place, byte) {
+            (Place::Begin, b'"') => {
+                self.opened = self.ended + 1;
+                Place::Quoted
             }
-            self.ended += 1;
-            if !std::mem::take(&mut self.is_begun) && self.place != Place::Quoted {
-                match self.empty.last_mut() {
-                    Some([_, end]) if *end == self.ended => *end += 1,
-                    _ => self.empty.push([self.ended, self.ended + 1]),
-                }
+            (Place::Quoted, b'"') => Place::Closed,
+            (Place::Quoted, _) | (Place::Closed, b'"') => Place::Quoted,
+            (_, b'\n') => Place::Begin,
+            (_, byte) if byte == self.delimiter => Place::Begin,
+            _ => Place::Plain,
+        };
+        if byte != b'\n' {
+            self.is_begun |= byte != b'\r';
+            return;
+        }
+        self.ended += 1;
+        if !std::mem::take(&mut self.is_begun) && self.place != Place::Quoted {
+            match self.empty.last_mut() {
+                Some([_, end]) if *end == self.ended => *end += 1,
+                _ => self.empty.push([self.ended, self.ended + 1]),
             }
         }
     }
@@ -95,7 +92,7 @@ impl Lines {
 
 impl<R> LineFeeds<R> {
     pub(super) fn new(inner: R, delimiter: u8) -> Self {
-        Self { inner, is_quoted: false, has_return: false, lines: Lines::new(delimiter) }
+        Self { inner, has_return: false, lines: Lines::new(delimiter) }
     }
 
     pub(super) fn lines(&self) -> &Lines {
@@ -116,29 +113,29 @@ impl<R: BufRead> Read for LineFeeds<R> {
         loop {
             let text = self.inner.fill_buf()?;
             if text.is_empty() {
-                out[0] = b'\r';
-                return Ok(usize::from(std::mem::take(&mut self.has_return)));
+                if !std::mem::take(&mut self.has_return) {
+                    return Ok(0);
+                }
+                self.lines.add(b'\n');
+                out[0] = b'\n';
+                return Ok(1);
             }
             let (mut used, mut written) = (0, 0);
-            for &byte in text {
-                if self.has_return && byte != b'\n' && written < out.len() {
-                    out[written] = b'\r';
-                    written += 1;
-                    self.has_return = false;
+            while used < text.len() && written < out.len() {
+                let byte = text[used];
+                let ends = std::mem::take(&mut self.has_return);
+                let is_alone = ends && byte != b'\n';
+                used += usize::from(!is_alone);
+                if !ends && byte == b'\r' && self.lines.place != Place::Quoted {
+                    self.has_return = true;
+                    continue;
                 }
-                if written == out.len() {
-                    break;
-                }
-                used += 1;
-                self.is_quoted ^= byte == b'"';
-                self.has_return = byte == b'\r' && !self.is_quoted;
-                if !self.has_return {
-                    out[written] = byte;
-                    written += 1;
-                }
+                let byte = if ends { b'\n' } else { byte };
+                self.lines.add(byte);
+                out[written] = byte;
+                written += 1;
             }
             self.inner.consume(used);
-            self.lines.add(&out[..written]);
             if written > 0 {
                 return Ok(written);
             }

@@ -26,7 +26,7 @@ pub fn reader<R: BufRead>(mut text: R) -> io::Result<csv::Reader<LineFeeds<R>>> 
         return other("a Parquet file, but a CSV table is expected");
     }
     let marked = start.starts_with(b"\xef\xbb\xbf");
-    let mut lines = start.split(|&byte| byte == b'\n');
+    let mut lines = start.split(|byte| b"\r\n".contains(byte));
     let line = lines.find(|line| !line.trim_ascii().is_empty()).unwrap_or_default();
     let delimiter =
         [b',', b';', b'\t'].into_iter().find(|byte| line.contains(byte)).unwrap_or(b',');
@@ -145,10 +145,10 @@ mod tests {
         assert_eq!(fault.to_string(), expected);
     }
 
-    /// Messages named the line before.
+    /// Messages named the line before, or the first.
     #[test]
-    fn lines_that_end_by_cr_lf_are_counted_as_they_are() {
-        for ending in ["\n", "\r\n"] {
+    fn lines_are_counted_whatever_ends_them() {
+        for ending in ["\n", "\r\n", "\r"] {
             let text = "id,note\na,\"x\ny\"\nb,1\nd,5\ne,6".replace('\n', ending);
             for capacity in [8, 9, 10, 11, 64] {
                 let buffered = io::BufReader::with_capacity(capacity, text.as_bytes());
@@ -166,7 +166,7 @@ mod tests {
     /// Records behind empty lines were said to stand on these.
     #[test]
     fn empty_lines_are_counted() {
-        for ending in ["\n", "\r\n"] {
+        for ending in ["\n", "\r\n", "\r"] {
             let text = "\n\nid,note\n\na,\"x\n\n\ny\"\n\n\n\nb,1\nd,5\n\n".replace('\n', ending);
             let mut table = reader(text.as_bytes()).unwrap();
             assert_eq!(&table.headers().unwrap()[1], "note");
@@ -193,7 +193,7 @@ mod tests {
                 Ok(_) => records(&mut table).find_map(Result::err).map(|fault| fault.to_string()),
             }
         };
-        for ending in ["\n", "\r\n"] {
+        for ending in ["\n", "\r\n", "\r"] {
             for capacity in [16, 8192] {
                 for (text, line) in [
                     ("id,note\na,x\n\nb,\"y\nc,z\nd,z\n", 4),
@@ -217,10 +217,15 @@ mod tests {
         }
     }
 
-    /// A lone carriage return ends a line, too, for the csv crate; none is lost.
+    /// A lone carriage return ends a line, too; between quotation marks every one is kept.
     #[test]
-    fn other_carriage_returns_are_kept() {
-        for text in ["a\rb\r", "\r\r\n\"\r\n\"\r", "\r"] {
+    fn other_carriage_returns_are_line_feeds() {
+        for (text, expected) in [
+            ("a\rb\r", "a\nb\n"),
+            ("\r\r\n\"\r\n\"\r", "\n\n\"\r\n\"\n"),
+            ("\r", "\n"),
+            ("5\" pipe,\"a\rb\"\r", "5\" pipe,\"a\rb\"\n"),
+        ] {
             for capacity in [1, 2, 64] {
                 let inner = io::BufReader::with_capacity(capacity, text.as_bytes());
                 let mut plain = LineFeeds::new(inner, b',');
@@ -230,7 +235,6 @@ mod tests {
                 while plain.read(&mut byte).unwrap() > 0 {
                     found.push(byte[0]);
                 }
-                let expected = text.replace("\r\r\n\"", "\r\n\"");
                 assert_eq!(String::from_utf8(found).unwrap(), expected);
             }
         }

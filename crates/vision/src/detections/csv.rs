@@ -2,13 +2,15 @@
 
 use std::path::Path;
 
+use corsmal_files::csv_text::{self, Fault};
+
 use super::{Detection, MAX_DETECTIONS, Segmentation, beside, detection};
 use crate::error::{Result, VisionError};
 
 pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Vec<Detection>> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
-    let fault = |e: csv::Error| VisionError::file(path, format!("not a readable table: {e}"));
-    let header = reader.headers().map_err(fault)?.clone();
+    let mut reader = csv_text::reader(bytes).map_err(|e| VisionError::file(path, e.to_string()))?;
+    let fault = |e: Fault| VisionError::file(path, e.to_string());
+    let header = csv_text::header(&mut reader).map_err(fault)?;
     let column = |name: &str| header.iter().position(|h| h.eq_ignore_ascii_case(name));
     for name in ["frame", "view", "label", "score", "x_min", "y_min", "x_max", "y_max"] {
         if column(name).is_none() {
@@ -22,13 +24,10 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Vec<Detection>> {
         }
     }
     let mut detections = Vec::new();
-    for row in reader.records() {
-        let row = row.map_err(fault)?;
-        let at = row.position().map_or(0, |p| p.byte() as usize);
+    for row in csv_text::records(&mut reader) {
+        let (line, row) = row.map_err(fault)?;
         let text = |key: &str| column(key).and_then(|c| row.get(c)).unwrap_or_default();
-        let place = |reason: String| {
-            VisionError::file(path, format!("line {}: {reason}", line_of(bytes, at)))
-        };
+        let place = |reason: String| VisionError::file(path, format!("line {line}: {reason}"));
         if detections.len() == MAX_DETECTIONS {
             return Err(place(format!("a table has at most {MAX_DETECTIONS} detections")));
         }
@@ -53,12 +52,4 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Vec<Detection>> {
         detections.push(detection(names, score, bounds, mask).map_err(place)?);
     }
     Ok(detections)
-}
-
-/// The line of the row that begins at a byte. The csv crate takes the line feed after a carriage return, and
-/// empty lines, for a part of the row behind them.
-fn line_of(bytes: &[u8], at: usize) -> usize {
-    let (before, row) = bytes.split_at(at.min(bytes.len()));
-    let ends = row.iter().take_while(|byte| matches!(byte, b'\r' | b'\n'));
-    1 + before.iter().chain(ends).filter(|&&byte| byte == b'\n').count()
 }

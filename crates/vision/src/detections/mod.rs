@@ -203,15 +203,17 @@ mod tests {
             ("1,1,cup,1,0,0,inf,1,", "is not an edge"),
             ("1,1,cup,1,3,0,1,1,", "comes first"),
             ("1,1,cup,1,0,0,1,1,{x", "not readable as JSON"),
-            ("1,1,cup", "not a readable table"),
+            ("1,1,cup", "line 2: 3 fields, but the first line has 9"),
+            ("1,1,\"cup,1,0,0,1,1,\n1,1,cup,1,0,0,1,1,", "line 2: a quotation mark opens here"),
         ] {
             let error = table("d.csv", &format!("{HEADER}{row}\n")).unwrap_err().to_string();
             assert!(error.contains(part), "{error}");
         }
-        // As Excel ends lines, and behind an empty one.
+        // As Excel ends lines and separates columns, and behind an empty one.
         let rows = format!("{HEADER}1,1,cup,1,0,0,1,1,m.png\n\n1,5,cup,1,0,0,1,1,\n");
-        for ending in ["\n", "\r\n"] {
-            let error = table("d.csv", &rows.replace('\n', ending)).unwrap_err().to_string();
+        for (ending, comma) in [("\n", ","), ("\r\n", ";"), ("\r", "\t")] {
+            let rows = rows.replace(',', comma).replace('\n', ending);
+            let error = table("d.csv", &rows).unwrap_err().to_string();
             assert!(error.contains("line 4: '5' is not a view"), "{error}");
         }
         let error = table("d.csv", "frame,view\n1,1\n").unwrap_err().to_string();
