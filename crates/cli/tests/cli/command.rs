@@ -37,6 +37,13 @@ pub fn refused(arguments: &[&str]) -> String {
     message
 }
 
+/// A file with some text.
+pub fn written(folder: &Path, name: &str, text: &str) -> PathBuf {
+    let path = folder.join(name);
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
 /// Sends SIGINT and gives the exit code; `None` where a minute later the process still runs, which
 /// then is ended.
 #[cfg(unix)]

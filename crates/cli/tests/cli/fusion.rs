@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::command::{done, refused, run, shared, text};
+use crate::command::{done, refused, run, shared, text, written};
 
 /// The command of docs/ccm.md: type, level and capacity of every row are M5's.
 #[test]
@@ -205,11 +205,7 @@ fn prediction_files_are_averaged_by_id() {
 #[test]
 fn the_worst_status_stays() {
     let folder = tempfile::tempdir().unwrap();
-    let put = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        std::fs::write(&path, text).unwrap();
-        path
-    };
+    let put = |name: &str, text: &str| written(folder.path(), name, text);
     let windows = put(
         "w.csv",
         "id,start,end,status,predicted,p_x,p_y\na,0,1,ok,x,0.75,0.25\na,1,2,truncated,y,0.25,0.75\n\
@@ -243,11 +239,7 @@ fn the_worst_status_stays() {
 #[test]
 fn contradictions_and_repeated_windows_are_not_fused() {
     let folder = tempfile::tempdir().unwrap();
-    let put = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        std::fs::write(&path, text).unwrap();
-        path
-    };
+    let put = |name: &str, text: &str| written(folder.path(), name, text);
     let head = "id,fold,true,predicted,p_x,p_y\n";
     let one = put("1.csv", &format!("{head}a,1,x,x,0.9,0.1\nb,2,y,y,0.2,0.8\n"));
     for (other, message) in [

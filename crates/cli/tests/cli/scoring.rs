@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::command::{done, refused, run, text};
+use crate::command::{done, refused, run, text, written};
 
 /// Values of scikit-learn 1.9: accuracy_score, f1_score, brier_score_loss, roc_auc_score(ovr),
 /// average_precision_score of these six rows.
@@ -79,11 +79,7 @@ fn labels_come_from_a_file_with_any_key_column() {
 #[test]
 fn the_only_label_column_has_the_true_classes() {
     let folder = tempfile::tempdir().unwrap();
-    let put = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        std::fs::write(&path, text).unwrap();
-        path
-    };
+    let put = |name: &str, text: &str| written(folder.path(), name, text);
     let file = put("p.csv", "id,true,predicted\na,x,x\nb,y,y\n");
     let accuracy = |labels: &std::path::Path, more: &[&str]| {
         let score = ["score", text(&file), "--labels", text(labels), "--json"];
@@ -123,11 +119,7 @@ fn numbers_are_not_compared_as_classes() {
 #[test]
 fn lines_without_a_prediction_are_compared_as_score_counts_them() {
     let folder = tempfile::tempdir().unwrap();
-    let put = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        std::fs::write(&path, text).unwrap();
-        path
-    };
+    let put = |name: &str, text: &str| written(folder.path(), name, text);
     let one = put("1.csv", "id,true,predicted\n1,x,x\n2,y,y\n3,x,y\n4,y,y\n5,x,x\n");
     let two = put("2.csv", "id,true,predicted\n5,x,y\n1,x,y\n2,y,y\n3,x,x\n4,y,\n");
     let compared = done(&["compare-predictions", text(&one), text(&two), "--json"]);
@@ -146,11 +138,7 @@ fn lines_without_a_prediction_are_compared_as_score_counts_them() {
 #[test]
 fn ids_name_recordings_before_container_and_sequence_do() {
     let folder = tempfile::tempdir().unwrap();
-    let put = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        std::fs::write(&path, text).unwrap();
-        path
-    };
+    let put = |name: &str, text: &str| written(folder.path(), name, text);
     let one = put("1.csv", "id,container,sequence,true,predicted\na,1,1,c,c\nb,1,1,d,c\n");
     let two = put("2.csv", "id,container,sequence,true,predicted\nb,1,1,d,d\na,1,1,c,d\n");
     assert!(done(&["score", text(&one)]).contains("2 rows"));

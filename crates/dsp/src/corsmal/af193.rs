@@ -86,7 +86,7 @@ impl Af193 {
     pub fn of(sr: f64, librosa: LibrosaVersion) -> Result<Self> {
         let freqs = fft_frequencies(sr, N_FFT)?;
         let contrast = ContrastParams::default();
-        let highest = contrast.fmin * 2.0_f64.powi(contrast.n_bands as i32 - 1);
+        let highest = contrast.start_of(contrast.n_bands);
         if highest >= 0.5 * sr {
             let allowed = format!(
                 "above {} Hz for af193: the highest band of its spectral contrast starts at {highest} Hz",

@@ -46,6 +46,16 @@ impl Band {
     }
 }
 
+impl ContrastParams {
+    /// Where a band begins, in Hz.
+    pub(crate) fn start_of(&self, band: usize) -> f64 {
+        match band {
+            0 => 0.0,
+            _ => self.fmin * 2.0_f64.powi(band as i32 - 1),
+        }
+    }
+}
+
 /// Tables of the bands for one set of bin frequencies.
 #[derive(Debug, Clone)]
 pub struct Contrast {
@@ -70,10 +80,9 @@ impl Contrast {
         if !(params.fmin.is_finite() && params.fmin > 0.0) {
             return Err(DspError::parameter("fmin", params.fmin, "above 0 Hz"));
         }
-        let edge = |band: usize| params.fmin * 2.0_f64.powi(band as i32);
         let mut bands = Vec::new();
         for k in 0..=n_bands {
-            let (low, high) = (if k == 0 { 0.0 } else { edge(k - 1) }, edge(k));
+            let (low, high) = (params.start_of(k), params.start_of(k + 1));
             if low >= 0.5 * sr {
                 let allowed = format!(
                     "so few that all bands start below sr / 2 (band {k} starts at {low} Hz)"

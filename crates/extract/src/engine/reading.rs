@@ -172,6 +172,16 @@ pub fn require_finite(
     Err(Failed { byte_offset: byte_of(frame), ..Failed::new(Status::NonFinite, reason) })
 }
 
+/// Why a stretch has no samples.
+pub fn no_frame(rate: u32) -> String {
+    format!("the stretch has no frame at {rate} Hz")
+}
+
+/// Why a stretch has no samples of its recording.
+pub fn behind_the_end(start: f64) -> String {
+    format!("the stretch begins at {start} s, after the end of the recording")
+}
+
 /// Notes where a stretch reaches beyond the end of its recording, now read.
 ///
 /// # Errors
@@ -190,13 +200,12 @@ pub fn check_stretch(
         let of = if (input.start, input.end) == (None, None) { "recording" } else { "stretch" };
         let reason = match has_frames {
             true => format!("signal.start and signal.end leave nothing of the {of}"),
-            false => format!("the stretch has no frame at {rate} Hz"),
+            false => no_frame(rate),
         };
         return Err(Failed::new(Status::Empty, reason));
     }
     if let Some(start) = input.start.filter(|_| crop.start > 0 && outcome.decoded_frames == 0) {
-        let reason = format!("the stretch begins at {start} s, after the end of the recording");
-        return Err(Failed::new(Status::Empty, reason));
+        return Err(Failed::new(Status::Empty, behind_the_end(start)));
     }
     let is_end = input.end.is_some_and(|end| crop.end == frame_at(end, rate));
     if is_end && outcome.decoded_frames < crop.end - crop.start {

@@ -150,7 +150,12 @@ impl<'a> Windows<'a> {
         let wanted = end.min(self.limit);
         while self.reached() < wanted && self.read(wanted - self.reached())? {}
         if self.held.is_empty() && self.number == 0 {
-            return Err(Failed::new(Status::Empty, "no samples"));
+            let reason = match (self.base, self.limit) {
+                (base, limit) if base >= limit => reading::no_frame(sample_rate),
+                (0, _) => "no samples".into(),
+                (base, _) => reading::behind_the_end(base as f64 / f64::from(sample_rate)),
+            };
+            return Err(Failed::new(Status::Empty, reason));
         }
         if self.reached() < end && self.number > 0 {
             return Ok(None);
@@ -303,6 +308,17 @@ mod tests {
             Windows::open(&input(&empty, (None, None)), &signals, windowing, &go_on()).unwrap();
         assert_eq!(windows.next().unwrap().err().unwrap().status, Status::Empty);
         assert!(windows.next().is_none());
+        let short = recording(folder.path(), 8000);
+        for (path, span, reason) in [
+            (&empty, (None, None), "no samples"),
+            (&short, (Some(1.5), None), "the stretch begins at 1.5 s, after the end"),
+            (&short, (Some(0.5), Some(0.5)), "the stretch has no frame at 8000 Hz"),
+        ] {
+            let mut windows =
+                Windows::open(&input(path, span), &signals, windowing, &go_on()).unwrap();
+            let found = windows.next().unwrap().err().unwrap();
+            assert!(found.reason.starts_with(reason), "{}", found.reason);
+        }
         let absent = input(&folder.path().join("absent.wav"), (None, None));
         assert!(Windows::open(&absent, &signals, windowing, &go_on()).is_err());
         assert!(Windowing::new(0.0, 1.0).is_none() && Windowing::new(1.0, f64::NAN).is_none());

@@ -3,7 +3,8 @@
 use std::io::{self, BufRead, Read};
 
 /// Text whose lines end by line feeds alone, except in quotation marks. Where they end by CR LF, the csv crate
-/// takes the second for a part of the next line and counts one too few; where they end by CR, it counts none.
+/// takes the second for a part of the next line and counts one too few; where they end by CR, it counts none. A CR
+/// between quotation marks ends no line.
 pub struct LineFeeds<R> {
     inner: R,
     /// A carriage return that ends a line was read and not given.
