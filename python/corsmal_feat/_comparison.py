@@ -9,6 +9,7 @@ from typing import Any
 from . import _core
 from ._predictions import StrPath
 from ._refusals import existing, refuses, seed_of, whole
+from ._warnings import warn
 
 __all__ = ["Comparison", "compare_predictions"]
 
@@ -22,7 +23,7 @@ class Comparison:
     only_first, only_second : number of recordings that only one of the two got right
     p_value : p value of McNemar's exact test
     difference, low, high : weighted F1 of the second minus that of the first, with its 95 %
-        bootstrap interval over recordings
+        bootstrap interval over groups, or else over rows
     report : everything, as `corsmal-feat compare-predictions --json` prints it
 
     Examples
@@ -47,6 +48,7 @@ def compare_predictions(
     second: StrPath,
     *,
     target: str | None = None,
+    groups: str | None = None,
     resamples: int = 2000,
     seed: int = 0,
 ) -> Comparison:
@@ -58,6 +60,9 @@ def compare_predictions(
         Prediction files of the same recordings with true classes.
     target : str, optional
         Column of the true classes; `true` by default.
+    groups : str, optional
+        Column of groups that are drawn together, since their rows are not independent; by default
+        a column `group`, `container` or `recording`.
     resamples, seed : int
         Number of bootstrap resamples, and the seed.
 
@@ -78,10 +83,12 @@ def compare_predictions(
     """
     count = whole("resamples", resamples, 1_000_001)
     text = _core.compare_predictions(
-        existing(first), existing(second), target, count, seed_of(seed)
+        existing(first), existing(second), target, groups, count, seed_of(seed)
     )
     report = json.loads(text)
-    test, interval = report["mcnemar"], report["bootstrap_rows"]
+    for warning in report["warnings"]:
+        warn(warning)
+    test, interval = report["mcnemar"], report["bootstrap_groups"] or report["bootstrap_rows"]
     return Comparison(
         test["only_first"],
         test["only_second"],

@@ -354,7 +354,7 @@ def fuse(
     least: int,
 ) -> str: ...
 def compare_predictions(
-    first: str, second: str, target: str | None, resamples: int, seed: int
+    first: str, second: str, target: str | None, groups: str | None, resamples: int, seed: int
 ) -> str: ...
 def score(
     predictions: str,

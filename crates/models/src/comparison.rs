@@ -7,9 +7,9 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
 use crate::error::{ModelError, Result};
-use crate::labels::Labels;
+use crate::labels::{Labels, alike};
 use crate::predictions::{Id, PredictionError, PredictionTable};
-use crate::scores::{Scores, Tally};
+use crate::scores::{Scores, Tally, check_spelling};
 
 /// McNemar's exact test.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -53,9 +53,13 @@ pub struct Bootstrap {
     pub low: f64,
     /// its upper end
     pub high: f64,
-    /// part of resamples in which the second is not better, doubled for both sides, at most 1
-    pub p_value: f64,
+    /// part of resamples in which the second is not better, doubled for both sides, at most 1; `None` where fewer
+    /// than ten rows or groups are drawn: if all agree, the part is 0, whatever chance there was of that
+    pub p_value: Option<f64>,
 }
+
+/// Fewest rows or groups whose draws say how probable a difference is.
+const FEWEST: usize = 10;
 
 /// Resamples rows, or whole groups when given, with replacement.
 ///
@@ -112,7 +116,7 @@ pub fn bootstrap<S: AsRef<str>>(
         difference: difference(&all),
         low: at(0.025),
         high: at(0.975),
-        p_value: (2.0 * tail).min(1.0),
+        p_value: (units.len() >= FEWEST).then_some((2.0 * tail).min(1.0)),
     })
 }
 
@@ -127,8 +131,14 @@ pub struct Comparison {
     pub second: Compared,
     /// McNemar's test
     pub mcnemar: McNemar,
-    /// difference of weighted F1 with recordings drawn
+    /// difference of weighted F1 with rows drawn
     pub bootstrap_rows: Bootstrap,
+    /// the same with whole groups of the first file drawn
+    pub bootstrap_groups: Option<Bootstrap>,
+    /// column of the groups
+    pub grouped_by: Option<String>,
+    /// number of groups
+    pub groups: usize,
     /// the same with whole folds drawn, where all lines have one, there are several, and they do not
     /// differ between the files
     pub bootstrap_folds: Option<Bootstrap>,
@@ -142,6 +152,8 @@ pub struct Comparison {
     pub seed: u64,
     /// names of the classes, in the order of the scores
     pub labels: Labels,
+    /// what makes the comparison doubtful, in words
+    pub warnings: Vec<String>,
 }
 
 /// One of two files.
@@ -154,15 +166,16 @@ pub struct Compared {
 }
 
 /// Compares predictions of the same recordings. `target` names the column of true classes, else
-/// `true`. A line without a prediction is wrong.
+/// `true`, and `groups` that of groups, else `group`, `container` or `recording` where there is one. A line without a
+/// prediction is wrong.
 ///
 /// # Errors
 /// Recordings that one file has and the other has not, other true classes, recordings that occur twice; numbers with
-/// fractions, which are no classes.
+/// fractions, which are no classes; a class that predictions spell as another number; no such groups.
 pub fn compare(
     first: &PredictionTable,
     second: &PredictionTable,
-    target: Option<&str>,
+    (target, groups): (Option<&str>, Option<&str>),
     resamples: usize,
     seed: u64,
 ) -> std::result::Result<Comparison, PredictionError> {
@@ -204,6 +217,9 @@ pub fn compare(
                       errors of each file";
         return Err(first.content(reason));
     }
+    let spelled: Vec<&str> = truth.iter().map(String::as_str).collect();
+    check_spelling(first, &spelled, false)?;
+    check_spelling(second, &spelled, false)?;
     let named: Vec<&String> = truth.iter().chain(predicted).collect();
     let (labels, all) = Labels::of(&named);
     let truth = &all[..truth.len()];
@@ -223,6 +239,16 @@ pub fn compare(
         p.into_iter().map(|class| class.unwrap_or(labels.len())).collect()
     };
     let (a, b) = (&all(a)[..], &all(b)[..]);
+    let grouped = first.groups(groups)?;
+    let by_group =
+        grouped.as_ref().map(|(_, of)| bootstrap(truth, a, b, Some(of), resamples, seed));
+    let mut warnings = alike(&labels);
+    if let Some((column, _)) = &grouped {
+        warnings.push(format!(
+            "rows of one {column} are not independent: McNemar's test and the interval over rows take them as if \
+             they were, and are too sure"
+        ));
+    }
     let (folds, others) = (first.column("fold"), second.column("fold"));
     let folds_differ = match (&folds, &others) {
         (Some(folds), Some(others)) => {
@@ -241,12 +267,16 @@ pub fn compare(
         second: two_scores.map_err(refuse)?,
         mcnemar: mcnemar(truth, a, b).map_err(refuse)?,
         bootstrap_rows: bootstrap::<&str>(truth, a, b, None, resamples, seed).map_err(refuse)?,
+        bootstrap_groups: by_group.transpose().map_err(refuse)?,
+        groups: grouped.as_ref().map_or(0, |(_, of)| Labels::of(of).0.len()),
+        grouped_by: grouped.map(|(column, _)| column.to_owned()),
         bootstrap_folds: by_fold.transpose().map_err(refuse)?,
         folds: n_folds,
         folds_differ,
         resamples,
         seed,
         labels,
+        warnings,
     })
 }
 
@@ -283,11 +313,19 @@ mod tests {
         let first: Vec<usize> =
             (0..200).map(|i| if i % 3 == 0 { 1 - i % 2 } else { i % 2 }).collect();
         let clear = bootstrap::<&str>(&truth, &first, &truth, None, 500, 1).unwrap();
-        assert!(clear.low > 0.2 && clear.high < 0.5 && clear.p_value == 0.0, "{clear:?}");
+        assert!(clear.low > 0.2 && clear.high < 0.5 && clear.p_value == Some(0.0), "{clear:?}");
         let none = bootstrap::<&str>(&truth, &first, &first, None, 500, 1).unwrap();
-        assert_eq!((none.difference, none.low, none.high, none.p_value), (0.0, 0.0, 0.0, 1.0));
+        assert_eq!(
+            (none.difference, none.low, none.high, none.p_value),
+            (0.0, 0.0, 0.0, Some(1.0))
+        );
         let groups: Vec<String> = (0..200).map(|i| (i / 20).to_string()).collect();
         let grouped = bootstrap(&truth, &first, &truth, Some(&groups), 500, 1).unwrap();
         assert!(grouped.difference == clear.difference && grouped.low > 0.2);
+        assert_eq!(grouped.p_value, Some(0.0));
+        // Nine groups that agree are no proof.
+        let groups: Vec<String> = (0..200).map(|i| (i / 25 + i / 199).to_string()).collect();
+        let few = bootstrap(&truth, &first, &truth, Some(&groups), 500, 1).unwrap();
+        assert_eq!((few.difference, few.p_value), (clear.difference, None));
     }
 }

@@ -1,6 +1,8 @@
 //! What a classifier relies on, and whether more rows would help: both by training on the folds'
 //! training rows and scoring their test rows.
 
+use std::collections::BTreeMap;
+
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::Serialize;
 
@@ -87,6 +89,8 @@ pub struct Setting<'a> {
     pub n_classes: usize,
     /// what is trained on and what is scored
     pub folds: &'a [Fold],
+    /// what each row belongs to, where rows of one group are not independent
+    pub groups: Option<&'a [String]>,
     /// what is trained
     pub spec: &'a PipelineSpec,
 }
@@ -95,6 +99,10 @@ impl Setting<'_> {
     fn check(&self) -> Result<()> {
         crate::table::check_features(self.x)?;
         crate::table::check_labels(self.x.nrows(), self.y, self.n_classes)?;
+        if let Some(groups) = self.groups.filter(|groups| groups.len() != self.y.len()) {
+            let (what, expected) = ("groups", self.y.len());
+            return Err(ModelError::Length { what, expected, actual: groups.len() });
+        }
         let beyond = |row: &usize| *row >= self.y.len();
         for fold in self.folds {
             if fold.train.iter().chain(&fold.test).any(beyond) || fold.test.is_empty() {
@@ -110,6 +118,21 @@ impl Setting<'_> {
         self.spec.train(self.x.select(Axis(0), rows).view(), &y, self.n_classes)
     }
 
+    /// Rows of a class that come together: those of a group, or each by itself.
+    fn units(&self, rows: impl Iterator<Item = usize>) -> Vec<Vec<usize>> {
+        let Some(groups) = self.groups else { return rows.map(|row| vec![row]).collect() };
+        let mut units: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+        rows.for_each(|row| units.entry(&groups[row]).or_default().push(row));
+        units.into_values().collect()
+    }
+
+    /// Whether a fold tests rows of one class alone.
+    fn has_uniform_fold(&self) -> bool {
+        let uniform =
+            |fold: &Fold| fold.test.iter().all(|row| self.y[*row] == self.y[fold.test[0]]);
+        self.folds.iter().any(uniform)
+    }
+
     fn accuracy(&self, predicted: &[usize], rows: &[usize]) -> f64 {
         let right = predicted.iter().zip(rows).filter(|(p, row)| **p == self.y[**row]).count();
         right as f64 / rows.len() as f64
@@ -117,7 +140,9 @@ impl Setting<'_> {
 }
 
 /// Permutation importance of each family: in each fold the values of all its features are exchanged
-/// together among the test rows, `repeats` times, and the accuracy lost is noted.
+/// together among the test rows, `repeats` times, and the accuracy lost is noted. Where a fold tests one class
+/// alone, as a fold of one row does, values come from the test rows of all folds: others of its class would say the
+/// same.
 ///
 /// # Errors
 /// No repetition, a family with a column beyond the table, folds that do not fit the table, and
@@ -141,15 +166,18 @@ pub fn permutation_importance(
     }
     let mut losses: Vec<Vec<f64>> = vec![Vec::new(); families.len()];
     let mut random = RandomState::new(seed);
+    let of_all: Option<Vec<usize>> = setting
+        .has_uniform_fold()
+        .then(|| setting.folds.iter().flat_map(|fold| fold.test.iter().copied()).collect());
     for fold in setting.folds {
         let model = setting.train(&fold.train)?;
         let x = setting.x.select(Axis(0), &fold.test);
         let whole = setting.accuracy(&model.predict(x.view())?, &fold.test);
         for (family, losses) in families.iter().zip(&mut losses) {
             for _ in 0..repeats {
-                let mut order: Vec<usize> = (0..x.nrows()).collect();
-                random.shuffle(&mut order);
-                let permuted = permuted(&x, &family.columns, &order);
+                let mut from = of_all.clone().unwrap_or_else(|| fold.test.clone());
+                random.shuffle(&mut from);
+                let permuted = permuted(&x, &family.columns, (setting.x, &from));
                 let accuracy = setting.accuracy(&model.predict(permuted.view())?, &fold.test);
                 losses.push(whole - accuracy);
             }
@@ -165,12 +193,16 @@ pub fn permutation_importance(
     Ok(families.iter().zip(losses).map(importance).collect())
 }
 
-fn permuted(x: &Array2<f64>, columns: &[usize], order: &[usize]) -> Array2<f64> {
+/// `x` with the values that other rows of the table have in these columns.
+fn permuted(
+    x: &Array2<f64>,
+    columns: &[usize],
+    (table, from): (ArrayView2<'_, f64>, &[usize]),
+) -> Array2<f64> {
     let mut out = x.clone();
     for &column in columns {
-        for (row, &from) in order.iter().enumerate() {
-            out[[row, column]] = x[[from, column]];
-        }
+        let values = from.iter().map(|row| table[[*row, column]]);
+        out.column_mut(column).iter_mut().zip(values).for_each(|(slot, value)| *slot = value);
     }
     out
 }
@@ -188,16 +220,22 @@ pub struct LearningPoint {
     pub high: f64,
 }
 
-/// Accuracy on the test rows when only these shares (above 0, up to 1) of each class's training rows
-/// are learned from, at least two of each class. Smaller parts are contained in larger ones.
+/// Accuracies with growing parts of the training rows.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LearningCurve {
+    /// those that could be trained
+    pub points: Vec<LearningPoint>,
+    /// the largest share that the classifier refused as too few rows, and its words
+    pub refused: Option<(f64, String)>,
+}
+
+/// Accuracy on the test rows when only these shares (above 0, up to 1) of each class's training rows, or
+/// groups of them, are learned from, at least two of each class. Smaller parts are contained in larger ones. What
+/// cannot be trained on a part, such as 15 neighbours on 10 rows, has no point there.
 ///
 /// # Errors
-/// A share out of range, folds that do not fit the table, and whatever training refuses.
-pub fn learning_curve(
-    setting: &Setting<'_>,
-    shares: &[f64],
-    seed: u32,
-) -> Result<Vec<LearningPoint>> {
+/// A share out of range, folds or groups that do not fit the table.
+pub fn learning_curve(setting: &Setting<'_>, shares: &[f64], seed: u32) -> Result<LearningCurve> {
     setting.check()?;
     if let Some(share) = shares.iter().find(|share| !(**share > 0.0 && **share <= 1.0)) {
         let reason =
@@ -205,27 +243,27 @@ pub fn learning_curve(
         return Err(ModelError::Folds { reason });
     }
     let mut random = RandomState::new(seed);
-    let orders: Vec<Vec<Vec<usize>>> = setting
+    let orders: Vec<Vec<Vec<Vec<usize>>>> = setting
         .folds
         .iter()
         .map(|fold| {
             let of_class = |class: usize| {
                 let rows = fold.train.iter().copied().filter(|row| setting.y[*row] == class);
-                let mut rows: Vec<usize> = rows.collect();
-                random.shuffle(&mut rows);
-                rows
+                let mut units = setting.units(rows);
+                random.shuffle(&mut units);
+                units
             };
             (0..setting.n_classes).map(of_class).collect()
         })
         .collect();
-    let point = |share: &f64| {
+    let point = |share: &f64| -> Result<LearningPoint> {
         let mut accuracies = Vec::with_capacity(setting.folds.len());
         let mut rows = 0;
         for (fold, order) in setting.folds.iter().zip(&orders) {
             let mut part: Vec<usize> = Vec::new();
             for class in order {
                 let wanted = (share * class.len() as f64).round().max(2.0) as usize;
-                part.extend(&class[..wanted.min(class.len())]);
+                part.extend(class[..wanted.min(class.len())].iter().flatten());
             }
             part.sort_unstable();
             rows += part.len();
@@ -241,5 +279,15 @@ pub fn learning_curve(
             high: accuracies.iter().copied().fold(f64::NEG_INFINITY, f64::max),
         })
     };
-    shares.iter().map(point).collect()
+    let (mut points, mut refused) = (Vec::new(), None::<(f64, String)>);
+    for share in shares {
+        match point(share) {
+            Ok(point) => points.push(point),
+            Err(error) if refused.as_ref().is_none_or(|(most, _)| most < share) => {
+                refused = Some((*share, error.to_string()));
+            }
+            Err(_) => {}
+        }
+    }
+    Ok(LearningCurve { points, refused })
 }

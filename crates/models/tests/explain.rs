@@ -51,7 +51,8 @@ fn what_tells_the_classes_apart_is_important() {
     let (x, y) = table();
     let folds = stratified_k_fold(&y, 4, Some(1)).unwrap();
     let spec = forest();
-    let setting = Setting { x: x.view(), y: &y, n_classes: 2, folds: &folds, spec: &spec };
+    let setting =
+        Setting { x: x.view(), y: &y, n_classes: 2, folds: &folds, groups: None, spec: &spec };
     let families = families(&named(&["good[0]", "good[1]", "noise[0]"]));
     let found = permutation_importance(&setting, &families, 3, 7).unwrap();
     assert!(found[0].mean > 0.3, "{found:?}");
@@ -67,12 +68,68 @@ fn more_rows_help_until_all_are_used() {
     let (x, y) = table();
     let folds = stratified_k_fold(&y, 4, Some(1)).unwrap();
     let spec = forest();
-    let setting = Setting { x: x.view(), y: &y, n_classes: 2, folds: &folds, spec: &spec };
-    let curve = learning_curve(&setting, &[0.01, 0.5, 1.0], 3).unwrap();
+    let setting =
+        Setting { x: x.view(), y: &y, n_classes: 2, folds: &folds, groups: None, spec: &spec };
+    let curve = learning_curve(&setting, &[0.01, 0.5, 1.0], 3).unwrap().points;
     let rows: Vec<f64> = curve.iter().map(|p| p.rows).collect();
     assert_eq!((rows[0], rows[2]), (4.0, 90.0));
     assert!((44.0..=46.0).contains(&rows[1]), "{rows:?}");
     assert!(curve[2].mean > 0.85 && curve[2].mean >= curve[0].mean, "{curve:?}");
+}
+
+/// The report was lost when the smallest part was too small for the classifier.
+#[test]
+fn parts_that_are_too_small_have_no_point() {
+    let (x, y) = table();
+    let folds = stratified_k_fold(&y, 4, Some(1)).unwrap();
+    let parameters = serde_json::json!({"k": 15});
+    let knn = ClassifierSpec::new("knn", parameters.as_object().unwrap()).unwrap();
+    let spec = PipelineSpec::plain(knn);
+    let setting =
+        Setting { x: x.view(), y: &y, n_classes: 2, folds: &folds, groups: None, spec: &spec };
+    let curve = learning_curve(&setting, &[0.05, 0.1, 0.5, 1.0], 3).unwrap();
+    assert_eq!(curve.points.len(), 2);
+    let (share, reason) = curve.refused.unwrap();
+    assert!(share == 0.1 && reason.contains('k'), "{reason}");
+}
+
+/// Parts of every recording tell nothing about more recordings.
+#[test]
+fn whole_groups_are_learned_from() {
+    let (x, y) = table();
+    // Ten rows of a class in a group.
+    let mut seen = [0; 2];
+    let group = |class: &usize| {
+        seen[*class] += 1;
+        format!("{class}-{}", (seen[*class] - 1) / 10)
+    };
+    let groups: Vec<String> = y.iter().map(group).collect();
+    let all: Vec<usize> = (0..y.len()).collect();
+    let folds = vec![Fold { name: "f".into(), train: all.clone(), test: all }];
+    let spec = forest();
+    let groups = Some(&groups[..]);
+    let setting = Setting { x: x.view(), y: &y, n_classes: 2, folds: &folds, groups, spec: &spec };
+    let curve = learning_curve(&setting, &[0.01, 1.0], 3).unwrap().points;
+    assert_eq!((curve[0].rows, curve[1].rows), (40.0, y.len() as f64));
+    assert!(learning_curve(&Setting { groups: Some(&[]), ..setting }, &[1.0], 3).is_err());
+}
+
+/// In folds of one row, or of one class, nothing was ever important.
+#[test]
+fn folds_of_one_class_show_what_is_important() {
+    let (x, y) = table();
+    let spec = forest();
+    let fold = |class: usize, odd: usize| {
+        let tests = |row: &usize| y[*row] == class && row % 4 / 2 == odd;
+        let (test, train) = (0..y.len()).partition(tests);
+        Fold { name: format!("{class}{odd}"), train, test }
+    };
+    let folds = [fold(0, 0), fold(0, 1), fold(1, 0), fold(1, 1)];
+    let setting =
+        Setting { x: x.view(), y: &y, n_classes: 2, folds: &folds, groups: None, spec: &spec };
+    let families = families(&named(&["good[0]", "good[1]", "noise[0]"]));
+    let found = permutation_importance(&setting, &families, 3, 7).unwrap();
+    assert!(found[0].mean > 0.2 && found[1].mean.abs() < 0.1, "{found:?}");
 }
 
 #[test]
@@ -81,7 +138,8 @@ fn impossible_requests_are_refused() {
     let spec = forest();
     let fold = |test: Vec<usize>| vec![Fold { name: "f".into(), train: (0..60).collect(), test }];
     let (good, empty, beyond) = (fold(vec![100]), fold(vec![]), fold(vec![999]));
-    let setting = |folds| Setting { x: x.view(), y: &y, n_classes: 2, folds, spec: &spec };
+    let setting =
+        |folds| Setting { x: x.view(), y: &y, n_classes: 2, folds, groups: None, spec: &spec };
     assert!(learning_curve(&setting(&good), &[0.0], 0).is_err());
     assert!(learning_curve(&setting(&good), &[1.5], 0).is_err());
     assert!(learning_curve(&setting(&empty), &[1.0], 0).is_err());

@@ -149,12 +149,13 @@ pub(crate) fn compare_predictions(
     first: PathBuf,
     second: PathBuf,
     target: Option<&str>,
+    groups: Option<&str>,
     resamples: usize,
     seed: u64,
 ) -> PyResult<String> {
     let report = compute(py, || {
         let (first, second) = (PredictionTable::read(&first)?, PredictionTable::read(&second)?);
-        compare(&first, &second, target, resamples, seed)
+        compare(&first, &second, (target, groups), resamples, seed)
     })?;
     serde_json::to_string(&report.map_err(value_error)?).map_err(value_error)
 }

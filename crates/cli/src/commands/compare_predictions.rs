@@ -19,9 +19,10 @@ Example:
   corsmal-feat compare-predictions svm.csv rf.csv
 
 McNemar's exact test looks at the recordings that only one of the two got right. The bootstrap
-draws recordings, and whole folds if all lines have one, with replacement, and gives a 95 %
-interval of the difference of weighted F1. Recordings of one group resemble each other, so if
-folds are groups, the interval over folds is the honest one; with few folds it says little.
+draws lines, whole groups if there are any, and whole folds if all lines have one, with replacement,
+and gives a 95 % interval of the difference of weighted F1. Lines of one group, such as windows of one
+recording, resemble each other, so the interval over groups is the honest one; that of fewer than ten
+groups or folds says little, and has no p value.
 
 Exit codes: 0 fine, 2 could not run.")]
 pub struct Args {
@@ -36,6 +37,9 @@ pub struct Args {
     /// Column of the true classes; by default the only label column of --labels, else `true`.
     #[arg(long, visible_alias = "y", value_name = "COLUMN")]
     target: Option<String>,
+    /// Column of groups that are drawn together; by default a column group, container or recording.
+    #[arg(long, value_name = "COLUMN")]
+    groups: Option<String>,
     /// Number of bootstrap resamples.
     #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     resamples: u32,
@@ -61,7 +65,11 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     };
     let ((first, target), (second, _)) = (read(&args.first)?, read(&args.second)?);
     let draws = args.resamples as usize;
-    let report = compare(&first, &second, target.as_deref(), draws, args.seed)?;
+    let columns = (target.as_deref(), args.groups.as_deref());
+    let report = compare(&first, &second, columns, draws, args.seed)?;
+    for warning in &report.warnings {
+        eprintln!("warning: {warning}");
+    }
     let has_folds = |table: &PredictionTable| table.columns.iter().any(|name| name == "fold");
     if has_folds(&first) != has_folds(&second) {
         let (with, without) = match has_folds(&first) {
@@ -100,7 +108,13 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         report.rows,
         probability(test.p_value, 1e-4)
     );
-    print("recordings", &report.bootstrap_rows, args.resamples);
+    let lines = if report.grouped_by.is_some() { "rows" } else { "recordings" };
+    print(lines, &report.bootstrap_rows, args.resamples);
+    if let Some((by_group, column)) =
+        report.bootstrap_groups.as_ref().zip(report.grouped_by.as_ref())
+    {
+        print(&format!("{} values of {column}", report.groups), by_group, args.resamples);
+    }
     if let Some(by_fold) = &report.bootstrap_folds {
         print(&format!("{} folds", report.folds), by_fold, args.resamples);
     }
@@ -108,13 +122,16 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 }
 
 fn print(unit: &str, result: &Bootstrap, draws: u32) {
+    let p = match result.p_value {
+        Some(p) => format!("p {}", probability(p, 1.0 / f64::from(draws))),
+        None => "with so few of them, it says little".into(),
+    };
     println!(
         "bootstrap over {unit}: weighted F1 of the second {:+.2} points, 95 % interval {:+.2} to \
-         {:+.2}; p {}",
+         {:+.2}; {p}",
         100.0 * result.difference,
         100.0 * result.low,
         100.0 * result.high,
-        probability(result.p_value, 1.0 / f64::from(draws))
     );
 }
 

@@ -79,15 +79,16 @@ impl HeldOut<'_> {
             ..of_predictions(self.predictions, None, self.scores)?
         };
         self.add_stretches(&mut study);
-        if let Some(explained) = explained {
-            self.explain(&mut study, explained)?;
-        }
+        let left_out = match explained {
+            Some(explained) => self.explain(&mut study, explained)?,
+            None => None,
+        };
         recordings::add(&mut study, self.sources(), self.quiet);
         study.facts = vec![Fact::new("Features", self.table.path.display().to_string())];
         study.facts.extend(self.facts);
         study.facts.push(Fact::new("Held out", &self.folds.description));
         let cautions = self.folds.warnings(self.classes).into_iter();
-        study.facts.extend(cautions.map(|caution| Fact::new("Caution", caution)));
+        study.facts.extend(cautions.chain(left_out).map(|caution| Fact::new("Caution", caution)));
         if !self.table.config_hash.is_empty() {
             study.facts.push(Fact::new("Feature configuration", &self.table.config_hash));
         }
@@ -117,13 +118,15 @@ impl HeldOut<'_> {
         }
     }
 
-    fn explain(&self, study: &mut Study, with: &Explained<'_>) -> Result<(), Failure> {
+    /// Why a part of the learning curve is missing, if it is.
+    fn explain(&self, study: &mut Study, with: &Explained<'_>) -> Result<Option<String>, Failure> {
         let classes = self.classes.indices().to_vec();
         let setting = Setting {
             x: self.table.x.view(),
             y: &classes,
             n_classes: self.classes.n_classes(),
             folds: &self.folds.outer,
+            groups: self.folds.dependent(),
             spec: with.spec,
         };
         let families = families(&self.table.feature_names);
@@ -137,14 +140,19 @@ impl HeldOut<'_> {
             });
             study.importances = importance.collect();
         }
-        let points = learning_curve(&setting, &SHARES, with.seed)?;
-        let point = points.into_iter().map(|p| LearningPoint {
+        let curve = learning_curve(&setting, &SHARES, with.seed)?;
+        let point = curve.points.into_iter().map(|p| LearningPoint {
             rows: p.rows,
             accuracy: 100.0 * p.mean,
             range: (100.0 * p.low, 100.0 * p.high),
         });
         study.learning = point.collect();
-        Ok(())
+        Ok(curve.refused.map(|(share, reason)| {
+            format!(
+                "The learning curve begins above {} % of the training rows, which are too few for this classifier: {reason}",
+                100.0 * share
+            )
+        }))
     }
 
     fn sources(&self) -> Vec<Source> {

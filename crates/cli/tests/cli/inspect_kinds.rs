@@ -184,6 +184,15 @@ fn predictions_are_as_right_as_their_score() {
     ];
     let (text, json) = shown("p.csv", &rows.join("\n"));
     assert!(text.contains("accuracy   50.00 %"), "{text}");
+    // They were called no known audio format, and UTF-16 a part of MPEG audio.
+    for separator in [";", "\t"] {
+        let (_, json) = shown("s.csv", &rows.join("\n").replace(',', separator));
+        assert_eq!(json["accuracy"], 0.5, "{separator:?}");
+    }
+    let wide: Vec<u8> = "\u{feff}id,x\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    std::fs::write(folder.path().join("w.csv"), wide).unwrap();
+    let told = inspect(&[&folder.path().join("w.csv")]).stderr;
+    assert!(self::text(&told).contains("text in UTF-16"), "{}", self::text(&told));
     let scored =
         tool().args(["score", "--json"]).arg(folder.path().join("p.csv")).output().unwrap();
     let scored: serde_json::Value = serde_json::from_slice(&scored.stdout).unwrap();

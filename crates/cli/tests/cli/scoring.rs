@@ -135,6 +135,56 @@ fn lines_without_a_prediction_are_compared_as_score_counts_them() {
 }
 
 /// Label columns of these names hid the ids.
+/// Windows counted as independent recordings.
+#[test]
+fn windows_of_a_recording_are_drawn_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| written(folder.path(), name, text);
+    let table = |wrong: std::ops::Range<usize>, column: &str| {
+        let line = |row: usize| {
+            let predicted = if wrong.contains(&(row / 10)) { "y" } else { "x" };
+            format!("{row},{},x,{predicted}\n", row / 10)
+        };
+        format!("id,{column},true,predicted\n{}", (0..120).map(line).collect::<String>())
+    };
+    let (one, two) =
+        (put("1.csv", &table(0..3, "recording")), put("2.csv", &table(3..4, "recording")));
+    let compare = ["compare-predictions", text(&one), text(&two)];
+    let output = run(&compare);
+    let (shown, told) = [&output.stdout, &output.stderr].map(|b| String::from_utf8_lossy(b)).into();
+    assert!(
+        shown.contains("over rows") && shown.contains("over 12 values of recording"),
+        "{shown}"
+    );
+    assert!(told.contains("rows of one recording are not independent"), "{told}");
+    let report = done(&[&compare[..], &["--json"]].concat());
+    let report: Value = serde_json::from_str(&report).unwrap();
+    assert!(report["bootstrap_rows"]["low"].as_f64().unwrap() > 0.0, "{report}");
+    assert!(report["bootstrap_groups"]["low"].as_f64().unwrap() < 0.0, "{report}");
+    let (one, two) = (put("1.csv", &table(0..3, "place")), put("2.csv", &table(3..4, "place")));
+    let compare = ["compare-predictions", text(&one), text(&two)];
+    assert!(done(&compare).contains("over recordings"));
+    assert!(done(&[&compare[..], &["--groups", "place"]].concat()).contains("12 values of place"));
+}
+
+/// As pandas writes whole numbers beside empty cells: every row was wrong.
+#[test]
+fn numbers_that_are_spelled_otherwise_are_not_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| written(folder.path(), name, text);
+    let one = put("1.csv", "id,true,predicted\na,1,1\nb,2,2\nc,1,1\n");
+    let two = put("2.csv", "id,true,predicted\na,1,1.0\nb,2,2.0\nc,1,1.0\n");
+    for files in [[&one, &two], [&two, &one]] {
+        let found = refused(&["compare-predictions", text(files[0]), text(files[1])]);
+        assert!(found.contains("are the same number: spell both alike"), "{found}");
+    }
+    let one = put("1.csv", "id,true,predicted\na,Dog,Dog\nb,cat,cat\n");
+    let two = put("2.csv", "id,true,predicted\na,Dog,dog\nb,cat,cat\n");
+    let output = run(&["compare-predictions", text(&one), text(&two)]);
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(told.contains("\"Dog\" and \"dog\" differ only in how they are written"), "{told}");
+}
+
 #[test]
 fn ids_name_recordings_before_container_and_sequence_do() {
     let folder = tempfile::tempdir().unwrap();

@@ -47,7 +47,7 @@ impl<'a> Names<'a> {
 ///
 /// # Errors
 /// [`PredictionError::Content`].
-pub(super) fn check_spelling<K>(
+pub(crate) fn check_spelling<K>(
     table: &PredictionTable<K>,
     truth: &[&str],
     decimal: bool,

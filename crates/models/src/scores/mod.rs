@@ -13,6 +13,7 @@ use serde::Serialize;
 pub(crate) use confusion::Tally;
 pub use confusion::{ClassScores, ConfusionMatrix};
 pub use curves::ClassCurves;
+pub(crate) use doubts::check_spelling;
 pub use interval::Interval;
 pub use numeric::{NumericScores, no_estimate};
 pub use reliability::{Reliability, ReliabilityBin};

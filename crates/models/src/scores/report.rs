@@ -104,30 +104,9 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     pub fn score(&self, how: &Scoring) -> Result<ScoreReport, PredictionError> {
         let of_windows = self.check_windows()?;
         let truth = self.truth(how.target.as_deref())?;
-        let several = |column: &str| {
-            self.column(column).is_some_and(|values| Labels::of(&values).0.len() > 1)
-        };
-        let column = match &how.groups {
-            Some(column) => Some(column.as_str()),
-            None => GROUPS.into_iter().find(|column| several(column)),
-        };
-        let groups = match column {
-            None => None,
-            Some(name) => Some(self.column(name).ok_or_else(|| {
-                let choices = corsmal_names::choices(name, self.columns.iter().map(String::as_str));
-                self.content(format!("no column {name:?} of groups; {choices}"))
-            })?),
-        };
-        if let (Some(name), Some(values)) = (column, &groups)
-            && let Some(first) = values.iter().position(|value| is_missing(value))
-        {
-            let (rows, id) = (count(missing(values), "row"), &self.rows[first].key);
-            return Err(self.content(format!(
-                "{rows} without {name} of {}, the first is {id}: give every row one, or name other \
-                 groups, such as id",
-                values.len()
-            )));
-        }
+        let grouped = self.groups(how.groups.as_deref())?;
+        let (column, groups) =
+            grouped.map_or((None, None), |(name, values)| (Some(name), Some(values)));
         // Windows of one recording are not independent of each other.
         let recordings: Option<Vec<String>> = (of_windows && groups.is_none())
             .then(|| self.rows.iter().map(|row| row.key.to_string()).collect());
@@ -148,6 +127,35 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         }
         let report = self.score_classes(&truth, groups.as_deref(), drawn, how)?;
         Ok(ScoreReport::Classes(Box::new(report)))
+    }
+
+    /// Groups of rows that are not independent of each other: the column of that name, or else the first that
+    /// is usual for them and has several values.
+    ///
+    /// # Errors
+    /// There is no such column, or a row has no group.
+    pub(crate) fn groups<'t>(
+        &'t self,
+        wanted: Option<&'t str>,
+    ) -> Result<Option<(&'t str, Vec<&'t str>)>, PredictionError> {
+        let several = |column: &str| {
+            self.column(column).is_some_and(|values| Labels::of(&values).0.len() > 1)
+        };
+        let usual = || GROUPS.into_iter().find(|column| several(column));
+        let Some(name) = wanted.or_else(usual) else { return Ok(None) };
+        let values = self.column(name).ok_or_else(|| {
+            let choices = corsmal_names::choices(name, self.columns.iter().map(String::as_str));
+            self.content(format!("no column {name:?} of groups; {choices}"))
+        })?;
+        if let Some(first) = values.iter().position(|value| is_missing(value)) {
+            let (rows, id) = (count(missing(&values), "row"), &self.rows[first].key);
+            return Err(self.content(format!(
+                "{rows} without {name} of {}, the first is {id}: give every row one, or name other \
+                 groups, such as id",
+                values.len()
+            )));
+        }
+        Ok(Some((name, values)))
     }
 
     fn score_numbers(

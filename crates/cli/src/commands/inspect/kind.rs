@@ -28,7 +28,7 @@ pub enum Kind {
     Picture,
     /// A pickle, as calibrations are.
     Pickle,
-    /// Lines of comma-separated values.
+    /// Lines of values that commas, semicolons or tabs separate.
     Table,
     /// A configuration of `extract`.
     Configuration,
@@ -45,6 +45,8 @@ pub fn of(path: &Path) -> io::Result<Option<Kind>> {
         // The length of a header below 4 GiB, and the header's brace.
         [_, _, _, _, 0, 0, 0, 0, b'{', ..] => Some(Kind::Tensors),
         [0x89, b'P', b'N', b'G', ..] | [0xff, 0xd8, 0xff, ..] => Some(Kind::Picture),
+        // Text in UTF-16, which readers of tables name; MPEG audio begins alike.
+        [0xff, 0xfe, _, 0, _, 0, ..] | [0xfe, 0xff, 0, _, 0, ..] => Some(Kind::Table),
         [b'%', b'P', b'D', b'F', b'-', ..] => Some(Kind::Page("PDF")),
         // A text pickle begins with a mark, and another one or a list, dictionary or tuple.
         [b'(', b'(' | b'l' | b'd' | b't', ..] | [0x80, 2..=5, ..] => Some(Kind::Pickle),
@@ -101,7 +103,7 @@ fn of_text(text: &str, path: &Path) -> Option<Kind> {
     if is_configuration(content, path) {
         return Some(Kind::Configuration);
     }
-    text.lines().next().is_some_and(|line| line.contains(',')).then_some(Kind::Table)
+    text.lines().next().is_some_and(|line| line.contains([',', ';', '\t'])).then_some(Kind::Table)
 }
 
 /// Whether it is a configuration, if perhaps with faults, and not just any text.
