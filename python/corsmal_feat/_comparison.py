@@ -21,7 +21,7 @@ class Comparison:
     Attributes
     ----------
     only_first, only_second : number of recordings that only one of the two got right
-    p_value : p value of McNemar's exact test
+    p_value : p value of McNemar's exact test, which takes rows as independent
     difference, low, high : weighted F1 of the second minus that of the first, with its 95 %
         bootstrap interval over groups, or else over rows
     report : everything, as `corsmal-feat compare-predictions --json` prints it
@@ -69,6 +69,11 @@ def compare_predictions(
     Returns
     -------
     Comparison
+
+    Warns
+    -----
+    UserWarning
+        Rows have groups, so that McNemar's test is too sure, or classes differ only in case.
 
     Raises
     ------

@@ -177,14 +177,14 @@ def test_files_are_fused_and_compared(tmp_path: Path) -> None:
     same = corsmal_feat.compare_predictions(one, two, resamples=50)
     assert (same.only_first, same.only_second, same.p_value, same.difference) == (0, 0, 1.0, 0.0)
     # Ten windows of each of four recordings: the first errs in one of them, the second nowhere.
-    rows = [f"{w},{w // 10},x,{'y' if wrong and w < 10 else 'x'}\n" for wrong in (1, 0) for w in range(40)]
-    for path, part in ((one, rows[:40]), (two, rows[40:])):
-        path.write_text("id,recording,true,predicted\n" + "".join(part))
+    for path, wrong in ((one, 10), (two, 0)):
+        lines = [f"{w},{w // 10},x,{'y' if w < wrong else 'x'}\n" for w in range(40)]
+        path.write_text("id,recording,true,predicted\n" + "".join(lines))
     with pytest.warns(UserWarning, match="rows of one recording are not independent"):
         grouped = corsmal_feat.compare_predictions(one, two, resamples=200)
     assert (grouped.low, grouped.report["bootstrap_groups"]["p_value"]) == (0.0, None)
     assert grouped.report["bootstrap_rows"]["low"] > 0.05
-    with pytest.raises(ParameterError, match="no column 'speaker' of groups|\"speaker\" of groups"):
+    with pytest.raises(ParameterError, match='no column "speaker" of groups'):
         corsmal_feat.compare_predictions(one, two, groups="speaker")
     predictions(one, seed=1)
     two.write_text(one.read_text())

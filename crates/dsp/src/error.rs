@@ -87,7 +87,7 @@ pub fn room_for<T>(name: &'static str, shape: &[usize]) -> Result<()> {
     Err(DspError::Shape { name, expected, actual: shape.to_vec() })
 }
 
-/// Digits of a value that are shown.
+/// Longest text of a number; longer ones are shown with an exponent.
 const LONGEST: usize = 24;
 
 impl DspError {

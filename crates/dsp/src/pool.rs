@@ -13,7 +13,7 @@ impl<W> Default for Pool<W> {
 }
 
 impl<W> Pool<W> {
-    /// Memory in any state.
+    /// Memory in any state; `None` if all is in use.
     pub fn take(&self) -> Option<W> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).pop()
     }

@@ -53,8 +53,8 @@ pub struct Bootstrap {
     pub low: f64,
     /// its upper end
     pub high: f64,
-    /// part of resamples in which the second is not better, doubled for both sides, at most 1; `None` where fewer
-    /// than ten rows or groups are drawn: if all agree, the part is 0, whatever chance there was of that
+    /// part of resamples in which the second is not better, doubled for both sides, at most 1, and at least what n
+    /// rows or groups that agree by chance have (0.5 to the power of n - 1); `None` for fewer than ten
     pub p_value: Option<f64>,
 }
 
@@ -116,7 +116,9 @@ pub fn bootstrap<S: AsRef<str>>(
         difference: difference(&all),
         low: at(0.025),
         high: at(0.975),
-        p_value: (units.len() >= FEWEST).then_some((2.0 * tail).min(1.0)),
+        // No draw of n that agree is rarer than their agreeing by chance.
+        p_value: (units.len() >= FEWEST)
+            .then_some((2.0 * tail).max(0.5_f64.powi(units.len() as i32 - 1)).min(1.0)),
     })
 }
 
@@ -133,7 +135,7 @@ pub struct Comparison {
     pub mcnemar: McNemar,
     /// difference of weighted F1 with rows drawn
     pub bootstrap_rows: Bootstrap,
-    /// the same with whole groups of the first file drawn
+    /// the same with whole groups drawn, of the first file, or else of the second
     pub bootstrap_groups: Option<Bootstrap>,
     /// column of the groups
     pub grouped_by: Option<String>,
@@ -239,7 +241,20 @@ pub fn compare(
         p.into_iter().map(|class| class.unwrap_or(labels.len())).collect()
     };
     let (a, b) = (&all(a)[..], &all(b)[..]);
-    let grouped = first.groups(groups)?;
+    let has = |table: &PredictionTable| groups.is_none_or(|name| table.column(name).is_some());
+    let of_first = if has(first) { first.groups(groups)? } else { None };
+    let grouped = match of_first {
+        None if has(second) => second
+            .groups(groups)?
+            .map(|(name, of)| (name, first.rows.iter().map(|row| of[places[&row.key]]).collect())),
+        // Neither has it.
+        None => first.groups(groups)?,
+        found => found,
+    };
+    // Groups of one row are rows, the classes are no groups, and of one group nothing is drawn.
+    let grouped = grouped.filter(|(name, of): &(&str, Vec<&str>)| {
+        Some(*name) != target && (2..of.len()).contains(&Labels::of(of).0.len())
+    });
     let by_group =
         grouped.as_ref().map(|(_, of)| bootstrap(truth, a, b, Some(of), resamples, seed));
     let mut warnings = alike(&labels);
@@ -313,7 +328,7 @@ mod tests {
         let first: Vec<usize> =
             (0..200).map(|i| if i % 3 == 0 { 1 - i % 2 } else { i % 2 }).collect();
         let clear = bootstrap::<&str>(&truth, &first, &truth, None, 500, 1).unwrap();
-        assert!(clear.low > 0.2 && clear.high < 0.5 && clear.p_value == Some(0.0), "{clear:?}");
+        assert!(clear.low > 0.2 && clear.high < 0.5 && clear.p_value < Some(1e-9), "{clear:?}");
         let none = bootstrap::<&str>(&truth, &first, &first, None, 500, 1).unwrap();
         assert_eq!(
             (none.difference, none.low, none.high, none.p_value),
@@ -322,7 +337,7 @@ mod tests {
         let groups: Vec<String> = (0..200).map(|i| (i / 20).to_string()).collect();
         let grouped = bootstrap(&truth, &first, &truth, Some(&groups), 500, 1).unwrap();
         assert!(grouped.difference == clear.difference && grouped.low > 0.2);
-        assert_eq!(grouped.p_value, Some(0.0));
+        assert_eq!(grouped.p_value, Some(0.5_f64.powi(9)));
         // Nine groups that agree are no proof.
         let groups: Vec<String> = (0..200).map(|i| (i / 25 + i / 199).to_string()).collect();
         let few = bootstrap(&truth, &first, &truth, Some(&groups), 500, 1).unwrap();

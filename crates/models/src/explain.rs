@@ -1,7 +1,7 @@
 //! What a classifier relies on, and whether more rows would help: both by training on the folds'
 //! training rows and scoring their test rows.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::Serialize;
@@ -225,7 +225,7 @@ pub struct LearningPoint {
 pub struct LearningCurve {
     /// those that could be trained
     pub points: Vec<LearningPoint>,
-    /// the largest share that the classifier refused as too few rows, and its words
+    /// the largest share that could not be trained, and why
     pub refused: Option<(f64, String)>,
 }
 
@@ -247,10 +247,22 @@ pub fn learning_curve(setting: &Setting<'_>, shares: &[f64], seed: u32) -> Resul
         .folds
         .iter()
         .map(|fold| {
+            // One order of the groups for all classes, which groups may share.
+            let places = setting.groups.map(|groups| {
+                let names: BTreeSet<&str> = fold.train.iter().map(|row| &*groups[*row]).collect();
+                let mut names: Vec<&str> = names.into_iter().collect();
+                random.shuffle(&mut names);
+                names.into_iter().zip(0..).collect::<HashMap<&str, usize>>()
+            });
             let of_class = |class: usize| {
                 let rows = fold.train.iter().copied().filter(|row| setting.y[*row] == class);
                 let mut units = setting.units(rows);
-                random.shuffle(&mut units);
+                match (setting.groups, &places) {
+                    (Some(groups), Some(places)) => {
+                        units.sort_by_key(|unit| places[&*groups[unit[0]]]);
+                    }
+                    _ => random.shuffle(&mut units),
+                }
                 units
             };
             (0..setting.n_classes).map(of_class).collect()
@@ -279,9 +291,11 @@ pub fn learning_curve(setting: &Setting<'_>, shares: &[f64], seed: u32) -> Resul
             high: accuracies.iter().copied().fold(f64::NEG_INFINITY, f64::max),
         })
     };
-    let (mut points, mut refused) = (Vec::new(), None::<(f64, String)>);
+    let (mut points, mut refused) = (Vec::<LearningPoint>::new(), None::<(f64, String)>);
     for share in shares {
         match point(share) {
+            // Few groups: this part is the one before.
+            Ok(point) if points.last().is_some_and(|last| last.rows == point.rows) => {}
             Ok(point) => points.push(point),
             Err(error) if refused.as_ref().is_none_or(|(most, _)| most < share) => {
                 refused = Some((*share, error.to_string()));

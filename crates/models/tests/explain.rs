@@ -111,6 +111,21 @@ fn whole_groups_are_learned_from() {
     let setting = Setting { x: x.view(), y: &y, n_classes: 2, folds: &folds, groups, spec: &spec };
     let curve = learning_curve(&setting, &[0.01, 1.0], 3).unwrap().points;
     assert_eq!((curve[0].rows, curve[1].rows), (40.0, y.len() as f64));
+    // Two of six groups that hold both classes: the same two of each.
+    let shared: Vec<String> = (0..y.len()).map(|row| (row / 20).to_string()).collect();
+    let setting = Setting { groups: Some(&shared), ..setting };
+    let curve = learning_curve(&setting, &[0.1, 0.3, 1.0], 3).unwrap().points;
+    assert_eq!((curve.len(), curve[0].rows), (2, 40.0), "{curve:?}");
+    // A nearest neighbour tells the classes apart in groups of which it learned both.
+    let place = |row: usize| 10.0 * 3.0_f64.powi(row as i32 / 20);
+    let x = Array2::from_shape_fn((120, 1), |(row, _)| place(row) + (row % 2) as f64);
+    let one = serde_json::json!({"k": 1});
+    let spec = PipelineSpec::plain(ClassifierSpec::new("knn", one.as_object().unwrap()).unwrap());
+    let setting = Setting { x: x.view(), spec: &spec, ..setting };
+    for seed in 0..8 {
+        let curve = learning_curve(&setting, &[0.1], seed).unwrap().points;
+        assert_eq!(curve[0].mean, 80.0 / 120.0, "{curve:?}");
+    }
     assert!(learning_curve(&Setting { groups: Some(&[]), ..setting }, &[1.0], 3).is_err());
 }
 

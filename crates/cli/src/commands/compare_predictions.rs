@@ -19,10 +19,10 @@ Example:
   corsmal-feat compare-predictions svm.csv rf.csv
 
 McNemar's exact test looks at the recordings that only one of the two got right. The bootstrap
-draws lines, whole groups if there are any, and whole folds if all lines have one, with replacement,
-and gives a 95 % interval of the difference of weighted F1. Lines of one group, such as windows of one
+draws rows, whole groups if there are any, and whole folds if all rows have one, with replacement,
+and gives a 95 % interval of the difference of weighted F1. Rows of one group, such as windows of one
 recording, resemble each other, so the interval over groups is the honest one; that of fewer than ten
-groups or folds says little, and has no p value.
+rows, groups or folds says little, and has no p value.
 
 Exit codes: 0 fine, 2 could not run.")]
 pub struct Args {
@@ -58,7 +58,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let read = |path: &PathBuf| -> Result<(PredictionTable, Option<String>), Failure> {
         let mut table = PredictionTable::read(path)?;
         let target = match &source {
-            Some(source) => table.add_labels(source, target, None)?,
+            Some(source) => table.add_labels(source, target, args.groups.as_deref())?,
             None => target.map(String::from),
         };
         Ok((table, target))
@@ -108,8 +108,8 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         report.rows,
         probability(test.p_value, 1e-4)
     );
-    let lines = if report.grouped_by.is_some() { "rows" } else { "recordings" };
-    print(lines, &report.bootstrap_rows, args.resamples);
+    let rows = if report.grouped_by.is_some() { "rows" } else { "recordings" };
+    print(rows, &report.bootstrap_rows, args.resamples);
     if let Some((by_group, column)) =
         report.bootstrap_groups.as_ref().zip(report.grouped_by.as_ref())
     {
@@ -124,7 +124,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 fn print(unit: &str, result: &Bootstrap, draws: u32) {
     let p = match result.p_value {
         Some(p) => format!("p {}", probability(p, 1.0 / f64::from(draws))),
-        None => "with so few of them, it says little".into(),
+        None => "too few for a p value".into(),
     };
     println!(
         "bootstrap over {unit}: weighted F1 of the second {:+.2} points, 95 % interval {:+.2} to \

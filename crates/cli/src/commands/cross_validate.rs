@@ -86,8 +86,8 @@ fn cross_validate(args: &Args) -> Result<ExitCode, Failure> {
     if let Some(path) = args.predictions.as_deref().filter(|path| is_stdout(path)) {
         if args.json || !args.quiet {
             let message = format!(
-                "--predictions {}: the scores go to standard output; name a file, or have no scores with --quiet and \
-                 without --json",
+                "--predictions {}: the scores are printed there, too; name a file, or add --quiet and leave out \
+                 --json",
                 path.display()
             );
             return Err(Failure::new(message));

@@ -147,11 +147,13 @@ impl HeldOut<'_> {
             range: (100.0 * p.low, 100.0 * p.high),
         });
         study.learning = point.collect();
-        Ok(curve.refused.map(|(share, reason)| {
-            format!(
-                "The learning curve begins above {} % of the training rows, which are too few for this classifier: {reason}",
+        let is_there = study.learning.len() > 1;
+        Ok(curve.refused.map(|(share, reason)| match is_there {
+            true => format!(
+                "The learning curve has no point at {} % of the training rows: {reason}.",
                 100.0 * share
-            )
+            ),
+            false => format!("There is no learning curve: {reason}."),
         }))
     }
 

@@ -28,8 +28,10 @@ fn devices_take_tables() {
     // A file called `-` was written.
     let printed = done(&[&held_out[..], &["-"]].concat());
     assert_eq!(printed.lines().count(), table.lines().count());
-    let found = refused(&[&["cross-validate"], &learn[..], &["-o", "-"]].concat());
-    assert!(found.contains("--predictions -: the scores go to standard output"), "{found}");
+    for place in ["-", "/dev/stdout"] {
+        let found = refused(&[&["cross-validate"], &learn[..], &["-o", place]].concat());
+        assert!(found.contains("the scores are printed there, too"), "{found}");
+    }
     let found = refused(&[&["train"], &learn[..], &["-o", "/dev/null"]].concat());
     assert!(found.contains("/dev/null is a device; this output gets its name when"), "{found}");
     let wav = at("a.wav");

@@ -134,7 +134,6 @@ fn lines_without_a_prediction_are_compared_as_score_counts_them() {
     assert_eq!(compared["mcnemar"]["only_first"], 3);
 }
 
-/// Label columns of these names hid the ids.
 /// Windows counted as independent recordings.
 #[test]
 fn windows_of_a_recording_are_drawn_together() {
@@ -164,6 +163,18 @@ fn windows_of_a_recording_are_drawn_together() {
     let (one, two) = (put("1.csv", &table(0..3, "place")), put("2.csv", &table(3..4, "place")));
     let compare = ["compare-predictions", text(&one), text(&two)];
     assert!(done(&compare).contains("over recordings"));
+    // Groups of either file count, those of one row do not.
+    let named = put("3.csv", &table(0..3, "recording"));
+    for files in [[&named, &two], [&two, &named]] {
+        let output = run(&["compare-predictions", text(files[0]), text(files[1])]);
+        let shown = String::from_utf8_lossy(&output.stdout);
+        assert!(shown.contains("over 12 values of recording"), "{shown}");
+    }
+    let alone = put(
+        "4.csv",
+        &table(0..3, "recording").replace("recording", "r").replace("id,", "recording,"),
+    );
+    assert!(done(&["compare-predictions", text(&alone), text(&alone)]).contains("over recordings"));
     assert!(done(&[&compare[..], &["--groups", "place"]].concat()).contains("12 values of place"));
 }
 
@@ -176,7 +187,7 @@ fn numbers_that_are_spelled_otherwise_are_not_compared() {
     let two = put("2.csv", "id,true,predicted\na,1,1.0\nb,2,2.0\nc,1,1.0\n");
     for files in [[&one, &two], [&two, &one]] {
         let found = refused(&["compare-predictions", text(files[0]), text(files[1])]);
-        assert!(found.contains("are the same number: spell both alike"), "{found}");
+        assert!(found.contains("are the same number: spell both alike, or score them"), "{found}");
     }
     let one = put("1.csv", "id,true,predicted\na,Dog,Dog\nb,cat,cat\n");
     let two = put("2.csv", "id,true,predicted\na,Dog,dog\nb,cat,cat\n");
@@ -185,6 +196,7 @@ fn numbers_that_are_spelled_otherwise_are_not_compared() {
     assert!(told.contains("\"Dog\" and \"dog\" differ only in how they are written"), "{told}");
 }
 
+/// Label columns of these names hid the ids.
 #[test]
 fn ids_name_recordings_before_container_and_sequence_do() {
     let folder = tempfile::tempdir().unwrap();

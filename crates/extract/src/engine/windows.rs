@@ -58,6 +58,8 @@ pub struct Windows<'a> {
     /// Frames of a window, and from one to the next.
     window: u64,
     hop: u64,
+    /// Where the input begins, in seconds, if it is a stretch.
+    start: Option<f64>,
     /// Frames of the recording where the first window begins and where the input ends.
     base: u64,
     limit: u64,
@@ -90,6 +92,7 @@ impl<'a> Windows<'a> {
             signals,
             window: frames(windowing.window),
             hop: frames(windowing.hop),
+            start: input.start,
             base: input.start.map_or(0, |start| reading::frame_at(start, rate)),
             limit: input.end.map_or(u64::MAX, |end| reading::frame_at(end, rate)),
             held: Vec::new(),
@@ -150,10 +153,10 @@ impl<'a> Windows<'a> {
         let wanted = end.min(self.limit);
         while self.reached() < wanted && self.read(wanted - self.reached())? {}
         if self.held.is_empty() && self.number == 0 {
-            let reason = match (self.base, self.limit) {
-                (base, limit) if base >= limit => reading::no_frame(sample_rate),
-                (0, _) => "no samples".into(),
-                (base, _) => reading::behind_the_end(base as f64 / f64::from(sample_rate)),
+            let reason = match self.start.filter(|_| self.base > 0) {
+                _ if self.base >= self.limit => reading::no_frame(sample_rate),
+                None => "no samples".into(),
+                Some(start) => reading::behind_the_end(start),
             };
             return Err(Failed::new(Status::Empty, reason));
         }
@@ -309,9 +312,11 @@ mod tests {
         assert_eq!(windows.next().unwrap().err().unwrap().status, Status::Empty);
         assert!(windows.next().is_none());
         let short = recording(folder.path(), 8000);
+        let odd = recording_at(11_025, folder.path(), 11_025);
         for (path, span, reason) in [
             (&empty, (None, None), "no samples"),
-            (&short, (Some(1.5), None), "the stretch begins at 1.5 s, after the end"),
+            (&short, (Some(1.3), None), "the stretch begins at 1.3 s, after the end"),
+            (&odd, (Some(1.1), None), "the stretch begins at 1.1 s, after the end"),
             (&short, (Some(0.5), Some(0.5)), "the stretch has no frame at 8000 Hz"),
         ] {
             let mut windows =

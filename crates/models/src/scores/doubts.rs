@@ -66,7 +66,7 @@ pub(crate) fn check_spelling<K>(
         if let Some((truth, predicted)) = pair {
             let numeric = match table.rows.iter().any(|row| row.proba.is_some()) {
                 true => "",
-                false => ", or score them as numbers (--numeric)",
+                false => ", or score them as numbers (score --numeric)",
             };
             return Err(PredictionError::Content {
                 path: table.path.clone(),

@@ -221,7 +221,8 @@ pub(super) fn importances(study: &Study) -> Result<Option<Section>> {
     let section = Section {
         text: vec![
             "The values of all features of a family are shuffled among the held-out rows (of each \
-             fold, or of all folds where one holds out a single class), so they no longer say anything about the class; the accuracy lost is what the models get \
+             fold, or of all folds where one holds out a single class), so they no longer \
+             say anything about the class; the accuracy lost is what the models get \
              only from that family. Families that repeat the information of another lose little, \
              even if the two together matter. Whiskers span folds and repetitions."
                 .into(),
