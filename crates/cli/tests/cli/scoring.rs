@@ -170,10 +170,8 @@ fn windows_of_a_recording_are_drawn_together() {
         let shown = String::from_utf8_lossy(&output.stdout);
         assert!(shown.contains("over 12 values of recording"), "{shown}");
     }
-    let alone = put(
-        "4.csv",
-        &table(0..3, "recording").replace("recording", "r").replace("id,", "recording,"),
-    );
+    let lines: String = (0..12).map(|row| format!("{row},{row},x,x\n")).collect();
+    let alone = put("4.csv", &format!("id,recording,true,predicted\n{lines}"));
     assert!(done(&["compare-predictions", text(&alone), text(&alone)]).contains("over recordings"));
     assert!(done(&[&compare[..], &["--groups", "place"]].concat()).contains("12 values of place"));
 }
