@@ -174,7 +174,8 @@ def test_files_are_fused_and_compared(tmp_path: Path) -> None:
     truth, first, _ = predictions(one, seed=1)
     rows = one.read_text().splitlines()
     two.write_text("\n".join([rows[0], *reversed(rows[1:])]) + "\n")
-    same = corsmal_feat.compare_predictions(one, two, resamples=50)
+    with pytest.warns(UserWarning, match="rows of one group are not independent"):
+        same = corsmal_feat.compare_predictions(one, two, resamples=50)
     assert (same.only_first, same.only_second, same.p_value, same.difference) == (0, 0, 1.0, 0.0)
     # Ten windows of each of four recordings: the first errs in one of them, the second nowhere.
     for path, wrong in ((one, 10), (two, 0)):
