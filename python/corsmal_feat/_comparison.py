@@ -73,7 +73,7 @@ def compare_predictions(
     Warns
     -----
     UserWarning
-        Rows have groups, so that McNemar's test is too sure, or classes differ only in case.
+        Rows have groups, so McNemar's test overstates the evidence, or classes differ only in case.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 //! Whether two classifiers differ on the same rows.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::error::{ModelError, Result};
 use crate::labels::{Labels, alike};
 use crate::predictions::{Id, PredictionError, PredictionTable};
-use crate::scores::{Scores, Tally, check_spelling};
+use crate::scores::{Scores, Tally, check_spelling, units};
 
 /// McNemar's exact test.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -82,15 +82,7 @@ pub fn bootstrap<S: AsRef<str>>(
         let what = "rows and resamples";
         return Err(ModelError::Length { what, expected: 1, actual: 0 });
     }
-    let mut units: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
-    let units: Vec<Vec<usize>> = match groups {
-        None => (0..truth.len()).map(|row| vec![row]).collect(),
-        Some(groups) => {
-            let rows = groups.iter().enumerate();
-            rows.for_each(|(row, g)| units.entry(g.as_ref()).or_default().push(row));
-            units.into_values().collect()
-        }
-    };
+    let units = units(truth.len(), groups);
     let n_classes = truth.iter().chain(first).chain(second).max().map_or(0, |c| c + 1);
     let difference = |rows: &[usize]| {
         let f1 = |p: &[usize]| {
@@ -260,8 +252,8 @@ pub fn compare(
     let mut warnings = alike(&labels);
     if let Some((column, _)) = &grouped {
         warnings.push(format!(
-            "rows of one {column} are not independent: McNemar's test and the interval over rows take them as if \
-             they were, and are too sure"
+            "rows of one {column} are not independent: McNemar's test and the interval over rows assume that they \
+             are, so both overstate the evidence"
         ));
     }
     let (folds, others) = (first.column("fold"), second.column("fold"));

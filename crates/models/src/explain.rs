@@ -1,7 +1,7 @@
 //! What a classifier relies on, and whether more rows would help: both by training on the folds'
 //! training rows and scoring their test rows.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap};
 
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::Serialize;
@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::error::{ModelError, Result};
 use crate::mt19937::RandomState;
 use crate::pipeline::PipelineSpec;
+use crate::scores::units;
 use crate::splits::Fold;
 
 /// Features that belong together.
@@ -120,10 +121,11 @@ impl Setting<'_> {
 
     /// Rows of a class that come together: those of a group, or each by itself.
     fn units(&self, rows: impl Iterator<Item = usize>) -> Vec<Vec<usize>> {
-        let Some(groups) = self.groups else { return rows.map(|row| vec![row]).collect() };
-        let mut units: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
-        rows.for_each(|row| units.entry(&groups[row]).or_default().push(row));
-        units.into_values().collect()
+        let rows: Vec<usize> = rows.collect();
+        let groups = self.groups.map(|of| rows.iter().map(|row| &*of[*row]).collect::<Vec<&str>>());
+        let mut units = units(rows.len(), groups.as_deref());
+        units.iter_mut().flatten().for_each(|at| *at = rows[*at]);
+        units
     }
 
     /// Whether a fold tests rows of one class alone.
@@ -173,9 +175,10 @@ pub fn permutation_importance(
         let model = setting.train(&fold.train)?;
         let x = setting.x.select(Axis(0), &fold.test);
         let whole = setting.accuracy(&model.predict(x.view())?, &fold.test);
+        let others = of_all.as_deref().unwrap_or(&fold.test);
         for (family, losses) in families.iter().zip(&mut losses) {
             for _ in 0..repeats {
-                let mut from = of_all.clone().unwrap_or_else(|| fold.test.clone());
+                let mut from = others.to_vec();
                 random.shuffle(&mut from);
                 let permuted = permuted(&x, &family.columns, (setting.x, &from));
                 let accuracy = setting.accuracy(&model.predict(permuted.view())?, &fold.test);

@@ -90,7 +90,7 @@ fn parts_that_are_too_small_have_no_point() {
     let curve = learning_curve(&setting, &[0.05, 0.1, 0.5, 1.0], 3).unwrap();
     assert_eq!(curve.points.len(), 2);
     let (share, reason) = curve.refused.unwrap();
-    assert!(share == 0.1 && reason.contains('k'), "{reason}");
+    assert!(share == 0.1 && reason.contains("k must be at most"), "{reason}");
 }
 
 /// Parts of every recording tell nothing about more recordings.

@@ -18,7 +18,7 @@ Example:
   corsmal-feat cross-validate … --classifier rf --predictions rf.csv
   corsmal-feat compare-predictions svm.csv rf.csv
 
-McNemar's exact test looks at the recordings that only one of the two got right. The bootstrap
+McNemar's exact test looks at the rows that only one of the two got right. The bootstrap
 draws rows, whole groups if there are any, and whole folds if all rows have one, with replacement,
 and gives a 95 % interval of the difference of weighted F1. Rows of one group, such as windows of one
 recording, resemble each other, so the interval over groups is the honest one; that of fewer than ten

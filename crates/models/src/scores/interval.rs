@@ -16,7 +16,7 @@ pub struct Interval {
 }
 
 /// Rows that are drawn together: those of each group, or each row by itself.
-pub(super) fn units<S: AsRef<str>>(rows: usize, groups: Option<&[S]>) -> Vec<Vec<usize>> {
+pub(crate) fn units<S: AsRef<str>>(rows: usize, groups: Option<&[S]>) -> Vec<Vec<usize>> {
     let Some(groups) = groups else { return (0..rows).map(|row| vec![row]).collect() };
     let mut units: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
     groups.iter().enumerate().for_each(|(row, g)| units.entry(g.as_ref()).or_default().push(row));

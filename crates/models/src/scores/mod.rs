@@ -15,6 +15,7 @@ pub use confusion::{ClassScores, ConfusionMatrix};
 pub use curves::ClassCurves;
 pub(crate) use doubts::check_spelling;
 pub use interval::Interval;
+pub(crate) use interval::units;
 pub use numeric::{NumericScores, no_estimate};
 pub use reliability::{Reliability, ReliabilityBin};
 pub use report::{ClassReport, ScoreIntervals, ScoreReport, Scoring};

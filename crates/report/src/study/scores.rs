@@ -221,9 +221,9 @@ pub(super) fn importances(study: &Study) -> Result<Option<Section>> {
     let section = Section {
         text: vec![
             "The values of all features of a family are shuffled among the held-out rows (of each \
-             fold, or of all folds where one holds out a single class), so they no longer \
-             say anything about the class; the accuracy lost is what the models get \
-             only from that family. Families that repeat the information of another lose little, \
+             fold, or of all folds where one holds out a single class), so they no longer say \
+             anything about the class; the accuracy lost is what the models get only from that \
+             family. Families that repeat the information of another lose little, \
              even if the two together matter. Whiskers span folds and repetitions."
                 .into(),
         ],
@@ -272,7 +272,8 @@ pub(super) fn learning(study: &Study) -> Result<Option<Section>> {
     let section = Section {
         text: vec![
             "Models trained on growing parts of each fold's training rows (of whole groups, where \
-             rows have groups), scored on its held-out rows. If the curve still rises at its end, more recordings are likely to help."
+             rows have groups), scored on its held-out rows. If the curve still rises at its \
+             end, more recordings are likely to help."
                 .into(),
         ],
         tables: vec![table],
