@@ -256,6 +256,11 @@ pub fn compare(
              are, so both overstate the evidence"
         ));
     }
+    if let (Some(column), None) = (groups, &grouped) {
+        warnings.push(format!(
+            "no groups are drawn by {column:?}: it has a single value, or another one in each row, or it is the target"
+        ));
+    }
     let (folds, others) = (first.column("fold"), second.column("fold"));
     let folds_differ = match (&folds, &others) {
         (Some(folds), Some(others)) => {

@@ -174,6 +174,10 @@ fn windows_of_a_recording_are_drawn_together() {
     let alone = put("4.csv", &format!("id,recording,true,predicted\n{lines}"));
     assert!(done(&["compare-predictions", text(&alone), text(&alone)]).contains("over recordings"));
     assert!(done(&[&compare[..], &["--groups", "place"]].concat()).contains("12 values of place"));
+    // They were left out without a word.
+    let output = run(&[&compare[..], &["--groups", "true"]].concat());
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(told.contains("no groups are drawn by \"true\": it has a single value"), "{told}");
 }
 
 /// As pandas writes whole numbers beside empty cells: every row was wrong.
