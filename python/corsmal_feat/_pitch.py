@@ -15,7 +15,7 @@ from ._params import PitchParams
 from ._refusals import refuses
 from ._spectrum import spectrogram
 from ._warnings import warn
-from .errors import ParameterError
+from .errors import DataTypeError, ParameterError
 
 
 def _tracked(
@@ -195,6 +195,8 @@ def pitch_tuning(
     0.0
     """
     array = np.atleast_1d(as_array("frequencies", frequencies))
+    if array.dtype.kind not in "biuf":
+        raise DataTypeError(f"frequencies must be real numbers, not {array.dtype}")
     if array.dtype != np.float32:
         array = array.astype(np.float64)
     bins = size("bins_per_octave", bins_per_octave)

@@ -80,19 +80,23 @@ def labels_of(y: Any, rows: int, owner: str) -> tuple[npt.NDArray[Any], npt.NDAr
             raise ParameterError(
                 "Unknown label type: continuous. Classes are needed, not measured values."
             )
-    if labels.dtype.kind == "S" or (
-        labels.dtype == object and any(isinstance(label, bytes) for label in labels)
-    ):
-        raise ParameterError(f"{owner}: y holds bytes, expected strings: decode them first")
-    if labels.dtype == object:
-        missing = [row for row, label in enumerate(labels) if _is_missing(label)]
-        if missing:
-            raise ParameterError(f"{owner}: y contains missing values (row {missing[0]})")
+    check_named("y", labels, owner)
     try:
         classes, positions = np.unique(labels, return_inverse=True)
     except TypeError as error:
         raise ParameterError(f"{owner}: y mixes labels of different types: {error}") from error
     return classes, positions
+
+
+def check_named(name: str, values: npt.NDArray[Any], owner: str) -> None:
+    """Refuses bytes, whose text nobody knows, and missing values among names of classes or groups."""
+    is_object = values.dtype == object
+    if values.dtype.kind == "S" or (is_object and any(isinstance(v, bytes) for v in values)):
+        raise ParameterError(f"{owner}: {name} holds bytes, expected strings: decode them first")
+    if is_object:
+        missing = [row for row, value in enumerate(values) if _is_missing(value)]
+        if missing:
+            raise ParameterError(f"{owner}: {name} contains missing values (row {missing[0]})")
 
 
 def weights_of(sample_weight: Any, rows: int, owner: str) -> Matrix | None:
@@ -131,10 +135,10 @@ def _array(name: str, value: Any, owner: str) -> npt.NDArray[Any]:
         raise ParameterError(f"{owner}: the rows of {name} differ in length") from error
 
 
-def _is_missing(label: Any) -> bool:
+def _is_missing(value: Any) -> bool:
     # Not equal to itself: NaN, NaT; nor different: pandas' NA has no truth.
     try:
-        return label is None or bool(label != label)
+        return value is None or bool(value != value)
     except TypeError:
         return True
 

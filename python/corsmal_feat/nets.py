@@ -25,6 +25,7 @@ from ._network import Network, TrainingSteps, settings, single
 from ._refusals import refuses, seed_of
 from ._scoring import CrossValidation, validated
 from ._trained_network import TrainedNetwork, jobs_of, paths_of
+from ._validation import check_named
 from ._warnings import warn
 from .errors import ParameterError
 
@@ -328,6 +329,8 @@ def _rows(
                 f"{what} has shape {values.shape}, expected one value for each of the"
                 f" {len(paths)} recordings"
             )
+        if values is not None:
+            check_named(what, values, "nets")
     names = [str(label) for label in labels.tolist()]
     parts = [None] * len(paths) if of_group is None else [str(g) for g in of_group.tolist()]
     return list(zip(paths, names, parts, strict=True)), label_kind(labels)

@@ -222,7 +222,14 @@ pub fn read_capacities(path: &Path) -> Result<HashMap<Named, Option<f64>>> {
             return Err(table.fault(row, file, "a name that occurs once"));
         }
         let value = table.number(row, capacity)?;
-        by_key.insert(named, (value > -1.0).then_some(value));
+        if value < 0.0 && value != -1.0 {
+            return Err(table.fault(
+                row,
+                capacity,
+                "a capacity of at least 0, or -1 for no estimate",
+            ));
+        }
+        by_key.insert(named, (value != -1.0).then_some(value));
     }
     // An id without a part could be of any: beside others its estimate would be theirs, too.
     let ids = |part: bool| {
@@ -362,6 +369,22 @@ mod tests {
         let mixed = read(&[named, unnamed].concat()).unwrap_err();
         assert!(mixed.contains("ids without a part: id 0"), "{mixed}");
         assert_eq!(read(&format!("{named}id10_0001.png,200,\n")), Ok(2), "its container tells");
+    }
+
+    #[test]
+    fn capacities_below_zero_are_no_estimates_only_as_minus_one() {
+        let read = |value: &str| {
+            let file = tempfile::NamedTempFile::new().unwrap();
+            let text = format!("fileName,capacity[mL]\nid10_0001.png,{value}\n");
+            std::fs::write(file.path(), text).unwrap();
+            let found = read_capacities(file.path()).map_err(|e| e.to_string());
+            found.map(|found| found.into_values().next().unwrap())
+        };
+        assert_eq!((read("-1"), read("0"), read("2.5")), (Ok(None), Ok(Some(0.0)), Ok(Some(2.5))));
+        for value in ["-5", "-0.5"] {
+            let refused = read(value).unwrap_err();
+            assert!(refused.contains("at least 0, or -1 for no estimate"), "{refused}");
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The help of the command: what it can do, in groups.
 
-use clap::{Command, CommandFactory, FromArgMatches};
+use clap::{Arg, Command, CommandFactory, FromArgMatches};
 
 use crate::commands::Cli;
 
@@ -30,8 +30,20 @@ Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 inter
 
 /// Parses the arguments of the process; ends it for help, version and errors.
 pub fn parse() -> Cli {
-    let matches = grouped(Cli::command()).get_matches();
+    let matches = grouped(with_negative_values(Cli::command())).get_matches();
     Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+}
+
+/// The same command where -1 after an option is its value, so that what refuses it can say why.
+fn with_negative_values(command: Command) -> Command {
+    let takes_one = |argument: &Arg| {
+        argument.get_action().takes_values()
+            && !argument.is_positional()
+            && !argument.is_allow_hyphen_values_set()
+    };
+    command
+        .mut_args(|arg| if takes_one(&arg) { arg.allow_negative_numbers(true) } else { arg })
+        .mut_subcommands(with_negative_values)
 }
 
 /// The same command with its subcommands in groups.

@@ -7,7 +7,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
 use crate::error::{ModelError, Result};
-use crate::labels::{Labels, alike};
+use crate::labels::{Labels, alike, is_missing};
 use crate::predictions::{Id, PredictionError, PredictionTable};
 use crate::scores::{Scores, Tally, check_spelling, units};
 
@@ -103,14 +103,15 @@ pub fn bootstrap<S: AsRef<str>>(
         found.iter().filter(|d| holds(d)).count() as f64 / resamples as f64
     };
     let tail = part(|d| *d <= 0.0).min(part(|d| *d >= 0.0));
+    // No draw of n that agree is rarer than their agreeing by chance, and draws show no p value below
+    // that of one more draw on the other side.
+    let least = 0.5_f64.powi(units.len() as i32 - 1).max(2.0 / (resamples as f64 + 1.0));
     let all: Vec<usize> = (0..truth.len()).collect();
     Ok(Bootstrap {
         difference: difference(&all),
         low: at(0.025),
         high: at(0.975),
-        // No draw of n that agree is rarer than their agreeing by chance.
-        p_value: (units.len() >= FEWEST)
-            .then_some((2.0 * tail).max(0.5_f64.powi(units.len() as i32 - 1)).min(1.0)),
+        p_value: (units.len() >= FEWEST).then_some((2.0 * tail).max(least).min(1.0)),
     })
 }
 
@@ -165,7 +166,8 @@ pub struct Compared {
 ///
 /// # Errors
 /// Recordings that one file has and the other has not, other true classes, recordings that occur twice; numbers with
-/// fractions, which are no classes; a class that predictions spell as another number; no such groups.
+/// fractions, which are no classes; a class that predictions spell as another number; no such groups, or other ones
+/// in the second file.
 pub fn compare(
     first: &PredictionTable,
     second: &PredictionTable,
@@ -247,6 +249,9 @@ pub fn compare(
     let grouped = grouped.filter(|(name, of): &(&str, Vec<&str>)| {
         Some(*name) != target && (2..of.len()).contains(&Labels::of(of).0.len())
     });
+    if let Some((column, _)) = &grouped {
+        check_same_groups(first, second, column, &places)?;
+    }
     let by_group =
         grouped.as_ref().map(|(_, of)| bootstrap(truth, a, b, Some(of), resamples, seed));
     let mut warnings = alike(&labels);
@@ -292,6 +297,30 @@ pub fn compare(
     })
 }
 
+/// Refuses recordings that the files put in different groups.
+fn check_same_groups(
+    first: &PredictionTable,
+    second: &PredictionTable,
+    column: &str,
+    places: &HashMap<&Id, usize>,
+) -> std::result::Result<(), PredictionError> {
+    let Some((here, there)) = first.column(column).zip(second.column(column)) else {
+        return Ok(());
+    };
+    for (row, group) in first.rows.iter().zip(here) {
+        let other = there[places[&row.key]];
+        if group != other && !is_missing(group) && !is_missing(other) {
+            return Err(first.content(format!(
+                "{:?} has {column} {group:?} here and {other:?} in {}: correct one of the files, or name \
+                 other groups with --groups",
+                row.key.0,
+                second.path.display()
+            )));
+        }
+    }
+    Ok(())
+}
+
 fn same_length(truth: &[usize], first: &[usize], second: &[usize]) -> Result<()> {
     match [first, second].into_iter().find(|p| p.len() != truth.len()) {
         Some(p) => {
@@ -325,7 +354,11 @@ mod tests {
         let first: Vec<usize> =
             (0..200).map(|i| if i % 3 == 0 { 1 - i % 2 } else { i % 2 }).collect();
         let clear = bootstrap::<&str>(&truth, &first, &truth, None, 500, 1).unwrap();
-        assert!(clear.low > 0.2 && clear.high < 0.5 && clear.p_value < Some(1e-9), "{clear:?}");
+        assert!(clear.low > 0.2 && clear.high < 0.5, "{clear:?}");
+        // 500 draws that agree show no more.
+        assert_eq!(clear.p_value, Some(2.0 / 501.0));
+        let one = bootstrap::<&str>(&truth, &first, &truth, None, 1, 1).unwrap();
+        assert_eq!(one.p_value, Some(1.0));
         let none = bootstrap::<&str>(&truth, &first, &first, None, 500, 1).unwrap();
         assert_eq!(
             (none.difference, none.low, none.high, none.p_value),
@@ -334,6 +367,8 @@ mod tests {
         let groups: Vec<String> = (0..200).map(|i| (i / 20).to_string()).collect();
         let grouped = bootstrap(&truth, &first, &truth, Some(&groups), 500, 1).unwrap();
         assert!(grouped.difference == clear.difference && grouped.low > 0.2);
+        assert_eq!(grouped.p_value, Some(2.0 / 501.0));
+        let grouped = bootstrap(&truth, &first, &truth, Some(&groups), 5000, 1).unwrap();
         assert_eq!(grouped.p_value, Some(0.5_f64.powi(9)));
         // Nine groups that agree are no proof.
         let groups: Vec<String> = (0..200).map(|i| (i / 25 + i / 199).to_string()).collect();

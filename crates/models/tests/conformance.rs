@@ -6,7 +6,9 @@ mod common;
 
 use common::clouds;
 use corsmal_models::ModelError;
-use corsmal_models::classifiers::{CLASSIFIERS, ClassifierSpec, Predicted};
+use corsmal_models::classifiers::{
+    CLASSIFIERS, ClassifierSpec, KNearestParams, Predicted, SvmKernel, SvmParams, Weights,
+};
 use corsmal_models::params::key_values;
 use corsmal_models::pipeline::PipelineSpec;
 use corsmal_models::targets::Classes;
@@ -128,6 +130,28 @@ fn huge_values_are_an_error_or_a_finite_answer() {
                 }
             }
         }
+    }
+}
+
+/// Of lengths and products of rows no digits were left: kNN missed its own rows, the linear SVM was at chance.
+#[test]
+fn features_far_from_zero_are_told_apart() {
+    let (x, y) = clouds(200, 6, 3, 9);
+    // Multiples of 1/1024, to which numbers are added exactly.
+    let x = x.mapv(|v| (v * 1024.0).round() / 1024.0);
+    let linear = SvmParams { kernel: SvmKernel::Linear, ..Default::default() };
+    let nearest = KNearestParams { weights: Weights::Distance, ..Default::default() };
+    for spec in all().chain([linear.into(), nearest.into()]) {
+        // Trees compare in single precision.
+        let is_tree = ["tree", "forest", "extra"].iter().any(|of| spec.name().contains(of));
+        let [near, far] = [0.0, if is_tree { 8192.0 } else { 2f64.powi(30) }].map(|offset| {
+            let x = &x + offset;
+            spec.train(x.view(), &y, 3).unwrap().predict_proba(x.view()).unwrap()
+        });
+        let most = (near - far).iter().fold(0.0, |most: f64, d| most.max(d.abs()));
+        // A solver stops anywhere within its tolerance.
+        let allowed = if spec.name() == "svm" { 1e-3 } else { 1e-6 };
+        assert!(most < allowed, "{spec:?}: {most}");
     }
 }
 

@@ -123,7 +123,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 
 fn print(unit: &str, result: &Bootstrap, draws: u32) {
     let p = match result.p_value {
-        Some(p) => format!("p {}", probability(p, 1.0 / f64::from(draws))),
+        Some(p) => format!("p {}", probability(p, 2.0 / f64::from(draws))),
         None => "too few for a p value".into(),
     };
     println!(

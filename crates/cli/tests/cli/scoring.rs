@@ -27,6 +27,9 @@ fn predictions_are_scored() {
     close(&report["roc_auc"], (0.875 + 0.875 + 1.0) / 3.0);
     assert_eq!((&report["drawn"], &report["units"]), (&"group".into(), &2.into()));
     assert_eq!(report["unknown"], 0);
+    // The tip was to give -0.1 as a file.
+    let negative = refused(&["score", text(&file), "--reject", "-0.1"]);
+    assert!(negative.contains("0 to 1") && !negative.contains("unexpected"), "{negative}");
     let rejected = done(&["score", text(&file), "--json", "--reject", "0.65"]);
     let rejected: Value = serde_json::from_str(&rejected).unwrap();
     assert_eq!(rejected["unknown"], 3);
@@ -178,6 +181,42 @@ fn windows_of_a_recording_are_drawn_together() {
     let output = run(&[&compare[..], &["--groups", "true"]].concat());
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(told.contains("no groups are drawn by \"true\": it has a single value"), "{told}");
+}
+
+/// The first file's were taken: the order of the files decided what is significant.
+#[test]
+fn files_that_disagree_about_groups_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| written(folder.path(), name, text);
+    let table = |size: usize, missing: usize| {
+        let group =
+            |row: usize| if row < missing { String::new() } else { (row / size).to_string() };
+        let lines = (0..60).map(|row| format!("{row},{},x,x\n", group(row)));
+        format!("id,group,true,predicted\n{}", lines.collect::<String>())
+    };
+    let (one, two) = (put("1.csv", &table(4, 0)), put("2.csv", &table(5, 0)));
+    for files in [[&one, &two], [&two, &one]] {
+        let found = refused(&["compare-predictions", text(files[0]), text(files[1])]);
+        assert!(found.contains("has group \"") && found.contains("name other groups"), "{found}");
+    }
+    let some = put("3.csv", &table(4, 8));
+    assert!(done(&["compare-predictions", text(&one), text(&some)]).contains("15 values of group"));
+}
+
+/// 1e-36 from 2,000 draws, and the same from one.
+#[test]
+fn draws_that_agree_bound_the_p_value() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| written(folder.path(), name, text);
+    let table = |right: usize| {
+        let line = |row: usize| format!("{row},x,{}\n", if row < right { "x" } else { "y" });
+        format!("id,true,predicted\n{}", (0..120).map(line).collect::<String>())
+    };
+    let (one, two) = (put("1.csv", &table(20)), put("2.csv", &table(110)));
+    let compare = ["compare-predictions", text(&one), text(&two)];
+    let report: Value = serde_json::from_str(&done(&[&compare[..], &["--json"]].concat())).unwrap();
+    assert_eq!(report["bootstrap_rows"]["p_value"], 2.0 / 2001.0);
+    assert!(done(&compare).contains("; p < 0.001"));
 }
 
 /// As pandas writes whole numbers beside empty cells: every row was wrong.

@@ -52,9 +52,8 @@ impl LinfaNeighbours {
         query: ArrayView1<'_, f64>,
     ) -> Result<Vec<f64>> {
         let rows = &self.0;
-        let norm = query.dot(&query);
         let found = index.k_nearest(query, rows.k).map_err(failed)?;
-        let exact = |(_, row): &(_, usize)| (rows.distance(query, norm, *row), *row);
+        let exact = |(_, row): &(_, usize)| (rows.distance(query, *row), *row);
         let nearest = Nearest::exactly(found.iter().map(exact).collect());
         let mut votes = vec![0.0; rows.n_classes];
         rows.vote(nearest, &mut votes);

@@ -1,8 +1,8 @@
 //! k nearest neighbours by exhaustive search, in blocks.
 //!
 //! Euclidean and cosine distances (‖a‖² + ‖b‖² − 2a·b) are first estimated in single precision with an
-//! error bound ([`screen`]); only rows that may be near are computed exactly. Others come from plain
-//! loops. Equal distances are ordered as scikit-learn 1.9's brute-force search orders them (a binary
+//! error bound ([`screen`]); only rows that may be near are computed exactly, from their differences.
+//! Others come from plain loops. Equal distances are ordered as scikit-learn 1.9's brute-force search orders them (a binary
 //! max-heap filled in row order, [`nearest`]), equal votes go to the lowest class.
 
 mod linfa;
@@ -181,21 +181,20 @@ impl KNearest {
             Metric::Cosine => unit_rows(block),
             _ => block.as_standard_layout().into_owned(),
         };
-        let norms = squared_lengths(block.view());
         let Some(screen) = screen else {
-            let nearest = |(query, &norm): (ArrayView1<'_, f64>, &f64)| {
+            let nearest = |query: ArrayView1<'_, f64>| {
                 let mut heap = Nearest::new(k);
-                (0..self.x.nrows()).for_each(|row| heap.push(self.distance(query, norm, row), row));
+                (0..self.x.nrows()).for_each(|row| heap.push(self.distance(query, row), row));
                 heap
             };
-            return block.outer_iter().zip(&norms).map(nearest).collect();
+            return block.outer_iter().map(nearest).collect();
         };
         let found: Vec<Option<Nearest>> = self
             .candidates(block.view(), screen, k)
             .into_iter()
             .enumerate()
             .map(|(q, rows)| {
-                let exact = |row| (self.distance(block.row(q), norms[q], row), row);
+                let exact = |row| (self.distance(block.row(q), row), row);
                 Nearest::of(k, rows.into_iter().map(exact).collect())
             })
             .collect();
@@ -230,22 +229,22 @@ impl KNearest {
 
     /// The same with every training row offered in its order, for rows whose ties matter.
     fn in_order(&self, block: ArrayView2<'_, f64>, screen: &Screen, k: usize) -> Vec<Nearest> {
-        let norms = squared_lengths(block);
         let mut heaps = vec![Nearest::new(k); block.nrows()];
         screen.scan(block, |pair| {
             let (heap, query) = (&mut heaps[pair.query], block.row(pair.query));
-            heap.push(self.distance(query, norms[pair.query], pair.row), pair.row);
+            heap.push(self.distance(query, pair.row), pair.row);
             screen.score(heap.farthest(), query)
         });
         heaps
     }
 
-    /// Distance of a query row with squared length `norm` to training row `row`.
-    fn distance(&self, query: ArrayView1<'_, f64>, norm: f64, row: usize) -> f64 {
+    /// Distance of a query row to training row `row`; squared, if euclidean.
+    fn distance(&self, query: ArrayView1<'_, f64>, row: usize) -> f64 {
         let other = self.x.row(row);
         let (a, b) = (query.as_slice().unwrap_or(&[]), other.as_slice().unwrap_or(&[]));
         match self.metric {
-            Metric::Euclidean => norm + self.norms[row] - 2.0 * query.dot(&other),
+            // Of lengths and a product nothing would be left where a feature is far from zero.
+            Metric::Euclidean => lanes(a, b, |sum, d| sum + d * d, |x, y| x + y),
             Metric::Cosine => (1.0 - query.dot(&other)).clamp(0.0, 2.0),
             Metric::Manhattan => lanes(a, b, |sum, d| sum + d.abs(), |x, y| x + y),
             Metric::Chebyshev => lanes(a, b, |max, d| d.abs().max(max), f64::max),

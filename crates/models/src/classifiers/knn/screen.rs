@@ -14,12 +14,11 @@ const CHUNK: usize = 32;
 /// Sums of terms up to this magnitude cannot overflow in single precision.
 const SAFE: f64 = 1e37;
 
-/// Rows prepared for the product: one more column, lengths as they are after centring and before.
+/// Rows prepared for the product: centred, one more column, and their squared lengths.
 struct Rows {
     /// `[rows, features + 1]`
     x: Array2<f32>,
     norms: Vec<f64>,
-    plain_norms: Vec<f64>,
 }
 
 /// Training rows in single precision.
@@ -64,10 +63,9 @@ impl Screen {
             let rows = self.rows.x.slice(s![start..end, ..]);
             ndarray::linalg::general_mat_mul(1.0, &own.x, &rows.t(), 0.0, &mut scores);
             let longest = largest(&self.rows.norms[start..end]);
-            let plain_longest = largest(&self.rows.plain_norms[start..end]);
             for (query, limit) in limits.iter_mut().enumerate() {
                 let slack = self.slack(own.norms[query], longest)
-                    + self.exact_slack(own.plain_norms[query], plain_longest);
+                    + self.exact_slack(own.norms[query], longest);
                 let scores = scores.row(query);
                 let scores = scores.to_slice().expect("rows of a new array");
                 let mut cut = cut(*limit, slack);
@@ -97,7 +95,7 @@ impl Screen {
         if terms < SAFE { slack } else { f64::INFINITY }
     }
 
-    /// The same of the exact distance, in double precision and before centring.
+    /// The same of the exact distance and of centred lengths, in double precision.
     fn exact_slack(&self, query_norm: f64, row_norm: f64) -> f64 {
         4.0 * (self.rows.x.ncols() as f64 + 4.0) * f64::EPSILON * (query_norm + row_norm)
     }
@@ -143,7 +141,7 @@ fn prepared(
 ) -> Rows {
     let features = x.ncols();
     let mut low = Array2::<f32>::zeros((x.nrows(), features + 1));
-    let (norms, plain_norms) = low
+    let norms = low
         .axis_iter_mut(Axis(0))
         .into_par_iter()
         .zip(x.axis_iter(Axis(0)))
@@ -156,9 +154,9 @@ fn prepared(
                     .zip_mut_with(shifted, |l, &v| *l = (factor * v) as f32);
                 let norm = shifted.dot(shifted);
                 low[features] = last(norm);
-                (norm, row.dot(&row))
+                norm
             },
         )
-        .unzip();
-    Rows { x: low, norms, plain_norms }
+        .collect();
+    Rows { x: low, norms }
 }

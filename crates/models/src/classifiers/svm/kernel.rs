@@ -1,6 +1,6 @@
 //! Kernel values: all at once when they fit the memory allowed, else row by row through a cache.
 
-use ndarray::{Array2, ArrayView2, Axis};
+use ndarray::{Array1, Array2, ArrayView2, Axis};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,35 @@ pub(super) enum Function {
     Linear,
 }
 
+/// Rows less their mean: where a feature is far from zero, products of the rows themselves have no
+/// digits left for its differences.
+pub(super) struct Centred {
+    pub(super) x: Array2<f64>,
+    pub(super) centre: Array1<f64>,
+}
+
+impl Centred {
+    pub(super) fn at_mean(x: ArrayView2<'_, f64>) -> Self {
+        let centre = x.sum_axis(Axis(0)) / (x.nrows().max(1) as f64);
+        let x = &x.as_standard_layout() - &centre;
+        Self { x, centre }
+    }
+}
+
 impl Function {
+    /// What Σαy·K(row, ·) of rows as they are exceeds that of the rows centred by; `terms` are rows
+    /// and αy, whose sum is zero.
+    pub(super) fn shift<'a>(
+        self,
+        rows: &Centred,
+        terms: impl Iterator<Item = (usize, &'a f64)>,
+    ) -> f64 {
+        match self {
+            Self::Rbf { .. } => 0.0,
+            Self::Linear => terms.map(|(row, c)| c * rows.x.row(row).dot(&rows.centre)).sum(),
+        }
+    }
+
     fn finish(self, dot: f64, norm_a: f64, norm_b: f64) -> f64 {
         match self {
             Self::Linear => dot,
@@ -65,8 +93,8 @@ impl<'a> Gram<'a> {
         let norms = squared_lengths(x);
         let gram = Self { x, norms, function, full: None };
         // Kernel values are kept in single precision: they must be finite there.
-        let largest = gram.norms.iter().fold(0.0f64, |a, &b| a.max(b));
-        if !largest.is_finite() || (matches!(function, Function::Linear) && largest > 1e37) {
+        let most = if matches!(function, Function::Linear) { 1e37 } else { f64::MAX };
+        if !gram.norms.iter().all(|&norm| norm <= most) {
             return Err(ModelError::Numerical {
                 owner: "svm",
                 reason: "features are too large: standardise them first".into(),

@@ -1,7 +1,8 @@
 //! Support vector machine (C-SVC), one against one, labels by votes as LIBSVM and scikit-learn.
 //!
 //! Chang & Lin, "LIBSVM: a library for support vector machines" (2011). Probabilities: a sigmoid
-//! per pair fitted on five-fold held-out decision values, then pairwise coupling.
+//! per pair fitted on five-fold held-out decision values, then pairwise coupling. Kernel values are
+//! those of rows less their mean, which moves no decision and keeps digits.
 
 mod kernel;
 mod linfa;
@@ -15,7 +16,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use self::kernel::{Function, Gram};
+use self::kernel::{Centred, Function, Gram};
 use self::linfa::Solved;
 use self::probability::Sigmoid;
 use self::two_class::TwoClass;
@@ -149,9 +150,9 @@ impl Train for SvmParams {
     fn train(&self, x: ArrayView2<'_, f64>, y: &[usize], n_classes: usize) -> Result<Svm> {
         let weights = self.class_weight.per_class(y, n_classes)?;
         if self.solver == SvmSolver::Linfa {
-            let (function, x) = (self.function(x), x.as_standard_layout());
+            let (function, rows) = (self.function(x), Centred::at_mean(x));
             let costs: Vec<f64> = weights.iter().map(|weight| self.C * weight).collect();
-            let solved = linfa::train(x.view(), y, &costs, function, self.tol)?;
+            let solved = linfa::train(rows.x.view(), y, &costs, function, self.tol)?;
             let pair = |Solved { first, second, rows, coefficients, rho }| Pair {
                 first,
                 second,
@@ -160,9 +161,8 @@ impl Train for SvmParams {
                 rho,
                 sigmoid: None,
             };
-            let mut pairs: Vec<Pair> = solved.into_iter().map(pair).collect();
-            let support = compact(&mut pairs, x.view());
-            return Ok(Svm { n_classes, function, support, pairs });
+            let pairs = solved.into_iter().map(pair).collect();
+            return Ok(Svm::new(n_classes, function, pairs, x, &rows));
         }
         let costs: Vec<f64> = y.iter().map(|&class| self.C * weights[class]).collect();
         self.solve(x, y, n_classes, &costs)
@@ -199,9 +199,9 @@ impl SvmParams {
         costs: &[f64],
     ) -> Result<Svm> {
         let function = self.function(x);
-        let x = x.as_standard_layout();
+        let centred = Centred::at_mean(x);
         let budget = self.cache_mb.saturating_mul(1 << 20);
-        let gram = Gram::new(x.view(), function, budget)?;
+        let gram = Gram::new(centred.x.view(), function, budget)?;
         let mut members = vec![Vec::new(); n_classes];
         y.iter().enumerate().for_each(|(row, &c)| members[c].push(row as u32));
         let mut seeds = Xoshiro256PlusPlus::seed_from_u64(self.seed);
@@ -210,7 +210,7 @@ impl SvmParams {
             .map(|(a, b)| (a, b, seeds.next_u64()))
             .collect();
         let cache_bytes = budget / rayon::current_num_threads().min(jobs.len()).max(1);
-        let mut pairs: Vec<Pair> = jobs
+        let pairs: Vec<Pair> = jobs
             .into_par_iter()
             .map(|(first, second, seed)| {
                 let rows = [members[first].as_slice(), &members[second]].concat();
@@ -242,8 +242,7 @@ impl SvmParams {
                 Ok(Pair { first, second, rows, coefficients, rho: solution.rho, sigmoid })
             })
             .collect::<Result<_>>()?;
-        let support = compact(&mut pairs, x.view());
-        Ok(Svm { n_classes, function, support, pairs })
+        Ok(Svm::new(n_classes, function, pairs, x, &centred))
     }
 }
 
@@ -260,6 +259,22 @@ fn compact(pairs: &mut [Pair], x: ArrayView2<'_, f64>) -> Array2<f64> {
 }
 
 impl Svm {
+    /// From pairs of rows of `x` that were trained on these rows `centred`.
+    fn new(
+        n_classes: usize,
+        function: Function,
+        mut pairs: Vec<Pair>,
+        x: ArrayView2<'_, f64>,
+        centred: &Centred,
+    ) -> Self {
+        for pair in &mut pairs {
+            let terms = pair.rows.iter().map(|&row| row as usize).zip(&pair.coefficients);
+            pair.rho += function.shift(centred, terms);
+        }
+        let support = compact(&mut pairs, x);
+        Self { n_classes, function, support, pairs }
+    }
+
     /// Calls `finish` with every row's number and its decision values, one per pair.
     fn decide<T: Send>(
         &self,
@@ -267,19 +282,27 @@ impl Svm {
         finish: impl Fn(ArrayView1<'_, f64>) -> T + Sync,
     ) -> Vec<T> {
         const BLOCK: usize = 128;
-        let norms = kernel::squared_lengths(self.support.view());
+        let support = Centred::at_mean(self.support.view());
+        let norms = kernel::squared_lengths(support.x.view());
+        let rhos = self.pairs.iter().map(|pair| {
+            let terms = pair.rows.iter().map(|&row| row as usize).zip(&pair.coefficients);
+            pair.rho - self.function.shift(&support, terms)
+        });
+        let rhos: Vec<f64> = rhos.collect();
         let blocks: Vec<_> = x.axis_chunks_iter(Axis(0), BLOCK).collect();
         blocks
             .into_par_iter()
             .flat_map_iter(|block| {
-                let values = self.function.matrix(block, self.support.view(), &norms);
+                let block = &block - &support.centre;
+                let values = self.function.matrix(block.view(), support.x.view(), &norms);
                 let decide = |row: ArrayView1<'_, f64>| {
                     let decisions: Array1<f64> = self
                         .pairs
                         .iter()
-                        .map(|pair| {
+                        .zip(&rhos)
+                        .map(|(pair, rho)| {
                             let terms = pair.rows.iter().zip(&pair.coefficients);
-                            terms.map(|(&i, c)| row[i as usize] * c).sum::<f64>() - pair.rho
+                            terms.map(|(&i, c)| row[i as usize] * c).sum::<f64>() - rho
                         })
                         .collect();
                     finish(decisions.view())
