@@ -236,13 +236,13 @@ pub fn compare(
     };
     let (a, b) = (&all(a)[..], &all(b)[..]);
     let has = |table: &PredictionTable| groups.is_none_or(|name| table.column(name).is_some());
-    let of_first = if has(first) { first.groups(groups)? } else { None };
+    let of_first = if has(first) { first.groups(groups, target)? } else { None };
     let grouped = match of_first {
         None if has(second) => second
-            .groups(groups)?
+            .groups(groups, target)?
             .map(|(name, of)| (name, first.rows.iter().map(|row| of[places[&row.key]]).collect())),
         // Neither has it.
-        None => first.groups(groups)?,
+        None => first.groups(groups, target)?,
         found => found,
     };
     // Groups of one row are rows, the classes are no groups, and of one group nothing is drawn.

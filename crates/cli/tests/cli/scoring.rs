@@ -94,6 +94,11 @@ fn the_only_label_column_has_the_true_classes() {
     assert_eq!(accuracy(&one, &["--target", "true"]), 1.0);
     let group = put("group.csv", "id,site\na,1\nb,2\n");
     assert_eq!(accuracy(&group, &["--groups", "site"]), 1.0);
+    // The classes themselves were drawn as groups.
+    let of = put("of.csv", "id,container,predicted\na,1,1\nb,2,2\nc,1,1\nd,2,1\n");
+    let scored = done(&["score", text(&of), "--target", "container", "--json"]);
+    let scored: Value = serde_json::from_str(&scored).unwrap();
+    assert_eq!(scored["drawn"], "rows", "{scored}");
     let two = put("two.csv", "id,site,class\na,1,y\nb,2,x\n");
     let score = ["score", text(&file), "--labels", text(&two)];
     let message = refused(&score);

@@ -104,7 +104,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     pub fn score(&self, how: &Scoring) -> Result<ScoreReport, PredictionError> {
         let of_windows = self.check_windows()?;
         let truth = self.truth(how.target.as_deref())?;
-        let grouped = self.groups(how.groups.as_deref())?;
+        let grouped = self.groups(how.groups.as_deref(), how.target.as_deref())?;
         let (column, groups) =
             grouped.map_or((None, None), |(name, values)| (Some(name), Some(values)));
         // Windows of one recording are not independent of each other.
@@ -130,18 +130,21 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     }
 
     /// Groups of rows that are not independent of each other: the column of that name, or else the first that
-    /// is usual for them and has several values.
+    /// is usual for them and has several values, unless it is the `target`.
     ///
     /// # Errors
     /// There is no such column, or a row has no group.
     pub(crate) fn groups<'t>(
         &'t self,
         wanted: Option<&'t str>,
+        target: Option<&str>,
     ) -> Result<Option<(&'t str, Vec<&'t str>)>, PredictionError> {
         let several = |column: &str| {
             self.column(column).is_some_and(|values| Labels::of(&values).0.len() > 1)
         };
-        let usual = || GROUPS.into_iter().find(|column| several(column));
+        let usual = || {
+            GROUPS.into_iter().find(|&column| Some(column) != target && several(column))
+        };
         let Some(name) = wanted.or_else(usual) else { return Ok(None) };
         let values = self.column(name).ok_or_else(|| {
             let choices = corsmal_names::choices(name, self.columns.iter().map(String::as_str));
