@@ -1,4 +1,4 @@
-"""Class labels in model files, which hold texts."""
+"""Class labels, and those in model files, which hold texts."""
 
 from __future__ import annotations
 
@@ -9,10 +9,21 @@ import numpy.typing as npt
 
 from .errors import ParameterError
 
-__all__ = ["class_labels", "label_kind", "require_kept"]
+__all__ = ["check_named", "class_labels", "label_kind", "require_kept"]
 
 #: numpy's letters of the types that come back as they were
 _KEPT = "biufUT"
+
+
+def check_named(name: str, values: npt.NDArray[Any], owner: str) -> None:
+    """Refuses bytes, whose encoding nobody knows, and missing values among names."""
+    is_object = values.dtype == object
+    if values.dtype.kind == "S" or (is_object and any(isinstance(v, bytes) for v in values)):
+        raise ParameterError(f"{owner}: {name} holds bytes, expected strings: decode them first")
+    if is_object:
+        missing = [row for row, value in enumerate(values) if _is_missing(value)]
+        if missing:
+            raise ParameterError(f"{owner}: {name} contains missing values (row {missing[0]})")
 
 
 def label_kind(classes: npt.NDArray[Any]) -> str:
@@ -47,3 +58,11 @@ def class_labels(header: dict[str, Any]) -> npt.NDArray[Any]:
     if kind == "f":
         return names.astype(np.float64)
     return names.astype(str)
+
+
+def _is_missing(value: Any) -> bool:
+    # Not equal to itself: NaN, NaT; nor different: pandas' NA has no truth.
+    try:
+        return value is None or bool(value != value)
+    except TypeError:
+        return True

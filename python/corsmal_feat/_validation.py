@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import as_array, unmasked
+from ._class_labels import check_named
 from ._sklearn import DataConversionWarning
 from ._warnings import warn
 from .errors import DataTypeError, ParameterError
@@ -88,17 +89,6 @@ def labels_of(y: Any, rows: int, owner: str) -> tuple[npt.NDArray[Any], npt.NDAr
     return classes, positions
 
 
-def check_named(name: str, values: npt.NDArray[Any], owner: str) -> None:
-    """Refuses bytes, whose text nobody knows, and missing values among names of classes or groups."""
-    is_object = values.dtype == object
-    if values.dtype.kind == "S" or (is_object and any(isinstance(v, bytes) for v in values)):
-        raise ParameterError(f"{owner}: {name} holds bytes, expected strings: decode them first")
-    if is_object:
-        missing = [row for row, value in enumerate(values) if _is_missing(value)]
-        if missing:
-            raise ParameterError(f"{owner}: {name} contains missing values (row {missing[0]})")
-
-
 def weights_of(sample_weight: Any, rows: int, owner: str) -> Matrix | None:
     """Weight of each row [shape=(rows,)]; None if all weigh the same."""
     if sample_weight is None:
@@ -133,14 +123,6 @@ def _array(name: str, value: Any, owner: str) -> npt.NDArray[Any]:
         return as_array(name, value)
     except ValueError as error:
         raise ParameterError(f"{owner}: the rows of {name} differ in length") from error
-
-
-def _is_missing(value: Any) -> bool:
-    # Not equal to itself: NaN, NaT; nor different: pandas' NA has no truth.
-    try:
-        return value is None or bool(value != value)
-    except TypeError:
-        return True
 
 
 def _warn_column(labels: npt.NDArray[Any]) -> None:

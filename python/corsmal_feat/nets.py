@@ -19,13 +19,12 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import Singles, as_array
-from ._class_labels import label_kind
+from ._class_labels import check_named, label_kind
 from ._features import StrPath
 from ._network import Network, TrainingSteps, settings, single
 from ._refusals import refuses, seed_of
 from ._scoring import CrossValidation, validated
 from ._trained_network import TrainedNetwork, jobs_of, paths_of
-from ._validation import check_named
 from ._warnings import warn
 from .errors import ParameterError
 

@@ -13,18 +13,28 @@ pub(super) enum Function {
     Linear,
 }
 
-/// Rows less their mean: where a feature is far from zero, products of the rows themselves have no
-/// digits left for its differences.
+/// Rows less their mean, if they are far from zero compared with how much they differ: products of the
+/// rows themselves have no digits left for the differences then. Else the rows, less zero.
 pub(super) struct Centred {
     pub(super) x: Array2<f64>,
     pub(super) centre: Array1<f64>,
 }
 
+/// The squared mean in variances from which rows are far. Single precision, in which kernel values are
+/// kept, has three digits left for the differences, as many as a solver's tolerance.
+const FAR: f64 = 1e4;
+
 impl Centred {
-    pub(super) fn at_mean(x: ArrayView2<'_, f64>) -> Self {
-        let centre = x.sum_axis(Axis(0)) / (x.nrows().max(1) as f64);
-        let x = &x.as_standard_layout() - &centre;
-        Self { x, centre }
+    pub(super) fn new(x: ArrayView2<'_, f64>) -> Self {
+        let rows = x.nrows().max(1) as f64;
+        let centre = x.sum_axis(Axis(0)) / rows;
+        let centred = &x.as_standard_layout() - &centre;
+        let variance = centred.iter().map(|v| v * v).sum::<f64>() / rows;
+        if centre.dot(&centre) > FAR * variance {
+            Self { x: centred, centre }
+        } else {
+            Self { x: x.as_standard_layout().into_owned(), centre: Array1::zeros(x.ncols()) }
+        }
     }
 }
 

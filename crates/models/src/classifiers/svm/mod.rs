@@ -1,8 +1,8 @@
 //! Support vector machine (C-SVC), one against one, labels by votes as LIBSVM and scikit-learn.
 //!
 //! Chang & Lin, "LIBSVM: a library for support vector machines" (2011). Probabilities: a sigmoid
-//! per pair fitted on five-fold held-out decision values, then pairwise coupling. Kernel values are
-//! those of rows less their mean, which moves no decision and keeps digits.
+//! per pair fitted on five-fold held-out decision values, then pairwise coupling. Kernel values of rows
+//! far from zero are those of the rows less their mean, which moves no decision and keeps digits.
 
 mod kernel;
 mod linfa;
@@ -150,7 +150,7 @@ impl Train for SvmParams {
     fn train(&self, x: ArrayView2<'_, f64>, y: &[usize], n_classes: usize) -> Result<Svm> {
         let weights = self.class_weight.per_class(y, n_classes)?;
         if self.solver == SvmSolver::Linfa {
-            let (function, rows) = (self.function(x), Centred::at_mean(x));
+            let (function, rows) = (self.function(x), Centred::new(x));
             let costs: Vec<f64> = weights.iter().map(|weight| self.C * weight).collect();
             let solved = linfa::train(rows.x.view(), y, &costs, function, self.tol)?;
             let pair = |Solved { first, second, rows, coefficients, rho }| Pair {
@@ -199,7 +199,7 @@ impl SvmParams {
         costs: &[f64],
     ) -> Result<Svm> {
         let function = self.function(x);
-        let centred = Centred::at_mean(x);
+        let centred = Centred::new(x);
         let budget = self.cache_mb.saturating_mul(1 << 20);
         let gram = Gram::new(centred.x.view(), function, budget)?;
         let mut members = vec![Vec::new(); n_classes];
@@ -282,7 +282,7 @@ impl Svm {
         finish: impl Fn(ArrayView1<'_, f64>) -> T + Sync,
     ) -> Vec<T> {
         const BLOCK: usize = 128;
-        let support = Centred::at_mean(self.support.view());
+        let support = Centred::new(self.support.view());
         let norms = kernel::squared_lengths(support.x.view());
         let rhos = self.pairs.iter().map(|pair| {
             let terms = pair.rows.iter().map(|&row| row as usize).zip(&pair.coefficients);
