@@ -49,7 +49,8 @@ impl Pca {
             return Err(DspError::parameter("part of the variance", part, "0 to 1"));
         }
         let most = x.nrows().min(x.ncols());
-        let eigen = Eigen::of(x)?;
+        let mut eigen = Eigen::of(x)?;
+        eigen.resolve(most)?;
         let values = eigen.values.mapv(|v| v.max(0.0));
         let total = values.sum();
         let mut sum = 0.0;
@@ -86,6 +87,10 @@ impl Pca {
     }
 }
 
+/// Part of the largest eigenvalue of a Gram matrix below which its eigenvectors are not resolved: rounding
+/// moves them by about the precision over this.
+const RESOLVED: f64 = 1e-8;
+
 /// The centred data with the eigenvectors of the smaller of its two Gram matrices.
 struct Eigen {
     mean: Array1<f64>,
@@ -108,21 +113,38 @@ impl Eigen {
         let tall = rows > columns;
         let gram = if tall { gram(centred.t()) } else { gram(centred.view()) };
         require_finite("X, squared", &gram)?;
-        let (values, vectors) = gram
-            .eigh_into()
-            .map_err(|e| {
-                DspError::parameter(
-                    "X",
-                    format!("these ({e})"),
-                    "data whose eigenvectors can be computed",
-                )
-            })?
-            .sort_eig_desc();
+        let (values, vectors) = eigen(gram)?;
         Ok(Self { mean, centred, values, vectors })
     }
 
+    /// Computes again, of what the others leave of the data, eigenvectors among the first `wanted` that
+    /// are too small to be resolved beside them.
+    fn resolve(&mut self, wanted: usize) -> Result<()> {
+        let (rows, columns) = self.centred.dim();
+        let wide = if rows > columns { self.centred.t() } else { self.centred.view() };
+        let floor = self.values[0] * (rows.max(columns) as f64 * f64::EPSILON).powi(2);
+        let mut from = 0;
+        loop {
+            let least = self.values[from] * RESOLVED;
+            from +=
+                self.values.iter().skip(from).take_while(|&&value| value >= least).count().max(1);
+            if from >= wanted.min(self.values.len()) {
+                return Ok(());
+            }
+            let rest = self.vectors.slice(s![.., from..]).to_owned();
+            let (values, rotation) = eigen(gram(rest.t().dot(&wide).view()))?;
+            // Of nothing but rounding there is nothing to resolve.
+            if values[0] <= floor {
+                return Ok(());
+            }
+            self.vectors.slice_mut(s![.., from..]).assign(&rest.dot(&rotation));
+            self.values.slice_mut(s![from..]).assign(&values);
+        }
+    }
+
     /// The first directions as an orthonormal set.
-    fn directions(self, n_components: usize) -> Result<Pca> {
+    fn directions(mut self, n_components: usize) -> Result<Pca> {
+        self.resolve(n_components)?;
         let Self { mean, centred, vectors, .. } = self;
         let (rows, columns) = centred.dim();
         let tall = rows > columns;
@@ -152,6 +174,15 @@ impl Eigen {
         }
         Ok(Pca { mean, components, explained_variance })
     }
+}
+
+/// Eigenvalues, largest first, and the eigenvectors as columns.
+fn eigen(gram: Array2<f64>) -> Result<(Array1<f64>, Array2<f64>)> {
+    let refuse = |e| {
+        let allowed = "data whose eigenvectors can be computed";
+        DspError::parameter("X", format!("these ({e})"), allowed)
+    };
+    Ok(gram.eigh_into().map_err(refuse)?.sort_eig_desc())
 }
 
 /// `x xᵀ`. Only a half of it is computed, by all threads; its bits are those of the whole product, whose sums
@@ -230,6 +261,38 @@ mod tests {
             }
             let white = pca.project(x.view(), true).unwrap();
             assert!((white.column(0).mapv(|v| v * v).sum() / (rows - 1) as f64 - 1.0).abs() < 1e-9);
+        }
+    }
+
+    /// Deviations from 1 down to 1e-12 along rotated axes: beyond 1e-8 directions were those of rounding,
+    /// and variances up to a million times too large.
+    #[test]
+    fn small_directions_beside_large_ones_are_resolved() {
+        for (rows, columns) in [(60, 7), (7, 60)] {
+            let n = rows.min(columns);
+            // Orthonormal columns of two sides, from waves, and a spread for each.
+            let waves = |size: usize| {
+                Array2::from_shape_fn((size, n), |(i, k)| {
+                    let angle = std::f64::consts::PI * (k + 1) as f64 * (i as f64 + 0.5);
+                    (2.0 / size as f64).sqrt() * (angle / size as f64).cos()
+                })
+            };
+            let spread = |k: usize| 10f64.powi(-2 * k as i32);
+            let kept = n - 1;
+            let (left, right) = (waves(rows), waves(columns));
+            let mut x = Array2::<f64>::zeros((rows, columns));
+            for k in (0..kept).rev() {
+                let (u, v) = (left.column(k), right.column(k));
+                x += &(&u.insert_axis(Axis(1)) * &v.insert_axis(Axis(0)) * spread(k));
+            }
+            let pca = Pca::fit(x.view(), kept).unwrap();
+            for k in 0..kept {
+                let cosine = pca.components.row(k).dot(&right.column(k)).abs();
+                let deviation = (pca.explained_variance[k] * (rows - 1) as f64).sqrt();
+                let allowed = 1e-14 / spread(k);
+                assert!((1.0 - cosine) < allowed + 1e-12, "{rows}: {k}: {cosine}");
+                assert!((deviation / spread(k) - 1.0).abs() < allowed + 1e-7, "{k}: {deviation}");
+            }
         }
     }
 

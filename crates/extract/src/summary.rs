@@ -215,16 +215,18 @@ impl Accumulator {
                     continue;
                 }
                 let [a, b, c, d] = [0, 1, 2, 3].map(|k| self.sums[k][i] / n);
-                let variance = (b - a * a).max(0.0);
+                // Not `max`, which would make zero of NaN.
+                let variance = b - a * a;
+                let variance = if variance < 0.0 { 0.0 } else { variance };
                 let value = match stat {
                     Stat::Mean => self.shift[i] + a,
                     Stat::Std => variance.sqrt(),
                     Stat::Min => f64::from(self.min[i]),
                     Stat::Max => f64::from(self.max[i]),
-                    Stat::Skew if variance > 0.0 => {
+                    Stat::Skew if variance != 0.0 => {
                         (c - 3.0 * a * b + 2.0 * a * a * a) / variance.powf(1.5)
                     }
-                    Stat::Kurtosis if variance > 0.0 => {
+                    Stat::Kurtosis if variance != 0.0 => {
                         let fourth = d - 4.0 * a * c + 6.0 * a * a * b - 3.0 * a * a * a * a;
                         fourth / (variance * variance) - 3.0
                     }

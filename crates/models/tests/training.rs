@@ -65,6 +65,22 @@ fn a_weight_of_two_is_the_row_twice() {
     }
 }
 
+/// Sums of large weights overflowed, so all probabilities were NaN; squares of small ones were zero.
+#[test]
+fn the_unit_of_weights_does_not_matter_to_trees() {
+    let (x, y) = clouds(90, 5, 3, 5);
+    let weights: Vec<f64> = (0..90).map(|row| 0.1 + f64::from(row % 7)).collect();
+    for spec in [spec("tree", &["max_depth=4"]), spec("et", &["trees=7"]), spec("rf", &["trees=7"])]
+    {
+        let [plain, large, small] = [0, 1020, -1000].map(|exponent| {
+            let scaled: Vec<f64> = weights.iter().map(|w| w * 2f64.powi(exponent)).collect();
+            let model = spec.train_weighted(x.view(), &y, 3, Some(&scaled)).unwrap();
+            model.predict_proba(x.view()).unwrap()
+        });
+        assert!(plain == large && plain == small, "{}", spec.name());
+    }
+}
+
 #[test]
 fn weights_that_are_none_are_refused() {
     let (x, y) = clouds(6, 2, 2, 3);

@@ -11,7 +11,7 @@ use super::extractor::{Extractor, Span};
 use super::failed::Failed;
 use super::held::Held;
 use super::plans::Planned;
-use super::reading::{BLOCK, require_finite, unread};
+use super::reading::{BLOCK, check_samples, unread};
 use super::signal_chain::SignalChain;
 
 /// Values computed of a span before they are handed on (8 MiB).
@@ -224,7 +224,7 @@ impl Pass {
         *decoded += self.stretch.owned(self.position, frames);
         if self.checked {
             let samples = &room[..frames * self.channels];
-            require_finite(samples, self.position, self.channels, |frame| source.byte_of(frame))?;
+            check_samples(samples, self.position, self.channels, |frame| source.byte_of(frame))?;
         }
         extractor.commit(wanted, frames);
         self.advance(frames);
@@ -244,7 +244,7 @@ impl Pass {
         let frames = samples.len() / self.channels;
         *decoded += self.stretch.owned(self.position, frames);
         if self.checked {
-            require_finite(samples, self.position, self.channels, |frame| source.byte_of(frame))?;
+            check_samples(samples, self.position, self.channels, |frame| source.byte_of(frame))?;
         }
         self.front.push(samples, &mut self.signal);
         self.branches.iter_mut().for_each(|branch| branch.push(&self.signal));

@@ -150,26 +150,34 @@ pub(super) fn unread(
     }
 }
 
+/// Largest sample: the power of a window of 65,536 of them still has a place in single precision.
+const LARGEST: f32 = 1e12;
+
 /// Refuses samples that features cannot be computed of; `position` is that of the first frame, and
 /// `byte_of` knows where in the file a frame begins.
-pub fn require_finite(
+pub fn check_samples(
     samples: &[f32],
     position: u64,
     channels: usize,
     byte_of: impl Fn(u64) -> Option<u64>,
 ) -> Result<(), Failed> {
-    if samples.iter().fold(true, |all, x| all & x.is_finite()) {
+    // Not so for NaN either.
+    let is_usable = |x: &f32| x.abs() <= LARGEST;
+    if samples.iter().fold(true, |all, x| all & is_usable(x)) {
         return Ok(());
     }
-    let bad = samples.iter().filter(|x| !x.is_finite()).count();
-    let at = samples.iter().position(|x| !x.is_finite()).unwrap_or(0);
-    let frame = position + (at / channels) as u64;
+    let bad = samples.iter().filter(|x| !is_usable(x)).count();
+    let at = samples.iter().position(|x| !is_usable(x)).unwrap_or(0);
+    let (frame, channel) = (position + (at / channels) as u64, at % channels);
+    let (status, what) = match samples[at].is_finite() {
+        true => (Status::Unsupported, "beyond 1e12, where powers overflow (scale the samples),"),
+        false => (Status::NonFinite, "NaN or infinite"),
+    };
     let reason = format!(
-        "NaN or infinite from frame {frame} on (channel {}; {} of this block)",
-        at % channels,
+        "{what} from frame {frame} on (channel {channel}; {} of this block)",
         if bad == 1 { "1 sample".into() } else { format!("{bad} samples") }
     );
-    Err(Failed { byte_offset: byte_of(frame), ..Failed::new(Status::NonFinite, reason) })
+    Err(Failed { byte_offset: byte_of(frame), ..Failed::new(status, reason) })
 }
 
 /// Why a stretch has no samples.

@@ -124,7 +124,7 @@ impl Signal {
             let inside = |frame: u64| frame.clamp(begin, self.position) - begin;
             let (from, to) = (inside(self.crop.start), inside(self.crop.end));
             let block = &block[from as usize * self.channels..to as usize * self.channels];
-            reading::require_finite(block, begin + from, self.channels, |_| None)?;
+            reading::check_samples(block, begin + from, self.channels, |_| None)?;
             self.front.push(block, &mut self.held);
             self.extractor.push(&self.held);
             self.held.clear();
@@ -192,6 +192,11 @@ mod tests {
         };
         assert_eq!(status(&[]), Status::Empty);
         assert_eq!(status(&[0.0, f32::NAN]), Status::NonFinite);
+        assert_eq!(status(&[0.0, -1e18]), Status::Unsupported);
+        let mut signal = signals.start(22_050, 2).unwrap();
+        let refused = signal.push(&[0.0, 1e12, 0.0, 2e12]).unwrap_err().reason;
+        let expected = "beyond 1e12, where powers overflow (scale the samples), from frame 1 on (channel 1; 1 sample";
+        assert!(refused.starts_with(expected), "{refused}");
         assert!(signals.start(22_050, 0).is_err());
     }
 }

@@ -235,7 +235,8 @@ impl Trees {
         let weights = weights.filter(|all| all.iter().any(|weight| *weight != all[0]));
         let upto = weights.filter(|_| plan.bootstrap).map(added_up);
         let upto = upto.as_deref();
-        let row_weights = weights.filter(|_| !plan.bootstrap);
+        let row_weights = weights.filter(|_| !plan.bootstrap).map(scaled);
+        let row_weights = row_weights.as_deref();
         let (trees, shares): (Vec<Tree>, Vec<Vec<(u32, f64)>>) = seeds
             .par_iter()
             .map(|&seed| {
@@ -288,6 +289,13 @@ impl Trees {
         }
         fractions
     }
+}
+
+/// Weights divided by a power of two, which changes no bits of a tree but lets no sum or square of them overflow.
+fn scaled(weights: &[f64]) -> Vec<f64> {
+    let largest = weights.iter().copied().fold(0.0, f64::max);
+    let factor = 2f64.powi((largest.log2() as i32).clamp(-1022, 1023));
+    weights.iter().map(|weight| weight / factor).collect()
 }
 
 /// Sums of the weights up to each row, the largest weight being one.

@@ -79,7 +79,8 @@ impl NumericScores {
             mean_absolute_error: mean(&|(t, e)| (e - t).abs()),
             root_mean_squared_error: squared.sqrt(),
             mean_relative_error: relative.iter().sum::<f64>() / relative.len().max(1) as f64,
-            r2: match spread > 0.0 {
+            // The mean of equal numbers may be a bit beside them.
+            r2: match spread > 0.0 && pairs.iter().any(|(t, _)| *t != pairs[0].0) {
                 true => 1.0 - squared / spread,
                 false => f64::from(squared == 0.0),
             },
@@ -99,7 +100,7 @@ mod tests {
         assert_eq!(no_estimate(&[-20.5, 3.0]), None);
     }
 
-    /// As scikit-learn's `r2_score`.
+    /// As scikit-learn's `r2_score`, but for rounding.
     #[test]
     fn a_constant_truth_is_determined_by_right_estimates_alone() {
         let r2 = |estimates: [f64; 2]| {
@@ -107,5 +108,9 @@ mod tests {
             NumericScores::new::<&str>(&[1.5, 1.5], &estimates, None, (0, 0)).unwrap().r2
         };
         assert_eq!((r2([1.5, 1.5]), r2([1.5, 2.0])), (1.0, 0.0));
+        // Their mean is a bit beside them: it was -8.7e31, as scikit-learn's is.
+        let three =
+            NumericScores::new::<&str>(&[0.1; 3], &[Some(0.2), Some(0.1), Some(0.3)], None, (0, 0));
+        assert_eq!(three.unwrap().r2, 0.0);
     }
 }

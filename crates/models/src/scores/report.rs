@@ -142,9 +142,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         let several = |column: &str| {
             self.column(column).is_some_and(|values| Labels::of(&values).0.len() > 1)
         };
-        let usual = || {
-            GROUPS.into_iter().find(|&column| Some(column) != target && several(column))
-        };
+        let usual = || GROUPS.into_iter().find(|&column| Some(column) != target && several(column));
         let Some(name) = wanted.or_else(usual) else { return Ok(None) };
         let values = self.column(name).ok_or_else(|| {
             let choices = corsmal_names::choices(name, self.columns.iter().map(String::as_str));
