@@ -15,13 +15,18 @@ __all__ = ["check_named", "class_labels", "label_kind", "require_kept"]
 _KEPT = "biufUT"
 
 
-def check_named(name: str, values: npt.NDArray[Any], owner: str) -> None:
-    """Refuses bytes, whose encoding nobody knows, and missing values among names."""
-    is_object = values.dtype == object
-    if values.dtype.kind == "S" or (is_object and any(isinstance(v, bytes) for v in values)):
+def check_named(name: str, values: Any, array: npt.NDArray[Any], owner: str) -> None:
+    """Refuses bytes, whose encoding nobody knows, and missing values among names.
+
+    `values` are what `array` was made of: beside texts, numpy makes a text of NaN.
+    """
+    mixed = isinstance(values, (list, tuple))
+    each = values if mixed else array.reshape(-1)
+    kind = "O" if mixed else array.dtype.kind
+    if kind == "S" or (kind == "O" and any(isinstance(value, bytes) for value in each)):
         raise ParameterError(f"{owner}: {name} holds bytes, expected strings: decode them first")
-    if is_object:
-        missing = [row for row, value in enumerate(values) if _is_missing(value)]
+    if kind in "OfcmM":
+        missing = [row for row, value in enumerate(each) if _is_missing(value)]
         if missing:
             raise ParameterError(f"{owner}: {name} contains missing values (row {missing[0]})")
 

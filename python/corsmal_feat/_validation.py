@@ -81,7 +81,7 @@ def labels_of(y: Any, rows: int, owner: str) -> tuple[npt.NDArray[Any], npt.NDAr
             raise ParameterError(
                 "Unknown label type: continuous. Classes are needed, not measured values."
             )
-    check_named("y", labels, owner)
+    check_named("y", y, labels, owner)
     try:
         classes, positions = np.unique(labels, return_inverse=True)
     except TypeError as error:

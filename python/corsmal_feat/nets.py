@@ -322,14 +322,14 @@ def _rows(
     """Path, label and group of each recording, and the kind of the labels."""
     paths, labels = paths_of(recordings), as_array("y", y)
     of_group = None if groups is None else as_array("groups", groups)
-    for what, values in (("y", labels), ("groups", of_group)):
+    for what, given, values in (("y", y, labels), ("groups", groups, of_group)):
         if values is not None and values.shape != (len(paths),):
             raise ParameterError(
                 f"{what} has shape {values.shape}, expected one value for each of the"
                 f" {len(paths)} recordings"
             )
         if values is not None:
-            check_named(what, values, "nets")
+            check_named(what, given, values, "nets")
     names = [str(label) for label in labels.tolist()]
     parts = [None] * len(paths) if of_group is None else [str(g) for g in of_group.tolist()]
     return list(zip(paths, names, parts, strict=True)), label_kind(labels)

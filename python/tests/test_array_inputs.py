@@ -70,3 +70,10 @@ def test_rms_prefers_the_signal_as_librosa_does() -> None:
     y = np.random.default_rng(2).standard_normal(4096)
     both = cf.feature.rms(y=y, S=np.ones((1025, 9)))
     assert np.array_equal(both, cf.feature.rms(y=y))
+
+
+def test_frequencies_are_real_numbers() -> None:
+    """None was a tuning of 0, and imaginary parts were dropped."""
+    for frequencies in (None, [440 + 3j], ["440"]):
+        with pytest.raises(cf.CorsmalFeatError, match="frequencies must be real numbers, not"):
+            cf.pitch_tuning(frequencies)  # type: ignore[arg-type]

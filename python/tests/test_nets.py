@@ -249,13 +249,18 @@ def test_a_network_learns_from_recordings_and_hears_them(tmp_path: Path) -> None
     # They became classes "None" and "b'a'", and a group "None".
     for labels, message in (
         ([None, *y[1:]], r"y contains missing values \(row 0\)"),
+        ([*y[1:], np.nan], r"y contains missing values \(row 5\)"),
+        (["a", "b", np.nan] * 2, r"y contains missing values \(row 2\)"),
         ([b"a", b"b"] * 3, "y holds bytes"),
     ):
         for learn in (nets.train, nets.cross_validate):
             with pytest.raises(ParameterError, match=message):
                 learn("m1", paths, labels)
-    with pytest.raises(ParameterError, match=r"groups contains missing values \(row 0\)"):
-        nets.train("m1", paths, y, groups=[None, *groups[1:]])
+    for none in (None, np.nan):
+        with pytest.raises(ParameterError, match=r"groups contains missing values \(row 0\)"):
+            nets.train("m1", paths, y, groups=[none, *groups[1:]])
+    with pytest.raises(ParameterError, match=r"groups contains missing values \(row 1\)"):
+        nets.train("m1", paths, y, groups=np.array([1, np.nan] * 3))
     with pytest.raises(ParameterError, match="not recordings"):
         nets.train("m5-vggish-level", paths, y)
     with pytest.raises(ParameterError, match=r"features\.0\.weight"):

@@ -50,15 +50,11 @@ impl Pca {
         }
         let most = x.nrows().min(x.ncols());
         let mut eigen = Eigen::of(x)?;
-        eigen.resolve(most)?;
-        let values = eigen.values.mapv(|v| v.max(0.0));
-        let total = values.sum();
-        let mut sum = 0.0;
-        let enough = values.iter().position(|v| {
-            sum += v / total;
-            sum > part
-        });
-        let kept = enough.map_or(most, |at| (at + 1).min(most));
+        let (mut kept, mut total) = eigen.explaining(part);
+        if kept > 0 && eigen.values[kept - 1] < eigen.values[0] * RESOLVED {
+            eigen.resolve(most)?;
+            (kept, total) = eigen.explaining(part);
+        }
         Ok((eigen.directions(kept)?, total / (x.nrows() - 1) as f64))
     }
 
@@ -90,6 +86,8 @@ impl Pca {
 /// Part of the largest eigenvalue of a Gram matrix below which its eigenvectors are not resolved: rounding
 /// moves them by about the precision over this.
 const RESOLVED: f64 = 1e-8;
+/// The same where others are computed again: what rounding moves is in the data that they leave.
+const LEFT: f64 = 1e-4;
 
 /// The centred data with the eigenvectors of the smaller of its two Gram matrices.
 struct Eigen {
@@ -117,6 +115,18 @@ impl Eigen {
         Ok(Self { mean, centred, values, vectors })
     }
 
+    /// How many directions explain more than `part` of the sum of squares, and that sum.
+    fn explaining(&self, part: f64) -> (usize, f64) {
+        let values = self.values.mapv(|v| v.max(0.0));
+        let total = values.sum();
+        let mut sum = 0.0;
+        let enough = values.iter().position(|v| {
+            sum += v / total;
+            sum > part
+        });
+        (enough.map_or(values.len(), |at| at + 1), total)
+    }
+
     /// Computes again, of what the others leave of the data, eigenvectors among the first `wanted` that
     /// are too small to be resolved beside them.
     fn resolve(&mut self, wanted: usize) -> Result<()> {
@@ -124,8 +134,11 @@ impl Eigen {
         let wide = if rows > columns { self.centred.t() } else { self.centred.view() };
         let floor = self.values[0] * (rows.max(columns) as f64 * f64::EPSILON).powi(2);
         let mut from = 0;
+        if wanted == 0 || self.values[wanted - 1] >= self.values[0] * RESOLVED {
+            return Ok(());
+        }
         loop {
-            let least = self.values[from] * RESOLVED;
+            let least = self.values[from] * LEFT;
             from +=
                 self.values.iter().skip(from).take_while(|&&value| value >= least).count().max(1);
             if from >= wanted.min(self.values.len()) {
@@ -133,7 +146,7 @@ impl Eigen {
             }
             let rest = self.vectors.slice(s![.., from..]).to_owned();
             let (values, rotation) = eigen(gram(rest.t().dot(&wide).view()))?;
-            // Of nothing but rounding there is nothing to resolve.
+            // Rounding alone is left, of which there is nothing to resolve.
             if values[0] <= floor {
                 return Ok(());
             }
@@ -265,10 +278,10 @@ mod tests {
     }
 
     /// Deviations from 1 down to 1e-12 along rotated axes: beyond 1e-8 directions were those of rounding,
-    /// and variances up to a million times too large.
+    /// and variances thousands of times too large.
     #[test]
     fn small_directions_beside_large_ones_are_resolved() {
-        for (rows, columns) in [(60, 7), (7, 60)] {
+        for (rows, columns) in [(90, 26), (26, 90)] {
             let n = rows.min(columns);
             // Orthonormal columns of two sides, from waves, and a spread for each.
             let waves = |size: usize| {
@@ -277,7 +290,7 @@ mod tests {
                     (2.0 / size as f64).sqrt() * (angle / size as f64).cos()
                 })
             };
-            let spread = |k: usize| 10f64.powi(-2 * k as i32);
+            let spread = |k: usize| 10f64.powf(-0.5 * k as f64);
             let kept = n - 1;
             let (left, right) = (waves(rows), waves(columns));
             let mut x = Array2::<f64>::zeros((rows, columns));

@@ -123,7 +123,12 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 
 fn print(unit: &str, result: &Bootstrap, draws: u32) {
     let p = match result.p_value {
-        Some(p) => format!("p {}", probability(p, 2.0 / f64::from(draws))),
+        Some(p) => {
+            // The least that so many draws show, rounded up to what is printed.
+            let least = 2.0 / (f64::from(draws) + 1.0);
+            let shown = if p <= least { (least * 1e4).ceil() / 1e4 } else { least };
+            format!("p {}", probability(p, shown.min(1.0)))
+        }
         None => "too few for a p value".into(),
     };
     println!(

@@ -202,10 +202,24 @@ fn files_that_disagree_about_groups_are_refused() {
     let (one, two) = (put("1.csv", &table(4, 0)), put("2.csv", &table(5, 0)));
     for files in [[&one, &two], [&two, &one]] {
         let found = refused(&["compare-predictions", text(files[0]), text(files[1])]);
-        assert!(found.contains("has group \"") && found.contains("name other groups"), "{found}");
+        assert!(found.contains("is of group \"") && found.contains("name other groups"), "{found}");
     }
-    let some = put("3.csv", &table(4, 8));
-    assert!(done(&["compare-predictions", text(&one), text(&some)]).contains("15 values of group"));
+    // Each row its own group: nothing to draw, but no less a contradiction.
+    let alone = put("3.csv", &table(1, 0));
+    for files in [[&one, &alone], [&alone, &one]] {
+        refused(&["compare-predictions", text(files[0]), text(files[1])]);
+    }
+    // Missing cells, other names of the same groups, a column that only one file has.
+    let some = put("4.csv", &table(4, 8));
+    let renamed = put("5.csv", &table(4, 8).replace(",x,x", ".0,x,x").replace(",.0,", ",,"));
+    let places = table(10, 0).replace("group", "container");
+    let placed = put("6.csv", &places);
+    for (other, expected) in [(&some, 15), (&renamed, 15), (&placed, 15)] {
+        for files in [[&one, other], [other, &one]] {
+            let found = done(&["compare-predictions", text(files[0]), text(files[1])]);
+            assert!(found.contains(&format!("{expected} values of group")), "{found}");
+        }
+    }
 }
 
 /// 1e-36 from 2,000 draws, and the same from one.

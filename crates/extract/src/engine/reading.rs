@@ -150,7 +150,7 @@ pub(super) fn unread(
     }
 }
 
-/// Largest sample: the power of a window of 65,536 of them still has a place in single precision.
+/// Largest sample: the power of the longest window of them still has a place in single precision.
 const LARGEST: f32 = 1e12;
 
 /// Refuses samples that features cannot be computed of; `position` is that of the first frame, and
@@ -166,10 +166,11 @@ pub fn check_samples(
     if samples.iter().fold(true, |all, x| all & is_usable(x)) {
         return Ok(());
     }
-    let bad = samples.iter().filter(|x| !is_usable(x)).count();
     let at = samples.iter().position(|x| !is_usable(x)).unwrap_or(0);
     let (frame, channel) = (position + (at / channels) as u64, at % channels);
-    let (status, what) = match samples[at].is_finite() {
+    let is_finite = samples[at].is_finite();
+    let bad = samples.iter().filter(|x| !is_usable(x) && x.is_finite() == is_finite).count();
+    let (status, what) = match is_finite {
         true => (Status::Unsupported, "beyond 1e12, where powers overflow (scale the samples),"),
         false => (Status::NonFinite, "NaN or infinite"),
     };

@@ -227,7 +227,7 @@ impl Trees {
             });
         }
         let columns = FeatureColumns::new(x)?;
-        let per_class = plan.class_weight.per_class(y, n_classes)?;
+        let per_class = scaled(&plan.class_weight.per_class(y, n_classes)?);
         let labels: Vec<u32> = y.iter().map(|&c| c as u32).collect();
         let mut seeds = Xoshiro256PlusPlus::seed_from_u64(plan.seed);
         let seeds: Vec<u64> = (0..plan.n_trees).map(|_| seeds.next_u64()).collect();
@@ -291,7 +291,8 @@ impl Trees {
     }
 }
 
-/// Weights divided by a power of two, which changes no bits of a tree but lets no sum or square of them overflow.
+/// Weights divided by a power of two, the largest being near one: that changes no bits of a tree, but lets no sum
+/// or square overflow.
 fn scaled(weights: &[f64]) -> Vec<f64> {
     let largest = weights.iter().copied().fold(0.0, f64::max);
     let factor = 2f64.powi((largest.log2() as i32).clamp(-1022, 1023));

@@ -139,24 +139,38 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         wanted: Option<&'t str>,
         target: Option<&str>,
     ) -> Result<Option<(&'t str, Vec<&'t str>)>, PredictionError> {
-        let several = |column: &str| {
-            self.column(column).is_some_and(|values| Labels::of(&values).0.len() > 1)
-        };
-        let usual = || GROUPS.into_iter().find(|&column| Some(column) != target && several(column));
+        let usual = || self.usual_groups(target).map(|(_, column)| column);
         let Some(name) = wanted.or_else(usual) else { return Ok(None) };
         let values = self.column(name).ok_or_else(|| {
             let choices = corsmal_names::choices(name, self.columns.iter().map(String::as_str));
             self.content(format!("no column {name:?} of groups; {choices}"))
         })?;
-        if let Some(first) = values.iter().position(|value| is_missing(value)) {
-            let (rows, id) = (count(missing(&values), "row"), &self.rows[first].key);
-            return Err(self.content(format!(
-                "{rows} without {name} of {}, the first is {id}: give every row one, or name other \
-                 groups, such as id",
-                values.len()
-            )));
-        }
+        self.require_groups(name, &values)?;
         Ok(Some((name, values)))
+    }
+
+    /// The first usual column of groups that has several values and is not the target, and its rank
+    /// among them.
+    pub(crate) fn usual_groups(&self, target: Option<&str>) -> Option<(usize, &'static str)> {
+        let several = |column: &str| {
+            self.column(column).is_some_and(|values| Labels::of(&values).0.len() > 1)
+        };
+        let mut columns = GROUPS.into_iter().enumerate();
+        columns.find(|&(_, column)| Some(column) != target && several(column))
+    }
+
+    /// Refuses rows without a group.
+    pub(crate) fn require_groups(
+        &self,
+        name: &str,
+        values: &[&str],
+    ) -> Result<(), PredictionError> {
+        let Some(first) = values.iter().position(|value| is_missing(value)) else { return Ok(()) };
+        let (rows, id) = (count(missing(values), "row"), &self.rows[first].key);
+        Err(self.content(format!(
+            "{rows} without {name} of {}, the first is {id}: give every row one, or name other groups, such as id",
+            values.len()
+        )))
     }
 
     fn score_numbers(

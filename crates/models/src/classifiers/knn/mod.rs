@@ -63,7 +63,7 @@ pub struct KNearest {
     /// `[rows, features]`, shared with who trained it where that can be; rows of unit length for the cosine metric
     x: ArcArray2<f64>,
     y: Vec<usize>,
-    /// squared row lengths
+    /// squared row lengths, by which linfa's search refuses what it overflows on
     norms: Vec<f64>,
 }
 

@@ -68,7 +68,7 @@ impl Nearest {
     }
 }
 
-/// Rounding can give a little less than zero, overflow infinity or NaN: farthest of all.
+/// Overflow gives infinity or NaN: farthest of all. Rounding can take cosine distances a little below zero.
 fn bounded(distance: f64) -> f64 {
     if distance < f64::MAX { distance.max(0.0) } else { f64::MAX }
 }

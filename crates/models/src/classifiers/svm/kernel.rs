@@ -1,6 +1,6 @@
 //! Kernel values: all at once when they fit the memory allowed, else row by row through a cache.
 
-use ndarray::{Array1, Array2, ArrayView2, Axis};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, CowArray, Ix2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -15,27 +15,46 @@ pub(super) enum Function {
 
 /// Rows less their mean, if they are far from zero compared with how much they differ: products of the
 /// rows themselves have no digits left for the differences then. Else the rows, less zero.
-pub(super) struct Centred {
-    pub(super) x: Array2<f64>,
-    pub(super) centre: Array1<f64>,
+pub(super) struct Centred<'a> {
+    pub(super) x: CowArray<'a, f64, Ix2>,
+    /// `None`: zero
+    pub(super) centre: Option<Array1<f64>>,
 }
 
 /// The squared mean in variances from which rows are far. Single precision, in which kernel values are
 /// kept, has three digits left for the differences, as many as a solver's tolerance.
 const FAR: f64 = 1e4;
 
-impl Centred {
-    pub(super) fn new(x: ArrayView2<'_, f64>) -> Self {
+impl<'a> Centred<'a> {
+    pub(super) fn new(x: ArrayView2<'a, f64>) -> Self {
         let rows = x.nrows().max(1) as f64;
-        let centre = x.sum_axis(Axis(0)) / rows;
-        let centred = &x.as_standard_layout() - &centre;
-        let variance = centred.iter().map(|v| v * v).sum::<f64>() / rows;
+        // From the first row on, so that a constant has no remainder.
+        let first = x.outer_iter().next().map(|row| row.to_owned()).unwrap_or_default();
+        let mut beyond = Array1::<f64>::zeros(first.len());
+        x.outer_iter().for_each(|row| beyond += &(&row - &first));
+        let centre = first + beyond / rows;
+        let square = |row: ArrayView1<'_, f64>| -> f64 {
+            row.iter().zip(&centre).map(|(v, c)| (v - c) * (v - c)).sum()
+        };
+        let variance = x.outer_iter().map(square).sum::<f64>() / rows;
         if centre.dot(&centre) > FAR * variance {
-            Self { x: centred, centre }
+            Self { x: (&x.as_standard_layout() - &centre).into(), centre: Some(centre) }
         } else {
-            Self { x: x.as_standard_layout().into_owned(), centre: Array1::zeros(x.ncols()) }
+            Self { x: standard(x), centre: None }
         }
     }
+
+    /// Other rows less the same.
+    pub(super) fn shifted<'b>(&self, x: ArrayView2<'b, f64>) -> CowArray<'b, f64, Ix2> {
+        match &self.centre {
+            Some(centre) => (&x - centre).into(),
+            None => x.into(),
+        }
+    }
+}
+
+fn standard(x: ArrayView2<'_, f64>) -> CowArray<'_, f64, Ix2> {
+    if x.is_standard_layout() { x.into() } else { x.as_standard_layout().into_owned().into() }
 }
 
 impl Function {
@@ -43,12 +62,15 @@ impl Function {
     /// and αy, whose sum is zero.
     pub(super) fn shift<'a>(
         self,
-        rows: &Centred,
+        rows: &Centred<'_>,
         terms: impl Iterator<Item = (usize, &'a f64)>,
     ) -> f64 {
         match self {
             Self::Rbf { .. } => 0.0,
-            Self::Linear => terms.map(|(row, c)| c * rows.x.row(row).dot(&rows.centre)).sum(),
+            Self::Linear => rows
+                .centre
+                .as_ref()
+                .map_or(0.0, |centre| terms.map(|(row, c)| c * rows.x.row(row).dot(centre)).sum()),
         }
     }
 

@@ -265,7 +265,7 @@ impl Svm {
         function: Function,
         mut pairs: Vec<Pair>,
         x: ArrayView2<'_, f64>,
-        centred: &Centred,
+        centred: &Centred<'_>,
     ) -> Self {
         for pair in &mut pairs {
             let terms = pair.rows.iter().map(|&row| row as usize).zip(&pair.coefficients);
@@ -293,7 +293,7 @@ impl Svm {
         blocks
             .into_par_iter()
             .flat_map_iter(|block| {
-                let block = &block - &support.centre;
+                let block = support.shifted(block);
                 let values = self.function.matrix(block.view(), support.x.view(), &norms);
                 let decide = |row: ArrayView1<'_, f64>| {
                     let decisions: Array1<f64> = self

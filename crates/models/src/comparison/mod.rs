@@ -1,5 +1,7 @@
 //! Whether two classifiers differ on the same rows.
 
+mod groups;
+
 use std::collections::{HashMap, HashSet};
 
 use rand::{Rng, SeedableRng};
@@ -7,7 +9,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
 use crate::error::{ModelError, Result};
-use crate::labels::{Labels, alike, is_missing};
+use crate::labels::{Labels, alike};
 use crate::predictions::{Id, PredictionError, PredictionTable};
 use crate::scores::{Scores, Tally, check_spelling, units};
 
@@ -235,23 +237,11 @@ pub fn compare(
         p.into_iter().map(|class| class.unwrap_or(labels.len())).collect()
     };
     let (a, b) = (&all(a)[..], &all(b)[..]);
-    let has = |table: &PredictionTable| groups.is_none_or(|name| table.column(name).is_some());
-    let of_first = if has(first) { first.groups(groups, target)? } else { None };
-    let grouped = match of_first {
-        None if has(second) => second
-            .groups(groups, target)?
-            .map(|(name, of)| (name, first.rows.iter().map(|row| of[places[&row.key]]).collect())),
-        // Neither has it.
-        None => first.groups(groups, target)?,
-        found => found,
-    };
+    let grouped = groups::of_both(first, second, (target, groups), &places)?;
     // Groups of one row are rows, the classes are no groups, and of one group nothing is drawn.
     let grouped = grouped.filter(|(name, of): &(&str, Vec<&str>)| {
         Some(*name) != target && (2..of.len()).contains(&Labels::of(of).0.len())
     });
-    if let Some((column, _)) = &grouped {
-        check_same_groups(first, second, column, &places)?;
-    }
     let by_group =
         grouped.as_ref().map(|(_, of)| bootstrap(truth, a, b, Some(of), resamples, seed));
     let mut warnings = alike(&labels);
@@ -295,30 +285,6 @@ pub fn compare(
         labels,
         warnings,
     })
-}
-
-/// Refuses recordings that the files put in different groups.
-fn check_same_groups(
-    first: &PredictionTable,
-    second: &PredictionTable,
-    column: &str,
-    places: &HashMap<&Id, usize>,
-) -> std::result::Result<(), PredictionError> {
-    let Some((here, there)) = first.column(column).zip(second.column(column)) else {
-        return Ok(());
-    };
-    for (row, group) in first.rows.iter().zip(here) {
-        let other = there[places[&row.key]];
-        if group != other && !is_missing(group) && !is_missing(other) {
-            return Err(first.content(format!(
-                "{:?} has {column} {group:?} here and {other:?} in {}: correct one of the files, or name \
-                 other groups with --groups",
-                row.key.0,
-                second.path.display()
-            )));
-        }
-    }
-    Ok(())
 }
 
 fn same_length(truth: &[usize], first: &[usize], second: &[usize]) -> Result<()> {
