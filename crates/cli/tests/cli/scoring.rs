@@ -220,6 +220,11 @@ fn files_that_disagree_about_groups_are_refused() {
             assert!(found.contains(&format!("{expected} values of group")), "{found}");
         }
     }
+    // Without its own name, row 1 would join group b of the first file.
+    let named = put("7.csv", "id,group,true,predicted\n0,b,x,x\n1,,x,x\n2,c,x,x\n");
+    let other = put("8.csv", "id,group,true,predicted\n0,a,x,x\n1,b,x,x\n2,c,x,x\n");
+    let found = refused(&["compare-predictions", text(&named), text(&other)]);
+    assert!(found.contains("is the name of another one here"), "{found}");
 }
 
 /// 1e-36 from 2,000 draws, and the same from one.

@@ -49,6 +49,21 @@ pub(super) fn of_both<'t>(
             )));
         }
     }
+    // A group that only the second file names must not have the name of another group of the first.
+    let taken = |other: &str| {
+        !own.contains_key(other) && others.get(other).is_some_and(|theirs| *theirs != other)
+    };
+    let confused =
+        pairs.iter().find(|(_, group, other)| group.is_none() && other.is_some_and(taken));
+    if let Some(&(row, _, other)) = confused {
+        return Err(first.content(format!(
+            "{:?} has no {name} here, and its {:?} in {} is the name of another one here: give every row one, or \
+             name other groups with --groups",
+            first.rows[row].key.0,
+            other.unwrap_or_default(),
+            second.path.display()
+        )));
+    }
     let merged = pairs.iter().map(|(_, group, other)| {
         let of_other = other.map(|other| own.get(other).copied().unwrap_or(other));
         group.or(of_other).unwrap_or_default()
