@@ -36,13 +36,13 @@ pub fn parse() -> Cli {
 
 /// The same command where -1 after an option is its value, so that what refuses it can say why.
 fn with_negative_values(command: Command) -> Command {
-    let takes_one = |argument: &Arg| {
+    let takes_values = |argument: &Arg| {
         argument.get_action().takes_values()
             && !argument.is_positional()
             && !argument.is_allow_hyphen_values_set()
     };
     command
-        .mut_args(|arg| if takes_one(&arg) { arg.allow_negative_numbers(true) } else { arg })
+        .mut_args(|arg| if takes_values(&arg) { arg.allow_negative_numbers(true) } else { arg })
         .mut_subcommands(with_negative_values)
 }
 

@@ -1,9 +1,10 @@
 //! k nearest neighbours by exhaustive search, in blocks.
 //!
 //! Euclidean and cosine distances (‖a‖² + ‖b‖² − 2a·b) are first estimated in single precision with an
-//! error bound ([`screen`]); only rows that may be near are computed exactly, from their differences.
-//! Others come from plain loops. Equal distances are ordered as scikit-learn 1.9's brute-force search orders them (a binary
-//! max-heap filled in row order, [`nearest`]), equal votes go to the lowest class.
+//! error bound ([`screen`]); only rows that may be near are computed exactly, euclidean distances from
+//! differences. Others come from plain loops. Equal distances are ordered as scikit-learn 1.9's
+//! brute-force search orders them (a binary max-heap filled in row order, [`nearest`]), equal votes go to
+//! the lowest class.
 
 mod linfa;
 mod nearest;

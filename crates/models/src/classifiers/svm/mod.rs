@@ -133,6 +133,13 @@ struct Pair {
     sigmoid: Option<Sigmoid>,
 }
 
+impl Pair {
+    /// Rows and α·y of each.
+    fn terms(&self) -> impl Iterator<Item = (usize, &f64)> {
+        self.rows.iter().map(|&row| row as usize).zip(&self.coefficients)
+    }
+}
+
 /// A fitted support vector machine.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Svm {
@@ -268,8 +275,7 @@ impl Svm {
         centred: &Centred<'_>,
     ) -> Self {
         for pair in &mut pairs {
-            let terms = pair.rows.iter().map(|&row| row as usize).zip(&pair.coefficients);
-            pair.rho += function.shift(centred, terms);
+            pair.rho += function.shift(centred, pair.terms());
         }
         let support = compact(&mut pairs, x);
         Self { n_classes, function, support, pairs }
@@ -284,10 +290,8 @@ impl Svm {
         const BLOCK: usize = 128;
         let support = Centred::new(self.support.view());
         let norms = kernel::squared_lengths(support.x.view());
-        let rhos = self.pairs.iter().map(|pair| {
-            let terms = pair.rows.iter().map(|&row| row as usize).zip(&pair.coefficients);
-            pair.rho - self.function.shift(&support, terms)
-        });
+        let rhos =
+            self.pairs.iter().map(|pair| pair.rho - self.function.shift(&support, pair.terms()));
         let rhos: Vec<f64> = rhos.collect();
         let blocks: Vec<_> = x.axis_chunks_iter(Axis(0), BLOCK).collect();
         blocks
@@ -300,10 +304,7 @@ impl Svm {
                         .pairs
                         .iter()
                         .zip(&rhos)
-                        .map(|(pair, rho)| {
-                            let terms = pair.rows.iter().zip(&pair.coefficients);
-                            terms.map(|(&i, c)| row[i as usize] * c).sum::<f64>() - rho
-                        })
+                        .map(|(pair, rho)| pair.terms().map(|(i, c)| row[i] * c).sum::<f64>() - rho)
                         .collect();
                     finish(decisions.view())
                 };
