@@ -283,6 +283,13 @@ mod tests {
         assert_eq!(stats(&["std", "skew", "kurtosis"], &[1e6; 100]), [0.0; 3]);
     }
 
+    /// The deviation was 0, and so were skew and kurtosis.
+    #[test]
+    fn statistics_of_an_infinite_value_are_not_finite() {
+        let got = stats(&["std", "skew", "kurtosis"], &[1.0, f32::INFINITY, 2.0]);
+        assert!(got.iter().all(|value| value.is_nan()), "{got:?}");
+    }
+
     #[test]
     fn unknown_names_are_refused() {
         assert!("p101".parse::<Stat>().is_err());

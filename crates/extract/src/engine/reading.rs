@@ -161,7 +161,7 @@ pub fn check_samples(
     channels: usize,
     byte_of: impl Fn(u64) -> Option<u64>,
 ) -> Result<(), Failed> {
-    // Not so for NaN either.
+    // False for NaN.
     let is_usable = |x: &f32| x.abs() <= LARGEST;
     if samples.iter().fold(true, |all, x| all & is_usable(x)) {
         return Ok(());
@@ -170,12 +170,14 @@ pub fn check_samples(
     let (frame, channel) = (position + (at / channels) as u64, at % channels);
     let is_finite = samples[at].is_finite();
     let bad = samples.iter().filter(|x| !is_usable(x) && x.is_finite() == is_finite).count();
-    let (status, what) = match is_finite {
-        true => (Status::Unsupported, "beyond 1e12, where powers overflow (scale the samples),"),
-        false => (Status::NonFinite, "NaN or infinite"),
+    let (status, what, why) = match is_finite {
+        true => {
+            (Status::Unsupported, "beyond ±1e12", ": their powers overflow; scale the recording")
+        }
+        false => (Status::NonFinite, "NaN or infinite", ""),
     };
     let reason = format!(
-        "{what} from frame {frame} on (channel {channel}; {} of this block)",
+        "{what} from frame {frame} on (channel {channel}; {} of this block){why}",
         if bad == 1 { "1 sample".into() } else { format!("{bad} samples") }
     );
     Err(Failed { byte_offset: byte_of(frame), ..Failed::new(status, reason) })

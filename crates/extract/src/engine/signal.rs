@@ -195,7 +195,7 @@ mod tests {
         assert_eq!(status(&[0.0, -1e18]), Status::Unsupported);
         let mut signal = signals.start(22_050, 2).unwrap();
         let refused = signal.push(&[0.0, 1e12, 0.0, 2e12]).unwrap_err().reason;
-        let expected = "beyond 1e12, where powers overflow (scale the samples), from frame 1 on (channel 1; 1 sample";
+        let expected = "beyond ±1e12 from frame 1 on (channel 1; 1 sample of this block): their powers overflow";
         assert!(refused.starts_with(expected), "{refused}");
         assert!(signals.start(22_050, 0).is_err());
     }
