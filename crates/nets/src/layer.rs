@@ -3,6 +3,8 @@
 use std::collections::HashMap;
 use std::fmt::Debug;
 
+use rayon::prelude::*;
+
 use crate::batch::{Batch, Shape};
 use crate::error::Result;
 #[cfg(any(test, feature = "gpu"))]
@@ -141,12 +143,53 @@ impl<'a> Pass<'a> {
 
     /// Through the layers of each input; the sum of what comes after them.
     pub(crate) fn network(&mut self, inputs: &[Batch], chains: &[&[Box<dyn Layer>]]) -> Batch {
-        let mut out = self.chain(chains[0], inputs[0].clone());
+        let mut out = self.from_input(chains[0], inputs[0].clone());
         for (layers, input) in chains.iter().zip(inputs).skip(1) {
-            let more = self.chain(layers, input.clone());
+            let more = self.from_input(layers, input.clone());
             kernels::add(out.values.values_mut(), more.values.values());
         }
         out
+    }
+
+    /// Through the layers of an input. In evaluation, few images at a time pass those layers that keep them images:
+    /// what passes between layers stays in the cache. Later layers take all, so that their weights are read once.
+    fn from_input(&mut self, layers: &[Box<dyn Layer>], input: Batch) -> Batch {
+        let images = match self.training {
+            None => image_layers(layers, input.shape),
+            Some(_) => 0,
+        };
+        let (first, rest) = layers.split_at(images);
+        let together = (PASSING / passing_by(first, input.shape).max(1)).max(1);
+        if first.is_empty() || together >= input.items() {
+            return self.chain(layers, input);
+        }
+        let parameters = self.parameters;
+        let groups = input.values.values().par_chunks(together * input.shape.len());
+        let groups: Vec<Batch> = groups
+            .map(|images| {
+                let images = Batch::new(images.to_vec(), input.shape);
+                Pass::evaluate(parameters, &[]).chain(first, images)
+            })
+            .collect();
+        let shape = groups[0].shape;
+        let values: Vec<&[f32]> = groups.iter().map(|group| group.values.values()).collect();
+        self.chain(rest, Batch::new(values.concat(), shape))
+    }
+}
+
+/// Numbers of images that pass a layer together in evaluation, about.
+const PASSING: usize = 1 << 21;
+
+/// How many layers at the beginning make images of images.
+fn image_layers(layers: &[Box<dyn Layer>], input: Shape) -> usize {
+    let mut shape = input;
+    let next = |layer: &Box<dyn Layer>| {
+        shape = layer.output(shape).ok()?;
+        matches!(shape, Shape::Image { .. }).then_some(())
+    };
+    match input {
+        Shape::Image { .. } => layers.iter().map_while(next).count(),
+        _ => 0,
     }
 }
 

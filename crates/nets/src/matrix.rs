@@ -3,8 +3,8 @@
 //! Rows lie one after another. A clone shares the numbers; writing copies them only while they are
 //! shared. Products are burn's, on its CPU backend; those of evaluation are `packed`'s.
 
+use burn_backend::TensorData;
 use burn_backend::ops::FloatTensorOps;
-use burn_backend::{DType, TensorData};
 use burn_flex::{Flex, FlexTensor, Layout};
 use burn_std::Shape;
 
@@ -42,8 +42,8 @@ impl Matrix {
 
     /// Zeros.
     pub fn zeros(rows: usize, cols: usize) -> Self {
-        let tensor = FlexTensor::zeros(Shape::from([rows, cols]), DType::F32);
-        Self { tensor, rows, cols }
+        // Not by burn, which copies them once more to align bytes.
+        Self::new(rows, cols, vec![0.0; rows * cols])
     }
 
     /// Rows.

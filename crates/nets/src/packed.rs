@@ -12,6 +12,8 @@ use crate::matrix::Matrix;
 const VECTORS: usize = 2;
 /// Rows of a block: with two vectors each, their sums are twelve of sixteen registers.
 const ROWS: usize = 6;
+/// Rows of a block where there are thirty-two registers.
+const MORE_ROWS: usize = 2 * ROWS;
 /// Panels of a block of one row, so that as many sums run side by side.
 const PANELS: usize = 4;
 /// Numbers that are summed before their sum goes to the others, about: rounding grows with the length of a sum.
@@ -118,8 +120,16 @@ impl WithSimd for Product<'_> {
             return;
         }
         for panel in 0..panels {
-            let whole = rows / ROWS * ROWS;
-            (0..whole).step_by(ROWS).for_each(|row| self.block::<S, ROWS, 1>(simd, row, panel));
+            let (mut begun, whole) = (0, rows / ROWS * ROWS);
+            if S::REGISTER_COUNT >= 32 {
+                while begun + MORE_ROWS <= rows {
+                    self.block::<S, MORE_ROWS, 1>(simd, begun, panel);
+                    begun += MORE_ROWS;
+                }
+            }
+            for row in (begun..whole).step_by(ROWS) {
+                self.block::<S, ROWS, 1>(simd, row, panel);
+            }
             match rows - whole {
                 5 => self.block::<S, 5, 1>(simd, whole, panel),
                 4 => self.block::<S, 4, 1>(simd, whole, panel),

@@ -64,7 +64,7 @@ pub struct Parameters {
     /// `[first dimension, product of the others]`
     values: Vec<Matrix>,
     /// the same as products read them, until they change
-    packed: Vec<OnceLock<Arc<Packed>>>,
+    packed: Vec<OnceLock<Arc<[Packed]>>>,
     index: HashMap<String, usize>,
     /// the same on a GPU, until they change
     #[cfg(any(test, feature = "gpu"))]
@@ -116,13 +116,22 @@ impl Parameters {
 
     /// The weights of a layer, packed by `pack` at the first call after they changed.
     pub(crate) fn packed(&self, name: &str, pack: impl FnOnce(&Matrix) -> Packed) -> &Packed {
+        &self.packed_parts(name, |weight| vec![pack(weight)])[0]
+    }
+
+    /// The same for weights that become several matrices.
+    pub(crate) fn packed_parts(
+        &self,
+        name: &str,
+        pack: impl FnOnce(&Matrix) -> Vec<Packed>,
+    ) -> &[Packed] {
         let i = self.index[name];
         if let Some(packed) = self.packed[i].get() {
             return packed;
         }
         // Not inside of `get_or_init`: a thread of the pool that waits there could hold the work that
         // the packing thread waits for.
-        let packed = Arc::new(pack(&self.values[i]));
+        let packed = pack(&self.values[i]).into();
         self.packed[i].get_or_init(|| packed)
     }
 

@@ -1,6 +1,7 @@
 //! Convolution over images, as matrix products over the pixels that each output sees.
 
 mod geometry;
+mod winograd;
 
 #[cfg(any(test, feature = "gpu"))]
 use burn_tensor::ops::ConvOptions;
@@ -117,6 +118,10 @@ impl Conv2d {
         bias: Option<&[f32]>,
         pass: &Pass<'_>,
     ) -> Matrix {
+        if winograd::suits(g, self.outputs) {
+            let weights = pass.parameters.packed_parts(&self.key("weight"), winograd::pack);
+            return winograd::convolution(g, input.values.values(), weights, bias, self.outputs);
+        }
         let pack = |weight: &Matrix| Packed::new(&self.matrix(weight));
         let weight = pass.parameters.packed(&self.key("weight"), pack);
         let (row, lines) = (g.out_width * self.outputs, g.lines_together());
