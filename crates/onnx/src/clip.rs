@@ -48,7 +48,8 @@ pub fn window(frames: &[Vec<f32>]) -> Vec<f32> {
 /// For the middle pixels of the new size: two old pixels and the weight of the second.
 fn taps(from: usize, to: usize) -> Vec<(usize, usize, f32)> {
     let scale = from as f64 / to as f64;
-    let first = (to - SIDE) / 2;
+    // Half columns are rounded as in torchvision and in M5's code: 29.5 to 30.
+    let first = (to - SIDE).div_ceil(2);
     let tap = |i: usize| {
         let at = ((i as f64 + 0.5) * scale - 0.5).max(0.0);
         let low = (at as usize).min(from - 1);
@@ -68,9 +69,9 @@ mod tests {
         let image = Rgb { width: 171, height: 128, data: (0..171 * 128).flat_map(pixel).collect() };
         let seen = frame(&image);
         assert_eq!(seen.len(), 3 * 112 * 112);
-        // Columns 29 to 140, rows 8 to 119, as torchvision cuts out the middle.
+        // Columns 30 to 141, rows 8 to 119, as torchvision cuts out the middle.
         let red = |value: f32| (value / 255.0 - 0.43216) / 0.22803;
-        assert!((seen[0] - red(29.0)).abs() < 1e-6 && (seen[111] - red(140.0)).abs() < 1e-6);
+        assert!((seen[0] - red(30.0)).abs() < 1e-6 && (seen[111] - red(141.0)).abs() < 1e-6);
         let green = |value: f32| (value / 255.0 - 0.394_666) / 0.221_45;
         let at = 112 * 112;
         assert!((seen[at] - green(8.0)).abs() < 1e-6);
@@ -79,7 +80,7 @@ mod tests {
         // Twice as large: between two pixels.
         let pixel = |i: usize| [(i % 342 / 2) as u8, 0, 0];
         let image = Rgb { width: 342, height: 256, data: (0..342 * 256).flat_map(pixel).collect() };
-        assert!((frame(&image)[5] - red(34.0)).abs() < 1e-6);
+        assert!((frame(&image)[5] - red(35.0)).abs() < 1e-6);
     }
 
     #[test]

@@ -66,6 +66,9 @@ impl Instances<'_> {
             });
             if Category::of_label(name).is_some() {
                 let data = &self.masks[i * pixels..(i + 1) * pixels];
+                if let Some(value) = data.iter().find(|value| !value.is_finite()) {
+                    return Err(format!("detection {i}: a number of its mask is {value}"));
+                }
                 let data = data.iter().map(|&value| value >= INSIDE).collect();
                 let mask = Mask { width: size.0, height: size.1, data };
                 row["mask"] = json!({ "size": [size.1, size.0], "counts": compress(&mask) });
@@ -84,6 +87,21 @@ mod tests {
     fn colours_lie_apart() {
         let image = Rgb { width: 2, height: 1, data: vec![0, 51, 102, 255, 204, 153] };
         assert_eq!(input(&image), [0.0, 1.0, 0.2, 0.8, 0.4, 0.6]);
+    }
+
+    #[test]
+    fn masks_of_no_numbers_are_refused() {
+        let found = |mask: &[f32]| {
+            let boxes = [[0.0, 0.0, 1.0, 1.0]];
+            Instances { boxes: &boxes, labels: &[47], scores: &[0.9], masks: mask }
+                .rows((0, 1), (2, 1), 0.5)
+                .map(|rows| rows.len())
+        };
+        assert_eq!(found(&[0.2, 0.7]), Ok(1));
+        for value in [f32::NAN, f32::INFINITY] {
+            let said = found(&[0.2, value]).unwrap_err();
+            assert!(said.contains("a number of its mask"), "{said}");
+        }
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Models run by ONNX Runtime.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use corsmal_vision::Rgb;
@@ -34,9 +36,36 @@ impl Runtime {
         let builder = Session::builder(&self.environment).map_err(|e| refuse(e.to_string()))?;
         let mut builder =
             builder.with_intra_threads(self.threads).map_err(|e| refuse(e.to_string()))?;
-        let session = builder.commit_from_file(path).map_err(|e| refuse(e.to_string()))?;
+        // From memory: the runtime would read weights in other files, which the identity of this one does not cover.
+        let bytes = content(path).map_err(refuse)?;
+        let session =
+            builder.commit_from_memory(&bytes).map_err(|e| match names_files(&bytes) {
+                true => refuse(format!(
+                    "its weights lie in other files: export it with external_data=False ({e})"
+                )),
+                false => refuse(e.to_string()),
+            })?;
         Ok(Model { path: path.into(), session })
     }
+}
+
+/// Most bytes of a model: protocol buffers cannot be larger.
+const MOST: u64 = (1 << 31) - 1;
+
+fn content(path: &Path) -> std::result::Result<Vec<u8>, String> {
+    let about = std::fs::metadata(path).map_err(|e| e.to_string())?;
+    if !about.is_file() || about.len() > MOST {
+        return Err("expected a file of at most 2 GiB".into());
+    }
+    let (mut bytes, file) = (Vec::new(), File::open(path).map_err(|e| e.to_string())?);
+    file.take(MOST).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
+    Ok(bytes)
+}
+
+/// Whether a model seems to name files with its weights: the entry `location` of a tensor's `external_data`.
+fn names_files(model: &[u8]) -> bool {
+    const LOCATION: &[u8] = b"\x0a\x08location";
+    model.windows(LOCATION.len()).any(|bytes| bytes == LOCATION)
 }
 
 struct Model {
@@ -186,5 +215,17 @@ impl ClipEmbedder {
             Some(value) => Err(fault(format!("an output is {value}"))),
             None => Ok(values.to_vec()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn models_with_weights_elsewhere_are_told() {
+        assert!(names_files(b"..\x0a\x08location\x12\x01w.."));
+        assert!(!names_files(b"a node called location") && !names_files(b""));
+        assert!(content(Path::new(".")).unwrap_err().contains("expected a file"));
     }
 }

@@ -51,6 +51,14 @@ fn frames_are_counted_without_decoding() {
     }
 }
 
+/// Frames that are predicted from later ones are stored after them.
+#[test]
+fn another_order_of_frames_is_told() {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    let of = |name: &str| Video::open(&here.join(name)).unwrap().is_reordered();
+    assert_eq!(["reordered.mp4", "shades.mp4", "grey.mp4"].map(of), [true, false, false]);
+}
+
 #[test]
 fn damaged_files_are_refused() {
     let whole = muxed::mp4(b"avc1", &[], &[vec![1; 5], vec![2; 9], vec![3; 4], vec![4; 4]]);
@@ -223,6 +231,32 @@ mod decoded {
                 .all(|(got, want)| (f64::from(*got) - want.clamp(0.0, 255.0)).abs() <= 4.0);
             assert!(near, "frame {k}: {got:?} not {want:?}");
         }
+    }
+
+    /// Six frames of brightness alone, made as those above with `-pix_fmt gray`: the decoder leaves their colours unset.
+    #[test]
+    fn frames_without_colours_are_grey() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/grey.mp4");
+        let found = pictures(&path).unwrap();
+        assert_eq!(found.len(), 6);
+        for (k, (_, picture)) in found.iter().enumerate() {
+            let want = 1.164_383 * (60.0 + 10.0 * k as f64 - 16.0);
+            for pixel in picture.data.as_chunks::<3>().0 {
+                let near = (f64::from(pixel[0]) - want).abs() <= 4.0;
+                assert!(
+                    near && pixel.iter().all(|value| *value == pixel[0]),
+                    "frame {k}: {pixel:?}"
+                );
+            }
+        }
+    }
+
+    /// The same with `-pix_fmt yuv444p`.
+    #[test]
+    fn what_the_decoder_is_not_made_for_is_said() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/full.mp4");
+        let said = pictures(&path).unwrap_err();
+        assert!(said.contains("colours of 4:4:4") && said.contains("extract the frames"), "{said}");
     }
 
     /// Brightness and differences of colour of a frame.

@@ -141,6 +141,26 @@ impl Views {
     }
 }
 
+/// Recordings whose pictures come from videos with B-frames, in words: what the decoder makes of these may be wrong.
+pub fn doubtful_colours(recordings: &[Recording]) -> Option<String> {
+    let doubtful = |recording: &&Recording| {
+        let views = Views::of(recording, None);
+        let mut sources = VIEWS.filter_map(|view| match views.colours(view).ok()?.0 {
+            Source::Images(_) => None,
+            Source::Video(video) => Some(video.is_reordered()),
+        });
+        sources.any(|reordered| reordered)
+    };
+    let mut doubtful = recordings.iter().filter(doubtful);
+    let first = doubtful.next()?.path.display();
+    Some(format!(
+        "{} of {} recordings, first {first}, have videos with frames that are predicted from later ones (B-frames): \
+         OpenH264 decodes some of them visibly wrong; extract the frames as PNG with ffmpeg (docs/vision.md)",
+        1 + doubtful.count(),
+        recordings.len()
+    ))
+}
+
 /// Refuses recordings none of which has a colour frame, and those in videos where this program decodes none.
 ///
 /// # Errors

@@ -20,7 +20,7 @@ use crate::dataset::{Container, DataSet, Recording, Subset};
 use crate::error::{CcmError, Result};
 use crate::submission::RowKey;
 
-pub use colours::{Colours, Reader, require_colours};
+pub use colours::{Colours, Reader, doubtful_colours, require_colours};
 pub use combine::combine_files;
 pub use methods::{Estimate, M5_FROM_END, RegionNetwork, Sizes};
 use model::Sample;

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
-use corsmal_ccm::capacity::{Problem, Views, require_colours};
+use corsmal_ccm::capacity::{Problem, Views, doubtful_colours, require_colours};
 use corsmal_ccm::dataset::{Container, DataSet, SequenceName};
 use corsmal_files::format::require_npz;
 use corsmal_nets::dataset::Dataset;
@@ -28,6 +28,9 @@ pub fn run(args: &Args, data: &Path, model: &Path, library: &Path) -> Result<Exi
         .map_err(|e| Failure::new(format!("{}: {e}", model.display())))?;
     let set = DataSet::open(data)?;
     require_colours(&set.recordings)?;
+    if let Some(doubt) = doubtful_colours(&set.recordings) {
+        eprintln!("warning: {doubt}");
+    }
     let runtime = Runtime::load(library, args.jobs.count())?;
     let mut embedder = ClipEmbedder::open(&runtime, model)?;
     let (mut ids, mut view_of, mut names) = (Vec::new(), Vec::new(), Vec::new());

@@ -53,7 +53,10 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         }
         written => written?,
     };
-    let Written { crops, recordings, without, failed, synthetic } = written;
+    let Written { crops, recordings, without, failed, synthetic, doubt } = written;
+    if let Some(doubt) = doubt {
+        eprintln!("warning: {doubt}");
+    }
     let failures = failed.len();
     told.tell(
         || {

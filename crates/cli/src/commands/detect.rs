@@ -101,6 +101,9 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 
     let set = DataSet::open(&args.data)?;
     corsmal_ccm::capacity::require_colours(&set.recordings)?;
+    if let Some(doubt) = corsmal_ccm::capacity::doubtful_colours(&set.recordings) {
+        eprintln!("warning: {doubt}");
+    }
     let runtime = Runtime::load(&args.library, args.jobs.count())?;
     let mut detector = Detector::open(&runtime, &args.model)?;
     let tables: Vec<PathBuf> = set

@@ -91,10 +91,13 @@ impl Camera {
                 (product - if i == j { 1.0 } else { 0.0 }).abs() <= TURNED
             })
         });
-        if !unit || matrix::determinant(r) <= 0.0 {
+        if !unit {
             return Err(
                 "'rvec' is not a rotation: expected rows of length 1 at right angles".into()
             );
+        }
+        if matrix::determinant(r) <= 0.0 {
+            return Err("'rvec' is a mirrored rotation: expected a determinant of 1, not -1".into());
         }
         if !self.translation.iter().all(|t| t.abs() <= MAX_DISTANCE) {
             return Err(format!(

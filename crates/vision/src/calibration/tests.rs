@@ -57,7 +57,7 @@ fn what_is_missing_or_wrong_is_named() {
             &CAMERA.replace("[0,0,0]", "[[1e-39,0,0],[0,1,0],[0,0,1]]"),
             "camera 'rgb': 'rvec' is not a rotation",
         ),
-        (&CAMERA.replace("[0,0,0]", "[[1,0,0],[0,1,0],[0,0,-1]]"), "'rvec' is not a rotation"),
+        (&CAMERA.replace("[0,0,0]", "[[1,0,0],[0,1,0],[0,0,-1]]"), "'rvec' is a mirrored rotation"),
         (&CAMERA.replace("[0,0,0]", "[1e200,0,0]"), "'rvec' is not a rotation"),
         // Of a focal length of 600 px, and of another place.
         (&projected(600.0, 2.0, 1.0), "'projMatrix' is not 'intrinsic' times 'rvec' and 'tvec'"),

@@ -14,7 +14,17 @@ const POINT: i32 = 16;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Colours {
     file: Declared,
-    stream: Option<Declared>,
+    stream: Option<Stream>,
+}
+
+/// What a sequence parameter set says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Stream {
+    declared: Declared,
+    /// Without colours: brightness alone.
+    grey: bool,
+    /// What the decoder is not made for.
+    foreign: Option<&'static str>,
 }
 
 impl Colours {
@@ -31,11 +41,21 @@ impl Colours {
         if unit.first().is_none_or(|header| header & 31 != 7) {
             return Ok(());
         }
-        let declared = declared(&unit[1..]).ok_or("a damaged sequence parameter set")?;
-        match self.stream.replace(declared) {
-            Some(before) if before != declared => Err("its parts declare different colours".into()),
+        let said = parameters(&unit[1..]).ok_or("a damaged sequence parameter set")?;
+        match self.stream.replace(said) {
+            Some(before) if before != said => Err("its parts declare different colours".into()),
             _ => Ok(()),
         }
+    }
+
+    /// Whether frames have brightness alone.
+    pub(super) fn is_grey(&self) -> bool {
+        self.stream.is_some_and(|stream| stream.grey)
+    }
+
+    /// What of the stream the decoder is not made for, in words.
+    pub(super) fn foreign(&self) -> Option<&'static str> {
+        self.stream?.foreign
     }
 
     /// What makes pictures of frames.
@@ -43,7 +63,7 @@ impl Colours {
     /// # Errors
     /// In words, for a matrix that is none of the usual ones.
     pub(super) fn conversion(&self) -> Result<Conversion, String> {
-        let stream = self.stream.unwrap_or_default();
+        let stream = self.stream.map(|stream| stream.declared).unwrap_or_default();
         let known = |matrix: &u16| *matrix != UNSPECIFIED;
         let matrix = stream.matrix.filter(known).or(self.file.matrix.filter(known));
         let full = stream.full.or(self.file.full).unwrap_or(false);
@@ -124,9 +144,10 @@ fn row((all, stride): Plane<'_>, at: usize) -> &[u8] {
     all.get(at * stride..).unwrap_or_default()
 }
 
-/// What a sequence parameter set declares; `None` where it ends too early.
-fn declared(set: &[u8]) -> Option<Declared> {
+/// What a sequence parameter set says; `None` where it ends too early.
+fn parameters(set: &[u8]) -> Option<Stream> {
     let mut bits = Bits::new(set);
+    let (mut grey, mut foreign) = (false, None);
     let profile = bits.take(8)?;
     bits.take(16)?;
     bits.unsigned()?;
@@ -135,9 +156,16 @@ fn declared(set: &[u8]) -> Option<Declared> {
         if chroma == 3 {
             bits.take(1)?;
         }
-        bits.unsigned()?;
-        bits.unsigned()?;
-        bits.take(1)?;
+        let deep = [bits.unsigned()?, bits.unsigned()?] != [0, 0];
+        let lossless = bits.flag()?;
+        grey = chroma == 0;
+        foreign = match (chroma, deep, lossless) {
+            (2, ..) => Some("colours of 4:2:2"),
+            (3, ..) => Some("colours of 4:4:4"),
+            (_, true, _) => Some("more than 8 bits"),
+            (.., true) => Some("lossless coding"),
+            _ => None,
+        };
         if bits.flag()? {
             for list in 0..if chroma == 3 { 12 } else { 8 } {
                 if bits.flag()? {
@@ -166,6 +194,7 @@ fn declared(set: &[u8]) -> Option<Declared> {
     bits.unsigned()?;
     bits.unsigned()?;
     if !bits.flag()? {
+        foreign = foreign.or(Some("interlaced frames"));
         bits.take(1)?;
     }
     bits.take(1)?;
@@ -174,10 +203,13 @@ fn declared(set: &[u8]) -> Option<Declared> {
             bits.unsigned()?;
         }
     }
+    let declared = if bits.flag()? { usability(&mut bits)? } else { Declared::default() };
+    Some(Stream { declared, grey, foreign })
+}
+
+/// What its usability information says of colours.
+fn usability(bits: &mut Bits) -> Option<Declared> {
     let mut found = Declared::default();
-    if !bits.flag()? {
-        return Some(found);
-    }
     // The shape of a pixel; its sides where it is none of the listed ones.
     if bits.flag()? && bits.take(8)? == 255 {
         bits.take(32)?;
@@ -270,7 +302,7 @@ mod tests {
 
     #[test]
     fn declarations_are_found() {
-        let of = |tail: &str| declared(&set(tail)[1..]).unwrap();
+        let of = |tail: &str| parameters(&set(tail)[1..]).unwrap().declared;
         assert_eq!(of("0"), Declared::default());
         // Nothing of pixels and of overscan, then a format, the range and the matrix.
         assert_eq!(of("1000"), Declared::default());
@@ -282,9 +314,9 @@ mod tests {
         let sides = format!("11{:08b}{:016b}{:016b}0110101{:08b}{:08b}{:08b}", 255, 2, 1, 9, 9, 9);
         assert_eq!(of(&sides), Declared { matrix: Some(9), full: Some(false) });
         for end in 1..4 {
-            assert!(declared(&set("0")[1..end]).is_none());
+            assert!(parameters(&set("0")[1..end]).is_none());
         }
-        assert!(declared(&[0; 400]).is_none());
+        assert!(parameters(&[0; 400]).is_none());
     }
 
     #[test]

@@ -105,7 +105,13 @@ impl<'v> Decoding<'v> {
             Ok(Some(yuv)) => Some(converted(&yuv, shown, wanted, (colours, path))).transpose(),
             Ok(None) => Ok(None),
             Err(error) => {
-                let reason = format!("frame {number} cannot be decoded: {error}");
+                let reason = match colours.foreign() {
+                    Some(foreign) => format!(
+                        "it has {foreign}, which OpenH264 does not decode: extract the frames as PNG or JPEG \
+                         (docs/vision.md)"
+                    ),
+                    None => format!("frame {number} cannot be decoded: {error}"),
+                };
                 Err(VisionError::file(path, reason))
             }
         });
@@ -201,7 +207,12 @@ fn rgb(yuv: &DecodedYUV<'_>, colours: &Colours, path: &Path) -> Result<Rgb> {
     let conversion = colours.conversion().map_err(|reason| VisionError::file(path, reason))?;
     let mut data = vec![0; 3 * width * height];
     let strides = yuv.strides();
-    let planes = [(yuv.y(), strides.0), (yuv.u(), strides.1), (yuv.v(), strides.2)];
+    // The decoder leaves the colours of grey frames unset.
+    let neutral = vec![128; width.div_ceil(2)];
+    let planes = match colours.is_grey() {
+        true => [(yuv.y(), strides.0), (&neutral[..], 0), (&neutral[..], 0)],
+        false => [(yuv.y(), strides.0), (yuv.u(), strides.1), (yuv.v(), strides.2)],
+    };
     conversion.write(planes, width, &mut data);
     Ok(Rgb { width, height, data })
 }

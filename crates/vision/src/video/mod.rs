@@ -44,6 +44,12 @@ impl Video {
         self.len() == 0
     }
 
+    /// Whether frames are stored in another order than they are shown in, as those that are predicted from later
+    /// ones (B-frames) must be: OpenH264 decodes some of these visibly wrong.
+    pub fn is_reordered(&self) -> bool {
+        self.track.reordered
+    }
+
     /// Whether this program decodes videos.
     pub const DECODES: bool = cfg!(feature = "video");
 

@@ -32,6 +32,8 @@ pub(super) struct Track {
     pub(super) declared: Declared,
     /// First byte and number of bytes of each frame, in decoding order.
     pub(super) frames: Vec<(u64, u32)>,
+    /// Whether frames are stored in another order than they are shown in.
+    pub(super) reordered: bool,
 }
 
 /// What is said of colours.
@@ -152,6 +154,14 @@ fn shown(table: &[u8], count: usize) -> Result<Vec<i64>, String> {
     Ok(times)
 }
 
+/// Whether the frames of these delays come by different ones.
+fn varies(later: &[u8]) -> bool {
+    let Ok(runs) = entries(later, 8) else { return false };
+    let mut delays = runs.map(|run| u32_at(run, 4).ok());
+    let first = delays.next();
+    delays.any(|delay| Some(delay) != first)
+}
+
 /// Refuses an edit list that leaves frames out: players do not show them, and they have no number.
 fn whole(edits: &[u8], times: &[i64], (movie, media): (u32, u32)) -> Result<(), String> {
     let long = edits.first() == Some(&1);
@@ -247,7 +257,10 @@ fn track(table: &[u8], size: u64) -> Result<Track, String> {
         }
     }
     match frames.len() == count {
-        true => Ok(Track { codec, setup, declared, frames }),
+        true => {
+            let reordered = child(table, b"ctts").is_ok_and(varies);
+            Ok(Track { codec, setup, declared, frames, reordered })
+        }
         false => Err(format!("its index locates {} of {count} frames", frames.len())),
     }
 }
