@@ -138,7 +138,7 @@ class Network:
             classes,
             numbers,
             steps,
-            json.dumps(dict(recipe), default=plain),
+            json.dumps(settings(recipe)),
             seed_of(seed) if dropout else None,
             _lengths(lengths),
         )

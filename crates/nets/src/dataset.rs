@@ -127,6 +127,11 @@ impl Dataset {
         items
             .check(network)
             .map_err(|source| ItemsError::Items { path: path.display().to_string(), source })?;
+        // Rows would have numbers for names, in silence.
+        let has_ids = columns.iter().any(|(name, _)| name == "ids");
+        if named.is_none() && npz.contains("ids") && !has_ids {
+            return Err(refuse(format!("ids: expected a value for each of the {count} items")));
+        }
         let ids = match named {
             Some(name) => columns.iter().find(|(n, _)| n == name).map(|(_, v)| v.clone()),
             None => Some(ids(&columns, items.len())),
@@ -168,7 +173,8 @@ impl Dataset {
         for (name, values) in &self.columns {
             npz.strings(name, values)?;
         }
-        npz.text("__meta__", about)?;
+        // Not `__meta__`: the layout of extracted features is another one.
+        npz.text("__made__", about)?;
         npz.finish()?;
         draft.publish().map_err(io)?;
         Ok(())
@@ -258,6 +264,8 @@ fn views_of(
             return Err(format!("row {row}: view {view} of its recording occurs twice"));
         }
     }
+    let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+    let names = names.join(", ");
     for (name, values) in columns.iter_mut() {
         *values = first.iter().map(|&row| values[row].clone()).collect();
         debug_assert!(name != "view");
@@ -265,8 +273,12 @@ fn views_of(
     let mut result = vec![Column { values: Vec::new(), offsets: vec![0] }; inputs];
     for (recording, rows) in found.iter().enumerate() {
         for (view, (row, column)) in rows.iter().zip(&mut result).enumerate() {
-            let row =
-                row.ok_or_else(|| format!("recording {recording} has no view {}", view + 1))?;
+            let row = row.ok_or_else(|| {
+                format!(
+                    "recording {recording} has no view {}; rows of one recording have the same {names}",
+                    view + 1
+                )
+            })?;
             column.values.extend_from_slice(&all.values[all.offsets[row]..all.offsets[row + 1]]);
             column.offsets.push(column.values.len());
         }
@@ -309,6 +321,8 @@ mod tests {
         let read = Dataset::read(&path, &network).unwrap();
         assert_eq!((&read.ids, &read.items), (&written.ids, &written.items));
         assert_eq!(read.column("level"), Some(&written.columns[0].1[..]));
-        assert!(read.column("__meta__").is_none());
+        assert!(read.column("__made__").is_none());
+        // `inspect` and `compare` would look for the tables of extracted features.
+        assert!(!corsmal_files::layout::is_ours(&NpzFile::open(&path).unwrap()));
     }
 }

@@ -55,7 +55,11 @@ impl Loss {
         let n = outputs.shape.len();
         let items = outputs.items();
         let refuse = |text: String| Err(NetError::Targets(text));
-        if targets.items(n) != items {
+        let fits = match self {
+            Self::CrossEntropy => matches!(targets, Targets::Classes(_)),
+            Self::Mse => matches!(targets, Targets::Numbers(_)),
+        };
+        if fits && targets.items(n) != items {
             return refuse(format!("{} targets for {items} items", targets.items(n)));
         }
         let values = outputs.values.values();
@@ -97,10 +101,10 @@ impl Loss {
                 loss
             }
             (Self::CrossEntropy, Targets::Numbers(_)) => {
-                return refuse("cross-entropy needs classes".into());
+                return refuse("cross-entropy needs classes: integers from 0 on".into());
             }
             (Self::Mse, Targets::Classes(_)) => {
-                return refuse("the squared difference needs numbers".into());
+                return refuse("the squared difference needs floating-point numbers".into());
             }
         };
         let values = Matrix::new(outputs.values.rows(), outputs.values.cols(), gradient);

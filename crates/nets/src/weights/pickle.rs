@@ -356,9 +356,18 @@ fn call(function: Value, arguments: Value) -> Result<Value, String> {
                 Value::Int(offset),
                 Value::Tuple(shape),
                 Value::Tuple(strides),
-                ..,
+                // whether it is trained, its hooks; then what else there is to it
+                rest @ ..,
             ],
         ) if shape.len() == strides.len() => {
+            let plain = |more: &Value| matches!(more, Value::Dict(more) if more.is_empty());
+            if !rest.iter().skip(2).all(plain) {
+                return Err(
+                    "a tensor whose numbers are to be negated or conjugated when read: save \
+                            tensor.resolve_neg().resolve_conj()"
+                        .into(),
+                );
+            }
             let sizes = |all: &[Value]| -> Result<Vec<usize>, String> {
                 let one = |v: &Value| match v {
                     Value::Int(n) => usize::try_from(*n).map_err(|_| "a negative size".to_string()),

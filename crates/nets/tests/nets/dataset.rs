@@ -1,6 +1,6 @@
 //! Inputs of networks from files.
 
-use corsmal_files::npy::{DType, Header};
+use corsmal_files::npy::{DType, Header, Kind};
 use corsmal_files::npz::{Compression, NpzWriter};
 use corsmal_nets::dataset::Dataset;
 use corsmal_nets::networks;
@@ -61,6 +61,41 @@ fn a_member_id_names_the_items() {
         npz.finish().unwrap();
         assert_eq!(Dataset::read(&path, &network).unwrap().ids, expected);
     }
+}
+
+/// Rows had the names 0, 1, ... in silence.
+#[test]
+fn too_few_ids_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.npz");
+    let network = networks::named("m1").unwrap().build(None, 0).unwrap();
+    let mut npz = NpzWriter::create(&path, Compression::Stored).unwrap();
+    npz.floats("X", &[2, 2050], &[0.0; 4100]).unwrap();
+    npz.strings("ids", &["a"]).unwrap();
+    npz.finish().unwrap();
+    let said = Dataset::read(&path, &network).unwrap_err().to_string();
+    assert!(said.contains("ids: expected a value for each of the 2 items"), "{said}");
+}
+
+#[test]
+fn views_of_a_recording_have_the_same_labels() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.npz");
+    let network = networks::named("m5_r21d_level").unwrap().build(None, 0).unwrap();
+    let mut npz = NpzWriter::create(&path, Compression::Stored).unwrap();
+    npz.floats("X", &[4, 512], &[0.0; 2048]).unwrap();
+    let header = Header::new(DType { kind: Kind::Int, itemsize: 8, big_endian: false }, &[5]);
+    let ends: Vec<u8> = (0..5i64).flat_map(i64::to_le_bytes).collect();
+    npz.array("offsets", &header, &ends).unwrap();
+    npz.strings("ids", &["a"; 4]).unwrap();
+    npz.strings("level", &["0", "1", "0", "0"]).unwrap();
+    npz.strings("view", &["1", "2", "3", "4"]).unwrap();
+    npz.finish().unwrap();
+    let said = Dataset::read(&path, &network).unwrap_err().to_string();
+    assert!(
+        said.contains("has no view 2; rows of one recording have the same ids, level"),
+        "{said}"
+    );
 }
 
 #[test]

@@ -85,6 +85,22 @@ fn a_state_dict_of_pytorch_is_read_without_running_it() {
     // A transposed view of the same numbers.
     pth(&path, &pickle([2, 3], [1, 2], 6), &six());
     assert_eq!(weights::read(&path).unwrap()[0].2, [0.0, 2.0, 4.0, 1.0, 3.0, 5.0]);
+    // `expand`: three numbers, each row the same.
+    pth(&path, &pickle([2, 3], [0, 1], 3), &six()[..12]);
+    assert_eq!(weights::read(&path).unwrap()[0].2, [0.0, 1.0, 2.0, 0.0, 1.0, 2.0]);
+}
+
+/// `torch._neg_view`: the numbers are stored without the sign.
+#[test]
+fn numbers_to_be_negated_are_not_read_as_they_stand() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("net.pth");
+    let mut negated = pickle([2, 3], [3, 1], 6);
+    let end = negated.len() - b"tRu.".len();
+    negated.splice(end..end, *b"}X\x03\x00\x00\x00neg\x88s");
+    pth(&path, &negated, &six());
+    let said = weights::read(&path).unwrap_err().to_string();
+    assert!(said.contains("net.pth") && said.contains("resolve_neg"), "{said}");
 }
 
 #[test]
