@@ -1,13 +1,28 @@
 //! A report as a page and as files.
 
-use std::path::Path;
+use std::io::ErrorKind;
+use std::path::{Component, Path};
 
 use corsmal_files::draft;
+use serde::{Deserialize, Serialize};
 
 use crate::Source;
 use crate::error::{ReportError, Result};
+use crate::figure::Figure;
 use crate::report::Report;
 use crate::{latex, page};
+
+/// Folders of tables and of figures.
+const FOLDERS: [&str; 2] = ["tables", "figures"];
+
+/// `report.json`.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    report: &'a Report,
+    /// What else was written, to be removed by the next report in the same folder.
+    files: &'a [String],
+}
 
 impl Report {
     /// The page: no other file is needed to read it.
@@ -16,47 +31,66 @@ impl Report {
     }
 
     /// Writes `report.html`, `report.json`, `tables/NAME.csv`, `tables/NAME.tex`,
-    /// `figures/NAME.svg` and `figures/NAME.pdf` below `dir`. Tables and figures of a report that was
-    /// there before are removed.
+    /// `figures/NAME.svg` and `figures/NAME.pdf` below `dir`, with `more` figures that the page does not show. Tables
+    /// and figures of a report that was there before are removed.
     ///
     /// # Errors
     /// [`ReportError`] when something cannot be written.
-    pub fn write(&self, dir: &Path) -> Result<()> {
+    pub fn write(&self, dir: &Path, more: &[Figure]) -> Result<()> {
         let folder = |name: &str| {
             let path = dir.join(name);
             std::fs::create_dir_all(&path)
                 .map_err(|source| ReportError::Folder { path: path.clone(), source })?;
             Ok::<_, ReportError>(path)
         };
-        let (tables, figures) = (folder("tables")?, folder("figures")?);
+        let [tables, figures] = FOLDERS;
+        let places = [folder(tables)?, folder(figures)?];
         // What another report left here would pass as part of this one.
-        if dir.join("report.json").is_file() {
-            for (folder, extensions) in [(&tables, ["csv", "tex"]), (&figures, ["svg", "pdf"])] {
-                for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
-                    let path = entry.path();
-                    if extensions.iter().any(|e| path.extension().is_some_and(|found| found == *e))
-                    {
-                        std::fs::remove_file(&path)
-                            .map_err(|source| ReportError::Folder { path: path.clone(), source })?;
-                    }
-                }
-            }
+        for name in earlier(dir) {
+            let path = dir.join(name);
+            let removed = std::fs::remove_file(&path);
+            removed
+                .or_else(|e| if e.kind() == ErrorKind::NotFound { Ok(()) } else { Err(e) })
+                .map_err(|source| ReportError::Folder { path, source })?;
         }
+        let mut files = Vec::new();
         let mut rows = self.sections.iter().flat_map(|s| &s.tables).flat_map(|t| &t.rows);
         let mixed = rows.any(|row| row.source != Source::Ours);
         let put = |path: &Path, bytes: &[u8]| draft::write(path, bytes).map_err(ReportError::Write);
         for table in self.sections.iter().flat_map(|s| &s.tables) {
-            put(&tables.join(format!("{}.csv", table.name)), table.csv(mixed)?.as_bytes())?;
-            put(&tables.join(format!("{}.tex", table.name)), latex::table(table).as_bytes())?;
+            put(&places[0].join(format!("{}.csv", table.name)), table.csv(mixed)?.as_bytes())?;
+            put(&places[0].join(format!("{}.tex", table.name)), latex::table(table).as_bytes())?;
+            files.extend(["csv", "tex"].map(|e| format!("{tables}/{}.{e}", table.name)));
         }
-        for section in &self.sections {
-            let grouped = section.groups.iter().flat_map(|g| &g.figures);
-            for figure in section.figures.iter().chain(grouped) {
-                figure.write(&figures)?;
-            }
+        let grouped = self.sections.iter().flat_map(|s| &s.groups).flat_map(|g| &g.figures);
+        let shown = self.sections.iter().flat_map(|s| &s.figures);
+        for figure in shown.chain(grouped).chain(more) {
+            figure.write(&places[1])?;
+            files.extend(["svg", "pdf"].map(|e| format!("{figures}/{}.{e}", figure.name)));
         }
-        let json = serde_json::to_string_pretty(self)?;
-        put(&dir.join("report.json"), json.as_bytes())?;
+        let document = Document { report: self, files: &files };
+        put(&dir.join("report.json"), serde_json::to_string_pretty(&document)?.as_bytes())?;
         put(&dir.join("report.html"), self.html().as_bytes())
     }
+}
+
+/// The files that an earlier report says it wrote.
+fn earlier(dir: &Path) -> Vec<String> {
+    #[derive(Deserialize)]
+    struct Earlier {
+        files: Vec<String>,
+    }
+    let written = std::fs::read(dir.join("report.json")).ok();
+    let written = written.and_then(|text| serde_json::from_slice::<Earlier>(&text).ok());
+    let mut files = written.map(|earlier| earlier.files).unwrap_or_default();
+    files.retain(|name| is_ours(Path::new(name)));
+    files
+}
+
+/// Whether it names a file in one of our folders, and nothing outside.
+fn is_ours(name: &Path) -> bool {
+    let mut parts = name.components();
+    let folder = |part: Component<'_>| FOLDERS.iter().any(|f| part.as_os_str() == *f);
+    let file = |part: Component<'_>| matches!(part, Component::Normal(_));
+    parts.next().is_some_and(folder) && parts.next().is_some_and(file) && parts.next().is_none()
 }

@@ -111,7 +111,7 @@ fn paper_shows_everything() {
 #[test]
 fn every_table_and_figure_has_its_files() {
     let dir = tempfile::tempdir().unwrap();
-    report().write(dir.path()).unwrap();
+    report().write(dir.path(), &[]).unwrap();
     let read = |name: &str| std::fs::read(dir.path().join(name)).unwrap();
     for name in ["first", "open", "closed"] {
         assert!(read(&format!("figures/{name}.svg")).starts_with(b"<svg"));
@@ -122,8 +122,27 @@ fn every_table_and_figure_has_its_files() {
     assert!(String::from_utf8(read("tables/t12.tex")).unwrap().contains("{lrrrrrrrrrrrr}"));
     let json: serde_json::Value = serde_json::from_slice(&read("report.json")).unwrap();
     assert_eq!(json["sections"][0]["tables"][0]["rows"][0]["cells"][1], 91.31);
+    // The next report removes what this one wrote, and nothing else.
+    let at = |name: &str| dir.path().join(name);
+    std::fs::write(at("figures/own.pdf"), "mine").unwrap();
+    let outside = json.as_object().unwrap().clone();
+    let mut outside = serde_json::Value::from(outside);
+    let files = outside["files"].as_array_mut().unwrap();
+    files.extend(["../file", "figures/../notes", "notes", "/figures/x"].map(Into::into));
+    std::fs::write(at("report.json"), outside.to_string()).unwrap();
+    std::fs::write(at("notes"), "mine").unwrap();
+    let mut more = report().sections[0].figures[0].clone();
+    more.name = "more".into();
+    corsmal_report::Report::new("empty").write(dir.path(), &[more]).unwrap();
+    let mut left: Vec<String> = std::fs::read_dir(at("figures"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    left.sort();
+    assert_eq!(left, ["more.pdf", "more.svg", "own.pdf"]);
+    assert!(at("notes").exists() && std::fs::read_dir(at("tables")).unwrap().next().is_none());
     let blocked = dir.path().join("file");
     std::fs::write(&blocked, "").unwrap();
-    let error = report().write(&blocked.join("x")).unwrap_err().to_string();
+    let error = report().write(&blocked.join("x"), &[]).unwrap_err().to_string();
     assert!(error.starts_with("cannot make the folder"), "{error}");
 }

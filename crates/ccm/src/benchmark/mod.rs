@@ -17,7 +17,7 @@ mod report;
 mod results;
 mod system;
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -114,12 +114,7 @@ pub fn run(
     progress: &(dyn Fn(&str) + Sync),
     stop: &Arc<AtomicBool>,
 ) -> Result<Report> {
-    let mut names = HashSet::new();
-    let named = options.added.iter().map(|(name, _)| name);
-    let named = named.chain(options.capacities.iter().map(|table| &table.name));
-    if let Some(name) = named.into_iter().find(|name| !names.insert(*name)) {
-        return Err(CcmError::Request(format!("{name}: added twice; names must differ")));
-    }
+    require_names(options)?;
     let mut slugs = HashSet::new();
     if let Some(twice) = options.baselines.iter().find(|b| !slugs.insert(b.slug())) {
         return Err(CcmError::Request(format!("baseline {} is given twice", twice.slug())));
@@ -176,16 +171,51 @@ pub fn run(
         cautions: &cautions,
     };
     files::write_completed(&options.out, &rows, &predicted, options.seed)?;
-    let (figures, seed) = (options.out.join("figures"), options.seed);
-    let report = pool.install(|| {
-        report::write_figures(&figures, &rows, &predicted, seed)?;
-        report::report(&set, &rows, &predicted, seed, made)
+    let seed = options.seed;
+    let (more, report) = pool.install(|| {
+        let report = report::report(&set, &rows, &predicted, seed, made)?;
+        Ok::<_, CcmError>((report::figures(&rows, &predicted, seed)?, report))
     })?;
-    report.write(&options.out)?;
+    report.write(&options.out, &more)?;
     if let Some(caution) = earlier.caution(&options.out) {
         progress(&format!("warning: {}: {caution}", options.out.display()));
     }
     Ok(report)
+}
+
+/// Refuses names of what is added whose files would replace each other.
+fn require_names(options: &BenchmarkOptions) -> Result<()> {
+    let added = options.added.iter().map(|(name, _)| name.as_str());
+    let capacities = options.capacities.iter().map(|table| table.name.as_str());
+    let same = |name: &str, other: &str| {
+        Err(CcmError::Request(match name == other {
+            true => format!("{name}: given twice; names must differ"),
+            false => format!(
+                "{name}: its files would have the names of those of {other}; names must differ in letters from a to z \
+                 or in digits"
+            ),
+        }))
+    };
+    let mut seen = HashMap::new();
+    for name in added.clone().chain(capacities) {
+        let file = method::file_name(name);
+        if file.is_empty() {
+            return Err(CcmError::Request(format!(
+                "{name}: files get this name, so it needs a letter from a to z or a digit"
+            )));
+        }
+        if let Some(other) = seen.insert(file, name) {
+            return same(name, other);
+        }
+    }
+    for name in added {
+        let mut systems = options.systems.iter().map(|system| system.name());
+        let file = method::file_name(name);
+        if let Some(system) = systems.find(|system| method::file_name(system) == file) {
+            return same(name, system);
+        }
+    }
+    Ok(())
 }
 
 /// The outcomes of all baselines, in the order of their feature sets.

@@ -8,21 +8,35 @@ use corsmal_report::Report;
 
 use crate::run;
 
-#[test]
-fn one_name_is_not_added_twice() {
-    let options = BenchmarkOptions {
+/// Nothing of nothing.
+fn none() -> BenchmarkOptions {
+    BenchmarkOptions {
         data: "nowhere".into(),
         out: "nowhere".into(),
         baselines: Vec::new(),
         systems: Vec::new(),
-        added: vec![("x".into(), "a.csv".into()), ("x".into(), "b.csv".into())],
+        added: Vec::new(),
         capacities: Vec::new(),
         detections: None,
         jobs: 1,
         seed: 1,
         made: Made::default(),
+    }
+}
+
+#[test]
+fn one_name_is_not_added_twice() {
+    let added = vec![("x".into(), "a.csv".into()), ("x".into(), "b.csv".into())];
+    let options = BenchmarkOptions { added, ..none() };
+    assert_eq!(run(&options).unwrap_err().to_string(), "x: given twice; names must differ");
+    // Files have their names in small letters and digits: one would have replaced the other.
+    let add = |names: [&str; 2]| {
+        let added = names.map(|name| (name.to_owned(), "a.csv".into())).into();
+        run(&BenchmarkOptions { added, ..none() }).unwrap_err().to_string()
     };
-    assert_eq!(run(&options).unwrap_err().to_string(), "x: added twice; names must differ");
+    let said = add(["Cap A", "cap-a"]);
+    assert!(said.starts_with("cap-a: its files would have the names of those of Cap A"), "{said}");
+    assert!(add(["x", "容量"]).starts_with("容量: files get this name"), "{}", add(["x", "容量"]));
 }
 
 #[test]

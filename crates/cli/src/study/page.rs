@@ -33,7 +33,7 @@ pub(super) fn add_made(facts: &mut Vec<Fact>) {
 
 /// Writes a report and says where it is.
 pub(super) fn write(folder: &Path, report: &Report, quiet: bool) -> Result<(), Failure> {
-    report.write(folder)?;
+    report.write(folder, &[])?;
     if !quiet {
         eprintln!("report: {}", folder.join("report.html").display());
     }

@@ -163,9 +163,15 @@ fn windows_are_listened_to_where_they_are() {
     let refused = run(&again);
     let message = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert!(message.contains("has a report already; --overwrite replaces it"), "{message}");
-    std::fs::write(report.join("tables/of-another.csv"), "a\n").unwrap();
+    for name in ["of-another.csv", "notes.csv"] {
+        std::fs::write(report.join("tables").join(name), "a\n").unwrap();
+    }
+    let mut another = j.report("report");
+    another["files"].as_array_mut().unwrap().push("tables/of-another.csv".into());
+    std::fs::write(report.join("report.json"), another.to_string()).unwrap();
     let moved = run(&[&again[..], &["--overwrite"]].concat());
     assert!(!report.join("tables/of-another.csv").exists());
+    assert!(report.join("tables/notes.csv").exists());
     let message = String::from_utf8_lossy(&moved.stderr).into_owned();
     assert!(moved.status.success() && moved.stdout.is_empty(), "{message}");
     assert!(message.contains("24 of 24 recordings are no longer at their paths"), "{message}");

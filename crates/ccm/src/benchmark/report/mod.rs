@@ -8,9 +8,7 @@ mod corrections;
 mod glance;
 mod tasks;
 
-use std::path::Path;
-
-use corsmal_report::Report;
+use corsmal_report::{Figure, Report};
 use rayon::prelude::*;
 
 use super::Made;
@@ -82,22 +80,13 @@ fn warning(set: &DataSet) -> Option<String> {
     (!all.is_empty()).then(|| all.join(" "))
 }
 
-/// Writes the confusion matrices of every baseline, of both protocols, and of every system into a
-/// folder.
-pub(super) fn write_figures(
-    folder: &Path,
-    rows: &Rows,
-    predicted: &Predicted<'_>,
-    seed: u64,
-) -> Result<()> {
+/// The confusion matrices of every baseline, of both protocols, and of every system.
+pub(super) fn figures(rows: &Rows, predicted: &Predicted<'_>, seed: u64) -> Result<Vec<Figure>> {
     let methods = methods(rows, predicted, seed);
-    methods.par_iter().filter(|m| !m.completes()).try_for_each(|method| {
-        let Some(slug) = &method.slug else { return Ok(()) };
-        let Some(scores) = method.scores(rows, Part::Training, seed, &|_| true) else {
-            return Ok(());
-        };
-        let title = format!("{}, {}", method.name, method.protocol);
-        let figures = classes::figures(slug, &title, &scores)?;
-        Ok(figures.iter().try_for_each(|figure| figure.write(folder))?)
-    })
+    let figures = methods.par_iter().filter(|m| !m.completes()).map(|method| {
+        let scores = method.scores(rows, Part::Training, seed, &|_| true);
+        let Some((slug, scores)) = method.slug.as_ref().zip(scores) else { return Ok(Vec::new()) };
+        classes::figures(slug, &format!("{}, {}", method.name, method.protocol), &scores)
+    });
+    Ok(figures.collect::<Result<Vec<_>>>()?.concat())
 }
