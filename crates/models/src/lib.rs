@@ -45,6 +45,7 @@ pub mod comparison;
 mod copies;
 pub mod cross_validation;
 pub mod dataset;
+mod dominance;
 pub mod error;
 pub mod explain;
 pub mod folds;
@@ -70,5 +71,6 @@ pub mod validation;
 pub mod voting;
 mod words;
 
+pub use dominance::dominance;
 pub use error::{ModelError, Result};
 pub use table::argmax;

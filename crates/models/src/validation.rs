@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::cross_validation::{CrossValidation, Data, cross_validate, nested_cross_validate};
 use crate::dataset::{DatasetError, LabelledTable, Result};
+use crate::dominance::dominance;
 use crate::folds::{CvPlan, Folds};
 use crate::labels::Labels;
 use crate::pipeline::PipelineSpec;
@@ -60,7 +61,8 @@ pub fn validate(
 ) -> Result<Validation> {
     let (labels, classes) = table.classes(target)?;
     let folds = Folds::new(plan, table, groups, (&labels, &classes), seed)?;
-    let warnings = folds.warnings(&classes);
+    let mut warnings = folds.warnings(&classes);
+    warnings.extend(dominance(&candidates, table));
     let dataset = table.dataset(classes.clone());
     let data = Data { dataset: &dataset, merge: None };
     let result = match candidates.as_slice() {

@@ -77,6 +77,9 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
     for warning in alike(&labels) {
         eprintln!("warning: {warning}");
     }
+    if let Some(warning) = corsmal_models::dominance(&candidates, &table) {
+        eprintln!("warning: {warning}");
+    }
     let rows_of = counts(&labels, &classes.indices().to_vec());
     for (name, rows) in &rows_of {
         if *rows == 1 {
