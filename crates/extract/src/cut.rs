@@ -1,6 +1,6 @@
 //! Recordings cut into windows or stretches, each an input of its own.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::RangeInclusive;
 use std::path::absolute;
 use std::sync::Arc;
@@ -30,11 +30,14 @@ pub struct WindowSpan {
 
 /// The same with a label `recording`, the path, where inputs are stretches of one file: folds keep them
 /// together also where another program rewrites the table. A label of that name stays as it is.
-pub fn name_recordings(mut inputs: Vec<Input>) -> Vec<Input> {
+///
+/// # Errors
+/// Stretches of web addresses that only their queries tell apart, which no output has.
+pub fn name_recordings(mut inputs: Vec<Input>) -> Result<Vec<Input>, InputError> {
     let is_stretch = |input: &Input| input.start.is_some() || input.end.is_some();
     let is_named = |input: &Input| input.labels.iter().any(|(name, _)| name == RECORDING);
     if !inputs.iter().any(is_stretch) || inputs.iter().any(is_named) {
-        return inputs;
+        return Ok(inputs);
     }
     // A file may be written in several ways; the first one names it.
     let mut names: HashMap<String, String> = HashMap::new();
@@ -42,18 +45,30 @@ pub fn name_recordings(mut inputs: Vec<Input>) -> Vec<Input> {
     for input in &inputs {
         let name = spelling::plain(&input.source.to_string());
         let place = match &input.source {
-            InputSource::File(path) => absolute(path).ok(),
+            InputSource::File(path) => {
+                absolute(path).ok().map(|path| spelling::plain(&path.to_string_lossy()))
+            }
+            InputSource::Object(object) => Some(object.address()),
             _ => None,
         };
-        let place = place.map(|path| spelling::plain(&path.to_string_lossy()));
         let place = place.unwrap_or_else(|| name.clone());
         recordings.push(names.entry(place).or_insert(name).clone());
+    }
+    let mut seen = HashSet::new();
+    if let Some(name) = names.values().find(|name| !seen.insert(name.as_str())) {
+        return Err(InputError::Store {
+            name: name.clone(),
+            reason: format!(
+                "several recordings have this address and differ in its query: add a column {RECORDING} to the \
+                 manifest that names the recording of each row"
+            ),
+        });
     }
     if names.len() < inputs.len() {
         let named = inputs.iter_mut().zip(recordings);
         named.for_each(|(input, recording)| input.labels.push((RECORDING.into(), recording)));
     }
-    inputs
+    Ok(inputs)
 }
 
 /// The windows of every recording, in the order of time: `x@0.5` begins half a second into `x`.

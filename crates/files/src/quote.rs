@@ -34,8 +34,9 @@ pub fn shown(text: &str) -> String {
 const LONGEST_MESSAGE: usize = 4000;
 
 /// A whole message as a terminal may have it, whatever it repeats: control characters but line feeds
-/// and tabs escaped, and not endless.
+/// and tabs escaped, not endless, and without what may be secret in addresses.
 pub fn printable(message: &str) -> String {
+    let message = &without_secrets(message);
     let mut out = String::with_capacity(message.len().min(LONGEST_MESSAGE));
     let mut left = message.chars();
     for character in left.by_ref().take(LONGEST_MESSAGE) {
@@ -55,6 +56,35 @@ pub fn printable(message: &str) -> String {
     out
 }
 
+/// A message without passwords in addresses, and without the queries of web addresses, which may be signatures.
+fn without_secrets(message: &str) -> String {
+    const SCHEME: &str = "://";
+    let mut out = String::with_capacity(message.len());
+    let mut left = message;
+    while let Some(at) = left.find(SCHEME) {
+        let (before, after) = left.split_at(at + SCHEME.len());
+        let end = after.find(|c: char| c.is_whitespace() || "\"'`<>".contains(c));
+        let (word, rest) = after.split_at(end.unwrap_or(after.len()));
+        // What ends the name in a message, such as a colon.
+        let address = word.trim_end_matches([':', ',', ';', '.', ')']);
+        let behind = &word[address.len()..];
+        let is_web = ["http://", "https://"].iter().any(|web| before.ends_with(web));
+        let address = match address.split_once('?') {
+            Some((address, _)) if is_web => address,
+            _ => address,
+        };
+        let is_user = |user: &&str| user.contains(':');
+        let host = match address.rsplit_once('@').filter(|(user, _)| is_user(user)) {
+            Some((_, host)) => host,
+            None => address,
+        };
+        out.extend([before, host, behind]);
+        left = rest;
+    }
+    out.push_str(left);
+    out
+}
+
 /// Whether a character changes the order in which those around it are shown.
 fn is_direction(character: char) -> bool {
     matches!(character, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
@@ -71,6 +101,15 @@ mod tests {
         assert_eq!(shown("it's"), "it's");
         assert_eq!(printable("a: b\n\tc\u{7}\u{2066}ü"), "a: b\n\tc\\u{7}\\u{2066}ü");
         assert!(printable(&"x".repeat(1_000_000)).len() < 4100);
+        for (message, shown) in [
+            ("https://h:8/x.wav?key=secret: gone", "https://h:8/x.wav: gone"),
+            ("a \"http://me:secret@h/x.wav\", b", "a \"http://h/x.wav\", b"),
+            ("s3://ID:se/cret@bucket/x.wav, y://z?", "s3://bucket/x.wav, y://z?"),
+            ("abfss://c@account/x: https://", "abfss://c@account/x: https://"),
+            ("s3://b/what?.wav", "s3://b/what?.wav"),
+        ] {
+            assert_eq!(printable(message), shown);
+        }
         let long = shown(&"x".repeat(1_000_000));
         assert!(long.len() < 200 && long.ends_with("x… (999880 more characters)"), "{long}");
     }

@@ -32,6 +32,9 @@ pub fn list(folder: &Uri, stop: &AtomicBool) -> Result<Vec<Object>, StoreError> 
         listed: Some(Version::of(&meta)),
     };
     let mut objects: Vec<Object> = found.into_iter().map(object).collect();
-    objects.sort_unstable_by(|a, b| a.uri.key().cmp(b.uri.key()));
+    let size = |object: &Object| object.listed.as_ref().map_or(0, |version| version.size);
+    objects.sort_by(|a, b| a.uri.key().cmp(b.uri.key()).then(size(b).cmp(&size(a))));
+    // The client takes the slash off the empty object that stands for a folder (`x.wav/`).
+    objects.dedup_by(|b, a| size(b) == 0 && a.uri.key() == b.uri.key());
     Ok(objects)
 }

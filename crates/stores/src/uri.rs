@@ -75,6 +75,13 @@ impl Uri {
         if bucket.is_empty() {
             return Err(wrong("has no bucket".into()));
         }
+        if scheme != Scheme::Web && bucket.contains(':') {
+            // A key and its secret would stand in messages and outputs.
+            return Err(StoreError::Name {
+                name: "an address in a store".into(),
+                reason: "must not contain a user name, password or port".into(),
+            });
+        }
         let (key, query) = match scheme {
             Scheme::Web => {
                 if bucket.contains('@') {
@@ -202,9 +209,13 @@ mod tests {
         assert_eq!(uri.address(), "https://host:8/a%20b.wav?signature=secret");
         assert_eq!(Uri::parse(&uri.address()).unwrap(), uri);
         assert!(!format!("{uri:?}").contains("secret"));
-        for name in
-            ["https://me:secret@host/x.wav", "https:///x.wav?secret", "http://h/a//b?secret"]
-        {
+        for name in [
+            "https://me:secret@host/x.wav",
+            "https:///x.wav?secret",
+            "http://h/a//b?secret",
+            "s3://id:secret@bucket/x.wav",
+            "s3://id:sec/ret@secret/x.wav",
+        ] {
             let error = Uri::parse(name).unwrap_err();
             assert!(!format!("{error} {error:?}").contains("secret"), "{error:?}");
         }

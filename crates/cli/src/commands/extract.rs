@@ -152,7 +152,7 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
     let stop = crate::interrupt::flag();
     let mut found = recordings::named(&names, |warning| meter.warning(warning))?;
     found = match args.window {
-        None => name_recordings(found),
+        None => name_recordings(found)?,
         Some(window) => {
             let span = WindowSpan { window, hop: args.hop.unwrap_or(window / 2.0) };
             match into_windows(found, span, stop) {

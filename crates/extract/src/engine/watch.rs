@@ -6,7 +6,7 @@ use corsmal_files::identity::Stamp;
 use corsmal_files::outcome::Status;
 
 use super::failed::Failed;
-use crate::inputs::stored::{Pin, identity_of_read};
+use crate::inputs::stored::{Pin, identity_of_read, of_address};
 use crate::inputs::{Input, InputSource};
 
 /// A file as it was when it was looked at.
@@ -48,8 +48,12 @@ impl Watch {
 
     /// What the bytes are known by that came from a store; `None` for files, and before any came.
     pub(crate) fn identity(&self) -> Option<String> {
-        let whole = identity_of_read(&self.pin)?;
-        Some(match self.stored.as_ref()? {
+        let (whole, stored) = (identity_of_read(&self.pin)?, self.stored.as_ref()?);
+        let whole = match stored.object() {
+            Some(object) => of_address(object, whole),
+            None => whole,
+        };
+        Some(match stored {
             InputSource::Member(member) => member.identity_in(&whole),
             _ => whole,
         })

@@ -53,6 +53,18 @@ impl InputSource {
         }
     }
 
+    /// The object that holds the bytes, where there is one.
+    pub(crate) fn object(&self) -> Option<&Object> {
+        match self {
+            Self::Object(object) => Some(object),
+            Self::Member(member) => match &member.archive {
+                Place::Object(object) => Some(object),
+                Place::File(_) => None,
+            },
+            Self::File(_) | Self::Memory(_) | Self::Stdin => None,
+        }
+    }
+
     /// Whether reading it may be waiting for bytes to come.
     pub(crate) fn waits(&self) -> bool {
         *self == Self::Stdin || self.is_stored()

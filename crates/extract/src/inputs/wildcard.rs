@@ -53,6 +53,8 @@ pub(super) fn expand(pattern: &str) -> Result<Vec<PathBuf>, InputError> {
         }
         found = next;
     }
+    // The current folder, which `**` matches too.
+    found.iter_mut().filter(|path| path.as_os_str().is_empty()).for_each(|path| path.push("."));
     Ok(found)
 }
 

@@ -63,6 +63,9 @@ pub enum MergeError {
         /// The shard.
         path: PathBuf,
     },
+    /// A shard that was copied from a store, by its name there, and what is wrong with it.
+    #[error("{0}")]
+    Copied(String),
     /// The tables of two shards do not fit together.
     #[error("{path}: {source}")]
     Table {

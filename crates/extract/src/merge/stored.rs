@@ -41,6 +41,7 @@ pub fn merge(
     // Removed when it is dropped.
     let mut copies: Option<TempDir> = None;
     let mut here = Vec::with_capacity(shards.len());
+    let in_stores = |error, here: &[PathBuf]| named_as_given(error, here.iter().zip(shards));
     for (index, shard) in shards.iter().enumerate() {
         let Some(name) = shard.to_str().filter(|name| is_stored(name)) else {
             here.push(shard.clone());
@@ -55,12 +56,30 @@ pub fn merge(
         here.push(copy);
     }
     let Some(stored) = stored else {
-        return super::merge(&here, out, existing, stop);
+        return super::merge(&here, out, existing, stop).map_err(|e| in_stores(e, &here));
     };
     // A result that was not sent is made again: its shards may be others by now.
     let local = if stored.file.exists() { Existing::Overwrite } else { existing };
-    super::merge(&here, &stored.file, local, stop)?;
+    super::merge(&here, &stored.file, local, stop).map_err(|e| in_stores(e, &here))?;
     Ok(stored.publish(existing == Existing::Overwrite, stop)?)
+}
+
+/// The error with the names of shards instead of their copies, which are gone by the time it is read.
+fn named_as_given<'a>(
+    error: MergeError,
+    copies: impl Iterator<Item = (&'a PathBuf, &'a PathBuf)>,
+) -> MergeError {
+    if matches!(error, MergeError::Run(RunError::Interrupted)) {
+        return error;
+    }
+    let message = error.to_string();
+    let mut copied = copies.filter(|(copy, given)| copy != given).collect::<Vec<_>>();
+    // `10` before `1`.
+    copied.sort_by_key(|(copy, _)| std::cmp::Reverse(copy.as_os_str().len()));
+    let named = copied.iter().fold(message.clone(), |message, (copy, given)| {
+        message.replace(&*copy.to_string_lossy(), &given.to_string_lossy())
+    });
+    if named == message { error } else { MergeError::Copied(named) }
 }
 
 fn temporary(work: Option<&Path>) -> Result<TempDir, MergeError> {

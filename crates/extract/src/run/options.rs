@@ -69,7 +69,10 @@ pub(super) fn mixed(outcomes: &[Outcome]) -> Option<String> {
             format!("{n} recordings were replaced during the run, {first} for one: their rows come")
         }
     };
-    Some(format!("{replaced} from different versions of the file; extract again"))
+    // Whose queries no output has.
+    let web =
+        if first.starts_with("http") { ", or its addresses differ in their queries" } else { "" };
+    Some(format!("{replaced} from different versions of the file{web}; extract again"))
 }
 
 /// Told what goes on, from several threads.

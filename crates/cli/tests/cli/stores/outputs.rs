@@ -187,6 +187,11 @@ fn shards_in_a_bucket_are_merged_into_the_object_of_one_run() {
         assert!(merge(&[]).with(2).stderr.contains(&format!("{out} exists")));
         merge(&["--overwrite"]).with(0);
         assert_eq!(twins.left(), Vec::<String>::new(), "{name}");
+        // A shard is named as it was given, not its copy, which is gone by now.
+        let mut command = twins.store.tool();
+        command.arg("merge").arg(part(1)).args(["--out", "s3://lab/out/one.npz"]);
+        let said = ended(command.arg("--work").arg(twins.at("work"))).with(2).stderr;
+        assert!(said.contains(&part(1)) && !said.contains("-merge-"), "{said}");
     }
 }
 

@@ -63,6 +63,10 @@ pub(crate) fn identity_of_read(_: &Pin) -> Option<String> {
     None
 }
 
+pub(crate) fn of_address(object: &Object, _: String) -> String {
+    match *object {}
+}
+
 pub(crate) fn identity_now(object: &Object, _: &AtomicBool) -> String {
     match *object {}
 }

@@ -73,14 +73,18 @@ pub fn require_store(name: &str, stop: &AtomicBool) -> Result<(), InputError> {
     }
 }
 
-/// A name without the query of a web address, which may hold a signature, or its user and password.
+/// A name without the query of a web address, which may hold a signature, or a user and password.
 pub fn shown(name: &str) -> String {
+    let bucket = name.split_once("://").and_then(|(_, rest)| rest.split('/').next());
     let is_web = name.split_once("://").is_some_and(|(scheme, _)| {
         ["http", "https"].iter().any(|web| scheme.eq_ignore_ascii_case(web))
     });
     match name.split(['?', '#']).next() {
         Some(address) if is_web && address.contains('@') => "a web address".into(),
         Some(address) if is_web => address.into(),
+        _ if is_stored(name) && bucket.is_some_and(|bucket| bucket.contains(':')) => {
+            "an address in a store".into()
+        }
         _ => name.into(),
     }
 }
@@ -101,7 +105,9 @@ mod tests {
         {
             assert!(!is_stored(name), "{name}");
         }
-        for name in ["https://h/x.wav?secret", "http://me:secret@h/x.wav"] {
+        for name in
+            ["https://h/x.wav?secret", "http://me:secret@h/x.wav", "s3://me:secret/y@b/x.wav"]
+        {
             assert!(!shown(name).contains("secret"), "{name}");
         }
         for name in ["http#1.wav", "https/a?b.wav", "s3://b/a?b#c.wav"] {

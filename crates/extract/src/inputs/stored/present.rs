@@ -50,10 +50,21 @@ pub(crate) fn identity_of_read(pin: &Pin) -> Option<String> {
     pin.version().map(|version| identity_of(&version))
 }
 
+/// An identity of what lies at the object's address: without an entity tag, files that a web server tells apart by
+/// the query could have the same one.
+pub(crate) fn of_address(object: &Object, identity: String) -> String {
+    match object.address().strip_prefix(object.name()) {
+        Some(query) if !query.is_empty() && identity.contains(":modified:") => {
+            format!("{identity}:query:{}", identity::of_bytes(query.as_bytes()))
+        }
+        _ => identity,
+    }
+}
+
 /// What the object is known by now; empty where it cannot be asked.
 pub(crate) fn identity_now(object: &Object, stop: &AtomicBool) -> String {
     let version = object.listed.clone().or_else(|| object.look(stop).ok());
-    version.map(|version| identity_of(&version)).unwrap_or_default()
+    version.map(|version| of_address(object, identity_of(&version))).unwrap_or_default()
 }
 
 /// The object with its present version; `None` where there is none.
