@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use corsmal_files::draft;
 use corsmal_vision::{Detection, Rgb};
 
-use crate::capacity::{Problem, Views, doubtful_colours, each, key, require_colours, training};
+use crate::capacity::{Problem, Views, each, key, require_colours, training};
 use crate::dataset::{DataSet, Recording};
 use crate::error::{CcmError, Result};
 use crate::submission::RowKey;
@@ -70,8 +70,6 @@ pub struct Written {
     pub failed: Vec<(RowKey, String)>,
     /// Whether they are synthetic.
     pub synthetic: bool,
-    /// What may be wrong with the pictures; see [`doubtful_colours`].
-    pub doubt: Option<String>,
 }
 
 /// Writes the crops of all labelled training recordings as PNG into a new or empty folder, and
@@ -138,7 +136,6 @@ fn write_into(
         without: 0,
         failed: Vec::new(),
         synthetic: set.synthetic,
-        doubt: doubtful_colours(&recordings),
     };
     let mut table = String::from("id,container,view,level,type\n");
     let mut missing = None;

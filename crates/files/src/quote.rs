@@ -56,33 +56,48 @@ pub fn printable(message: &str) -> String {
     out
 }
 
-/// A message without passwords in addresses, and without the queries of web addresses, which may be signatures.
+/// A message without passwords in addresses, and without the queries of web addresses, which may be signatures. An
+/// address ends at a blank or a quotation mark.
 fn without_secrets(message: &str) -> String {
     const SCHEME: &str = "://";
-    let mut out = String::with_capacity(message.len());
-    let mut left = message;
+    let ends = |c: char| c.is_whitespace() || "\"`<>".contains(c);
+    let (mut out, mut left) = (String::with_capacity(message.len()), message);
     while let Some(at) = left.find(SCHEME) {
         let (before, after) = left.split_at(at + SCHEME.len());
-        let end = after.find(|c: char| c.is_whitespace() || "\"'`<>".contains(c));
-        let (word, rest) = after.split_at(end.unwrap_or(after.len()));
-        // What ends the name in a message, such as a colon.
-        let address = word.trim_end_matches([':', ',', ';', '.', ')']);
-        let behind = &word[address.len()..];
-        let is_web = ["http://", "https://"].iter().any(|web| before.ends_with(web));
-        let address = match address.split_once('?') {
-            Some((address, _)) if is_web => address,
-            _ => address,
-        };
-        let is_user = |user: &&str| user.contains(':');
-        let host = match address.rsplit_once('@').filter(|(user, _)| is_user(user)) {
-            Some((_, host)) => host,
-            None => address,
-        };
-        out.extend([before, host, behind]);
-        left = rest;
+        out.push_str(before);
+        let word = &after[..after.find(ends).unwrap_or(after.len())];
+        let host = &word[user(word)..];
+        left = &after[word.len() - host.len()..];
+        let scheme = before.to_ascii_lowercase();
+        let is_web = ["http://", "https://"].iter().any(|web| scheme.ends_with(web));
+        // A list of addresses may follow: each has its turn.
+        let query = host.find('?').filter(|&at| is_web && !host[..at].contains(SCHEME));
+        if let Some(query) = query {
+            // What ends the name in the message, such as a colon.
+            let behind = host.trim_end_matches([':', ',', ';', '.', ')', '\'']).len().max(query);
+            out.extend([&host[..query], &host[behind..]]);
+            left = &left[host.len()..];
+        }
     }
     out.push_str(left);
     out
+}
+
+/// Length of a user and password at the beginning of an address.
+fn user(address: &str) -> usize {
+    let authority = address.split(['/', '?', '#']).next().unwrap_or_default();
+    let is_port = |text: &str| text.bytes().all(|b| b.is_ascii_digit());
+    let length = match authority.rfind('@') {
+        Some(at) if authority[..at].contains(':') => Some(at),
+        Some(_) => None,
+        // Secrets of stores have slashes.
+        None => {
+            let port = authority.split_once(':').map(|(_, port)| port);
+            port.filter(|port| !authority.starts_with('[') && !is_port(port))
+                .and_then(|_| address.find('@'))
+        }
+    };
+    length.map_or(0, |at| at + 1)
 }
 
 /// Whether a character changes the order in which those around it are shown.
@@ -107,6 +122,12 @@ mod tests {
             ("s3://ID:se/cret@bucket/x.wav, y://z?", "s3://bucket/x.wav, y://z?"),
             ("abfss://c@account/x: https://", "abfss://c@account/x: https://"),
             ("s3://b/what?.wav", "s3://b/what?.wav"),
+            ("http://h:8765/take@2.wav: io", "http://h:8765/take@2.wav: io"),
+            ("s3://lab/05-01T10:20:30@site.wav", "s3://lab/05-01T10:20:30@site.wav"),
+            ("s3://b/x.wav,s3://b/a@b.wav", "s3://b/x.wav,s3://b/a@b.wav"),
+            ("http://h/a,http://u:secret@h/b?c: d", "http://h/a,http://h/b: d"),
+            ("HTTPS://h/x?a='b'&key=secret; e", "HTTPS://h/x; e"),
+            ("http://[::1]:80/a@b", "http://[::1]:80/a@b"),
         ] {
             assert_eq!(printable(message), shown);
         }

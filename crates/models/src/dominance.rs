@@ -1,13 +1,13 @@
 //! One feature that outweighs all others in distances.
 
-use ndarray::Axis;
+use ndarray::ArrayView1;
 
 use crate::classifiers::ClassifierSpec;
 use crate::dataset::LabelledTable;
 use crate::pipeline::PipelineSpec;
 use crate::steps::StepSpec;
 
-/// Share of the variance of all features from which on a feature decides alone.
+/// Share of the squared spreads of all features from which on a feature decides alone.
 const SHARE: f64 = 0.9;
 /// Fewest features: of two, one may well say more.
 const FEATURES: usize = 3;
@@ -24,19 +24,29 @@ pub fn dominance(pipelines: &[PipelineSpec], table: &LabelledTable) -> Option<St
     if table.x.ncols() < FEATURES {
         return None;
     }
-    let variances = table.x.var_axis(Axis(0), 0.0);
+    let spreads: Vec<f64> =
+        table.x.columns().into_iter().map(|column| spread(column).powi(2)).collect();
     let (first, largest) =
-        variances.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let share = largest / variances.sum();
-    (share >= SHARE).then(|| {
+        spreads.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (largest >= SHARE * spreads.iter().sum::<f64>() && largest > 0.0).then(|| {
         format!(
-            "{} has {:.1} % of the variance of all {} features, so {name} decides by it almost alone; --standardize \
+            "{} varies so much more than the {} other features that {name} decides by it almost alone; --standardize \
              (in Python a StandardScaler before it) gives all features the same weight",
             table.feature_name(first),
-            100.0 * share,
-            table.x.ncols()
+            table.x.ncols() - 1
         )
     })
+}
+
+/// From the 10th to the 90th percentile, about: a few outliers do not count.
+fn spread(column: ArrayView1<'_, f64>) -> f64 {
+    let mut values = column.to_vec();
+    let tenth = values.len() / 10;
+    let mut at = |place: usize| *values.select_nth_unstable_by(place, f64::total_cmp).1;
+    match column.len() {
+        0 => 0.0,
+        n => at(n - 1 - tenth) - at(tenth),
+    }
 }
 
 #[cfg(test)]
@@ -59,7 +69,7 @@ mod tests {
         let spec = |name: &str| ClassifierSpec::named(name).unwrap();
         let plain = |name: &str| [PipelineSpec::plain(spec(name))];
         let said = dominance(&plain("knn"), &table(1000.0)).unwrap();
-        assert!(said.contains("100.0 % of the variance of all 3 features, so knn"), "{said}");
+        assert!(said.contains("more than the 2 other features that knn decides"), "{said}");
         assert!(dominance(&plain("svm"), &table(1000.0)).is_some());
         for (pipeline, scale) in [
             (plain("knn"), 0.1),

@@ -164,13 +164,19 @@ impl<'a> Pass<'a> {
             return self.chain(layers, input);
         }
         let parameters = self.parameters;
-        let groups = input.values.values().par_chunks(together * input.shape.len());
-        let groups: Vec<Batch> = groups
-            .map(|images| {
-                let images = Batch::new(images.to_vec(), input.shape);
-                Pass::evaluate(parameters, &[]).chain(first, images)
-            })
-            .collect();
+        let through = |images: &[f32]| {
+            let images = Batch::new(images.to_vec(), input.shape);
+            Pass::evaluate(parameters, &[]).chain(first, images)
+        };
+        let (each, mut left) = (together * input.shape.len(), input.values.values());
+        let mut groups = Vec::with_capacity(input.items().div_ceil(together));
+        // One alone packs the weights; side by side, each would pack them all.
+        if !parameters.has_packed() {
+            let (one, others) = left.split_at(each);
+            groups.push(through(one));
+            left = others;
+        }
+        groups.par_extend(left.par_chunks(each).map(through));
         let shape = groups[0].shape;
         let values: Vec<&[f32]> = groups.iter().map(|group| group.values.values()).collect();
         self.chain(rest, Batch::new(values.concat(), shape))

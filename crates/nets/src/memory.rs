@@ -27,8 +27,7 @@ pub(crate) fn of_training(network: &Network, course: &Course<'_>, recipe: &Recip
     };
     let training = step(course.train, recipe.batch, Network::kept);
     let rating = step(course.watched, TOGETHER, Network::passing);
-    // Weights are packed for it.
-    let packed = if course.watched.is_empty() { 0 } else { network.parameters().count() as u64 };
+    let packed = if course.watched.is_empty() { 0 } else { packed(network) };
     FLOAT.saturating_mul(numbers.saturating_add(packed).saturating_add(training.max(rating)))
 }
 
@@ -40,9 +39,13 @@ pub(crate) fn of_evaluation(
     recipe: &Recipe,
 ) -> u64 {
     let worst = Worst::of(network, items, rows, rows.len(), recipe);
-    // Weights are packed for it.
-    let packed = network.parameters().count() as u64;
-    FLOAT.saturating_mul(worst.numbers(network, Network::passing).saturating_add(packed))
+    let passing = worst.numbers(network, Network::passing);
+    FLOAT.saturating_mul(passing.saturating_add(packed(network)))
+}
+
+/// Numbers of the packed weights, at most: 3 x 3 kernels become sixteen numbers of nine.
+fn packed(network: &Network) -> u64 {
+    2 * network.parameters().count() as u64
 }
 
 /// Numbers for an item of these shapes.

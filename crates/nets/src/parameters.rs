@@ -135,6 +135,11 @@ impl Parameters {
         self.packed[i].get_or_init(|| packed)
     }
 
+    /// Whether any weights have been packed since they changed.
+    pub(crate) fn has_packed(&self) -> bool {
+        self.packed.iter().any(|packed| packed.get().is_some())
+    }
+
     /// A copy without the packed weights.
     pub(crate) fn unpacked(&self) -> Self {
         Self::of(self.declared.clone(), self.values.clone(), self.index.clone())

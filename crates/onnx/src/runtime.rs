@@ -36,15 +36,13 @@ impl Runtime {
         let builder = Session::builder(&self.environment).map_err(|e| refuse(e.to_string()))?;
         let mut builder =
             builder.with_intra_threads(self.threads).map_err(|e| refuse(e.to_string()))?;
-        // From memory: the runtime would read weights in other files, which the identity of this one does not cover.
+        // The identity of this file does not cover weights in others.
         let bytes = content(path).map_err(refuse)?;
-        let session =
-            builder.commit_from_memory(&bytes).map_err(|e| match names_files(&bytes) {
-                true => refuse(format!(
-                    "its weights lie in other files: export it with external_data=False ({e})"
-                )),
-                false => refuse(e.to_string()),
-            })?;
+        if names_files(&bytes) {
+            let reason = "its weights lie in other files: export it with external_data=False";
+            return Err(refuse(reason.into()));
+        }
+        let session = builder.commit_from_memory(&bytes).map_err(|e| refuse(e.to_string()))?;
         Ok(Model { path: path.into(), session })
     }
 }
@@ -62,10 +60,15 @@ fn content(path: &Path) -> std::result::Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
-/// Whether a model seems to name files with its weights: the entry `location` of a tensor's `external_data`.
+/// Whether a model names files with its weights: an entry `location` of a tensor's `external_data` (field 13), whose
+/// length takes one or two bytes.
 fn names_files(model: &[u8]) -> bool {
-    const LOCATION: &[u8] = b"\x0a\x08location";
-    model.windows(LOCATION.len()).any(|bytes| bytes == LOCATION)
+    const LOCATION: &[u8] = b"\x0a\x08location\x12";
+    const EXTERNAL: u8 = 13 << 3 | 2;
+    let is_entry =
+        |at: usize| [2, 3].iter().any(|&back| at >= back && model[at - back] == EXTERNAL);
+    let mut places = (0..model.len()).filter(|&at| model[at..].starts_with(LOCATION));
+    places.any(is_entry)
 }
 
 struct Model {
@@ -224,8 +227,11 @@ mod tests {
 
     #[test]
     fn models_with_weights_elsewhere_are_told() {
-        assert!(names_files(b"..\x0a\x08location\x12\x01w.."));
-        assert!(!names_files(b"a node called location") && !names_files(b""));
+        assert!(names_files(b"..\x6a\x0d\x0a\x08location\x12\x01w.."));
+        assert!(names_files(b"\x6a\x8c\x01\x0a\x08location\x12\x7fw"));
+        // An input, and an entry of the model's own properties (field 14).
+        assert!(!names_files(b"..\x0a\x08location\x12\x01w..") && !names_files(b""));
+        assert!(!names_files(b"\x72\x0d\x0a\x08location\x12\x01w"));
         assert!(content(Path::new(".")).unwrap_err().contains("expected a file"));
     }
 }

@@ -68,12 +68,9 @@ impl Figure {
     }
 
     /// Writes `NAME.svg` and `NAME.pdf` into a folder.
-    ///
-    /// # Errors
-    /// [`ReportError::Write`] when a file cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<()> {
+    pub(crate) fn write(&self, folder: &Path, name: &str) -> Result<()> {
         let put = |extension: &str, bytes: &[u8]| {
-            let path = folder.join(format!("{}.{extension}", self.name));
+            let path = folder.join(format!("{name}.{extension}"));
             draft::write(&path, bytes).map_err(ReportError::Write)
         };
         put("svg", self.svg.as_bytes())?;

@@ -1,5 +1,6 @@
 //! A report as a page and as files.
 
+use std::collections::HashSet;
 use std::io::ErrorKind;
 use std::path::{Component, Path};
 
@@ -64,9 +65,14 @@ impl Report {
         }
         let grouped = self.sections.iter().flat_map(|s| &s.groups).flat_map(|g| &g.figures);
         let shown = self.sections.iter().flat_map(|s| &s.figures);
+        let mut names = HashSet::new();
         for figure in shown.chain(grouped).chain(more) {
-            figure.write(&places[1])?;
-            files.extend(["svg", "pdf"].map(|e| format!("{figures}/{}.{e}", figure.name)));
+            // Methods of other names may have one name in small letters.
+            let numbered = (2..).map(|n| format!("{}-{n}", figure.name));
+            let mut names_of = std::iter::once(figure.name.clone()).chain(numbered);
+            let Some(name) = names_of.find(|name| names.insert(name.clone())) else { continue };
+            figure.write(&places[1], &name)?;
+            files.extend(["svg", "pdf"].map(|e| format!("{figures}/{name}.{e}")));
         }
         let document = Document { report: self, files: &files };
         put(&dir.join("report.json"), serde_json::to_string_pretty(&document)?.as_bytes())?;
@@ -74,15 +80,51 @@ impl Report {
     }
 }
 
+/// An earlier `report.json`.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Earlier {
+    /// Not in the first reports.
+    files: Option<Vec<String>>,
+    sections: Vec<EarlierSection>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct EarlierSection {
+    tables: Vec<Named>,
+    figures: Vec<Named>,
+    groups: Vec<EarlierSection>,
+}
+
+#[derive(Deserialize)]
+struct Named {
+    name: String,
+}
+
+impl EarlierSection {
+    fn files(&self) -> Vec<String> {
+        let [tables, figures] = FOLDERS;
+        let of_tables = self
+            .tables
+            .iter()
+            .flat_map(|t| ["csv", "tex"].map(|e| format!("{tables}/{}.{e}", t.name)));
+        let of_figures = self
+            .figures
+            .iter()
+            .flat_map(|f| ["svg", "pdf"].map(|e| format!("{figures}/{}.{e}", f.name)));
+        let of_groups = self.groups.iter().flat_map(Self::files);
+        of_tables.chain(of_figures).chain(of_groups).collect()
+    }
+}
+
 /// The files that an earlier report says it wrote.
 fn earlier(dir: &Path) -> Vec<String> {
-    #[derive(Deserialize)]
-    struct Earlier {
-        files: Vec<String>,
-    }
     let written = std::fs::read(dir.join("report.json")).ok();
     let written = written.and_then(|text| serde_json::from_slice::<Earlier>(&text).ok());
-    let mut files = written.map(|earlier| earlier.files).unwrap_or_default();
+    let Earlier { files, sections } = written.unwrap_or_default();
+    let named = || sections.iter().flat_map(EarlierSection::files).collect();
+    let mut files = files.unwrap_or_else(named);
     files.retain(|name| is_ours(Path::new(name)));
     files
 }

@@ -124,10 +124,22 @@ fn every_table_and_figure_has_its_files() {
     assert_eq!(json["sections"][0]["tables"][0]["rows"][0]["cells"][1], 91.31);
     // The next report removes what this one wrote, and nothing else.
     let at = |name: &str| dir.path().join(name);
+    let twice = [report().sections[0].figures[0].clone()];
+    report().write(dir.path(), &twice).unwrap();
+    assert!(at("figures/first-2.svg").exists());
     std::fs::write(at("figures/own.pdf"), "mine").unwrap();
     let outside = json.as_object().unwrap().clone();
     let mut outside = serde_json::Value::from(outside);
+    // As the first reports were.
+    let mut old = outside.clone();
+    old.as_object_mut().unwrap().remove("files");
+    std::fs::write(at("report.json"), old.to_string()).unwrap();
+    corsmal_report::Report::new("empty").write(dir.path(), &[]).unwrap();
+    let left = |folder: &str| std::fs::read_dir(at(folder)).unwrap().count();
+    assert_eq!((left("tables"), left("figures")), (0, 3), "own and the second `first`");
+    report().write(dir.path(), &twice).unwrap();
     let files = outside["files"].as_array_mut().unwrap();
+    files.extend(["figures/first-2.svg", "figures/first-2.pdf"].map(Into::into));
     files.extend(["../file", "figures/../notes", "notes", "/figures/x"].map(Into::into));
     std::fs::write(at("report.json"), outside.to_string()).unwrap();
     std::fs::write(at("notes"), "mine").unwrap();

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use corsmal_ccm::CcmError;
+use corsmal_ccm::capacity::doubtful_colours;
 use corsmal_ccm::crop::{self, Written};
+use corsmal_ccm::dataset::DataSet;
 use serde_json::json;
 
 use crate::args::{Jobs, Told};
@@ -46,6 +48,9 @@ pub struct Args {
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let Args { data, detections, out, jobs, told } = args;
     let stop = crate::interrupt::flag();
+    if let Some(doubt) = doubtful_colours(&DataSet::open(&data)?.recordings) {
+        eprintln!("warning: {doubt}");
+    }
     let written = match crop::write(&data, detections.as_deref(), &out, jobs.count(), stop) {
         Err(error @ CcmError::Interrupted) => {
             eprintln!("{error}");
@@ -53,10 +58,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         }
         written => written?,
     };
-    let Written { crops, recordings, without, failed, synthetic, doubt } = written;
-    if let Some(doubt) = doubt {
-        eprintln!("warning: {doubt}");
-    }
+    let Written { crops, recordings, without, failed, synthetic } = written;
     let failures = failed.len();
     told.tell(
         || {

@@ -53,8 +53,10 @@ pub(super) fn expand(pattern: &str) -> Result<Vec<PathBuf>, InputError> {
         }
         found = next;
     }
-    // The current folder, which `**` matches too.
-    found.iter_mut().filter(|path| path.as_os_str().is_empty()).for_each(|path| path.push("."));
+    // `**` matches the current folder, too: all others lie in it.
+    if found.iter().any(|path| path.as_os_str().is_empty()) {
+        found = vec![PathBuf::from(".")];
+    }
     Ok(found)
 }
 

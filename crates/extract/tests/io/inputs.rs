@@ -108,8 +108,6 @@ fn globs_follow_the_rules_of_shells() {
     assert_eq!(at("[!2]/*.wav").unwrap(), ["1/a"]);
     assert_eq!(at("**/?.wav").unwrap(), ["1/a", "1/b/c", "2/a"]);
     assert_eq!(at("1/**").unwrap(), ["a", "b/c"]);
-    // What is in the current folder itself, too.
-    assert_eq!(at("**").unwrap(), ["1/a", "1/b/c", "2/a", "x[1]"]);
     assert_eq!(at("1/*").unwrap(), ["a", "b/c"]);
     assert_eq!(at("x[1].wav").unwrap(), ["x[1]"]);
     assert!(at("*/nothing.wav").unwrap_err().contains("no file with an audio extension"));

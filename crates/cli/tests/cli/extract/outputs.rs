@@ -16,6 +16,21 @@ fn bytes(path: &Path) -> Vec<u8> {
 const SUMMARY: &[&str] = &["--preset", "mfcc-zcr"];
 
 #[test]
+fn a_glob_of_everything_has_the_current_folder_and_those_below() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for name in ["a.wav", "d/b.wav", "d/e/c.wav"] {
+        wav(&at("in").join(name), 1, 4000, 1);
+    }
+    for (pattern, out) in [("**", "all.npz"), (".", "folder.npz")] {
+        let mut command = tool();
+        command.current_dir(at("in")).args(["extract", pattern, "-o"]).arg(at(out)).args(SUMMARY);
+        ended(&mut command).with(0);
+        assert_eq!(table(&at(out)).ids(), ["a", "d/b", "d/e/c"], "{pattern}");
+    }
+}
+
+#[test]
 fn every_kind_of_input_gives_the_same_numbers() {
     let folder = folder(6);
     let at = |name: &str| folder.path().join(name);

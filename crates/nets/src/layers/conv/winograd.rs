@@ -74,7 +74,7 @@ pub(super) fn convolution(
     let lines = images.len() / (g.width * g.channels);
     let mut out = Matrix::zeros(lines * g.width, outputs);
     let across = g.width / 2;
-    let rows = (HELD / (PRODUCTS * (g.channels + outputs))).div_ceil(across);
+    let rows = (HELD / (PRODUCTS * (g.channels + outputs))).div_ceil(across).max(1);
     let pieces = out.values_mut().par_chunks_mut(rows * 2 * g.width * outputs).enumerate();
     pieces.for_each_init(Work::default, |work, (piece, out)| {
         let first = piece * rows;
