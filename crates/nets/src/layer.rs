@@ -143,9 +143,9 @@ impl<'a> Pass<'a> {
 
     /// Through the layers of each input; the sum of what comes after them.
     pub(crate) fn network(&mut self, inputs: &[Batch], chains: &[&[Box<dyn Layer>]]) -> Batch {
-        let mut out = self.from_input(chains[0], inputs[0].clone());
+        let mut out = self.through_input(chains[0], inputs[0].clone());
         for (layers, input) in chains.iter().zip(inputs).skip(1) {
-            let more = self.from_input(layers, input.clone());
+            let more = self.through_input(layers, input.clone());
             kernels::add(out.values.values_mut(), more.values.values());
         }
         out
@@ -153,7 +153,7 @@ impl<'a> Pass<'a> {
 
     /// Through the layers of an input. In evaluation, few images at a time pass those layers that keep them images:
     /// what passes between layers stays in the cache. Later layers take all, so that their weights are read once.
-    fn from_input(&mut self, layers: &[Box<dyn Layer>], input: Batch) -> Batch {
+    fn through_input(&mut self, layers: &[Box<dyn Layer>], input: Batch) -> Batch {
         let images = match self.training {
             None => image_layers(layers, input.shape),
             Some(_) => 0,
@@ -189,14 +189,12 @@ const PASSING: usize = 1 << 21;
 /// How many layers at the beginning make images of images.
 fn image_layers(layers: &[Box<dyn Layer>], input: Shape) -> usize {
     let mut shape = input;
-    let next = |layer: &Box<dyn Layer>| {
-        shape = layer.output(shape).ok()?;
-        matches!(shape, Shape::Image { .. }).then_some(())
+    let keeps = |layer: &dyn Layer| {
+        let before = shape;
+        shape = layer.output(shape).unwrap_or(Shape::Vector(0));
+        [before, shape].iter().all(|shape| matches!(shape, Shape::Image { .. }))
     };
-    match input {
-        Shape::Image { .. } => layers.iter().map_while(next).count(),
-        _ => 0,
-    }
+    layers.iter().map(Box::as_ref).map(keeps).take_while(|keeps| *keeps).count()
 }
 
 /// What a layer keeps for the way back.

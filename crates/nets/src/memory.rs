@@ -6,7 +6,7 @@ use crate::batch::Shape;
 use crate::course::Course;
 use crate::error::{NetError, Result};
 use crate::items::{Items, TOGETHER};
-use crate::network::Network;
+use crate::network::{Input, Network};
 use crate::recipe::{Offset, OptimizerKind, Padding, Recipe, Select};
 
 const FLOAT: u64 = 4;
@@ -43,9 +43,11 @@ pub(crate) fn of_evaluation(
     FLOAT.saturating_mul(passing.saturating_add(packed(network)))
 }
 
-/// Numbers of the packed weights, at most: 3 x 3 kernels become sixteen numbers of nine.
+/// Numbers of the packed weights, at most: kernels of 3 x 3 over images become sixteen numbers of nine.
 fn packed(network: &Network) -> u64 {
-    2 * network.parameters().count() as u64
+    let is_image = |input: &Input| matches!(input.shape, Shape::Image { .. });
+    let copies = if network.inputs().iter().any(is_image) { 2 } else { 1 };
+    copies * network.parameters().count() as u64
 }
 
 /// Numbers for an item of these shapes.

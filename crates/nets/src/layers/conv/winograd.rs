@@ -33,8 +33,8 @@ struct Work {
 /// same outputs in every batch.
 pub(super) fn suits(g: Geometry, outputs: usize) -> bool {
     (g.kernel, g.stride, g.padding) == ((3, 3), 1, 1)
-        && g.height % 2 == 0
-        && g.width % 2 == 0
+        && g.height.is_multiple_of(2)
+        && g.width.is_multiple_of(2)
         && g.height * g.width >= PIXELS
         && g.channels.min(outputs) >= CHANNELS
 }
