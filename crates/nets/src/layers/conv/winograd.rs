@@ -14,15 +14,15 @@ use crate::packed::{Packed, Runs};
 const PRODUCTS: usize = 16;
 /// Fewest pixels of an image: below, reading sixteen weights for nine takes longer than it saves.
 const PIXELS: usize = 64;
-/// Fewest channels on both sides: below, changing tiles takes longer than it saves.
+/// Fewest channels on both sides: below, transforming tiles takes longer than it saves.
 const CHANNELS: usize = 8;
-/// Numbers of changed tiles and their products that a thread holds, about: they stay in the second cache.
+/// Numbers of transformed tiles and their products that a thread holds, about: they stay in the second cache.
 const HELD: usize = 1 << 17;
 
 /// Memory of a thread.
 #[derive(Default)]
 struct Work {
-    /// changed tiles `[16][tiles][channels]`
+    /// transformed tiles `[16][tiles][channels]`
     tiles: Vec<f32>,
     /// their products `[16][tiles][outputs]`
     products: Vec<f32>,
@@ -42,24 +42,27 @@ pub(super) fn suits(g: Geometry, outputs: usize) -> bool {
 /// The sixteen matrices `[outputs, inputs]` of a weight `[outputs, inputs * 9]`.
 pub(super) fn pack(weight: &Matrix) -> Vec<Packed> {
     let (outputs, inputs) = (weight.rows(), weight.cols() / 9);
-    let mut changed = vec![vec![0.0; outputs * inputs]; PRODUCTS];
+    let mut transformed = vec![vec![0.0; outputs * inputs]; PRODUCTS];
     for (pair, kernel) in weight.values().as_chunks::<9>().0.iter().enumerate() {
         let row = |y: usize| -> [f64; 3] { std::array::from_fn(|x| f64::from(kernel[3 * y + x])) };
-        let rows = changed_weights([row(0), row(1), row(2)].map(changed_weights_of_row));
-        for (to, number) in changed.iter_mut().zip(rows.as_flattened()) {
+        let rows = transformed_weights([row(0), row(1), row(2)].map(transformed_row));
+        for (to, number) in transformed.iter_mut().zip(rows.as_flattened()) {
             to[pair] = *number as f32;
         }
     }
-    changed.into_iter().map(|values| Packed::new(&Matrix::new(outputs, inputs, values))).collect()
+    transformed
+        .into_iter()
+        .map(|values| Packed::new(&Matrix::new(outputs, inputs, values)))
+        .collect()
 }
 
-fn changed_weights_of_row([a, b, c]: [f64; 3]) -> [f64; 4] {
+fn transformed_row([a, b, c]: [f64; 3]) -> [f64; 4] {
     [a, (a + b + c) / 2.0, (a - b + c) / 2.0, c]
 }
 
-fn changed_weights(rows: [[f64; 4]; 3]) -> [[f64; 4]; 4] {
+fn transformed_weights(rows: [[f64; 4]; 3]) -> [[f64; 4]; 4] {
     let columns: [[f64; 4]; 4] =
-        std::array::from_fn(|x| changed_weights_of_row([rows[0][x], rows[1][x], rows[2][x]]));
+        std::array::from_fn(|x| transformed_row([rows[0][x], rows[1][x], rows[2][x]]));
     std::array::from_fn(|y| std::array::from_fn(|x| columns[x][y]))
 }
 
@@ -83,21 +86,21 @@ pub(super) fn convolution(
         work.products.resize(PRODUCTS * tiles * outputs, 0.0);
         work.starts.clear();
         work.starts.extend((0..tiles).map(|tile| tile * g.channels));
-        Arch::new().dispatch(Change { g, images, first, to: &mut work.tiles });
-        let changed = work.tiles.chunks_exact(tiles * g.channels);
+        Arch::new().dispatch(InputTransform { g, images, first, to: &mut work.tiles });
+        let transformed = work.tiles.chunks_exact(tiles * g.channels);
         let products = work.products.chunks_exact_mut(tiles * outputs);
-        for ((values, to), weight) in changed.zip(products).zip(weights) {
+        for ((values, to), weight) in transformed.zip(products).zip(weights) {
             let starts = &work.starts;
             let runs = Runs { values, starts, count: 1, jump: 0, length: g.channels };
             weight.multiply(runs, None, to);
         }
-        Arch::new().dispatch(ChangeBack { g, products: &work.products, bias, outputs, out });
+        Arch::new().dispatch(OutputTransform { g, products: &work.products, bias, outputs, out });
     });
     out
 }
 
-/// The tiles of some rows of tiles, changed.
-struct Change<'a> {
+/// Transforms the tiles of some rows of tiles.
+struct InputTransform<'a> {
     g: Geometry,
     images: &'a [f32],
     /// row of tiles, counted over all images
@@ -105,7 +108,7 @@ struct Change<'a> {
     to: &'a mut [f32],
 }
 
-impl WithSimd for Change<'_> {
+impl WithSimd for InputTransform<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -138,34 +141,34 @@ impl WithSimd for Change<'_> {
                 pixels,
                 to,
                 #[inline(always)]
-                |d| changed(simd, d),
+                |d| input_tile(simd, d),
             );
         }
     }
 }
 
-/// A tile, changed along its columns, then along its rows.
+/// A tile, transformed along its columns, then along its rows.
 #[inline(always)]
-fn changed<S: Simd>(simd: S, d: [S::f32s; PRODUCTS]) -> [S::f32s; PRODUCTS] {
+fn input_tile<S: Simd>(simd: S, d: [S::f32s; PRODUCTS]) -> [S::f32s; PRODUCTS] {
     let mut columns = [[simd.splat_f32s(0.0); 4]; 4];
     for (x, column) in columns.iter_mut().enumerate() {
-        *column = changed_line(simd, [d[x], d[4 + x], d[8 + x], d[12 + x]]);
+        *column = input_line(simd, [d[x], d[4 + x], d[8 + x], d[12 + x]]);
     }
     let mut all = d;
     let [a, b, c, d] = columns;
     for (y, row) in all.as_chunks_mut::<4>().0.iter_mut().enumerate() {
-        *row = changed_line(simd, [a[y], b[y], c[y], d[y]]);
+        *row = input_line(simd, [a[y], b[y], c[y], d[y]]);
     }
     all
 }
 
 #[inline(always)]
-fn changed_line<S: Simd>(simd: S, [a, b, c, d]: [S::f32s; 4]) -> [S::f32s; 4] {
+fn input_line<S: Simd>(simd: S, [a, b, c, d]: [S::f32s; 4]) -> [S::f32s; 4] {
     [simd.sub_f32s(a, c), simd.add_f32s(b, c), simd.sub_f32s(c, b), simd.sub_f32s(b, d)]
 }
 
 /// The outputs of some rows of tiles from their products.
-struct ChangeBack<'a> {
+struct OutputTransform<'a> {
     g: Geometry,
     products: &'a [f32],
     bias: Option<&'a [f32]>,
@@ -173,7 +176,7 @@ struct ChangeBack<'a> {
     out: &'a mut [f32],
 }
 
-impl WithSimd for ChangeBack<'_> {
+impl WithSimd for OutputTransform<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -200,7 +203,7 @@ impl WithSimd for ChangeBack<'_> {
                     from,
                     [a, b, c, d],
                     #[inline(always)]
-                    |m| changed_back(simd, m),
+                    |m| output_tile(simd, m),
                 );
                 tile += 1;
             }
@@ -210,14 +213,14 @@ impl WithSimd for ChangeBack<'_> {
 
 /// The outputs of a tile from its products, which the bias follows.
 #[inline(always)]
-fn changed_back<S: Simd>(simd: S, m: [S::f32s; PRODUCTS + 1]) -> [S::f32s; 4] {
+fn output_tile<S: Simd>(simd: S, m: [S::f32s; PRODUCTS + 1]) -> [S::f32s; 4] {
     let mut columns = [[simd.splat_f32s(0.0); 2]; 4];
     for (x, column) in columns.iter_mut().enumerate() {
-        *column = changed_line_back(simd, [m[x], m[4 + x], m[8 + x], m[12 + x]]);
+        *column = output_line(simd, [m[x], m[4 + x], m[8 + x], m[12 + x]]);
     }
     let [a, b, c, d] = columns;
-    let upper = changed_line_back(simd, [a[0], b[0], c[0], d[0]]);
-    let lower = changed_line_back(simd, [a[1], b[1], c[1], d[1]]);
+    let upper = output_line(simd, [a[0], b[0], c[0], d[0]]);
+    let lower = output_line(simd, [a[1], b[1], c[1], d[1]]);
     let bias = m[PRODUCTS];
     [
         simd.add_f32s(upper[0], bias),
@@ -228,17 +231,17 @@ fn changed_back<S: Simd>(simd: S, m: [S::f32s; PRODUCTS + 1]) -> [S::f32s; 4] {
 }
 
 #[inline(always)]
-fn changed_line_back<S: Simd>(simd: S, [a, b, c, d]: [S::f32s; 4]) -> [S::f32s; 2] {
+fn output_line<S: Simd>(simd: S, [a, b, c, d]: [S::f32s; 4]) -> [S::f32s; 2] {
     [simd.add_f32s(simd.add_f32s(a, b), c), simd.sub_f32s(simd.sub_f32s(b, c), d)]
 }
 
-/// `change` of numbers side by side in slices of one length, vector by vector.
+/// `transform` of numbers side by side in slices of one length, vector by vector.
 #[inline(always)]
 fn each_vector<S: Simd, const N: usize, const M: usize>(
     simd: S,
     from: [&[f32]; N],
     to: [&mut [f32]; M],
-    change: impl Fn([S::f32s; N]) -> [S::f32s; M],
+    transform: impl Fn([S::f32s; N]) -> [S::f32s; M],
 ) {
     let from = from.map(S::as_simd_f32s);
     let mut to = to.map(S::as_mut_simd_f32s);
@@ -246,12 +249,12 @@ fn each_vector<S: Simd, const N: usize, const M: usize>(
     let heads: [&[S::f32s]; N] = std::array::from_fn(|k| &from[k].0[..whole]);
     let mut into: [&mut [S::f32s]; M] = to.each_mut().map(|to| &mut to.0[..whole]);
     for v in 0..whole {
-        let changed = change(std::array::from_fn(|k| heads[k][v]));
-        into.iter_mut().zip(changed).for_each(|(to, number)| to[v] = number);
+        let transformed = transform(std::array::from_fn(|k| heads[k][v]));
+        into.iter_mut().zip(transformed).for_each(|(to, number)| to[v] = number);
     }
     if !from[0].1.is_empty() {
-        let changed = change(std::array::from_fn(|k| simd.partial_load_f32s(from[k].1)));
-        to.iter_mut().zip(changed).for_each(|(to, v)| simd.partial_store_f32s(to.1, v));
+        let transformed = transform(std::array::from_fn(|k| simd.partial_load_f32s(from[k].1)));
+        to.iter_mut().zip(transformed).for_each(|(to, v)| simd.partial_store_f32s(to.1, v));
     }
 }
 
