@@ -59,8 +59,8 @@ pub fn name_recordings(mut inputs: Vec<Input>) -> Result<Vec<Input>, InputError>
         return Err(InputError::Store {
             name: name.clone(),
             reason: format!(
-                "several recordings have this address and differ in its query: add a column {RECORDING} to the \
-                 manifest that names the recording of each row"
+                "several recordings share this address and differ only in the query: add a column {RECORDING} to the \
+                 manifest, with a name for each recording"
             ),
         });
     }

@@ -14,6 +14,14 @@ pub enum ReportError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A file of an earlier report could not be removed.
+    #[error("cannot remove {}, which an earlier report wrote: {source}", path.display())]
+    Remove {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
     /// A file could not be written; the text names it.
     #[error(transparent)]
     Write(std::io::Error),

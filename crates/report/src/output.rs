@@ -52,7 +52,7 @@ impl Report {
             let removed = std::fs::remove_file(&path);
             removed
                 .or_else(|e| if e.kind() == ErrorKind::NotFound { Ok(()) } else { Err(e) })
-                .map_err(|source| ReportError::Folder { path, source })?;
+                .map_err(|source| ReportError::Remove { path, source })?;
         }
         let mut files = Vec::new();
         let mut rows = self.sections.iter().flat_map(|s| &s.tables).flat_map(|t| &t.rows);

@@ -191,8 +191,7 @@ fn require_names(options: &BenchmarkOptions) -> Result<()> {
         Err(CcmError::Request(match name == other {
             true => format!("{name}: given twice; names must differ"),
             false => format!(
-                "{name}: its files would have the names of those of {other}; names must differ in letters from a to z \
-                 or in digits"
+                "{name}: its files would overwrite those of {other}; names must differ in a letter (a to z) or a digit"
             ),
         }))
     };
@@ -201,7 +200,7 @@ fn require_names(options: &BenchmarkOptions) -> Result<()> {
         let file = method::file_name(name);
         if file.is_empty() {
             return Err(CcmError::Request(format!(
-                "{name}: files get this name, so it needs a letter from a to z or a digit"
+                "{name}: files are named after it, so it must contain a letter (a to z) or a digit"
             )));
         }
         if let Some(other) = seen.insert(file, name) {

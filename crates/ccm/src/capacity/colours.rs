@@ -154,8 +154,8 @@ pub fn doubtful_colours(recordings: &[Recording]) -> Option<String> {
     let mut doubtful = recordings.iter().filter(doubtful);
     let first = doubtful.next()?.path.display();
     Some(format!(
-        "{} of {} recordings, first {first}, have videos with frames that are predicted from later ones (B-frames): \
-         OpenH264 decodes some of them visibly wrong; extract the frames as PNG with ffmpeg (docs/vision.md)",
+        "the videos of {} of {} recordings (the first is {first}) have B-frames, some of which OpenH264 decodes visibly \
+         wrong: extract the frames as PNG with ffmpeg (docs/vision.md)",
         1 + doubtful.count(),
         recordings.len()
     ))

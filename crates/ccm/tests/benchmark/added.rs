@@ -35,8 +35,12 @@ fn one_name_is_not_added_twice() {
         run(&BenchmarkOptions { added, ..none() }).unwrap_err().to_string()
     };
     let said = add(["Cap A", "cap-a"]);
-    assert!(said.starts_with("cap-a: its files would have the names of those of Cap A"), "{said}");
-    assert!(add(["x", "容量"]).starts_with("容量: files get this name"), "{}", add(["x", "容量"]));
+    assert!(said.starts_with("cap-a: its files would overwrite those of Cap A"), "{said}");
+    assert!(
+        add(["x", "容量"]).starts_with("容量: files are named after it"),
+        "{}",
+        add(["x", "容量"])
+    );
 }
 
 #[test]

@@ -7,6 +7,8 @@ use corsmal_files::npz::Compression;
 use corsmal_files::outcome::Outcome;
 use corsmal_files::shard::Shard;
 
+use crate::inputs::is_stored;
+
 /// Most worker threads.
 pub const MAX_JOBS: usize = 1024;
 
@@ -70,8 +72,7 @@ pub(super) fn mixed(outcomes: &[Outcome]) -> Option<String> {
         }
     };
     // Whose queries no output has.
-    let web =
-        if first.starts_with("http") { ", or its addresses differ in their queries" } else { "" };
+    let web = if is_stored(first) { ", or its addresses differ in their queries" } else { "" };
     Some(format!("{replaced} from different versions of the file{web}; extract again"))
 }
 

@@ -312,7 +312,7 @@ fn manifests_name_objects_files_and_web_addresses() {
     fs::write(twins.at("queries.csv"), &rows).unwrap();
     let run = twins.stored(twins.at("queries.csv"), "x.npz", &[]).with(2);
     assert!(
-        run.stderr.contains("/web/get: several recordings have this address"),
+        run.stderr.contains("/web/get: several recordings share this address"),
         "{}",
         run.stderr
     );
