@@ -64,9 +64,16 @@ impl Packed {
     pub(crate) fn product(&self, values: &[f32], bias: Option<&[f32]>) -> Matrix {
         let rows = values.len() / self.inputs.max(1);
         let mut out = Matrix::zeros(rows, self.outputs);
+        self.product_into(values, bias, out.values_mut());
+        out
+    }
+
+    /// The same into `out`, whose numbers are replaced.
+    pub(crate) fn product_into(&self, values: &[f32], bias: Option<&[f32]>, out: &mut [f32]) {
+        let rows = values.len() / self.inputs.max(1);
         let share = rows.div_ceil(rayon::current_num_threads()).next_multiple_of(ROWS);
         let together = share.clamp(ROWS, TOGETHER);
-        let pieces = out.values_mut().par_chunks_mut((together * self.outputs).max(1)).enumerate();
+        let pieces = out.par_chunks_mut((together * self.outputs).max(1)).enumerate();
         pieces.for_each(|(piece, out)| {
             let first = piece * together;
             let rows = first..rows.min(first + together);
@@ -74,7 +81,6 @@ impl Packed {
             let runs = Runs { values, starts: &starts, count: 1, jump: 0, length: self.inputs };
             self.multiply(runs, bias, out);
         });
-        out
     }
 
     /// The same into `out` for rows that lie anywhere, on this thread.

@@ -49,7 +49,8 @@ impl Layer for Bidirectional {
     }
 
     fn passing(&self, input: Shape) -> usize {
-        2 * self.ahead.passing(input)
+        // The input packed and in reverse; outputs of each direction, in order, together and unpacked.
+        3 * input.len() + 7 * input.places() * self.ahead.hidden
     }
 
     fn output(&self, input: Shape) -> Result<Shape> {
@@ -71,12 +72,20 @@ impl Layer for Bidirectional {
         let packing = Packing::new(items, shape.places(), lengths.as_deref());
         let values = packing.pack(values.values(), self.ahead.inputs);
         let reversed = packing.reversed(&values);
+        let shaped = |both: &Matrix, lengths| Batch {
+            values: packing.unpack(both.values(), 2 * hidden),
+            shape: shape.with_numbers(2 * hidden),
+            lengths,
+        };
+        if pass.training.is_none() {
+            let ahead = self.ahead.all(&values, &packing, pass.parameters);
+            let back = self.back.all(&reversed, &packing, pass.parameters);
+            return shaped(&side_by_side(&ahead, &packing.reversed(&back)), lengths);
+        }
         let ahead = self.ahead.forward_layer(0, &values, &packing, pass);
         let back = self.back.forward_layer(0, &reversed, &packing, pass);
         let both = side_by_side(&ahead.hidden, &packing.reversed(&back.hidden));
-        let out = packing.unpack(both.values(), 2 * hidden);
-        let out =
-            Batch { values: out, shape: shape.with_numbers(2 * hidden), lengths: lengths.clone() };
+        let out = shaped(&both, lengths.clone());
         pass.save(|| {
             let layers = [(values, ahead), (reversed, back)];
             let layers = layers.map(|(input, states)| LayerTrace { input, states, kept: vec![] });

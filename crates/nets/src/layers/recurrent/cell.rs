@@ -62,25 +62,58 @@ impl States {
         products: Option<&Matrix>,
         bias: &[f32],
     ) {
-        let (n, cell) = (self.hidden.cols(), self.cell);
-        let width = n * cell.gates();
-        let zeros = vec![0.0; width];
-        let products = products.map(Matrix::values);
+        let n = self.hidden.cols();
+        let width = n * self.cell.gates();
         let gates = &mut self.gates.values_mut()[rows.start * width..rows.end * width];
         let (inner_before, inner) = split(self.inner.values_mut(), &rows, before, n);
         let (hidden_before, hidden) = split(self.hidden.values_mut(), &rows, before, n);
-        let states = inner.par_chunks_mut(n).zip(hidden.par_chunks_mut(n));
+        let before = inner_before.zip(hidden_before).zip(products).map(|((inner, hidden), p)| {
+            Before { inner, hidden, products: p.values() }
+        });
+        self.cell.step(n, gates, before, bias, State { inner, hidden });
+    }
+}
+
+/// What a step makes, a row for each item: see [`States`].
+#[derive(Debug)]
+pub(super) struct State<'a> {
+    pub(super) inner: &'a mut [f32],
+    pub(super) hidden: &'a mut [f32],
+}
+
+/// What the step before made, with the recurrent products without their bias.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Before<'a> {
+    pub(super) inner: &'a [f32],
+    pub(super) hidden: &'a [f32],
+    pub(super) products: &'a [f32],
+}
+
+impl Cell {
+    /// One step of `n` numbers an item. `gates` are the products by the input, and become the gates themselves;
+    /// nothing is `before` the first step.
+    pub(super) fn step(
+        self,
+        n: usize,
+        gates: &mut [f32],
+        before: Option<Before<'_>>,
+        bias: &[f32],
+        state: State<'_>,
+    ) {
+        let width = n * self.gates();
+        let zeros = vec![0.0; if before.is_none() { width } else { 0 }];
+        let states = state.inner.par_chunks_mut(n).zip(state.hidden.par_chunks_mut(n));
         let all = gates.par_chunks_mut(width).zip(states).enumerate().with_min_len(ROWS);
         all.for_each(|(i, (gates, (inner, hidden)))| {
-            let product = products.map_or(&zeros[..], |p| &p[i * width..(i + 1) * width]);
-            let of = |all: Option<&'_ [f32]>| all.map_or(0..0, |_| i * n..(i + 1) * n);
-            match cell {
-                Cell::Gru => {
-                    let h = hidden_before.map_or(&zeros[..n], |h| &h[of(hidden_before)]);
+            let (cells, whole) = (i * n..(i + 1) * n, i * width..(i + 1) * width);
+            let product = before.map_or(&zeros[..], |before| &before.products[whole]);
+            match self {
+                Self::Gru => {
+                    let h = before.map_or(&zeros[..n], |before| &before.hidden[cells]);
                     gru(gates, product, bias, h, inner, hidden);
                 }
-                Cell::Lstm => {
-                    let c = inner_before.map_or(&zeros[..n], |c| &c[of(inner_before)]);
+                Self::Lstm => {
+                    let c = before.map_or(&zeros[..n], |before| &before.inner[cells]);
                     lstm(gates, product, bias, c, inner, hidden);
                 }
             }

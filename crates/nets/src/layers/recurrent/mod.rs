@@ -7,6 +7,7 @@
 
 mod bidirectional;
 mod cell;
+mod evaluation;
 #[cfg(any(test, feature = "gpu"))]
 mod on_gpu;
 mod packing;
@@ -22,7 +23,6 @@ use crate::layer::{Backward, Layer, Pass, Saved};
 use crate::layers::dropout;
 use crate::layers::linear::column;
 use crate::matrix::Matrix;
-use crate::packed::Packed;
 use crate::parameters::Declared;
 use cell::{Cell, Gradients, States};
 use packing::Packing;
@@ -71,6 +71,7 @@ impl Recurrent {
         format!("{}.{what}_l{layer}{reverse}", self.name)
     }
 
+    /// The states of all steps, which training needs; see [`evaluation`] for results alone.
     fn forward_layer(
         &self,
         layer: usize,
@@ -81,16 +82,13 @@ impl Recurrent {
         let key = |what| self.key(what, layer);
         let gates = pass.product(input, &key("weight_ih"), &key("bias_ih"));
         let mut states = States::new(self.cell, gates, self.hidden);
-        let (weight, bias) = (key("weight_hh"), pass.parameters.get(&key("bias_hh")).values());
+        let weight = pass.parameters.get(&key("weight_hh"));
+        let bias = pass.parameters.get(&key("bias_hh")).values();
         for step in 0..packing.steps() {
             let products = (step > 0).then(|| {
                 let (before, n) = (packing.rows(step - 1).start, packing.rows(step).len());
                 let rows = &states.hidden.values()[before * self.hidden..][..n * self.hidden];
-                match pass.training {
-                    None => pass.parameters.packed(&weight, Packed::new).product(rows, None),
-                    Some(_) => Matrix::new(n, self.hidden, rows.to_vec())
-                        .dot_t(pass.parameters.get(&weight)),
-                }
+                Matrix::new(n, self.hidden, rows.to_vec()).dot_t(weight)
             });
             let before = step.checked_sub(1).map(|s| packing.rows(s).start);
             states.step(packing.rows(step), before, products.as_ref(), bias);
@@ -176,8 +174,8 @@ impl Layer for Recurrent {
     }
 
     fn passing(&self, input: Shape) -> usize {
-        // Gates and states of a layer, and the outputs of the one before.
-        input.len() + input.places() * self.hidden * (self.cell.gates() + 3)
+        // Beside the input, a stretch of steps, whose size does not grow with the item.
+        input.len() + self.layers * self.hidden * (self.cell.gates() + 8)
     }
 
     fn output(&self, input: Shape) -> Result<Shape> {
@@ -196,6 +194,10 @@ impl Layer for Recurrent {
     fn forward(&self, input: Batch, pass: &mut Pass<'_>) -> Batch {
         let (steps, items) = (input.shape.places(), input.items());
         let packing = Packing::new(items, steps, input.lengths.as_deref());
+        if pass.training.is_none() {
+            let last = self.last(input.values.values(), &packing, pass.parameters);
+            return Batch { values: last, shape: Shape::Vector(self.hidden), lengths: None };
+        }
         let mut values = packing.pack(input.values.values(), self.inputs);
         let mut layers = Vec::new();
         for layer in 0..self.layers {
@@ -209,9 +211,7 @@ impl Layer for Recurrent {
             }
             let states = self.forward_layer(layer, &values, &packing, pass);
             let output = states.hidden.clone();
-            if pass.training.is_some() {
-                layers.push(LayerTrace { input: values, states, kept });
-            }
+            layers.push(LayerTrace { input: values, states, kept });
             values = output;
         }
         let last = packing.last(values.values(), self.hidden);

@@ -46,20 +46,38 @@ impl Packing {
         self.starts[step]..self.starts[step + 1]
     }
 
+    /// All steps, as many at a time as have `most` rows together, or one.
+    pub(super) fn stretches(&self, most: usize) -> impl Iterator<Item = Range<usize>> {
+        let mut begun = 0;
+        std::iter::from_fn(move || {
+            let first = *self.starts.get(begun)?;
+            let fits = self.starts[begun..].partition_point(|start| start - first <= most);
+            let steps = begun..(begun + fits - 1).max(begun + 1);
+            begun = steps.end;
+            (steps.end < self.starts.len()).then_some(steps)
+        })
+    }
+
     pub(super) fn total(&self) -> usize {
         self.starts[self.steps()]
     }
 
     /// `[items * padded, n]` to packed rows.
     pub(super) fn pack(&self, values: &[f32], n: usize) -> Matrix {
-        let mut out = Vec::with_capacity(self.total() * n);
-        for step in 0..self.steps() {
+        self.pack_steps(0..self.steps(), values, n)
+    }
+
+    /// The packed rows of these steps.
+    pub(super) fn pack_steps(&self, steps: Range<usize>, values: &[f32], n: usize) -> Matrix {
+        let rows = self.starts[steps.end] - self.starts[steps.start];
+        let mut out = Vec::with_capacity(rows * n);
+        for step in steps {
             for &item in &self.order[..self.rows(step).len()] {
                 let at = (item * self.padded + step) * n;
                 out.extend_from_slice(&values[at..at + n]);
             }
         }
-        Matrix::new(self.total(), n, out)
+        Matrix::new(rows, n, out)
     }
 
     /// Packed rows to `[items * padded, n]`, zeros where there is nothing.
@@ -79,18 +97,30 @@ impl Packing {
     /// The last step of every sequence, in the order of the items: `[items, n]`.
     pub(super) fn last(&self, values: &[f32], n: usize) -> Matrix {
         let mut out = Matrix::zeros(self.items(), n);
-        let all = out.values_mut();
-        self.ends(|row, item| {
+        self.last_of_steps(0..self.steps(), values, n, &mut out);
+        out
+    }
+
+    /// Of packed rows of these steps, those that are the last of their sequences, to the rows of their items.
+    pub(super) fn last_of_steps(
+        &self,
+        steps: Range<usize>,
+        values: &[f32],
+        n: usize,
+        out: &mut Matrix,
+    ) {
+        let (all, first) = (out.values_mut(), self.starts[steps.start]);
+        self.ends(steps, |row, item| {
+            let row = row - first;
             all[item * n..(item + 1) * n].copy_from_slice(&values[row * n..(row + 1) * n]);
         });
-        out
     }
 
     /// Packed rows that are zero but for the last step of every sequence.
     pub(super) fn only_last(&self, values: &[f32], n: usize) -> Matrix {
         let mut out = Matrix::zeros(self.total(), n);
         let all = out.values_mut();
-        self.ends(|row, item| {
+        self.ends(0..self.steps(), |row, item| {
             all[row * n..(row + 1) * n].copy_from_slice(&values[item * n..(item + 1) * n]);
         });
         out
@@ -113,9 +143,9 @@ impl Packing {
         Matrix::new(rows.rows(), n, out)
     }
 
-    /// For each item the row of its last step.
-    fn ends(&self, mut each: impl FnMut(usize, usize)) {
-        for step in 0..self.steps() {
+    /// For each item that ends in these steps, the row of its last step.
+    fn ends(&self, steps: Range<usize>, mut each: impl FnMut(usize, usize)) {
+        for step in steps {
             let rows = self.rows(step);
             let go_on = if step + 1 < self.steps() { self.rows(step + 1).len() } else { 0 };
             (go_on..rows.len()).for_each(|place| each(rows.start + place, self.order[place]));
@@ -160,6 +190,11 @@ mod tests {
         assert_eq!(packing.reversed(&reversed).values(), packed.values());
         let before = packing.states_before(packed.values(), 1).unwrap();
         assert_eq!(before.values(), [4.0, 0.0, 5.0, 6.0]);
+        let of = |most| packing.stretches(most).collect::<Vec<_>>();
+        assert_eq!(of(100), [0..4]);
+        assert_eq!(of(1), [0..1, 1..2, 2..3, 3..4]);
+        assert_eq!(of(3), [0..1, 1..2, 2..4]);
+        assert!(Packing::new(0, 4, None).stretches(9).next().is_none());
         let short = Packing::new(2, 1, None);
         assert!(short.states_before(&[1.0, 2.0], 1).is_none());
     }
