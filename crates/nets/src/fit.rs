@@ -170,7 +170,7 @@ mod tests {
     fn a_long_item_is_not_classified_with_many() {
         let definition = networks::named("m5_vggish_level").unwrap();
         let network = definition.build(None, 0).unwrap();
-        let long = vec![0.0; 128 * 60_000];
+        let long = vec![0.0; 128 * 200_000];
         let mut column = Column::of([&long[..]]);
         (0..70).for_each(|_| column.push(&[0.0; 128]));
         let items = Items { columns: vec![column] };

@@ -67,9 +67,10 @@ impl States {
         let gates = &mut self.gates.values_mut()[rows.start * width..rows.end * width];
         let (inner_before, inner) = split(self.inner.values_mut(), &rows, before, n);
         let (hidden_before, hidden) = split(self.hidden.values_mut(), &rows, before, n);
-        let before = inner_before.zip(hidden_before).zip(products).map(|((inner, hidden), p)| {
-            Before { inner, hidden, products: p.values() }
-        });
+        let before = inner_before
+            .zip(hidden_before)
+            .zip(products)
+            .map(|((inner, hidden), p)| Before { inner, hidden, products: p.values() });
         self.cell.step(n, gates, before, bias, State { inner, hidden });
     }
 }
@@ -89,6 +90,16 @@ pub(super) struct Before<'a> {
     pub(super) products: &'a [f32],
 }
 
+impl Before<'_> {
+    fn row(self, i: usize, n: usize, width: usize) -> Self {
+        Self {
+            inner: &self.inner[i * n..(i + 1) * n],
+            hidden: &self.hidden[i * n..(i + 1) * n],
+            products: &self.products[i * width..(i + 1) * width],
+        }
+    }
+}
+
 impl Cell {
     /// One step of `n` numbers an item. `gates` are the products by the input, and become the gates themselves;
     /// nothing is `before` the first step.
@@ -101,21 +112,15 @@ impl Cell {
         state: State<'_>,
     ) {
         let width = n * self.gates();
-        let zeros = vec![0.0; if before.is_none() { width } else { 0 }];
+        let zeros = vec![0.0; width];
+        let zeros = Before { inner: &zeros[..n], hidden: &zeros[..n], products: &zeros };
         let states = state.inner.par_chunks_mut(n).zip(state.hidden.par_chunks_mut(n));
         let all = gates.par_chunks_mut(width).zip(states).enumerate().with_min_len(ROWS);
         all.for_each(|(i, (gates, (inner, hidden)))| {
-            let (cells, whole) = (i * n..(i + 1) * n, i * width..(i + 1) * width);
-            let product = before.map_or(&zeros[..], |before| &before.products[whole]);
+            let before = before.map_or(zeros, |before| before.row(i, n, width));
             match self {
-                Self::Gru => {
-                    let h = before.map_or(&zeros[..n], |before| &before.hidden[cells]);
-                    gru(gates, product, bias, h, inner, hidden);
-                }
-                Self::Lstm => {
-                    let c = before.map_or(&zeros[..n], |before| &before.inner[cells]);
-                    lstm(gates, product, bias, c, inner, hidden);
-                }
+                Self::Gru => gru(gates, before.products, bias, before.hidden, inner, hidden),
+                Self::Lstm => lstm(gates, before.products, bias, before.inner, inner, hidden),
             }
         });
     }

@@ -100,9 +100,9 @@ impl Recurrent {
         let mut out = Matrix::zeros(packing.items(), self.hidden);
         for steps in packing.stretches(self.rows_together()) {
             let packed = packing.pack_steps(steps.clone(), values, self.inputs);
-            let outputs = layers.iter_mut().fold(packed.values(), |input, layer| {
-                layer.stretch(steps.clone(), input, packing)
-            });
+            let outputs = layers
+                .iter_mut()
+                .fold(packed.values(), |input, layer| layer.stretch(steps.clone(), input, packing));
             packing.last_of_steps(steps, outputs, self.hidden, &mut out);
         }
         out
