@@ -101,9 +101,13 @@ pub fn into_windows(
     }
     let mut windows = Vec::new();
     for ((input, header), length) in inputs.into_iter().zip(headers).zip(lengths) {
-        if input.source == InputSource::Stdin {
-            let reason = "standard input cannot be cut into windows; classify --window can";
-            return Err(InputError::Window { id: input.id, reason: reason.into() });
+        if input.source.comes_once() {
+            let name = match &input.source {
+                InputSource::Pipe(path) => format!("{} is no file, so it", path.display()),
+                _ => "standard input".into(),
+            };
+            let reason = format!("{name} cannot be cut into windows; classify --window can");
+            return Err(InputError::Window { id: input.id, reason });
         }
         match header.zip(length) {
             Some((header, length)) => {

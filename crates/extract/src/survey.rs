@@ -29,7 +29,7 @@ pub struct Header {
     pub seekable: bool,
 }
 
-/// The header of each input, every file opened once; `None` for standard input and for what cannot
+/// The header of each input, every file opened once; `None` for what comes once and for what cannot
 /// be read, which the run will say. Waiting for stores ends when `stop` is set.
 pub fn headers(inputs: &[Input], stop: &Arc<AtomicBool>) -> Vec<Option<Header>> {
     let mut sources: Vec<&InputSource> = inputs.iter().filter_map(again).collect();
@@ -59,7 +59,7 @@ fn on_threads<T: Send>(waits: bool, work: impl FnOnce() -> T + Send) -> T {
 
 /// What can be read again afterwards.
 fn again(input: &Input) -> Option<&InputSource> {
-    (input.source != InputSource::Stdin).then_some(&input.source)
+    (!input.source.comes_once()).then_some(&input.source)
 }
 
 fn of(source: &dyn BlockSource) -> Header {

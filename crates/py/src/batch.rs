@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 
 use crate::arrays::into_numpy;
-use crate::errors::{RunError, value_error};
+use crate::errors::{run_error, value_error};
 use crate::extract::{config_of, input_error, interruptible};
 use crate::pool::jobs;
 
@@ -40,7 +40,7 @@ impl Source {
                 InputSource::Member(Box::new(Member { archive, path, offset, size, fault }))
             }
             Self::Path(path) => match place_of(path)? {
-                Place::File(path) => InputSource::File(path),
+                Place::File(path) => InputSource::at(path),
                 Place::Object(object) => InputSource::Object(object),
             },
         })
@@ -126,7 +126,7 @@ impl PyRecordings {
 fn stopped(error: Stopped) -> PyErr {
     match error {
         Stopped::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
-        other => RunError::new_err(other.to_string()),
+        other => run_error(&other),
     }
 }
 

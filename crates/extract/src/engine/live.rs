@@ -1,6 +1,8 @@
-//! Standard input whose reader does not wait when it is asked to stop.
+//! Standard input and pipes whose reader does not wait when it is asked to stop.
 
+use std::fs::File;
 use std::io::{self, Read};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -41,6 +43,24 @@ impl Live {
             }
         });
         Self { parts, part: Vec::new(), taken: 0, stop }
+    }
+}
+
+/// A pipe that is opened when it is read: opening it waits for whoever writes to it.
+pub struct Pipe {
+    /// where it is
+    pub path: PathBuf,
+    /// once it is
+    pub opened: Option<File>,
+}
+
+impl Read for Pipe {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let file = match self.opened.take() {
+            Some(file) => file,
+            None => File::open(&self.path)?,
+        };
+        self.opened.insert(file).read(into)
     }
 }
 

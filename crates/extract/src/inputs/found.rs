@@ -26,7 +26,7 @@ impl Found {
     /// A recording at `path`, which is `relative` to its root.
     pub(super) fn file(path: PathBuf, relative: PathBuf) -> Self {
         Self {
-            source: InputSource::File(path),
+            source: InputSource::at(path),
             naming: Naming::Derived(relative),
             start: None,
             end: None,

@@ -99,7 +99,7 @@ fn forms(found: &Found) -> Vec<String> {
         (Naming::Given(id), _) => vec![id.clone()],
         (Naming::Derived(relative), source) => {
             let path = match source {
-                InputSource::File(path) => path.clone(),
+                InputSource::File(path) | InputSource::Pipe(path) => path.clone(),
                 InputSource::Object(object) => stored::path_in_store(object).into(),
                 InputSource::Member(member) => member.path.clone(),
                 InputSource::Memory(_) | InputSource::Stdin => return vec![id_of(relative)],
@@ -122,7 +122,10 @@ fn forms(found: &Found) -> Vec<String> {
 fn place(found: &Found) -> Option<&InputSource> {
     match &found.source {
         InputSource::File(_) | InputSource::Object(_) => Some(&found.source),
-        InputSource::Member(_) | InputSource::Memory(_) | InputSource::Stdin => None,
+        InputSource::Pipe(_)
+        | InputSource::Member(_)
+        | InputSource::Memory(_)
+        | InputSource::Stdin => None,
     }
 }
 

@@ -1,6 +1,7 @@
 //! A recording of a run.
 
 use std::fmt;
+use std::fs::Metadata;
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -17,6 +18,8 @@ use super::stored::{self, Object, Pin, Purpose};
 pub enum InputSource {
     /// A file.
     File(PathBuf),
+    /// A pipe or device, whose bytes come once.
+    Pipe(PathBuf),
     /// An object of a store, or a file on a web server.
     Object(Arc<Object>),
     /// A member of a tar archive.
@@ -30,7 +33,7 @@ pub enum InputSource {
 impl fmt::Display for InputSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::File(path) => path.display().fmt(f),
+            Self::File(path) | Self::Pipe(path) => path.display().fmt(f),
             Self::Object(object) => object.fmt(f),
             Self::Member(member) => member.path.display().fmt(f),
             // What tells them apart.
@@ -41,6 +44,20 @@ impl fmt::Display for InputSource {
 }
 
 impl InputSource {
+    /// The file, pipe or device at a path.
+    pub fn at(path: PathBuf) -> Self {
+        let is_pipe = |meta: Metadata| !meta.is_file() && !meta.is_dir();
+        match std::fs::metadata(&path).is_ok_and(is_pipe) {
+            true => Self::Pipe(path),
+            false => Self::File(path),
+        }
+    }
+
+    /// Whether its bytes come once: what has looked at them has taken them.
+    pub fn comes_once(&self) -> bool {
+        matches!(self, Self::Pipe(_) | Self::Stdin)
+    }
+
     /// The file that holds the bytes, where there is one.
     pub fn file(&self) -> Option<&Path> {
         match self {
@@ -49,7 +66,7 @@ impl InputSource {
                 Place::File(path) => Some(path),
                 Place::Object(_) => None,
             },
-            Self::Object(_) | Self::Memory(_) | Self::Stdin => None,
+            Self::Object(_) | Self::Pipe(_) | Self::Memory(_) | Self::Stdin => None,
         }
     }
 
@@ -61,13 +78,13 @@ impl InputSource {
                 Place::Object(object) => Some(object),
                 Place::File(_) => None,
             },
-            Self::File(_) | Self::Memory(_) | Self::Stdin => None,
+            Self::File(_) | Self::Pipe(_) | Self::Memory(_) | Self::Stdin => None,
         }
     }
 
     /// Whether reading it may be waiting for bytes to come.
     pub(crate) fn waits(&self) -> bool {
-        *self == Self::Stdin || self.is_stored()
+        self.comes_once() || self.is_stored()
     }
 
     /// Whether the bytes come from a store, which takes time and can be called off.
@@ -75,7 +92,7 @@ impl InputSource {
         match self {
             Self::Object(_) => true,
             Self::Member(member) => matches!(member.archive, Place::Object(_)),
-            Self::File(_) | Self::Memory(_) | Self::Stdin => false,
+            Self::File(_) | Self::Pipe(_) | Self::Memory(_) | Self::Stdin => false,
         }
     }
 
@@ -88,7 +105,7 @@ impl InputSource {
                 Place::Object(object) => Some(stored::pin_to_listed(object)),
                 Place::File(_) => None,
             },
-            Self::File(_) | Self::Memory(_) | Self::Stdin => None,
+            Self::File(_) | Self::Pipe(_) | Self::Memory(_) | Self::Stdin => None,
         }
     }
 
@@ -132,7 +149,7 @@ impl InputSource {
         with: (&Pin, &Arc<AtomicBool>),
     ) -> Result<Box<dyn BlockSource>, AudioError> {
         match self {
-            Self::File(path) => corsmal_audio::open(path),
+            Self::File(path) | Self::Pipe(path) => corsmal_audio::open(path),
             Self::Object(object) => {
                 let failed = |source| AudioError::Open { path: object.to_string().into(), source };
                 let blocks = stored::open(object, None, purpose, with).map_err(failed)?;
@@ -156,7 +173,7 @@ impl InputSource {
             Self::Object(object) => stored::identity_now(object, stop),
             Self::Member(member) => member.identity(stop).unwrap_or_default(),
             Self::Memory(bytes) => identity::of_bytes(bytes),
-            Self::Stdin => identity::STREAM.to_string(),
+            Self::Pipe(_) | Self::Stdin => identity::STREAM.to_string(),
         }
     }
 }

@@ -299,6 +299,12 @@ impl<'a> Search<'a> {
                         self.skipped.push(entry.path);
                         continue;
                     }
+                    Ok(meta) if !meta.is_file() => {
+                        return Err(wrong(format!(
+                            "{} is a pipe or device, whose bytes come once: give it as an input, not in a manifest",
+                            entry.path.display()
+                        )));
+                    }
                     Ok(_) => {}
                     Err(error) => {
                         let first =

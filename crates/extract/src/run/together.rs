@@ -19,7 +19,7 @@ use super::work::{self, broken, known_outcome_of, outcome_of};
 use crate::engine::reading::{self, Part};
 use crate::engine::together::{self as engine, Computed};
 use crate::engine::{Decoders, Failed, Features, Planned, Plans, Recording, Watch};
-use crate::inputs::{Input, InputSource};
+use crate::inputs::Input;
 use crate::survey::Survey;
 
 /// Completes runs that have begun, all of which make statistics, with `jobs` threads. Inputs with the same number
@@ -244,7 +244,7 @@ fn shared(
         let each = asked.iter().zip(outcomes);
         each.map(|(asked, outcome)| alone(asked, outcome, stop)).collect()
     };
-    if first.input.source == InputSource::Stdin {
+    if first.input.source.comes_once() {
         return Ok(one_by_one(outcomes));
     }
     let opened = watch.settle(reading::open(first.input, watch, Part::Whole, stop));

@@ -22,7 +22,7 @@ pub(super) enum End {
 /// The path of a recording as given.
 pub(super) fn path_of(input: &Input) -> &str {
     match &input.source {
-        InputSource::File(path) => path.to_str().unwrap_or(&input.id),
+        InputSource::File(path) | InputSource::Pipe(path) => path.to_str().unwrap_or(&input.id),
         InputSource::Member(member) => member.path.to_str().unwrap_or(&input.id),
         InputSource::Object(object) => object.name(),
         InputSource::Memory(_) => &input.id,

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use corsmal_extract::inputs::{Input, InputSource};
+use corsmal_extract::inputs::Input;
 use corsmal_extract::run::{self, RunError};
 use corsmal_files::draft;
 use corsmal_files::outcome::{Outcome, Status};
@@ -147,8 +147,7 @@ struct Answer {
 fn by_format(found: &[Input], formats: &FormatRule, meter: &Meter) -> Vec<Input> {
     let mut accepted = Vec::new();
     for input in found {
-        let can_be_read_again = input.source != InputSource::Stdin;
-        let header = can_be_read_again
+        let header = (!input.source.comes_once())
             .then(|| input.source.open_header(crate::interrupt::flag()).ok())
             .flatten();
         let spec = header.as_ref().map(|source| source.spec());

@@ -19,6 +19,7 @@ mod tensors;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use corsmal_extract::inputs::InputSource;
 use corsmal_files::feature_file::FeatureFile;
 use corsmal_files::format::Content;
 use corsmal_files::layout;
@@ -58,6 +59,13 @@ pub struct Args {
 /// Prints what the files are.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let picture = args.picture.check()?;
+    if let Some(pipe) = args.paths.iter().find(|path| InputSource::at((*path).clone()).comes_once())
+    {
+        return Err(Failure::new(format!(
+            "{}: inspect reads files more than once, and a pipe or device gives its bytes once: name a file",
+            pipe.display()
+        )));
+    }
     match args.paths.as_slice() {
         [path] if is_partitioned(path) => match &picture {
             None => output::inspect(path, args.json),

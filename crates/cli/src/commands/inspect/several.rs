@@ -57,7 +57,11 @@ pub fn inspect(paths: &[PathBuf], json: bool) -> Result<ExitCode, Failure> {
                     "{object}: inspect looks at files; extract and classify read objects in stores"
                 )));
             }
-            InputSource::Memory(_) | InputSource::Stdin => {}
+            source => {
+                return Err(Failure::new(format!(
+                    "{source}: inspect looks at files, and reads them more than once: name a file"
+                )));
+            }
         }
     }
     let lines: Vec<Line> = files.par_iter().map(|path| Line::of(path)).collect();
@@ -69,7 +73,7 @@ pub fn inspect(paths: &[PathBuf], json: bool) -> Result<ExitCode, Failure> {
 impl Line {
     fn of(path: &Path) -> Self {
         let name = path.display().to_string();
-        match look(path, None) {
+        match look(path, Vec::new()) {
             Ok(look) => {
                 Self { path: name, status: "ok", reason: None, sound: Some(Sound::of(look)) }
             }

@@ -75,20 +75,47 @@ fn a_stream_is_never_taken_for_the_one_before() {
     assert!(std::fs::read(&out).unwrap() != first);
 }
 
+/// A look at the header before the run took the beginning of what came.
 #[cfg(unix)]
 #[test]
-fn a_named_pipe_is_read_once() {
+fn a_named_pipe_is_read_once_and_from_its_beginning() {
     let folder = tempfile::tempdir().unwrap();
     let one = wav(&folder.path().join("1.wav"), 2, 4000, 1);
     let (pipe, out) = (folder.path().join("pipe"), folder.path().join("feats.npz"));
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-    let bytes = std::fs::read(one).unwrap();
-    let writer = std::thread::spawn({
-        let pipe = pipe.clone();
-        move || std::fs::write(pipe, bytes)
-    });
-    extract(&pipe, &out, &[]).with(0);
-    writer.join().unwrap().unwrap();
-    let outcome = table(&out).outcomes()[0].clone();
-    assert_eq!((outcome.status, outcome.decoded_frames), (Status::Ok, 4000));
+    let bytes = std::fs::read(&one).unwrap();
+    // The second one's table is as wide as the recordings have channels.
+    for more in [&["--overwrite"][..], &["--overwrite", "--preset", "mfcc-zcr"]] {
+        let writer = std::thread::spawn({
+            let (pipe, bytes) = (pipe.clone(), bytes.clone());
+            move || std::fs::write(pipe, bytes)
+        });
+        extract(&pipe, &out, more).with(0);
+        writer.join().unwrap().unwrap();
+        let found = table(&out);
+        let outcome = &found.outcomes()[0];
+        assert_eq!((outcome.status, outcome.decoded_frames), (Status::Ok, 4000));
+        if more.len() > 1 {
+            let file = folder.path().join("file.npz");
+            extract(&one, &file, more).with(0);
+            assert_eq!(found.values(), table(&file).values());
+        }
+    }
+    // Nobody writes to it: what needs the bytes twice is refused, and a run that waits can be ended.
+    let refused = extract(&pipe, &out, &["--window", "0.1", "--overwrite"]).with(2);
+    assert!(refused.stderr.contains("is no file, so it cannot be cut"), "{}", refused.stderr);
+    for paths in [&[&pipe][..], &[&pipe, &one]] {
+        let refused = ended(tool().arg("inspect").args(paths)).with(2);
+        assert!(refused.stderr.contains("name a file"), "{}", refused.stderr);
+    }
+    let manifest = folder.path().join("list.csv");
+    std::fs::write(&manifest, "path\npipe\n").unwrap();
+    let refused = extract(&manifest, &out, &["--overwrite"]).with(2);
+    assert!(refused.stderr.contains("not in a manifest"), "{}", refused.stderr);
+    let waits = folder.path().join("waits.npz");
+    let mut child = extraction(&pipe, &waits, &[]).spawn().unwrap();
+    while !folder.path().join("waits.npz.ledger").exists() {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    assert_eq!(crate::command::interrupt(&mut child), Some(130));
 }
