@@ -129,6 +129,13 @@ impl Outcome {
         let rate = self.sample_rate.filter(|rate| *rate > 0)?;
         Some(self.decoded_frames as f64 / f64::from(rate))
     }
+
+    /// Where the stretch lies in its recording, from and to in seconds; `None` where all of it is taken.
+    pub fn stretch(&self) -> Option<(f64, f64)> {
+        let rate = self.sample_rate.filter(|rate| *rate > 0)?;
+        let start = self.start_frame? as f64 / f64::from(rate);
+        Some((start, start + self.seconds()?))
+    }
 }
 
 #[cfg(test)]

@@ -33,7 +33,7 @@ mod table;
 pub use bands::FrequencyAxis;
 pub use error::{ReportError, Result};
 pub use figure::{Figure, FigureGroup};
-pub use look::{Look, look};
+pub use look::{Excerpt, Look, look};
 pub use overview::{Overview, View};
 pub use report::{Fact, Report, Section, Snippet, capitalised};
 pub use table::{Cell, Row, Source, Table};

@@ -1,5 +1,6 @@
 //! A recording read once: its format, its health and, on request, its picture.
 
+use std::ops::Range;
 use std::path::Path;
 
 use corsmal_audio::{AudioError, AudioSpec, Health, HealthMeter, open};
@@ -20,8 +21,8 @@ pub struct Look {
     pub health: Health,
     /// Repairs that the reader made.
     pub repairs: usize,
-    /// Waveforms and spectrograms, where a view was given.
-    pub picture: Option<RecordingPicture>,
+    /// Waveforms and spectrograms of each excerpt asked for.
+    pub pictures: Vec<RecordingPicture>,
 }
 
 impl Look {
@@ -55,20 +56,40 @@ impl Look {
     }
 }
 
+/// What is drawn of a recording.
+#[derive(Debug, Clone, Default)]
+pub struct Excerpt {
+    /// How, and where it begins.
+    pub view: View,
+    /// Where it ends, in seconds; the end of the recording where there is none.
+    pub end: Option<f64>,
+}
+
+impl Excerpt {
+    fn frames(&self, sample_rate: u32) -> Range<u64> {
+        let frame = |seconds: f64| (seconds * f64::from(sample_rate)).round() as u64;
+        frame(self.view.start)..self.end.map_or(u64::MAX, frame)
+    }
+}
+
 /// Reads a recording.
 ///
 /// # Errors
 /// [`ReportError::Audio`] when it cannot be read, [`ReportError::Spectrum`] when a view leaves nothing
 /// to show.
-pub fn look(path: &Path, view: Option<View>) -> Result<Look> {
+pub fn look(path: &Path, excerpts: Vec<Excerpt>) -> Result<Look> {
     let audio = |source: AudioError| ReportError::Audio { path: path.into(), source };
     let spectrum = |source| ReportError::Spectrum { path: path.into(), source };
     let mut source = open(path).map_err(audio)?;
     let spec = source.spec().clone();
     let channels = usize::from(spec.channels);
     let mut meter = HealthMeter::new(channels, spec.sample_rate);
-    let overview = view.map(|view| Overview::new(channels, spec.sample_rate, view));
-    let mut overview = overview.transpose().map_err(spectrum)?;
+    let begin = |excerpt: Excerpt| {
+        let frames = excerpt.frames(spec.sample_rate);
+        Ok((frames, Overview::new(channels, spec.sample_rate, excerpt.view).map_err(spectrum)?))
+    };
+    let mut overviews = excerpts.into_iter().map(begin).collect::<Result<Vec<_>>>()?;
+    let mut read = 0;
     let mut block = vec![0.0; BLOCK * channels];
     loop {
         let frames = source.read(&mut block).map_err(audio)?;
@@ -77,12 +98,17 @@ pub fn look(path: &Path, view: Option<View>) -> Result<Look> {
         }
         let samples = &block[..frames * channels];
         meter.push(samples);
-        if let Some(overview) = &mut overview {
-            overview.push(samples).map_err(spectrum)?;
+        for (wanted, overview) in &mut overviews {
+            let within = |frame: u64| (frame.saturating_sub(read) as usize).min(frames);
+            let (first, end) = (within(wanted.start), within(wanted.end));
+            if first < end {
+                overview.push(&samples[first * channels..end * channels]).map_err(spectrum)?;
+            }
         }
+        read += frames as u64;
     }
     let health = meter.finish();
-    let picture = overview.map(|overview| {
+    let drawn = overviews.into_iter().map(|(_, overview)| {
         let title = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let facts = format!(
             "{} · {} ch · {} Hz · {:.2} s",
@@ -93,9 +119,9 @@ pub fn look(path: &Path, view: Option<View>) -> Result<Look> {
         );
         overview.finish(title, facts, |channel| health.notes(channel)).map_err(spectrum)
     });
-    let picture = picture.transpose()?;
+    let pictures = drawn.collect::<Result<Vec<_>>>()?;
     let repairs = source.health().repairs.len();
-    Ok(Look { spec, health, repairs, picture })
+    Ok(Look { spec, health, repairs, pictures })
 }
 
 #[cfg(test)]
@@ -120,14 +146,15 @@ mod tests {
             }
         }
         writer.finalize().unwrap();
-        let found = look(&path, Some(View::default())).unwrap();
+        let part = Excerpt { view: View { start: 0.125, ..View::default() }, end: Some(0.25) };
+        let found = look(&path, vec![Excerpt::default(), part]).unwrap();
         assert_eq!(found.seconds(), 0.5);
         assert!((found.peak_dbfs().unwrap() + 6.02).abs() < 0.1);
         assert_eq!(found.notes(), ["ch 1, 2 dead (constant)"]);
-        let picture = found.picture.unwrap();
-        assert_eq!((picture.channels.len(), picture.time), (3, (0.0, 0.5)));
-        assert!(look(&path, None).unwrap().picture.is_none());
+        let times: Vec<_> = found.pictures.iter().map(|picture| picture.time).collect();
+        assert_eq!((found.pictures[0].channels.len(), times), (3, vec![(0.0, 0.5), (0.125, 0.25)]));
+        assert!(look(&path, Vec::new()).unwrap().pictures.is_empty());
         std::fs::write(&path, "RIFF").unwrap();
-        assert!(matches!(look(&path, None), Err(ReportError::Audio { .. })));
+        assert!(matches!(look(&path, Vec::new()), Err(ReportError::Audio { .. })));
     }
 }

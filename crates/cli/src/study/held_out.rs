@@ -96,23 +96,11 @@ impl HeldOut<'_> {
         write(folder, &study.report()?, self.quiet)
     }
 
-    /// Where the windows of `extract --window` are in their recordings.
+    /// Where rows that are stretches lie in their recordings.
     fn add_stretches(&self, study: &mut Study) {
-        let columns = self.table.columns().iter();
-        let Some((_, recordings)) = columns.clone().find(|(name, _)| name == "recording") else {
-            return;
-        };
         let outcomes = self.table.outcomes.iter();
-        let lengths = outcomes.filter_map(|o| Some((o.id.as_str(), o.seconds()?)));
-        let lengths: HashMap<&str, f64> = lengths.collect();
-        let mut stretches: HashMap<&str, (f64, f64)> = HashMap::new();
-        for (id, recording) in self.table.ids.iter().zip(recordings) {
-            let start = id.strip_prefix(recording.as_str()).and_then(|rest| rest.strip_prefix('@'));
-            let start = start.and_then(|start| start.parse::<f64>().ok());
-            if let Some((start, length)) = start.zip(lengths.get(id.as_str())) {
-                stretches.insert(id, (start, start + length));
-            }
-        }
+        let stretches: HashMap<&str, (f64, f64)> =
+            outcomes.filter_map(|o| Some((o.id.as_str(), o.stretch()?))).collect();
         for prediction in &mut study.predictions {
             prediction.stretch = stretches.get(prediction.id.as_str()).copied();
         }
@@ -165,6 +153,8 @@ impl HeldOut<'_> {
             id: outcome.id.clone(),
             path: PathBuf::from(&outcome.path),
             class: class_of.get(outcome.id.as_str()).copied(),
+            stretch: outcome.stretch(),
+            identity: outcome.identity.clone(),
             unused: (!outcome.status.has_features())
                 .then(|| format!("not in the scores: {}", fault(outcome))),
         });

@@ -1,11 +1,12 @@
 //! What the recordings behind a report are like.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 
+use corsmal_files::identity;
 use corsmal_plot::RecordingPicture;
 use corsmal_report::study::{Recording, Study};
-use corsmal_report::{Look, View, look};
+use corsmal_report::{Excerpt, Look, View, look};
 use rayon::prelude::*;
 
 use crate::progress::bar;
@@ -13,68 +14,130 @@ use crate::progress::bar;
 /// Classes of which a recording is drawn.
 const PICTURES: usize = 50;
 
-/// A recording that may still be at its path.
+/// A row of a study: a recording, or a stretch of it, that may still be at its path.
 pub(super) struct Source {
     pub id: String,
     pub path: PathBuf,
     pub class: Option<usize>,
+    /// Where the stretch is in the recording, in seconds.
+    pub stretch: Option<(f64, f64)>,
+    /// What its bytes were known by; empty where that is not known.
+    pub identity: String,
     /// Why it has no features.
     pub unused: Option<String>,
 }
 
-/// Reads the recordings, each file once: their health, and a picture of the first of each class. Where
+/// A recording, and what is drawn of it.
+struct Heard {
+    source: Source,
+    present: Present,
+    examples: Vec<(usize, Excerpt)>,
+}
+
+/// What is at the path of a recording.
+#[derive(Clone, Copy, PartialEq)]
+enum Present {
+    Yes,
+    Gone,
+    /// another file
+    Changed,
+}
+
+impl Present {
+    fn of(source: &Source) -> Self {
+        let known = !source.identity.is_empty() && source.identity != identity::STREAM;
+        match source.path.is_file() {
+            false => Self::Gone,
+            true if known
+                && identity::of_file(&source.path).ok().as_ref() != Some(&source.identity) =>
+            {
+                Self::Changed
+            }
+            true => Self::Yes,
+        }
+    }
+}
+
+/// Reads the recordings, each file once: their health, and a picture of the first row of each class. Where
 /// none is at its path any more, the report does without.
 pub(super) fn add(study: &mut Study, sources: Vec<Source>, quiet: bool) {
-    let mut seen = HashSet::new();
-    let sources: Vec<Source> =
-        sources.into_iter().filter(|source| seen.insert(source.path.clone())).collect();
-    let gone = sources.iter().filter(|source| !source.path.is_file()).count();
-    if let Some(first) = sources.iter().find(|source| !source.path.is_file()) {
-        eprintln!(
-            "warning: {gone} of {} recordings are no longer at their paths, such as {}{}",
-            sources.len(),
-            first.path.display(),
-            if gone == sources.len() { "; the report leaves out their sound" } else { "" }
-        );
-    }
-    if gone == sources.len() {
+    let recordings = heard(sources);
+    warn(&recordings, Present::Gone, "are no longer at their paths");
+    warn(&recordings, Present::Changed, "are no longer those that the features were made from");
+    if recordings.iter().all(|heard| heard.present != Present::Yes) {
         return;
     }
-    let mut pictured = HashSet::new();
-    let wanted: Vec<bool> = sources
-        .iter()
-        .map(|source| {
-            let new = |class| pictured.len() < PICTURES && pictured.insert(class);
-            source.path.is_file() && source.class.is_some_and(new)
-        })
-        .collect();
-    let bar = bar(sources.len(), "recordings", quiet);
-    let looks: Vec<(Recording, Option<RecordingPicture>)> = sources
-        .par_iter()
-        .zip(wanted)
-        .map(|(source, wanted)| {
-            let recording =
-                Recording { id: source.id.clone(), class: source.class, ..Recording::default() };
-            // All channels of an array would fill a page for each class.
-            let view = wanted.then(|| View { channels: vec![0], ..View::default() });
-            let mut found = match look(&source.path, view) {
-                Ok(found) => (described(recording, &found), found.picture),
-                Err(error) => (Recording { failure: Some(error.to_string()), ..recording }, None),
-            };
-            found.0.notes.extend(source.unused.clone());
+    let bar = bar(recordings.len(), "recordings", quiet);
+    let looks: Vec<_> = recordings
+        .into_par_iter()
+        .map(|heard| {
+            let found = described(heard);
             bar.inc(1);
             found
         })
         .collect();
     bar.finish_and_clear();
-    for (recording, picture) in looks {
-        study.examples.extend(recording.class.zip(picture));
+    for (recording, pictures) in looks {
+        study.examples.extend(pictures);
         study.recordings.push(recording);
     }
     study.examples.sort_by_key(|(class, _)| *class);
 }
 
-fn described(recording: Recording, found: &Look) -> Recording {
+/// The recordings of the rows, with the first row of each class as an example. A recording with stretches of
+/// several classes has none.
+fn heard(sources: Vec<Source>) -> Vec<Heard> {
+    let mut recordings: Vec<Heard> = Vec::new();
+    let (mut known, mut pictured) = (HashMap::new(), HashSet::new());
+    for source in sources {
+        let index = *known.entry(source.path.clone()).or_insert(recordings.len());
+        let (class, stretch) = (source.class, source.stretch);
+        if index == recordings.len() {
+            let present = Present::of(&source);
+            recordings.push(Heard { source, present, examples: Vec::new() });
+        }
+        let heard = &mut recordings[index];
+        heard.source.class = heard.source.class.filter(|_| heard.source.class == class);
+        let Some(class) = class.filter(|_| heard.present == Present::Yes) else { continue };
+        if pictured.len() < PICTURES && pictured.insert(class) {
+            // All channels of an array would fill a page for each class.
+            let start = stretch.map_or(0.0, |(start, _)| start);
+            let view = View { channels: vec![0], start, ..View::default() };
+            heard.examples.push((class, Excerpt { view, end: stretch.map(|(_, end)| end) }));
+        }
+    }
+    recordings
+}
+
+fn warn(recordings: &[Heard], present: Present, what: &str) {
+    let such = || recordings.iter().filter(|heard| heard.present == present);
+    let Some(first) = such().next() else { return };
+    let (count, all) = (such().count(), recordings.len());
+    eprintln!(
+        "warning: {count} of {all} recordings {what}, such as {}; the report leaves out their sound",
+        first.source.path.display()
+    );
+}
+
+fn described(heard: Heard) -> (Recording, Vec<(usize, RecordingPicture)>) {
+    let Heard { source, present, examples } = heard;
+    let recording = Recording { id: source.id, class: source.class, ..Recording::default() };
+    let (classes, excerpts): (Vec<usize>, _) = examples.into_iter().unzip();
+    let found = match present {
+        Present::Changed => {
+            Err("another file than the one that the features were made from".into())
+        }
+        _ => look(&source.path, excerpts).map_err(|error| error.to_string()),
+    };
+    let (mut recording, pictures) = match found {
+        Ok(found) => (of_look(recording, &found), found.pictures),
+        Err(failure) => (Recording { failure: Some(failure), ..recording }, Vec::new()),
+    };
+    recording.notes.extend(source.unused);
+    (recording, classes.into_iter().zip(pictures).collect())
+}
+
+fn of_look(recording: Recording, found: &Look) -> Recording {
     Recording {
         seconds: found.seconds(),
         sample_rate: found.spec.sample_rate,

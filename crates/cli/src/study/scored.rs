@@ -35,6 +35,8 @@ pub fn write_scored(
             id: row.key.0.clone(),
             path: PathBuf::from(path),
             class: Some(prediction.truth),
+            stretch: prediction.stretch,
+            identity: String::new(),
             unused: None,
         });
         let sources = sources.collect();

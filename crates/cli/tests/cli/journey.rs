@@ -138,6 +138,49 @@ fn from_a_folder_to_a_report() {
     assert_eq!(found["sections"][0]["tables"][0]["rows"][0]["cells"][1], 100.0 * accuracy);
 }
 
+/// A recording with stretches of several classes is an example of each; another file at its path is none.
+#[test]
+fn stretches_of_one_recording_are_examples_of_their_classes() {
+    let j = Journey::begin();
+    let spec = hound::WavSpec {
+        channels: 1,
+        sample_rate: RATE,
+        bits_per_sample: 16,
+        sample_format: hound::SampleFormat::Int,
+    };
+    let mut list = String::from("path,start,end,class\n");
+    for number in 0..3 {
+        let name = format!("long{number}.wav");
+        let mut writer = hound::WavWriter::create(j.path(&name), spec).unwrap();
+        for (part, class) in ["hum", "rain", "hum", "rain"].into_iter().enumerate() {
+            let samples = sound(class, 4 * number + part as u64);
+            samples.into_iter().for_each(|s| writer.write_sample(s).unwrap());
+            let start = 1.5 * part as f64;
+            list += &format!("{name},{start},{},{class}\n", start + 1.5);
+        }
+        writer.finalize().unwrap();
+    }
+    std::fs::write(j.path("list.csv"), list).unwrap();
+    let (table, report) = (j.path("t.npz"), j.path("report"));
+    let at = ["--preset", "esc26", "--set", "signal.start=0.25", "-q"];
+    done(&[&["extract", text(&j.path("list.csv")), "-o", text(&table)], &at[..]].concat());
+    let validate = ["cross-validate", text(&table), "--target", "class", "--cv", "group=recording"];
+    let write = ["--set", "trees=25", "--report", text(&report), "--overwrite", "-q"];
+    let validate = [&validate[..], &write[..]].concat();
+    done(&validate);
+    holds(&report.join("report.html"), &["hum: long0.wav", "rain: long0.wav"]);
+
+    std::fs::copy(j.path("audio/ticks/ticks0.wav"), j.path("long0.wav")).unwrap();
+    let again = run(&validate);
+    let message = String::from_utf8_lossy(&again.stderr).into_owned();
+    assert!(again.status.success(), "{message}");
+    assert!(
+        message.contains("1 of 3 recordings are no longer those that the features"),
+        "{message}"
+    );
+    holds(&report.join("report.html"), &["hum: long1.wav", "another file than the one"]);
+}
+
 #[test]
 fn windows_are_listened_to_where_they_are() {
     let j = Journey::begin();

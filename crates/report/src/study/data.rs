@@ -132,7 +132,7 @@ pub(super) fn classes(study: &Study) -> Result<Option<Section>> {
         groups.push(FigureGroup { title: "The other classes".into(), figures: rest });
     }
     Ok(Some(Section {
-        text: vec!["The first recording of each class: waveform and spectrogram.".into()],
+        text: vec!["The first recording of each class, or the first stretch of one: waveform and spectrogram.".into()],
         groups,
         ..Section::new("examples", "An example of each class")
     }))
