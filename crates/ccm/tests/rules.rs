@@ -130,6 +130,14 @@ fn wrong_type_changes_the_mass_of_the_paper_only() {
     close(&score_rows(rows, RuleSet::Toolkit), "s8", right);
 }
 
+/// The density of a type that is not estimated is no 0, which made an empty container right.
+#[test]
+fn a_row_without_a_type_has_no_mass_in_the_paper() {
+    let mut rows = RIGHT;
+    (rows[0][1], rows[2][1]) = ("-1", "-1");
+    close(&score_rows(rows, RuleSet::Paper), "mass", 50.0);
+}
+
 #[test]
 fn tasks_not_addressed_weigh_the_mass() {
     let mut rows = RIGHT;

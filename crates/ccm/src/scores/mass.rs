@@ -39,7 +39,7 @@ impl MassInput {
 
     /// Mass per row in g: level · capacity · `density(row, type)`; -1 where level or capacity is
     /// not estimated. A missing type is passed on as `None`.
-    pub(super) fn masses(&self, density: impl Fn(usize, Option<usize>) -> f64) -> Vec<f64> {
+    pub(super) fn masses(&self, density: impl Fn(usize, Option<usize>) -> Option<f64>) -> Vec<f64> {
         (0..self.kind.len())
             .map(|row| {
                 let (level, capacity) = (self.level[row], self.capacity[row]);
@@ -52,7 +52,7 @@ impl MassInput {
                     other => other,
                 };
                 let kind = (self.kind[row] >= 0.0).then_some(self.kind[row] as usize);
-                percent / 100.0 * capacity * density(row, kind)
+                density(row, kind).map_or(-1.0, |density| percent / 100.0 * capacity * density)
             })
             .collect()
     }

@@ -127,8 +127,7 @@ impl<'a> Truth<'a> {
     }
 
     fn paper(&self, s: &Submission, input: &MassInput) -> Scores {
-        let densities = DensityTable::with_annotations(self.annotations);
-        let masses = self.masses_by_estimated_type(input, &densities);
+        let masses = self.masses_of_estimates(input);
         let mass = regression::filling_mass(&self.filling_mass, &masses);
         self.scores(
             RuleSet::Paper,
@@ -157,7 +156,7 @@ impl<'a> Truth<'a> {
                 row.container
             )));
         }
-        let masses = self.masses_by_estimated_type(input, &densities);
+        let masses = self.masses_by_estimated_type(input, &densities, Some(0.0));
         let mass = regression::filling_mass(&self.filling_mass, &masses) + 0.00493;
         // Labels are compared as text with however the annotations are written.
         let percent = self.annotations.levels_in_percent;
@@ -196,7 +195,7 @@ impl<'a> Truth<'a> {
 
         // The estimated type never enters: the annotated density decides, so that empty
         // containers are right whatever is estimated.
-        let masses = input.masses(|row, _| rows[row].density);
+        let masses = input.masses(|row, _| Some(rows[row].density));
         let offset = self.offset(rules)?;
         let weight = match (input.addressed, rules) {
             (0, _) => 0.0,
@@ -265,13 +264,25 @@ impl<'a> Truth<'a> {
         }
     }
 
-    fn masses_by_estimated_type(&self, input: &MassInput, densities: &DensityTable) -> Vec<f64> {
+    /// Masses by the estimated type; `missing` is the density where there is none.
+    fn masses_by_estimated_type(
+        &self,
+        input: &MassInput,
+        densities: &DensityTable,
+        missing: Option<f64>,
+    ) -> Vec<f64> {
         input.masses(|row, kind| {
-            // Type not estimated: density 0.
-            kind.and_then(|k| FillingType::ALL.get(k))
-                .and_then(|&k| densities.density(self.annotations.rows[row].container, k))
-                .unwrap_or(0.0)
+            let Some(kind) = kind else { return missing };
+            let container = self.annotations.rows[row].container;
+            let kind = FillingType::ALL.get(kind);
+            Some(kind.and_then(|&kind| densities.density(container, kind)).unwrap_or(0.0))
         })
+    }
+
+    /// Masses of rows whose level, capacity and type are all estimated.
+    fn masses_of_estimates(&self, input: &MassInput) -> Vec<f64> {
+        let densities = DensityTable::with_annotations(self.annotations);
+        self.masses_by_estimated_type(input, &densities, None)
     }
 
     /// Mean absolute error of the object's weight in N over rows with both masses estimated.
@@ -279,8 +290,7 @@ impl<'a> Truth<'a> {
         if input.addressed < 3 || !s.container_mass.addressed() {
             return None;
         }
-        let densities = DensityTable::with_annotations(self.annotations);
-        let masses = self.masses_by_estimated_type(input, &densities);
+        let masses = self.masses_of_estimates(input);
         let errors: Vec<f64> = (0..masses.len())
             .filter(|&i| masses[i] > -1.0 && s.container_mass.values[i] > -1.0)
             .map(|i| {
