@@ -110,7 +110,14 @@ impl Folds {
         seed: u32,
     ) -> Result<Self> {
         let y = &classes.indices().to_vec();
-        let known = || GROUPS.into_iter().find(|column| has_groups(table, column));
+        let is_target = |column: &str| {
+            let of_row = |row: usize| &labels.names()[y[row]];
+            table
+                .column(column)
+                .is_ok_and(|v| v.iter().enumerate().all(|(row, v)| v == of_row(row)))
+        };
+        let known =
+            || GROUPS.into_iter().find(|column| has_groups(table, column) && !is_target(column));
         let default = match groups.or_else(known) {
             Some(column) => CvPlan::Group(column.into()),
             None => CvPlan::K(FOLDS),
@@ -155,6 +162,12 @@ impl Folds {
         if one {
             odd.push(ONE_RECORDING.into());
         }
+        if let (CvPlan::K(_), None, Some(groups)) = (plan, column, known()) {
+            odd.push(format!(
+                "the table has a column {groups}, and rows of one {groups} are in both training and test: \
+                 --groups {groups} keeps them together"
+            ));
+        }
         odd.extend(copies::warning(table, &outer));
         let are_folds = matches!(plan, CvPlan::Fold(_)) && groups.is_none();
         let names = labels.names().to_vec();
@@ -196,6 +209,12 @@ impl Folds {
         };
         let inside: Vec<&str> = rows.iter().map(|&row| groups[row].as_str()).collect();
         let different = Labels::of(&inside).0.len();
+        if different < 2 {
+            let reason = "the training rows are all of one group, so parameters cannot be chosen on other groups \
+                          than they were fitted to: leave out --tune, or name finer groups with --groups"
+                .into();
+            return Err(ModelError::Folds { reason });
+        }
         splits::group_k_fold(&inside, different.clamp(2, FOLDS))
     }
 
@@ -317,5 +336,29 @@ mod tests {
             assert!(refused.contains(expected), "{plan}: {refused}");
         }
         assert!(folds("2", None).is_ok());
+    }
+
+    #[test]
+    fn groups_that_a_plan_splits_are_said_and_the_target_is_none() {
+        let column = |values: [&str; 4]| values.map(String::from).to_vec();
+        let columns = vec![
+            ("container".to_string(), column(["a", "b", "a", "b"])),
+            ("group".to_string(), column(["1", "1", "2", "2"])),
+        ];
+        let ids = column(["r0", "r1", "r2", "r3"]);
+        let table = LabelledTable::of_columns(std::path::Path::new("x.npz"), ids, columns);
+        let (labels, classes) = table.classes("container").unwrap();
+        let folds = |plan: Option<&CvPlan>, groups| {
+            Folds::new(plan, &table, groups, (&labels, &classes), 0).unwrap()
+        };
+        assert_eq!(folds(None, None).description, "one group of group held out");
+        let said = folds(Some(&CvPlan::K(2)), None).warnings(&classes).join(" ");
+        assert!(said.contains("column group") && said.contains("--groups group"), "{said}");
+        let kept = folds(Some(&CvPlan::K(2)), Some("group")).warnings(&classes).join(" ");
+        assert!(!kept.contains("--groups"), "{kept}");
+
+        let by_group = folds(None, None);
+        let refused = by_group.inner(&[0, 1], &classes).unwrap_err().to_string();
+        assert!(refused.contains("all of one group") && refused.contains("--tune"), "{refused}");
     }
 }

@@ -145,16 +145,7 @@ pub fn print_overall(report: &ClassReport) {
         table.row([name.to_string(), percent(score)].into_iter().chain(interval(bounds)));
     }
     println!("{}", table.text());
-    let drawn =
-        if report.drawn == "rows" { "rows".into() } else { format!("values of {}", report.drawn) };
-    println!("bootstrap over {} {drawn}", report.units);
-    if report.drawn == "rows" {
-        println!(
-            "rows of one person, place or device are not independent: name them with --groups"
-        );
-    } else if report.units < 10 {
-        println!("with so few of them, the interval says little");
-    }
+    print_drawn(&report.drawn, report.units);
     if let Some(calibration) = &report.calibration {
         println!(
             "\nBrier score {:.4}, expected calibration error {:.4}",
@@ -165,6 +156,24 @@ pub fn print_overall(report: &ClassReport) {
         println!(
             "area under the ROC curve {roc:.4}, average precision {precision:.4} (class means)"
         );
+    }
+}
+
+/// What the intervals are drawn over.
+fn print_drawn(drawn: &str, units: usize) {
+    match drawn {
+        "rows" => {
+            println!("bootstrap over {units} rows");
+            println!(
+                "rows of one person, place or device are not independent: name them with --groups"
+            );
+        }
+        column => {
+            println!("bootstrap over {units} values of {column}");
+            if units < 10 {
+                println!("with so few of them, the interval says little");
+            }
+        }
     }
 }
 
@@ -209,6 +218,7 @@ fn print_numbers(scores: &NumericScores) {
         table.row([name.to_string(), value]);
     }
     println!("{}", table.text());
+    print_drawn(&scores.drawn, scores.units);
 }
 
 /// Says what the scores may not be meant to be.

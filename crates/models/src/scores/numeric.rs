@@ -25,6 +25,10 @@ pub struct NumericScores {
     pub score: f64,
     /// 95 % bootstrap interval of the paper's score
     pub score_interval: Interval,
+    /// what was drawn for it: the name of a column, or `rows`
+    pub drawn: String,
+    /// how many of those there are
+    pub units: usize,
 }
 
 /// What stands for no estimate among `truth`: the benchmark's -1, unless a true number is negative, where -1 is a
@@ -34,14 +38,14 @@ pub fn no_estimate(truth: &[f64]) -> Option<f64> {
 }
 
 impl NumericScores {
-    /// Scores of `estimates` against `truth`, with intervals over rows or whole groups.
+    /// Scores of `estimates` against `truth`, with intervals over rows or whole groups, which are called `drawn`.
     ///
     /// # Errors
     /// Different lengths, or no rows.
     pub fn new<S: AsRef<str>>(
         truth: &[f64],
         estimates: &[Option<f64>],
-        groups: Option<&[S]>,
+        (drawn, groups): (&str, Option<&[S]>),
         (draws, seed): (usize, u64),
     ) -> Result<Self> {
         let length = |what, expected, actual| Err(ModelError::Length { what, expected, actual });
@@ -72,7 +76,8 @@ impl NumericScores {
             [rows.iter().map(|&row| of_row(row)).sum::<f64>() / rows.len().max(1) as f64]
         };
         let all: Vec<usize> = (0..truth.len()).collect();
-        let [score_interval] = intervals(&units(truth.len(), groups), draws, seed, score);
+        let units = units(truth.len(), groups);
+        let [score_interval] = intervals(&units, draws, seed, score);
         Ok(Self {
             rows: truth.len(),
             unknown: truth.len() - pairs.len(),
@@ -86,6 +91,8 @@ impl NumericScores {
             },
             score: score(&all)[0],
             score_interval,
+            drawn: drawn.into(),
+            units: units.len(),
         })
     }
 }
@@ -105,12 +112,16 @@ mod tests {
     fn a_constant_truth_is_determined_by_right_estimates_alone() {
         let r2 = |estimates: [f64; 2]| {
             let estimates = estimates.map(Some);
-            NumericScores::new::<&str>(&[1.5, 1.5], &estimates, None, (0, 0)).unwrap().r2
+            NumericScores::new::<&str>(&[1.5, 1.5], &estimates, ("rows", None), (0, 0)).unwrap().r2
         };
         assert_eq!((r2([1.5, 1.5]), r2([1.5, 2.0])), (1.0, 0.0));
         // Their mean is a bit beside them: it was -8.7e31, as scikit-learn's is.
-        let three =
-            NumericScores::new::<&str>(&[0.1; 3], &[Some(0.2), Some(0.1), Some(0.3)], None, (0, 0));
+        let three = NumericScores::new::<&str>(
+            &[0.1; 3],
+            &[Some(0.2), Some(0.1), Some(0.3)],
+            ("rows", None),
+            (0, 0),
+        );
         assert_eq!(three.unwrap().r2, 0.0);
     }
 }

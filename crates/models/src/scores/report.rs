@@ -123,7 +123,8 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
             doubts::check_spelling(self, &truth, numbers)?;
         }
         if how.numeric || numbers {
-            return self.score_numbers(&truth, groups.as_deref(), how).map(ScoreReport::Numbers);
+            let numbers = self.score_numbers(&truth, (&drawn, groups.as_deref()), how)?;
+            return Ok(ScoreReport::Numbers(numbers));
         }
         let report = self.score_classes(&truth, groups.as_deref(), drawn, how)?;
         Ok(ScoreReport::Classes(Box::new(report)))
@@ -176,7 +177,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     fn score_numbers(
         &self,
         truth: &[&str],
-        groups: Option<&[&str]>,
+        drawn: (&str, Option<&[&str]>),
         how: &Scoring,
     ) -> Result<NumericScores, PredictionError> {
         let number = |text: &str, row: usize| match text.parse::<f64>() {
@@ -199,7 +200,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         };
         let estimates: Vec<Option<f64>> =
             self.rows.iter().enumerate().map(estimate).collect::<Result<_, PredictionError>>()?;
-        NumericScores::new(&truths, &estimates, groups, (how.draws, how.seed))
+        NumericScores::new(&truths, &estimates, drawn, (how.draws, how.seed))
             .map_err(|e| self.model(e))
     }
 
