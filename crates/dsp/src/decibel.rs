@@ -41,7 +41,13 @@ impl Decibel {
 
     /// `10 log10(max(amin, |ref|))`, subtracted from every value.
     pub fn offset(&self) -> f64 {
-        10.0 * self.amin.max(self.reference.abs()).log10()
+        10.0 * self.least().log10()
+    }
+
+    /// `max(amin, |ref|)`; NaN where the reference is.
+    fn least(&self) -> f64 {
+        let reference = self.reference.abs();
+        if reference < self.amin { self.amin } else { reference }
     }
 
     /// Power values to decibels in place. The `top_db` clamp takes its maximum over the whole
@@ -93,7 +99,9 @@ impl Decibel {
             && floor.is_normal()
             && part_finite(values)
         {
-            let offset = self.offset() as f32;
+            let least = self.least() as f32;
+            // By the function of the values, so that the reference itself becomes 0.
+            let offset = if least.is_normal() { decibel(least) } else { self.offset() as f32 };
             let (low, high) = map(
                 values,
                 out,
@@ -103,7 +111,8 @@ impl Decibel {
             return (T::of(low.into()), T::of(high.into()));
         }
         if !T::SINGLE && self.amin.is_normal() && part_finite(values) {
-            let (amin, offset) = (self.amin, self.offset());
+            let (amin, least) = (self.amin, self.least());
+            let offset = if least.is_normal() { decibel_double(least) } else { self.offset() };
             return map(
                 values,
                 out,
@@ -150,7 +159,8 @@ impl Decibel {
 const PART: usize = 1 << 12;
 
 /// The larger one, NaN where one is.
-fn larger<T: Real>(a: T, b: T) -> T {
+#[inline(always)]
+pub(crate) fn larger<T: Real>(a: T, b: T) -> T {
     if a > b || a.is_nan() { a } else { b }
 }
 
@@ -198,6 +208,20 @@ mod tests {
         let mut x = vec![0.0_f64; 4];
         Decibel::default().power(&mut x).unwrap();
         assert!(x.iter().all(|v| (v + 100.0).abs() < 1e-9));
+    }
+
+    #[test]
+    fn the_reference_itself_becomes_0_and_a_reference_that_is_nan_leaves_no_number() {
+        for reference in [1.0, 0.3, 1234.567, 1e-9_f64] {
+            let decibel = Decibel { reference, ..Decibel::default() };
+            assert_eq!(decibel.of(&[reference]).unwrap(), [0.0]);
+            let single = reference as f32;
+            let decibel = Decibel { reference: f64::from(single), ..decibel };
+            assert_eq!(decibel.of(&[single]).unwrap(), [0.0]);
+        }
+        let decibel = Decibel { reference: f64::NAN, ..Decibel::default() };
+        assert!(decibel.of(&[1.0_f64, 4.0]).unwrap().iter().all(|v| v.is_nan()));
+        assert!(decibel.of(&[1.0_f32, 4.0]).unwrap().iter().all(|v| v.is_nan()));
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3, CowArray, Ix3, s};
 
+use crate::decibel::larger;
 use crate::error::{DspError, Result};
 use crate::frequency::require_rate;
 use crate::real::Real;
@@ -59,8 +60,14 @@ impl OnsetParams {
 pub fn max_filter<T: Real>(spectrum: &[T], size: usize, out: &mut [T]) {
     for (k, slot) in out.iter_mut().enumerate() {
         let window = &spectrum[window(k, size, spectrum.len())];
-        *slot = window.iter().fold(T::neg_infinity(), |m, x| x.max(m));
+        *slot = window.iter().fold(T::neg_infinity(), |most, x| larger(*x, most));
     }
+}
+
+/// What has risen; NaN stays NaN.
+#[inline(always)]
+fn risen<T: Real>(difference: T) -> T {
+    if difference < T::zero() { T::zero() } else { difference }
 }
 
 /// The `size` of `bands` bands around band `k`.
@@ -88,7 +95,7 @@ fn references<'a, T: Real>(
     for (mut highest, given) in highest.outer_iter_mut().zip(given.outer_iter()) {
         for (k, mut highest) in highest.outer_iter_mut().enumerate() {
             for band in given.slice(s![window(k, max_size, bands), ..]).outer_iter() {
-                highest.zip_mut_with(&band, |high, x| *high = x.max(*high));
+                highest.zip_mut_with(&band, |high, x| *high = larger(*x, *high));
             }
         }
     }
@@ -124,7 +131,7 @@ pub fn onset_rises<T: Real>(
         ndarray::Zip::from(&mut rises)
             .and(now)
             .and(earlier)
-            .for_each(|rise, now, earlier| *rise = (*now - *earlier).max(T::zero()));
+            .for_each(|rise, now, earlier| *rise = risen(*now - *earlier));
     }
     Ok(rises)
 }
@@ -163,8 +170,7 @@ pub fn onset_strength<T: Real>(
                 #[inline(always)]
                 || {
                     for (sum, (now, earlier)) in sums.iter_mut().zip(now.iter().zip(earlier)) {
-                        let rise = *now - *earlier;
-                        *sum += if rise > T::zero() { rise } else { T::zero() }.wide();
+                        *sum += risen(*now - *earlier).wide();
                     }
                 },
             );

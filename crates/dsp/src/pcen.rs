@@ -100,7 +100,8 @@ impl Pcen {
         let PcenParams { gain, bias, power, eps, .. } = self.params;
         // scipy.signal.lfilter([b], [1, b - 1]), transposed direct form.
         let smooth = *state + self.b * level;
-        *state = -((self.b - 1.0) * smooth);
+        // The product with the next coefficient of b, which is 0, makes NaN of what is not finite.
+        *state = 0.0 * level - (self.b - 1.0) * smooth;
         let gain = (-gain * (self.floor + (smooth / eps).ln_1p())).exp();
         if power == 0.0 {
             (value * gain).ln_1p()
