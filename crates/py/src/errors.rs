@@ -14,6 +14,13 @@ pub(crate) fn model_error(error: impl std::fmt::Display) -> PyErr {
     ModelError::new_err(error.to_string())
 }
 
+/// A run that could not go on. Its message names options as Python does.
+pub(crate) fn run_error(error: &dyn std::fmt::Display) -> PyErr {
+    let text = error.to_string();
+    let text = text.replace("--overwrite", "overwrite=True").replace("--resume", "resume=True");
+    RunError::new_err(text)
+}
+
 /// Any of our refusals as `ParameterError` (a `ValueError`).
 pub(crate) fn value_error(error: impl std::fmt::Display) -> PyErr {
     ParameterError::new_err(error.to_string())

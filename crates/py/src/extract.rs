@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use corsmal_extract::config::{Config, Preset};
@@ -21,7 +21,7 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
 use crate::arrays::{into_numpy, view2};
-use crate::errors::{ConfigError, MissingFileError, RunError, value_error};
+use crate::errors::{ConfigError, MissingFileError, run_error, value_error};
 use crate::pool::{self, compute};
 
 /// How often a run asks whether Python has a signal for us.
@@ -144,7 +144,7 @@ pub(crate) fn extract(
         };
         run::run(&inputs, &config, &options, &told, stop).map_err(|error| match error {
             run::RunError::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
-            other => RunError::new_err(other.to_string()),
+            other => run_error(&other),
         })
     };
     let mut last = (0, 0);
@@ -165,7 +165,7 @@ pub(crate) fn input_error(error: InputError) -> PyErr {
     match error {
         InputError::Stopped => PyKeyboardInterrupt::new_err(error.to_string()),
         InputError::Missing { .. } => MissingFileError::new_err(error.to_string()),
-        error => RunError::new_err(error.to_string()),
+        error => run_error(&error),
     }
 }
 
@@ -175,7 +175,7 @@ pub(crate) fn fetch(py: Python<'_>, name: &str, to: PathBuf) -> PyResult<()> {
     let work = |stop: &Arc<AtomicBool>| {
         run::fetch_to(name, &to, stop).map_err(|error| match error {
             run::RunError::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
-            other => RunError::new_err(other.to_string()),
+            other => run_error(&other),
         })
     };
     py.detach(|| interruptible(work, &mut |_| Ok(())))
@@ -236,39 +236,46 @@ impl PySignals {
     /// Begins a signal.
     fn start(&self, py: Python<'_>, sample_rate: u32, channels: u16) -> PyResult<PySignal> {
         let signal = compute(py, || self.0.start(sample_rate, channels))?.map_err(value_error)?;
-        Ok(PySignal(Some(signal)))
+        Ok(PySignal(Mutex::new(Some(signal))))
     }
 }
 
 /// One signal, pushed block by block.
 #[pyclass(name = "Signal", module = "corsmal_feat._core")]
-pub(crate) struct PySignal(Option<Signal>);
+pub(crate) struct PySignal(Mutex<Option<Signal>>);
 
 impl PySignal {
-    fn open(&mut self) -> PyResult<&mut Signal> {
-        self.0.as_mut().ok_or_else(|| value_error(FINISHED))
+    /// Works on the signal while no other thread does. The interpreter is left before the wait: a thread that
+    /// holds the signal may need it.
+    fn with<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Option<Signal>) -> T + Send,
+    ) -> PyResult<T> {
+        compute(py, || work(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner)))
     }
 }
 
 #[pymethods]
 impl PySignal {
     /// Takes samples [frames, channels].
-    fn push(&mut self, py: Python<'_>, block: PyReadonlyArrayDyn<'_, f32>) -> PyResult<()> {
+    fn push(&self, py: Python<'_>, block: PyReadonlyArrayDyn<'_, f32>) -> PyResult<()> {
         let view = view2(&block)?;
         let samples = view.as_slice().ok_or_else(|| value_error("block is not contiguous"))?;
-        let signal = self.open()?;
-        compute(py, || signal.push(samples))?.map_err(value_error)
+        let pushed = self.with(py, |signal| signal.as_mut().map(|signal| signal.push(samples)))?;
+        pushed.ok_or_else(|| value_error(FINISHED))?.map_err(value_error)
     }
 
     /// Names of the summary's values; empty without a summary.
-    fn summary_names(&mut self) -> PyResult<Vec<String>> {
-        Ok(self.open()?.plan().summary_names().to_vec())
+    fn summary_names(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        let names = |signal: &Signal| signal.plan().summary_names().to_vec();
+        self.with(py, |signal| signal.as_ref().map(names))?.ok_or_else(|| value_error(FINISHED))
     }
 
     /// The summary [values] if there is one, and frame-level features: name, whether values are
     /// pairs of real and imaginary parts, values [frames, coefficients, channels].
-    fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<Finished<'py>> {
-        let Some(signal) = self.0.take() else { return Err(value_error(FINISHED)) };
+    fn finish<'py>(&self, py: Python<'py>) -> PyResult<Finished<'py>> {
+        let Some(signal) = self.with(py, Option::take)? else { return Err(value_error(FINISHED)) };
         let channels = signal.plan().channels;
         match compute(py, || signal.finish())?.map_err(value_error)? {
             Features::Summary(row) => {

@@ -34,10 +34,36 @@ pub struct Hpss {
     /// Frames of the filter along time, bins of the filter along frequency; or one number for both.
     #[serde(deserialize_with = "one_or_two")]
     kernel_size: [usize; 2],
+    #[serde(with = "exponent")]
     power: f64,
     /// Of the harmonic and of the percussive mask; or one number for both.
     #[serde(deserialize_with = "one_or_two")]
     margin: [f64; 2],
+}
+
+/// A number, or `"inf"`, which JSON has no number for.
+mod exponent {
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    pub(super) fn serialize<S: Serializer>(power: &f64, s: S) -> Result<S::Ok, S::Error> {
+        if power.is_infinite() { s.serialize_str("inf") } else { s.serialize_f64(*power) }
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
+        #[derive(Deserialize)]
+        #[serde(untagged, expecting = "expected a number or \"inf\"")]
+        enum Power {
+            Number(f64),
+            Word(String),
+        }
+        match Power::deserialize(value)? {
+            Power::Number(power) => Ok(power),
+            Power::Word(word) if word == "inf" => Ok(f64::INFINITY),
+            Power::Word(word) => {
+                Err(D::Error::custom(format!("must be a number or \"inf\", not \"{word}\"")))
+            }
+        }
+    }
 }
 
 /// `[a, b]`, or `a` for `[a, a]`, as librosa takes them.

@@ -16,20 +16,21 @@ pub fn inspect(path: &Path, json: bool) -> Result<ExitCode, Failure> {
     match Model::load(path) {
         Ok(model) => {
             let header = model.header();
-            print!("{}", if json { to_json(header)? } else { model_text(&name, header)? });
+            print!("{}", if json { to_json(header)? } else { model_text(&name, &model)? });
             Ok(ExitCode::SUCCESS)
         }
         Err(error) => corrupt(path, &error, json),
     }
 }
 
-fn model_text(name: &str, header: &ModelHeader) -> Result<String, Failure> {
+fn model_text(name: &str, model: &Model) -> Result<String, Failure> {
+    let header = model.header();
     let document = serde_json::to_value(header)?;
     let mut out = format!(
         "{name}\n  model · corsmal-feat {} · predicts {} from {}\n",
         header.tool_version,
         header.target,
-        plural(header.feature_names.len(), "feature")
+        plural(model.n_features(), "feature")
     );
     let classes: Vec<&str> = match &document["labels"] {
         Value::Array(names) => names.iter().filter_map(Value::as_str).collect(),
@@ -55,12 +56,16 @@ fn model_text(name: &str, header: &ModelHeader) -> Result<String, Failure> {
     if !header.feature_config_hash.is_empty() {
         out.push_str(&format!("  configuration  {}\n", header.feature_config_hash));
     }
-    out.push_str(&format!("\n  corsmal-feat classify --model {name} RECORDINGS\n"));
+    let of = if header.feature_config.is_null() { "--features FILE" } else { "RECORDINGS" };
+    out.push_str(&format!("\n  corsmal-feat classify --model {name} {of}\n"));
     Ok(out)
 }
 
 /// The recordings that the model was trained on: what `classify` refuses others by.
 fn recordings(header: &ModelHeader) -> String {
+    if header.feature_config.is_null() {
+        return "none: the features are another program's, and classify takes such a table".into();
+    }
     let Some(trained) = &header.trained_on else {
         return "sample rates and channels not recorded: classify needs --any-rate".into();
     };
