@@ -172,7 +172,17 @@ def stream(
     if start:
         recording.skip(start)
     wanted = frame_length + (block_length - 1) * hop_length
-    return _blocks(recording, wanted, frame_length - hop_length, left, bool(mono), fill_value, kind)
+    overlap = frame_length - hop_length
+    blocks = _blocks(recording, wanted, overlap, left, bool(mono), fill_value, kind)
+    return _not_empty(blocks, f"{path} ends before offset = {offset} s") if start else blocks
+
+
+def _not_empty(blocks: Iterator[Floats], fault: str) -> Iterator[Floats]:
+    first = next(blocks, None)
+    if first is None:
+        raise DecodeError(fault)
+    yield first
+    yield from blocks
 
 
 def _blocks(

@@ -19,7 +19,7 @@ from .errors import ParameterError
 def power_to_db(
     S: npt.ArrayLike,
     *,
-    ref: float | Callable[..., Any] = 1.0,
+    ref: npt.ArrayLike | Callable[..., Any] = 1.0,
     amin: float = 1e-10,
     top_db: float | None = 80.0,
 ) -> Floats:
@@ -29,7 +29,7 @@ def power_to_db(
     ----------
     S : float32 or float64, any shape
         Powers; for complex values the magnitude is used, with a warning.
-    ref : float or callable
+    ref : float, array that broadcasts to the shape of `S`, or callable
         The power of 0 dB, or a function that finds it in `S`, such as `numpy.max`.
     amin : float
         Smallest power; smaller values are raised to it.
@@ -51,8 +51,11 @@ def power_to_db(
         array = np.abs(array)
     scalar = array.ndim == 0
     array = floats("S", array.astype(np.float64) if array.dtype.kind in "iu" else array, 0)
-    reference = float(abs(ref(array) if callable(ref) else ref))
+    reference: Any = np.abs(ref(array) if callable(ref) else as_array("ref", ref))
     top = None if top_db is None else number("top_db", top_db)
+    if reference.ndim:
+        return _by_each(array, reference, number("amin", amin), top)
+    reference = float(reference)
     result: Any = _core.power_to_db(
         np.ascontiguousarray(array), reference, number("amin", amin), top
     )
@@ -60,11 +63,31 @@ def power_to_db(
     return decibels
 
 
+def _by_each(powers: Floats, reference: Any, amin: float, top_db: float | None) -> Floats:
+    """Decibels by references that differ."""
+    kept = _core.power_to_db(np.ascontiguousarray(powers), amin, amin, None).reshape(powers.shape)
+    try:
+        decibels: Floats = kept - 10.0 * np.log10(np.maximum(reference, amin) / amin)
+        if decibels.shape != powers.shape:
+            raise ValueError
+    except ValueError:
+        raise ParameterError(
+            f"ref has shape {reference.shape}, which does not broadcast to that of S,"
+            f" {powers.shape}"
+        ) from None
+    decibels = decibels.astype(powers.dtype, copy=False)
+    return (
+        decibels
+        if top_db is None or not decibels.size
+        else np.maximum(decibels, decibels.max() - top_db)
+    )
+
+
 @refuses
 def amplitude_to_db(
     S: npt.ArrayLike,
     *,
-    ref: float | Callable[..., Any] = 1.0,
+    ref: npt.ArrayLike | Callable[..., Any] = 1.0,
     amin: float = 1e-5,
     top_db: float | None = 80.0,
 ) -> Floats:
@@ -92,7 +115,7 @@ def amplitude_to_db(
     if amin <= 0:
         raise ParameterError(f"amin must be above 0, not {amin}")
     magnitude = np.abs(S)
-    reference = float(abs(ref(magnitude) if callable(ref) else ref))
+    reference = np.abs(ref(magnitude) if callable(ref) else as_array("ref", ref))
     squares: Any = np.square(magnitude)
     return power_to_db(squares, ref=reference**2, amin=amin**2, top_db=top_db)
 

@@ -173,7 +173,8 @@ class Features:
         paths = {row["id"]: row["path"] for row in self.outcomes}
         files = [paths.get(i, i) for i in self.ids]
         if self.summary is not None:
-            starts, ends = np.zeros(len(files)), self._durations()
+            starts = self._starts()
+            ends = starts + self._durations()
             counts = [1] * len(files)
             columns = dict(zip(self.names, self.summary.T, strict=True))
         else:
@@ -184,7 +185,9 @@ class Features:
                 name: np.concatenate([table.get(name, _missing(len(t))) for t, table in tables])
                 for name in names
             }
+            offsets = np.repeat(self._starts(), counts)
             starts = np.concatenate([t for t, _ in tables]) if tables else np.zeros(0)
+            starts = starts + offsets
             steps = [np.diff(t, append=_next(t)) for t, _ in tables]
             ends = starts + (np.concatenate(steps) if steps else np.zeros(0))
         columns |= {k: np.repeat(np.asarray(v), counts) for k, v in self.labels.items()}
@@ -244,6 +247,17 @@ class Features:
             row = rows.get(recording, {})
             rate = row.get("sample_rate")
             return row["decoded_frames"] / rate if rate else np.nan
+
+        return np.array([seconds(i) for i in self.ids], dtype=np.float64)
+
+    def _starts(self) -> npt.NDArray[np.float64]:
+        """Where each row begins in its recording, in seconds."""
+        rows = {row["id"]: row for row in self.outcomes}
+
+        def seconds(recording: str) -> float:
+            row = rows.get(recording, {})
+            start, rate = row.get("start_frame") or 0, row.get("sample_rate")
+            return start / rate if start and rate else 0.0
 
         return np.array([seconds(i) for i in self.ids], dtype=np.float64)
 

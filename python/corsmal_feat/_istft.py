@@ -58,8 +58,8 @@ def istft(
         raise ParameterError(f"stft_matrix has {d.ndim} dimensions, expected at least 2")
     if d.shape[-1] == 0:
         raise ParameterError("stft_matrix has 0 frames, expected at least 1")
-    if d.dtype not in (np.complex64, np.complex128):
-        d = d.astype(np.complex64 if d.dtype == np.float32 else np.complex128)
+    single = d.dtype.newbyteorder("=") in (np.complex64, np.float32)
+    d = d.astype(np.complex64 if single else np.complex128, copy=False)
     if n_fft is None:
         n_fft = 2 * (d.shape[-2] - 1)
     params = stft_params(n_fft, hop_length, win_length, window, center, "constant")
@@ -70,6 +70,11 @@ def istft(
         stacked = np.ascontiguousarray(stacked)
     flat = _core.istft(stacked, params, samples)
     y: Floats = flat.reshape(*d.shape[:-2], flat.shape[-1])
+    for name, kind in (("dtype", dtype), ("out", None if out is None else out.dtype)):
+        if kind is not None and np.dtype(kind).kind not in "fc":
+            raise ParameterError(
+                f"{name} is {np.dtype(kind)}, which cannot hold samples: expected float32 or float64"
+            )
     if dtype is not None:
         y = y.astype(dtype, copy=False)
     if out is None:

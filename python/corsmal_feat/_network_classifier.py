@@ -17,7 +17,7 @@ from ._network import settings
 from ._refusals import destination, existing, seed_of
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
 from ._validation import labels_of
-from .errors import ParameterError
+from .errors import DataTypeError, ParameterError
 
 #: values of one input of all items, and where each item begins
 _Column = tuple[npt.NDArray[np.float32], list[int]]
@@ -105,7 +105,9 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         """Probabilities [shape=(items, classes)], columns in the order of `classes_`."""
         if not hasattr(self, "_model"):
             raise not_fitted(self)
-        return self._model.predict_proba(self._columns(X))
+        probabilities = self._model.predict_proba(self._columns(X))
+        # Networks compute in single precision.
+        return probabilities / probabilities.sum(axis=1, keepdims=True)
 
     def predict(self, X: Any) -> npt.NDArray[Any]:
         """The label of each item of `X`."""
@@ -186,7 +188,12 @@ def _column(items: list[Any], place: str, shape: str) -> _Column:
     expected = shape.split(" x ")
     arrays = []
     for number, item in enumerate(items):
-        array = as_array(f"item {number} of X", item, np.float32)
+        given_item = as_array(f"item {number} of X", item)
+        if given_item.dtype.kind not in "fiub":
+            raise DataTypeError(
+                f"{place}: item {number} of X has dtype {given_item.dtype}, expected real numbers"
+            )
+        array = given_item.astype(np.float32, copy=False)
         known = [
             size if size == "steps" and given else str(given)
             for size, given in zip(expected, array.shape, strict=False)

@@ -25,6 +25,7 @@ from ._arrays import (
 from ._params import FrameParams
 from ._refusals import refuses
 from .errors import ParameterError
+from .util import frame as frames_of
 
 
 @refuses
@@ -73,7 +74,12 @@ def zero_crossing_rate(
     y = audio(y)
     frame = framing(frame_length, hop_length, center)
     if callable(ref_magnitude):
-        threshold = threshold * float(ref_magnitude(abs(y)))
+        # As librosa: of the frames, in which samples come as often as frames have them.
+        ends = [(0, 0)] * (y.ndim - 1) + [(frame_length // 2,) * 2 if center else (0, 0)]
+        framed = frames_of(
+            np.pad(y, ends, mode="edge"), frame_length=frame_length, hop_length=hop_length
+        )
+        threshold = threshold * float(ref_magnitude(abs(framed)))
     elif ref_magnitude is not None:
         threshold = threshold * number("ref_magnitude", ref_magnitude)
     rate = _core.zero_crossing_rate(

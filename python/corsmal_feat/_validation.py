@@ -18,12 +18,17 @@ Matrix = npt.NDArray[np.float64]
 
 
 def names_of(X: Any) -> npt.NDArray[np.object_] | None:
-    """Column names of a data frame, if all are strings."""
+    """Column names of a data frame as strings; None without names."""
     columns = getattr(X, "columns", None)
-    if columns is None:
+    if columns is None or not len(columns):
         return None
-    names = np.asarray(list(columns), dtype=object)
-    return names if len(names) and all(isinstance(n, str) for n in names) else None
+    names = list(columns)
+    if len({isinstance(name, str) for name in names}) > 1:
+        raise DataTypeError(
+            "the column names of X are strings and others, expected strings alone:"
+            " X.columns = X.columns.astype(str) makes them so"
+        )
+    return np.array([str(name) for name in names], dtype=object)
 
 
 def features(X: Any, owner: str) -> Matrix:

@@ -34,6 +34,26 @@ FORESTS = [
 ]
 
 
+@pytest.mark.parametrize("columns", [[0, 1, 2], [10, 7, 8]])
+def test_columns_of_a_data_frame_whose_names_are_numbers_keep_their_order(
+    columns: list[int],
+) -> None:
+    pandas = pytest.importorskip("pandas")
+    x = np.random.default_rng(0).standard_normal((60, 3))
+    y = np.where(x[:, 0] > 0, "p", "n")
+    table = pandas.DataFrame(x, columns=columns)
+    tree = DecisionTree().fit(table, y)
+    assert tree.score(table, y) == tree.score(x, y) == 1
+    for other in (table[columns[::-1]], table.set_axis(["a", "b", "c"], axis=1)):
+        with pytest.raises(cf.ParameterError, match="feature names"):
+            tree.predict(other)
+    named = DecisionTree().fit(table.set_axis(["a", "b", "c"], axis=1), y)
+    with pytest.raises(cf.ParameterError, match="feature names"):
+        named.predict(table)
+    with pytest.raises(TypeError, match="column names of X are strings and others"):
+        named.predict(table.set_axis(["a", 1, "c"], axis=1))
+
+
 def clouds(rows: int, features: int, classes: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     which = np.arange(rows) % classes

@@ -139,6 +139,21 @@ def test_data_frames(folder: Path, summary: cf.Features, frames: cf.Features) ->
     np.testing.assert_allclose(starts, times, atol=1e-6)
 
 
+def test_data_frames_of_windows_say_where_they_are(folder: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    windows = cf.extract([folder / "a.wav"], preset="mfcc-zcr", window=0.2, hop=0.1)
+    starts = windows.to_frame().index.get_level_values("start")
+    assert list(starts[:3]) == [pandas.Timedelta(f"{k}ms") for k in (0, 100, 200)]
+    ends = windows.to_frame().index.get_level_values("end")
+    assert (ends[:2] - starts[:2] == pandas.Timedelta("200ms")).all()
+    frames = cf.extract(
+        [folder / "a.wav"], config={"features": {"rms": {}}}, window=0.2, hop=0.2
+    ).to_frame()
+    index = frames.index
+    assert not index.duplicated().any()
+    assert index.get_level_values("start").max() >= pandas.Timedelta("200ms")
+
+
 def test_notebooks(summary: cf.Features) -> None:
     html = summary._repr_html_()
     assert html.count("<tr>") == 4 and "not_audio" in html

@@ -29,6 +29,28 @@ def features(y: np.ndarray) -> list[np.ndarray]:
     ]
 
 
+def test_threads_take_turns_at_one_signal() -> None:
+    extractor = corsmal_feat.SignalExtractor(8000, preset="mfcc-zcr")
+    blocks, faults = 200, []
+
+    def push() -> None:
+        try:
+            for _ in range(blocks):
+                extractor.push(np.ones(80, np.float32))
+        except Exception as error:
+            faults.append(error)
+
+    threads = [threading.Thread(target=push) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not faults
+    alone = corsmal_feat.SignalExtractor(8000, preset="mfcc-zcr")
+    alone.push(np.ones(3 * blocks * 80, np.float32))
+    np.testing.assert_array_equal(extractor.finish(), alone.finish())
+
+
 @pytest.mark.parametrize("jobs", ["1", "2", "7"])
 def test_the_number_of_threads_changes_nothing(monkeypatch: pytest.MonkeyPatch, jobs: str) -> None:
     want = features(Y)
