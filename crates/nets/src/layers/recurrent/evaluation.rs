@@ -11,7 +11,7 @@ use crate::packed::Packed;
 use crate::parameters::Parameters;
 
 /// Numbers of gates that a stretch has, about.
-const STRETCH: usize = 1 << 17;
+const STRETCH: usize = 1 << 20;
 
 /// A layer with its weights, and where it is.
 struct Running<'a> {
