@@ -97,7 +97,7 @@ def load(
         recording.skip(start)
     samples = recording.read(frames)
     if not len(samples) and frames != 0:
-        what = f"ends before offset = {offset} s" if start else "has no samples"
+        what = f"has no samples at offset = {offset} s or later" if start else "has no samples"
         raise DecodeError(f"{path} {what}")
     _tell(recording, path)
     y: Floats = samples[:, 0] if samples.shape[1] == 1 else samples.T
@@ -174,7 +174,8 @@ def stream(
     wanted = frame_length + (block_length - 1) * hop_length
     overlap = frame_length - hop_length
     blocks = _blocks(recording, wanted, overlap, left, bool(mono), fill_value, kind)
-    return _not_empty(blocks, f"{path} ends before offset = {offset} s") if start else blocks
+    fault = f"{path} has no samples at offset = {offset} s or later"
+    return _not_empty(blocks, fault) if start else blocks
 
 
 def _not_empty(blocks: Iterator[Floats], fault: str) -> Iterator[Floats]:

@@ -17,7 +17,7 @@ from ._fingerprints import Fingerprints, check_rows, fingerprints
 from ._model import read_model
 from ._refusals import destination, existing
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
-from ._validation import Matrix, features, labels_of, names_of, weights_of
+from ._validation import Matrix, features, labels_of, labels_of_columns, names_of, weights_of
 from .errors import ModelError, ParameterError
 
 if TYPE_CHECKING:
@@ -122,6 +122,7 @@ class Classifier(ClassifierMixin, BaseEstimator):
         self._fitted_on = fingerprints(x)
         self.classes_ = classes
         self.n_features_in_ = x.shape[1]
+        self._column_labels = labels_of_columns(X)
         if names is not None:
             self.feature_names_in_ = names
         elif hasattr(self, "feature_names_in_"):
@@ -131,8 +132,9 @@ class Classifier(ClassifierMixin, BaseEstimator):
     def _query(self, X: Any) -> Matrix:
         if not hasattr(self, "_model"):
             raise not_fitted(self)
-        names = names_of(X)
-        known = getattr(self, "feature_names_in_", None)
+        names, known = labels_of_columns(X), getattr(self, "_column_labels", None)
+        if known is None:
+            known = getattr(self, "feature_names_in_", None)
         if names is not None and known is not None and names.tolist() != known.tolist():
             raise ParameterError(
                 "The feature names should match those that were passed during fit: expected "

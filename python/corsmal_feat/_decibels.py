@@ -54,6 +54,8 @@ def power_to_db(
     reference: Any = np.abs(ref(array) if callable(ref) else as_array("ref", ref))
     top = None if top_db is None else number("top_db", top_db)
     if reference.ndim:
+        if top is not None and not top >= 0:
+            raise ParameterError(f"top_db must be 0 or more, or None, not {top}")
         return _by_each(array, reference, number("amin", amin), top)
     reference = float(reference)
     result: Any = _core.power_to_db(
@@ -63,11 +65,13 @@ def power_to_db(
     return decibels
 
 
-def _by_each(powers: Floats, reference: Any, amin: float, top_db: float | None) -> Floats:
+def _by_each(powers: Any, reference: Any, amin: float, top_db: float | None) -> Floats:
     """Decibels by references that differ."""
-    kept = _core.power_to_db(np.ascontiguousarray(powers), amin, amin, None).reshape(powers.shape)
+    above_amin: Any = _core.power_to_db(np.ascontiguousarray(powers), amin, amin, None)
     try:
-        decibels: Floats = kept - 10.0 * np.log10(np.maximum(reference, amin) / amin)
+        decibels: Any = above_amin.reshape(powers.shape) - 10.0 * np.log10(
+            np.maximum(reference, amin) / amin
+        )
         if decibels.shape != powers.shape:
             raise ValueError
     except ValueError:
@@ -76,11 +80,10 @@ def _by_each(powers: Floats, reference: Any, amin: float, top_db: float | None) 
             f" {powers.shape}"
         ) from None
     decibels = decibels.astype(powers.dtype, copy=False)
-    return (
-        decibels
-        if top_db is None or not decibels.size
-        else np.maximum(decibels, decibels.max() - top_db)
-    )
+    if top_db is not None and decibels.size:
+        decibels = np.maximum(decibels, decibels.max() - top_db)
+    clamped: Floats = decibels
+    return clamped
 
 
 @refuses

@@ -252,12 +252,13 @@ class Features:
 
     def _starts(self) -> npt.NDArray[np.float64]:
         """Where each row begins in its recording, in seconds."""
+        of_all = float(self.config.get("signal", {}).get("start", 0.0))
         rows = {row["id"]: row for row in self.outcomes}
 
         def seconds(recording: str) -> float:
             row = rows.get(recording, {})
-            start, rate = row.get("start_frame") or 0, row.get("sample_rate")
-            return start / rate if start and rate else 0.0
+            start, rate = row.get("start_frame"), row.get("sample_rate")
+            return start / rate if start is not None and rate else of_all
 
         return np.array([seconds(i) for i in self.ids], dtype=np.float64)
 

@@ -151,7 +151,7 @@ def _read(name: str) -> tuple[dict[str, Any], Any]:
     columns: dict[str, Values] = {}
     names: list[str] = []
     for field in table.schema:
-        if field.name in {"id", *frames} or field.name.startswith("__"):
+        if field.name in {"id", *frames, *(f"__times__/{k}" for k in frames)}:
             continue
         whole = types.is_integer(field.type)
         # pandas makes a column of whole values one of integers; ours have such names.

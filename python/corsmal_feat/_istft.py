@@ -73,7 +73,8 @@ def istft(
     for name, kind in (("dtype", dtype), ("out", None if out is None else out.dtype)):
         if kind is not None and np.dtype(kind).kind not in "fc":
             raise ParameterError(
-                f"{name} is {np.dtype(kind)}, which cannot hold samples: expected float32 or float64"
+                f"{name} is {np.dtype(kind)}, which cannot hold samples: expected float32 or"
+                " float64"
             )
     if dtype is not None:
         y = y.astype(dtype, copy=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import zipfile
 from collections.abc import Iterator, MutableMapping
 from typing import Any
@@ -40,18 +41,36 @@ class Members(MutableMapping[str, Any]):
 
     def __init__(self, archive: Any, name: str, members: dict[str, Names]) -> None:
         self._archive, self._name = archive, name
+        self._process = os.getpid()
         self._members = members
         self._read: dict[str, Any] = {}
 
     def __getitem__(self, recording: str) -> Any:
         if recording not in self._read:
             names = self._members[recording]
+            if self._process != os.getpid():
+                self._open_again()
             self._read[recording] = (
                 read_member(self._archive, self._name, names)
                 if isinstance(names, str)
                 else {k: read_member(self._archive, self._name, v) for k, v in names.items()}
             )
         return self._read[recording]
+
+    def _open_again(self) -> None:
+        """In a forked process, whose open file would move the parent's place in it."""
+        file = self._archive.zip.fp
+        if hasattr(file, "name"):
+            try:
+                ours, there = os.fstat(file.fileno()), os.stat(file.name)
+                if (ours.st_dev, ours.st_ino) != (there.st_dev, there.st_ino):
+                    raise FileNotFoundError
+                self._archive = np.load(file.name)
+            except OSError as error:
+                raise ParameterError(
+                    f"{self._name} was moved or replaced after it was loaded: load it again"
+                ) from error
+        self._process = os.getpid()
 
     def __setitem__(self, recording: str, values: Any) -> None:
         self._members.setdefault(recording, "")

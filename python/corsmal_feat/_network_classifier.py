@@ -105,9 +105,10 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         """Probabilities [shape=(items, classes)], columns in the order of `classes_`."""
         if not hasattr(self, "_model"):
             raise not_fitted(self)
-        probabilities = self._model.predict_proba(self._columns(X))
+        probabilities: npt.NDArray[np.float64] = self._model.predict_proba(self._columns(X))
         # Networks compute in single precision.
-        return probabilities / probabilities.sum(axis=1, keepdims=True)
+        probabilities /= probabilities.sum(axis=1, keepdims=True)
+        return probabilities
 
     def predict(self, X: Any) -> npt.NDArray[Any]:
         """The label of each item of `X`."""

@@ -18,11 +18,20 @@ Matrix = npt.NDArray[np.float64]
 
 
 def names_of(X: Any) -> npt.NDArray[np.object_] | None:
-    """Column names of a data frame as strings; None without names."""
+    """Column names of a data frame, if all are strings."""
+    names = labels_of_columns(X)
+    return names if names is not None and all(isinstance(n, str) for n in X.columns) else None
+
+
+def labels_of_columns(X: Any) -> npt.NDArray[np.object_] | None:
+    """Labels of the columns of a data frame, such as numbers, as strings."""
     columns = getattr(X, "columns", None)
     if columns is None or not len(columns):
         return None
     names = list(columns)
+    # pandas has an index; others have strings, or the columns themselves.
+    if not hasattr(columns, "dtype") and not all(isinstance(name, str) for name in names):
+        return None
     if len({isinstance(name, str) for name in names}) > 1:
         raise DataTypeError(
             "the column names of X are strings and others, expected strings alone:"

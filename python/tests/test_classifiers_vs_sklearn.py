@@ -119,8 +119,8 @@ def test_logistic_probabilities(table, strength, target):
 @pytest.mark.parametrize(
     ("ours", "theirs"),
     [
-        (RandomForest(100), ensemble.RandomForestClassifier(100, n_jobs=-1)),
-        (ExtraTrees(100), ensemble.ExtraTreesClassifier(100, n_jobs=-1)),
+        (RandomForest(100), ensemble.RandomForestClassifier(100)),
+        (ExtraTrees(100), ensemble.ExtraTreesClassifier(100)),
     ],
     ids=["rf", "et"],
 )

@@ -54,6 +54,16 @@ def test_columns_of_a_data_frame_whose_names_are_numbers_keep_their_order(
         named.predict(table.set_axis(["a", 1, "c"], axis=1))
 
 
+def test_tables_of_pyarrow_have_no_names() -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    x = np.random.default_rng(0).standard_normal((20, 2))
+    y = np.where(x[:, 0] > 0, "p", "n")
+    table = pyarrow.table({"a": x[:, 0], "b": x[:, 1]})
+    tree = DecisionTree().fit(table, y)
+    assert tree.predict(table.slice(0, 5)).tolist() == y[:5].tolist()
+    assert not hasattr(tree, "feature_names_in_")
+
+
 def clouds(rows: int, features: int, classes: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     which = np.arange(rows) % classes

@@ -154,6 +154,21 @@ def test_data_frames_of_windows_say_where_they_are(folder: Path) -> None:
     assert index.get_level_values("start").max() >= pandas.Timedelta("200ms")
 
 
+def test_rows_of_a_signal_that_begins_later_say_so(folder: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    table = cf.extract([folder / "a.wav"], preset="mfcc-zcr", set={"signal.start": 0.25}).to_frame()
+    assert list(table.index.get_level_values("start")) == [pandas.Timedelta("250ms")]
+
+
+def test_labels_may_have_any_name_in_both_formats(folder: Path, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    manifest = tmp_path / "list.csv"
+    manifest.write_text(f"path,__note,kind\n{folder / 'a.wav'},x,y\n", encoding="utf-8")
+    for out in (tmp_path / "f.npz", tmp_path / "f.parquet"):
+        cf.extract([manifest], preset="mfcc-zcr", out=out)
+        assert list(cf.load_features(out).labels) == ["__note", "kind"]
+
+
 def test_notebooks(summary: cf.Features) -> None:
     html = summary._repr_html_()
     assert html.count("<tr>") == 4 and "not_audio" in html

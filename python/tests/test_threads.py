@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import corsmal_feat
 import numpy as np
@@ -116,3 +117,31 @@ def test_other_threads_run_meanwhile() -> None:
     thread.join()
     # With the lock held all the time there would be none but at the edges.
     assert sum(start + 0.01 < t < end - 0.01 for t in ticks) > 3, (end - start, sys.version)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_forked_processes_read_one_file(tmp_path: Path) -> None:
+    names = [tmp_path / f"{k}.wav" for k in range(40)]
+    for name in names:
+        write(name, 1)
+    out = tmp_path / "frames.npz"
+    corsmal_feat.extract(names, config={"features": {"melspectrogram": {}}}, out=out)
+    features = corsmal_feat.load_features(out)
+    want = features[features.ids[0]]
+    context = multiprocessing.get_context("fork")
+
+    def read(faults: Any) -> None:
+        try:
+            for recording in features.ids[1:]:
+                assert np.array_equal(features[recording], want)
+            faults.put("")
+        except Exception as error:
+            faults.put(repr(error))
+
+    faults = context.Queue()
+    processes = [context.Process(target=read, args=(faults,)) for _ in range(4)]
+    for process in processes:
+        process.start()
+    assert [faults.get(timeout=60) for _ in processes] == [""] * 4
+    for process in processes:
+        process.join()

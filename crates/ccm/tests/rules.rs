@@ -130,7 +130,7 @@ fn wrong_type_changes_the_mass_of_the_paper_only() {
     close(&score_rows(rows, RuleSet::Toolkit), "s8", right);
 }
 
-/// The density of a type that is not estimated is no 0, which made an empty container right.
+/// Its density was taken for 0, which made empty containers right.
 #[test]
 fn a_row_without_a_type_has_no_mass_in_the_paper() {
     let mut rows = RIGHT;

@@ -103,7 +103,7 @@ pub fn into_windows(
     for ((input, header), length) in inputs.into_iter().zip(headers).zip(lengths) {
         if input.source.comes_once() {
             let name = match &input.source {
-                InputSource::Pipe(path) => format!("{} is no file, so it", path.display()),
+                InputSource::Pipe(path) => format!("{} is a pipe or device, so it", path.display()),
                 _ => "standard input".into(),
             };
             let reason = format!("{name} cannot be cut into windows; classify --window can");

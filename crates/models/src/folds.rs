@@ -1,6 +1,6 @@
 //! Which rows are held out together, from `--cv`.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fmt;
 use std::str::FromStr;
 
@@ -162,11 +162,16 @@ impl Folds {
         if one {
             odd.push(ONE_RECORDING.into());
         }
-        if let (CvPlan::K(_), None, Some(groups)) = (plan, column, known()) {
-            odd.push(format!(
-                "the table has a column {groups}, and rows of one {groups} are in both training and test: \
-                 --groups {groups} keeps them together"
-            ));
+        if let (CvPlan::K(_), None) = (plan, column) {
+            let is_split = |column: &&str| {
+                let values = table.column(column);
+                !is_target(column) && values.is_ok_and(|values| splits_any(&outer, &values))
+            };
+            odd.extend(GROUPS.into_iter().filter(is_split).map(|groups| {
+                format!(
+                    "rows of one {groups} are in both training and test: --groups {groups} keeps them together"
+                )
+            }));
         }
         odd.extend(copies::warning(table, &outer));
         let are_folds = matches!(plan, CvPlan::Fold(_)) && groups.is_none();
@@ -282,6 +287,14 @@ fn has_groups(table: &LabelledTable, column: &str) -> bool {
     table.column(column).is_ok_and(|values| Labels::of(&values).0.len() > 1)
 }
 
+/// Whether some fold tests a value that it also trains on.
+fn splits_any(folds: &[Fold], values: &[String]) -> bool {
+    folds.iter().any(|fold| {
+        let trained: HashSet<&String> = fold.train.iter().map(|&row| &values[row]).collect();
+        fold.test.iter().any(|&row| !is_missing(&values[row]) && trained.contains(&values[row]))
+    })
+}
+
 fn stratified(labels: &Labels, y: &[usize], k: usize, seed: u32) -> Result<Vec<Fold>> {
     for (class, name) in labels.names().iter().enumerate() {
         let rows = y.iter().filter(|&&c| c == class).count();
@@ -353,9 +366,22 @@ mod tests {
         };
         assert_eq!(folds(None, None).description, "one group of group held out");
         let said = folds(Some(&CvPlan::K(2)), None).warnings(&classes).join(" ");
-        assert!(said.contains("column group") && said.contains("--groups group"), "{said}");
+        assert!(
+            said.contains("one group are in both") && said.contains("--groups group"),
+            "{said}"
+        );
         let kept = folds(Some(&CvPlan::K(2)), Some("group")).warnings(&classes).join(" ");
         assert!(!kept.contains("--groups"), "{kept}");
+
+        let columns = vec![
+            ("y".to_string(), column(["a", "b", "a", "b"])),
+            ("group".to_string(), column(["1", "2", "3", ""])),
+        ];
+        let ids = column(["r0", "r1", "r2", "r3"]);
+        let apart = LabelledTable::of_columns(std::path::Path::new("x.npz"), ids, columns);
+        let (y, of_y) = apart.classes("y").unwrap();
+        let whole = Folds::new(Some(&CvPlan::K(2)), &apart, None, (&y, &of_y), 0).unwrap();
+        assert!(!whole.warnings(&of_y).join(" ").contains("--groups"), "no group has two rows");
 
         let by_group = folds(None, None);
         let refused = by_group.inner(&[0, 1], &classes).unwrap_err().to_string();

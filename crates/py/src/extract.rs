@@ -245,14 +245,19 @@ impl PySignals {
 pub(crate) struct PySignal(Mutex<Option<Signal>>);
 
 impl PySignal {
-    /// Works on the signal while no other thread does. The interpreter is left before the wait: a thread that
-    /// holds the signal may need it.
+    /// Works on the signal while no other thread does. The interpreter is left before the wait, and the pool is
+    /// entered after it: a thread that holds the signal may need both.
     fn with<T: Send>(
         &self,
         py: Python<'_>,
         work: impl FnOnce(&mut Option<Signal>) -> T + Send,
     ) -> PyResult<T> {
-        compute(py, || work(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner)))
+        let pool = pool::pool(py)?;
+        Ok(py.detach(|| {
+            let mut held = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let signal = &mut *held;
+            pool.install(|| work(signal))
+        }))
     }
 }
 

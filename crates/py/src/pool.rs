@@ -27,7 +27,8 @@ pub(crate) fn jobs() -> PyResult<usize> {
     }
 }
 
-fn pool(_: Python<'_>) -> PyResult<Arc<ThreadPool>> {
+/// The threads of this process.
+pub(crate) fn pool(_: Python<'_>) -> PyResult<Arc<ThreadPool>> {
     let (process, jobs) = (std::process::id(), jobs()?);
     let mut slot = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     match slot.take() {

@@ -88,16 +88,20 @@ pub(super) fn add(study: &mut Study, sources: Vec<Source>, quiet: bool) {
 /// several classes has none.
 fn heard(sources: Vec<Source>) -> Vec<Heard> {
     let mut recordings: Vec<Heard> = Vec::new();
-    let (mut known, mut pictured) = (HashMap::new(), HashSet::new());
+    let (mut known, mut pictured, mut rows) = (HashMap::new(), HashSet::new(), Vec::new());
     for source in sources {
         let index = *known.entry(source.path.clone()).or_insert(recordings.len());
         let (class, stretch) = (source.class, source.stretch);
         if index == recordings.len() {
-            let present = Present::of(&source);
-            recordings.push(Heard { source, present, examples: Vec::new() });
+            recordings.push(Heard { source, present: Present::Gone, examples: Vec::new() });
         }
         let heard = &mut recordings[index];
         heard.source.class = heard.source.class.filter(|_| heard.source.class == class);
+        rows.push((index, class, stretch));
+    }
+    recordings.par_iter_mut().for_each(|heard| heard.present = Present::of(&heard.source));
+    for (index, class, stretch) in rows {
+        let heard = &mut recordings[index];
         let Some(class) = class.filter(|_| heard.present == Present::Yes) else { continue };
         if pictured.len() < PICTURES && pictured.insert(class) {
             // All channels of an array would fill a page for each class.

@@ -201,6 +201,32 @@ fn prediction_files_are_averaged_by_id() {
     );
 }
 
+/// Labels called `p0` and `p1` were taken for the probabilities.
+#[test]
+fn labels_that_look_like_probabilities_stay_labels() {
+    let folder = tempfile::tempdir().unwrap();
+    let header = "id,path,status,true,p0,p1,predicted,p_0,p_1\n";
+    let rows = "a,a.wav,ok,0,0.9,0.1,0,0.75,0.25\nb,b.wav,ok,1,0.9,0.1,1,0.25,0.75\n";
+    let file = written(folder.path(), "p.csv", &format!("{header}{rows}"));
+    let score: Value = serde_json::from_str(&done(&["score", text(&file), "--json"])).unwrap();
+    assert_eq!(score["calibration"]["brier"], 0.0625, "{score}");
+    let fused = done(&["fuse", text(&file), text(&file), "-o", "-"]);
+    assert_eq!(fused, format!("{header}{rows}"));
+}
+
+/// One of them made a recording of every window.
+#[test]
+fn windows_without_features_belong_to_their_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let windows = "id,path,status,recording,predicted,p_x,p_y\nn@0,n.wav,ok,n,x,1,0\n\
+                   n@0.5,n.wav,non_finite,,,,\no@0,o.wav,ok,o,y,0,1\no@0.5,o.wav,ok,o,y,0,1\n";
+    let file = written(folder.path(), "w.csv", windows);
+    let voted = run(&["fuse", text(&file), "--vote", "majority", "-o", "-"]);
+    let table = String::from_utf8(voted.stdout).unwrap();
+    let ids: Vec<_> = table.lines().filter_map(|line| line.split(',').next()).collect();
+    assert_eq!(ids, ["id", "n", "o"], "{table}");
+}
+
 /// A recording that lacked samples looked whole.
 #[test]
 fn the_worst_status_stays() {

@@ -129,8 +129,9 @@ impl PitchTracker {
         reference: T,
     ) -> Option<Peak<T>> {
         let kept = |s: T| if s > reference { s } else { T::zero() };
-        if here <= reference || here <= kept(left) || right.is_some_and(|right| here < kept(right))
-        {
+        // Not where the reference is NaN.
+        let exceeds = here > reference;
+        if !exceeds || here <= kept(left) || right.is_some_and(|right| here < kept(right)) {
             return None;
         }
         let (mut shift, mut skew) = (T::zero(), T::zero());

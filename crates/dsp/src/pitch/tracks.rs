@@ -4,6 +4,7 @@ use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis, s};
 use rayon::prelude::*;
 
 use super::{AT_ONCE, Peak, PitchParams, PitchTracker, TuningEstimator, check};
+use crate::decibel::larger;
 use crate::error::Result;
 use crate::real::Real;
 use crate::simd::vectorized;
@@ -125,7 +126,7 @@ fn thresholds<T: Real>(s: ArrayView3<T>, threshold: T) -> Array2<T> {
                 || {
                     for (largest, x) in part.iter_mut().zip(row) {
                         let x = x.abs();
-                        *largest = if x > *largest { x } else { *largest };
+                        *largest = larger(x, *largest);
                     }
                 },
             );

@@ -9,7 +9,7 @@ use corsmal_files::outcome::{Outcome, Status};
 
 use super::extractor::Span;
 use super::failed::Failed;
-use super::live::{Live, Pipe};
+use super::live::Live;
 use super::pass::Pass;
 use super::plans::Planned;
 use super::signal_chain::SignalChain;
@@ -46,8 +46,7 @@ pub fn open(
             corsmal_audio::from_reader(Live::new(std::io::stdin(), stop.clone()))?
         }
         InputSource::Pipe(path) => {
-            let pipe = Pipe { path: path.clone(), opened: None };
-            corsmal_audio::from_reader(Live::new(pipe, stop.clone()))?
+            corsmal_audio::from_reader(Live::of_pipe(path.clone(), stop.clone()))?
         }
         source => source.open_for(purpose, (watch.pin(), stop))?,
     })

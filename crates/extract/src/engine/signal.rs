@@ -80,6 +80,7 @@ impl Signals {
             crop: reading::crop(config, (None, None), sample_rate),
             channels: usize::from(channels),
             step,
+            origin: 0,
             position: 0,
             held: Vec::new(),
             folder: self.folder.clone(),
@@ -98,6 +99,8 @@ pub struct Signal {
     channels: usize,
     /// Input frames taken at a time.
     step: usize,
+    /// Frame of the recording at which it begins.
+    origin: u64,
     /// Input frames pushed.
     position: u64,
     /// What the signal chain gave for a block.
@@ -109,6 +112,11 @@ impl Signal {
     /// What is computed.
     pub fn plan(&self) -> &Arc<Plan> {
         &self.plan
+    }
+
+    /// The same signal as a part of a recording that begins at this frame: messages name frames of the recording.
+    pub(super) fn within(self, origin: u64) -> Self {
+        Self { origin, ..self }
     }
 
     /// Takes interleaved samples; a frame that is not whole is left out.
@@ -124,7 +132,8 @@ impl Signal {
             let inside = |frame: u64| frame.clamp(begin, self.position) - begin;
             let (from, to) = (inside(self.crop.start), inside(self.crop.end));
             let block = &block[from as usize * self.channels..to as usize * self.channels];
-            reading::check_samples(block, begin + from, self.channels, |_| None)?;
+            let at = self.origin + begin + from;
+            reading::check_samples(block, at, self.channels, |_| None)?;
             self.front.push(block, &mut self.held);
             self.extractor.push(&self.held);
             self.held.clear();

@@ -166,7 +166,8 @@ impl<'a> Windows<'a> {
         self.number += 1;
         let frames = wanted.min(self.reached()).saturating_sub(self.first) as usize;
         let samples = &self.held[..frames * usize::from(channels)];
-        let features = self.signals.start(sample_rate, channels).and_then(|mut signal| {
+        let features = self.signals.start(sample_rate, channels).and_then(|signal| {
+            let mut signal = signal.within(self.first);
             signal.push(samples)?;
             signal.finish()
         });

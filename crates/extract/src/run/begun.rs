@@ -115,7 +115,7 @@ impl<'a> Begun<'a> {
         }
         let resumed = records.len();
         let frames = config.summary.is_none();
-        let output = Output::new(ledger, records, inputs, (format, frames))?;
+        let output = Output::new(ledger, records, (inputs, all), (format, frames))?;
         let survey = Survey::of(all, config, stop);
         survey.warnings().iter().for_each(|warning| progress.warning(warning));
         let ending = ending(resumed);

@@ -128,14 +128,15 @@ struct Partial {
 }
 
 impl Output {
-    /// Opens the output behind the records of an interrupted run; it is to hold frames or a summary.
+    /// Opens the output behind the records of an interrupted run, which are of the first of `inputs`, its shard of
+    /// `all`; it is to hold frames or a summary.
     pub fn new(
         ledger: Ledger,
         records: Vec<Record>,
-        inputs: &[Input],
+        (inputs, all): (&[Input], &[Input]),
         (format, frames): (OutputFormat, bool),
     ) -> Result<Self, RunError> {
-        let mut table = empty_table(inputs)?;
+        let mut table = empty_table(all)?;
         let mut entries = Vec::new();
         let next = records.len();
         for (record, input) in records.into_iter().zip(inputs) {
@@ -269,7 +270,7 @@ pub(super) fn other_width(actual: usize, expected: usize) -> String {
     )
 }
 
-/// A table with the label columns of the inputs.
+/// A table with the label columns of the inputs; of all shards', since a shard may have none.
 fn empty_table(inputs: &[Input]) -> Result<Table, TableError> {
     let columns = inputs.first().map(|i| i.labels.iter().map(|(c, _)| c.clone()).collect());
     Table::new(columns.unwrap_or_default())

@@ -300,7 +300,8 @@ impl PredictionTable {
         let at = self.position("recording");
         let of_window = |row: &PredictionRow<Id>| {
             let (recording, start) = row.key.0.rsplit_once('@')?;
-            match at {
+            // A window without features has no labels.
+            match at.filter(|&at| !row.cells[at].is_empty()) {
                 None => start.parse::<f64>().ok().map(|_| recording.to_owned()),
                 Some(at) => {
                     let times = row.key.0.strip_prefix(row.cells[at].as_str())?;

@@ -106,7 +106,8 @@ impl PredictionColumns {
         let numbered: Vec<usize> = (0..).map_while(|c| find(&format!("p{c}"))).collect();
         let named: Vec<usize> =
             (0..header.len()).filter(|&i| header[i].starts_with("p_")).collect();
-        let proba = if numbered.len() > 1 { numbered } else { named };
+        // Beside columns of the classes by name, `p0` and `p1` are labels.
+        let proba = if numbered.len() > 1 && named.len() < 2 { numbered } else { named };
         let predicted = find("predicted");
         let labels = match (proba.len(), predicted) {
             (0, None) => {

@@ -80,9 +80,11 @@ impl<W: Write> RecordWriter<W> {
         let mut carried = Vec::new();
         for (at, column) in columns.iter().enumerate() {
             let name = if column == target { "true" } else { column.as_str() };
-            let own = RESERVED.contains(&name) || name.starts_with("p_");
-            let replaced = has_target && column == "true" && column != target;
-            if !own && !replaced && !all.contains(&name) {
+            // Readers ignore case.
+            let is = |other: &&str| other.eq_ignore_ascii_case(name);
+            let own = RESERVED.iter().any(is) || name.starts_with("p_");
+            let replaced = has_target && column.eq_ignore_ascii_case("true") && column != target;
+            if !own && !replaced && !all.iter().any(is) {
                 all.push(name);
                 carried.push(at);
             }

@@ -215,6 +215,23 @@ fn a_shard_without_recordings_says_so() {
     assert!(table(&out).ids().is_empty());
 }
 
+/// It had no label columns, and `merge` refused the others for theirs.
+#[test]
+fn a_shard_without_recordings_has_the_labels_of_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    wav(&folder.path().join("a.wav"), 1, 8000, 1);
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("list.csv"), "path,kind\na.wav,x\n").unwrap();
+    for (out, more) in
+        [("0.npz", &["--shard", "0/2"][..]), ("1.npz", &["--shard", "1/2"]), ("whole.npz", &[])]
+    {
+        extract(&at("list.csv"), &at(out), &[&["--preset", "mfcc-zcr"], more].concat()).with(0);
+    }
+    let merge = [at("0.npz"), at("1.npz"), "-o".into(), at("merged.npz")];
+    ended(tool().arg("merge").args(&merge)).with(0);
+    assert!(bytes(&at("merged.npz")) == bytes(&at("whole.npz")));
+}
+
 #[test]
 fn every_command_has_help_with_an_example_and_a_manual_page() {
     let commands = ended(tool().arg("--help")).with(0).stdout;

@@ -10,8 +10,8 @@ use crate::matrix::Matrix;
 use crate::packed::Packed;
 use crate::parameters::Parameters;
 
-/// Numbers of gates that a stretch has, about.
-const STRETCH: usize = 1 << 20;
+/// Numbers of gates that a stretch has, about; few in tests, so that there are several.
+const STRETCH: usize = if cfg!(test) { 1 << 8 } else { 1 << 20 };
 
 /// A layer with its weights, and where it is.
 struct Running<'a> {

@@ -191,7 +191,7 @@ mod tests {
         let before = packing.states_before(packed.values(), 1).unwrap();
         assert_eq!(before.values(), [4.0, 0.0, 5.0, 6.0]);
         let of = |most| packing.stretches(most).collect::<Vec<_>>();
-        assert_eq!(of(100), [0..4]);
+        assert!(matches!(&of(100)[..], [all] if *all == (0..4)));
         assert_eq!(of(1), [0..1, 1..2, 2..3, 3..4]);
         assert_eq!(of(3), [0..1, 1..3, 3..4]);
         assert!(Packing::new(0, 4, None).stretches(9).next().is_none());
