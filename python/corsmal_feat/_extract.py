@@ -157,7 +157,7 @@ def configuration(
         return ("preset", preset or "logmel"), overrides
     if isinstance(config, Mapping):
         try:
-            return ("json", json.dumps(config, default=_plain)), overrides
+            return ("json", _json(config)), overrides
         except TypeError as error:
             raise ParameterError(f"config: {error}") from error
     text = os.fspath(config)
@@ -181,9 +181,22 @@ def _toml(key: str, value: Any) -> str:
     if value is None or isinstance(value, Mapping):
         raise ParameterError(f"{key} must be a number, string, boolean or list, not {value!r}")
     try:
-        return json.dumps(value, default=_plain)
+        return _json(value)
     except TypeError as error:
         raise ParameterError(f"{key}: {error}") from error
+
+
+def _json(value: Any) -> str:
+    """JSON, in which infinity is the word that configurations have for it."""
+    return json.dumps(_worded(json.loads(json.dumps(value, default=_plain))))
+
+
+def _worded(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _worded(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_worded(inner) for inner in value]
+    return "inf" if value == float("inf") else value
 
 
 class SignalExtractor:

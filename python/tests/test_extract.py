@@ -227,6 +227,16 @@ def test_blocks_do_not_matter_and_files_give_the_same(folder: Path, preset: str)
         whole.push(y)
 
 
+def test_infinity_is_a_value_of_a_configuration(folder: Path):
+    config = {"features": {"hpss": {"power": np.inf}}}
+    hard = cf.extract(folder / "r0.wav", config=config)
+    assert hard.config["features"]["hpss"]["power"] == "inf"
+    word = cf.extract(folder / "r0.wav", config=config, set={"hpss.power": "inf"})
+    by_key = {"features": {"hpss": {}}}
+    key = cf.extract(folder / "r0.wav", config=by_key, set={"hpss.power": float("inf")})
+    assert hard.config_hash == word.config_hash == key.config_hash
+
+
 def test_signals_that_have_no_features():
     with pytest.raises(cf.ParameterError, match="no samples"):
         cf.SignalExtractor(RATE).finish()
