@@ -54,6 +54,10 @@ impl Live {
     }
 }
 
+fn interrupted() -> io::Error {
+    io::Error::other("interrupted")
+}
+
 /// A pipe that is opened when it is read: opening it waits for whoever writes to it.
 struct Pipe {
     path: PathBuf,
@@ -67,9 +71,9 @@ impl Read for Pipe {
             Some(file) => file,
             None => File::open(&self.path)?,
         };
-        // What comes from now on is for another run.
+        // What comes from now on is for another run, and this is no end of the recording.
         if self.stop.load(Ordering::Relaxed) {
-            return Ok(0);
+            return Err(interrupted());
         }
         self.opened.insert(file).read(into)
     }
@@ -96,7 +100,7 @@ impl Read for Live {
                 if let Some(pipe) = self.pipe.take() {
                     end_wait(&pipe);
                 }
-                return Err(io::Error::other("interrupted"));
+                return Err(interrupted());
             }
             match self.parts.recv_timeout(LOOK) {
                 Ok(part) => (self.part, self.taken) = (part?, 0),
