@@ -61,6 +61,10 @@ def of_partitions(name: str) -> dict[str, Any]:
             raise ParameterError(f"{file} and {files[0]} are parts of different outputs")
         places += [(place, number, at) for at, place in enumerate(of["places"])]
         found["labels"][of["label"]] = np.array([of["value"]] * len(found["ids"]), dtype=np.str_)
+        with_features = set(found["ids"])
+        for row in found["outcomes"]:
+            if row["id"] not in with_features:
+                row["labels"] = row.get("labels", {}) | {of["label"]: of["value"]}
     first, label = parts[0], read[0][1]["label"]
     places.sort()
     whole = len(places) == read[0][1]["inputs"]

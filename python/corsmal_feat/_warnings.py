@@ -7,6 +7,8 @@ import sys
 import warnings
 from pathlib import Path
 
+from ._core import in_python
+
 _HERE = f"{Path(__file__).parent}{os.sep}"
 
 
@@ -15,4 +17,4 @@ def warn(message: str, category: type[Warning] = UserWarning) -> None:
     level, frame = 2, sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_HERE):
         level, frame = level + 1, frame.f_back
-    warnings.warn(message, category, stacklevel=level)
+    warnings.warn(in_python(message), category, stacklevel=level)

@@ -1,5 +1,7 @@
 //! What became of one input.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 /// The verdict on one input.
@@ -98,6 +100,9 @@ pub struct Outcome {
     /// [`crate::identity`] of the file; empty when it could not be read.
     #[serde(default)]
     pub identity: String,
+    /// Its labels, where the output has no row with them: of an input without features.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub labels: BTreeMap<String, String>,
 }
 
 impl Outcome {
@@ -121,6 +126,7 @@ impl Outcome {
             channels: None,
             repairs: Vec::new(),
             identity: String::new(),
+            labels: BTreeMap::new(),
         }
     }
 

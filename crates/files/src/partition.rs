@@ -46,6 +46,10 @@ pub fn split(table: &Table, label: &str, values: &[String]) -> Result<Vec<Partit
     }
     let column = table.labels().position(|(name, _)| name == label).unwrap_or_default();
     let inputs = table.outcomes().len();
+    if inputs == 0 {
+        // A shard may have none; a folder without parts would not say what it is of.
+        places.insert("", Vec::new());
+    }
     let part = |(value, places): (&str, Vec<usize>)| {
         let table = table.of_places(&places, label)?;
         let part = Part { label: label.into(), value: value.into(), column, inputs, places };
@@ -187,6 +191,8 @@ fn joined(label: &str, parts: &[Partition]) -> Result<Table, Result<usize, Table
             );
             labels.insert(at, (label.into(), part.value.clone()));
             values.extend(table.values().row(row));
+        } else {
+            labels.push((label.into(), part.value.clone()));
         }
         all.push(outcome.clone(), &labels, &values).map_err(Err)?;
     }
@@ -240,6 +246,33 @@ mod tests {
         assert!(refused.contains("--partition-by"), "{refused}");
         let (found, label) = open(&path).unwrap();
         assert_eq!((found.table, label.as_str()), (table, "type"));
+    }
+
+    #[test]
+    fn an_input_without_features_keeps_its_labels() {
+        let (table, values) = table();
+        let labels = |table: &Table, place: usize| {
+            let labels = table.outcomes()[place].labels.iter();
+            labels.map(|(name, value)| format!("{name}={value}")).collect::<Vec<_>>()
+        };
+        assert_eq!(labels(&table, 3), ["take=3", "type=rice"]);
+        assert_eq!(labels(&table, 0), [""; 0], "a row has them");
+        let parts = split(&table, "type", &values).unwrap();
+        assert_eq!(labels(&parts[3].table, 1), ["take=3"]);
+        let mut twice = Table::new(vec!["type".into(), "take".into()]).unwrap();
+        twice.extend(&table).unwrap();
+        assert_eq!(twice, table);
+    }
+
+    #[test]
+    fn an_output_without_inputs_has_a_part() {
+        let table = Table::new(vec!["type".into(), "take".into()]).unwrap();
+        let parts = split(&table, "take", &[]).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out");
+        write_parts(&path, &parts);
+        let (found, label) = open(&path).unwrap();
+        assert_eq!((found.table, label.as_str()), (table, "take"));
     }
 
     #[test]

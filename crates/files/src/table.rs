@@ -118,13 +118,13 @@ impl Table {
     }
 
     /// Appends an input: its outcome and, if that has features, its id, labels and summary row
-    /// (empty when the run has no summaries).
+    /// (empty when the run has no summaries). Without features, the outcome keeps the labels.
     ///
     /// # Errors
     /// [`TableError::Row`] or [`TableError::Labels`] when they do not fit; the table is unchanged.
     pub fn push(
         &mut self,
-        outcome: Outcome,
+        mut outcome: Outcome,
         labels: &[(String, String)],
         row: &[f32],
     ) -> Result<(), TableError> {
@@ -148,6 +148,8 @@ impl Table {
                 make_room(column, 1);
                 column.push(value.clone());
             }
+        } else {
+            outcome.labels.extend(labels.iter().cloned());
         }
         make_room(&mut self.outcomes, 1);
         self.outcomes.push(outcome);
@@ -194,7 +196,9 @@ impl Table {
         for &place in places {
             let (outcome, row) = (&self.outcomes[place], rows[place]);
             if !outcome.status.has_features() {
-                part.push(outcome.clone(), &[], &[])?;
+                let mut outcome = outcome.clone();
+                outcome.labels.remove(without);
+                part.push(outcome, &[], &[])?;
                 continue;
             }
             let labels = self.labels().filter(|(name, _)| *name != without);

@@ -21,17 +21,13 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
 use crate::arrays::{into_numpy, view2};
-use crate::errors::{ConfigError, MissingFileError, run_error, value_error};
+use crate::errors::{MissingFileError, config_error, run_error, value_error};
 use crate::pool::{self, compute};
 
 /// How often a run asks whether Python has a signal for us.
 const POLL: Duration = Duration::from_millis(50);
 
 const FINISHED: &str = "the signal is finished: start another one";
-
-fn config_error(error: impl std::fmt::Display) -> PyErr {
-    ConfigError::new_err(error.to_string())
-}
 
 /// The configuration from `(kind, text)`, `kind` being "preset", "path", "toml" or "json".
 pub(crate) fn config_of((kind, text): (&str, &str), overrides: &[String]) -> PyResult<Arc<Config>> {

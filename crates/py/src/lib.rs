@@ -45,6 +45,8 @@ mod _core {
     #[pymodule_export]
     use crate::compound::{a34_short, a34f136, paa_fbank, pca_fit, pca_project, sk_resize};
     #[pymodule_export]
+    use crate::errors::in_python;
+    #[pymodule_export]
     use crate::evaluate::evaluate;
     #[pymodule_export]
     use crate::extract::{PySignal, PySignals, effective_config, extract, fetch, fit_projection};

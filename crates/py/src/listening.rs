@@ -16,7 +16,7 @@ use numpy::{IntoPyArray, PyArrayDyn, PyArrayMethods};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
-use crate::errors::{RunError, value_error};
+use crate::errors::{run_error, value_error};
 use crate::extract::{input_error, interruptible};
 use crate::nets::PyTrainedNetwork;
 use crate::pool::{compute, jobs as usual_jobs};
@@ -36,7 +36,7 @@ type Embedded<'py> = Vec<(String, Bound<'py, PyArrayDyn<f32>>)>;
 fn error(error: SystemError) -> PyErr {
     match error {
         SystemError::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
-        SystemError::Extraction(error) => RunError::new_err(error.to_string()),
+        SystemError::Extraction(error) => run_error(&error),
         error => value_error(error),
     }
 }

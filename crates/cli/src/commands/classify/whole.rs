@@ -116,14 +116,25 @@ pub fn of_features(
     let mut records = args.records(&header.labels, &header.target, Unit::Recording, &columns)?;
     let rows: HashMap<&str, usize> =
         table.ids.iter().enumerate().map(|(row, id)| (id.as_str(), row)).collect();
-    let inputs: Vec<(&str, &str)> = match table.outcomes.is_empty() {
-        true => table.ids.iter().map(|id| (id.as_str(), "")).collect(),
-        false => table.outcomes.iter().map(|o| (o.id.as_str(), o.path.as_str())).collect(),
+    let inputs: Vec<(&str, &str, Option<&Outcome>)> = match table.outcomes.is_empty() {
+        true => table.ids.iter().map(|id| (id.as_str(), "", None)).collect(),
+        false => {
+            let outcomes = table.outcomes.iter();
+            outcomes.map(|o| (o.id.as_str(), o.path.as_str(), Some(o))).collect()
+        }
     };
-    for (id, path) in inputs {
-        let labels = rows.get(id).map_or(Vec::new(), |&row| {
-            table.columns().iter().map(|(_, values)| values[row].as_str()).collect()
-        });
+    for (id, path, outcome) in inputs {
+        let kept = outcome.filter(|o| !o.labels.is_empty());
+        let labels = match (rows.get(id), kept) {
+            (Some(&row), _) => {
+                table.columns().iter().map(|(_, values)| values[row].as_str()).collect()
+            }
+            (None, Some(outcome)) => {
+                let label = |name: &String| outcome.labels.get(name).map_or("", String::as_str);
+                table.columns().iter().map(|(name, _)| label(name)).collect()
+            }
+            (None, None) => Vec::new(),
+        };
         let Answer { status, class, proba } = predictions[id].clone();
         let record = Record { id, path, span: None, windows: 0, status, labels, class, proba };
         if !delivered(records.write(&record))? {

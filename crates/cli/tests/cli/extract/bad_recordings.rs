@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use corsmal_files::outcome::{Outcome, Status};
 
 use super::support::{extract, spec, table, wav};
+use crate::command::{done, run, text};
 
 /// Two good recordings and every kind of bad one.
 fn zoo(folder: &Path) -> PathBuf {
@@ -193,4 +194,34 @@ fn a_rate_that_would_make_billions_of_samples_is_refused() {
     let outcome = table(&out).outcomes()[0].clone();
     assert_eq!(outcome.status, Status::Unsupported);
     assert!(outcome.reason.contains("22050 is more than 100 times the 1 Hz"), "{}", outcome.reason);
+}
+
+#[test]
+fn the_class_of_one_is_kept_so_that_it_counts_as_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let mut list = String::from("path,type,take\n");
+    for i in 0..6 {
+        wav(&at(&format!("{i}.wav")), 1, 8000, 100 * (1 + i % 2));
+        list.push_str(&format!("{i}.wav,{},{i}\n", ["rice", "water"][i as usize % 2]));
+    }
+    std::fs::write(at("list.csv"), &list).unwrap();
+    extract(&at("list.csv"), &at("good.npz"), &["--preset", "mfcc-zcr"]).with(0);
+    let (good, model, csv) = (at("good.npz"), at("x.model"), at("p.csv"));
+    let (good, model, csv) = (text(&good), text(&model), text(&csv));
+    done(&["train", good, "--target", "type", "--classifier", "knn", "--out", model]);
+    std::fs::write(at("5.wav"), "no recording").unwrap();
+    let by = ["--preset", "mfcc-zcr", "--partition-by", "type"];
+    for (out, more) in [("f.npz", &by[..2]), ("f.parquet", &by[..2]), ("parts", &by[..])] {
+        extract(&at("list.csv"), &at(out), more).with(1);
+        let classified = ["classify", "--model", model, "--features"];
+        let ended = run(&[&classified[..], &[text(&at(out)), "--out", csv, "--overwrite"]].concat());
+        assert_eq!(ended.status.code(), Some(1), "{out}");
+        let lines = std::fs::read_to_string(csv).unwrap();
+        let failed = lines.lines().find(|line| line.starts_with("5,")).unwrap();
+        assert!(failed.contains(",not_audio,water,5,"), "{out}: {lines}");
+        let report: serde_json::Value =
+            serde_json::from_str(&done(&["score", csv, "--json"])).unwrap();
+        assert_eq!((&report["unknown"], &report["rows"]), (&1.into(), &6.into()), "{out}");
+    }
 }

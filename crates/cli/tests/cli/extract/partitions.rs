@@ -139,3 +139,21 @@ fn what_cannot_be_partitioned_is_refused_and_nothing_is_removed() {
         extract(&at("r000.wav"), &at("x"), &["--preset", "mfcc-zcr", "--partition-by", "type"]);
     assert!(unlabelled.with(2).stderr.contains("have no labels"));
 }
+
+#[test]
+fn a_shard_without_recordings_is_an_output_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let list = manifest(folder.path(), 2);
+    let out = folder.path().join("shard");
+    for more in [&["--preset", "mfcc-zcr"][..], &[]] {
+        let by = ["--partition-by", "type", "--shard", "2/3", "--overwrite"];
+        extract(&list, &out, &[more, &by].concat()).with(0);
+        assert_eq!(names(&out), ["type=__HIVE_DEFAULT_PARTITION__"]);
+        let (found, label) = partition::open(&out).unwrap();
+        assert_eq!((found.table.outcomes().len(), label.as_str()), (0, "type"));
+        let told = done(&["inspect", text(&out)]);
+        assert!(told.contains("0 inputs"), "{told}");
+        let again = extract(&list, &out, &[more, &by[..4]].concat()).with(0);
+        assert!(again.stderr.contains("up to date"), "{}", again.stderr);
+    }
+}

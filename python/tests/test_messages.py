@@ -1,0 +1,41 @@
+"""Messages name arguments, not options of the command."""
+
+from __future__ import annotations
+
+import pathlib
+
+import numpy as np
+import pytest
+from corsmal_feat import _core, cross_validate
+from corsmal_feat.errors import CorsmalFeatError
+
+
+@pytest.mark.parametrize(
+    ("told", "wanted"),
+    [
+        ("x.npz exists; --overwrite replaces it", "x.npz exists; overwrite=True replaces it"),
+        ('no column "f" (--id-column): a', 'no column "f" (id_column): a'),
+        (
+            "16 kHz: --set signal.sample_rate=8000 resamples it, --any-rate, as it is",
+            '16 kHz: set={"signal.sample_rate": 8000} resamples it, any_rate=True, as it is',
+        ),
+        ("--set signal.channels=mean mixes", 'set={"signal.channels": "mean"} mixes'),
+        ("--set rms.center=false", 'set={"rms.center": False}'),
+        ("a--resume  b/--set --unheard -- --", "a--resume  b/--set --unheard -- --"),
+        ("", ""),
+    ],
+)
+def test_options_become_arguments_and_other_text_stays(told: str, wanted: str) -> None:
+    assert _core.in_python(told) == wanted
+
+
+def test_warnings_and_refusals_of_a_cross_validation(tmp_path: pathlib.Path) -> None:
+    x = np.random.default_rng(0).normal(size=(12, 2))
+    y = np.array(["a", "b"] * 6)
+    path = tmp_path / "x.npz"
+    np.savez(path, X=x, y=y, group=np.array(["p", "p", "q", "q"] * 3))
+    with pytest.warns(UserWarning, match="in both training and test: groups group keeps"):
+        cross_validate(path, "y", classifier="knn", cv=3)
+    with pytest.raises(CorsmalFeatError, match="cv 6 makes 6 folds") as refused:
+        cross_validate(path, "y", classifier="knn", cv=9)
+    assert "--" not in str(refused.value)
