@@ -111,6 +111,8 @@ class Features:
         return f"<Features: {len(self.ids)} recordings, {failed}, {self._what()}>"
 
     def _what(self) -> str:
+        if not self.ids:
+            return "no features"
         if self.summary is None:
             return "frames of " + ", ".join(self.config["features"])
         return f"summary of {len(self.names)} values"

@@ -43,6 +43,21 @@ pub enum FeatureFileError {
         /// The folder.
         path: PathBuf,
     },
+    /// A pipe or a device, whose bytes come once.
+    #[error(
+        "{path} is a pipe or device, which gives its bytes once, but a feature file is read in \
+         several places: give a file"
+    )]
+    Pipe {
+        /// The pipe.
+        path: PathBuf,
+    },
+    /// An object in a store. What follows may hold secrets.
+    #[error("{scheme}://...: feature files are read from a disk, not from an address: copy it to one first")]
+    Address {
+        /// What the address begins with.
+        scheme: String,
+    },
     /// The first bytes are of no format that is read.
     #[error("{path}: expected {expected}, found another kind of file")]
     Content {
@@ -98,6 +113,16 @@ impl FeatureFile {
         }
         if path.is_dir() {
             return Err(FeatureFileError::Folder { path: path.into() });
+        }
+        let address = path.to_str().and_then(|name| name.split_once("://"));
+        match (path.metadata(), address) {
+            (Ok(metadata), _) if !metadata.is_file() => {
+                return Err(FeatureFileError::Pipe { path: path.into() });
+            }
+            (Err(_), Some((scheme, _))) => {
+                return Err(FeatureFileError::Address { scheme: scheme.into() });
+            }
+            _ => {}
         }
         let content = Content::of(path)
             .map_err(|source| FeatureFileError::Io { path: path.into(), source })?;

@@ -6,7 +6,7 @@ use std::process::Output;
 use corsmal_ccm::dataset::{Container, SequenceName};
 use corsmal_ccm::synth::write_views;
 
-use crate::command::tool;
+use crate::command::{refused, tool};
 
 fn inspect(args: &[&Path]) -> Output {
     tool().arg("inspect").args(args).output().unwrap()
@@ -237,4 +237,14 @@ fn files_of_other_kinds_are_inspected_one_at_a_time() {
     assert!(text(&out.stderr).contains("a.npz: no recording: files of other kinds"));
     let out = inspect(&["-".as_ref()]);
     assert!(text(&out.stderr).contains("inspect reads files, not standard input"));
+}
+
+#[test]
+fn addresses_and_pipes_are_no_files() {
+    for command in [&["inspect"][..], &["pca", "--out", "x.npz"], &["train", "--target", "y", "--out", "x"]] {
+        let told = refused(&[command, &["s3://secret/x.npz"]].concat());
+        assert!(told.contains("copy it to one first"), "{told}");
+    }
+    let told = refused(&["train", "--target", "y", "--out", "x", "/dev/null"]);
+    assert!(told.contains("gives its bytes once"), "{told}");
 }

@@ -19,7 +19,7 @@ mod tensors;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use corsmal_extract::inputs::InputSource;
+use corsmal_extract::inputs::{InputSource, is_stored, shown};
 use corsmal_files::feature_file::FeatureFile;
 use corsmal_files::format::Content;
 use corsmal_files::layout;
@@ -64,6 +64,12 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         return Err(Failure::new(format!(
             "{}: inspect reads files more than once, and a pipe or device gives its bytes once: name a file",
             pipe.display()
+        )));
+    }
+    if let Some(address) = args.paths.iter().find(|path| path.to_str().is_some_and(is_stored)) {
+        return Err(Failure::new(format!(
+            "{}: inspect reads files on a disk: copy it to one first",
+            shown(&address.to_string_lossy())
         )));
     }
     match args.paths.as_slice() {

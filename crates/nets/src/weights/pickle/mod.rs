@@ -2,57 +2,15 @@
 //! and functions that occur are known by name, everything else is refused. These are
 //! binary pickles, from protocol 2 on; `corsmal_vision` reads those of protocol 0, which are text.
 
-use super::numbers::Kind;
+mod value;
 
-/// A value on the pickle machine's stack.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Value {
-    None,
-    Bool(bool),
-    Int(i64),
-    Float,
-    Text(String),
-    Tuple(Vec<Value>),
-    List(Vec<Value>),
-    Dict(Vec<(Value, Value)>),
-    Global(Global),
-    Storage(Storage),
-    Tensor(Tensor),
-    Mark,
-}
-
-/// The names that are known.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Global {
-    OrderedDict,
-    RebuildTensor,
-    RebuildParameter,
-    Storage(Kind),
-}
-
-/// Where a tensor's numbers lie in the archive.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Storage {
-    pub(super) kind: Kind,
-    pub(super) key: String,
-    pub(super) len: usize,
-}
-
-/// A view of a storage.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Tensor {
-    pub(super) storage: Storage,
-    pub(super) offset: usize,
-    pub(super) shape: Vec<usize>,
-    pub(super) strides: Vec<usize>,
-}
+use value::{call, global, size, storage};
+pub(super) use value::{Storage, Tensor, Value};
 
 /// Longest stack and memo accepted.
 const MAX_VALUES: usize = 1 << 20;
 /// Values made and copied in all; a long text counts for several.
 const MAX_WORK: usize = 2 * MAX_VALUES;
-/// Deepest nesting accepted; weights have a few levels.
-const MAX_DEPTH: usize = 16;
 
 /// Reads one pickle.
 pub(super) fn read(bytes: &[u8]) -> Result<Value, String> {
@@ -307,103 +265,4 @@ impl Machine<'_> {
 fn shallow(items: Vec<Value>) -> Result<Vec<Value>, String> {
     items.iter().try_for_each(|item| size(item, 1).map(|_| ()))?;
     Ok(items)
-}
-
-/// Values in a value; refuses nesting beyond what weights have.
-fn size(value: &Value, depth: usize) -> Result<usize, String> {
-    if depth > MAX_DEPTH {
-        return Err("values nested too deep".into());
-    }
-    let add = |n: usize, item: &Value| Ok::<_, String>(n + size(item, depth + 1)?);
-    match value {
-        Value::Tuple(items) | Value::List(items) => items.iter().try_fold(1, add),
-        Value::Dict(items) => items.iter().flat_map(|(k, v)| [k, v]).try_fold(1, add),
-        Value::Text(text) => Ok(1 + text.len() / 64),
-        Value::Storage(storage) => Ok(1 + storage.key.len() / 64),
-        Value::Tensor(tensor) => Ok(1 + (tensor.storage.key.len() + 16 * tensor.shape.len()) / 64),
-        _ => Ok(1),
-    }
-}
-
-fn global(module: &str, name: &str) -> Result<Global, String> {
-    Ok(match (module, name) {
-        ("collections", "OrderedDict") => Global::OrderedDict,
-        ("torch._utils", "_rebuild_tensor_v2") => Global::RebuildTensor,
-        ("torch._utils", "_rebuild_parameter") => Global::RebuildParameter,
-        ("torch", "FloatStorage") => Global::Storage(Kind::F32),
-        ("torch", "DoubleStorage") => Global::Storage(Kind::F64),
-        ("torch", "HalfStorage") => Global::Storage(Kind::F16),
-        ("torch", "BFloat16Storage") => Global::Storage(Kind::Bf16),
-        ("torch", "LongStorage") => Global::Storage(Kind::I64),
-        ("torch", "IntStorage") => Global::Storage(Kind::I32),
-        _ => {
-            return Err(format!(
-                "it needs {module}.{name}; only dictionaries of tensors are read, and nothing in \
-                 a pickle is run: save net.state_dict()"
-            ));
-        }
-    })
-}
-
-fn call(function: Value, arguments: Value) -> Result<Value, String> {
-    let Value::Tuple(arguments) = arguments else { return Err("a call without arguments".into()) };
-    match (function, &arguments[..]) {
-        (Value::Global(Global::OrderedDict), []) => Ok(Value::Dict(Vec::new())),
-        (
-            Value::Global(Global::RebuildTensor),
-            [
-                Value::Storage(storage),
-                Value::Int(offset),
-                Value::Tuple(shape),
-                Value::Tuple(strides),
-                // whether it is trained, its hooks; then what else there is to it
-                rest @ ..,
-            ],
-        ) if shape.len() == strides.len() => {
-            let plain = |more: &Value| matches!(more, Value::Dict(more) if more.is_empty());
-            if !rest.iter().skip(2).all(plain) {
-                return Err(
-                    "a tensor whose numbers are to be negated or conjugated when read: save \
-                            tensor.resolve_neg().resolve_conj()"
-                        .into(),
-                );
-            }
-            let sizes = |all: &[Value]| -> Result<Vec<usize>, String> {
-                let one = |v: &Value| match v {
-                    Value::Int(n) => usize::try_from(*n).map_err(|_| "a negative size".to_string()),
-                    _ => Err("a size that is not a number".into()),
-                };
-                all.iter().map(one).collect()
-            };
-            let offset = usize::try_from(*offset).map_err(|_| "a negative offset")?;
-            Ok(Value::Tensor(Tensor {
-                storage: storage.clone(),
-                offset,
-                shape: sizes(shape)?,
-                strides: sizes(strides)?,
-            }))
-        }
-        (Value::Global(Global::RebuildParameter), [Value::Tensor(tensor), ..]) => {
-            Ok(Value::Tensor(tensor.clone()))
-        }
-        _ => Err("a call of an unknown function, or with other arguments".into()),
-    }
-}
-
-/// `('storage', type, key, location, count)`.
-fn storage(id: Value) -> Result<Value, String> {
-    let Value::Tuple(parts) = id else { return Err("a storage without a description".into()) };
-    match &parts[..] {
-        [
-            Value::Text(word),
-            Value::Global(Global::Storage(kind)),
-            Value::Text(key),
-            Value::Text(_),
-            Value::Int(len),
-        ] if word == "storage" => {
-            let len = usize::try_from(*len).map_err(|_| "a storage of negative size")?;
-            Ok(Value::Storage(Storage { kind: *kind, key: key.clone(), len }))
-        }
-        _ => Err("a storage that is not described as PyTorch does".into()),
-    }
 }
