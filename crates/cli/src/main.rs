@@ -3,7 +3,6 @@
 #[macro_use]
 mod streams;
 
-mod allocator;
 mod args;
 mod commands;
 mod configuration;
@@ -25,7 +24,7 @@ mod text_table;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    allocator::keep_freed_memory();
+    corsmal_files::memory::keep_freed();
     let cli = help::parse();
     match cli.run() {
         Ok(code) => code,

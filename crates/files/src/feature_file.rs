@@ -53,7 +53,9 @@ pub enum FeatureFileError {
         path: PathBuf,
     },
     /// An object in a store. What follows may hold secrets.
-    #[error("{scheme}://...: feature files are read from a disk, not from an address: copy it to one first")]
+    #[error(
+        "{scheme}://...: feature files are read from a disk, not from an address: copy it to one first"
+    )]
     Address {
         /// What the address begins with.
         scheme: String,

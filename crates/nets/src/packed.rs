@@ -16,8 +16,9 @@ const ROWS: usize = 6;
 const MORE_ROWS: usize = 2 * ROWS;
 /// Panels of a block of one row, so that as many sums run side by side.
 const PANELS: usize = 4;
-/// Numbers that are summed before their sum goes to the others, about: rounding grows with the length of a sum.
-const STRETCH: usize = 256;
+/// Numbers that are summed before their sum goes to the others, about: rounding grows with the length of a sum, and
+/// the weights of a part stay in the nearest cache while all rows pass.
+const PART: usize = 128;
 /// Rows that a thread multiplies at a time: what they see stays in the cache while the panels pass.
 const TOGETHER: usize = 32 * ROWS;
 
@@ -44,6 +45,32 @@ pub(crate) struct Runs<'a> {
     pub(crate) jump: usize,
     /// numbers of a run
     pub(crate) length: usize,
+}
+
+/// What is summed before the sum goes to the others: some runs, or a piece of one.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    runs: (usize, usize),
+    /// place in each run
+    first: usize,
+    length: usize,
+}
+
+impl Runs<'_> {
+    /// All numbers of a row, part by part.
+    fn parts(self) -> impl Iterator<Item = Part> + use<> {
+        let Self { count, length, .. } = self;
+        let pieces = length.div_ceil(PART).max(1);
+        let piece = length.div_ceil(pieces).max(1);
+        let together = if pieces > 1 { 1 } else { (PART / piece).max(1) };
+        (0..count.max(1)).step_by(together).flat_map(move |run| {
+            (0..length.max(1)).step_by(piece).map(move |first| Part {
+                runs: (run, count.min(run + together)),
+                first,
+                length: piece.min(length - first),
+            })
+        })
+    }
 }
 
 impl Packed {
@@ -121,46 +148,56 @@ impl WithSimd for Product<'_> {
         let panels = self.packed.outputs.div_ceil(self.packed.width);
         if rows == 1 {
             let (blocks, rest) = (panels / PANELS, panels % PANELS);
-            (0..blocks).for_each(|b| self.block::<S, 1, PANELS>(simd, 0, b * PANELS));
-            (panels - rest..panels).for_each(|p| self.block::<S, 1, 1>(simd, 0, p));
+            (0..blocks).for_each(|b| self.parts::<S, 1, PANELS>(simd, b * PANELS));
+            (panels - rest..panels).for_each(|p| self.parts::<S, 1, 1>(simd, p));
             return;
         }
         for panel in 0..panels {
-            let (mut begun, whole) = (0, rows / ROWS * ROWS);
-            if S::REGISTER_COUNT >= 32 {
-                while begun + MORE_ROWS <= rows {
-                    self.block::<S, MORE_ROWS, 1>(simd, begun, panel);
-                    begun += MORE_ROWS;
+            for part in self.runs.parts() {
+                let (mut begun, whole) = (0, rows / ROWS * ROWS);
+                if S::REGISTER_COUNT >= 32 {
+                    while begun + MORE_ROWS <= rows {
+                        self.block::<S, MORE_ROWS, 1>(simd, begun, panel, part);
+                        begun += MORE_ROWS;
+                    }
                 }
-            }
-            for row in (begun..whole).step_by(ROWS) {
-                self.block::<S, ROWS, 1>(simd, row, panel);
-            }
-            match rows - whole {
-                5 => self.block::<S, 5, 1>(simd, whole, panel),
-                4 => self.block::<S, 4, 1>(simd, whole, panel),
-                3 => self.block::<S, 3, 1>(simd, whole, panel),
-                2 => self.block::<S, 2, 1>(simd, whole, panel),
-                1 => self.block::<S, 1, 1>(simd, whole, panel),
-                _ => (),
+                for row in (begun..whole).step_by(ROWS) {
+                    self.block::<S, ROWS, 1>(simd, row, panel, part);
+                }
+                match rows - whole {
+                    5 => self.block::<S, 5, 1>(simd, whole, panel, part),
+                    4 => self.block::<S, 4, 1>(simd, whole, panel, part),
+                    3 => self.block::<S, 3, 1>(simd, whole, panel, part),
+                    2 => self.block::<S, 2, 1>(simd, whole, panel, part),
+                    1 => self.block::<S, 1, 1>(simd, whole, panel, part),
+                    _ => (),
+                }
             }
         }
     }
 }
 
 impl Product<'_> {
+    /// All parts of one row's sums.
+    #[inline(always)]
+    fn parts<S: Simd, const R: usize, const P: usize>(&mut self, simd: S, panel: usize) {
+        self.runs.parts().for_each(|part| self.block::<S, R, P>(simd, 0, panel, part));
+    }
+
     #[inline(always)]
     fn block<S: Simd, const R: usize, const P: usize>(
         &mut self,
         simd: S,
         row: usize,
         panel: usize,
+        part: Part,
     ) {
         let Self { packed, runs, bias, out } = self;
         simd.vectorize(Block::<S, R, P> {
             simd,
             packed,
             runs: *runs,
+            part,
             bias: *bias,
             row,
             panel,
@@ -169,11 +206,12 @@ impl Product<'_> {
     }
 }
 
-/// `R` rows times `P` panels.
+/// `R` rows times `P` panels, over a part of their numbers.
 struct Block<'a, S: Simd, const R: usize, const P: usize> {
     simd: S,
     packed: &'a Packed,
     runs: Runs<'a>,
+    part: Part,
     bias: Option<&'a [f32]>,
     row: usize,
     panel: usize,
@@ -185,32 +223,24 @@ impl<S: Simd, const R: usize, const P: usize> NullaryFnOnce for Block<'_, S, R, 
 
     #[inline(always)]
     fn call(self) {
-        let Self { simd, packed, runs, bias, row, panel, out } = self;
+        let Self { simd, packed, runs, part, bias, row, panel, out } = self;
         let each = packed.width * packed.inputs;
         let weights: [_; P] = std::array::from_fn(|p| {
             let panel = &packed.panels[(panel + p) * each..][..each];
             S::as_simd_f32s(panel).0.as_chunks::<VECTORS>().0
         });
         let starts = &runs.starts[row..row + R];
-        let mut to = Output { packed, bias, row, panel, out, empty: true };
-        let zeros = [[[simd.splat_f32s(0.0); VECTORS]; P]; R];
-        let (mut sums, mut summed) = (zeros, 0);
-        for run in 0..runs.count {
-            for first in (0..runs.length).step_by(STRETCH) {
-                if summed >= STRETCH {
-                    to.add(simd, &sums);
-                    (sums, summed) = (zeros, 0);
-                }
-                let length = STRETCH.min(runs.length - first);
-                let at = run * runs.jump + first;
-                let x: [_; R] = std::array::from_fn(|r| &runs.values[starts[r] + at..][..length]);
-                let at = run * runs.length + first;
-                let w: [_; P] = std::array::from_fn(|p| &weights[p][at..][..length]);
-                sums = multiplied(simd, x, w, sums);
-                summed += length;
-            }
+        let mut sums = [[[simd.splat_f32s(0.0); VECTORS]; P]; R];
+        for run in part.runs.0..part.runs.1 {
+            let at = run * runs.jump + part.first;
+            let x: [_; R] = std::array::from_fn(|r| &runs.values[starts[r] + at..][..part.length]);
+            let at = run * runs.length + part.first;
+            let w: [_; P] = std::array::from_fn(|p| &weights[p][at..][..part.length]);
+            sums = multiplied(simd, x, w, sums);
         }
-        to.add(simd, &sums);
+        let begins = part.runs.0 == 0 && part.first == 0;
+        Output { packed, bias: bias.filter(|_| begins), row, panel, out, empty: begins }
+            .add(simd, &sums);
     }
 }
 
@@ -245,14 +275,14 @@ struct Output<'a> {
     row: usize,
     panel: usize,
     out: &'a mut [f32],
-    /// nothing is there yet
+    /// whether nothing is there yet
     empty: bool,
 }
 
 impl Output<'_> {
     #[inline(always)]
     fn add<S: Simd, const R: usize, const P: usize>(
-        &mut self,
+        self,
         simd: S,
         sums: &[[[S::f32s; VECTORS]; P]; R],
     ) {
@@ -287,7 +317,6 @@ impl Output<'_> {
                 }
             }
         }
-        self.empty = false;
     }
 }
 

@@ -99,6 +99,7 @@ mod _core {
 
     #[pymodule_init]
     fn init(m: &Bound<'_, PyModule>) -> PyResult<()> {
+        corsmal_files::memory::keep_freed();
         m.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

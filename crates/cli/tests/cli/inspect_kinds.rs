@@ -241,7 +241,9 @@ fn files_of_other_kinds_are_inspected_one_at_a_time() {
 
 #[test]
 fn addresses_and_pipes_are_no_files() {
-    for command in [&["inspect"][..], &["pca", "--out", "x.npz"], &["train", "--target", "y", "--out", "x"]] {
+    for command in
+        [&["inspect"][..], &["pca", "--out", "x.npz"], &["train", "--target", "y", "--out", "x"]]
+    {
         let told = refused(&[command, &["s3://secret/x.npz"]].concat());
         assert!(told.contains("copy it to one first"), "{told}");
     }

@@ -215,7 +215,8 @@ fn the_class_of_one_is_kept_so_that_it_counts_as_wrong() {
     for (out, more) in [("f.npz", &by[..2]), ("f.parquet", &by[..2]), ("parts", &by[..])] {
         extract(&at("list.csv"), &at(out), more).with(1);
         let classified = ["classify", "--model", model, "--features"];
-        let ended = run(&[&classified[..], &[text(&at(out)), "--out", csv, "--overwrite"]].concat());
+        let ended =
+            run(&[&classified[..], &[text(&at(out)), "--out", csv, "--overwrite"]].concat());
         assert_eq!(ended.status.code(), Some(1), "{out}");
         let lines = std::fs::read_to_string(csv).unwrap();
         let failed = lines.lines().find(|line| line.starts_with("5,")).unwrap();

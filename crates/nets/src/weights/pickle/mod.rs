@@ -4,8 +4,8 @@
 
 mod value;
 
-use value::{call, global, size, storage};
 pub(super) use value::{Storage, Tensor, Value};
+use value::{call, global, size, storage};
 
 /// Longest stack and memo accepted.
 const MAX_VALUES: usize = 1 << 20;
