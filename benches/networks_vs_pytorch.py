@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-os.environ["RAYON_NUM_THREADS"] = "1"
+os.environ["CORSMAL_FEAT_JOBS"] = "1"
 os.environ["OMP_NUM_THREADS"] = "1"
 
 import numpy as np

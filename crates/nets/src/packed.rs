@@ -18,7 +18,7 @@ const MORE_ROWS: usize = 2 * ROWS;
 const PANELS: usize = 4;
 /// Numbers that are summed before their sum goes to the others, about: rounding grows with the length of a sum, and
 /// the weights of a part stay in the nearest cache while all rows pass.
-const PART: usize = 128;
+const PART: usize = 256;
 /// Rows that a thread multiplies at a time: what they see stays in the cache while the panels pass.
 const TOGETHER: usize = 32 * ROWS;
 
@@ -56,13 +56,19 @@ struct Part {
     length: usize,
 }
 
+impl Part {
+    fn begins(self) -> bool {
+        self.runs.0 == 0 && self.first == 0
+    }
+}
+
 impl Runs<'_> {
     /// All numbers of a row, part by part.
-    fn parts(self) -> impl Iterator<Item = Part> + use<> {
+    fn parts(self) -> impl Iterator<Item = Part> + Clone + use<> {
         let Self { count, length, .. } = self;
         let pieces = length.div_ceil(PART).max(1);
         let piece = length.div_ceil(pieces).max(1);
-        let together = if pieces > 1 { 1 } else { (PART / piece).max(1) };
+        let together = if pieces > 1 { 1 } else { PART.div_ceil(piece) };
         (0..count.max(1)).step_by(together).flat_map(move |run| {
             (0..length.max(1)).step_by(piece).map(move |first| Part {
                 runs: (run, count.min(run + together)),
@@ -144,44 +150,52 @@ impl WithSimd for Product<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        let rows = self.runs.starts.len();
         let panels = self.packed.outputs.div_ceil(self.packed.width);
-        if rows == 1 {
+        if self.runs.starts.len() == 1 {
             let (blocks, rest) = (panels / PANELS, panels % PANELS);
-            (0..blocks).for_each(|b| self.parts::<S, 1, PANELS>(simd, b * PANELS));
-            (panels - rest..panels).for_each(|p| self.parts::<S, 1, 1>(simd, p));
+            let parts = self.runs.parts();
+            for b in 0..blocks {
+                self.block::<S, 1, PANELS>(simd, 0, b * PANELS, parts.clone());
+            }
+            (panels - rest..panels).for_each(|p| self.block::<S, 1, 1>(simd, 0, p, parts.clone()));
             return;
         }
         for panel in 0..panels {
-            for part in self.runs.parts() {
-                let (mut begun, whole) = (0, rows / ROWS * ROWS);
-                if S::REGISTER_COUNT >= 32 {
-                    while begun + MORE_ROWS <= rows {
-                        self.block::<S, MORE_ROWS, 1>(simd, begun, panel, part);
-                        begun += MORE_ROWS;
-                    }
+            match self.runs.count {
+                // Long rows: the weights of a part stay in the nearest cache while all rows pass.
+                1 => {
+                    let parts = self.runs.parts();
+                    parts.for_each(|part| self.rows(simd, panel, std::iter::once(part)));
                 }
-                for row in (begun..whole).step_by(ROWS) {
-                    self.block::<S, ROWS, 1>(simd, row, panel, part);
-                }
-                match rows - whole {
-                    5 => self.block::<S, 5, 1>(simd, whole, panel, part),
-                    4 => self.block::<S, 4, 1>(simd, whole, panel, part),
-                    3 => self.block::<S, 3, 1>(simd, whole, panel, part),
-                    2 => self.block::<S, 2, 1>(simd, whole, panel, part),
-                    1 => self.block::<S, 1, 1>(simd, whole, panel, part),
-                    _ => (),
-                }
+                _ => self.rows(simd, panel, self.runs.parts()),
             }
         }
     }
 }
 
 impl Product<'_> {
-    /// All parts of one row's sums.
+    /// Parts of all rows for a panel.
     #[inline(always)]
-    fn parts<S: Simd, const R: usize, const P: usize>(&mut self, simd: S, panel: usize) {
-        self.runs.parts().for_each(|part| self.block::<S, R, P>(simd, 0, panel, part));
+    fn rows<S: Simd>(&mut self, simd: S, panel: usize, parts: impl Iterator<Item = Part> + Clone) {
+        let rows = self.runs.starts.len();
+        let (mut begun, whole) = (0, rows / ROWS * ROWS);
+        if S::REGISTER_COUNT >= 32 {
+            while begun + MORE_ROWS <= rows {
+                self.block::<S, MORE_ROWS, 1>(simd, begun, panel, parts.clone());
+                begun += MORE_ROWS;
+            }
+        }
+        for row in (begun..whole).step_by(ROWS) {
+            self.block::<S, ROWS, 1>(simd, row, panel, parts.clone());
+        }
+        match rows - whole {
+            5 => self.block::<S, 5, 1>(simd, whole, panel, parts),
+            4 => self.block::<S, 4, 1>(simd, whole, panel, parts),
+            3 => self.block::<S, 3, 1>(simd, whole, panel, parts),
+            2 => self.block::<S, 2, 1>(simd, whole, panel, parts),
+            1 => self.block::<S, 1, 1>(simd, whole, panel, parts),
+            _ => (),
+        }
     }
 
     #[inline(always)]
@@ -190,57 +204,53 @@ impl Product<'_> {
         simd: S,
         row: usize,
         panel: usize,
-        part: Part,
+        parts: impl Iterator<Item = Part>,
     ) {
         let Self { packed, runs, bias, out } = self;
-        simd.vectorize(Block::<S, R, P> {
-            simd,
-            packed,
-            runs: *runs,
-            part,
-            bias: *bias,
-            row,
-            panel,
-            out,
-        });
+        let (runs, bias) = (*runs, *bias);
+        simd.vectorize(Block::<S, _, R, P> { simd, packed, runs, parts, bias, row, panel, out });
     }
 }
 
-/// `R` rows times `P` panels, over a part of their numbers.
-struct Block<'a, S: Simd, const R: usize, const P: usize> {
+/// `R` rows times `P` panels, over parts of their numbers.
+struct Block<'a, S: Simd, I, const R: usize, const P: usize> {
     simd: S,
     packed: &'a Packed,
     runs: Runs<'a>,
-    part: Part,
+    parts: I,
     bias: Option<&'a [f32]>,
     row: usize,
     panel: usize,
     out: &'a mut [f32],
 }
 
-impl<S: Simd, const R: usize, const P: usize> NullaryFnOnce for Block<'_, S, R, P> {
+impl<S: Simd, I: Iterator<Item = Part>, const R: usize, const P: usize> NullaryFnOnce
+    for Block<'_, S, I, R, P>
+{
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        let Self { simd, packed, runs, part, bias, row, panel, out } = self;
+        let Self { simd, packed, runs, parts, bias, row, panel, out } = self;
         let each = packed.width * packed.inputs;
         let weights: [_; P] = std::array::from_fn(|p| {
             let panel = &packed.panels[(panel + p) * each..][..each];
             S::as_simd_f32s(panel).0.as_chunks::<VECTORS>().0
         });
         let starts = &runs.starts[row..row + R];
-        let mut sums = [[[simd.splat_f32s(0.0); VECTORS]; P]; R];
-        for run in part.runs.0..part.runs.1 {
-            let at = run * runs.jump + part.first;
-            let x: [_; R] = std::array::from_fn(|r| &runs.values[starts[r] + at..][..part.length]);
-            let at = run * runs.length + part.first;
-            let w: [_; P] = std::array::from_fn(|p| &weights[p][at..][..part.length]);
-            sums = multiplied(simd, x, w, sums);
+        let mut to = Output { packed, bias, row, panel, out };
+        for part in parts {
+            let mut sums = [[[simd.splat_f32s(0.0); VECTORS]; P]; R];
+            for run in part.runs.0..part.runs.1 {
+                let at = run * runs.jump + part.first;
+                let x: [_; R] =
+                    std::array::from_fn(|r| &runs.values[starts[r] + at..][..part.length]);
+                let at = run * runs.length + part.first;
+                let w: [_; P] = std::array::from_fn(|p| &weights[p][at..][..part.length]);
+                sums = multiplied(simd, x, w, sums);
+            }
+            to.add(simd, &sums, part.begins());
         }
-        let begins = part.runs.0 == 0 && part.first == 0;
-        Output { packed, bias: bias.filter(|_| begins), row, panel, out, empty: begins }
-            .add(simd, &sums);
     }
 }
 
@@ -275,16 +285,16 @@ struct Output<'a> {
     row: usize,
     panel: usize,
     out: &'a mut [f32],
-    /// whether nothing is there yet
-    empty: bool,
 }
 
 impl Output<'_> {
     #[inline(always)]
+    /// `begins`: whether nothing is there yet.
     fn add<S: Simd, const R: usize, const P: usize>(
-        self,
+        &mut self,
         simd: S,
         sums: &[[[S::f32s; VECTORS]; P]; R],
+        begins: bool,
     ) {
         let Packed { outputs, width, .. } = *self.packed;
         for (r, sums) in sums.iter().enumerate() {
@@ -293,14 +303,14 @@ impl Output<'_> {
                 let end = outputs.min(first + width);
                 let row = (self.row + r) * outputs;
                 let to = &mut self.out[row + first..row + end];
-                let bias = self.bias.filter(|_| self.empty).map(|bias| &bias[first..end]);
+                let bias = self.bias.filter(|_| begins).map(|bias| &bias[first..end]);
                 if to.len() == width {
                     let to = S::as_mut_simd_f32s(to).0;
                     let bias = bias.map(|bias| S::as_simd_f32s(bias).0);
                     for (v, (to, sum)) in to.iter_mut().zip(sums).enumerate() {
                         *to = match bias {
                             Some(bias) => simd.add_f32s(bias[v], *sum),
-                            None if self.empty => *sum,
+                            None if begins => *sum,
                             None => simd.add_f32s(*to, *sum),
                         };
                     }
@@ -310,7 +320,7 @@ impl Output<'_> {
                     let first = v * S::F32_LANES;
                     let before = match bias {
                         Some(bias) => simd.partial_load_f32s(&bias[first..first + to.len()]),
-                        None if self.empty => simd.splat_f32s(0.0),
+                        None if begins => simd.splat_f32s(0.0),
                         None => simd.partial_load_f32s(to),
                     };
                     simd.partial_store_f32s(to, simd.add_f32s(before, *sum));
