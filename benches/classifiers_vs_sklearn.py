@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-os.environ.setdefault("RAYON_NUM_THREADS", "2")
+os.environ.setdefault("CORSMAL_FEAT_JOBS", "2")
 os.environ.setdefault("OMP_NUM_THREADS", "2")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "2")
 

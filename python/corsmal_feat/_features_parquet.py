@@ -13,6 +13,7 @@ from urllib.parse import quote
 import numpy as np
 import numpy.typing as npt
 
+from ._core import is_statistic
 from ._warnings import warn
 from .errors import ParameterError
 
@@ -22,11 +23,6 @@ Values = npt.NDArray[Any]
 def _is_text(types: Any, kind: Any) -> bool:
     kind = kind.value_type if types.is_dictionary(kind) else kind
     return bool(types.is_string(kind) or types.is_large_string(kind))
-
-
-def _is_statistic(column: str) -> bool:
-    """Whether a column is named like a value of a summary: `mfcc[0].mean`, `rms.std`."""
-    return "[" in column or "." in column
 
 
 def _ids(name: str, column: list[Any]) -> list[str]:
@@ -159,7 +155,7 @@ def _read(name: str) -> tuple[dict[str, Any], Any]:
             continue
         whole = types.is_integer(field.type)
         # pandas makes a column of whole values one of integers; ours have such names.
-        if types.is_floating(field.type) or (whole and _is_statistic(field.name)):
+        if types.is_floating(field.type) or (whole and is_statistic(field.name)):
             names.append(field.name)
             columns[field.name] = table.column(field.name).to_numpy()
         elif whole or types.is_boolean(field.type) or _is_text(types, field.type):

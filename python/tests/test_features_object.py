@@ -370,3 +370,28 @@ def test_parquet_of_the_shared_cases() -> None:
         pytest.skip("no shared cases here")
     features = cf.load_features(CASES / "own_ed.parquet")
     assert len(features) and features.names
+
+
+def test_whole_numbers_are_features_where_they_are_named_so(tmp_path: Path) -> None:
+    pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    classes = [0, 1] * 10
+    columns = {
+        "id": [str(row) for row in range(20)],
+        "mfcc[0].mean": np.random.default_rng(0).random(20),
+        "rms.max": classes[::-1],
+        # These were features, and told the class.
+        "class.code": classes,
+        "speaker.id": [row // 4 for row in range(20)],
+        "y": ["a", "b"] * 10,
+    }
+    path = tmp_path / "table.parquet"
+    pq.write_table(pa.table(columns), path)
+    features = cf.load_features(path)
+    assert features.names == ["mfcc[0].mean", "rms.max"]
+    assert set(features.labels) == {"class.code", "speaker.id", "y"}
+    report = cf.cross_validate(path, "y", groups="speaker.id", classifier="tree")
+    assert report.report["features"] == 2
+    for codec in ("gzip", "lz4", "brotli"):
+        pq.write_table(pa.table(columns), path, compression=codec)
+        with pytest.raises(cf.ParameterError, match=f"snappy or zstd .*a column with {codec}"):
+            cf.cross_validate(path, "y", cv=2)

@@ -18,19 +18,25 @@ pub enum Rule {
     Separate,
     /// The feasible pair of the largest product: level empty goes with type none only.
     Joint,
-    /// As [`Rule::Joint`], and no water in food boxes, where the container is known.
+    /// As [`Rule::Joint`], and no water in food boxes.
     JointDryBoxes,
 }
 
+/// Containers of recordings that are named by a number.
+pub type Containers = HashMap<RowKey, Container>;
+
 /// Estimates from probabilities of the type, of the level, or of both over the same recordings.
+/// `containers` are needed for dry boxes where names do not say of which container a recording is.
 ///
 /// # Errors
 /// [`CcmError`] for class names that are no types or levels, lines that are no recording of the data
-/// set or occur twice, and recordings that one table has and the other has not.
+/// set or occur twice, recordings that one table has and the other has not, and, unless the rule is
+/// [`Rule::Separate`], classes without probabilities.
 pub fn decide(
     kind: Option<&RecordingPredictions>,
     level: Option<&RecordingPredictions>,
     rule: Rule,
+    containers: &Containers,
 ) -> Result<Vec<SubmissionRow>> {
     let kinds = kind.map(of_kind).transpose()?;
     let levels = level.map(of_level).transpose()?;
@@ -57,7 +63,21 @@ pub fn decide(
             return Err(fault(extra, &level.path, "rows that the types lack"));
         }
         if rule != Rule::Separate {
-            estimates.iter_mut().try_for_each(|e| together(e, rule == Rule::JointDryBoxes))?;
+            for table in [kind, level] {
+                if let Some(row) =
+                    table.rows.iter().find(|r| r.class.is_some() && r.proba.is_none())
+                {
+                    return Err(CcmError::Request(format!(
+                        "{}: {} has no probabilities, which feasible pairs need",
+                        table.path.display(),
+                        row.key
+                    )));
+                }
+            }
+            for estimate in &mut estimates {
+                let is_box = rule == Rule::JointDryBoxes && is_box(estimate.key, containers)?;
+                together(estimate, is_box)?;
+            }
         }
     }
     Ok(estimates)
@@ -143,17 +163,25 @@ fn blank(table: &RecordingPredictions) -> Result<Vec<SubmissionRow>> {
     table.rows.iter().map(|row| &row.key).map(key).collect()
 }
 
+fn is_box(key: RowKey, containers: &Containers) -> Result<bool> {
+    let container = match key {
+        RowKey::Sequence(number, _) => Container::new(number),
+        RowKey::Id(_) => containers.get(&key).copied(),
+    };
+    container.map(|c| c.category() == Category::Box).ok_or_else(|| {
+        CcmError::Request(format!(
+            "whether the container of {key} is a box is not known: give --annotations, or name \
+             recordings by container and sequence"
+        ))
+    })
+}
+
 /// Replaces type and level by the best feasible pair, where both have probabilities.
-fn together(estimate: &mut SubmissionRow, dry_boxes: bool) -> Result<()> {
+fn together(estimate: &mut SubmissionRow, dry: bool) -> Result<()> {
     let both = estimate.kind_probabilities.zip(estimate.level_probabilities);
     let Some((kinds, levels)) = both else { return Ok(()) };
-    let container = match estimate.key {
-        RowKey::Sequence(number, _) => Container::new(number),
-        RowKey::Id(_) => None,
-    };
-    let is_box = container.is_some_and(|c| c.category() == Category::Box);
     let feasible: Vec<(usize, usize)> = Filling::all()
-        .filter(|f| !(dry_boxes && is_box && f.kind() == FillingType::Water))
+        .filter(|f| !(dry && f.kind() == FillingType::Water))
         .map(|f| (f.kind() as usize, f.level() as usize))
         .collect();
     let row = |p: &[f64]| Array2::from_shape_fn((1, p.len()), |(_, c)| p[c]);
@@ -182,14 +210,47 @@ mod tests {
         let kind = table("Object,Sequence,p0,p1,p2,p3\n10,0,.5,.4,.1,0\n12,0,0,.3,.2,.5\n");
         let level = table("Object,Sequence,p0,p1,p2\n12,0,0,.4,.6\n10,0,.1,.6,.3\n");
         let pairs = |rule| -> Vec<(usize, usize)> {
-            let found = decide(Some(&kind), Some(&level), rule).unwrap();
+            let found = decide(Some(&kind), Some(&level), rule, &Containers::new()).unwrap();
             found.iter().map(|p| (p.kind.unwrap() as usize, p.level.unwrap() as usize)).collect()
         };
         assert_eq!(pairs(Rule::Separate), [(0, 1), (3, 2)]);
         assert_eq!(pairs(Rule::Joint), [(1, 1), (3, 2)]);
         assert_eq!(pairs(Rule::JointDryBoxes), [(1, 1), (1, 2)]);
-        let only = decide(Some(&kind), None, Rule::Joint).unwrap();
+        let only = decide(Some(&kind), None, Rule::Joint, &Containers::new()).unwrap();
         assert!(only.iter().all(|p| p.level.is_none() && p.kind.is_some()));
+    }
+
+    #[test]
+    fn numbers_need_the_containers_of_the_annotations() {
+        let kind = table("id,p_none,p_rice,p_water\n42,.2,.3,.5\n");
+        let level = table("id,p_empty,p_half,p_full\n42,0,.4,.6\n");
+        let with = |containers: &Containers| {
+            decide(Some(&kind), Some(&level), Rule::JointDryBoxes, containers)
+        };
+        let refused = with(&Containers::new()).unwrap_err().to_string();
+        assert!(refused.contains("id 42") && refused.contains("--annotations"), "{refused}");
+        for (number, expected) in [(7, FillingType::Rice), (1, FillingType::Water)] {
+            let containers = [(RowKey::Id(42), Container::new(number).unwrap())].into();
+            assert_eq!(with(&containers).unwrap()[0].kind, Some(expected), "container {number}");
+        }
+    }
+
+    #[test]
+    fn a_class_without_probabilities_has_no_feasible_pair() {
+        let none = Containers::new();
+        let sure = table("id,predicted,p_none,p_rice\n4,rice,.4,.6\n5,,,\n");
+        for (kind, level) in [
+            ("id,predicted\n4,none\n5,\n", "id,predicted,p_empty,p_full\n4,full,.4,.6\n5,,,\n"),
+            ("id,predicted,p_none,p_rice\n4,none,.6,.4\n5,,,\n", "id,predicted\n4,full\n5,\n"),
+        ] {
+            let (kind, level) = (table(kind), table(level));
+            let refused = decide(Some(&kind), Some(&level), Rule::Joint, &none).unwrap_err();
+            assert!(refused.to_string().contains("id 4 has no probabilities"), "{refused}");
+            assert!(decide(Some(&kind), Some(&level), Rule::Separate, &none).is_ok());
+        }
+        let level = table("id,predicted,p_empty,p_full\n4,full,.4,.6\n5,,,\n");
+        let found = decide(Some(&sure), Some(&level), Rule::Joint, &none).unwrap();
+        assert_eq!((found[1].kind, found[1].level), (None, None), "failed in both");
     }
 
     #[test]
@@ -208,14 +269,16 @@ mod tests {
 
     #[test]
     fn rows_and_classes_must_be_those_of_the_data_set() {
-        let message = |text: &str| decide(Some(&table(text)), None, Rule::Separate).unwrap_err();
+        let none = Containers::new();
+        let message =
+            |text: &str| decide(Some(&table(text)), None, Rule::Separate, &none).unwrap_err();
         let tea = message("id,p_none,p_tea\n10/0003,1,0\n").to_string();
         assert!(tea.contains("class 'tea' is not a filling type"), "{tea}");
         let odd = message("id,p_none,p_rice\nhello,1,0\n").to_string();
         assert!(odd.contains("names no recording of the data set: hello"), "{odd}");
         let kind = table("Object,Sequence,p0,p1\n10,0,1,0\n");
         let level = table("Object,Sequence,p0,p1\n10,1,1,0\n");
-        let other = decide(Some(&kind), Some(&level), Rule::Joint).unwrap_err().to_string();
+        let other = decide(Some(&kind), Some(&level), Rule::Joint, &none).unwrap_err().to_string();
         assert!(other.contains("missing rows: container 10 sequence 0"), "{other}");
     }
 }

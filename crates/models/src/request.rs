@@ -100,17 +100,41 @@ fn twice(classifier: &ClassifierSpec, key: String, value: String) -> ModelError 
 impl PipelineSpec {
     /// The pipeline in a line, with the parameters that are not the classifier's defaults.
     pub fn describe(&self) -> String {
+        self.describe_among(&[])
+    }
+
+    /// The same with the parameters in which candidates differ, default or not.
+    pub fn describe_among(&self, candidates: &[Self]) -> String {
+        let all: Vec<_> = candidates.iter().map(|c| c.classifier.parameters()).collect();
         let defaults = ClassifierSpec::named(self.classifier.name()).map(|c| c.parameters());
         let defaults = defaults.unwrap_or_default();
         let parameters = self.classifier.parameters();
         let changed: Vec<String> = parameters
             .iter()
-            .filter(|(key, value)| defaults.get(*key) != Some(value))
+            .filter(|(key, value)| {
+                let tuned = all.iter().any(|other| other.get(*key) != Some(value));
+                tuned || defaults.get(*key) != Some(value)
+            })
             .map(|(key, value)| format!("{key}={value}"))
             .collect();
         let mut parts: Vec<String> = self.steps.iter().map(|s| s.name().to_string()).collect();
         let classifier = format!("{} {}", self.classifier.name(), changed.join(" "));
         parts.push(classifier.trim_end().to_string());
         parts.join(", ")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_tuned_is_told_even_where_it_is_the_default() {
+        let tune = vec!["k=1,5".to_string()];
+        let request = PipelineRequest { classifier: "knn".into(), tune, ..Default::default() };
+        let all = request.candidates().unwrap();
+        let told: Vec<String> = all.iter().map(|spec| spec.describe_among(&all)).collect();
+        assert_eq!(told, ["knn k=1", "knn k=5"]);
+        assert_eq!(all[1].describe(), "knn");
     }
 }

@@ -81,7 +81,7 @@ mod _core {
     #[pymodule_export]
     use crate::resample::resample;
     #[pymodule_export]
-    use crate::scoring::{compare_predictions, cross_validate, fuse, score};
+    use crate::scoring::{compare_predictions, cross_validate, fuse, is_statistic, score};
     #[pymodule_export]
     use crate::spectral::{
         fft_frequencies, poly_features, spectral_bandwidth, spectral_centroid, spectral_contrast,

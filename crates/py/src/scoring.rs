@@ -54,6 +54,12 @@ pub(crate) struct RecipeArguments {
     seed: u32,
 }
 
+/// Whether a column is named like a value of a summary.
+#[pyfunction]
+pub(crate) fn is_statistic(column: &str) -> bool {
+    corsmal_models::dataset::is_statistic(column)
+}
+
 /// The report as JSON, and the predictions of the held-out rows as CSV.
 #[pyfunction]
 pub(crate) fn cross_validate(

@@ -201,7 +201,10 @@ fn report(
     let spec = &candidates[most];
     let classifier = match candidates.len() {
         1 => spec.describe(),
-        n => format!("chosen in every fold among {n}; most often {}", spec.describe()),
+        n => format!(
+            "chosen in every fold among {n}; most often {}",
+            spec.describe_among(candidates)
+        ),
     };
     let held_out = HeldOut {
         table,
@@ -325,7 +328,7 @@ fn print_folds(result: &CrossValidation, candidates: &[PipelineSpec], folds: &Fo
         let s = &fold.scores;
         let scores = [s.accuracy, s.weighted_f1, s.macro_f1].map(percent);
         let counts = [fold.name.clone(), plan.train.len().to_string(), plan.test.len().to_string()];
-        let chosen = tuned.then(|| candidates[fold.chosen].describe());
+        let chosen = tuned.then(|| candidates[fold.chosen].describe_among(candidates));
         table.row(counts.into_iter().chain(scores).chain(chosen));
     }
     let spreads = [&result.accuracy, &result.weighted_f1, &result.macro_f1];

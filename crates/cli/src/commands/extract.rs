@@ -30,7 +30,8 @@ Examples:
   corsmal-feat extract --in test/ --out test.npz --preset spec9216-code --project pca.npz
   sox in.flac -t wav - | corsmal-feat extract --in - --out feats.npz --preset esc26
 
-Exit codes: 0 all fine, 1 finished with failed files, 2 could not run, 130 interrupted.")]
+Exit codes: 0 all fine, 1 finished with failed files, 2 could not run or stopped by --strict or
+--max-errors, 130 interrupted.")]
 pub struct Args {
     /// Recordings: files, folders (including subfolders), globs, manifests (.csv, .jsonl), or - for a
     /// WAV stream on standard input.
@@ -211,8 +212,7 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
         Err(error @ RunError::TooManyErrors { .. }) => {
             let message =
                 format!("{error}; repair them or allow more, then --resume continues the run");
-            Meter::stopped(args.log_format, "error", &message);
-            Ok(ExitCode::from(FAILED_FILES))
+            Err(Failure::new(message))
         }
         Err(error) => Err(error.into()),
     }

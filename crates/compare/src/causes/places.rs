@@ -90,6 +90,16 @@ fn edges(profile: &Profile) -> Option<Cause> {
     if head > EDGE || tail > EDGE || 3 * (head + tail) > frames {
         return None;
     }
+    // What comes from an end begins there, and reaches frame after frame.
+    let dense = |edge: &[bool], at_end: Option<&bool>| {
+        let touched = edge.iter().filter(|&&t| t).count();
+        edge.is_empty() || (at_end == Some(&true) && 5 * touched >= 4 * edge.len())
+    };
+    if !dense(&touched[..head], touched.first())
+        || !dense(&touched[frames - tail..], touched.last())
+    {
+        return None;
+    }
     let between = frames - head - tail;
     let which = match (head, tail) {
         (0, tail) => format!("last {tail}"),
@@ -190,4 +200,31 @@ fn steps(profile: &Profile, pair: &Pair, noise: f64) -> Option<Cause> {
     );
     let cause = "single counts flip (a bin of a rolloff, a zero crossing): rounding at a threshold";
     Some(Cause::new(CauseKind::Steps, cause, evidence))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_comes_from_an_end_begins_there() {
+        let cause = |differing: &[usize]| {
+            let mut frames = vec![false; 118];
+            differing.iter().for_each(|&at| frames[at] = true);
+            let touched = [vec![true; 2], vec![true; 5], frames];
+            let profile = Profile { differing: differing.len(), touched, least: 0.1, most: 1.0 };
+            edges(&profile).map(|cause| cause.evidence)
+        };
+        for apart in [&[7][..], &[60], &[20], &[110], &[0, 7], &[0, 1, 110], &[116]] {
+            assert_eq!(cause(apart), None, "{apart:?}");
+        }
+        for (edge, which) in [
+            (&[0][..], "first 1 "),
+            (&[0, 1, 2, 4, 5], "first 6 "),
+            (&[117], "last 1 "),
+            (&[0, 1, 116, 117], "first 2 and the last 2 "),
+        ] {
+            assert!(cause(edge).is_some_and(|said| said.contains(which)), "{edge:?}");
+        }
+    }
 }

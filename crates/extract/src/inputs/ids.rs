@@ -80,7 +80,7 @@ pub(super) fn assign(found: &[Found]) -> Result<Vec<String>, InputError> {
             }
             if changed.len() == before {
                 return Err(InputError::Duplicate {
-                    id: ids[group[0]].clone(),
+                    id: forms(&found[group[0]]).swap_remove(0),
                     first: found[group[0]].described(),
                     second: found[group[1]].described(),
                 });
@@ -113,6 +113,7 @@ fn forms(found: &Found) -> Vec<String> {
             if forms.is_empty() {
                 forms.push(format!("{}_", id_of(relative)));
             }
+            forms.push(format!("{}~{}", id_of(&path), fingerprint(&path)));
             forms
         }
     }
@@ -150,6 +151,19 @@ fn id_of(path: &Path) -> String {
     // Parts between backslashes are folders elsewhere.
     let id = if climbs(&id) { id.replace("..", "_") } else { id };
     if id.starts_with(RESERVED) { format!("./{id}") } else { id }
+}
+
+/// Of the bytes of a path, of which an id may lose some.
+fn fingerprint(path: &Path) -> String {
+    let mut hash = blake3::Hasher::new();
+    let parts = path.components().filter_map(|part| match part {
+        Component::Normal(name) => Some(name),
+        _ => None,
+    });
+    parts.for_each(|name| {
+        hash.update(name.as_encoded_bytes()).update(b"/");
+    });
+    hash.finalize().to_hex()[..8].into()
 }
 
 /// A name as text: bytes that are not UTF-8 as `\xff`, so that different names stay different.

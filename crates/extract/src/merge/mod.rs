@@ -160,7 +160,7 @@ impl Merge<'_> {
                 for name in frames.cloned().collect::<Vec<_>>() {
                     go_on(self.stop)?;
                     let (entry, raw) = npz.raw(&name)?;
-                    entries.push(writer.copy(&entry, raw)?);
+                    entries.push(writer.copy(&entry, raw, shard)?);
                 }
             }
             piece.require_same()?;
@@ -265,6 +265,25 @@ mod tests {
                 std::fs::remove_file(&out).unwrap();
             }
         }
+    }
+
+    /// The output was said to be damaged.
+    #[test]
+    fn a_damaged_shard_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let shards: Vec<PathBuf> = (0..2).map(|i| path(&format!("{i}.npz"))).collect();
+        for (index, file) in shards.iter().enumerate() {
+            shard(file, Compression::Stored, Shard { index, count: 2 });
+        }
+        let mut bytes = std::fs::read(&shards[1]).unwrap();
+        let one = 2f32.to_le_bytes();
+        let at = bytes.windows(8).position(|w| w[..4] == one && w[4..] == one).unwrap();
+        bytes[at] ^= 1;
+        std::fs::write(&shards[1], bytes).unwrap();
+        let refused = merge(&shards, &path("out.npz"), Existing::Overwrite, &GO).unwrap_err();
+        let refused = refused.to_string();
+        assert!(refused.contains("1.npz: member \"1/1") && refused.contains("CRC"), "{refused}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use corsmal_files::feature_file::{FeatureFileError, FeatureTable};
 use corsmal_files::format::{OutputFormat, require_npz};
+use corsmal_files::layout::TIMES;
 use corsmal_files::provenance::Provenance;
 use corsmal_files::{draft, identity, partition};
 
@@ -88,6 +89,9 @@ pub fn check(
     }
     let (text, hash) = (config.to_value().to_string(), config.hash());
     let provenance = Provenance::new(text, hash, list_hash(inputs), options.shard);
+    if let (OutputFormat::Parquet, None) = (format, &config.summary) {
+        require_other_names(inputs, &provenance.features(), out)?;
+    }
     let (mut done, mut is_sent) = (None, false);
     let own = options.shard.of(inputs);
     let finished = Finished { inputs: own, provenance: &provenance, format, by };
@@ -117,6 +121,23 @@ pub fn check(
         None => advice(options.shard.of(inputs).len(), config, format),
     };
     Ok(Checked { out: out.clone(), format, provenance, done, stored, is_sent, advice })
+}
+
+/// Refuses labels that are called like the columns of frames.
+fn require_other_names(inputs: &[Input], features: &[String], out: &Path) -> Result<(), RunError> {
+    let taken = |label: &str| {
+        features.iter().any(|f| label == f || label.strip_prefix(TIMES) == Some(f.as_str()))
+    };
+    let mut labels = inputs.first().into_iter().flat_map(|input| &input.labels);
+    match labels.find(|(label, _)| taken(label)) {
+        None => Ok(()),
+        Some((label, _)) => {
+            let why = format!(
+                "would have two columns {label:?}, a label and frames: rename the label, or write .npz"
+            );
+            Err(RunError::Format { path: out.into(), why })
+        }
+    }
 }
 
 /// Refuses numbers of threads that cannot be.

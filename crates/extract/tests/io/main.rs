@@ -7,6 +7,7 @@ mod archives;
 mod faults;
 mod in_order;
 mod inputs;
+mod manifests;
 mod outputs;
 mod own_feature;
 mod pieces;

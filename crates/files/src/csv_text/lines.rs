@@ -2,13 +2,18 @@
 
 use std::io::{self, BufRead, Read};
 
-/// Text whose lines end by line feeds alone, except in quotation marks. Where they end by CR LF, the csv crate
-/// takes the second for a part of the next line and counts one too few; where they end by CR, it counts none. A CR
-/// between quotation marks ends no line.
+/// Text whose lines end by line feeds alone, and whose fields have no blanks around them, except in quotation marks.
+/// Where lines end by CR LF, the csv crate takes the second for a part of the next line and counts one too few; where
+/// they end by CR, it counts none. A CR between quotation marks ends no line. The csv crate would take blanks away
+/// within quotation marks, too, where they belong to a name.
 pub struct LineFeeds<R> {
     inner: R,
     /// A carriage return that ends a line was read and not given.
     has_return: bool,
+    /// Blanks that were read and not given: behind them, the field may end.
+    blanks: Vec<u8>,
+    /// Of these, those that are given now, since the field went on.
+    given: usize,
     lines: Lines,
 }
 
@@ -56,6 +61,11 @@ impl Lines {
         (self.place == Place::Quoted).then_some(self.opened)
     }
 
+    /// Whether a byte is a blank outside of quotation marks.
+    fn is_blank(&self, byte: u8) -> bool {
+        matches!(byte, b' ' | b'\t') && byte != self.delimiter
+    }
+
     fn add(&mut self, byte: u8) {
         self.bytes += 1;
         self.place = match (self.place, byte) {
@@ -93,7 +103,8 @@ impl Lines {
 
 impl<R> LineFeeds<R> {
     pub(super) fn new(inner: R, delimiter: u8) -> Self {
-        Self { inner, has_return: false, lines: Lines::new(delimiter) }
+        let lines = Lines::new(delimiter);
+        Self { inner, has_return: false, blanks: Vec::new(), given: 0, lines }
     }
 
     pub(super) fn lines(&self) -> &Lines {
@@ -123,15 +134,34 @@ impl<R: BufRead> Read for LineFeeds<R> {
             }
             let (mut used, mut written) = (0, 0);
             while used < text.len() && written < out.len() {
-                let byte = text[used];
-                let ends = std::mem::take(&mut self.has_return);
-                let is_alone = ends && byte != b'\n';
-                used += usize::from(!is_alone);
-                if !ends && byte == b'\r' && self.lines.place != Place::Quoted {
-                    self.has_return = true;
+                let mut byte = text[used];
+                let ends = self.has_return;
+                let quoted = self.lines.place == Place::Quoted;
+                if !ends && !quoted && (byte == b'\r' || self.lines.is_blank(byte)) {
+                    used += 1;
+                    match byte {
+                        b'\r' => self.has_return = true,
+                        _ if self.lines.place == Place::Begin => {}
+                        _ => self.blanks.push(byte),
+                    }
                     continue;
                 }
-                let byte = if ends { b'\n' } else { byte };
+                if ends || byte == b'\n' || byte == self.lines.delimiter {
+                    // The field ends before them.
+                    self.blanks.clear();
+                } else if let Some(&blank) = self.blanks.get(self.given) {
+                    self.given += 1;
+                    self.lines.add(blank);
+                    out[written] = blank;
+                    written += 1;
+                    continue;
+                }
+                (self.given, self.has_return) = (0, false);
+                self.blanks.clear();
+                used += usize::from(!ends || byte == b'\n');
+                if ends {
+                    byte = b'\n';
+                }
                 self.lines.add(byte);
                 out[written] = byte;
                 written += 1;

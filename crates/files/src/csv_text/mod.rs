@@ -9,7 +9,7 @@ use std::io::{self, BufRead};
 pub use lines::LineFeeds;
 
 /// A reader of the table in `text`, whose first line says what separates its fields: commas where
-/// it has one, else semicolons, else tabs. Space around fields is left out.
+/// it has one, else semicolons, else tabs. Blanks around fields are left out, but for those in quotation marks.
 ///
 /// # Errors
 /// Reading fails, or the text is not UTF-8 but UTF-16, a feature file or a model; the error says so.
@@ -35,7 +35,7 @@ pub fn reader<R: BufRead>(mut text: R) -> io::Result<csv::Reader<LineFeeds<R>>> 
     }
     let mut builder = csv::ReaderBuilder::new();
     let text = LineFeeds::new(text, delimiter);
-    Ok(builder.delimiter(delimiter).trim(csv::Trim::All).from_reader(text))
+    Ok(builder.delimiter(delimiter).from_reader(text))
 }
 
 /// The names of the columns.
@@ -251,6 +251,37 @@ mod tests {
                 assert_eq!(String::from_utf8(found).unwrap(), expected);
             }
         }
+    }
+
+    /// Of two files, the one without the blank was read.
+    #[test]
+    fn blanks_count_within_quotation_marks_alone() {
+        let rows = [
+            ("a b , c\t,  \n", ["a b", "c", ""]),
+            ("  a  b,\" c \" ,\" \"\"x\"\" \"\n", ["a  b", " c ", " \"x\" "]),
+            (" \"a\" , b\" c\" ,\t\"\"\n", ["a", "b\" c\"", ""]),
+            ("\"a\" b, ,c ", ["a b", "", "c"]),
+        ];
+        for ending in ["\n", "\r\n", "\r"] {
+            for capacity in [1, 2, 3, 64] {
+                for (row, expected) in rows {
+                    let text = format!(" x, \"y\" ,z \n{row}").replace('\n', ending);
+                    let inner = io::BufReader::with_capacity(capacity.max(8), text.as_bytes());
+                    let mut table = reader(inner).unwrap();
+                    assert_eq!(
+                        table.headers().unwrap().iter().collect::<Vec<_>>(),
+                        ["x", "y", "z"]
+                    );
+                    let found = records(&mut table).next().unwrap().unwrap().1;
+                    assert_eq!(found.iter().collect::<Vec<_>>(), expected, "{text:?}");
+                }
+            }
+        }
+        let mut table = reader(&b"a\tb \tc\n1\t\t 3 \n \n4\t5\t6"[..]).unwrap();
+        assert_eq!(table.headers().unwrap().len(), 3);
+        let found: Vec<_> = records(&mut table).map(|r| r.unwrap()).collect();
+        assert_eq!((found[0].0, &found[0].1[1], &found[0].1[2]), (2, "", "3"));
+        assert_eq!((found[1].0, &found[1].1[0]), (4, "4"), "a line of blanks is empty");
     }
 
     #[test]

@@ -18,7 +18,7 @@ use super::packed::Packed;
 use crate::growth::make_room;
 use crate::npy::{DType, Header};
 
-/// Bytes copied at a time from a stream.
+/// Bytes copied at a time.
 const CHUNK: usize = 1 << 20;
 
 /// Appends entries to an archive; [`NpzWriter::finish`] makes it complete.
@@ -289,23 +289,35 @@ impl NpzWriter {
         Err(NpzError::member(&self.path, name, expected, actual))
     }
 
-    /// Appends a complete entry of another archive without decoding it.
+    /// Appends a complete entry of another archive, `from`, without decoding it.
     ///
     /// # Errors
-    /// [`NpzError::Member`] when `raw` is not as long as the entry says, [`NpzError::Io`].
+    /// [`NpzError::Member`] of `from` when `raw` is not what the entry says, [`NpzError::Io`] of the
+    /// archive that fails.
     pub fn copy(
         &mut self,
         entry: &EntryRecord,
         mut raw: impl Read,
+        from: &Path,
     ) -> Result<EntryRecord, NpzError> {
         let mut entry = EntryRecord { offset: self.end, ..entry.clone() };
         let local = headers::local_header(&entry, self.zip64);
         self.write_at_end(&[&local])?;
         let mut out = Checked::new(&self.file);
-        let copied = io::copy(&mut raw, &mut out).map_err(|e| NpzError::io(&self.path, e))?;
+        let (mut piece, mut copied) = (vec![0; CHUNK], 0);
+        loop {
+            match raw.read(&mut piece) {
+                Ok(0) => break,
+                Ok(n) => {
+                    out.write_all(&piece[..n]).map_err(|e| NpzError::io(&self.path, e))?;
+                    copied += n as u64;
+                }
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                Err(e) => return Err(NpzError::io(from, e)),
+            }
+        }
         entry.stored_crc32 = out.crc32();
-        let damaged =
-            |expected, actual| NpzError::member(&self.path, &entry.name, expected, actual);
+        let damaged = |expected, actual| NpzError::member(from, &entry.name, expected, actual);
         if copied != entry.compressed {
             return Err(damaged(format!("{} bytes", entry.compressed), copied.to_string()));
         }

@@ -87,7 +87,13 @@ pub(super) fn check_pages(
                 Some(end) if end <= length => {
                     let expansion = match chunk.compression() {
                         Compression::ZSTD(_) => ZSTD_EXPANSION,
-                        _ => EXPANSION,
+                        Compression::UNCOMPRESSED | Compression::SNAPPY => EXPANSION,
+                        other => {
+                            let read = "columns without compression or with snappy or zstd (write \
+                                        the file again with one of these)";
+                            let found = format!("a column with {}", codec(other));
+                            return Err(layout(path, read, found));
+                        }
                     };
                     walk_pages(path, file, (start, end), expansion)?;
                 }
@@ -100,6 +106,12 @@ pub(super) fn check_pages(
         return Err(layout(path, format!("at most {most} values in {length} bytes"), values));
     }
     usize::try_from(rows).map_err(|_| layout(path, "fewer rows", rows))
+}
+
+/// What pyarrow and polars call a codec.
+fn codec(compression: Compression) -> String {
+    let name = compression.to_string().to_lowercase();
+    name.split('(').next().unwrap_or_default().to_owned()
 }
 
 /// Goes from page header to page header of one column.

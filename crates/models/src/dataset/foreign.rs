@@ -106,6 +106,9 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
     })
 }
 
+/// Columns that a message names.
+const SHOWN: usize = 8;
+
 /// Why a column of a Parquet table is neither feature nor label.
 const UNREAD: &str = "has neither numbers nor text: dates, lists, decimals and bytes are not read";
 
@@ -156,7 +159,7 @@ pub(super) fn read_parquet(
     let mut features = Vec::new();
     for (at, (name, kind)) in names.iter().zip(&types).enumerate() {
         if name.starts_with(RESERVED) {
-        } else if kind.starts_with("float") || (kind.contains("int") && name.contains(['[', '.'])) {
+        } else if kind.starts_with("float") || (kind.contains("int") && is_statistic(name)) {
             features.push(at);
         } else {
             let whole = |v: &f64| if v.is_nan() { String::new() } else { format!("{v:.0}") };
@@ -165,9 +168,11 @@ pub(super) fn read_parquet(
     }
     if features.is_empty() {
         let columns = names.iter().chain(texts.iter().map(|(name, _)| name)).map(String::as_str);
-        let found = columns.take(8).collect::<Vec<_>>().join(", ");
+        let found = columns.take(SHOWN).collect::<Vec<_>>().join(", ");
+        let unread = skipped.iter().take(SHOWN).map(|name| format!("; {name:?} {UNREAD}"));
         return Err(fault(format!(
-            "no column of decimal numbers, which would be features: {found}"
+            "no column of decimal numbers, which would be features: {found}{}",
+            unread.collect::<String>()
         )));
     }
     let ids = match (&members.ids, ids) {
@@ -194,6 +199,21 @@ pub(super) fn read_parquet(
         numbered,
         added: Vec::new(),
     })
+}
+
+/// Whether a column is called as our summaries are: `mfcc[3].mean`, `ch1/rms.p95`, `af193[7]`.
+pub fn is_statistic(name: &str) -> bool {
+    const NAMES: [&str; 7] = ["mean", "std", "min", "max", "median", "skew", "kurtosis"];
+    let is_percentile = |stat: &str| {
+        stat.strip_prefix('p').is_some_and(|p| p.parse::<f64>().is_ok_and(|p| p.is_finite()))
+    };
+    match name.rsplit_once('.') {
+        Some((feature, stat)) if NAMES.contains(&stat) || is_percentile(stat) => {
+            !feature.is_empty()
+        }
+        // The place of a number in a vector may have a dot.
+        _ => name.ends_with(']') && name.find('[').is_some_and(|at| at > 0),
+    }
 }
 
 /// Why values do not name rows: one is empty, or there twice.

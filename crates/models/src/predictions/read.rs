@@ -117,9 +117,13 @@ impl PredictionColumns {
             }
             // Without probabilities the classes are those that occur.
             (0, Some(predicted)) => {
-                let truth = find("true").into_iter().chain([predicted]);
-                let values = truth.flat_map(|at| lines.iter().map(move |(_, line)| &line[at]));
-                let given: Vec<&str> = values.filter(|v| !v.is_empty() && *v != UNKNOWN).collect();
+                let values = |at: usize| lines.iter().map(move |(_, line)| &line[at]);
+                let truth: Vec<&str> = find("true").into_iter().flat_map(values).collect();
+                // What is true somewhere is a class, and no word for a rejected prediction.
+                let is_true = truth.contains(&UNKNOWN);
+                let is_class = |v: &&str| !v.is_empty() && (*v != UNKNOWN || is_true);
+                let all = truth.iter().copied().chain(values(predicted));
+                let given: Vec<&str> = all.filter(is_class).collect();
                 Labels::of(&given).0.names().to_vec()
             }
             (1, _) => return Err(lacking("p_<label> for each of two or more classes")),
@@ -200,5 +204,27 @@ impl PredictionColumns {
         let named_by = if self.together { self.naming.len() } else { 1 };
         let key = Id(cells[..named_by].join("/"));
         Ok(PredictionRow { key, cells, class, proba })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A class of this name was never right.
+    #[test]
+    fn unknown_is_a_class_where_it_is_true() {
+        let read = |text: &str| {
+            let file = tempfile::NamedTempFile::new().unwrap();
+            std::fs::write(file.path(), text).unwrap();
+            PredictionTable::read(file.path()).unwrap()
+        };
+        let classes =
+            |table: &PredictionTable| table.rows.iter().map(|row| row.class).collect::<Vec<_>>();
+        let table = read("id,true,predicted\n1,unknown,unknown\n2,x,x\n3,x,unknown\n4,x,\n");
+        assert_eq!(table.labels, ["unknown", "x"]);
+        assert_eq!(classes(&table), [Some(0), Some(1), Some(0), None]);
+        let table = read("id,true,predicted\n1,y,unknown\n2,x,x\n");
+        assert_eq!((table.labels.len(), classes(&table)), (2, vec![None, Some(0)]));
     }
 }

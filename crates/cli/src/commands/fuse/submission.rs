@@ -1,14 +1,15 @@
 //! Fused type and level as an official submission.
 
 use std::collections::HashMap;
+use std::mem::discriminant;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use corsmal_ccm::capacity::{self, Measured};
-use corsmal_ccm::dataset::{Annotations, Subset};
-use corsmal_ccm::decision::{Rule, decide, decide_joint};
+use corsmal_ccm::dataset::{Annotations, Container, Subset};
+use corsmal_ccm::decision::{Containers, Rule, decide, decide_joint};
 use corsmal_ccm::predictions::Named;
-use corsmal_ccm::submission::{self, RowKey, Submission, SubmissionRow, official_rows};
+use corsmal_ccm::submission::{self, RowKey, Submission, official_rows};
 
 use super::args::{Args, Format, Part};
 use crate::failure::{FAILED_FILES, Failure};
@@ -48,6 +49,12 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
     if rule != Rule::Separate && (kind.is_none() || level.is_none()) {
         return Err(Failure::new("--feasible needs both --type and --level"));
     }
+    let format = match options.format {
+        Format::Y2020 => submission::Format::Y2020,
+        Format::Y2022 => submission::Format::Y2022,
+    };
+    let annotations = options.annotations.as_deref().map(Annotations::read).transpose()?;
+    let containers = annotations.as_ref().map_or_else(Containers::new, containers);
     let mut predictions = match (&joint, &kind, &level) {
         (Some(joint), ..) => decide_joint(joint)?,
         (None, None, None) => {
@@ -55,13 +62,34 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
                 "nothing to fuse: give --predictions, --type, --level or --joint",
             ));
         }
-        (None, kind, level) => decide(kind.as_ref(), level.as_ref(), rule)?,
+        (None, kind, level) => decide(kind.as_ref(), level.as_ref(), rule, &containers)?,
     };
+    let names = annotations.as_ref().map(|annotations| Names::of(annotations, format));
+    if let Some(names) = &names {
+        for prediction in &mut predictions {
+            prediction.key = names.of_format(prediction.key).ok_or_else(|| {
+                let path = names.path.display();
+                Failure::new(format!("{path}: has no line for {}", prediction.key))
+            })?;
+        }
+    }
     if let Some(path) = &options.capacity {
         let mut capacities = of_part(capacity::read(path)?, options.part, path)?;
+        if let Some(names) = &names {
+            let named = |(key, measured)| (names.of_format(key).unwrap_or(key), measured);
+            capacities = capacities.into_iter().map(named).collect();
+        }
         for prediction in &mut predictions {
             let measured = capacities.remove(&prediction.key).ok_or_else(|| {
-                Failure::new(format!("{}: has no line for {}", path.display(), prediction.key))
+                let is_other = |key: &RowKey| discriminant(key) != discriminant(&prediction.key);
+                let remedy = match capacities.keys().all(is_other) {
+                    true => {
+                        "; it names recordings in another way, and --annotations has both names"
+                    }
+                    false => "",
+                };
+                let path = path.display();
+                Failure::new(format!("{path}: has no line for {}{remedy}", prediction.key))
             })?;
             measured.complete(prediction);
         }
@@ -74,13 +102,6 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
     if options.mass_prior {
         let mass = Some(capacity::PRIOR_MASS_G);
         predictions.iter_mut().for_each(|prediction| prediction.container_mass_g = mass);
-    }
-    let format = match options.format {
-        Format::Y2020 => submission::Format::Y2020,
-        Format::Y2022 => submission::Format::Y2022,
-    };
-    if let Some(path) = &options.annotations {
-        rename(&mut predictions, &Annotations::read(path)?, format)?;
     }
     let expected: Vec<RowKey> = match options.part {
         None => predictions.iter().map(|p| p.key).collect(),
@@ -122,32 +143,38 @@ fn of_part(
     Ok(rows)
 }
 
-/// Names recordings as the format does, by the annotations.
-fn rename(
-    predictions: &mut [SubmissionRow],
-    annotations: &Annotations,
+/// The containers of the recordings, by their numbers.
+fn containers(annotations: &Annotations) -> Containers {
+    let rows = annotations.rows.iter();
+    rows.filter_map(|row| Some((RowKey::Id(row.id?), Container::new(row.container)?))).collect()
+}
+
+/// What a format calls recordings that annotations name in both ways.
+struct Names<'a> {
+    path: &'a Path,
     format: submission::Format,
-) -> Result<(), Failure> {
-    let pairs = annotations.rows.iter().filter_map(|row| {
-        let sequence = RowKey::Sequence(row.container, row.sequence?);
-        Some((sequence, RowKey::Id(row.id?)))
-    });
-    let names: HashMap<RowKey, RowKey> = match format {
-        submission::Format::Y2022 => pairs.collect(),
-        submission::Format::Y2020 => pairs.map(|(sequence, id)| (id, sequence)).collect(),
-    };
-    for prediction in predictions {
-        let fits = matches!(
-            (format, prediction.key),
+    names: HashMap<RowKey, RowKey>,
+}
+
+impl<'a> Names<'a> {
+    fn of(annotations: &'a Annotations, format: submission::Format) -> Self {
+        let pairs = annotations.rows.iter().filter_map(|row| {
+            let sequence = RowKey::Sequence(row.container, row.sequence?);
+            Some((sequence, RowKey::Id(row.id?)))
+        });
+        let names = match format {
+            submission::Format::Y2022 => pairs.collect(),
+            submission::Format::Y2020 => pairs.map(|(sequence, id)| (id, sequence)).collect(),
+        };
+        Self { path: &annotations.path, format, names }
+    }
+
+    /// The name in the format; `None` where the annotations do not have it.
+    fn of_format(&self, key: RowKey) -> Option<RowKey> {
+        match (self.format, key) {
             (submission::Format::Y2022, RowKey::Id(_))
-                | (submission::Format::Y2020, RowKey::Sequence(..))
-        );
-        if !fits {
-            prediction.key = *names.get(&prediction.key).ok_or_else(|| {
-                let path = annotations.path.display();
-                Failure::new(format!("{path}: has no line for {}", prediction.key))
-            })?;
+            | (submission::Format::Y2020, RowKey::Sequence(..)) => Some(key),
+            _ => self.names.get(&key).copied(),
         }
     }
-    Ok(())
 }

@@ -130,3 +130,26 @@ fn a_parquet_file_of_frames_says_how_it_was_made() {
     let refused = extract(&folder.path().join("audio"), &parquet, &["--add", "rms"]).with(2);
     assert!(refused.stderr.contains("another configuration"), "{}", refused.stderr);
 }
+
+/// A table that nobody could read was written.
+#[test]
+fn labels_are_not_called_like_frames() {
+    let folder = folder(1);
+    let at = |name: &str| folder.path().join(name);
+    for label in ["mfcc", "__times__/mfcc", "other"] {
+        std::fs::write(at("l.csv"), format!("path,{label}\naudio/00/r0000.wav,x\n")).unwrap();
+        let run = |out: &str, more: &[&str]| {
+            let only = ["--config", crate::command::text(&at("mfcc.toml"))].map(str::to_owned);
+            let only: Vec<&str> = only.iter().map(String::as_str).collect();
+            extract(&at("l.csv"), &at(out), &[&only, more].concat())
+        };
+        std::fs::write(at("mfcc.toml"), "[features.mfcc]\n").unwrap();
+        let code = if label == "other" { 0 } else { 2 };
+        for more in [&["--dry-run"][..], &[], &["--partition-by", label]] {
+            let name = if more.len() == 2 { format!("{code}") } else { format!("{code}.parquet") };
+            let ended = run(&name, more).with(code);
+            assert_eq!(ended.stderr.contains("two columns"), code == 2, "{}", ended.stderr);
+        }
+        run(&format!("{code}.npz"), &["--overwrite"]).with(0);
+    }
+}

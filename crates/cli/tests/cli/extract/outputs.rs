@@ -181,7 +181,7 @@ fn a_log_for_machines_is_json_lines() {
         let last = log(&run).pop().unwrap();
         (run.code, last["event"].as_str().unwrap().to_string())
     };
-    assert_eq!(json(&["--overwrite", "--strict"]), (Some(1), "error".into()));
+    assert_eq!(json(&["--overwrite", "--strict"]), (Some(2), "error".into()));
     assert_eq!(json(&["--overwrite", "--preset", "nope"]), (Some(2), "error".into()));
     assert_eq!(json(&["--preset", "esc26"]), (Some(2), "error".into()));
     assert_eq!(json(&["--dry-run"]), (Some(0), "checked".into()));
