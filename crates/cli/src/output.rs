@@ -59,19 +59,24 @@ impl Output {
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match self {
-            Self::Stdout(out) => out.write(bytes),
-            Self::Device(path, device) => device
-                .write(bytes)
-                .map_err(|e| io::Error::new(e.kind(), format!("{}: {e}", path.display()))),
+            Self::Stdout(out) => out.write(bytes).map_err(|e| of("standard output", &e)),
+            Self::Device(path, device) => {
+                device.write(bytes).map_err(|e| of(&path.display().to_string(), &e))
+            }
             Self::File(draft) => draft.write(bytes),
         }
     }
 
     fn flush(&mut self) -> io::Result<()> {
         match self {
-            Self::Stdout(out) => out.flush(),
+            Self::Stdout(out) => out.flush().map_err(|e| of("standard output", &e)),
             // A device has them already; a file is read when it has its name.
             Self::Device(..) | Self::File(_) => Ok(()),
         }
     }
+}
+
+/// An error with the place where it came from.
+fn of(place: &str, error: &io::Error) -> io::Error {
+    io::Error::new(error.kind(), format!("{place}: {error}"))
 }

@@ -282,8 +282,18 @@ fn json_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
 
 /// The keys and values of a JSON object, in the order written; no key is empty or there twice.
 pub(crate) fn fields(text: &str) -> Result<Vec<(String, Value)>, String> {
-    let object: Object = serde_json::from_str(text).map_err(|e| e.to_string())?;
+    let object: Object = serde_json::from_str(text).map_err(|e| json_fault(&e))?;
     Ok(object.0)
+}
+
+/// What is wrong with a line of JSON; the number of the line is told beside it.
+fn json_fault(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    let place = format!(" at line {} column {}", error.line(), error.column());
+    match text.strip_suffix(&place) {
+        Some(what) => format!("{what} (column {})", error.column()),
+        None => text,
+    }
 }
 
 /// The text of a value that can be a label; none of lists and objects.

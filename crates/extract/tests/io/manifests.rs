@@ -148,6 +148,11 @@ fn manifests_have_limits_that_are_named() {
         ("m.csv", format!("{}\na.wav\n", &long[..1 << 19]), "names no column `path`"),
         ("m.csv", format!("path,id\na.wav,__{}\n", &long[..1 << 19]), "must not begin with __"),
         ("m.csv", "path,id\na.wav,\u{1b}[2J\n".into(), "must not contain control characters"),
+        (
+            "m.jsonl",
+            "\n{\"path\": \"a.wav\", \"x\": 1e999}\n".into(),
+            "line 2: number out of range (column ",
+        ),
     ];
     for (name, content, message) in cases {
         let path = dir.path().join(name);
