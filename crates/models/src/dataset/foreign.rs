@@ -204,16 +204,14 @@ pub(super) fn read_parquet(
 /// Whether a column is called as our summaries are: `mfcc[3].mean`, `ch1/rms.p95`, `af193[7]`.
 pub fn is_statistic(name: &str) -> bool {
     const NAMES: [&str; 7] = ["mean", "std", "min", "max", "median", "skew", "kurtosis"];
-    let is_percentile = |stat: &str| {
-        stat.strip_prefix('p').is_some_and(|p| p.parse::<f64>().is_ok_and(|p| p.is_finite()))
+    let is_percentile = |(feature, p): (&str, &str)| {
+        !feature.is_empty() && p.parse::<f64>().is_ok_and(|p| (0.0..=100.0).contains(&p))
     };
-    match name.rsplit_once('.') {
-        Some((feature, stat)) if NAMES.contains(&stat) || is_percentile(stat) => {
-            !feature.is_empty()
-        }
-        // The place of a number in a vector may have a dot.
-        _ => name.ends_with(']') && name.find('[').is_some_and(|at| at > 0),
-    }
+    let is_named = |(feature, stat): (&str, &str)| !feature.is_empty() && NAMES.contains(&stat);
+    // The place of a number in a vector may have a dot.
+    name.rsplit_once('.').is_some_and(is_named)
+        || name.rsplit_once(".p").is_some_and(is_percentile)
+        || (name.ends_with(']') && name.find('[').is_some_and(|at| at > 0))
 }
 
 /// Why values do not name rows: one is empty, or there twice.

@@ -146,7 +146,7 @@ fn a_shard_without_recordings_is_an_output_too() {
     let list = manifest(folder.path(), 2);
     let out = folder.path().join("shard");
     for more in [&["--preset", "mfcc-zcr"][..], &[]] {
-        let by = ["--partition-by", "type", "--shard", "2/3", "--overwrite"];
+        let by = ["--partition-by", "type", "--shard", "0/3", "--overwrite"];
         extract(&list, &out, &[more, &by].concat()).with(0);
         assert_eq!(names(&out), ["type=__HIVE_DEFAULT_PARTITION__"]);
         let (found, label) = partition::open(&out).unwrap();
