@@ -46,6 +46,8 @@ def features(X: Any, owner: str) -> Matrix:
         raise DataTypeError(
             f"{owner}: sparse data was passed, but dense data is required; use .toarray()"
         )
+    if hasattr(X, "summary") and hasattr(X, "outcomes"):
+        raise DataTypeError(f"{owner}: X is what extract returns; give its statistics, X.summary")
     array = _array("X", X, owner)
     if array.dtype.kind == "c":
         raise ParameterError(f"Complex data not supported by {owner}")

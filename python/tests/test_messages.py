@@ -21,7 +21,12 @@ from corsmal_feat.errors import CorsmalFeatError
         ),
         ("--set signal.channels=mean mixes", 'set={"signal.channels": "mean"} mixes'),
         ("--set rms.center=false", 'set={"rms.center": False}'),
+        ("(--set x.y=80, or", '(set={"x.y": 80}, or'),
+        ('"--set a=false" --set b=[1, 2]', '"set={"a": False}" --set b=[1, 2]'),
+        ("--set x=inf; --set: no", 'set={"x": "inf"}; --set: no'),
+        ("\n--resume. --overwrite.", "\nresume=True. overwrite=True."),
         ("a--resume  b/--set --unheard -- --", "a--resume  b/--set --unheard -- --"),
+        (" /data/run --resume/x.npz", " /data/run --resume/x.npz"),
         ("", ""),
     ],
 )

@@ -75,8 +75,10 @@ pub fn decide(
                 }
             }
             for estimate in &mut estimates {
+                let both = estimate.kind_probabilities.zip(estimate.level_probabilities);
+                let Some(both) = both else { continue };
                 let is_box = rule == Rule::JointDryBoxes && is_box(estimate.key, containers)?;
-                together(estimate, is_box)?;
+                together(estimate, both, is_box)?;
             }
         }
     }
@@ -176,10 +178,12 @@ fn is_box(key: RowKey, containers: &Containers) -> Result<bool> {
     })
 }
 
-/// Replaces type and level by the best feasible pair, where both have probabilities.
-fn together(estimate: &mut SubmissionRow, dry: bool) -> Result<()> {
-    let both = estimate.kind_probabilities.zip(estimate.level_probabilities);
-    let Some((kinds, levels)) = both else { return Ok(()) };
+/// Replaces type and level by the best feasible pair by the probabilities of both.
+fn together(
+    estimate: &mut SubmissionRow,
+    (kinds, levels): ([f64; 4], [f64; 3]),
+    dry: bool,
+) -> Result<()> {
     let feasible: Vec<(usize, usize)> = Filling::all()
         .filter(|f| !(dry && f.kind() == FillingType::Water))
         .map(|f| (f.kind() as usize, f.level() as usize))

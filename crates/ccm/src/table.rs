@@ -85,7 +85,7 @@ impl Table {
 
     /// A finite number.
     pub(crate) fn number(&self, row: usize, column: usize) -> Result<f64> {
-        match self.text(row, column).parse::<f64>() {
+        match self.text(row, column).trim().parse::<f64>() {
             Ok(v) if v.is_finite() => Ok(v),
             _ => Err(self.fault(row, column, "a finite number")),
         }

@@ -166,7 +166,7 @@ impl ManifestColumns {
         };
         let seconds = |name: &str, text: Option<String>| match text {
             None => Ok(None),
-            Some(text) => match text.parse::<f64>() {
+            Some(text) => match text.trim().parse::<f64>() {
                 Ok(value) if value.is_finite() && value >= 0.0 => Ok(Some(value)),
                 _ => {
                     let reason = format!("{name} = {} is not a time in seconds", quoted(&text));

@@ -133,6 +133,7 @@ fn only_names_of_statistics_make_whole_numbers_features() {
         "age.max",
         "x.p2.5",
         "a34f136[mfcc_1]",
+        "ch2/a34f136[zcr]",
     ] {
         assert!(is_statistic(name), "{name}");
     }
@@ -148,6 +149,12 @@ fn only_names_of_statistics_make_whole_numbers_features() {
         "x.pinf",
         "a.means",
         "x[0",
+        "meta[class]",
+        "ch1/[0]",
+        "x[]",
+        "x.p-5",
+        "x.p101",
+        "[1]",
         "",
     ] {
         assert!(!is_statistic(name), "{name}");

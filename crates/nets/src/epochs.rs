@@ -1,5 +1,6 @@
 //! The training loop, whatever is learned.
 
+use std::collections::HashMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -7,6 +8,7 @@ use crate::checkpoint;
 use crate::course::Course;
 use crate::error::{NetError, Result};
 use crate::history::{Epoch, History, Progress};
+use crate::layers::MOMENTUM;
 use crate::memory;
 use crate::network::Network;
 use crate::random::Stream;
@@ -101,7 +103,52 @@ pub(crate) fn run(
         kept = epoch;
         *network.parameters_mut() = parameters;
     }
+    if recipe.epochs * steps_of(course.train, recipe, 0).len() < SETTLED {
+        settle(course, network, recipe)?;
+    }
     Ok(History { epochs, kept })
+}
+
+/// Steps after which running statistics have forgotten what they began with.
+const SETTLED: usize = 100;
+
+/// Sets the running statistics of batch normalisation to the means over the batches of one more epoch, in which
+/// nothing is learned. After a few steps they are still near their initial values, and evaluation, which uses them,
+/// would not be what was trained.
+fn settle(course: &Course<'_>, network: &mut Network, recipe: &Recipe) -> Result<()> {
+    let declared = network.parameters().declared().iter();
+    let names: Vec<String> = declared.filter(|d| !d.trained).map(|d| d.name.clone()).collect();
+    if names.is_empty() {
+        return Ok(());
+    }
+    for name in &names {
+        network.parameters_mut().get_mut(name).values_mut().fill(0.0);
+    }
+    let (mut sums, mut items) = (HashMap::<String, Vec<f64>>::new(), 0.0);
+    for rows in steps_of(course.train, recipe, recipe.epochs) {
+        let chance = Stream::new(recipe.seed, "offset").part(recipe.epochs as u64);
+        let inputs = course.items.laid(network, &rows, recipe, chance);
+        let targets = course.targets.pick(&rows, network.outputs());
+        let found =
+            network.gradients(&inputs, &targets, &course.loss, &course.class_weights, None)?;
+        items += rows.len() as f64;
+        for (name, moved) in found.running {
+            let sum = sums.entry(name).or_insert_with(|| vec![0.0; moved.len()]);
+            let from_zero = moved.iter().map(|&v| f64::from(v) / MOMENTUM * rows.len() as f64);
+            sum.iter_mut().zip(from_zero).for_each(|(sum, v)| *sum += v);
+        }
+    }
+    for (name, sum) in sums {
+        let values = network.parameters_mut().get_mut(&name).values_mut();
+        values.iter_mut().zip(sum).for_each(|(value, sum)| *value = (sum / items) as f32);
+    }
+    match network.parameters().not_finite() {
+        None => Ok(()),
+        Some((name, value)) => {
+            let (step, what) = (recipe.epochs as u64, format!("the mean of {name}"));
+            Err(NetError::Diverged { step, what, value })
+        }
+    }
 }
 
 /// Duration of the whole training, from one step that changes nothing.
@@ -135,4 +182,54 @@ fn steps_of(train: &[usize], recipe: &Recipe, epoch: usize) -> Vec<Vec<usize>> {
     let whole = rows.len() / recipe.batch * recipe.batch;
     let used = if recipe.drop_last { whole } else { rows.len() };
     rows[..used].chunks(recipe.batch).map(<[usize]>::to_vec).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::{self, Task};
+    use crate::items::{Column, Items};
+    use crate::networks;
+
+    /// Trained to a loss near 0, the network gave every recording the same class: what it had learned by the statistics
+    /// of its batches was nothing by the running ones.
+    #[test]
+    fn a_short_training_is_of_use() {
+        let definition = networks::named("mel_cnn").unwrap();
+        let mut network = definition.build(Some(2), 0).unwrap();
+        let size = network.inputs()[0].shape.len();
+        let mut state = 1u32;
+        let mut noise = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32 - 0.5
+        };
+        let classes: Vec<usize> = (0..8).map(|i| i % 2).collect();
+        let images: Vec<Vec<f32>> = classes
+            .iter()
+            .map(|&class| {
+                let half = |at: usize| usize::from(at >= size / 2);
+                (0..size)
+                    .map(|at| 10.0 * noise() + if half(at) == class { 6.0 } else { 4.0 })
+                    .collect()
+            })
+            .collect();
+        let items = Items { columns: vec![Column::of(images.iter().map(Vec::as_slice))] };
+        let rows: Vec<usize> = (0..8).collect();
+        let task = Task { items: &items, classes: &classes, train: &rows, watched: &[] };
+        let recipe = Recipe { epochs: 12, batch: 8, ..definition.recipe };
+        fit::fit(&mut network, task, &recipe, None, |_, _| 0.0, |_| true).unwrap();
+        let inputs = items.laid(&network, &rows, &recipe, Stream::new(0, "offset"));
+        let targets = crate::loss::Targets::Classes(classes);
+        let targets = targets.pick(&rows, network.outputs());
+        let loss = crate::loss::Loss::CrossEntropy;
+        let learned = network.gradients(&inputs, &targets, &loss, &[], None).unwrap().outputs;
+        let used = network.logits(&inputs).unwrap();
+        let both = learned.values.values().iter().zip(used.values.values());
+        for (learned, used) in both {
+            assert!(
+                (learned - used).abs() < 0.02 * learned.abs().max(1.0),
+                "{learned}, then {used}"
+            );
+        }
+    }
 }

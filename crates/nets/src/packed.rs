@@ -378,6 +378,41 @@ mod tests {
         assert_eq!(found.values(), all.values());
     }
 
+    /// Rows of several parts: their numbers and those of one row alone.
+    #[test]
+    fn parts_add_up_to_the_same_bits_for_any_rows() {
+        for (count, length) in
+            [(1, 255), (1, 256), (1, 257), (1, 600), (1, 1000), (3, 100), (3, 300), (7, 40)]
+        {
+            let inputs = count * length;
+            let weight = Matrix::new(37, inputs, numbers(37 * inputs, 7919));
+            let (packed, bias) = (Packed::new(&weight), numbers(37, 31));
+            let jump = length + 5;
+            let values = numbers(count * jump + 40 * 13, 6007);
+            for rows in [1, 2, 6, 12, 13, 31] {
+                let starts: Vec<usize> = (0..rows).map(|row| row * 13).collect();
+                let runs = Runs { values: &values, starts: &starts, count, jump, length };
+                let mut all = vec![f32::NAN; rows * 37];
+                packed.multiply(runs, Some(&bias), &mut all);
+                for (row, found) in all.chunks(37).enumerate() {
+                    let mut alone = vec![f32::NAN; 37];
+                    let runs = Runs { starts: &starts[row..=row], ..runs };
+                    packed.multiply(runs, Some(&bias), &mut alone);
+                    assert_eq!(found, alone, "row {row} of {rows}, {count} x {length}");
+                    let x =
+                        (0..count).flat_map(|run| &values[starts[row] + run * jump..][..length]);
+                    let x: Vec<f32> = x.copied().collect();
+                    for (o, found) in found.iter().enumerate() {
+                        let w = &weight.values()[o * inputs..][..inputs];
+                        let products = x.iter().zip(w).map(|(x, w)| f64::from(*x) * f64::from(*w));
+                        let off = f64::from(*found) - products.sum::<f64>() - f64::from(bias[o]);
+                        assert!(off.abs() < 1e-4, "{o} of row {row}, {count} x {length}: {off}");
+                    }
+                }
+            }
+        }
+    }
+
     #[test]
     fn runs_lie_anywhere() {
         let values = numbers(100, 37);

@@ -21,7 +21,7 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
 use crate::arrays::{into_numpy, view2};
-use crate::errors::{MissingFileError, config_error, run_error, value_error};
+use crate::errors::{MissingFileError, config_error, interrupted, run_error, value_error};
 use crate::pool::{self, compute};
 
 /// How often a run asks whether Python has a signal for us.
@@ -139,7 +139,7 @@ pub(crate) fn extract(
             Some(span) => into_windows(found.inputs, span, stop).map_err(input_error)?,
         };
         run::run(&inputs, &config, &options, &told, stop).map_err(|error| match error {
-            run::RunError::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
+            run::RunError::Interrupted => interrupted(&error),
             other => run_error(&other),
         })
     };
@@ -170,7 +170,7 @@ pub(crate) fn input_error(error: InputError) -> PyErr {
 pub(crate) fn fetch(py: Python<'_>, name: &str, to: PathBuf) -> PyResult<()> {
     let work = |stop: &Arc<AtomicBool>| {
         run::fetch_to(name, &to, stop).map_err(|error| match error {
-            run::RunError::Interrupted => PyKeyboardInterrupt::new_err(error.to_string()),
+            run::RunError::Interrupted => interrupted(&error),
             other => run_error(&other),
         })
     };

@@ -22,7 +22,7 @@ use crate::paragraphs::wrapped;
 #[command(after_help = "Examples:\n  corsmal-feat benchmark --data ~/CCM --out report\n  \
                         corsmal-feat benchmark --data ~/CCM --out report --baselines zcr-mfcc-rf \
                         --add M6=m6_acc.csv\n  corsmal-feat benchmark --data ~/CCM --out report \
-                        --methods m1,m2,m4,m6 --epochs 5\n  corsmal-feat benchmark --data ~/CCM --out report \
+                        --methods m1,m2,m4,m6 --epochs 5\n  corsmal-feat benchmark --data ~/CCM --out report \\\n      \
                         --capacity m5 --capacity fused=fused.capacity --capacity M2=m2.csv\n\nSystems are trained on whole containers \
                         held out in three folds, with their published recipes; `corsmal-feat nets` \
                         lists them.\n\nThe report is report/report.html; the same tables \

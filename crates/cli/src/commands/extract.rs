@@ -34,7 +34,7 @@ Exit codes: 0 all fine, 1 finished with failed files, 2 could not run or stopped
 --max-errors, 130 interrupted.")]
 pub struct Args {
     /// Recordings: files, folders (including subfolders), globs, manifests (.csv, .jsonl), or - for a
-    /// WAV stream on standard input.
+    /// recording on standard input.
     #[arg(value_name = "PATH", required_unless_present = "named")]
     inputs: Vec<OsString>,
     /// The same as the positional arguments, and added after them.
@@ -93,7 +93,8 @@ pub struct Args {
 /// Where a configuration comes from.
 #[derive(clap::Args)]
 pub struct ConfigArgs {
-    /// A configuration that comes with the tool (see `corsmal-feat presets`).
+    /// A configuration that comes with the tool (see `corsmal-feat presets`); without --config, the
+    /// default is logmel.
     #[arg(long, value_name = "NAME", conflicts_with = "config")]
     pub preset: Option<String>,
     /// A configuration file (TOML).

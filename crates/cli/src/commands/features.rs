@@ -67,8 +67,13 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
             println!("{key} = {value}");
         }
     }
+    println!("{}", wrapped(COEFFICIENTS, "# "));
     Ok(ExitCode::SUCCESS)
 }
+
+/// The key that every feature has.
+const COEFFICIENTS: &str = "Keep some coefficients only: coefficients = [1, 13] are those from 1 to 12, counted from 0. By \
+                            default all are kept.";
 
 /// Explains a section.
 fn shown(section: &Section, json: bool) -> Result<ExitCode, Failure> {

@@ -168,12 +168,10 @@ fn print_drawn(drawn: &str, units: usize) {
                 "rows of one person, place or device are not independent: name them with --groups"
             );
         }
-        column => {
-            println!("bootstrap over {units} values of {column}");
-            if units < 10 {
-                println!("with so few of them, the interval says little");
-            }
-        }
+        column => println!("bootstrap over {units} values of {column}"),
+    }
+    if units < 10 {
+        println!("with so few of them, the interval says little");
     }
 }
 

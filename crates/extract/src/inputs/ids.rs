@@ -71,11 +71,17 @@ pub(super) fn assign(found: &[Found]) -> Result<Vec<String>, InputError> {
         let mut changed = Vec::new();
         for group in order.chunk_by(|a, b| ids[*a] == ids[*b]).filter(|group| group.len() > 1) {
             let before = changed.len();
-            for &index in group {
-                let mut forms = forms(&found[index]);
-                if levels[index] + 1 < forms.len() {
-                    levels[index] += 1;
-                    changed.push((index, forms.swap_remove(levels[index])));
+            // The hash is for those that nothing else tells apart.
+            for last in [1, 0] {
+                for &index in group {
+                    let mut forms = forms(&found[index]);
+                    if levels[index] + 1 + last < forms.len() {
+                        levels[index] += 1;
+                        changed.push((index, forms.swap_remove(levels[index])));
+                    }
+                }
+                if changed.len() > before {
+                    break;
                 }
             }
             if changed.len() == before {
@@ -174,4 +180,28 @@ fn readable(name: &OsStr) -> String {
         text.extend(chunk.invalid().iter().map(|byte| format!("\\x{byte:02x}")));
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plain_names_get_no_hash() {
+        let files = [
+            ("x.flac", "1/x.flac"),
+            ("x.wav", "1/x.wav"),
+            ("x.wav", "2/x.wav"),
+            ("1/x.wav", "R/1/x.wav"),
+        ];
+        let found = files.map(|(relative, path)| Found {
+            source: InputSource::File(path.into()),
+            naming: Naming::Derived(relative.into()),
+            start: None,
+            end: None,
+            labels: Vec::new(),
+            line: None,
+        });
+        assert_eq!(assign(&found).unwrap(), ["x.flac", "1/x.wav", "2/x", "R/1/x"]);
+    }
 }

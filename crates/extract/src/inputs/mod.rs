@@ -1,6 +1,6 @@
 //! From what the user names to the list of recordings of a run.
 //!
-//! A name is, in this order of interpretation: `-` (a WAV stream on standard input), an object of a
+//! A name is, in this order of interpretation: `-` (a recording on standard input), an object of a
 //! store (`s3://bucket/x`; below), an existing file (a manifest if its extension is one of [`manifest::EXTENSIONS`], an archive if it is `.tar`,
 //! else a recording), an existing folder, a list in braces as `{000..012}.tar` or `{a,b}.wav`, or a
 //! glob. A name such as `s3://bucket/x` is never looked for on a disk: it is an object, a folder of them where it ends with a

@@ -141,13 +141,14 @@ impl<R: BufRead> Read for LineFeeds<R> {
                     used += 1;
                     match byte {
                         b'\r' => self.has_return = true,
-                        _ if self.lines.place == Place::Begin => {}
                         _ => self.blanks.push(byte),
                     }
                     continue;
                 }
-                if ends || byte == b'\n' || byte == self.lines.delimiter {
-                    // The field ends before them.
+                let begins = self.lines.place == Place::Begin && byte != b'"';
+                if ends || byte == b'\n' || byte == self.lines.delimiter || begins {
+                    // The field ends before them, or begins behind them. Before a quotation mark they stay: it is
+                    // text then.
                     self.blanks.clear();
                 } else if let Some(&blank) = self.blanks.get(self.given) {
                     self.given += 1;

@@ -8,6 +8,9 @@ use std::io::{self, BufRead};
 
 pub use lines::LineFeeds;
 
+/// What may lie around fields, and belongs to those between quotation marks.
+const BLANKS: [char; 2] = [' ', '\t'];
+
 /// A reader of the table in `text`, whose first line says what separates its fields: commas where
 /// it has one, else semicolons, else tabs. Blanks around fields are left out, but for those in quotation marks.
 ///
@@ -38,7 +41,7 @@ pub fn reader<R: BufRead>(mut text: R) -> io::Result<csv::Reader<LineFeeds<R>>> 
     Ok(builder.delimiter(delimiter).from_reader(text))
 }
 
-/// The names of the columns.
+/// The names of the columns, without white space around them.
 ///
 /// # Errors
 /// As those of records.
@@ -48,7 +51,7 @@ pub fn header<R: BufRead>(
     let header = reader.headers().cloned();
     match unclosed(reader) {
         Some(fault) => Err(fault),
-        None => Ok(header?),
+        None => Ok(header?.iter().map(str::trim).collect()),
     }
 }
 
@@ -76,7 +79,9 @@ pub fn records<R: BufRead>(
         match read {
             Ok(true) => {
                 let line = record.position().map_or(0, csv::Position::line);
-                Some(Ok((reader.get_ref().lines().of_record(line), record)))
+                let line = reader.get_ref().lines().of_record(line);
+                let same = record.iter().all(|field| bare(field).len() == field.len());
+                Some(Ok((line, if same { record } else { record.iter().map(bare).collect() })))
             }
             Ok(false) => None,
             Err(error) => {
@@ -86,6 +91,14 @@ pub fn records<R: BufRead>(
             }
         }
     })
+}
+
+/// A field without white space around it. Blanks count: they were between quotation marks, unless a quotation mark
+/// follows, which then is text.
+fn bare(field: &str) -> &str {
+    let field = field.trim_matches(|c: char| c.is_whitespace() && !BLANKS.contains(&c));
+    let inner = field.trim_start_matches(BLANKS);
+    if inner.starts_with('"') { inner } else { field }
 }
 
 /// What is wrong with a table, and where.
@@ -121,6 +134,21 @@ impl From<csv::Error> for Fault {
         };
         Self { line, reason }
     }
+}
+
+/// One record of several fields with its line end. Blanks around a field are kept by quotation marks, as
+/// [`reader`] has it; the csv crate would write them without.
+pub fn line(fields: &[String]) -> Vec<u8> {
+    let written = |field: &String| {
+        let has_blanks = field.trim_matches(BLANKS).len() < field.len();
+        match has_blanks || field.contains([',', '"', '\r', '\n']) {
+            true => format!("\"{}\"", field.replace('"', "\"\"")),
+            false => field.clone(),
+        }
+    };
+    let mut line = fields.iter().map(written).collect::<Vec<_>>().join(",").into_bytes();
+    line.push(b'\n');
+    line
 }
 
 /// A name that two columns have; columns without a name are not told apart.
@@ -258,27 +286,29 @@ mod tests {
     fn blanks_count_within_quotation_marks_alone() {
         let rows = [
             ("a b , c\t,  \n", ["a b", "c", ""]),
-            ("  a  b,\" c \" ,\" \"\"x\"\" \"\n", ["a  b", " c ", " \"x\" "]),
-            (" \"a\" , b\" c\" ,\t\"\"\n", ["a", "b\" c\"", ""]),
+            ("  a  b,\" c \" ,\" x \"\"y\"\" \"\n", ["a  b", " c ", " x \"y\" "]),
+            // A quotation mark behind a blank is text.
+            (" \"a\" , b\" c\" ,\t\"\"\n", ["\"a\"", "b\" c\"", "\"\""]),
+            ("f, \"12 inch, x\n", ["f", "\"12 inch", "x"]),
             ("\"a\" b, ,c ", ["a b", "", "c"]),
+            ("\u{a0}a\u{3000},\u{c}b\u{a0} ,\" \u{a0}\"", ["a", "b", " "]),
         ];
         for ending in ["\n", "\r\n", "\r"] {
-            for capacity in [1, 2, 3, 64] {
+            for capacity in 48..64 {
                 for (row, expected) in rows {
-                    let text = format!(" x, \"y\" ,z \n{row}").replace('\n', ending);
-                    let inner = io::BufReader::with_capacity(capacity.max(8), text.as_bytes());
+                    let text = format!("{:40}x, \u{a0}y\u{a0},\" z \" \n{row}", "");
+                    let text = text.replace('\n', ending);
+                    let inner = io::BufReader::with_capacity(capacity, text.as_bytes());
                     let mut table = reader(inner).unwrap();
-                    assert_eq!(
-                        table.headers().unwrap().iter().collect::<Vec<_>>(),
-                        ["x", "y", "z"]
-                    );
+                    let names = header(&mut table).unwrap();
+                    assert_eq!(names.iter().collect::<Vec<_>>(), ["x", "y", "z"]);
                     let found = records(&mut table).next().unwrap().unwrap().1;
                     assert_eq!(found.iter().collect::<Vec<_>>(), expected, "{text:?}");
                 }
             }
         }
         let mut table = reader(&b"a\tb \tc\n1\t\t 3 \n \n4\t5\t6"[..]).unwrap();
-        assert_eq!(table.headers().unwrap().len(), 3);
+        assert_eq!(header(&mut table).unwrap().len(), 3);
         let found: Vec<_> = records(&mut table).map(|r| r.unwrap()).collect();
         assert_eq!((found[0].0, &found[0].1[1], &found[0].1[2]), (2, "", "3"));
         assert_eq!((found[1].0, &found[1].1[0]), (4, "4"), "a line of blanks is empty");
@@ -302,6 +332,22 @@ mod tests {
     fn names_that_two_columns_have_are_found() {
         assert_eq!(repeated(["a", "", "A", "b", "", "A"]).as_deref(), Some("A"));
         assert_eq!(repeated(["a", "", "A", ""]), None);
+    }
+
+    #[test]
+    fn lines_are_those_of_the_csv_crate_but_for_blanks_at_ends() {
+        let fields = ["a", "", "b c", "x,y", "\"", "a\"b\"", "l\nm", "r\rs", "é;#'\t|", "-1.5"];
+        let fields = fields.map(String::from);
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(&fields).unwrap();
+        assert_eq!(line(&fields), writer.into_inner().unwrap());
+        let blanks = [" a", "b\t", " ", "\" "].map(String::from);
+        let written = line(&blanks);
+        assert_eq!(written, b"\" a\",\"b\t\",\" \",\"\"\" \"\n");
+        let text = [b"a,b,c,d\n", &written[..]].concat();
+        let mut table = reader(&text[..]).unwrap();
+        let found = records(&mut table).next().unwrap().unwrap().1;
+        assert_eq!(found.iter().collect::<Vec<_>>(), blanks);
     }
 
     #[test]

@@ -304,7 +304,8 @@ impl NpzWriter {
         let local = headers::local_header(&entry, self.zip64);
         self.write_at_end(&[&local])?;
         let mut out = Checked::new(&self.file);
-        let (mut piece, mut copied) = (vec![0; CHUNK], 0);
+        let size = usize::try_from(entry.compressed).unwrap_or(CHUNK).clamp(1, CHUNK);
+        let (mut piece, mut copied) = (vec![0; size], 0);
         loop {
             match raw.read(&mut piece) {
                 Ok(0) => break,

@@ -110,6 +110,9 @@ pub(super) fn check_pages(
 
 /// What pyarrow and polars call a codec.
 fn codec(compression: Compression) -> String {
+    if matches!(compression, Compression::LZ4_RAW) {
+        return "lz4".into();
+    }
     let name = compression.to_string().to_lowercase();
     name.split('(').next().unwrap_or_default().to_owned()
 }

@@ -208,10 +208,15 @@ pub fn is_statistic(name: &str) -> bool {
         !feature.is_empty() && p.parse::<f64>().is_ok_and(|p| (0.0..=100.0).contains(&p))
     };
     let is_named = |(feature, stat): (&str, &str)| !feature.is_empty() && NAMES.contains(&stat);
-    // The place of a number in a vector may have a dot.
+    // Those of `a34f136` have names for places.
+    let is_place = |(feature, place): (&str, &str)| {
+        let vector = feature.rsplit('/').next().unwrap_or_default();
+        !place.is_empty() && place.bytes().all(|b| b.is_ascii_digit()) && !vector.is_empty()
+            || vector == "a34f136"
+    };
     name.rsplit_once('.').is_some_and(is_named)
         || name.rsplit_once(".p").is_some_and(is_percentile)
-        || (name.ends_with(']') && name.find('[').is_some_and(|at| at > 0))
+        || name.strip_suffix(']').and_then(|name| name.split_once('[')).is_some_and(is_place)
 }
 
 /// Why values do not name rows: one is empty, or there twice.

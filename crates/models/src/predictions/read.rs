@@ -174,9 +174,9 @@ impl PredictionColumns {
             })
         };
         let mut proba = Vec::with_capacity(self.proba.len());
-        if !self.proba.iter().all(|&at| text(at).is_empty()) {
+        if !self.proba.iter().all(|&at| text(at).trim().is_empty()) {
             for &at in &self.proba {
-                match text(at).parse::<f64>() {
+                match text(at).trim().parse::<f64>() {
                     Ok(p) if (0.0..=1.0 + SUM_TOLERANCE).contains(&p) => proba.push(p),
                     _ => return refuse(at, "a probability (0 to 1)".into()),
                 }
@@ -191,7 +191,8 @@ impl PredictionColumns {
         let class = match self.predicted.map(|at| (at, text(at))) {
             Some((_, UNKNOWN)) if !classes.contains_key(UNKNOWN) => None,
             None | Some((_, "")) => proba.as_deref().map(argmax),
-            Some((at, name)) => match classes.get(name) {
+            // A column cannot be called with white space around the name.
+            Some((at, name)) => match classes.get(name).or_else(|| classes.get(name.trim())) {
                 Some(class) => Some(*class),
                 None => {
                     let choices =

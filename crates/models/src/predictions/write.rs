@@ -4,6 +4,7 @@ use std::fmt::Display;
 use std::hash::Hash;
 use std::io::{self, Write};
 
+use corsmal_files::csv_text;
 use serde_json::{Map, Value};
 
 use super::PredictionTable;
@@ -69,7 +70,7 @@ impl<W: Write> PredictionWriter<W> {
                     Some(proba) => proba[class].to_string(),
                     None => String::new(),
                 }));
-                csv_line(&fields)
+                csv_text::line(&fields)
             }
             Form::JsonLines => {
                 let mut object = Map::new();
@@ -106,7 +107,7 @@ impl<W: Write> PredictionWriter<W> {
         }
         let classes = self.labels.iter().map(|label| format!("p_{label}"));
         let header = self.columns.iter().cloned().chain(["predicted".into()]).chain(classes);
-        self.out.write_all(&csv_line(&header.collect::<Vec<_>>()))
+        self.out.write_all(&csv_text::line(&header.collect::<Vec<_>>()))
     }
 }
 
@@ -146,40 +147,4 @@ fn json(cell: &Cell<'_>) -> Option<Value> {
 
 fn rounded(seconds: f64) -> f64 {
     (seconds * 1e9).round() / 1e9
-}
-
-/// One record of several fields with its line end. Blanks around a field are kept by quotation marks, as our readers
-/// have it; the csv crate would write them without.
-fn csv_line(fields: &[String]) -> Vec<u8> {
-    let written = |field: &String| {
-        let has_blanks = field.trim_matches([' ', '\t']).len() < field.len();
-        match has_blanks || field.contains([',', '"', '\r', '\n']) {
-            true => format!("\"{}\"", field.replace('"', "\"\"")),
-            false => field.clone(),
-        }
-    };
-    let mut line = fields.iter().map(written).collect::<Vec<_>>().join(",").into_bytes();
-    line.push(b'\n');
-    line
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lines_are_those_of_the_csv_crate_but_for_blanks_at_ends() {
-        let fields = ["a", "", "b c", "x,y", "\"", "a\"b\"", "l\nm", "r\rs", "é;#'\t|", "-1.5"];
-        let fields = fields.map(String::from);
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        writer.write_record(&fields).unwrap();
-        assert_eq!(csv_line(&fields), writer.into_inner().unwrap());
-        let blanks = [" a", "b\t", " ", "\" "].map(String::from);
-        let line = csv_line(&blanks);
-        assert_eq!(line, b"\" a\",\"b\t\",\" \",\"\"\" \"\n");
-        let text = [b"a,b,c,d\n", &line[..]].concat();
-        let mut table = corsmal_files::csv_text::reader(&text[..]).unwrap();
-        let found = corsmal_files::csv_text::records(&mut table).next().unwrap().unwrap().1;
-        assert_eq!(found.iter().collect::<Vec<_>>(), blanks);
-    }
 }

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::labels::{caseless, number};
-use crate::predictions::{PredictionError, PredictionTable, Result};
+use crate::predictions::{PredictionError, PredictionTable, Result, UNKNOWN};
 
 /// Classes that are listed in a message.
 const LISTED: usize = 6;
@@ -101,8 +101,12 @@ fn no_prediction(known: &[String], strange: &[String]) -> Option<String> {
     let first = strange.first()?;
     let like = corsmal_names::closest(first, known.iter().map(String::as_str));
     let like = like.map(|name| format!("; did you mean {name:?}?")).unwrap_or_default();
+    let word = match strange.iter().any(|name| name == UNKNOWN) {
+        true => "; `unknown` as a prediction says that there is none",
+        false => "",
+    };
     Some(format!(
-        "no prediction can be one of the true classes {}, so their rows are wrong{like}",
+        "no prediction can be one of the true classes {}, so their rows are wrong{like}{word}",
         quoted(strange)
     ))
 }

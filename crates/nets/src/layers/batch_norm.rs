@@ -14,7 +14,8 @@ use burn_tensor::{Tensor, module};
 use rayon::prelude::*;
 
 const EPSILON: f64 = 1e-5;
-const MOMENTUM: f64 = 0.1;
+/// Share of a batch in a running statistic, as in PyTorch.
+pub(crate) const MOMENTUM: f64 = 0.1;
 
 /// Each channel to mean 0 and variance 1 over the batch (in evaluation: by the running statistics),
 /// then scaled and shifted.

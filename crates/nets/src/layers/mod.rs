@@ -14,6 +14,7 @@ mod residual;
 pub use activation::{Relu, Sigmoid, Softmax, softmax};
 pub use attention::Attention;
 pub use batch_norm::BatchNorm;
+pub(crate) use batch_norm::MOMENTUM;
 #[cfg(any(test, feature = "gpu"))]
 pub(crate) use batch_norm::moved;
 pub use conv::Conv2d;

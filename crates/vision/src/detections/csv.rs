@@ -41,7 +41,7 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Vec<Detection>> {
         };
         let number = |key: &str, what: &str| {
             let text = text(key);
-            text.parse::<f64>().map_err(|_| place(format!("'{text}' is not {what}")))
+            text.trim().parse::<f64>().map_err(|_| place(format!("'{text}' is not {what}")))
         };
         let mut bounds = [0.0; 4];
         for (side, key) in bounds.iter_mut().zip(["x_min", "y_min", "x_max", "y_max"]) {

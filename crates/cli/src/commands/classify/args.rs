@@ -24,7 +24,7 @@ Examples:
   corsmal-feat classify -m type.model audio/ -o predictions.csv
   corsmal-feat classify --model type.model --features feats.npz --out -
   corsmal-feat classify -m type.model audio/ --reject 0.6 -o predictions.csv
-  arecord -f cd -t wav | corsmal-feat classify --model type.model --in - --window 2 --hop 0.5
+  arecord -f S16_LE -r 44100 -c 1 -t wav | corsmal-feat classify -m type.model - --window 2 --hop 0.5
   corsmal-feat classify --model type.model --in audio/ --window 1 --vote majority --out votes.csv
 
 One line per recording: id, path, status, label columns of a manifest (the one that the model
@@ -41,7 +41,7 @@ pub struct Args {
     /// Model file from `corsmal-feat train` or `corsmal-feat benchmark`.
     #[arg(long, short, value_name = "FILE")]
     pub(super) model: PathBuf,
-    /// Recordings: files, folders, globs, manifests, or - for one WAV stream on standard input. For a
+    /// Recordings: files, folders, globs, manifests, or - for one on standard input. For a
     /// network that takes pictures, a folder of them.
     #[arg(value_name = "PATH", required_unless_present_any = ["features", "inputs"])]
     pub(super) paths: Vec<String>,

@@ -171,7 +171,8 @@ pub(super) struct SubmissionArgs {
     /// Write the median mass of the training containers, 15 g, for every container (2022 only).
     #[arg(long)]
     pub(super) mass_prior: bool,
-    /// Official annotations, to name recordings by id (2022) or container and sequence (2020).
+    /// Official annotations of the same part: with them, recordings may be named by number or by
+    /// container and sequence in every file, whatever the format; --dry-boxes needs them for numbers.
     #[arg(long, value_name = "CSV")]
     pub(super) annotations: Option<PathBuf>,
     /// Refuse a submission unless it has exactly the recordings of this part, and write them in the

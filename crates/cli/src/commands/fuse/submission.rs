@@ -9,7 +9,7 @@ use corsmal_ccm::capacity::{self, Measured};
 use corsmal_ccm::dataset::{Annotations, Container, Subset};
 use corsmal_ccm::decision::{Containers, Rule, decide, decide_joint};
 use corsmal_ccm::predictions::Named;
-use corsmal_ccm::submission::{self, RowKey, Submission, official_rows};
+use corsmal_ccm::submission::{self, RowKey, Submission, SubmissionRow, official_rows};
 
 use super::args::{Args, Format, Part};
 use crate::failure::{FAILED_FILES, Failure};
@@ -54,6 +54,9 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
         Format::Y2022 => submission::Format::Y2022,
     };
     let annotations = options.annotations.as_deref().map(Annotations::read).transpose()?;
+    if let (Some(annotations), Some(part)) = (&annotations, options.part) {
+        require_part(annotations, subset(part))?;
+    }
     let containers = annotations.as_ref().map_or_else(Containers::new, containers);
     let mut predictions = match (&joint, &kind, &level) {
         (Some(joint), ..) => decide_joint(joint)?,
@@ -74,30 +77,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
         }
     }
     if let Some(path) = &options.capacity {
-        let mut capacities = of_part(capacity::read(path)?, options.part, path)?;
-        if let Some(names) = &names {
-            let named = |(key, measured)| (names.of_format(key).unwrap_or(key), measured);
-            capacities = capacities.into_iter().map(named).collect();
-        }
-        for prediction in &mut predictions {
-            let measured = capacities.remove(&prediction.key).ok_or_else(|| {
-                let is_other = |key: &RowKey| discriminant(key) != discriminant(&prediction.key);
-                let remedy = match capacities.keys().all(is_other) {
-                    true => {
-                        "; it names recordings in another way, and --annotations has both names"
-                    }
-                    false => "",
-                };
-                let path = path.display();
-                Failure::new(format!("{path}: has no line for {}{remedy}", prediction.key))
-            })?;
-            measured.complete(prediction);
-        }
-        if let Some(extra) = capacities.keys().min() {
-            let text =
-                format!("{}: has a line for {extra}, which has no prediction", path.display());
-            return Err(Failure::new(text));
-        }
+        complete(&mut predictions, path, options.part, names.as_ref())?;
     }
     if options.mass_prior {
         let mass = Some(capacity::PRIOR_MASS_G);
@@ -111,6 +91,41 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
     let failed = predictions.iter().filter(|p| p.kind.is_none() && p.level.is_none()).count();
     args.tell(predictions.len(), failed, "an estimate")?;
     Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
+}
+
+/// Adds measured capacities, one to every prediction.
+fn complete(
+    predictions: &mut [SubmissionRow],
+    path: &Path,
+    part: Option<Part>,
+    names: Option<&Names<'_>>,
+) -> Result<(), Failure> {
+    let mut capacities = of_part(capacity::read(path)?, part, path)?;
+    if let Some(names) = names {
+        let named = |(key, measured)| (names.of_format(key).unwrap_or(key), measured);
+        capacities = capacities.into_iter().map(named).collect();
+    }
+    let is_other = |key: &RowKey| {
+        predictions.iter().all(|prediction| discriminant(&prediction.key) != discriminant(key))
+    };
+    let remedy = match names.is_none() && capacities.keys().any(is_other) {
+        true => "; it names recordings in another way, and --annotations has both names",
+        false => "",
+    };
+    let place = path.display();
+    for prediction in predictions {
+        let key = prediction.key;
+        let measured = capacities
+            .remove(&key)
+            .ok_or_else(|| Failure::new(format!("{place}: has no line for {key}{remedy}")))?;
+        measured.complete(prediction);
+    }
+    match capacities.keys().min() {
+        None => Ok(()),
+        Some(extra) => {
+            Err(Failure::new(format!("{place}: has a line for {extra}, which has no prediction")))
+        }
+    }
 }
 
 fn subset(part: Part) -> Subset {
@@ -141,6 +156,21 @@ fn of_part(
         }
     }
     Ok(rows)
+}
+
+/// Refuses annotations of another part of the data set, where the same numbers are other recordings.
+fn require_part(annotations: &Annotations, part: Subset) -> Result<(), Failure> {
+    let other = annotations.rows.iter().find(|row| {
+        Container::new(row.container).is_some_and(|container| container.subset() != part)
+    });
+    match other {
+        None => Ok(()),
+        Some(row) => Err(Failure::new(format!(
+            "{}: has container {}, which is not of the part that --part names",
+            annotations.path.display(),
+            row.container
+        ))),
+    }
 }
 
 /// The containers of the recordings, by their numbers.

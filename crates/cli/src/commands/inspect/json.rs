@@ -7,6 +7,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use corsmal_ccm::capacity::CapacityModel;
+use corsmal_files::csv_text;
 use corsmal_models::predictions::PredictionTable;
 use corsmal_vision::read_detections;
 use serde::Serialize;
@@ -117,7 +118,7 @@ fn records(path: &Path) -> Result<(Counter, Option<Scored>), String> {
     let mut table: Option<(Vec<String>, Counter)> = None;
     // Counting takes no memory, scoring does.
     let scored = std::fs::metadata(path).is_ok_and(|file| file.len() <= MAX_BYTES);
-    let mut csv = csv::Writer::from_writer(Vec::new());
+    let mut csv = Vec::new();
     let mut line = Vec::new();
     for number in 1.. {
         line.clear();
@@ -129,8 +130,7 @@ fn records(path: &Path) -> Result<(Counter, Option<Scored>), String> {
         if text.trim_ascii().is_empty() {
             continue;
         }
-        let value: Value =
-            serde_json::from_slice(text).map_err(|e| format!("line {number}: {e}"))?;
+        let value: Value = serde_json::from_slice(text).map_err(|e| of_line(number, &e))?;
         let Value::Object(record) = value else {
             return Err(format!("line {number} is not an object"));
         };
@@ -143,25 +143,32 @@ fn records(path: &Path) -> Result<(Counter, Option<Scored>), String> {
             let columns: Vec<String> = record.keys().cloned().collect();
             let counter = Counter::new(columns.clone());
             if scored && counter.has_truth() {
-                csv.write_record(&columns).map_err(|e| e.to_string())?;
+                csv.extend(csv_text::line(&columns));
             }
             table = Some((columns, counter));
         }
         if let Some((columns, counter)) = &mut table {
             counter.add(cell);
             if scored && counter.has_truth() {
-                csv.write_record(columns.iter().map(|column| cell(column)))
-                    .map_err(|e| e.to_string())?;
+                let cells: Vec<String> = columns.iter().map(|column| cell(column)).collect();
+                csv.extend(csv_text::line(&cells));
             }
         }
     }
     let (_, counter) = table.ok_or("no line")?;
-    let text = csv.into_inner().map_err(|e| e.to_string())?;
     let table = counter.has_truth().then(|| match scored {
-        true => PredictionTable::parse(&text, path).map_err(|e| e.to_string()),
+        true => PredictionTable::parse(&csv, path).map_err(|e| e.to_string()),
         false => Err(format!("more than {} MiB", MAX_BYTES >> 20)),
     });
     Ok((counter, table))
+}
+
+/// What is wrong with the JSON of a line, which serde_json takes for the first.
+fn of_line(number: usize, error: &serde_json::Error) -> String {
+    let place = format!(" at line {} column {}", error.line(), error.column());
+    let text = error.to_string();
+    let what = text.strip_suffix(&place).unwrap_or(&text);
+    format!("line {number}, column {}: {what}", error.column())
 }
 
 /// Kind, facts and lines of text.
