@@ -60,7 +60,8 @@ class Features:
     config, config_hash : dict, str
         Full configuration and its hash.
     outcomes : list of dict
-        One row per input, including those without features: id, path, status, ...
+        One row per input, including those without features: id, path, status, ...; those without
+        features keep their labels here.
 
     Examples
     --------
