@@ -130,12 +130,13 @@ impl FormatRule {
         sample_rate: Option<u32>,
         channels: Option<u32>,
     ) -> std::result::Result<(), String> {
+        let mut differences = Vec::new();
         if let (Some(known), Some(rate)) = (&self.sample_rates, sample_rate)
             && !known.contains(&rate)
         {
             let trained = known.iter().map(|rate| hertz(*rate)).collect::<Vec<_>>().join(", ");
             let resample = known[0];
-            return Err(format!(
+            differences.push(format!(
                 "{}; the model was trained on {trained}: --set signal.sample_rate={resample} \
                  resamples it, --any-rate takes it as it is",
                 hertz(rate)
@@ -158,13 +159,13 @@ impl FormatRule {
                 }
             };
             let ending = if known == &[1] { "" } else { "s" };
-            return Err(format!(
+            differences.push(format!(
                 "{}; the model was trained on recordings of {} channel{ending}: {remedy}",
                 words::count(count as usize, "channel"),
                 trained.join(", ")
             ));
         }
-        Ok(())
+        if differences.is_empty() { Ok(()) } else { Err(differences.join("; and ")) }
     }
 }
 

@@ -120,6 +120,8 @@ fn a_model_knows_which_recordings_it_may_be_applied_to() {
     let rate = rule.check(Some(22_050), Some(8)).unwrap_err();
     assert!(rate.starts_with("22,050 Hz; the model was trained on 44,100 Hz, 48,000 Hz"), "{rate}");
     assert!(rule.check(Some(44_100), Some(1)).unwrap_err().starts_with("1 channel;"));
+    let both = rule.check(Some(22_050), Some(1)).unwrap_err();
+    assert!(both.starts_with("22,050 Hz;") && both.contains("; and 1 channel;"), "{both}");
     // Resampled to a rate of the training, mixed or averaged: another format does not matter.
     let rule = model.format_rule(&config(48_000.0, "mean", false)).unwrap();
     assert!(rule.check(Some(22_050), Some(1)).is_ok());
