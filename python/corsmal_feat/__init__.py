@@ -16,6 +16,7 @@ from . import (
     util,
     vision,
 )
+from ._absent import absent as _absent
 from ._audio import get_duration, get_samplerate, load, stream
 from ._comparison import Comparison, compare_predictions
 from ._core import __version__
@@ -222,10 +223,7 @@ _LATER = {"FeatureExtractor": "._estimator", "classifiers": ".classifiers"} | di
 
 def __getattr__(name: str) -> Any:
     if name not in _LATER:
-        raise AttributeError(
-            f'module {__name__!r} has no attribute {name!r}; "Coming from librosa" in the'
-            " documentation lists what is available, and librosa works alongside"
-        )
+        raise _absent(__name__, name)
     module = _import_module(_LATER[name], __name__)
     return module if name == "classifiers" else getattr(module, name)
 

@@ -15,7 +15,7 @@ from ._by_name import ByName
 from ._predictions import Predictions, StrPath, parse
 from ._refusals import existing, refuses, seed_of, whole
 from ._warnings import warn
-from .errors import ParameterError
+from .errors import DataTypeError, ParameterError
 
 __all__ = [
     "CrossValidation",
@@ -139,6 +139,10 @@ def cross_validate(
     >>> result.accuracy["mean"], result.predictions.labels
     (1.0, ['rice', 'water'])
     """
+    if hasattr(features, "outcomes"):
+        raise DataTypeError(
+            "features must be the path of a feature file: extract(..., out=PATH) writes one"
+        )
     plan = str(cv) if cv is not None else None
     recipe = {
         "classifier": classifier,

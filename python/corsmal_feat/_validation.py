@@ -51,6 +51,11 @@ def features(X: Any, owner: str) -> Matrix:
     array = _array("X", X, owner)
     if array.dtype.kind == "c":
         raise ParameterError(f"Complex data not supported by {owner}")
+    if array.ndim == 1 and array.dtype.kind in "OU" and len(array):
+        raise ParameterError(
+            f"{owner}: X has one dimension, of {type(array[0]).__name__}: for paths of recordings, "
+            "put FeatureExtractor before the classifier (make_pipeline)"
+        )
     if array.ndim != 2:
         raise ParameterError(
             f"Expected 2D array, got {array.ndim}D array of shape {array.shape} instead. Reshape "

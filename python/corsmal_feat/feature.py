@@ -1,5 +1,8 @@
 """Features (librosa.feature): re-exported from one private module per family."""
 
+from typing import TYPE_CHECKING, Any
+
+from ._absent import absent as _absent
 from ._cens import chroma_cens
 from ._chroma import chroma_stft
 from ._chroma_cqt import chroma_cqt
@@ -34,3 +37,8 @@ __all__ = [
     "tonnetz",
     "zero_crossing_rate",
 ]
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        raise _absent(__name__, name)

@@ -6,7 +6,8 @@ import pathlib
 
 import numpy as np
 import pytest
-from corsmal_feat import _core, cross_validate
+import soundfile
+from corsmal_feat import KNN, _core, cross_validate, extract, feature
 from corsmal_feat.errors import CorsmalFeatError
 
 
@@ -32,6 +33,19 @@ from corsmal_feat.errors import CorsmalFeatError
 )
 def test_options_become_arguments_and_other_text_stays(told: str, wanted: str) -> None:
     assert _core.in_python(told) == wanted
+
+
+def test_what_is_given_instead_of_rows_is_named(tmp_path: pathlib.Path) -> None:
+    soundfile.write(tmp_path / "a.wav", np.zeros(8000), 8000)
+    features = extract([tmp_path], preset="mfcc-zcr")
+    with pytest.raises(CorsmalFeatError, match=r"give its statistics, X\.summary"):
+        KNN(1).fit(features, ["x"])
+    with pytest.raises(CorsmalFeatError, match="must be the path of a feature file"):
+        cross_validate(features, "y")  # type: ignore[arg-type]
+    with pytest.raises(CorsmalFeatError, match="put FeatureExtractor before"):
+        KNN(1).fit(["a.wav", "b.wav"], ["x", "y"])
+    with pytest.raises(AttributeError, match="lists what is available"):
+        feature.tempogram  # noqa: B018
 
 
 def test_warnings_and_refusals_of_a_cross_validation(tmp_path: pathlib.Path) -> None:
