@@ -63,6 +63,8 @@ __all__ = [
     "get_window",
     "hear_recordings",
     "hpss_masks",
+    "in_python",
+    "is_statistic",
     "is_stored",
     "istft",
     "jobs",

@@ -158,7 +158,10 @@ def cross_validate(
     text, held_out = _core.cross_validate(
         existing(features), target, _labels(labels, id_column, target), groups, plan, recipe
     )
-    return validated(text, held_out)
+    result = validated(text, held_out)
+    for told in result.report["warnings"]:
+        warn(told)
+    return result
 
 
 def validated(text: str, held_out: str) -> CrossValidation:

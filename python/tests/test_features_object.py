@@ -390,7 +390,7 @@ def test_whole_numbers_are_features_where_they_are_named_so(tmp_path: Path) -> N
     assert features.names == ["mfcc[0].mean", "rms.max"]
     assert set(features.labels) == {"class.code", "speaker.id", "y"}
     report = cf.cross_validate(path, "y", groups="speaker.id", classifier="tree")
-    assert report.report["features"] == 2
+    assert report.report["n_features"] == 2
     for codec in ("gzip", "lz4", "brotli"):
         pq.write_table(pa.table(columns), path, compression=codec)
         with pytest.raises(cf.ParameterError, match=f"snappy or zstd .*a column with {codec}"):

@@ -161,7 +161,10 @@ def test_cross_validation_gives_scores_and_predictions(table: Path, tmp_path: Pa
     with pytest.raises(ParameterError, match="already exists"):
         result.predictions.save(out, overwrite=False)
     assert corsmal_feat.score(out)["accuracy"] == pytest.approx(right)
-    tuned = corsmal_feat.cross_validate(table, "kind", cv=3, classifier="knn", tune={"k": [1, 5]})
+    with pytest.warns(UserWarning, match="rows of one group are in both training and test"):
+        tuned = corsmal_feat.cross_validate(
+            table, "kind", cv=3, classifier="knn", tune={"k": [1, 5]}
+        )
     assert len(tuned.report["candidates"]) == 2
     with pytest.raises(ParameterError, match="did you mean"):
         corsmal_feat.cross_validate(table, "kinds", cv=3)
