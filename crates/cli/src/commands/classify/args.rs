@@ -169,8 +169,9 @@ pub(super) fn configuration(args: &Args, model: &Model) -> Result<Arc<Config>, F
     let place = args.model.display();
     if header.feature_config.is_null() {
         return Err(Failure::new(format!(
-            "{place}: was trained on features of another program and cannot make them from \
-             recordings; give --features"
+            "{place}: does not say how its features are made (it was trained on a table of another \
+             program, or saved in Python without features=): give --features with a table like \
+             that one"
         )));
     }
     let config = Config::from_value(header.feature_config.clone())?;

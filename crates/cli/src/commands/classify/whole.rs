@@ -86,8 +86,9 @@ pub fn of_features(
         let wanted = &model.header().feature_config;
         let why = match (wanted.is_null(), table.config.is_null()) {
             (true, _) => {
-                "the model was trained on a table of another program: give a table of that \
-                          program, or train on an output of extract"
+                "the model does not say how its features are made (it was trained on a table of \
+                 another program, or saved in Python without features=): give a table like that \
+                 one, train on an output of extract, or save it with save(path, features=...)"
                     .into()
             }
             (_, true) => {

@@ -64,7 +64,8 @@ fn model_text(name: &str, model: &Model) -> Result<String, Failure> {
 /// The recordings that the model was trained on: what `classify` refuses others by.
 fn recordings(header: &ModelHeader) -> String {
     if header.feature_config.is_null() {
-        return "none: it was trained on a table of another program; classify takes such tables"
+        return "unknown: trained on a table of another program, or saved in Python without \
+                features=; classify takes such tables"
             .into();
     }
     let Some(trained) = &header.trained_on else {
