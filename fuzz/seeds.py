@@ -192,7 +192,7 @@ def main() -> None:
         # A strict run leaves the record of what it has done.
         (work / "audio/r9.wav").write_bytes(b"RIFF")
         strict = ["extract", "audio", "--preset", "logmel", *few, "--max-errors", "0"]
-        run(*strict, "--jobs", "1", "--out", "strict.npz", code=1)
+        run(*strict, "--jobs", "1", "--out", "strict.npz", code=2)
         ledger = (work / "strict.npz.ledger").read_bytes().splitlines()
         text = b"\n".join(line[33:] for line in ledger[1:])
         seed("ledger", "strict", pair(text, (work / "strict.npz.part").read_bytes()))
