@@ -29,7 +29,7 @@ fn main() -> ExitCode {
     match cli.run() {
         Ok(code) => code,
         Err(failure) => {
-            eprintln!("error: {failure}");
+            streams::err_lines(&format!("error: {failure}"));
             ExitCode::from(failure.code())
         }
     }

@@ -8,11 +8,12 @@ use std::time::{Duration, Instant};
 use clap::ValueEnum;
 use corsmal_extract::run::{Progress, RunReport};
 use corsmal_files::outcome::Outcome;
-use corsmal_files::quote::printable;
+use corsmal_files::quote::{printable, printable_line};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde_json::{Value, json};
 
 use crate::plural::plural;
+use crate::streams::err_lines;
 
 /// Form of messages.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -81,7 +82,7 @@ impl Meter {
     }
 
     fn line(&self, text: &str) {
-        self.bar.suspend(|| eprintln!("{}", printable(text)));
+        self.bar.suspend(|| eprintln!("{text}"));
     }
 
     /// Says why a recording has no result, unless that was said of many others.
@@ -98,7 +99,7 @@ impl Meter {
     pub fn rest(&self) {
         let faults = self.faults.lock().unwrap_or_else(|e| e.into_inner());
         for (fault, count) in faults.iter().filter(|(_, count)| **count > NAMED) {
-            eprintln!("and {} more: {}", count - NAMED, printable(fault));
+            eprintln!("and {} more: {}", count - NAMED, fault);
         }
     }
 
@@ -112,7 +113,7 @@ impl Meter {
                 let line = json!({
                     "event": "checked", "inputs": inputs, "config_hash": config_hash,
                 });
-                eprintln!("{line}");
+                event_line(&line);
             }
             LogFormat::Text => eprintln!(
                 "{}, configuration {}, nothing was read or written",
@@ -125,9 +126,11 @@ impl Meter {
     /// Why a run ended before its last recording.
     pub fn stopped(format: LogFormat, event: &str, message: &str) {
         match format {
-            LogFormat::Json => eprintln!("{}", json!({"event": event, "message": message})),
-            LogFormat::Text if event == "error" => eprintln!("error: {}", printable(message)),
-            LogFormat::Text => eprintln!("{}", printable(message)),
+            LogFormat::Json => event_line(&json!({"event": event, "message": printable(message)})),
+            LogFormat::Text if event == "error" => {
+                err_lines(&format!("error: {}", printable(message)));
+            }
+            LogFormat::Text => err_lines(&printable(message)),
         }
     }
 
@@ -157,14 +160,15 @@ impl Meter {
         if self.format == LogFormat::Json {
             let mut line = self.summary(report, out);
             line["event"] = "finished".into();
-            eprintln!("{line}");
+            event_line(&line);
             return;
         }
+        let out = out.display();
         let elapsed = self.started.elapsed();
         let seconds = self.audio();
         let statuses = counts(&report.outcomes);
         if report.up_to_date {
-            eprintln!("{}: up to date, nothing to do", out.display());
+            eprintln!("{out}: up to date, nothing to do");
             return;
         }
         let mut counts: Vec<String> = statuses.iter().map(|(s, n)| format!("{n} {s}")).collect();
@@ -172,8 +176,7 @@ impl Meter {
             counts.push("no recordings".into());
         }
         eprintln!(
-            "{}: {} in {} ({:.0} s of audio, {:.0} x real time){}",
-            out.display(),
+            "{out}: {} in {} ({:.0} s of audio, {:.0} x real time){}",
             counts.join(", "),
             human(elapsed),
             seconds,
@@ -185,7 +188,7 @@ impl Meter {
             },
         );
         if let Some(repaired) = repaired(report.outcomes.iter().map(|o| &o.repairs)) {
-            eprintln!("{}: {repaired}", out.display());
+            eprintln!("{out}: {repaired}");
         }
     }
 }
@@ -195,7 +198,7 @@ impl Progress for Meter {
         self.bar.set_length(inputs as u64);
         self.bar.set_position(done as u64);
         if self.format == LogFormat::Json && !self.quiet {
-            eprintln!("{}", json!({"event": "started", "inputs": inputs, "resumed": done}));
+            event_line(&json!({"event": "started", "inputs": inputs, "resumed": done}));
         }
     }
 
@@ -214,7 +217,7 @@ impl Progress for Meter {
         match self.format {
             LogFormat::Json => {
                 let value = serde_json::to_value(outcome).unwrap_or_default();
-                self.line(&json!({"event": "file", "outcome": value}).to_string());
+                event_line(&json!({"event": "file", "outcome": value}));
             }
             LogFormat::Text if !outcome.status.has_features() => {
                 self.refused(&outcome.path, &fault(outcome));
@@ -230,15 +233,20 @@ impl Progress for Meter {
         match self.format {
             LogFormat::Text => self.line(&format!("warning: {message}")),
             LogFormat::Json => {
-                self.line(&json!({"event": "warning", "message": message}).to_string())
+                event_line(&json!({"event": "warning", "message": printable(message)}))
             }
         }
     }
 }
 
+/// Says what happened to a program, which reads JSON: whole, however long it is.
+fn event_line(event: &Value) {
+    err_lines(&event.to_string());
+}
+
 /// Path, status and reason of a recording without features.
 pub fn failure_line(outcome: &Outcome) -> String {
-    format!("{}: {}", outcome.path, fault(outcome))
+    printable_line(&format!("{}: {}", outcome.path, fault(outcome)))
 }
 
 /// Status and reason of a recording without features.

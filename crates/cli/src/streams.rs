@@ -5,6 +5,8 @@ use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
 use std::process::exit;
 
+use corsmal_files::quote::printable_line;
+
 macro_rules! print {
     ($($text:tt)*) => { $crate::streams::out(format_args!($($text)*)) };
 }
@@ -32,8 +34,13 @@ pub fn out(text: Arguments<'_>) {
     }
 }
 
-/// Prints a line to standard error. Work goes on where nobody reads it.
+/// Prints a message to standard error, on one line whatever it repeats of an input.
 pub fn err(text: Arguments<'_>) {
-    // One write for the line, so that lines of several threads do not mix.
+    err_lines(&printable_line(&text.to_string()));
+}
+
+/// Prints lines to standard error as they are. Work goes on where nobody reads them.
+pub fn err_lines(text: &str) {
+    // One write, so that lines of several threads do not mix.
     let _ = io::stderr().write_all(format!("{text}\n").as_bytes());
 }

@@ -36,6 +36,16 @@ const LONGEST_MESSAGE: usize = 4000;
 /// A whole message as a terminal may have it, whatever it repeats: control characters but line feeds
 /// and tabs escaped, not endless, and without what may be secret in addresses.
 pub fn printable(message: &str) -> String {
+    escaped(message, |character| matches!(character, '\n' | '\t'))
+}
+
+/// As [`printable`], on one line: line feeds and tabs, which the names of files may have, are
+/// escaped as well.
+pub fn printable_line(text: &str) -> String {
+    escaped(text, |_| false)
+}
+
+fn escaped(message: &str, is_kept: fn(char) -> bool) -> String {
     // Twice as many, so that no secret is cut in two before it is found.
     let mut beyond = message.chars();
     let begin: String = beyond.by_ref().take(2 * LONGEST_MESSAGE).collect();
@@ -44,9 +54,9 @@ pub fn printable(message: &str) -> String {
     let mut left = begin.chars();
     for character in left.by_ref().take(LONGEST_MESSAGE) {
         match character {
-            '\n' | '\t' => out.push(character),
+            _ if is_kept(character) => out.push(character),
             _ if character.is_control() || is_direction(character) => {
-                out.extend(character.escape_unicode());
+                out.extend(character.escape_debug());
             }
             _ => out.push(character),
         }
@@ -118,6 +128,7 @@ mod tests {
         assert_eq!(shown("a\u{1b}[2Jb\n\u{202e}"), "a\\u{1b}[2Jb\\n\\u{202e}");
         assert_eq!(shown("it's"), "it's");
         assert_eq!(printable("a: b\n\tc\u{7}\u{2066}ü"), "a: b\n\tc\\u{7}\\u{2066}ü");
+        assert_eq!(printable_line("a\n\tb\u{7}"), "a\\n\\tb\\u{7}");
         assert!(printable(&"x".repeat(1_000_000)).len() < 4100);
         // Looking for secrets takes no longer for it.
         assert!(printable(&"a://".repeat(1_000_000)).ends_with("(3996000 more characters)"));

@@ -316,6 +316,14 @@ fn stratified(labels: &Labels, y: &[usize], k: usize, seed: u32) -> Result<Vec<F
 mod tests {
     use super::*;
 
+    /// Four rows, r0 to r3, with these columns.
+    fn table<const N: usize>(columns: [(&str, [&str; 4]); N]) -> LabelledTable {
+        let owned = |values: [&str; 4]| values.map(String::from).to_vec();
+        let columns = columns.map(|(name, values)| (name.to_string(), owned(values)));
+        let ids = owned(["r0", "r1", "r2", "r3"]);
+        LabelledTable::of_columns(std::path::Path::new("x.npz"), ids, columns.to_vec())
+    }
+
     #[test]
     fn plans_are_read_as_written() {
         let lists = vec![vec!["1".into(), "4".into()], vec!["2".into()]];
@@ -331,13 +339,7 @@ mod tests {
 
     #[test]
     fn rows_without_a_group_or_fold_are_refused() {
-        let column = |values: [&str; 4]| values.map(String::from).to_vec();
-        let columns = vec![
-            ("y".to_string(), column(["a", "b", "a", "b"])),
-            ("f".to_string(), column(["1", "", "2", "NaN"])),
-        ];
-        let ids = column(["r0", "r1", "r2", "r3"]);
-        let table = LabelledTable::of_columns(std::path::Path::new("x.npz"), ids, columns);
+        let table = table([("y", ["a", "b", "a", "b"]), ("f", ["1", "", "2", "NaN"])]);
         let (labels, classes) = table.classes("y").unwrap();
         let folds = |plan: &str, groups| {
             let plan: CvPlan = plan.parse().unwrap();
@@ -353,16 +355,10 @@ mod tests {
 
     #[test]
     fn groups_that_a_plan_splits_are_said_and_the_target_is_none() {
-        let column = |values: [&str; 4]| values.map(String::from).to_vec();
-        let columns = vec![
-            ("container".to_string(), column(["a", "b", "a", "b"])),
-            ("group".to_string(), column(["1", "1", "2", "2"])),
-        ];
-        let ids = column(["r0", "r1", "r2", "r3"]);
-        let table = LabelledTable::of_columns(std::path::Path::new("x.npz"), ids, columns);
-        let (labels, classes) = table.classes("container").unwrap();
+        let grouped = table([("container", ["a", "b", "a", "b"]), ("group", ["1", "1", "2", "2"])]);
+        let (labels, classes) = grouped.classes("container").unwrap();
         let folds = |plan: Option<&CvPlan>, groups| {
-            Folds::new(plan, &table, groups, (&labels, &classes), 0).unwrap()
+            Folds::new(plan, &grouped, groups, (&labels, &classes), 0).unwrap()
         };
         assert_eq!(folds(None, None).description, "one group of group held out");
         let said = folds(Some(&CvPlan::K(2)), None).warnings(&classes).join(" ");
@@ -373,12 +369,7 @@ mod tests {
         let kept = folds(Some(&CvPlan::K(2)), Some("group")).warnings(&classes).join(" ");
         assert!(!kept.contains("--groups"), "{kept}");
 
-        let columns = vec![
-            ("y".to_string(), column(["a", "b", "a", "b"])),
-            ("group".to_string(), column(["1", "2", "3", ""])),
-        ];
-        let ids = column(["r0", "r1", "r2", "r3"]);
-        let apart = LabelledTable::of_columns(std::path::Path::new("x.npz"), ids, columns);
+        let apart = table([("y", ["a", "b", "a", "b"]), ("group", ["1", "2", "3", ""])]);
         let (y, of_y) = apart.classes("y").unwrap();
         let whole = Folds::new(Some(&CvPlan::K(2)), &apart, None, (&y, &of_y), 0).unwrap();
         assert!(!whole.warnings(&of_y).join(" ").contains("--groups"), "no group has two rows");

@@ -62,6 +62,11 @@ pub struct LabelArgs {
 }
 
 impl LabelArgs {
+    /// The file of labels, if there is one.
+    pub fn file(&self) -> Option<&Path> {
+        self.labels.as_deref().filter(|path| *path != Path::new(FOLDERS))
+    }
+
     /// The source; `None` where labels are columns of the features or predictions themselves.
     pub fn source(&self, target: Option<&str>) -> Result<Option<LabelSource>, Failure> {
         match &self.labels {
@@ -83,11 +88,6 @@ impl LabelArgs {
                 Ok(Some(LabelSource::File { path: path.clone(), key: self.id_column.clone() }))
             }
         }
-    }
-
-    /// The label file, if there is one.
-    fn file(&self) -> Option<&Path> {
-        self.labels.as_deref().filter(|path| *path != Path::new(FOLDERS))
     }
 
     /// Whether the classes are folders.

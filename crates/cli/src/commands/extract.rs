@@ -11,6 +11,7 @@ use corsmal_extract::inputs::InputError;
 use corsmal_extract::run::{self, Progress, RunError, RunOptions};
 use corsmal_extract::survey::Survey;
 use corsmal_files::npz::Compression;
+use corsmal_files::quote::printable_line;
 use corsmal_files::shard::Shard;
 
 use crate::args::{Jobs, Told};
@@ -188,7 +189,8 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
         }
         let inputs = options.shard.of(&found);
         for input in inputs {
-            println!("{}\t{}", input.id, input.source);
+            let source = printable_line(&input.source.to_string());
+            println!("{}\t{source}", printable_line(&input.id));
         }
         Survey::of(&found, &config, stop)
             .warnings()

@@ -9,7 +9,7 @@ use corsmal_models::scores::{ClassReport, Interval, NumericScores, ScoreReport, 
 use crate::args::LabelArgs;
 use crate::failure::Failure;
 use crate::plural::plural;
-use crate::study;
+use crate::study::{self, Scored};
 use crate::text_table::{TextTable, confusion, percent};
 
 /// Arguments of `score`.
@@ -88,18 +88,23 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     };
     let report = table.score(&scoring)?;
     if let Some(folder) = &args.report {
-        let target = scoring.target.as_deref();
+        let scored = |predictions| Scored {
+            predictions,
+            labels: args.labels.file(),
+            target: scoring.target.as_deref(),
+            scoring: &scoring,
+        };
         match &report {
             ScoreReport::Classes(report) => {
                 if scoring.reject > 0.0 {
                     table.reject_below(scoring.reject)?;
                 }
-                study::write_scored(folder, &table, target, report)?;
+                study::write_scored(folder, &scored(&table), report)?;
             }
             ScoreReport::Numbers(scores) => {
                 let measures = number_measures(scores);
                 let measures = measures.map(|(name, value)| (name.trim().to_owned(), value));
-                study::write_estimates(folder, &table, target, measures.to_vec())?;
+                study::write_estimates(folder, &scored(&table), measures.to_vec())?;
             }
         }
     }

@@ -14,7 +14,7 @@ use corsmal_models::targets::Classes;
 use corsmal_report::Fact;
 use corsmal_report::study::{Importance, LearningPoint, Study};
 
-use super::page::{add_made, file_name, write};
+use super::page::{add_file, add_made, file_name, write};
 use super::recordings::{self, Source};
 use super::scored::of_predictions;
 use crate::failure::Failure;
@@ -84,7 +84,7 @@ impl HeldOut<'_> {
             None => None,
         };
         recordings::add(&mut study, self.sources(), self.quiet);
-        study.facts = vec![Fact::new("Features", self.table.path.display().to_string())];
+        add_file(&mut study.facts, "Features", &self.table.path);
         study.facts.extend(self.facts);
         study.facts.push(Fact::new("Held out", &self.folds.description));
         let cautions = self.folds.warnings(self.classes).into_iter();

@@ -7,4 +7,4 @@ mod scored;
 
 pub use held_out::{Explained, HeldOut};
 pub use page::prepare;
-pub use scored::{write_estimates, write_scored};
+pub use scored::{Scored, write_estimates, write_scored};

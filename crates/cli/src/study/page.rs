@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use corsmal_files::identity;
 use corsmal_report::{Fact, Report};
 
 use crate::failure::Failure;
@@ -20,6 +21,18 @@ pub fn prepare(folder: &Path, overwrite: bool) -> Result<(), Failure> {
     }
     std::fs::create_dir_all(folder)
         .map_err(|e| Failure::new(format!("--report {}: {e}", folder.display())))
+}
+
+/// A file that the report is made of, and its identity, as feature files and models record it.
+pub(super) fn add_file(facts: &mut Vec<Fact>, name: &str, path: &Path) {
+    facts.push(Fact::new(name, path.display().to_string()));
+    match identity::of_file(path) {
+        Ok(identity) if identity != identity::STREAM => {
+            facts.push(Fact::new(format!("Identity of the {}", name.to_lowercase()), identity));
+        }
+        // A folder of tables, or a file that was moved away meanwhile.
+        Ok(_) | Err(_) => {}
+    }
 }
 
 /// What stands in every report, after what the report is about.

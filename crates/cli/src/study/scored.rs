@@ -3,24 +3,47 @@
 use std::path::{Path, PathBuf};
 
 use corsmal_models::predictions::PredictionTable;
-use corsmal_models::scores::{ClassReport, Interval, no_estimate};
+use corsmal_models::scores::{ClassReport, Interval, Scoring, no_estimate};
 use corsmal_report::Fact;
 use corsmal_report::study::{
     CalibrationBin, ClassCurve, ClassScore, Estimate, Estimates, Prediction, Score, Study,
 };
 use ndarray::Array2;
 
-use super::page::{add_made, file_name, write};
+use super::page::{add_file, add_made, file_name, write};
 use super::recordings::{self, Source};
 use crate::failure::Failure;
+
+/// What was scored, and how.
+pub struct Scored<'a> {
+    /// The predictions.
+    pub predictions: &'a PredictionTable,
+    /// The file with the true values, where there is one.
+    pub labels: Option<&'a Path>,
+    /// The column of the true values.
+    pub target: Option<&'a str>,
+    /// How the bootstrap draws.
+    pub scoring: &'a Scoring,
+}
+
+impl Scored<'_> {
+    fn add_facts(&self, facts: &mut Vec<Fact>) {
+        add_file(facts, "Predictions", &self.predictions.path);
+        if let Some(labels) = self.labels {
+            add_file(facts, "Labels", labels);
+        }
+        let Scoring { draws, seed, .. } = self.scoring;
+        facts.push(Fact::new("Bootstrap", format!("{draws} resamples, seed {seed}")));
+    }
+}
 
 /// Writes the report of scored predictions of classes into a folder.
 pub fn write_scored(
     folder: &Path,
-    predictions: &PredictionTable,
-    target: Option<&str>,
+    scored: &Scored<'_>,
     scores: &ClassReport,
 ) -> Result<(), Failure> {
+    let Scored { predictions, target, .. } = *scored;
     let mut study = Study {
         title: format!("Scores of {}", file_name(&predictions.path)),
         target: target.unwrap_or("class").into(),
@@ -42,10 +65,8 @@ pub fn write_scored(
         let sources = sources.collect();
         recordings::add(&mut study, sources, false);
     }
-    study.facts = vec![
-        Fact::new("Predictions", predictions.path.display().to_string()),
-        Fact::new("Rows", scores.rows.to_string()),
-    ];
+    scored.add_facts(&mut study.facts);
+    study.facts.push(Fact::new("Rows", scores.rows.to_string()));
     add_made(&mut study.facts);
     write(folder, &study.report()?, false)
 }
@@ -53,10 +74,10 @@ pub fn write_scored(
 /// Writes the report of scored numbers, with the measures of their errors, into a folder.
 pub fn write_estimates(
     folder: &Path,
-    predictions: &PredictionTable,
-    target: Option<&str>,
+    scored: &Scored<'_>,
     measures: Vec<(String, String)>,
 ) -> Result<(), Failure> {
+    let Scored { predictions, target, .. } = *scored;
     let number = |text: &str| text.parse::<f64>().ok();
     let truth = predictions.truth(target)?;
     let truth: Vec<f64> = truth.iter().map(|text| number(text).unwrap_or(f64::NAN)).collect();
@@ -69,10 +90,11 @@ pub fn write_estimates(
     let mut estimates = Estimates {
         title: format!("Scores of {}", file_name(&predictions.path)),
         target: target.unwrap_or("the number").into(),
-        facts: vec![Fact::new("Predictions", predictions.path.display().to_string())],
+        facts: Vec::new(),
         measures,
         rows: rows.collect(),
     };
+    scored.add_facts(&mut estimates.facts);
     add_made(&mut estimates.facts);
     write(folder, &estimates.report()?, false)
 }

@@ -242,7 +242,9 @@ fn predictions_and_estimates_have_reports_of_their_own() {
     let errors = &found["sections"][3];
     assert!(errors["text"][0].as_str().unwrap().ends_with("1 without a prediction."));
     assert_eq!(errors["tables"][0]["rows"].as_array().unwrap().len(), 1);
-    holds(&report.join("report.html"), &["was trained without these recordings"]);
+    let identity = corsmal_files::identity::of_file(&csv).unwrap();
+    let facts = ["was trained without these recordings", &identity, "2000 resamples, seed 0"];
+    holds(&report.join("report.html"), &facts);
 
     std::fs::write(&csv, "id,capacity,predicted\n1,100.5,90\n2,200.5,300\n3,50,-1\n").unwrap();
     done(&["score", text(&csv), "--target", "capacity", "--report", text(&report), "--overwrite"]);

@@ -225,3 +225,29 @@ fn the_class_of_one_is_kept_so_that_it_counts_as_wrong() {
         assert_eq!((&report["unknown"], &report["rows"]), (&1.into(), &6.into()), "{out}");
     }
 }
+
+/// A file in an archive of others could be called anything, such as a line of this program.
+#[test]
+fn no_name_makes_a_line_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let (audio, out) = (folder.path().join("audio"), folder.path().join("x.npz"));
+    wav(&audio.join("a.wav"), 1, 8000, 1);
+    std::fs::write(audio.join("b\nx.npz: 2 ok\t.wav"), b"RIFF").unwrap();
+    let said = run(&["extract", text(&audio), "-o", text(&out), "--preset", "mfcc-zcr"]);
+    let said = String::from_utf8(said.stderr).unwrap();
+    assert!(said.lines().count() == 2 && said.contains("b\\nx.npz: 2 ok\\t.wav: "), "{said}");
+    let listed = done(&["extract", text(&audio), "-o", text(&out), "--dry-run", "--overwrite"]);
+    assert_eq!(listed.lines().count(), 2, "{listed}");
+
+    // Lines for programs are whole, however long.
+    let long = "x".repeat(5000);
+    let manifest = folder.path().join("m.csv");
+    std::fs::write(audio.join("c.wav"), b"RIFF").unwrap();
+    std::fs::write(&manifest, format!("path,note\naudio/c.wav,{long}\n")).unwrap();
+    let json = ["--log-format", "json", "--preset", "mfcc-zcr", "--overwrite", "-o", text(&out)];
+    let said = run(&[&["extract", text(&manifest)], &json[..]].concat());
+    let said = String::from_utf8(said.stderr).unwrap();
+    let events = said.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    let of_file: Vec<_> = events.filter(|event| event["event"] == "file").collect();
+    assert!(of_file[0]["outcome"]["labels"].to_string().contains(&long), "{said}");
+}
