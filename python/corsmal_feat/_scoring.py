@@ -288,11 +288,11 @@ def score(
         seed_of(seed),
     )
     report = json.loads(text)
+    for doubt in report.get("warnings", ()):
+        warn(f"{os.fspath(predictions)}: {doubt}")
     if report["kind"] == "numbers":
         names = ("mean_absolute_error", "root_mean_squared_error", "mean_relative_error", "r2")
         return ScoreReport("numbers", {name: report[name] for name in (*names, "score")}, report)
-    for doubt in report.get("warnings", ()):
-        warn(f"{os.fspath(predictions)}: {doubt}")
     values = {name: report["scores"][name] for name in ("accuracy", "weighted_f1", "macro_f1")}
     if report["calibration"] is not None:
         values |= {name: report["calibration"][name] for name in ("brier", "ece")}

@@ -215,6 +215,25 @@ def test_labels_come_from_a_file_or_from_folders(tmp_path: Path) -> None:
         corsmal_feat.score(path)
 
 
+def test_labels_without_recordings_are_told(tmp_path: Path) -> None:
+    labels, file = tmp_path / "all.csv", tmp_path / "p.csv"
+    file.write_text("id,predicted\na,x\nb,y\n")
+    labels.write_text("id,class\na,x\nb,y\nc,x\n")
+    with pytest.warns(UserWarning, match='line 4 of .*, "c", has no recording here'):
+        assert corsmal_feat.score(file, labels=labels)["accuracy"] == 1.0
+    file.write_text("id,predicted\na,1.5\nb,2.5\n")
+    labels.write_text("id,n\na,1.5\nb,2.5\nc,1.5\n")
+    with pytest.warns(UserWarning, match="has no recording here"):
+        assert corsmal_feat.score(file, labels=labels)["score"] == 1.0
+    table = {"X": np.arange(16.0).reshape(8, 2), "id": np.array([str(i) for i in range(8)])}
+    np.savez(tmp_path / "x.npz", **table)
+    labels.write_text("id,y\n" + "".join(f"{i},{i % 2}\n" for i in range(9)))
+    with pytest.warns(UserWarning, match='"8", has no recording here'):
+        corsmal_feat.cross_validate(
+            tmp_path / "x.npz", "y", labels=labels, classifier="knn", cv="k=2"
+        )
+
+
 def test_the_only_label_column_replaces_the_true_classes_of_the_file(tmp_path: Path) -> None:
     path, labels = tmp_path / "p.csv", tmp_path / "labels.csv"
     path.write_text("id,true,predicted\na,x,x\nb,y,y\n")

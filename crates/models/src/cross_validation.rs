@@ -164,6 +164,7 @@ impl CrossValidation {
             naming: 1,
             labels: names.names().to_vec(),
             rows: rows.into_iter().map(|(_, row)| row).collect(),
+            unmatched: None,
         }
     }
 

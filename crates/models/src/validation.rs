@@ -61,7 +61,8 @@ pub fn validate(
 ) -> Result<Validation> {
     let (labels, classes) = table.classes(target)?;
     let folds = Folds::new(plan, table, groups, (&labels, &classes), seed)?;
-    let mut warnings = folds.warnings(&classes);
+    let mut warnings: Vec<String> = table.unmatched.iter().cloned().collect();
+    warnings.extend(folds.warnings(&classes));
     warnings.extend(dominance(&candidates, table));
     let dataset = table.dataset(classes.clone());
     let data = Data { dataset: &dataset, merge: None };

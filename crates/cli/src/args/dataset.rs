@@ -198,6 +198,9 @@ impl DatasetArgs {
                 );
             }
         }
+        if let Some(unmatched) = table.unmatched.take() {
+            eprintln!("warning: {}: {unmatched}", self.path().display());
+        }
         self.target(table, usual)
     }
 

@@ -227,6 +227,13 @@ fn print_numbers(scores: &NumericScores) {
 /// Says what the scores may not be meant to be.
 fn warn(table: &PredictionTable, scoring: &Scoring, report: &ScoreReport) -> Result<(), Failure> {
     let place = table.path.display();
+    let warnings = match report {
+        ScoreReport::Classes(report) => &report.warnings,
+        ScoreReport::Numbers(scores) => &scores.warnings,
+    };
+    for warning in warnings {
+        eprintln!("warning: {place}: {warning}");
+    }
     let report = match report {
         ScoreReport::Classes(report) => report,
         ScoreReport::Numbers(_) => {
@@ -241,9 +248,6 @@ fn warn(table: &PredictionTable, scoring: &Scoring, report: &ScoreReport) -> Res
             return Ok(());
         }
     };
-    for warning in &report.warnings {
-        eprintln!("warning: {place}: {warning}");
-    }
     let whole = |name: &String| name.parse::<i64>().is_ok();
     let has_proba = table.rows.iter().any(|row| row.proba.is_some());
     if !has_proba && !report.labels.is_empty() && report.labels.iter().all(whole) {

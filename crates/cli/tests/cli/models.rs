@@ -188,8 +188,8 @@ fn what_cannot_be_learned_from_is_refused() {
         ])
     };
     for (lines, message) in [
-        (format!("id,kind\n{all}r99,1\n"), "line 42: \"r99\" matches no recording"),
         (format!("id,kind\n{}", &all[5..]), "no line for recording \"r0\""),
+        (format!("id,kind\n{}r99,1\n", &all[5..]), "line 41 of "),
         (format!("id,kind\n{all}r3,1\n"), "line 42 repeats \"r3\" of line 5"),
         (format!("id,kind\n{}", all.replace(",1", ",1.0")), "kind = \"1.0\" is a decimal number"),
         (

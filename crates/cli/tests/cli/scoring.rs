@@ -78,6 +78,32 @@ fn labels_come_from_a_file_with_any_key_column() {
     assert_eq!(report["scores"]["accuracy"], 0.5);
 }
 
+/// The labels of a whole data set serve a part of it, whose size they tell.
+#[test]
+fn labels_without_recordings_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| written(folder.path(), name, text);
+    let labels = put("all.csv", "id,class\na,x\nb,y\nc,x\nd,y\n");
+    let numbers = put("numbers.csv", "id,n\na,1.5\nb,2.5\nc,1.5\nd,2.5\n");
+    let file = put("p.csv", "id,predicted\na,x\nb,y\n");
+    let estimates = put("e.csv", "id,predicted\na,1.5\nb,2.5\nc,1\n");
+    for (file, labels, told) in
+        [(&file, &labels, "2 lines of "), (&estimates, &numbers, "line 5 of ")]
+    {
+        let scored = run(&["score", text(file), "--labels", text(labels)]);
+        let said = String::from_utf8(scored.stderr).unwrap();
+        assert!(scored.status.success() && said.contains(told), "{said}");
+        assert!(said.contains("no recording here") && said.lines().count() == 1, "{said}");
+    }
+    let compare = ["compare-predictions", text(&file), text(&file), "--labels", text(&labels)];
+    let said = String::from_utf8(run(&compare).stderr).unwrap();
+    assert!(said.contains("such as line 4, \"c\""), "{said}");
+    let fewer = put("fewer.csv", "id,class\na,x\nB,y\n");
+    let said = refused(&["score", text(&file), "--labels", text(&fewer)]);
+    let both = ["no line for recording \"b\"", "line 3 of ", ", \"B\", has no recording here"];
+    assert!(both.iter().all(|part| said.contains(part)), "{said}");
+}
+
 /// A corrected label file had no effect beside a column `true` of the predictions.
 #[test]
 fn the_only_label_column_has_the_true_classes() {

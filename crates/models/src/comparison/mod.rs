@@ -245,6 +245,7 @@ pub fn compare(
     let by_group =
         grouped.as_ref().map(|(_, of)| bootstrap(truth, a, b, Some(of), resamples, seed));
     let mut warnings = alike(&labels);
+    warnings.extend(first.unmatched.iter().cloned());
     if let Some((column, _)) = &grouped {
         warnings.push(format!(
             "rows of one {column} are not independent: McNemar's test and the interval over rows assume that they \

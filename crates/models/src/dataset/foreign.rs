@@ -103,6 +103,7 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
         unread,
         numbered,
         added: Vec::new(),
+        unmatched: None,
     })
 }
 
@@ -198,6 +199,7 @@ pub(super) fn read_parquet(
         unread: skipped.into_iter().map(|name| (name, UNREAD.into())).collect(),
         numbered,
         added: Vec::new(),
+        unmatched: None,
     })
 }
 

@@ -6,6 +6,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use corsmal_files::csv_text::{self, Fault};
+use corsmal_files::quote::quoted;
 
 use super::error::{DatasetError, Result};
 use crate::words::count;
@@ -125,18 +126,18 @@ impl LabelFile {
         Ok(Self { path: path.into(), key, columns, rows, stems })
     }
 
-    /// Label columns in the order of these recordings, given as (id, path). Lines of recordings
-    /// that `failed` extraction are allowed; any other line must have its recording, and every
-    /// recording its line.
+    /// Label columns in the order of these recordings, given as (id, path), of which each must have
+    /// its line. Says, too, if lines have no recording, but for those that `failed` extraction: the
+    /// labels may be those of a whole data set, or recordings may be missing.
     ///
     /// # Errors
-    /// [`DatasetError::Content`] with the first line or recording that has no counterpart.
+    /// [`DatasetError::Content`] with the first recording that has no line.
     pub fn for_recordings(
         &self,
         recordings: &[(&str, &str)],
         failed: &[(&str, &str)],
         features: &Path,
-    ) -> Result<Vec<(String, Vec<String>)>> {
+    ) -> Result<(Vec<(String, Vec<String>)>, Option<String>)> {
         let mut unused: HashMap<&str, u64> =
             self.rows.iter().map(|(key, line)| (key.as_str(), line.number)).collect();
         let mut columns: Vec<(String, Vec<String>)> =
@@ -180,21 +181,27 @@ impl LabelFile {
             }
         }
         let features = features.display();
-        if let Some((key, line)) = unused.iter().min_by_key(|(_, line)| **line) {
-            let count = count(unused.len(), "such line");
-            return Err(DatasetError::content(
-                &self.path,
-                format!("line {line}: {key:?} matches no recording of {features} ({count})"),
-            ));
-        }
+        let first = unused.iter().min_by_key(|(_, line)| **line);
+        let place = self.path.display();
+        let unmatched = first.map(|(key, line)| match unused.len() {
+            1 => format!("line {line} of {place}, {}, has no recording here", quoted(key)),
+            n => {
+                let which = format!("such as line {line}, {}", quoted(key));
+                format!("{n} lines of {place} have no recording here, {which}")
+            }
+        });
         if let Some(first) = missing.first() {
             let count = count(missing.len(), "recording");
+            let unmatched = unmatched.map_or(String::new(), |unmatched| format!("; {unmatched}"));
             return Err(DatasetError::content(
                 &self.path,
-                format!("no line for recording {first:?} of {features} ({count} without labels)"),
+                format!(
+                    "no line for recording {first:?} of {features} ({count} without \
+                     labels){unmatched}"
+                ),
             ));
         }
-        Ok(columns)
+        Ok((columns, unmatched))
     }
 
     /// By id; by path as extracted or, failing that, the path without extension as id; by any of
@@ -250,7 +257,7 @@ mod tests {
         let recordings = [("a/x", "data/a/x.wav"), ("b/y", "data/b/y.flac")];
         let classes = |text: &str, key| {
             let columns = file(text, key)?.for_recordings(&recordings, &[], Path::new("f.npz"))?;
-            Ok::<_, DatasetError>(columns[0].1.clone())
+            Ok::<_, DatasetError>(columns.0[0].1.clone())
         };
         for (text, key) in [
             ("id,class\nb/y,dog\na/x,cat\n", None),
@@ -292,7 +299,7 @@ mod tests {
             "id,path,class\na/x,/elsewhere/x.wav,cat\nb/y,,dog\n",
             "id,path,class\na/x,x.wav,cat\nb/y,y.flac,dog\n",
         ] {
-            assert_eq!(labels(text).unwrap()[0].1, ["cat", "dog"], "{text}");
+            assert_eq!(labels(text).unwrap().0[0].1, ["cat", "dog"], "{text}");
         }
         for text in [
             "id,path,class\na/x,data/b/y.flac,cat\nb/y,data/a/x.wav,dog\n",

@@ -44,6 +44,8 @@ pub struct LabelledTable {
     pub(super) numbered: bool,
     /// label columns of other files, with these
     pub(super) added: Vec<(String, PathBuf)>,
+    /// labels that no recording of the table has, if there are such
+    pub unmatched: Option<String>,
 }
 
 impl LabelledTable {
@@ -61,6 +63,7 @@ impl LabelledTable {
             unread: Vec::new(),
             numbered: false,
             added: Vec::new(),
+            unmatched: None,
         }
     }
 
@@ -93,6 +96,7 @@ impl LabelledTable {
             unread: Vec::new(),
             numbered: false,
             added: Vec::new(),
+            unmatched: None,
         })
     }
 
@@ -119,7 +123,7 @@ impl LabelledTable {
     /// Adds labels from a source. Gives the names of columns that were there and are now hidden.
     ///
     /// # Errors
-    /// [`DatasetError::Content`] for recordings without labels and labels without recording.
+    /// [`DatasetError::Content`] for recordings without labels.
     pub fn add_labels(&mut self, source: &LabelSource) -> Result<Vec<String>> {
         let columns = match source {
             LabelSource::Folders { column } => vec![(column.clone(), self.folders()?)],
@@ -144,7 +148,10 @@ impl LabelledTable {
                 } else {
                     pairs(true)
                 };
-                file.for_recordings(&recordings, &pairs(false), &self.path)?
+                let (columns, unmatched) =
+                    file.for_recordings(&recordings, &pairs(false), &self.path)?;
+                self.unmatched = unmatched;
+                columns
             }
         };
         let there = |name: &&String| self.columns.iter().any(|(column, _)| column == *name);

@@ -14,8 +14,8 @@ impl PredictionTable {
     /// is no group; `None` stands for the column `true`.
     ///
     /// # Errors
-    /// [`PredictionError::Content`](super::PredictionError::Content) for recordings without labels,
-    /// labels without recording, and several columns that may have the true classes.
+    /// [`PredictionError::Content`](super::PredictionError::Content) for recordings without labels
+    /// and several columns that may have the true classes.
     pub fn add_labels(
         &mut self,
         source: &LabelSource,
@@ -59,7 +59,7 @@ impl PredictionTable {
     }
 
     /// The columns of a source for the lines.
-    fn found(&self, source: &LabelSource) -> Result<Vec<(String, Vec<String>)>> {
+    fn found(&mut self, source: &LabelSource) -> Result<Vec<(String, Vec<String>)>> {
         let at = self.columns.iter().position(|c| c == "path");
         let path = |row: &PredictionRow<Id>| at.map_or(&row.key.0, |at| &row.cells[at]).clone();
         match source {
@@ -80,7 +80,10 @@ impl PredictionTable {
                 let names: Vec<(String, String)> = self.rows.iter().map(names).collect();
                 let pairs: Vec<(&str, &str)> =
                     names.iter().map(|(id, path)| (id.as_str(), path.as_str())).collect();
-                labels.for_recordings(&pairs, &[], &self.path).map_err(refuse)
+                let (columns, unmatched) =
+                    labels.for_recordings(&pairs, &[], &self.path).map_err(refuse)?;
+                self.unmatched = unmatched;
+                Ok(columns)
             }
         }
     }

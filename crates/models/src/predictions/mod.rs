@@ -154,6 +154,8 @@ pub struct PredictionTable<K = Id> {
     pub labels: Vec<String>,
     /// The lines, in the order of the file.
     pub rows: Vec<PredictionRow<K>>,
+    /// Labels of a label file that no line of the table has, if there are such.
+    pub unmatched: Option<String>,
 }
 
 impl<K> PredictionTable<K> {
@@ -190,12 +192,12 @@ impl<K> PredictionTable<K> {
 
     /// The same lines told apart by other keys.
     pub fn with_keys<L>(self, key: impl Fn(&PredictionRow<K>) -> L) -> PredictionTable<L> {
-        let Self { path, columns, naming, labels, rows } = self;
+        let Self { path, columns, naming, labels, rows, unmatched } = self;
         let rows = rows.into_iter().map(|row| {
             let key = key(&row);
             PredictionRow { key, cells: row.cells, class: row.class, proba: row.proba }
         });
-        PredictionTable { path, columns, naming, labels, rows: rows.collect() }
+        PredictionTable { path, columns, naming, labels, rows: rows.collect(), unmatched }
     }
 
     /// Probabilities `[lines, classes of into]`: each class of the table is one of `n_classes`

@@ -153,6 +153,7 @@ impl PredictionColumns {
             naming: self.naming.len(),
             rows: rows.collect::<Result<_>>()?,
             labels: self.labels,
+            unmatched: None,
         })
     }
 

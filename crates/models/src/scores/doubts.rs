@@ -87,7 +87,8 @@ pub(super) fn warnings<K>(
     truth: &[&str],
     strange: &[String],
 ) -> Vec<String> {
-    let mut warnings: Vec<String> = no_prediction(&table.labels, strange).into_iter().collect();
+    let mut warnings: Vec<String> = table.unmatched.iter().cloned().collect();
+    warnings.extend(no_prediction(&table.labels, strange));
     let names = Names::of(table, truth);
     let case = |name: &str| number(name).is_none().then(|| caseless(name));
     for alike in names.alike(number).into_iter().chain(names.alike(case)) {

@@ -29,6 +29,9 @@ pub struct NumericScores {
     pub drawn: String,
     /// how many of those there are
     pub units: usize,
+    /// what makes the scores doubtful; left out of JSON if there is nothing
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
 }
 
 /// What stands for no estimate among `truth`: the benchmark's -1, unless a true number is negative, where -1 is a
@@ -93,6 +96,7 @@ impl NumericScores {
             score_interval,
             drawn: drawn.into(),
             units: units.len(),
+            warnings: Vec::new(),
         })
     }
 }

@@ -200,8 +200,9 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         };
         let estimates: Vec<Option<f64>> =
             self.rows.iter().enumerate().map(estimate).collect::<Result<_, PredictionError>>()?;
-        NumericScores::new(&truths, &estimates, drawn, (how.draws, how.seed))
-            .map_err(|e| self.model(e))
+        let scores = NumericScores::new(&truths, &estimates, drawn, (how.draws, how.seed))
+            .map_err(|e| self.model(e))?;
+        Ok(NumericScores { warnings: self.unmatched.iter().cloned().collect(), ..scores })
     }
 
     fn score_classes(
