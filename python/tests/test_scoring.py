@@ -225,10 +225,10 @@ def test_labels_without_recordings_are_told(tmp_path: Path) -> None:
     labels.write_text("id,n\na,1.5\nb,2.5\nc,1.5\n")
     with pytest.warns(UserWarning, match="has no recording here"):
         assert corsmal_feat.score(file, labels=labels)["score"] == 1.0
-    table = {"X": np.arange(16.0).reshape(8, 2), "id": np.array([str(i) for i in range(8)])}
+    table = {"X": np.arange(40.0).reshape(20, 2), "id": np.array([str(i) for i in range(20)])}
     np.savez(tmp_path / "x.npz", **table)
-    labels.write_text("id,y\n" + "".join(f"{i},{i % 2}\n" for i in range(9)))
-    with pytest.warns(UserWarning, match='"8", has no recording here'):
+    labels.write_text("id,y\n" + "".join(f"{i},{i % 2}\n" for i in range(21)))
+    with pytest.warns(UserWarning, match='"20", has no recording here'):
         corsmal_feat.cross_validate(
             tmp_path / "x.npz", "y", labels=labels, classifier="knn", cv="k=2"
         )
