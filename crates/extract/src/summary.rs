@@ -1,5 +1,6 @@
 //! Statistics over frames.
 
+use corsmal_files::statistic::NAMES;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::params::ConfigError;
@@ -24,9 +25,6 @@ pub enum Stat {
     /// of the recording.
     Percentile(f64),
 }
-
-/// Names without numbers.
-const NAMES: [&str; 7] = ["mean", "std", "min", "max", "median", "skew", "kurtosis"];
 
 const STATS: &str = "mean, std, min, max, median, skew, kurtosis or a percentile such as p95";
 
@@ -275,6 +273,15 @@ mod tests {
         let want = [4.0, 3.1622777, 1.0, 10.0, 3.0, 1.138_419_9, -0.212, 2.0];
         for (got, want) in got.iter().zip(want) {
             assert!((got - want).abs() < 1e-6, "{got} {want}");
+        }
+    }
+
+    #[test]
+    fn names_are_read_and_written() {
+        for name in NAMES.iter().copied().chain(["p0", "p2.5", "p100"]) {
+            let stat: Stat = name.parse().unwrap();
+            assert_eq!(stat.to_string(), name);
+            assert!(corsmal_files::statistic::is_column(&format!("rms.{stat}")), "{stat}");
         }
     }
 

@@ -57,4 +57,5 @@ pub mod settings;
 pub mod shard;
 pub mod shield;
 pub mod spelling;
+pub mod statistic;
 pub mod table;

@@ -10,7 +10,7 @@ use corsmal_files::outcome::{Outcome, Status};
 use corsmal_files::provenance::Provenance;
 use corsmal_files::shard::Shard;
 use corsmal_files::table::Table;
-use corsmal_models::dataset::{LabelSource, LabelledTable, MemberNames, Result, is_statistic};
+use corsmal_models::dataset::{LabelSource, LabelledTable, MemberNames, Result};
 
 const LABELS: &str = "id,class\na,cat\nb,dog\nc,hen\n";
 
@@ -120,43 +120,5 @@ fn faults_of_joint_classes_name_the_file_of_their_part() {
     ] {
         let message = refused(own, lines);
         assert!(message.starts_with(&format!("{file}: {what}")), "{message}");
-    }
-}
-
-#[test]
-fn only_names_of_statistics_make_whole_numbers_features() {
-    for name in [
-        "mfcc[0].mean",
-        "ch1/rms.p95",
-        "rms.std",
-        "af193[7]",
-        "age.max",
-        "x.p2.5",
-        "a34f136[mfcc_1]",
-        "ch2/a34f136[zcr]",
-    ] {
-        assert!(is_statistic(name), "{name}");
-    }
-    for name in [
-        "label.code",
-        "speaker.id",
-        "fold.1",
-        "st.a",
-        ".mean",
-        "[0]",
-        "mean",
-        "x.px",
-        "x.pinf",
-        "a.means",
-        "x[0",
-        "meta[class]",
-        "ch1/[0]",
-        "x[]",
-        "x.p-5",
-        "x.p101",
-        "[1]",
-        "",
-    ] {
-        assert!(!is_statistic(name), "{name}");
     }
 }

@@ -57,7 +57,7 @@ pub(crate) struct RecipeArguments {
 /// Whether a column is named like a value of a summary.
 #[pyfunction]
 pub(crate) fn is_statistic(column: &str) -> bool {
-    corsmal_models::dataset::is_statistic(column)
+    corsmal_files::statistic::is_column(column)
 }
 
 /// The report as JSON, and the predictions of the held-out rows as CSV.

@@ -7,6 +7,7 @@ use corsmal_files::feature_file::FeatureFileError;
 use corsmal_files::npy::{Kind, NpyError};
 use corsmal_files::npz::{NpzError, NpzFile};
 use corsmal_files::parquet::{NumericTable, ParquetFile};
+use corsmal_files::statistic;
 use corsmal_files::table::{ID, ID_NAMES, RESERVED};
 use ndarray::{Axis, Ix2};
 use serde_json::Value;
@@ -160,7 +161,8 @@ pub(super) fn read_parquet(
     let mut features = Vec::new();
     for (at, (name, kind)) in names.iter().zip(&types).enumerate() {
         if name.starts_with(RESERVED) {
-        } else if kind.starts_with("float") || (kind.contains("int") && is_statistic(name)) {
+        } else if kind.starts_with("float") || (kind.contains("int") && statistic::is_column(name))
+        {
             features.push(at);
         } else {
             let whole = |v: &f64| if v.is_nan() { String::new() } else { format!("{v:.0}") };
@@ -201,24 +203,6 @@ pub(super) fn read_parquet(
         added: Vec::new(),
         unmatched: None,
     })
-}
-
-/// Whether a column is called as our summaries are: `mfcc[3].mean`, `ch1/rms.p95`, `af193[7]`.
-pub fn is_statistic(name: &str) -> bool {
-    const NAMES: [&str; 7] = ["mean", "std", "min", "max", "median", "skew", "kurtosis"];
-    let is_percentile = |(feature, p): (&str, &str)| {
-        !feature.is_empty() && p.parse::<f64>().is_ok_and(|p| (0.0..=100.0).contains(&p))
-    };
-    let is_named = |(feature, stat): (&str, &str)| !feature.is_empty() && NAMES.contains(&stat);
-    // Those of `a34f136` have names for places.
-    let is_place = |(feature, place): (&str, &str)| {
-        let vector = feature.rsplit('/').next().unwrap_or_default();
-        !place.is_empty() && place.bytes().all(|b| b.is_ascii_digit()) && !vector.is_empty()
-            || vector == "a34f136"
-    };
-    name.rsplit_once('.').is_some_and(is_named)
-        || name.rsplit_once(".p").is_some_and(is_percentile)
-        || name.strip_suffix(']').and_then(|name| name.split_once('[')).is_some_and(is_place)
 }
 
 /// Why values do not name rows: one is empty, or there twice.

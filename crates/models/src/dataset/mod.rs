@@ -11,6 +11,6 @@ mod reading;
 mod table;
 
 pub use error::{DatasetError, Result};
-pub use foreign::{MemberNames, is_statistic};
+pub use foreign::MemberNames;
 pub use label_file::{LabelFile, LabelSource};
 pub use table::LabelledTable;
