@@ -17,6 +17,7 @@ mod hostile;
 mod inspect;
 mod inspect_kinds;
 mod journey;
+mod labels;
 mod live;
 mod models;
 mod mutations;
