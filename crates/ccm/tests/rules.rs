@@ -171,3 +171,54 @@ fn missing_and_extra_rows_are_refused() {
     assert!(run(3).contains("missing rows: id 3"));
     assert!(run(5).contains("rows that the annotations lack: id 4"));
 }
+
+/// An amount that is withheld scored as its exponential: 1e30, or a little too much.
+#[test]
+fn amounts_that_are_withheld_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let row = "1,1,0,0,0,90,60,120,-1,520,10,1,1,0.34,109.2";
+    let run = |other: &str, estimated: &str, rules: RuleSet| {
+        let put = |name: &str, text: &str| {
+            let path = dir.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            path
+        };
+        let annotations = Annotations::read(&put("a.csv", &ANNOTATIONS.replace(row, other)));
+        let line = |id: usize| format!("{id},520,{estimated},-1,-1,-1,-1\n");
+        let text: String = (0..4).map(line).collect();
+        let submission = Submission::read(&put("s.csv", &format!("{HEADER}\n{text}"))).unwrap();
+        let keys: Vec<_> = (0..4).map(RowKey::Id).collect();
+        let baseline =
+            Submission::from_predictions("b", submission.format, &pseudo_random(&keys, 1));
+        evaluate(&submission, &annotations.unwrap(), &baseline, rules, None)
+    };
+    let all = "10,-1,-1,-1,-1,-1,1,-1,-1,-1,1,90,60,120";
+    let tasks = "-1,-1,-1,-1,-1,-1,1,-1,-1,-1,1,-1,-1,-1";
+    let (paper, toolkit) = (RuleSet::Paper, RuleSet::Toolkit);
+    let cases = [
+        ("1,1,0,0,0,90,60,120,-1,520,10,1,1,0.34,", "filling mass", &[toolkit][..]),
+        ("1,1,0,0,0,90,60,120,-1,520,10,1,1,0.34,-1", "filling mass", &[toolkit]),
+        ("1,1,0,0,0,90,60,120,-1,520,10,1,1,,109.2", "filling density", &[toolkit]),
+        ("1,1,0,0,0,90,60,120,-1,520,,1,1,0.34,109.2", "container mass", &[toolkit]),
+        ("1,1,0,0,0,90,60,-1,-1,520,10,1,1,0.34,109.2", "size", &[toolkit]),
+        ("1,1,0,0,0,90,60,120,-1,-1,10,1,1,0.34,109.2", "capacity", &[paper, toolkit]),
+    ];
+    for (other, what, all_rules) in cases {
+        for &rules in all_rules {
+            let refused = run(other, all, rules).unwrap_err().to_string();
+            let expected = format!("the {what} of container 1 is withheld");
+            assert!(refused.contains(&expected), "{what}: {refused}");
+        }
+    }
+    // What nobody estimated needs no truth.
+    for (other, what, _) in &cases[3..5] {
+        assert!(run(other, tasks, toolkit).is_ok(), "{what}");
+    }
+    // The paper's other scores stand by themselves.
+    let scores = run(cases[0].0, all, paper).unwrap();
+    assert!(scores.get("T1").is_some() && scores.get("mass").is_none());
+    assert!(scores.get("weight_error_N").is_none());
+    assert!(scores.notes[0].contains("that of container 1 is withheld"), "{:?}", scores.notes);
+    let scores = run(cases[3].0, all, paper).unwrap();
+    assert!(scores.get("mass").is_some() && scores.get("weight_error_N").is_none());
+}

@@ -17,6 +17,9 @@ use super::recording::Recording;
 use crate::error::{CcmError, Result};
 use crate::submission::RowKey;
 
+/// Digits that the numbers of the flat release have.
+const FLAT_DIGITS: usize = 6;
+
 /// Folders deeper than this are not searched.
 const MAX_DEPTH: usize = 6;
 
@@ -130,8 +133,18 @@ impl PathParts {
             .skip(1)
             .filter_map(|p| p.file_name().map(|n| n.to_string_lossy().into_owned()))
             .collect();
-        let container = folders.iter().find_map(|f| f.parse().ok());
         let digits = stem.strip_suffix("_audio").unwrap_or(&stem);
+        // Above the part, folders are the user's: `/home/7/flat/train/audio/000000.wav` is of no container 7.
+        let is_part = |f: &String| {
+            let f = f.to_lowercase();
+            f.starts_with("train") || f.starts_with("test")
+        };
+        let is_flat = digits.len() == FLAT_DIGITS && digits.len() == stem.len();
+        let within = match folders.iter().position(is_part) {
+            Some(part) if is_flat => &folders[..part],
+            _ => &folders[..],
+        };
+        let container = within.iter().find_map(|f| f.parse().ok());
         Self {
             container: container.map(|n: u8| Container::new(n).ok_or(n)),
             name: SequenceName::parse(&stem),
@@ -257,4 +270,26 @@ fn walk(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_above_the_part_are_no_containers() {
+        let key = |path: &str| PathParts::of(Path::new(path)).key();
+        for (path, expected) in [
+            ("/home/7/flat/train/audio/000011.wav", Some(RowKey::Id(11))),
+            ("7/test_pub/audio/000011.wav", Some(RowKey::Id(11))),
+            ("/data/7/train/3/audio/s0_fi0_fu0_b0_l0_audio.wav", Some(RowKey::Sequence(3, 0))),
+            ("7/test/12/audio/0011_audio.wav", Some(RowKey::Sequence(12, 11))),
+            ("train/3/audio/000011.wav", Some(RowKey::Sequence(3, 11))),
+            ("7/train/0011_audio.wav", Some(RowKey::Sequence(7, 11))),
+            ("7/audio/000011.wav", Some(RowKey::Sequence(7, 11))),
+            ("000011", Some(RowKey::Id(11))),
+        ] {
+            assert_eq!(key(path), expected, "{path}");
+        }
+    }
 }

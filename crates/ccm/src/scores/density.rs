@@ -1,6 +1,6 @@
 //! Densities of the fillings by container.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use crate::dataset::{Annotations, FillingType};
 
@@ -20,7 +20,7 @@ const AVERAGE_2020: [[f64; 2]; 9] = [
 
 /// Density of each filling type in each container.
 #[derive(Clone, Debug)]
-pub struct DensityTable(HashMap<u8, [f64; 4]>);
+pub struct DensityTable(BTreeMap<u8, [f64; 4]>);
 
 impl DensityTable {
     /// The published table of the training containers.

@@ -16,7 +16,7 @@ use super::regression;
 use super::rule_set::{RuleSet, Scores};
 use corsmal_models::scores::ConfusionMatrix;
 
-use crate::dataset::{Annotations, Filling, FillingLevel, FillingType};
+use crate::dataset::{Annotation, Annotations, Filling, FillingLevel, FillingType};
 use crate::error::{CcmError, Result};
 use crate::submission::{Estimates, Submission};
 
@@ -39,8 +39,8 @@ pub fn evaluate(
         Some(list) => annotations.of_containers(list),
         None => annotations.clone(),
     };
-    let truth = Truth::new(&wanted, rules)?;
     let aligned = submission.align(&wanted, annotations)?;
+    let truth = Truth::new(&wanted, &aligned, rules)?;
     let input = MassInput::new(&aligned, &baseline.align(&wanted, annotations)?);
     let mut scores = match rules {
         RuleSet::Paper => truth.paper(&aligned, &input),
@@ -74,20 +74,39 @@ struct Truth<'a> {
 }
 
 impl<'a> Truth<'a> {
-    fn new(annotations: &'a Annotations, rules: RuleSet) -> Result<Self> {
+    fn new(annotations: &'a Annotations, s: &Submission, rules: RuleSet) -> Result<Self> {
         let refuse = |text: String| {
             Err(CcmError::Request(format!("{}: {text}", annotations.path.display())))
         };
         if annotations.rows.is_empty() {
             return refuse("no annotated recording is left to score".into());
         }
+        // What an estimate is compared with: an amount that is withheld would score it, too.
+        let is_toolkit = matches!(rules, RuleSet::Toolkit | RuleSet::Toolkit202111);
+        let sizes = [&s.width_top, &s.width_bottom, &s.height];
+        let by_size = is_toolkit && sizes.iter().any(|estimates| estimates.addressed());
+        let by_mass = is_toolkit && s.container_mass.addressed();
+        let lacking = |row: &Annotation| {
+            let size = row.dimensions.as_ref().map(|d| [d.width_top, d.width_bottom, d.height]);
+            [
+                (row.filling.is_none(), "filling"),
+                (row.capacity_ml <= 0.0, "capacity"),
+                (row.filling_mass_g < 0.0 && rules != RuleSet::Paper, "filling mass"),
+                (row.density < 0.0 && is_toolkit, "filling density"),
+                (row.container_mass_g <= 0.0 && by_mass, "container mass"),
+                (by_size && size.is_none_or(|size| size.iter().any(|s| *s < 0.0)), "size"),
+            ]
+            .into_iter()
+            .find_map(|(is_lacking, what)| is_lacking.then_some(what))
+        };
         let mut fillings = Vec::with_capacity(annotations.rows.len());
         for row in &annotations.rows {
-            // The current toolkit also scores dimensions and masses; files that lack them get 0.
-            let Some(filling) = row.filling.filter(|_| row.capacity_ml > 0.0) else {
+            let what = lacking(row);
+            let (Some(filling), None) = (row.filling, what) else {
                 return refuse(format!(
-                    "the labels of container {} are withheld, so rules '{}' cannot be applied; \
+                    "the {} of container {} is withheld, so rules '{}' cannot be applied; \
                      choose containers with published labels",
+                    what.unwrap_or("filling"),
                     row.container,
                     rules.name()
                 ));
@@ -100,6 +119,11 @@ impl<'a> Truth<'a> {
             capacity: annotations.rows.iter().map(|r| r.capacity_ml).collect(),
             filling_mass: annotations.rows.iter().map(|r| r.filling_mass_g).collect(),
         })
+    }
+
+    /// A container of which a mass is withheld.
+    fn withheld_mass(&self, is_withheld: impl Fn(&Annotation) -> bool) -> Option<u8> {
+        self.annotations.rows.iter().find(|row| is_withheld(row)).map(|row| row.container)
     }
 
     fn level_f1(&self, estimate: impl Fn(usize) -> Option<usize>) -> f64 {
@@ -127,23 +151,24 @@ impl<'a> Truth<'a> {
     }
 
     fn paper(&self, s: &Submission, input: &MassInput) -> Scores {
-        let masses = self.masses_of_estimates(input);
-        let mass = regression::filling_mass(&self.filling_mass, &masses);
-        self.scores(
-            RuleSet::Paper,
-            vec![
-                ("T1", self.level_f1(|i| level_class(s.level.values[i]))),
-                ("T2", self.kind_f1(|i| kind_class(s.kind.values[i]))),
-                ("T3", regression::amount(&self.capacity, &s.capacity.values)),
-                ("mass", mass * input.addressed as f64 / 3.0),
-                (
-                    "joint",
-                    self.joint_f1(|i| {
-                        joint_class(kind_class(s.kind.values[i]), level_class(s.level.values[i]))
-                    }),
-                ),
-            ],
-        )
+        let mut values = vec![
+            ("T1", self.level_f1(|i| level_class(s.level.values[i]))),
+            ("T2", self.kind_f1(|i| kind_class(s.kind.values[i]))),
+            ("T3", regression::amount(&self.capacity, &s.capacity.values)),
+        ];
+        let withheld = self.withheld_mass(|row| row.filling_mass_g < 0.0);
+        if withheld.is_none() {
+            let masses = self.masses_of_estimates(input);
+            let mass = regression::filling_mass(&self.filling_mass, &masses);
+            values.push(("mass", mass * input.addressed as f64 / 3.0));
+        }
+        let joint = |i| joint_class(kind_class(s.kind.values[i]), level_class(s.level.values[i]));
+        values.push(("joint", self.joint_f1(joint)));
+        let mut scores = self.scores(RuleSet::Paper, values);
+        scores.notes.extend(
+            withheld.map(|c| format!("no score of the mass: that of container {c} is withheld")),
+        );
+        scores
     }
 
     fn toolkit_2020(&self, s: &Submission, input: &MassInput) -> Result<Scores> {
@@ -287,7 +312,10 @@ impl<'a> Truth<'a> {
 
     /// Mean absolute error of the object's weight in N over rows with both masses estimated.
     fn weight_error(&self, s: &Submission, input: &MassInput) -> Option<f64> {
-        if input.addressed < 3 || !s.container_mass.addressed() {
+        let is_withheld =
+            |row: &Annotation| row.filling_mass_g < 0.0 || row.container_mass_g <= 0.0;
+        let is_addressed = input.addressed == 3 && s.container_mass.addressed();
+        if !is_addressed || self.withheld_mass(is_withheld).is_some() {
             return None;
         }
         let masses = self.masses_of_estimates(input);

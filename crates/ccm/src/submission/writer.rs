@@ -4,13 +4,11 @@ use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use corsmal_files::draft;
+use corsmal_models::predictions::SUM_TOLERANCE;
 
 use super::{Estimates, Format, RowKey, Submission};
 use crate::dataset::{Dimensions, FillingLevel, FillingType};
 use crate::error::{CcmError, Result};
-
-/// Probabilities of a row must add up to one within this.
-const SUM_TOLERANCE: f64 = 1e-3;
 
 const HEADER_2022: &str = "Configuration ID,Container capacity,Container mass,Filling mass,None,\
 Pasta,Rice,Water,Filling type,Empty,Half-full,Full,Filling level,Width at the top,\
@@ -67,7 +65,8 @@ impl SubmissionRow {
         {
             let sum: f64 = p.iter().sum();
             // Written this way round so that NaN is a fault too.
-            if !(p.iter().all(|v| (0.0..=1.0).contains(v)) && (sum - 1.0).abs() <= SUM_TOLERANCE) {
+            let is_one = |v: &f64| (0.0..=1.0 + SUM_TOLERANCE).contains(v);
+            if !(p.iter().all(is_one) && (sum - 1.0).abs() <= SUM_TOLERANCE) {
                 return Some(format!("probabilities {p:?} are not in 0 to 1 with sum 1"));
             }
         }
@@ -191,7 +190,9 @@ fn row(p: &SubmissionRow) -> String {
         }
         RowKey::Id(id) => {
             let probabilities = |values: Option<&[f64]>, n: usize| match values {
-                Some(v) => v.iter().map(|v| format!("{v:.6}")).collect::<Vec<_>>().join(","),
+                Some(v) => {
+                    v.iter().map(|v| format!("{:.6}", v.min(1.0))).collect::<Vec<_>>().join(",")
+                }
                 None => vec!["-1"; n].join(","),
             };
             format!(
@@ -267,6 +268,13 @@ mod tests {
             assert!(error.contains(message), "{error}");
             assert!(!path.exists());
         }
+        // Sums of float32 may be a little above one.
+        let rounded =
+            SubmissionRow { kind_probabilities: Some([0.0, 0.0, 1.000_000_06, 0.0]), ..example(a) };
+        Submission::write(&path, Format::Y2022, &[rounded], &[a]).unwrap();
+        let written = std::fs::read_to_string(&path).unwrap();
+        assert!(written.contains(",0.000000,0.000000,1.000000,0.000000,"), "{written}");
+        std::fs::remove_file(&path).unwrap();
         // What cannot take the name leaves nothing behind.
         std::fs::create_dir(&path).unwrap();
         let written = Submission::write(&path, Format::Y2022, &[example(a)], &[a]);
