@@ -87,6 +87,8 @@ def evaluate(
     """
     chosen = None if containers is None else [size("containers", c, 0) for c in containers]
     if seed is not None:
+        if baseline is not None:
+            raise ParameterError("seed draws estimates instead of baseline: give one of them")
         seed = seed_of(seed)
     for container in chosen or ():
         if not 0 <= container <= 255:

@@ -198,6 +198,8 @@ def fuse(
         How to combine the windows of each recording into one decision first.
     background : str, optional
         With a majority: this class wins only if no other class has `least` windows.
+    least : int
+        Windows that a class other than `background` needs.
 
     Returns
     -------

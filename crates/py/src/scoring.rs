@@ -120,6 +120,12 @@ pub(crate) fn fuse(
         (Some("mean"), Some(_)) => Err(value_error("background needs vote = majority")),
         (Some(other), _) => Err(value_error(format!("vote must be majority or mean, not {other}"))),
     };
+    if vote.is_none() && background.is_some() {
+        return Err(value_error("background needs vote = majority"));
+    }
+    if background.is_none() && least != 1 {
+        return Err(value_error("least needs background, the class that it counts against"));
+    }
     let mut tables = Vec::with_capacity(paths.len());
     for path in &paths {
         let table = compute(py, || PredictionTable::read(path))?.map_err(value_error)?;

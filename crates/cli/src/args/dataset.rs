@@ -9,6 +9,7 @@ use corsmal_models::dataset::{LabelSource, LabelledTable, MemberNames};
 use corsmal_models::predictions::NO_TARGETS;
 use serde_json::{Value, json};
 
+use super::network::CLASSIFIER;
 use crate::failure::Failure;
 use crate::plural::plural;
 
@@ -134,7 +135,8 @@ pub struct DatasetArgs {
     features: Option<PathBuf>,
     /// A folder of pictures instead, such as those of `corsmal-feat crops`, for networks that take
     /// them. The labels come from its labels.csv unless --labels is given.
-    #[arg(long, value_name = "DIR", requires = "net", conflicts_with_all = ["table", "features"])]
+    #[arg(long, value_name = "DIR", requires = "net", conflicts_with_all = CLASSIFIER)]
+    #[arg(conflicts_with_all = ["table", "features"])]
     pub crops: Option<PathBuf>,
     #[command(flatten)]
     pub members: MemberArgs,

@@ -40,7 +40,7 @@ pub struct Args {
     #[arg(requires_all = ["model", "library"])]
     data: Option<PathBuf>,
     /// r21d as an ONNX model; docs/vision.md says how to export it.
-    #[arg(long, value_name = "FILE", requires = "data")]
+    #[arg(long, value_name = "FILE", requires = "data", conflicts_with_all = ["paths", "weights"])]
     model: Option<PathBuf>,
     /// Shared library of ONNX Runtime, such as libonnxruntime.so.1.32.0 of the PyPI package onnxruntime.
     #[arg(long, value_name = "FILE", env = "CORSMAL_ONNXRUNTIME")]

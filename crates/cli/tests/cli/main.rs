@@ -24,6 +24,7 @@ mod mutations;
 #[cfg(feature = "nets")]
 mod networks;
 mod onnx;
+mod options;
 #[cfg(feature = "nets")]
 mod pictures;
 mod scoring;

@@ -123,6 +123,10 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
             doubts::check_spelling(self, &truth, numbers)?;
         }
         if how.numeric || numbers {
+            if how.reject > 0.0 {
+                let reason = "numbers are scored, which have no probabilities for --reject";
+                return Err(self.content(reason));
+            }
             let numbers = self.score_numbers(&truth, (&drawn, groups.as_deref()), how)?;
             return Ok(ScoreReport::Numbers(numbers));
         }

@@ -68,7 +68,7 @@ pub struct Args {
     #[arg(long, value_name = "SECONDS")]
     pub(super) window: Option<f64>,
     /// Seconds from the start of one window to the start of the next; half a window by default.
-    #[arg(long, value_name = "SECONDS", requires = "window")]
+    #[arg(long, value_name = "SECONDS", requires = "window", conflicts_with = "features")]
     pub(super) hop: Option<f64>,
     #[command(flatten)]
     pub(super) vote: VoteArgs,

@@ -55,7 +55,8 @@ pub struct Args {
         value_name = "W,…",
         value_delimiter = ',',
         allow_hyphen_values = true,
-        requires = "kind"
+        requires = "kind",
+        conflicts_with_all = ["files", "predictions", "joint"]
     )]
     pub(super) type_weights: Option<Vec<f64>>,
     /// Weight of each file of --level.
@@ -64,7 +65,8 @@ pub struct Args {
         value_name = "W,…",
         value_delimiter = ',',
         allow_hyphen_values = true,
-        requires = "level"
+        requires = "level",
+        conflicts_with_all = ["files", "predictions", "joint"]
     )]
     pub(super) level_weights: Option<Vec<f64>>,
     #[command(flatten)]
@@ -155,9 +157,9 @@ impl Args {
 /// Arguments about submissions.
 #[derive(clap::Args)]
 pub(super) struct SubmissionArgs {
-    /// Official format of the submission; 2022 has class probabilities.
-    #[arg(long, value_enum, default_value = "2020")]
-    pub(super) format: Format,
+    /// Official format of the submission: 2020 by default; 2022 has class probabilities.
+    #[arg(long, value_enum)]
+    pub(super) format: Option<Format>,
     /// Decide type and level together: the level is empty if and only if the type is none.
     #[arg(long)]
     pub(super) feasible: bool,
@@ -196,6 +198,7 @@ impl SubmissionArgs {
     /// These go with --type, --level and --joint.
     pub(super) fn refuse_without_submission(&self) -> Result<(), Failure> {
         let given = [
+            ("--format", self.format.is_some()),
             ("--feasible", self.feasible),
             ("--capacity", self.capacity.is_some()),
             ("--mass-prior", self.mass_prior),

@@ -24,6 +24,12 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
             "--out {out} is not possible for a submission: name a file"
         )));
     }
+    let chosen = options.format.unwrap_or(Format::Y2020);
+    if options.mass_prior && chosen == Format::Y2020 {
+        return Err(Failure::new(
+            "--mass-prior: the format of 2020 has no masses; --format 2022 has",
+        ));
+    }
     let fused = |paths: &[PathBuf], weights: &Option<Vec<f64>>| {
         let some = !paths.is_empty();
         some.then(|| args.fused(paths, weights.as_deref())).transpose()
@@ -49,7 +55,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
     if rule != Rule::Separate && (kind.is_none() || level.is_none()) {
         return Err(Failure::new("--feasible needs both --type and --level"));
     }
-    let format = match options.format {
+    let format = match chosen {
         Format::Y2020 => submission::Format::Y2020,
         Format::Y2022 => submission::Format::Y2022,
     };

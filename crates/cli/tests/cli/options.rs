@@ -1,0 +1,49 @@
+//! Options that would have no effect are refused, not passed over.
+
+use crate::command::refused;
+
+/// clap asks for no option that another one excludes: these were accepted.
+#[test]
+fn what_needs_an_option_does_not_go_with_those_that_exclude_it() {
+    let train = ["train", "a.npz", "--target", "class", "-o", "m.model"];
+    let validate = ["cross-validate", "a.npz", "--target", "class"];
+    let of_networks = [["--weights", "w.pth"], ["--checkpoints", "runs"], ["--device", "gpu"]];
+    let of_classifiers: [&[&str]; 4] =
+        [&["--classifier", "knn"], &["--standardize"], &["--pca", "3"], &["--tune", "k=1,3"]];
+    for command in [&train[..], &validate] {
+        for network in of_networks {
+            for classifier in of_classifiers {
+                let said = refused(&[command, &network, classifier].concat());
+                assert!(said.contains("cannot be used with"), "{network:?} {classifier:?}: {said}");
+            }
+        }
+    }
+    let crops = ["train", "--crops", "c", "--classifier", "knn", "-o", "m.model"];
+    let weights = ["--type-weights", "9,1", "-o", "f.csv"];
+    let levels = ["--level-weights", "9,1", "-o", "f.csv"];
+    for line in [
+        &crops[..],
+        &[&["fuse", "a.csv", "b.csv"][..], &weights].concat(),
+        &[&["fuse", "--predictions", "a.csv", "b.csv"][..], &levels].concat(),
+        &[&["fuse", "--joint", "j.csv"][..], &weights].concat(),
+        &["classify", "-m", "m.model", "--features", "a.npz", "--hop", "1"],
+        &["embed", "vggish", "audio", "--weights", "w.pth", "--model", "m.onnx", "-o", "v.npz"],
+    ] {
+        let said = refused(line);
+        assert!(said.contains("cannot be used with"), "{line:?}: {said}");
+    }
+}
+
+#[test]
+fn what_a_form_has_no_place_for_is_refused() {
+    let fuse = |more: &[&str]| refused(&[&["fuse", "-o", "f.csv"], more].concat());
+    assert!(fuse(&["a.csv", "--format", "2022"]).contains("--format is for submissions"));
+    assert!(
+        fuse(&["--type", "t.csv", "--mass-prior"]).contains("the format of 2020 has no masses")
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let csv = folder.path().join("p.csv");
+    std::fs::write(&csv, "id,true,predicted\na,1.5,1\nb,2,2.5\n").unwrap();
+    let said = refused(&["score", csv.to_str().unwrap(), "--reject", "0.6"]);
+    assert!(said.contains("no probabilities for --reject"), "{said}");
+}
