@@ -228,6 +228,7 @@ impl SvmParams {
                     bounds: rows.iter().map(|&row| costs[row as usize]).collect(),
                     rows,
                     tol: self.tol,
+                    most_steps: smo::MOST_STEPS,
                     cache_bytes,
                 };
                 let solution = problem.solve()?;

@@ -13,23 +13,32 @@ pub(super) struct Solution {
 /// Smallest curvature used, where the kernel matrix is not positive definite.
 const TAU: f64 = 1e-12;
 
+/// Steps after which no optimum is near; scikit-learn goes on for ever.
+pub(super) const MOST_STEPS: usize = 100_000_000;
+
 pub(super) fn solve(
     kernel: &mut Rows<'_, '_>,
     y: &[f64],
     bound: &[f64],
-    tol: f64,
+    (tol, most_steps): (f64, usize),
 ) -> Result<Solution> {
     let n = kernel.len();
     let diagonal: Vec<f64> = (0..n).map(|i| kernel.diagonal(i)).collect();
     let mut alpha = vec![0.0; n];
     // y·gradient, so that no sign has to be looked up in the loops.
     let mut slope: Vec<f64> = y.iter().map(|y| -y).collect();
-    let limit = (100 * n).max(10_000_000);
-    for _ in 0..limit {
+    let (mut is_optimum, mut steps) = (false, 0);
+    while steps < most_steps {
+        steps += 1;
         let state = State { alpha: &alpha, y, bound };
-        let Some((i, steepest)) = state.up(&slope) else { break };
-        let row = kernel.one(i);
-        let Some(j) = state.down(&slope, i, steepest, row, &diagonal, tol) else { break };
+        let partner = state.up(&slope).and_then(|(i, steepest)| {
+            let row = kernel.one(i);
+            Some((i, state.down(&slope, i, steepest, row, &diagonal, tol)?))
+        });
+        let Some((i, j)) = partner else {
+            is_optimum = true;
+            break;
+        };
         let (row_i, row_j) = kernel.two(i, j);
         let curvature = (diagonal[i] + diagonal[j] - 2.0 * f64::from(row_i[j])).max(TAU);
         let (old_i, old_j) = (alpha[i], alpha[j]);
@@ -43,6 +52,10 @@ pub(super) fn solve(
         alpha[i] = snap(old_i + y[i] * step, step == room_i, y[i] > 0.0, bound[i]);
         alpha[j] = snap(old_j - y[j] * step, step == room_j, y[j] < 0.0, bound[j]);
         let (change_i, change_j) = (y[i] * (alpha[i] - old_i), y[j] * (alpha[j] - old_j));
+        if change_i == 0.0 && change_j == 0.0 {
+            // Rounding hides the step, and every further one.
+            break;
+        }
         for ((s, &ki), &kj) in slope.iter_mut().zip(row_i).zip(row_j) {
             *s += change_i * f64::from(ki) + change_j * f64::from(kj);
         }
@@ -52,6 +65,15 @@ pub(super) fn solve(
         return Err(ModelError::Numerical {
             owner: "svm",
             reason: "the optimisation overflowed: standardise the features first".into(),
+        });
+    }
+    if !is_optimum {
+        return Err(ModelError::Numerical {
+            owner: "svm",
+            reason: format!(
+                "no optimum found after {steps} steps: standardise the features, lower C, or raise \
+                 tol"
+            ),
         });
     }
     Ok(Solution { alpha, rho })

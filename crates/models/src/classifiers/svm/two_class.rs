@@ -18,6 +18,7 @@ pub(super) struct TwoClass<'a, 'x> {
     /// largest α of each row
     pub(super) bounds: Vec<f64>,
     pub(super) tol: f64,
+    pub(super) most_steps: usize,
     pub(super) cache_bytes: usize,
 }
 
@@ -25,7 +26,7 @@ impl TwoClass<'_, '_> {
     /// The machine.
     pub(super) fn solve(&self) -> Result<smo::Solution> {
         let mut rows = self.gram.rows(&self.rows, self.cache_bytes);
-        smo::solve(&mut rows, &self.signs, &self.bounds, self.tol)
+        smo::solve(&mut rows, &self.signs, &self.bounds, (self.tol, self.most_steps))
     }
 
     /// The problem restricted to some of its rows.
@@ -36,6 +37,7 @@ impl TwoClass<'_, '_> {
             signs: keep.iter().map(|&i| self.signs[i]).collect(),
             bounds: keep.iter().map(|&i| self.bounds[i]).collect(),
             tol: self.tol,
+            most_steps: self.most_steps,
             cache_bytes: self.cache_bytes,
         }
     }
@@ -73,5 +75,35 @@ impl TwoClass<'_, '_> {
             }
         }
         Ok(decisions)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+
+    use super::super::kernel::Function;
+    use super::*;
+
+    /// Machines that were no optimum yet were taken for it.
+    #[test]
+    fn too_few_steps_are_an_error() {
+        let x = Array2::from_shape_fn((20, 3), |(i, j)| ((i * 7 + j * 5) % 11) as f64);
+        let gram = Gram::new(x.view(), Function::Linear, 1 << 20).unwrap();
+        let solved = |most_steps| {
+            let problem = TwoClass {
+                gram: &gram,
+                rows: (0..20).collect(),
+                signs: (0..20).map(|i| if i % 3 == 0 { 1.0 } else { -1.0 }).collect(),
+                bounds: vec![1.0; 20],
+                tol: 1e-3,
+                most_steps,
+                cache_bytes: 1 << 20,
+            };
+            problem.solve().map(|_| ())
+        };
+        assert!(solved(smo::MOST_STEPS).is_ok());
+        let refused = solved(5).unwrap_err().to_string();
+        assert!(refused.contains("no optimum found after 5 steps"), "{refused}");
     }
 }
