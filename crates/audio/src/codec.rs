@@ -47,7 +47,7 @@ pub(crate) trait PacketDecoder: Send {
     /// Replaces the contents of `samples` by the interleaved samples of a packet.
     ///
     /// # Errors
-    /// The decoder panicked.
+    /// The decoder panicked, or the packet is of a kind that it would decode wrongly.
     fn decode(&mut self, packet: &[u8], samples: &mut Vec<f32>) -> Result<Decoded, Refusal>;
 
     /// Forgets the packets before.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::Path;
 
-use corsmal_audio::{AudioError, AudioSpec, Health, HealthMeter, open};
+use corsmal_audio::{AudioError, AudioSpec, Health, HealthMeter, Repair, open};
 use corsmal_plot::RecordingPicture;
 
 use crate::overview::{Overview, View};
@@ -21,6 +21,8 @@ pub struct Look {
     pub health: Health,
     /// Repairs that the reader made.
     pub repairs: usize,
+    /// That of them by which samples are missing, or may be.
+    pub loss: Option<Repair>,
     /// Waveforms and spectrograms of each excerpt asked for.
     pub pictures: Vec<RecordingPicture>,
 }
@@ -120,8 +122,9 @@ pub fn look(path: &Path, excerpts: Vec<Excerpt>) -> Result<Look> {
         overview.finish(title, facts, |channel| health.notes(channel)).map_err(spectrum)
     });
     let pictures = drawn.collect::<Result<Vec<_>>>()?;
-    let repairs = source.health().repairs.len();
-    Ok(Look { spec, health, repairs, pictures })
+    let reading = source.health();
+    let (repairs, loss) = (reading.repairs.len(), reading.loss().copied());
+    Ok(Look { spec, health, repairs, loss, pictures })
 }
 
 #[cfg(test)]

@@ -13,6 +13,8 @@ pub(super) struct Header {
     pub(super) block: u32,
     pub(super) number: Number,
     pub(super) channels: u16,
+    /// Whether one of two channels is the difference of both.
+    pub(super) has_side: bool,
     /// Bits per sample, where the header says so itself.
     pub(super) bits: Option<u32>,
     /// Hz, where the header says so itself.
@@ -78,9 +80,9 @@ impl Header {
             14 => Some(take(2)? as u32 * 10),
             _ => return None,
         };
-        let channels = match layout >> 4 {
-            n @ 0..=7 => u16::from(n) + 1,
-            8..=10 => 2,
+        let (channels, has_side) = match layout >> 4 {
+            n @ 0..=7 => (u16::from(n) + 1, false),
+            8..=10 => (2, true),
             _ => return None,
         };
         let bits = match layout >> 1 & 7 {
@@ -96,6 +98,7 @@ impl Header {
         let mut crc = Crc8Ccitt::new(0);
         crc.process_buf_bytes(&bytes[..length - 1]);
         let number = if sync == 0xf9 { Number::Sample(number) } else { Number::Frame(number) };
-        (crc.crc() == checksum).then_some(Self { block, number, channels, bits, sample_rate })
+        let header = Self { block, number, channels, has_side, bits, sample_rate };
+        (crc.crc() == checksum).then_some(header)
     }
 }

@@ -3,18 +3,20 @@
 //! A frame counts if its checksums are right. What lies between two such frames is damage, whose
 //! length in time the numbers of the frames tell, or does not belong to the audio.
 
+mod codec;
 mod frame;
 mod info;
 
 use symphonia::core::checksum::Crc16Ansi;
 use symphonia::core::io::Monitor;
 
-use crate::codec::{Codec, Decoded, PacketDecoder, Refusal};
+use crate::codec::{Decoded, PacketDecoder, Refusal};
 use crate::error::AudioError;
 use crate::input::Input;
 use crate::report::{ReadReport, Repair};
 use crate::source::{AudioSpec, BlockSource, SampleEncoding};
 use crate::stream::{LONGEST_GAP, Next, Stream, StreamSource};
+pub(crate) use codec::FlacCodec;
 use frame::{Header, Number};
 use info::Info;
 
@@ -34,7 +36,7 @@ const SEARCH: usize = 16 << 10;
 struct FlacStream {
     input: Input,
     info: Info,
-    codec: Codec,
+    codec: FlacCodec,
     /// A frame that comes after the silence before it.
     waiting: Vec<f32>,
     /// Samples per channel so far.
@@ -81,8 +83,7 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn BlockSource>, AudioError>
         encoding: SampleEncoding::Lossless,
         declared_frames: info.declared,
     };
-    let codec = Codec::flac(&info.repaired(), info.channels.into(), info.sample_rate)
-        .map_err(|refusal| refusal.at(at, EXPECTED))?;
+    let codec = FlacCodec::new(&info).map_err(|refusal| refusal.at(at, EXPECTED))?;
     let stream = FlacStream {
         input,
         info,
@@ -106,9 +107,9 @@ pub(crate) fn block_of(frame: &[u8]) -> Option<u32> {
 }
 
 /// A decoder for the stream that starts here, with its channels and its sample rate.
-pub(crate) fn codec_of(start: &[u8]) -> Option<Result<(Codec, u16, u32), Refusal>> {
+pub(crate) fn codec_of(start: &[u8]) -> Option<Result<(FlacCodec, u16, u32), Refusal>> {
     let info = Info::parse(start.strip_prefix(b"fLaC")?.get(4..)?)?;
-    let codec = Codec::flac(&info.repaired(), info.channels.into(), info.sample_rate);
+    let codec = FlacCodec::new(&info);
     Some(codec.map(|codec| (codec, info.channels, info.sample_rate)))
 }
 
@@ -279,8 +280,7 @@ impl FlacStream {
             let expected = "one channel count and rate in a recording";
             return Err(AudioError::unsupported(at, actual, expected));
         }
-        self.codec = Codec::flac(&info.repaired(), info.channels.into(), info.sample_rate)
-            .map_err(|refusal| refusal.at(at, EXPECTED))?;
+        self.codec = FlacCodec::new(&info).map_err(|refusal| refusal.at(at, EXPECTED))?;
         self.info = info;
         self.part = Part { begin: self.given, ..Part::default() };
         report.note(Repair::Concatenated { at: self.given });

@@ -102,7 +102,8 @@ impl Common {
             b"sowt" if (1..=4).contains(&bytes) => (Encoding::Int(bytes), Endian::Little),
             b"in24" => (Encoding::Int(3), Endian::Big),
             b"in32" => (Encoding::Int(4), Endian::Big),
-            b"42ni" => (Encoding::Int(3), Endian::Little),
+            // libsndfile writes a digit.
+            b"42ni" | b"42n1" => (Encoding::Int(3), Endian::Little),
             b"23ni" => (Encoding::Int(4), Endian::Little),
             b"raw " => (Encoding::U8, Endian::Big),
             b"fl32" | b"FL32" => (Encoding::F32, Endian::Big),

@@ -60,6 +60,12 @@ fn aiff_and_aiff_c() {
     check(&aiff(b"AIFF", b"", &big(), None), "aiff pcm_s16be", &[]);
     check(&aiff(b"AIFC", b"NONE\0\0", &big(), None), "aifc pcm_s16be", &[]);
     check(&aiff(b"AIFC", b"sowt\0\0", &little(), None), "aifc pcm_s16le", &[]);
+    // Each sample with a byte below it: libsndfile writes 42n1, others 42ni.
+    let wide: Vec<u8> = SAMPLES.iter().flat_map(|s| (i32::from(*s) << 8).to_le_bytes()).collect();
+    let wide: Vec<u8> = wide.chunks(4).flat_map(|sample| sample[..3].to_vec()).collect();
+    for kind in [b"42n1\0\0", b"42ni\0\0"] {
+        check(&aiff(b"AIFC", kind, &wide, None), "aifc pcm_s24le", &[]);
+    }
     check(&aiff(b"AIFF", b"", &big(), Some(0)), "aiff pcm_s16be", &["data_size_zero"]);
     check(&aiff(b"AIFF", b"", &big(), Some(u32::MAX)), "aiff pcm_s16be", &["data_size_unknown"]);
     check(&aiff(b"AIFF", b"", &big(), Some(900)), "aiff pcm_s16be", &["truncated"]);

@@ -19,6 +19,8 @@ mod dialects;
 #[cfg(feature = "symphonia")]
 mod flac;
 #[cfg(feature = "symphonia")]
+mod flac_sides;
+#[cfg(feature = "symphonia")]
 mod mp4;
 #[cfg(feature = "symphonia")]
 mod mpeg;

@@ -67,6 +67,25 @@ fn json_holds_the_same_with_all_correlations() {
     assert_eq!(health["correlation"].as_array().unwrap().len(), 4);
 }
 
+/// A recording that `extract` calls truncated was "ok".
+#[test]
+fn a_recording_that_lacks_samples_is_truncated() {
+    let folder = tempfile::tempdir().unwrap();
+    let wav = recording(folder.path());
+    let bytes = std::fs::read(&wav).unwrap();
+    let cut = folder.path().join("cut.wav");
+    std::fs::write(&cut, &bytes[..bytes.len() - 5000]).unwrap();
+    let out = inspect(&[&cut, "--json".as_ref()]);
+    let report: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!((&report["status"], &report["truncated"]), (&"truncated".into(), &true.into()));
+    let out = inspect(&[&wav, &cut, "--json".as_ref()]);
+    let lines: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(lines[0]["status"], "ok");
+    assert_eq!(lines[1]["status"], "truncated");
+    let shown = text(&inspect(&[&wav, &cut]).stdout);
+    assert!(shown.lines().any(|line| line.ends_with("; 1 repaired; truncated")), "{shown}");
+}
+
 #[test]
 fn pictures_by_extension() {
     let folder = tempfile::tempdir().unwrap();

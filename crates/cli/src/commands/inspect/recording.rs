@@ -4,7 +4,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
-use corsmal_audio::{AudioError, AudioSpec, BlockSource, Health, HealthMeter, ReadReport, open};
+use corsmal_audio::{
+    AudioError, AudioSpec, BlockSource, Health, HealthMeter, ReadReport, Repair, open,
+};
 use corsmal_report::Overview;
 use serde::Serialize;
 
@@ -55,14 +57,23 @@ pub fn inspect(path: &Path, picture: Option<&Picture>, json: bool) -> Result<Exi
     let health = meter.finish();
     let seconds = health.frames as f64 / f64::from(spec.sample_rate);
     let reading = source.health();
-    let report =
-        Inspection { path: name, status: "ok", spec: &spec, seconds, reading, health: &health };
+    let status = status(reading.loss(), &health);
+    let report = Inspection { path: name, status, spec: &spec, seconds, reading, health: &health };
     print!("{}", if json { to_json(&report)? } else { report.text() });
     if let Some(drawn) = drawn {
         let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         drawn.save(file, report.facts())?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// What `extract` says of a recording that can be read.
+pub(super) fn status(loss: Option<&Repair>, health: &Health) -> &'static str {
+    match (health.channels.iter().any(|channel| channel.non_finite > 0), loss) {
+        (true, _) => "non_finite",
+        (false, Some(_)) => "truncated",
+        (false, None) => "ok",
+    }
 }
 
 /// The stretch of a recording that is drawn, with the health of that stretch.

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use corsmal_extract::inputs::InputSource;
+use corsmal_files::quote::printable_line;
 use corsmal_report::{Look, ReportError, look};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::recording::{decibels, length};
+use super::recording::{decibels, length, status};
 use super::refusal::to_json;
 use crate::failure::{FAILED_FILES, Failure};
 use crate::plural::plural;
@@ -75,7 +76,8 @@ impl Line {
         let name = path.display().to_string();
         match look(path, Vec::new()) {
             Ok(look) => {
-                Self { path: name, status: "ok", reason: None, sound: Some(Sound::of(look)) }
+                let status = status(look.loss.as_ref(), &look.health);
+                Self { path: name, status, reason: None, sound: Some(Sound::of(look)) }
             }
             Err(error) => {
                 let status = match &error {
@@ -120,9 +122,12 @@ fn text(lines: &[Line]) -> String {
                 if sound.repairs > 0 {
                     notes.push(format!("{} repaired", sound.repairs));
                 }
+                if line.status == "truncated" {
+                    notes.push(line.status.into());
+                }
                 format!(
                     "{:width$}  {:>long$}  {:>6}  {:>2}  {:>9}  {:>7}  {}",
-                    line.path,
+                    printable_line(&line.path),
                     length(sound.seconds),
                     sound.sample_rate,
                     sound.channels,
@@ -132,7 +137,11 @@ fn text(lines: &[Line]) -> String {
                 )
             }
             (None, reason) => {
-                format!("{:width$}  {}", line.path, reason.as_deref().unwrap_or(line.status))
+                format!(
+                    "{:width$}  {}",
+                    printable_line(&line.path),
+                    reason.as_deref().unwrap_or(line.status)
+                )
             }
         };
         out.push_str(row.trim_end());
