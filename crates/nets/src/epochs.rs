@@ -72,6 +72,7 @@ pub(crate) fn run(
         if goes_on { Ok(()) } else { Err(NetError::Stopped { epochs: epochs.len() }) }
     };
     tell(&epochs, None)?;
+    let is_short = recipe.epochs * steps_of(course.train, recipe, 0).len() < SETTLED;
     for epoch in resumed..recipe.epochs {
         let mut sum = 0.0;
         let steps = steps_of(course.train, recipe, epoch);
@@ -86,7 +87,10 @@ pub(crate) fn run(
         }
         let mut result = Epoch { loss: sum / steps.len() as f64, score: None };
         if !course.watched.is_empty() {
-            let Rating { score, merit } = rate(trainer.network)?;
+            let Rating { score, merit } = match is_short {
+                true => rate_settled(course, trainer.network, recipe, &rate)?,
+                false => rate(trainer.network)?,
+            };
             result.score = Some(score);
             if recipe.select != Select::Last && best.as_ref().is_none_or(|b| merit > b.0) {
                 best = Some((merit, epoch, trainer.network.parameters().unpacked()));
@@ -103,7 +107,7 @@ pub(crate) fn run(
         kept = epoch;
         *network.parameters_mut() = parameters;
     }
-    if recipe.epochs * steps_of(course.train, recipe, 0).len() < SETTLED {
+    if is_short {
         settle(course, network, recipe)?;
     }
     Ok(History { epochs, kept })
@@ -116,8 +120,7 @@ const SETTLED: usize = 100;
 /// nothing is learned. After a few steps they are still near their initial values, and evaluation, which uses them,
 /// would not be what was trained.
 fn settle(course: &Course<'_>, network: &mut Network, recipe: &Recipe) -> Result<()> {
-    let declared = network.parameters().declared().iter();
-    let names: Vec<String> = declared.filter(|d| !d.trained).map(|d| d.name.clone()).collect();
+    let names = running(network);
     if names.is_empty() {
         return Ok(());
     }
@@ -149,6 +152,30 @@ fn settle(course: &Course<'_>, network: &mut Network, recipe: &Recipe) -> Result
             Err(NetError::Diverged { step, what, value })
         }
     }
+}
+
+/// Names of running statistics.
+fn running(network: &Network) -> Vec<String> {
+    let declared = network.parameters().declared().iter();
+    declared.filter(|d| !d.trained).map(|d| d.name.clone()).collect()
+}
+
+/// How good the network would be if its training ended here. Training goes on from the statistics that it has.
+fn rate_settled(
+    course: &Course<'_>,
+    network: &mut Network,
+    recipe: &Recipe,
+    rate: impl Fn(&Network) -> Result<Rating>,
+) -> Result<Rating> {
+    let of = |network: &Network, name: &String| network.parameters().get(name).values().to_vec();
+    let kept: Vec<(String, Vec<f32>)> =
+        running(network).into_iter().map(|name| (name.clone(), of(network, &name))).collect();
+    settle(course, network, recipe)?;
+    let rating = rate(network);
+    for (name, values) in kept {
+        network.parameters_mut().get_mut(&name).values_mut().copy_from_slice(&values);
+    }
+    rating
 }
 
 /// Duration of the whole training, from one step that changes nothing.
@@ -219,6 +246,20 @@ mod tests {
         let recipe = Recipe { epochs: 12, batch: 8, ..definition.recipe };
         fit::fit(&mut network, task, &recipe, None, |_, _| 0.0, |_| true).unwrap();
         let inputs = items.laid(&network, &rows, &recipe, Stream::new(0, "offset"));
+        let watched = Task { items: &items, classes: &classes, train: &rows, watched: &rows };
+        let right = |truth: &[usize], found: &[usize]| {
+            truth.iter().zip(found).filter(|(t, f)| t == f).count() as f64 / truth.len() as f64
+        };
+        let mut chosen = definition.build(Some(2), 0).unwrap();
+        let by_epoch = Recipe { select: Select::Validation, ..recipe };
+        let history = fit::fit(&mut chosen, watched, &by_epoch, None, right, |_| true).unwrap();
+        let scores: Vec<f64> = history.epochs.iter().filter_map(|epoch| epoch.score).collect();
+        // The score of the epoch that is kept is that of the network that is written.
+        let kept = chosen.logits(&inputs).unwrap();
+        let found: Vec<usize> =
+            kept.values.values().chunks(2).map(|row| usize::from(row[1] > row[0])).collect();
+        assert_eq!(scores[history.kept], right(&classes, &found), "{scores:?}");
+        assert_eq!(scores[history.kept], 1.0, "{scores:?}");
         let targets = crate::loss::Targets::Classes(classes);
         let targets = targets.pick(&rows, network.outputs());
         let loss = crate::loss::Loss::CrossEntropy;

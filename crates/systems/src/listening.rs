@@ -283,7 +283,10 @@ impl<'a> Listener<'a> {
                         continue;
                     }
                     (Ok(heard), Some(_)) => {
-                        self.add(&mut votes, &heard)?;
+                        // As without a vote: of what the network hears in a window, the mean.
+                        if let Some(proba) = self.votes(&heard)?.mean() {
+                            votes.add(argmax(&proba), Some(&proba)).map_err(SystemError::from)?;
+                        }
                         continue;
                     }
                     (Err(trouble), None) => Answer::none(span, trouble),
@@ -355,15 +358,10 @@ impl<'a> Listener<'a> {
 
     fn votes(&self, heard: &[Heard]) -> Result<WindowVotes> {
         let mut votes = WindowVotes::new(self.model.header.labels.len());
-        self.add(&mut votes, heard)?;
-        Ok(votes)
-    }
-
-    fn add(&self, votes: &mut WindowVotes, heard: &[Heard]) -> Result<()> {
         for (_, proba) in heard {
             votes.add(argmax(proba), Some(proba))?;
         }
-        Ok(())
+        Ok(votes)
     }
 }
 

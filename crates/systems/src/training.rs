@@ -200,6 +200,7 @@ impl Training<'_> {
                 "recordings": heard.as_ref().map(|_| table.ids.len()),
                 "items": y.len(),
                 "weights": self.weights.map(Weights::provenance),
+                "validation_group": validation_group,
                 "trained_on": heard.as_ref().and_then(|heard| heard.trained_on.as_ref()),
             }),
             tool_version: env!("CARGO_PKG_VERSION").into(),

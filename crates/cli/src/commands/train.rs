@@ -199,7 +199,12 @@ fn train_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
     } else if !args.quiet {
         let (name, target) = (&header.network, &header.target);
         println!("{out}: {name}, {} numbers", model.network.parameters().count());
-        println!("{target}: {}; epoch {} kept", header.labels.join(", "), header.history.kept + 1);
+        let by = validation_group.map_or(String::new(), |group| {
+            let groups = dataset.groups.as_deref().unwrap_or_default();
+            format!(", the best on {groups} {group}, which was not trained on")
+        });
+        let kept = header.history.kept + 1;
+        println!("{target}: {}; epoch {kept} kept{by}", header.labels.join(", "));
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -255,6 +255,26 @@ fn a_network_learns_from_recordings_and_hears_them() {
     let live = String::from_utf8(output.stdout).unwrap();
     assert_eq!(live.lines().count(), 5, "{live}");
 
+    // A vote is one over the windows that were asked for, not over those inside of them.
+    let windows = path("windows.csv");
+    let long = ["--window", "0.9", "--hop", "0.1", "-q"];
+    run(&[&classify[..], &long, &["-o", text(&windows)]].concat());
+    let outcome = |table: &str| -> Vec<Vec<String>> {
+        let mut lines = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
+        let head = lines.next().unwrap();
+        let wanted = ["id", "predicted", "p_noise", "p_tone"];
+        let place = |name: &str| head.iter().position(|column| *column == name);
+        let at = wanted.map(|name| place(name).unwrap_or_else(|| panic!("{name}: {table}")));
+        lines.map(|line| at.iter().map(|&at| line[at].to_string()).collect()).collect()
+    };
+    let voted = run(&[&classify[..], &long, &["--vote", "majority"]].concat());
+    let voted = String::from_utf8(voted.stdout).unwrap();
+    assert_eq!(voted.matches(",ok,2,").count(), 6, "two windows in a second: {voted}");
+    let voted = outcome(&voted);
+    let fused = run(&["fuse", text(&windows), "--vote", "majority", "-o", "-"]);
+    let fused = outcome(&String::from_utf8(fused.stdout).unwrap());
+    assert_eq!(fused, voted);
+
     // What is missing at the end of a file is said, for windows of either kind and for votes.
     let cut = path("cut.wav");
     let bytes = std::fs::read(&wav).unwrap();

@@ -98,7 +98,7 @@ pub fn train(
         let score = |&row: &usize| {
             let Example { depth, size, millilitres } = examples[row];
             let estimate = millilitres_of(network, depth, size)?;
-            Ok((-(estimate - millilitres).abs() / millilitres).exp())
+            Ok(score_of(estimate, millilitres))
         };
         let scores: Result<Vec<f64>> = watched.iter().map(score).collect();
         let score = scores?.iter().sum::<f64>() / watched.len() as f64;
@@ -114,6 +114,11 @@ pub fn train(
         tool_version: env!("CARGO_PKG_VERSION").into(),
     };
     Ok(CapacityNetwork { network, header: Some(header) })
+}
+
+/// The benchmark's score; an estimate that no container has scores nothing.
+fn score_of(estimate: f64, millilitres: f64) -> f64 {
+    if estimate > 0.0 { (-(estimate - millilitres).abs() / millilitres).exp() } else { 0.0 }
 }
 
 fn refuse(examples: &[Example<'_>], train: usize, watched: usize, recipe: &Recipe) -> Result<()> {
@@ -161,6 +166,12 @@ mod tests {
 
     fn with(text: serde_json::Value) -> Result<Recipe> {
         recipe(text.as_object().unwrap())
+    }
+
+    #[test]
+    fn impossible_estimates_score_nothing() {
+        assert_eq!((score_of(300.0, 300.0), score_of(600.0, 300.0)), (1.0, (-1.0f64).exp()));
+        assert_eq!((score_of(-5.8, 3209.0), score_of(0.0, 300.0)), (0.0, 0.0));
     }
 
     #[test]
