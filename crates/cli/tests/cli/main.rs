@@ -13,6 +13,8 @@ mod devices;
 mod extract;
 mod formats;
 mod fusion;
+#[cfg(feature = "nets")]
+mod hearing;
 mod hostile;
 mod inspect;
 mod inspect_kinds;
