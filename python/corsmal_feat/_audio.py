@@ -277,5 +277,6 @@ def get_duration(
         raise ParameterError(f"{'S' if y is None else 'y'} has 0 dimensions, expected at least 1")
     if y is not None:
         return float(given.shape[-1] / sr)
+    n_fft, hop_length = size("n_fft", n_fft), size("hop_length", hop_length)
     samples = n_fft + hop_length * (given.shape[-1] - 1)
-    return float(samples - 2 * int(n_fft // 2) if center else samples) / sr
+    return float(samples - 2 * (n_fft // 2) if center else samples) / sr

@@ -335,10 +335,11 @@ def fit_projection(
     """
     if not overwrite and os.path.exists(out):
         raise ParameterError(f"out = {os.fspath(out)!r} already exists: overwrite=True replaces it")
-    _core.fit_projection(features, None if n_components is None else int(n_components), out)
+    wanted = None if n_components is None else size("n_components", n_components)
+    _core.fit_projection(features, wanted, out)
 
 
 def _fit(X: Any, n_components: int) -> tuple[Doubles, Doubles, Doubles]:
     x = np.ascontiguousarray(_doubles("X", X, 2))
-    components, mean, variance = _core.pca_fit(x, int(n_components))
+    components, mean, variance = _core.pca_fit(x, size("n_components", n_components))
     return components, mean, variance

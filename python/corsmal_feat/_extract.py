@@ -24,6 +24,8 @@ StrPath = str | os.PathLike[str]
 Config = StrPath | Mapping[str, Any]
 Progress = Callable[[int, int], object]
 
+#: Most channels of a recording.
+MAX_CHANNELS = 64
 #: Most worker threads.
 MOST_JOBS = 4096
 
@@ -227,8 +229,9 @@ class SignalExtractor:
         config: Config | None = None,
         set: Mapping[str, Any] | None = None,
     ) -> None:
-        if not 1 <= channels < 1 << 16:
-            raise ParameterError(f"channels must be 1 to {(1 << 16) - 1}, not {channels}")
+        channels = size("channels", channels)
+        if channels > MAX_CHANNELS:
+            raise ParameterError(f"channels must be 1 to {MAX_CHANNELS}, not {channels}")
         signals = _core.Signals(*configuration(preset, config, set))
         self._signal = signals.start(whole_rate(sr), channels)
         self._channels = channels

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._arrays import size
 from ._pitches import hz_to_mel, mel_to_hz
 from ._refusals import refuses
 from ._times import Doubles
@@ -16,7 +17,7 @@ _MOST_BINS = 1 << 26
 def _count(name: str, value: int) -> int:
     if not 0 <= value <= _MOST_BINS:
         raise ParameterError(f"{name} must be 0 to {_MOST_BINS}, not {value}")
-    return int(value)
+    return size(name, value, 0)
 
 
 @refuses
@@ -43,7 +44,7 @@ def fft_frequencies(*, sr: float = 22050, n_fft: int = 2048) -> Doubles:
         raise ParameterError(
             f"sr must be above 0 and n_fft 1 to {_MOST_BINS}, not {sr} and {n_fft}"
         )
-    return np.asarray(np.fft.rfftfreq(int(n_fft), 1.0 / sr), dtype=np.float64)
+    return np.asarray(np.fft.rfftfreq(size("n_fft", n_fft), 1.0 / sr), dtype=np.float64)
 
 
 @refuses
@@ -130,7 +131,7 @@ def tempo_frequencies(n_bins: int, *, hop_length: int = 512, sr: float = 22050) 
     count = _count("n_bins", n_bins)
     if count == 0:
         raise ParameterError("n_bins must be at least 1, not 0")
-    tempi = 60.0 * sr / (hop_length * np.arange(1.0, count))
+    tempi = 60.0 * sr / (size("hop_length", hop_length) * np.arange(1.0, count))
     return np.concatenate([[np.inf], tempi])
 
 
@@ -158,4 +159,4 @@ def fourier_tempo_frequencies(
     >>> corsmal_feat.fourier_tempo_frequencies(sr=1000, win_length=4, hop_length=500)
     array([ 0., 30., 60.])
     """
-    return fft_frequencies(sr=sr * 60 / float(hop_length), n_fft=win_length)
+    return fft_frequencies(sr=sr * 60 / size("hop_length", hop_length), n_fft=win_length)

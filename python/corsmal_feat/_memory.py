@@ -41,8 +41,8 @@ def stack_memory(
     """
     if n_steps < 1:
         raise ParameterError(f"n_steps must be a whole number of at least 1, not {n_steps}")
-    if delay == 0:
-        raise ParameterError("delay must not be 0")
+    if delay == 0 or delay != int(delay):
+        raise ParameterError(f"delay must be a whole number other than 0, not {delay}")
     array = np.atleast_2d(as_array("data", data))
     frames = array.shape[-1]
     if frames < 1:

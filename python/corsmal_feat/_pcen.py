@@ -79,6 +79,8 @@ def pcen(
     if max_size > 1 and ref is None:
         if s.ndim == 1:
             raise ParameterError(f"max_size must be 1 where S has one dimension, not {max_size}")
+        if max_axis is not None and max_axis != int(max_axis):
+            raise ParameterError(f"max_axis must be a whole number, not {max_axis}")
         if max_axis is None and s.ndim != 2:
             raise ParameterError(f"max_axis must be given, since S has {s.ndim} dimensions")
         bands = (1 - time) % 2 if max_axis is None else max_axis % s.ndim

@@ -57,12 +57,28 @@ def refuses(function: Callable[P, R]) -> Callable[P, R]:
                 bound = inspect.signature(function).bind(*args, **kwargs)
             except TypeError:
                 raise error from None  # a missing or unknown argument, as Python says it
+            tried = isinstance(error, (TypeError, ParameterError))
+            if tried and (whole := _whole(function, bound.arguments)):
+                bound.arguments |= whole
+                return refusing(*bound.args, **bound.kwargs)
             told = _told(error, function, bound.arguments)
             if told is None:
                 raise
             raise told from error
 
     return refusing
+
+
+def _whole(function: Callable[..., Any], arguments: Mapping[str, Any]) -> dict[str, int]:
+    """Floats without a fraction, such as 2048.0, in place of whole numbers."""
+    hints = get_type_hints(function)
+    return {
+        name: int(value)
+        for name, value in arguments.items()
+        if isinstance(value, (float, np.floating))
+        and {int, float}.intersection(_parts(hints.get(name))) == {int}
+        and float(value).is_integer()
+    }
 
 
 def _told(
@@ -91,7 +107,7 @@ def _told(
             return ParameterError(f"{name} must be real, not complex")
         if isinstance(error, ZeroDivisionError) and _fits_kind(float, value) and value == 0:
             return ParameterError(f"{name} must not be 0")
-    if isinstance(error, (ValueError, OverflowError, MemoryError)):
+    if isinstance(error, (*_CAUSED, MemoryError)) and not isinstance(error, AttributeError):
         return ParameterError(f"{function.__name__}: {error}")
     return None
 

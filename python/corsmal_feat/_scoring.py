@@ -148,7 +148,7 @@ def cross_validate(
         "classifier": classifier,
         "parameters": [f"{key}={_value(value)}" for key, value in (parameters or {}).items()],
         "standardize": bool(standardize),
-        "pca": None if pca is None else repr(pca),
+        "pca": None if pca is None else repr(_plain(pca)),
         "tune": [
             f"{key}={json.dumps([_plain(value) for value in values])}"
             for key, values in (tune or {}).items()

@@ -17,7 +17,7 @@ Doubles = npt.NDArray[np.float64]
 
 
 def _offset(n_fft: int | None) -> int:
-    return 0 if n_fft is None else int(n_fft // 2)
+    return 0 if n_fft is None else size("n_fft", n_fft, 0) // 2
 
 
 def _hop(hop_length: int) -> int:

@@ -68,6 +68,10 @@ impl M5A34f136 {
     /// # Errors
     /// As [`M5A34f136::new`].
     pub fn with_peak(sr: f64, peak: Peak) -> Result<Self> {
+        // Frames of 50 ms are as long as it asks for.
+        if sr > MAX_SR {
+            return Err(DspError::parameter("sr", sr, "at most 768,000 Hz"));
+        }
         let samples = |seconds: f64| (seconds * sr).round_ties_even().max(0.0) as usize;
         let (frame, second) = (samples(0.05), samples(1.0));
         let plan = PaaPlan::new(sr, frame, frame)?.with_peak(peak);
@@ -89,6 +93,8 @@ impl M5A34f136 {
     }
 }
 
+/// Highest sample rate of a frame of 50 ms.
+const MAX_SR: f64 = 768_000.0;
 const VGGISH_SR: f64 = 16_000.0;
 const FRAME: usize = 400;
 const HOP: usize = 160;
