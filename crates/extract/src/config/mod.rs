@@ -203,15 +203,25 @@ impl Config {
         value
     }
 
-    /// BLAKE3 of the effective configuration, in hexadecimal. Of a projection the content of its
-    /// file counts, not where that lies.
+    /// BLAKE3 of the effective configuration, in hexadecimal, without the place of a projection.
     pub fn hash(&self) -> String {
-        let mut value = self.to_value();
-        if let Some(projection) = value.get_mut("projection").and_then(Value::as_object_mut) {
-            projection.remove("file");
-        }
+        let value = without_place(self.to_value());
         blake3::hash(value.to_string().as_bytes()).to_hex().to_string()
     }
+}
+
+/// What counts of a configuration that a file holds; as it is where it is none.
+pub(crate) fn meaning(text: &str) -> String {
+    serde_json::from_str(text)
+        .map_or_else(|_| text.into(), |value| without_place(value).to_string())
+}
+
+/// Of a projection the content of its file counts, not where that lies.
+fn without_place(mut config: Value) -> Value {
+    if let Some(projection) = config.get_mut("projection").and_then(Value::as_object_mut) {
+        projection.remove("file");
+    }
+    config
 }
 
 /// Outermost keys.

@@ -14,6 +14,7 @@ use corsmal_files::shard::Shard;
 use serde_json::Value;
 
 use super::error::{MergeError, go_on};
+use crate::config::meaning;
 
 /// A shard as it was found.
 pub(super) struct Piece {
@@ -86,7 +87,7 @@ pub(super) fn in_order(
                     "a list of inputs (ids, paths, times, labels) with the hash",
                     p.inputs_hash.clone(),
                 ),
-                ("configuration text", p.config.clone()),
+                ("configuration text", meaning(&p.config)),
             ]
         };
         let both = fields(&first).into_iter().zip(fields(&made));

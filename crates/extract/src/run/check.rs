@@ -14,7 +14,7 @@ use super::error::RunError;
 use super::options::{MAX_JOBS, RunOptions, RunReport};
 use super::partitions::{PartitionBy, is_ours};
 use super::stored::StoredOutput;
-use crate::config::Config;
+use crate::config::{Config, meaning};
 use crate::inputs::{Identities, Input, list_hash};
 use crate::ledger::{self, Ledger};
 
@@ -234,6 +234,12 @@ impl Finished<'_> {
         if found != format {
             return Err(refuse(&format!("is {found}, not {format}")));
         }
+        // A projection that lies elsewhere is the same.
+        let config = match meaning(&theirs.config) == meaning(&provenance.config) {
+            true => provenance.config.clone(),
+            false => theirs.config.clone(),
+        };
+        let theirs = Provenance { config, ..theirs };
         if theirs != *provenance {
             let why = if theirs.config_hash != provenance.config_hash {
                 "holds features of another configuration"

@@ -39,6 +39,32 @@ fn fitted_on_one_run_and_applied_to_another() {
     assert!(projected.values().iter().all(|x| x.is_finite() && *x != 0.0));
 }
 
+/// The machines of a cluster may have the same file at different places.
+#[test]
+fn a_projection_that_lies_elsewhere_is_the_same() {
+    let folder = folder(4);
+    let at = |name: &str| folder.path().join(name);
+    let audio = at("audio");
+    extract(&audio, &at("train.npz"), &["--preset", "esc26"]).with(0);
+    pca(&at("train.npz"), "2", &at("pca.npz")).with(0);
+    std::fs::copy(at("pca.npz"), at("copy.npz")).unwrap();
+    let places = [at("pca.npz").display().to_string(), at("copy.npz").display().to_string()];
+    let run = |out: &str, place: &str, more: &[&str]| {
+        let words = [&["--preset", "esc26", "--project", place], more].concat();
+        extract(&audio, &at(out), &words)
+    };
+    run("x.npz", &places[0], &[]).with(0);
+    let again = run("x.npz", &places[1], &["--resume"]).with(0);
+    assert!(again.stderr.contains("up to date"), "{}", again.stderr);
+    for (shard, place) in places.iter().enumerate() {
+        run(&format!("{shard}.npz"), place, &["--shard", &format!("{shard}/2")]).with(0);
+    }
+    let mut merge = tool();
+    merge.arg("merge").args([at("0.npz"), at("1.npz")]).arg("--out").arg(at("both.npz"));
+    ended(&mut merge).with(0);
+    assert_eq!(table(&at("both.npz")).values(), table(&at("x.npz")).values());
+}
+
 #[test]
 fn what_cannot_be_fitted_or_applied_is_refused_and_leaves_nothing() {
     let folder = folder(4);
