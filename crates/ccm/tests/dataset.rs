@@ -49,6 +49,37 @@ fn actions_are_missing_exactly_for_empty_containers() {
 }
 
 #[test]
+fn odd_files_of_actions_are_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    };
+    put("train/1/audio/s0_fi0_fu0_b0_l0_audio.wav", "RIFF");
+    let head = "folder_num,file_name,start,end\n";
+    let row = "1,s0_fi1_fu1_b0_l0_c2,1,2\n";
+    let odd = || {
+        let found = corsmal_ccm::dataset::check(&DataSet::open(folder.path()).unwrap());
+        found.odd.iter().map(|odd| odd.what.clone()).collect::<Vec<_>>().join("; ")
+    };
+    put("man_annotations.csv", &format!("{head}{row}"));
+    let before = odd();
+    put("man_annotations.csv", &format!("{head}garbage,x,y,z\n"));
+    assert!(odd().contains("line 2"), "{}", odd());
+    put("man_annotations.csv", &format!("{head}{row}{row}"));
+    assert!(odd().contains("one line for each recording"), "{}", odd());
+    put("man_annotations.csv", &format!("{head}{row}"));
+    put("man_annotations_old.csv", &format!("{head}garbage,x,y,z\n"));
+    assert_ne!(odd(), before);
+    assert!(
+        odd().contains("is not used: ") && odd().contains("man_annotations.csv has"),
+        "{}",
+        odd()
+    );
+}
+
+#[test]
 fn official_annotations_name_every_training_recording_once() {
     for file in ["ccm_train_annotation.csv", "ccm_train_annotation_2020-08.csv"] {
         let Some(path) = ccm(file) else { return };

@@ -34,7 +34,9 @@ pub fn read_actions(path: &Path) -> Result<Actions> {
             (from, to) if from >= 0.0 && to > from => Some(span),
             _ => return Err(table.fault(row, end, "an end after the start, or -1 for both")),
         };
-        actions.insert((container, name), action);
+        if actions.insert((container, name), action).is_some() {
+            return Err(table.fault(row, file, "one line for each recording"));
+        }
     }
     Ok(actions)
 }

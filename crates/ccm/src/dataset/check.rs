@@ -70,6 +70,9 @@ impl Findings {
 /// Looks at every recording's place and header; samples are not read.
 pub fn check(set: &DataSet) -> Findings {
     let mut odd = [set.odd.clone(), set.contradictions.clone()].concat();
+    if let (Some(path), Err(error)) = (&set.actions, set.actions()) {
+        odd.push(Oddity { path: path.clone(), what: error.to_string() });
+    }
     let mut formats = BTreeMap::new();
     let mut seconds = 0.0;
     for recording in &set.recordings {

@@ -63,7 +63,13 @@ impl DataSet {
         for path in tables {
             let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
             if name.starts_with("man_annotation") {
-                set.actions = Some(path);
+                match &set.actions {
+                    None => set.actions = Some(path),
+                    Some(first) => {
+                        let what = format!("is not used: {} has the actions", first.display());
+                        set.odd.push(Oddity { path, what });
+                    }
+                }
             } else if name.contains("annotation") {
                 match Annotations::read(&path) {
                     Ok(annotations) => set.annotations.push(annotations),

@@ -102,14 +102,24 @@ impl Args {
     }
 
     /// Says what was written; on standard error, since predictions may be on standard output.
-    pub(super) fn tell(&self, recordings: usize, failed: usize, what: &str) -> Result<(), Failure> {
+    /// `lacking` is how many recordings have nothing of each kind.
+    pub(super) fn tell(
+        &self,
+        recordings: usize,
+        failed: usize,
+        lacking: &[(&str, usize)],
+    ) -> Result<(), Failure> {
         let out = &self.out;
         if self.told.json {
-            let value = json!({ "out": out, "recordings": recordings, "failed": failed });
+            let mut value = json!({ "out": out, "recordings": recordings, "failed": failed });
+            if let [_, _, ..] = lacking {
+                value["without"] = lacking.iter().map(|&(what, n)| (what, n)).collect();
+            }
             println!("{}", serde_json::to_string_pretty(&value)?);
         } else if !self.told.quiet {
-            let recordings = plural(recordings, "recording");
-            eprintln!("{}: {recordings}, {failed} without {what}", out.display());
+            let each = lacking.iter().map(|(what, n)| format!("{n} without a {what}"));
+            let each = each.collect::<Vec<_>>().join(", ");
+            eprintln!("{}: {}, {each}", out.display(), plural(recordings, "recording"));
         }
         Ok(())
     }

@@ -29,6 +29,6 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let fused = args.fused(paths, args.weights.as_deref())?;
     output::write(&args.out, &fused.to_csv()?)?;
     let (recordings, failed) = (fused.rows.len(), fused.without_prediction());
-    args.tell(recordings, failed, "a prediction")?;
+    args.tell(recordings, failed, &[("prediction", failed)])?;
     Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
 }

@@ -95,7 +95,13 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
     };
     Submission::write(&args.out, format, &predictions, &expected)?;
     let failed = predictions.iter().filter(|p| p.kind.is_none() && p.level.is_none()).count();
-    args.tell(predictions.len(), failed, "an estimate")?;
+    let without = |has: fn(&SubmissionRow) -> bool| predictions.iter().filter(|p| !has(p)).count();
+    let lacking = [
+        ("type", without(|p| p.kind.is_some())),
+        ("level", without(|p| p.level.is_some())),
+        ("capacity", without(|p| p.capacity_ml.is_some())),
+    ];
+    args.tell(predictions.len(), failed, &lacking)?;
     Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
 }
 
