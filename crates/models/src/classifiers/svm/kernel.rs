@@ -107,6 +107,34 @@ pub(super) fn squared_lengths(x: ArrayView2<'_, f64>) -> Vec<f64> {
     x.outer_iter().map(|row| row.dot(&row)).collect()
 }
 
+/// What kernel values are kept in.
+pub(super) trait Precision: Copy + Default + Into<f64> + Send {
+    fn of(value: f64) -> Self;
+
+    /// All values of a table, where they are kept so.
+    fn all<'g>(gram: &'g Gram<'_>) -> Option<&'g Array2<Self>>;
+}
+
+impl Precision for f32 {
+    fn of(value: f64) -> Self {
+        value as f32
+    }
+
+    fn all<'g>(gram: &'g Gram<'_>) -> Option<&'g Array2<Self>> {
+        gram.full.as_ref()
+    }
+}
+
+impl Precision for f64 {
+    fn of(value: f64) -> Self {
+        value
+    }
+
+    fn all<'g>(_: &'g Gram<'_>) -> Option<&'g Array2<Self>> {
+        None
+    }
+}
+
 /// Kernel values among the training rows.
 pub(super) struct Gram<'a> {
     x: ArrayView2<'a, f64>,
@@ -152,9 +180,9 @@ impl<'a> Gram<'a> {
     }
 
     /// Kernel of training row `row` with each of `others`.
-    pub(super) fn fill(&self, row: u32, others: &[u32], out: &mut [f32]) {
+    pub(super) fn fill<T: Precision>(&self, row: u32, others: &[u32], out: &mut [T]) {
         let i = row as usize;
-        if let Some(full) = &self.full {
+        if let Some(full) = T::all(self) {
             let values = full.row(i);
             let values = values.to_slice().expect("standard layout");
             out.iter_mut().zip(others).for_each(|(to, &j)| *to = values[j as usize]);
@@ -163,7 +191,7 @@ impl<'a> Gram<'a> {
         let a = self.x.row(i);
         let value = |j: u32| {
             let j = j as usize;
-            self.function.finish(a.dot(&self.x.row(j)), self.norms[i], self.norms[j]) as f32
+            T::of(self.function.finish(a.dot(&self.x.row(j)), self.norms[i], self.norms[j]))
         };
         if others.len() * self.x.ncols() < PARALLEL_WORK {
             out.iter_mut().zip(others).for_each(|(to, &j)| *to = value(j));
@@ -172,9 +200,19 @@ impl<'a> Gram<'a> {
         }
     }
 
+    /// K(row, row).
+    pub(super) fn diagonal(&self, row: u32) -> f64 {
+        let norm = self.norms[row as usize];
+        self.function.finish(norm, norm, norm)
+    }
+
     /// The kernel matrix of some rows, for a solver.
-    pub(super) fn rows<'b>(&'b self, rows: &'b [u32], cache_bytes: usize) -> Rows<'b, 'a> {
-        let per_row = size_of::<f32>() * rows.len().max(1);
+    pub(super) fn rows<'b, T: Precision>(
+        &'b self,
+        rows: &'b [u32],
+        cache_bytes: usize,
+    ) -> Rows<'b, 'a, T> {
+        let per_row = size_of::<T>() * rows.len().max(1);
         Rows {
             gram: self,
             rows,
@@ -187,41 +225,31 @@ impl<'a> Gram<'a> {
     }
 }
 
-struct Slot {
+struct Slot<T> {
     row: usize,
     used: u64,
-    values: Vec<f32>,
+    values: Vec<T>,
 }
 
 /// Rows of a kernel matrix with the least recently used ones forgotten when memory is used up.
-pub(super) struct Rows<'a, 'x> {
+pub(super) struct Rows<'a, 'x, T> {
     gram: &'a Gram<'x>,
     rows: &'a [u32],
     capacity: usize,
-    slots: Vec<Slot>,
+    slots: Vec<Slot<T>>,
     slot_of: Vec<u32>,
     clock: u64,
 }
 
-impl Rows<'_, '_> {
-    pub(super) fn len(&self) -> usize {
-        self.rows.len()
-    }
-
-    /// K(i, i).
-    pub(super) fn diagonal(&self, i: usize) -> f64 {
-        let norm = self.gram.norms[self.rows[i] as usize];
-        self.gram.function.finish(norm, norm, norm)
-    }
-
+impl<T: Precision> Rows<'_, '_, T> {
     /// Row `i`.
-    pub(super) fn one(&mut self, i: usize) -> &[f32] {
+    pub(super) fn one(&mut self, i: usize) -> &[T] {
         let slot = self.load(i);
         &self.slots[slot].values
     }
 
     /// Rows `i` and `j`.
-    pub(super) fn two(&mut self, i: usize, j: usize) -> (&[f32], &[f32]) {
+    pub(super) fn two(&mut self, i: usize, j: usize) -> (&[T], &[T]) {
         // The first is now the most recently used: loading the second leaves it in place.
         let first = self.load(i);
         let second = self.load(j);
@@ -236,7 +264,7 @@ impl Rows<'_, '_> {
             return slot;
         }
         let slot = if self.slots.len() < self.capacity {
-            self.slots.push(Slot { row: i, used: 0, values: vec![0.0; self.rows.len()] });
+            self.slots.push(Slot { row: i, used: 0, values: vec![T::default(); self.rows.len()] });
             self.slots.len() - 1
         } else {
             let oldest = self.slots.iter().enumerate().min_by_key(|(_, s)| s.used);

@@ -1,7 +1,7 @@
 //! Sequential minimal optimisation with second-order working set selection (Fan, Chen & Lin 2005)
 //! for min ½αᵀQα − Σα, 0 ≤ αᵢ ≤ Cᵢ, yᵀα = 0, with Qᵢⱼ = yᵢyⱼK(i, j).
 
-use super::kernel::Rows;
+use super::kernel::{Gram, Precision, Rows};
 use crate::error::{ModelError, Result};
 
 /// The optimum: f(x) = Σ yᵢαᵢK(i, x) − ρ.
@@ -16,67 +16,122 @@ const TAU: f64 = 1e-12;
 /// Steps after which no optimum is near; scikit-learn goes on for ever.
 pub(super) const MOST_STEPS: usize = 100_000_000;
 
-pub(super) fn solve(
-    kernel: &mut Rows<'_, '_>,
-    y: &[f64],
-    bound: &[f64],
-    (tol, most_steps): (f64, usize),
-) -> Result<Solution> {
-    let n = kernel.len();
-    let diagonal: Vec<f64> = (0..n).map(|i| kernel.diagonal(i)).collect();
-    let mut alpha = vec![0.0; n];
-    // y·gradient, so that no sign has to be looked up in the loops.
-    let mut slope: Vec<f64> = y.iter().map(|y| -y).collect();
-    let (mut is_optimum, mut steps) = (false, 0);
-    while steps < most_steps {
-        steps += 1;
-        let state = State { alpha: &alpha, y, bound };
-        let partner = state.up(&slope).and_then(|(i, steepest)| {
-            let row = kernel.one(i);
-            Some((i, state.down(&slope, i, steepest, row, &diagonal, tol)?))
-        });
-        let Some((i, j)) = partner else {
-            is_optimum = true;
-            break;
+/// A two-class problem: y is 1 or -1, and no α goes beyond its bound.
+pub(super) struct Problem<'a> {
+    pub y: &'a [f64],
+    pub bound: &'a [f64],
+    pub tol: f64,
+    pub most_steps: usize,
+}
+
+impl Problem<'_> {
+    /// Searches with kernel values in single precision, then, where their rounding could be seen, from
+    /// there in double precision.
+    pub(super) fn solve(
+        &self,
+        gram: &Gram<'_>,
+        rows: &[u32],
+        cache_bytes: usize,
+    ) -> Result<Solution> {
+        let mut search = Search {
+            problem: self,
+            diagonal: rows.iter().map(|&row| gram.diagonal(row)).collect(),
+            alpha: vec![0.0; rows.len()],
+            slope: self.y.iter().map(|y| -y).collect(),
+            steps: 0,
         };
-        let (row_i, row_j) = kernel.two(i, j);
-        let curvature = (diagonal[i] + diagonal[j] - 2.0 * f64::from(row_i[j])).max(TAU);
-        let (old_i, old_j) = (alpha[i], alpha[j]);
-        // Along the line that keeps yᵀα: αᵢ += yᵢ·step, αⱼ −= yⱼ·step.
-        let step = (slope[j] - slope[i]) / curvature;
-        let room = |a: f64, y: f64, c: f64, forth: bool| if (y > 0.0) == forth { c - a } else { a };
-        let room_i = room(old_i, y[i], bound[i], true);
-        let room_j = room(old_j, y[j], bound[j], false);
-        let step = step.min(room_i).min(room_j);
-        // A bound that is reached is met exactly.
-        alpha[i] = snap(old_i + y[i] * step, step == room_i, y[i] > 0.0, bound[i]);
-        alpha[j] = snap(old_j - y[j] * step, step == room_j, y[j] < 0.0, bound[j]);
-        let (change_i, change_j) = (y[i] * (alpha[i] - old_i), y[j] * (alpha[j] - old_j));
-        if change_i == 0.0 && change_j == 0.0 {
-            // Rounding hides the step, and every further one.
-            break;
+        search.go_on(&mut gram.rows::<f32>(rows, cache_bytes))?;
+        if search.rounding() > self.tol {
+            let mut exact = gram.rows::<f64>(rows, cache_bytes);
+            search.correct(&mut exact);
+            search.go_on(&mut exact)?;
         }
-        for ((s, &ki), &kj) in slope.iter_mut().zip(row_i).zip(row_j) {
-            *s += change_i * f64::from(ki) + change_j * f64::from(kj);
+        let rho = search.state().rho(&search.slope);
+        Ok(Solution { alpha: search.alpha, rho })
+    }
+}
+
+struct Search<'a> {
+    problem: &'a Problem<'a>,
+    diagonal: Vec<f64>,
+    alpha: Vec<f64>,
+    /// y·gradient, so that no sign has to be looked up in the loops
+    slope: Vec<f64>,
+    steps: usize,
+}
+
+impl Search<'_> {
+    fn state(&self) -> State<'_> {
+        State { alpha: &self.alpha, y: self.problem.y, bound: self.problem.bound }
+    }
+
+    /// How far rounded kernel values may have led the slopes astray: some standard deviations.
+    fn rounding(&self) -> f64 {
+        let terms = self.alpha.iter().zip(&self.diagonal);
+        let spread = terms.map(|(alpha, k)| alpha * alpha * k).sum::<f64>();
+        let most = self.diagonal.iter().copied().fold(0.0, f64::max);
+        2.0 * f64::from(f32::EPSILON) * (spread * most).sqrt()
+    }
+
+    /// The slopes anew.
+    fn correct(&mut self, kernel: &mut Rows<'_, '_, f64>) {
+        let y = self.problem.y;
+        self.slope = y.iter().map(|y| -y).collect();
+        for (i, &alpha) in self.alpha.iter().enumerate().filter(|(_, alpha)| **alpha > 0.0) {
+            let row = kernel.one(i);
+            self.slope.iter_mut().zip(row).for_each(|(s, &k)| *s += alpha * y[i] * k);
         }
     }
-    let rho = State { alpha: &alpha, y, bound }.rho(&slope);
-    if !rho.is_finite() {
-        return Err(ModelError::Numerical {
-            owner: "svm",
-            reason: "the optimisation overflowed: standardise the features first".into(),
-        });
-    }
-    if !is_optimum {
-        return Err(ModelError::Numerical {
-            owner: "svm",
-            reason: format!(
-                "no optimum found after {steps} steps: standardise the features, lower C, or raise \
-                 tol"
+
+    fn go_on<T: Precision>(&mut self, kernel: &mut Rows<'_, '_, T>) -> Result<()> {
+        let Problem { y, bound, tol, most_steps } = *self.problem;
+        let Self { diagonal, alpha, slope, steps, .. } = self;
+        let mut is_optimum = false;
+        while *steps < most_steps {
+            *steps += 1;
+            let state = State { alpha, y, bound };
+            let partner = state.up(slope).and_then(|(i, steepest)| {
+                let row = kernel.one(i);
+                Some((i, state.down(slope, i, steepest, row, diagonal, tol)?))
+            });
+            let Some((i, j)) = partner else {
+                is_optimum = true;
+                break;
+            };
+            let (row_i, row_j) = kernel.two(i, j);
+            let curvature = (diagonal[i] + diagonal[j] - 2.0 * row_i[j].into()).max(TAU);
+            let (old_i, old_j) = (alpha[i], alpha[j]);
+            // Along the line that keeps yᵀα: αᵢ += yᵢ·step, αⱼ −= yⱼ·step.
+            let step = (slope[j] - slope[i]) / curvature;
+            let room =
+                |a: f64, y: f64, c: f64, forth: bool| if (y > 0.0) == forth { c - a } else { a };
+            let room_i = room(old_i, y[i], bound[i], true);
+            let room_j = room(old_j, y[j], bound[j], false);
+            let step = step.min(room_i).min(room_j);
+            // A bound that is reached is met exactly.
+            alpha[i] = snap(old_i + y[i] * step, step == room_i, y[i] > 0.0, bound[i]);
+            alpha[j] = snap(old_j - y[j] * step, step == room_j, y[j] < 0.0, bound[j]);
+            let (change_i, change_j) = (y[i] * (alpha[i] - old_i), y[j] * (alpha[j] - old_j));
+            if change_i == 0.0 && change_j == 0.0 {
+                // Rounding hides the step, and every further one.
+                break;
+            }
+            for ((s, &ki), &kj) in slope.iter_mut().zip(row_i).zip(row_j) {
+                *s += change_i * ki.into() + change_j * kj.into();
+            }
+        }
+        let reason = match is_optimum {
+            _ if !self.state().rho(&self.slope).is_finite() => {
+                "the optimisation overflowed: standardise the features first".into()
+            }
+            true => return Ok(()),
+            false => format!(
+                "no optimum found after {} steps: standardise the features, lower C, or raise tol",
+                self.steps
             ),
-        });
+        };
+        Err(ModelError::Numerical { owner: "svm", reason })
     }
-    Ok(Solution { alpha, rho })
 }
 
 fn snap(value: f64, reached: bool, rising: bool, bound: f64) -> f64 {
@@ -116,12 +171,12 @@ impl State<'_> {
     }
 
     /// The partner that gains most to second order; `None` when the conditions hold within `tol`.
-    fn down(
+    fn down<T: Precision>(
         &self,
         slope: &[f64],
         i: usize,
         steepest: f64,
-        row: &[f32],
+        row: &[T],
         diagonal: &[f64],
         tol: f64,
     ) -> Option<usize> {
@@ -134,7 +189,7 @@ impl State<'_> {
             lowest = lowest.max(s);
             let difference = steepest + s;
             if difference > 0.0 {
-                let curvature = (diagonal[i] + diagonal[t] - 2.0 * f64::from(row[t])).max(TAU);
+                let curvature = (diagonal[i] + diagonal[t] - 2.0 * row[t].into()).max(TAU);
                 let gain = difference * difference / curvature;
                 if best.is_none_or(|(_, b)| gain >= b) {
                     best = Some((t, gain));

@@ -25,8 +25,13 @@ pub(super) struct TwoClass<'a, 'x> {
 impl TwoClass<'_, '_> {
     /// The machine.
     pub(super) fn solve(&self) -> Result<smo::Solution> {
-        let mut rows = self.gram.rows(&self.rows, self.cache_bytes);
-        smo::solve(&mut rows, &self.signs, &self.bounds, (self.tol, self.most_steps))
+        let problem = smo::Problem {
+            y: &self.signs,
+            bound: &self.bounds,
+            tol: self.tol,
+            most_steps: self.most_steps,
+        };
+        problem.solve(self.gram, &self.rows, self.cache_bytes)
     }
 
     /// The problem restricted to some of its rows.
