@@ -1,15 +1,14 @@
 //! Uncertainty of a score by resampling.
 
-use rand::Rng;
-use rand::SeedableRng;
-use rand_xoshiro::Xoshiro256PlusPlus;
+use std::cell::Cell;
+
+use corsmal_models::scores::intervals;
 
 /// Resamples of each interval.
 const RESAMPLES: usize = 1000;
 
-/// The 95 % percentile interval of `score` over bootstrap samples: whole groups are drawn with
-/// replacement, as many as there are. `groups` are rows that belong together; `score` takes the rows
-/// of a sample. None for fewer than two groups or where the score is not finite.
+/// The 95 % percentile interval of `score` over bootstrap samples: whole groups are drawn. `groups` are rows that belong
+/// together; `score` takes the rows of a sample. None for fewer than two groups or where the score is not finite.
 pub(super) fn bootstrap(
     groups: &[Vec<usize>],
     seed: u64,
@@ -18,22 +17,13 @@ pub(super) fn bootstrap(
     if groups.len() < 2 {
         return None;
     }
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut scores = Vec::with_capacity(RESAMPLES);
-    let mut rows = Vec::new();
-    for _ in 0..RESAMPLES {
-        rows.clear();
-        for _ in 0..groups.len() {
-            rows.extend_from_slice(&groups[random.gen_range(0..groups.len())]);
-        }
-        scores.push(score(&rows));
-    }
-    if scores.iter().any(|s| !s.is_finite()) {
-        return None;
-    }
-    scores.sort_unstable_by(f64::total_cmp);
-    let at = |share: f64| scores[(share * (RESAMPLES - 1) as f64).round() as usize];
-    Some((at(0.025), at(0.975)))
+    let is_finite = Cell::new(true);
+    let [interval] = intervals(groups, RESAMPLES, seed, |rows| {
+        let score = score(rows);
+        is_finite.set(is_finite.get() && score.is_finite());
+        [score]
+    });
+    is_finite.get().then_some((interval.low, interval.high))
 }
 
 #[cfg(test)]

@@ -4,14 +4,12 @@ mod groups;
 
 use std::collections::{HashMap, HashSet};
 
-use rand::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
 use crate::error::{ModelError, Result};
 use crate::labels::{Labels, alike};
 use crate::predictions::{Id, PredictionError, PredictionTable};
-use crate::scores::{Scores, Tally, check_spelling, units};
+use crate::scores::{Interval, Scores, Tally, check_spelling, drawn, units};
 
 /// McNemar's exact test.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -93,14 +91,8 @@ pub fn bootstrap<S: AsRef<str>>(
         };
         f1(second) - f1(first)
     };
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut found = Vec::with_capacity(resamples.min(1 << 20));
-    for _ in 0..resamples {
-        let drawn = (0..units.len()).flat_map(|_| units[rng.gen_range(0..units.len())].iter());
-        found.push(difference(&drawn.copied().collect::<Vec<_>>()));
-    }
-    found.sort_by(f64::total_cmp);
-    let at = |part: f64| found[((resamples - 1) as f64 * part).round() as usize];
+    let [found] = drawn(&units, resamples, seed, |rows| [difference(rows)]);
+    let Interval { low, high } = Interval::of(&found);
     let part = |holds: fn(&f64) -> bool| {
         found.iter().filter(|d| holds(d)).count() as f64 / resamples as f64
     };
@@ -111,8 +103,8 @@ pub fn bootstrap<S: AsRef<str>>(
     let all: Vec<usize> = (0..truth.len()).collect();
     Ok(Bootstrap {
         difference: difference(&all),
-        low: at(0.025),
-        high: at(0.975),
+        low,
+        high,
         p_value: (units.len() >= FEWEST).then_some((2.0 * tail).max(least).min(1.0)),
     })
 }

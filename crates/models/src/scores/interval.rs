@@ -15,6 +15,17 @@ pub struct Interval {
     pub high: f64,
 }
 
+impl Interval {
+    /// Of sorted scores.
+    pub(crate) fn of(scores: &[f64]) -> Self {
+        let at = |part: f64| {
+            let place = (scores.len().saturating_sub(1) as f64 * part).round() as usize;
+            scores.get(place).copied().unwrap_or(f64::NAN)
+        };
+        Self { low: at(0.025), high: at(0.975) }
+    }
+}
+
 /// Rows that are drawn together: those of each group, or each row by itself.
 pub(crate) fn units<S: AsRef<str>>(rows: usize, groups: Option<&[S]>) -> Vec<Vec<usize>> {
     let Some(groups) = groups else { return (0..rows).map(|row| vec![row]).collect() };
@@ -23,15 +34,26 @@ pub(crate) fn units<S: AsRef<str>>(rows: usize, groups: Option<&[S]>) -> Vec<Vec
     units.into_values().collect()
 }
 
-/// The interval of each score of drawn rows.
-pub(super) fn intervals<const N: usize>(
+/// The interval of each score of rows that are drawn with replacement, all those of a unit together, as many units as
+/// there are.
+pub fn intervals<const N: usize>(
     units: &[Vec<usize>],
     draws: usize,
     seed: u64,
     scores: impl Fn(&[usize]) -> [f64; N],
 ) -> [Interval; N] {
+    drawn(units, draws, seed, scores).map(|all| Interval::of(&all))
+}
+
+/// The scores of the rows of each draw, from the least to the greatest.
+pub(crate) fn drawn<const N: usize>(
+    units: &[Vec<usize>],
+    draws: usize,
+    seed: u64,
+    scores: impl Fn(&[usize]) -> [f64; N],
+) -> [Vec<f64>; N] {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut found: [Vec<f64>; N] = std::array::from_fn(|_| Vec::with_capacity(draws));
+    let mut found: [Vec<f64>; N] = std::array::from_fn(|_| Vec::with_capacity(draws.min(1 << 20)));
     let mut rows = Vec::new();
     for _ in 0..draws {
         rows.clear();
@@ -40,12 +62,6 @@ pub(super) fn intervals<const N: usize>(
         }
         found.iter_mut().zip(scores(&rows)).for_each(|(all, score)| all.push(score));
     }
-    found.map(|mut all| {
-        all.sort_by(f64::total_cmp);
-        let at = |part: f64| {
-            let place = (all.len().saturating_sub(1) as f64 * part).round() as usize;
-            all.get(place).copied().unwrap_or(f64::NAN)
-        };
-        Interval { low: at(0.025), high: at(0.975) }
-    })
+    found.iter_mut().for_each(|all| all.sort_by(f64::total_cmp));
+    found
 }
