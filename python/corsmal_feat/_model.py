@@ -219,7 +219,13 @@ class TrainedModel:
         for row in [] if any_rate else outcomes:
             reason = self.refusal(row.get("sample_rate"), row.get("channels"))
             if reason is not None:
-                raise ParameterError(f"{row['path']}: {reason}; any_rate=True accepts it as it is")
+                advice = (
+                    "average the channels before, or extract and train with"
+                    ' set={"signal.channels": "mean"}'
+                    if "channel" in reason
+                    else "any_rate=True accepts it as it is"
+                )
+                raise ParameterError(f"{row['path']}: {reason}; {advice}")
         strange = self._model.length_warning(lengths(outcomes))
         if strange is not None:
             warn(strange)

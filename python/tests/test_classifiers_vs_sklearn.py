@@ -213,3 +213,27 @@ def test_scikit_learns_own_checks(estimator, check):
     if name in NOT_OURS:
         pytest.skip(NOT_OURS[name])
     check(estimator)
+
+
+@pytest.mark.parametrize("name", ["RandomForest", "ExtraTrees"])
+def test_class_weights_of_forests_are_chances(name):
+    """With a bootstrap, weights of classes lowered the probability of the class that they raise."""
+    rng = np.random.default_rng(0)
+    y = (rng.random(2000) < 0.1).astype(int)
+    x = rng.standard_normal((2000, 6))
+    x[:, 0] += 1.2 * y
+    x[:, 1] -= 0.8 * y
+    rows = np.where(y[:1000] == 1, 9.0, 1.0)
+    theirs, ours = getattr(ensemble, f"{name}Classifier"), globals()[name]
+
+    def rare(kind, weights=None, **parameters):
+        forest = kind(200, bootstrap=True, random_state=0, **parameters)
+        forest.fit(x[:1000], y[:1000], sample_weight=weights)
+        return forest.predict_proba(x[1000:])[:, 1].mean()
+
+    for parameters in ({}, {"class_weight": {0: 1.0, 1: 9.0}}, {"class_weight": "balanced"}):
+        assert rare(ours, **parameters) == pytest.approx(rare(theirs, **parameters), abs=0.015)
+        weighted = rare(ours, rows, **parameters)
+        assert weighted == pytest.approx(rare(theirs, rows, **parameters), abs=0.015)
+    # The same chances, the same forest.
+    assert rare(ours, class_weight={0: 1.0, 1: 9.0}) == rare(ours, rows)

@@ -27,7 +27,7 @@ pub(crate) fn warning(table: &LabelledTable, folds: &[Fold]) -> Option<String> {
     let &(tested, trained) = found.iter().min()?;
     Some(format!(
         "{} of {} rows {what} a row that is trained on when they are tested, such as {} and {}: if \
-         they are copies of one recording, the scores are better than they would be on other \
+         they are copies of one recording, and not silence, the scores are better than they would be on other \
          recordings; leave copies out, or let --groups name a column with one value for all copies",
         found.len(),
         first.len(),

@@ -149,7 +149,10 @@ pub enum ModelError {
         purpose: &'static str,
     },
     /// Fewer groups than folds.
-    #[error("{groups} groups are too few for {folds} folds")]
+    #[error(
+        "{groups} groups are too few for {folds} folds: ask for at most {groups}, or for none, which holds out each group \
+         once"
+    )]
     TooFewGroups {
         /// different groups
         groups: usize,

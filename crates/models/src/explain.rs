@@ -44,7 +44,8 @@ fn stem(name: &str) -> &str {
     let outer = name.split(['[', '.']).next().unwrap_or(name);
     let inner = name.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(i, _)| i);
     match inner {
-        Some(part) if part.starts_with(|c: char| !c.is_ascii_digit()) => {
+        // Coefficients of `poly_features` are called `f^2`.
+        Some(part) if part.starts_with(|c: char| !c.is_ascii_digit()) && !part.contains('^') => {
             let number = part.char_indices().find(|(i, c)| {
                 *c == '_' && part[i + 1..].starts_with(|c: char| c.is_ascii_digit())
             });

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use crate::copies;
 use crate::dataset::{LabelledTable, Result};
 use crate::error::ModelError;
-use crate::labels::{Labels, alike, is_missing, missing};
+use crate::labels::{Labels, alike, is_missing, measured, missing};
 use crate::splits::{self, Fold};
 use crate::targets::Classes;
 use crate::words::count;
@@ -70,7 +70,7 @@ impl FromStr for CvPlan {
 impl fmt::Display for CvPlan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Group(column) => write!(f, "one group of {column} held out"),
+            Self::Group(column) => write!(f, "each {column} once"),
             Self::K(k) => write!(f, "{k} folds"),
             Self::Lists(lists) => write!(f, "{} lists of groups", lists.len()),
             Self::Fold(column) => write!(f, "the folds of column {column}"),
@@ -159,6 +159,7 @@ impl Folds {
             && table.ids.len() > 1
             && table.column(RECORDING).is_ok_and(|values| Labels::of(&values).0.len() == 1);
         let mut odd = alike(labels);
+        odd.extend(measured(labels, classes.len()));
         if one {
             odd.push(ONE_RECORDING.into());
         }
@@ -226,11 +227,16 @@ impl Folds {
     /// What is odd, in words: classes that look the same, rows that are all parts of one recording or
     /// copies of one another, classes that some fold tests without having trained on them.
     pub fn warnings(&self, classes: &Classes) -> Vec<String> {
-        let one = |(class, fold): (usize, &str)| {
-            format!("fold {fold}: class {} has no training rows", self.names[class])
-        };
-        let untrained = self.untrained(classes).into_iter().map(one);
-        self.odd.iter().cloned().chain(untrained).collect()
+        let untrained = self.untrained(classes);
+        let of_fold = untrained.chunk_by(|(_, a), (_, b)| a == b).map(|classes| {
+            let (class, fold) = classes[0];
+            let first = &self.names[class];
+            match classes.len() {
+                1 => format!("fold {fold}: class {first} has no training rows"),
+                n => format!("fold {fold}: {n} classes have no training rows, such as {first}"),
+            }
+        });
+        self.odd.iter().cloned().chain(of_fold).collect()
     }
 
     /// Classes that some fold tests without having trained on them, each with the fold.

@@ -110,6 +110,20 @@ pub fn alike(labels: &Labels) -> Vec<String> {
     found
 }
 
+/// Classes that are probably measurements, in words: whole numbers of which hardly any occurs twice.
+pub fn measured(labels: &Labels, rows: usize) -> Option<String> {
+    const FEWEST: usize = 12;
+    let classes = labels.len();
+    let is_many = classes >= FEWEST && 2 * classes > rows;
+    let is_measured = is_many && labels.names().iter().all(|name| name.parse::<i128>().is_ok());
+    is_measured.then(|| {
+        format!(
+            "{classes} whole numbers are classes of {rows} rows: if they measure something, no classifier learns that; \
+             fit a regression on corsmal_feat.load_features(FILE).summary in Python"
+        )
+    })
+}
+
 /// What names have in common that differ only in case, in spaces around them, or in how Unicode composes
 /// their letters.
 pub(crate) fn caseless(name: &str) -> String {
@@ -152,5 +166,14 @@ mod tests {
     #[test]
     fn cells_without_a_value_are_counted() {
         assert_eq!(missing(&["", "NaN", "nan", "0", "no", "inf"]), 3);
+    }
+
+    #[test]
+    fn measurements_are_told_from_classes() {
+        let of = |n: usize| Labels::of(&(0..n).map(|i| i.to_string()).collect::<Vec<_>>()).0;
+        assert!(measured(&of(57), 60).unwrap().contains("57 whole numbers are classes of 60 rows"));
+        assert_eq!((measured(&of(57), 400), measured(&of(5), 6)), (None, None));
+        let names = Labels::of(&(0..20).map(|i| format!("x{i}")).collect::<Vec<_>>()).0;
+        assert_eq!(measured(&names, 20), None);
     }
 }

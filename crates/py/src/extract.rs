@@ -128,6 +128,9 @@ pub(crate) fn extract(
         overwrite,
         max_errors: None,
     };
+    if span.is_some() {
+        config.check_for_windows().map_err(config_error)?;
+    }
     let told = Told::default();
     let work = |stop: &Arc<AtomicBool>| {
         let found = inputs::collect_until(&paths, stop).map_err(input_error)?;

@@ -1,8 +1,8 @@
 //! Bands of a spectrogram along different axes of frequency.
 
 use corsmal_dsp::error::DspError;
-use corsmal_dsp::mel::{MelParams, hz_to_mel, mel_filter};
-use ndarray::Array2;
+use corsmal_dsp::mel::{MelParams, hz_to_mel, mel_filter, mel_to_hz};
+use ndarray::{Array2, ArrayViewMut1};
 
 /// How frequencies are spread over the height of a spectrogram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -39,9 +39,8 @@ impl FrequencyAxis {
         (0..=bands).map(|i| edge(at(i))).collect()
     }
 
-    /// Weights of a power spectrum's bins in each of `bands` bands, `[bands, 1 + n_fft / 2]`. Off the
-    /// mel scale, a band is the mean over its bins, or lies between the nearest two where it is
-    /// narrower than one.
+    /// Weights of a power spectrum's bins in each of `bands` bands, `[bands, 1 + n_fft / 2]`. A band is the
+    /// mean over its bins, or lies between the nearest two where it is narrower than one.
     pub(crate) fn bank(
         self,
         bands: usize,
@@ -50,8 +49,7 @@ impl FrequencyAxis {
         highest: f64,
     ) -> Result<Array2<f32>, DspError> {
         if self == Self::Mel {
-            let params = MelParams::new(sample_rate, n_fft);
-            return mel_filter(&MelParams { n_mels: bands, fmax: Some(highest), ..params });
+            return mel_bank(bands, n_fft, sample_rate, highest);
         }
         let width = sample_rate / n_fft as f64;
         let last = n_fft / 2;
@@ -60,13 +58,7 @@ impl FrequencyAxis {
             let (from, to) = (ends[0] / width, ends[1] / width);
             let bins: Vec<usize> = (from.ceil() as usize..to.ceil() as usize).collect();
             if bins.is_empty() {
-                let middle = ((from + to) / 2.0).min(last as f64);
-                let below = middle.floor() as usize;
-                let share = (middle - below as f64) as f32;
-                bank[[band, below]] = 1.0 - share;
-                if share > 0.0 {
-                    bank[[band, below + 1]] = share;
-                }
+                lie_between(bank.row_mut(band), (from + to) / 2.0, 1.0);
             } else {
                 for bin in bins.iter().filter(|bin| **bin <= last) {
                     bank[[band, *bin]] = 1.0 / bins.len() as f32;
@@ -98,6 +90,38 @@ impl FrequencyAxis {
         let inside = wanted.into_iter().filter(|hz| *hz < highest);
         let placed = inside.map(|hz| (hz, self.place(hz, highest)));
         placed.filter(|(_, place)| *place >= 0.0).collect()
+    }
+}
+
+/// Of the mel scale, bands that are narrow for the bins lie between the nearest two: some would have none.
+fn mel_bank(
+    bands: usize,
+    n_fft: usize,
+    sample_rate: f64,
+    highest: f64,
+) -> Result<Array2<f32>, DspError> {
+    let params = MelParams::new(sample_rate, n_fft);
+    let mut bank = mel_filter(&MelParams { n_mels: bands, fmax: Some(highest), ..params })?;
+    let (width, top) = (sample_rate / n_fft as f64, hz_to_mel(highest, false));
+    let edge = |i: usize| mel_to_hz(top * i as f64 / (bands + 1) as f64, false) / width;
+    for (band, row) in bank.outer_iter_mut().enumerate() {
+        if edge(band + 2) - edge(band) < 2.0 {
+            // As much as a band whose weights have the sum that Slaney's have.
+            lie_between(row, edge(band + 1), (1.0 / width) as f32);
+        }
+    }
+    Ok(bank)
+}
+
+/// Makes a band a share of the two bins around a place.
+fn lie_between(mut row: ArrayViewMut1<'_, f32>, place: f64, sum: f32) {
+    let place = place.min((row.len() - 1) as f64);
+    let below = place.floor() as usize;
+    let share = (place - below as f64) as f32;
+    row.fill(0.0);
+    row[below] = sum * (1.0 - share);
+    if share > 0.0 {
+        row[below + 1] = sum * share;
     }
 }
 
@@ -143,5 +167,20 @@ mod tests {
         let linear: Vec<f64> =
             FrequencyAxis::Linear.labelled(22_050.0).into_iter().map(|l| l.0).collect();
         assert_eq!(linear, [0.0, 5000.0, 10_000.0, 15_000.0, 20_000.0]);
+    }
+
+    /// Bands without a bin were black stripes.
+    #[test]
+    fn white_noise_is_even_on_the_mel_axis() {
+        for (rate, n_fft) in [(44_100.0, 1024), (16_000.0, 512), (8000.0, 512)] {
+            for highest in [300.0, 1000.0, 2000.0, rate / 2.0] {
+                let bank = FrequencyAxis::Mel.bank(64, n_fft, rate, highest).unwrap();
+                let even = rate / n_fft as f64;
+                for (band, row) in bank.outer_iter().enumerate() {
+                    let sum = f64::from(row.sum()) * even;
+                    assert!((0.5..2.0).contains(&sum), "{rate} {highest} {band}: {sum}");
+                }
+            }
+        }
     }
 }

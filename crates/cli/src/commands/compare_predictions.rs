@@ -113,7 +113,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     if let Some((by_group, column)) =
         report.bootstrap_groups.as_ref().zip(report.grouped_by.as_ref())
     {
-        print(&format!("{} values of {column}", report.groups), by_group, args.resamples);
+        print(&format!("{} groups (column {column})", report.groups), by_group, args.resamples);
     }
     if let Some(by_fold) = &report.bootstrap_folds {
         print(&format!("{} folds", report.folds), by_fold, args.resamples);

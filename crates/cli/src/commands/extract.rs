@@ -13,6 +13,7 @@ use corsmal_extract::survey::Survey;
 use corsmal_files::npz::Compression;
 use corsmal_files::quote::printable_line;
 use corsmal_files::shard::Shard;
+use serde_json::json;
 
 use crate::args::{Jobs, Told};
 use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
@@ -158,6 +159,7 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
         None => name_recordings(found)?,
         Some(window) => {
             let span = WindowSpan { window, hop: args.hop.unwrap_or(window / 2.0) };
+            config.check_for_windows()?;
             match into_windows(found, span, stop) {
                 Err(error @ InputError::Stopped) => {
                     return Err(Failure::interrupted(error.to_string()));
@@ -166,6 +168,10 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
             }
         }
     };
+    let is_parquet = args.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
+    if args.compress && (is_parquet || args.partition_by.is_some()) {
+        return Err(Failure::new("--compress deflates the arrays of an .npz, not Parquet"));
+    }
     let options = RunOptions {
         out: args.out,
         work: args.work,
@@ -188,7 +194,14 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
             meter.warning(advice);
         }
         let inputs = options.shard.of(&found);
-        for input in inputs {
+        if args.told.json {
+            let list: Vec<_> = inputs
+                .iter()
+                .map(|input| json!({ "id": input.id, "path": input.source.to_string() }))
+                .collect();
+            println!("{}", serde_json::to_string_pretty(&list)?);
+        }
+        for input in inputs.iter().filter(|_| !args.told.json) {
             let source = printable_line(&input.source.to_string());
             println!("{}\t{source}", printable_line(&input.id));
         }

@@ -173,7 +173,7 @@ fn print_drawn(drawn: &str, units: usize) {
                 "rows of one person, place or device are not independent: name them with --groups"
             );
         }
-        column => println!("bootstrap over {units} values of {column}"),
+        column => println!("bootstrap over {units} groups (column {column})"),
     }
     if units < 10 {
         println!("with so few of them, the interval says little");

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use corsmal_models::cross_validation::{Data, choose};
 use corsmal_models::dataset::LabelledTable;
 use corsmal_models::folds::Folds;
-use corsmal_models::labels::{Labels, alike};
+use corsmal_models::labels::{Labels, alike, measured};
 use corsmal_models::model_file::{Model, ModelHeader};
 use linfa::traits::Fit;
 use serde_json::{Map, Value, json};
@@ -74,7 +74,7 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
     let candidates = args.pipeline.candidates()?;
     let (table, target) = args.dataset.load()?;
     let (labels, classes) = table.classes(&target)?;
-    for warning in alike(&labels) {
+    for warning in alike(&labels).into_iter().chain(measured(&labels, classes.len())) {
         eprintln!("warning: {warning}");
     }
     if let Some(warning) = corsmal_models::dominance(&candidates, &table) {
@@ -168,7 +168,7 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
         let apply = if table.config.is_null() { "--features OTHER.npz" } else { "YOUR_RECORDINGS" };
         println!(
             "next: corsmal-feat classify --model {out} {apply} -o predictions.csv\n      \
-             corsmal-feat cross-validate with the same arguments estimates how good it is"
+             corsmal-feat cross-validate with the same arguments but -o estimates how good it is"
         );
     }
     Ok(ExitCode::SUCCESS)

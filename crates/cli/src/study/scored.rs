@@ -139,7 +139,7 @@ pub(super) fn of_predictions(
     });
     let drawn = match scores.drawn.as_str() {
         "rows" => format!("of {} rows", scores.units),
-        column => format!("of the {} values of {column}", scores.units),
+        column => format!("of the {} groups (column {column})", scores.units),
     };
     Ok(Study {
         classes: scores.labels.clone(),

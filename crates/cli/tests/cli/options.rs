@@ -41,7 +41,15 @@ fn what_a_form_has_no_place_for_is_refused() {
     assert!(
         fuse(&["--type", "t.csv", "--mass-prior"]).contains("the format of 2020 has no masses")
     );
+    let extract = |more: &[&str]| refused(&[&["extract", "a.wav", "--compress"], more].concat());
+    assert!(extract(&["-o", "x.parquet"]).contains("not Parquet"));
     let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let (wav, out) = (at("a.wav"), at("x.npz"));
+    std::fs::write(&wav, b"RIFF").unwrap();
+    let windows = ["extract", &wav, "-o", &out, "--window", "1", "--set", "signal.end=2"];
+    let said = refused(&windows);
+    assert!(said.contains("signal.end") && said.contains("must be 0 with windows"), "{said}");
     let csv = folder.path().join("p.csv");
     std::fs::write(&csv, "id,true,predicted\na,1.5,1\nb,2,2.5\n").unwrap();
     let said = refused(&["score", csv.to_str().unwrap(), "--reject", "0.6"]);

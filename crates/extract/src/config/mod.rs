@@ -203,6 +203,21 @@ impl Config {
         value
     }
 
+    /// Refuses what would crop each window, where recordings are cut into windows.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with the key.
+    pub fn check_for_windows(&self) -> Result<(), ConfigError> {
+        let [start, end] = [self.signal.start, self.signal.end];
+        let cropped =
+            [("signal.start", start), ("signal.end", end)].into_iter().find(|(_, s)| *s != 0.0);
+        cropped.map_or(Ok(()), |(key, _)| {
+            let why = "must be 0 with windows, each of which it would crop: columns start and end of a manifest crop \
+                       recordings before they are cut";
+            Err(ConfigError::key(key, why))
+        })
+    }
+
     /// BLAKE3 of the effective configuration, in hexadecimal, without the place of a projection.
     pub fn hash(&self) -> String {
         let value = without_place(self.to_value());

@@ -64,7 +64,8 @@ impl WholeKernel for Classes {
         let tuning = match self.tuning {
             AutoOr::Value(tuning) => tuning,
             AutoOr::Auto => {
-                let pitch = PitchParams::new(sr, n_fft);
+                // librosa's guess from the number of bins, one less than an odd length.
+                let pitch = PitchParams::new(sr, n_fft / 2 * 2);
                 let found = estimate_tuning(spectrum.view(), None, pitch, RESOLUTION, n_chroma)?;
                 found.unwrap_or(0.0)
             }

@@ -145,10 +145,9 @@ impl<R: BufRead> Read for LineFeeds<R> {
                     }
                     continue;
                 }
-                let begins = self.lines.place == Place::Begin && byte != b'"';
+                let begins = self.lines.place == Place::Begin;
                 if ends || byte == b'\n' || byte == self.lines.delimiter || begins {
-                    // The field ends before them, or begins behind them. Before a quotation mark they stay: it is
-                    // text then.
+                    // The field ends before them, or begins behind them.
                     self.blanks.clear();
                 } else if let Some(&blank) = self.blanks.get(self.given) {
                     self.given += 1;

@@ -93,12 +93,9 @@ pub fn records<R: BufRead>(
     })
 }
 
-/// A field without white space around it. Blanks count: they were between quotation marks, unless a quotation mark
-/// follows, which then is text.
+/// A field without white space around it. Blanks count: they were between quotation marks.
 fn bare(field: &str) -> &str {
-    let field = field.trim_matches(|c: char| c.is_whitespace() && !BLANKS.contains(&c));
-    let inner = field.trim_start_matches(BLANKS);
-    if inner.starts_with('"') { inner } else { field }
+    field.trim_matches(|c: char| c.is_whitespace() && !BLANKS.contains(&c))
 }
 
 /// What is wrong with a table, and where.
@@ -287,9 +284,9 @@ mod tests {
         let rows = [
             ("a b , c\t,  \n", ["a b", "c", ""]),
             ("  a  b,\" c \" ,\" x \"\"y\"\" \"\n", ["a  b", " c ", " x \"y\" "]),
-            // A quotation mark behind a blank is text.
-            (" \"a\" , b\" c\" ,\t\"\"\n", ["\"a\"", "b\" c\"", "\"\""]),
-            ("f, \"12 inch, x\n", ["f", "\"12 inch", "x"]),
+            // Blanks before a quotation mark do not matter; one inside of a field is text.
+            (" \"a\" , b\" c\" ,\t\"\"\n", ["a", "b\" c\"", ""]),
+            ("f, \" a, b\"\t, 12\" x\n", ["f", " a, b", "12\" x"]),
             ("\"a\" b, ,c ", ["a b", "", "c"]),
             ("\u{a0}a\u{3000},\u{c}b\u{a0} ,\" \u{a0}\"", ["a", "b", " "]),
         ];

@@ -159,6 +159,7 @@ macro_rules! forest {
                     bootstrap: self.bootstrap,
                     out_of_bag: self.oob_score,
                     class_weight: &self.class_weight,
+                    balances_weights: true,
                     seed: self.seed,
                 }
             }
@@ -175,6 +176,8 @@ pub(super) struct Plan<'a> {
     /// whether trees are asked about the rows that they have not seen
     pub out_of_bag: bool,
     pub class_weight: &'a ClassWeight,
+    /// whether balanced classes have equal weights of rows, or equal numbers
+    pub balances_weights: bool,
     pub seed: u64,
 }
 
@@ -227,10 +230,24 @@ impl Trees {
             });
         }
         let columns = FeatureColumns::new(x)?;
-        let per_class = scaled(&plan.class_weight.per_class(y, n_classes)?);
+        let counted = weights.filter(|_| plan.balances_weights);
+        let mut per_class = scaled(&plan.class_weight.per_class_of(y, n_classes, counted)?);
         let labels: Vec<u32> = y.iter().map(|&c| c as u32).collect();
         let mut seeds = Xoshiro256PlusPlus::seed_from_u64(plan.seed);
         let seeds: Vec<u64> = (0..plan.n_trees).map(|_| seeds.next_u64()).collect();
+        // Where rows are drawn, the weight of a row's class is a part of its chance, as in scikit-learn 1.9.
+        let chances: Vec<f64> = match plan.bootstrap {
+            true => {
+                let of_class = y.iter().map(|&class| per_class[class]);
+                let of_row = |(row, of_class)| weights.map_or(1.0, |all| all[row]) * of_class;
+                of_class.enumerate().map(of_row).collect()
+            }
+            false => Vec::new(),
+        };
+        let weights = if plan.bootstrap { Some(&chances[..]) } else { weights };
+        if plan.bootstrap {
+            per_class.fill(1.0);
+        }
         // Equal weights are none, to the bit.
         let weights = weights.filter(|all| all.iter().any(|weight| *weight != all[0]));
         let upto = weights.filter(|_| plan.bootstrap).map(added_up);

@@ -11,6 +11,9 @@ use corsmal_files::quote::quoted;
 use super::error::{DatasetError, Result};
 use crate::words::count;
 
+/// Names of label columns, each with a value for every recording.
+pub(crate) type LabelColumns = Vec<(String, Vec<String>)>;
+
 /// Where labels come from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LabelSource {
@@ -137,10 +140,10 @@ impl LabelFile {
         recordings: &[(&str, &str)],
         failed: &[(&str, &str)],
         features: &Path,
-    ) -> Result<(Vec<(String, Vec<String>)>, Option<String>)> {
+    ) -> Result<(LabelColumns, Option<String>)> {
         let mut unused: HashMap<&str, u64> =
             self.rows.iter().map(|(key, line)| (key.as_str(), line.number)).collect();
-        let mut columns: Vec<(String, Vec<String>)> =
+        let mut columns: LabelColumns =
             self.columns.iter().map(|c| (c.clone(), Vec::new())).collect();
         let mut missing = Vec::new();
         let mut of_name: HashMap<&str, (&str, &str)> = HashMap::new();
@@ -224,9 +227,15 @@ impl LabelFile {
         if self.key == Key::Path {
             return by_path;
         }
-        let name = || file.file_name().and_then(|n| n.to_str()).and_then(get);
+        let last = file.file_name().and_then(|n| n.to_str());
+        let name = || last.and_then(get);
         let stem = || file.file_stem().and_then(|n| n.to_str()).and_then(get);
-        by_path.or_else(|| get(id)).or_else(name).or_else(stem)
+        // Predictions may lack paths: an id is one without its extension.
+        let named = || {
+            let stem = self.stems.get(last.filter(|_| path.is_empty() || path == id)?)?;
+            get(stem)
+        };
+        by_path.or_else(|| get(id)).or_else(name).or_else(stem).or_else(named)
     }
 }
 
@@ -267,6 +276,13 @@ mod tests {
         ] {
             assert_eq!(classes(text, key).unwrap(), ["cat", "dog"], "{text}");
         }
+        // As `cross-validate -o` has them, without paths.
+        let bare = [("a/x", "a/x"), ("b/y", "b/y")];
+        let by_name = file("file,class\ny.flac,dog\nx.wav,cat\n", Some("file")).unwrap();
+        let found = by_name.for_recordings(&bare, &[], Path::new("f.npz")).unwrap();
+        assert_eq!(found.0[0].1, ["cat", "dog"]);
+        let doubled = [("a/x", "a/x"), ("b/x", "b/x"), ("b/y", "b/y")];
+        assert!(by_name.for_recordings(&doubled, &[], Path::new("f.npz")).is_err());
         let refused = classes("file,class\nx,cat\n", None).unwrap_err().to_string();
         assert!(refused.contains("--id-column file"), "{refused}");
         let refused = classes("x,class\nx,cat\n", None).unwrap_err().to_string();

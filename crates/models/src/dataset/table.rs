@@ -276,7 +276,8 @@ impl LabelledTable {
                 name = self.empty_part(name, row);
                 "is empty: give it a value, or leave the recording out"
             } else if value.parse::<f64>().is_ok() && value.parse::<i128>().is_err() {
-                "is a decimal number; classes are whole numbers or names (score measures estimates of numbers)"
+                "is a decimal number, and no classifier learns numbers (classes are names or whole numbers): fit a regression on \
+                 corsmal_feat.load_features(FILE).summary in Python; score measures its estimates"
             } else {
                 continue;
             };

@@ -75,7 +75,11 @@ pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Fail
     let (mut unread, mut unlike, mut repairs) = (false, Vec::new(), Vec::new());
     let mut each = |input: &Input, answer: Answer| -> Result<bool, Failure> {
         repairs.push(answer.repairs.clone());
-        unlike.extend(answer.unlike.map(|seconds| (input.id.clone(), seconds)));
+        let name = match windowing {
+            None => input.id.clone(),
+            Some(_) => format!("a window of {}", input.id),
+        };
+        unlike.extend(answer.unlike.map(|seconds| (name, seconds)));
         unread = !write(&mut records, input, answer)?;
         Ok(!unread)
     };

@@ -235,11 +235,16 @@ fn predictions(
 fn check_features(model: &Model, table: &LabelledTable, meter: &Meter) -> Result<bool, Failure> {
     let (known, given) = (model.n_features(), table.x.ncols());
     if known != given {
-        let channels = table.outcomes.iter().find_map(|o| o.channels);
-        let channels = channels.map_or(String::new(), |n| format!(", of {}", plural(n, "channel")));
+        let channels = table.outcomes.iter().find_map(|o| o.channels).filter(|n| *n > 1);
+        let from = channels.map_or(String::new(), |n| format!(", of {}", plural(n, "channel")));
+        let is_mono = model.header().feature_names.iter().all(|name| !name.contains('/'));
+        let remedy = match channels.is_some() && is_mono {
+            true => "; --set signal.channels=mean mixes the channels",
+            false => "",
+        };
         let names = (&model.header().feature_names, &table.feature_names);
         let reason = format!(
-            "gives {given} features{channels}; the model was trained on {known}{}",
+            "gives {given} features{from}; the model was trained on {known}{}{remedy}",
             apart(names.0, names.1)
         );
         table.ids.iter().for_each(|id| refuse(meter, id, &reason));

@@ -99,6 +99,7 @@ impl DecisionTreeParams {
             bootstrap: false,
             out_of_bag: false,
             class_weight: &self.class_weight,
+            balances_weights: false,
             seed: self.seed,
         };
         Trees::grow(x, y, n_classes, weights, &plan).map(FittedTree::Own)
