@@ -366,7 +366,7 @@ mod tests {
         let folds = |plan: Option<&CvPlan>, groups| {
             Folds::new(plan, &grouped, groups, (&labels, &classes), 0).unwrap()
         };
-        assert_eq!(folds(None, None).description, "one group of group held out");
+        assert_eq!(folds(None, None).description, "each group once");
         let said = folds(Some(&CvPlan::K(2)), None).warnings(&classes).join(" ");
         assert!(
             said.contains("one group are in both") && said.contains("--groups group"),

@@ -151,6 +151,10 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 
 fn extract(args: Args) -> Result<ExitCode, Failure> {
     let config = Arc::new(args.config.load()?);
+    let is_parquet = args.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
+    if args.compress && (is_parquet || args.partition_by.is_some()) {
+        return Err(Failure::new("--compress deflates the arrays of an .npz, not Parquet"));
+    }
     let names: Vec<OsString> = args.inputs.into_iter().chain(args.named).collect();
     let meter = Meter::new(args.log_format, args.told.quiet);
     let stop = crate::interrupt::flag();
@@ -168,10 +172,6 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
             }
         }
     };
-    let is_parquet = args.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
-    if args.compress && (is_parquet || args.partition_by.is_some()) {
-        return Err(Failure::new("--compress deflates the arrays of an .npz, not Parquet"));
-    }
     let options = RunOptions {
         out: args.out,
         work: args.work,

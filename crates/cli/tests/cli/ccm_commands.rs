@@ -54,7 +54,7 @@ fn from_synthetic_recordings_to_the_report() {
     let kept = std::fs::read_dir(out.join("features")).unwrap().next().unwrap().unwrap().path();
     let learn = ["--features", text(&kept), "--target", "type", "--classifier", "knn"];
     let validated = run(&[&["cross-validate"], &learn[..]].concat());
-    assert!(lines(&validated.stdout).contains("one group of container held out"));
+    assert!(lines(&validated.stdout).contains("each container once"));
 
     let submission = out.join("submissions/zcr-mfcc-rf-corrected-held-out.csv");
     let annotations = Path::new(data).join("ccm_train_annotation.csv");

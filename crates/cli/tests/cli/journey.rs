@@ -195,7 +195,7 @@ fn windows_are_listened_to_where_they_are() {
     let held = j.path("held.csv");
     let more = ["-o", text(&held), "--report", text(&report)];
     let told = done(&[&validate[..], &more[..]].concat());
-    assert!(told.contains("bootstrap over 24 values of group"), "{told}");
+    assert!(told.contains("bootstrap over 24 groups (column group)"), "{told}");
     let header = std::fs::read_to_string(&held).unwrap();
     assert!(header.starts_with("id,fold,group,true,predicted,"), "{header}");
     holds(&report.join("report.html"), &["hum/ticks0@0.5", "0.50 to 1.00 s"]);

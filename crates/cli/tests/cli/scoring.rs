@@ -36,9 +36,11 @@ fn predictions_are_scored() {
     close(&rejected["scores"]["accuracy"], 0.5);
     close(&rejected["accuracy_of_known"], 1.0);
     let shown = done(&["score", text(&file), "--reject", "0.65"]);
-    for part in
-        ["3 without a prediction count as wrong", "bootstrap over 2 values of group", "unknown"]
-    {
+    for part in [
+        "3 without a prediction count as wrong",
+        "bootstrap over 2 groups (column group)",
+        "unknown",
+    ] {
         assert!(shown.contains(part), "{part}: {shown}");
     }
     assert!(shown.lines().all(|line| line.chars().count() <= 80), "{shown}");
@@ -103,7 +105,7 @@ fn windows_of_a_recording_are_drawn_together() {
     let output = run(&compare);
     let (shown, told) = [&output.stdout, &output.stderr].map(|b| String::from_utf8_lossy(b)).into();
     assert!(
-        shown.contains("over rows") && shown.contains("over 12 values of recording"),
+        shown.contains("over rows") && shown.contains("over 12 groups (column recording)"),
         "{shown}"
     );
     assert!(told.contains("rows of one recording are not independent"), "{told}");
@@ -119,7 +121,7 @@ fn windows_of_a_recording_are_drawn_together() {
     for files in [[&named, &two], [&two, &named]] {
         let output = run(&["compare-predictions", text(files[0]), text(files[1])]);
         let shown = String::from_utf8_lossy(&output.stdout);
-        assert!(shown.contains("over 12 values of recording"), "{shown}");
+        assert!(shown.contains("over 12 groups (column recording)"), "{shown}");
     }
     let lines: String = (0..12).map(|row| format!("{row},{row},x,x\n")).collect();
     let alone = put("4.csv", &format!("id,recording,true,predicted\n{lines}"));
@@ -160,7 +162,7 @@ fn files_that_disagree_about_groups_are_refused() {
     for (other, expected) in [(&some, 15), (&renamed, 15), (&placed, 15)] {
         for files in [[&one, other], [other, &one]] {
             let found = done(&["compare-predictions", text(files[0]), text(files[1])]);
-            assert!(found.contains(&format!("{expected} values of group")), "{found}");
+            assert!(found.contains(&format!("{expected} groups (column group)")), "{found}");
         }
     }
     // Without its own name, row 1 would join group b of the first file.
