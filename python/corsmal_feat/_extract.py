@@ -229,8 +229,7 @@ class SignalExtractor:
         config: Config | None = None,
         set: Mapping[str, Any] | None = None,
     ) -> None:
-        channels = size("channels", channels)
-        if channels > MAX_CHANNELS:
+        if not 1 <= channels <= MAX_CHANNELS or channels != int(channels):
             raise ParameterError(f"channels must be 1 to {MAX_CHANNELS}, not {channels}")
         signals = _core.Signals(*configuration(preset, config, set))
         self._signal = signals.start(whole_rate(sr), channels)

@@ -107,6 +107,8 @@ def _told(
             return ParameterError(f"{name} must be real, not complex")
         if isinstance(error, ZeroDivisionError) and _fits_kind(float, value) and value == 0:
             return ParameterError(f"{name} must not be 0")
+    if isinstance(error, TypeError) and "unexpected keyword argument" in str(error):
+        return None  # an unknown argument, which `**kwargs` passed on
     if isinstance(error, (*_CAUSED, MemoryError)) and not isinstance(error, AttributeError):
         return ParameterError(f"{function.__name__}: {error}")
     return None

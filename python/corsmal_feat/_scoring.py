@@ -268,7 +268,7 @@ def score(
     Raises
     ------
     ParameterError
-        A column is missing, a recording has no label, or a label has no recording.
+        A column is missing, or a recording has no label.
 
     Examples
     --------

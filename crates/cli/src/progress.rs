@@ -239,7 +239,7 @@ impl Progress for Meter {
     }
 }
 
-/// Says what happened to a program, which reads JSON: whole, however long it is.
+/// Says what happened to a program, which reads JSON, in a line that is never cut.
 fn event_line(event: &Value) {
     err_lines(&event.to_string());
 }

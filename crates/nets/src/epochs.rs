@@ -72,7 +72,7 @@ pub(crate) fn run(
         if goes_on { Ok(()) } else { Err(NetError::Stopped { epochs: epochs.len() }) }
     };
     tell(&epochs, None)?;
-    let is_short = recipe.epochs * steps_of(course.train, recipe, 0).len() < SETTLED;
+    let is_short = is_short(course, recipe);
     for epoch in resumed..recipe.epochs {
         let mut sum = 0.0;
         let steps = steps_of(course.train, recipe, epoch);
@@ -111,6 +111,11 @@ pub(crate) fn run(
         settle(course, network, recipe)?;
     }
     Ok(History { epochs, kept })
+}
+
+/// Whether a training ends before running statistics have settled.
+fn is_short(course: &Course<'_>, recipe: &Recipe) -> bool {
+    recipe.epochs * steps_of(course.train, recipe, 0).len() < SETTLED
 }
 
 /// Steps after which running statistics have forgotten what they began with.
@@ -198,7 +203,10 @@ fn trial(
     step()?;
     let work = |rows: &[usize]| rows.iter().map(|&r| course.items.work(r)).sum::<usize>() as f64;
     // Evaluation takes about a third of a step.
-    let all = (work(course.train) + work(course.watched) / 3.0) / work(rows).max(1.0);
+    let is_settled =
+        is_short(course, recipe) && !course.watched.is_empty() && !running(network).is_empty();
+    let settling = if is_settled { work(course.train) } else { 0.0 };
+    let all = (work(course.train) + work(course.watched) / 3.0 + settling) / work(rows).max(1.0);
     Ok(began.elapsed().mul_f64(all * recipe.epochs as f64))
 }
 

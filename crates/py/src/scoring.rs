@@ -109,23 +109,22 @@ pub(crate) fn fuse(
     background: Option<&str>,
     least: usize,
 ) -> PyResult<String> {
-    let rule = |labels: &[String]| match (vote, background) {
-        (None, _) => Ok(None),
-        (Some("mean"), None) => Ok(Some(VotingRule::Mean)),
-        (Some("majority"), None) => Ok(Some(VotingRule::Majority(None))),
-        (Some("majority"), Some(label)) => {
-            let labels = Labels::new(labels.to_vec()).map_err(value_error)?;
-            VotingRule::majority_over(label, least, &labels).map(Some).map_err(value_error)
-        }
-        (Some("mean"), Some(_)) => Err(value_error("background needs vote = majority")),
-        (Some(other), _) => Err(value_error(format!("vote must be majority or mean, not {other}"))),
-    };
-    if vote.is_none() && background.is_some() {
+    if background.is_some() && matches!(vote, None | Some("mean")) {
         return Err(value_error("background needs vote = majority"));
     }
     if background.is_none() && least != 1 {
         return Err(value_error("least needs background, the class that it counts against"));
     }
+    let rule = |labels: &[String]| match (vote, background) {
+        (None, _) => Ok(None),
+        (Some("mean"), _) => Ok(Some(VotingRule::Mean)),
+        (Some("majority"), None) => Ok(Some(VotingRule::Majority(None))),
+        (Some("majority"), Some(label)) => {
+            let labels = Labels::new(labels.to_vec()).map_err(value_error)?;
+            VotingRule::majority_over(label, least, &labels).map(Some).map_err(value_error)
+        }
+        (Some(other), _) => Err(value_error(format!("vote must be majority or mean, not {other}"))),
+    };
     let mut tables = Vec::with_capacity(paths.len());
     for path in &paths {
         let table = compute(py, || PredictionTable::read(path))?.map_err(value_error)?;

@@ -140,7 +140,8 @@ impl PathParts {
             .filter_map(|p| p.file_name().map(|n| n.to_string_lossy().into_owned()))
             .collect();
         let digits = stem.strip_suffix("_audio").unwrap_or(&stem);
-        // Above the part, folders are the user's: `/home/7/flat/train/audio/000000.wav` is of no container 7.
+        // Of a six-digit name, folders above the part are the user's: `/home/7/train/audio/000000.wav` is of no
+        // container 7.
         let is_part = |f: &String| {
             let f = f.to_lowercase();
             f.starts_with("train") || f.starts_with("test")

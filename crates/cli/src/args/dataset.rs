@@ -159,6 +159,11 @@ impl DatasetArgs {
         given.into_iter().flatten().next().map_or(Path::new(""), PathBuf::as_path)
     }
 
+    /// The file of labels, if there is one.
+    pub fn label_file(&self) -> Option<&Path> {
+        self.labels.file()
+    }
+
     /// All files that are read.
     pub fn files(&self) -> Vec<PathBuf> {
         let own = self.crops.as_ref().map(|folder| folder.join("labels.csv"));

@@ -131,7 +131,13 @@ fn cross_validate(args: &Args) -> Result<ExitCode, Failure> {
         print(args, &table, &validation, all_seeds.as_ref());
     }
     if let Some(folder) = &args.report {
-        report(folder, &table, &validation, (&predictions, &others), args.quiet)?;
+        report(
+            folder,
+            (&table, args.dataset.label_file()),
+            &validation,
+            (&predictions, &others),
+            args.quiet,
+        )?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -186,7 +192,7 @@ impl Seeds {
 
 fn report(
     folder: &Path,
-    table: &LabelledTable,
+    (table, labels): (&LabelledTable, Option<&Path>),
     validation: &Validation,
     (predictions, seeds): (&PredictionTable, &[(u32, Scores)]),
     quiet: bool,
@@ -208,6 +214,7 @@ fn report(
     };
     let held_out = HeldOut {
         table,
+        labels,
         target: &validation.target,
         classes: &validation.classes,
         folds: &validation.folds,
@@ -297,6 +304,7 @@ fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
     if let Some(folder) = &args.report {
         let held_out = HeldOut {
             table: &examples.table,
+            labels: args.dataset.label_file(),
             target: &found.target,
             classes: &found.classes,
             folds: &found.folds,

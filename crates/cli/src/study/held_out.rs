@@ -29,6 +29,8 @@ const SHARES: [f64; 5] = [0.1, 0.25, 0.5, 0.75, 1.0];
 pub struct HeldOut<'a> {
     /// the data
     pub table: &'a LabelledTable,
+    /// the file of labels, where there is one
+    pub labels: Option<&'a Path>,
     /// the column predicted
     pub target: &'a str,
     /// the class of each row
@@ -85,6 +87,9 @@ impl HeldOut<'_> {
         };
         recordings::add(&mut study, self.sources(), self.quiet);
         add_file(&mut study.facts, "Features", &self.table.path);
+        if let Some(labels) = self.labels {
+            add_file(&mut study.facts, "Labels", labels);
+        }
         study.facts.extend(self.facts);
         study.facts.push(Fact::new("Held out", &self.folds.description));
         let cautions = self.folds.warnings(self.classes).into_iter();

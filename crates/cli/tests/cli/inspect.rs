@@ -82,8 +82,29 @@ fn a_recording_that_lacks_samples_is_truncated() {
     let lines: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
     assert_eq!(lines[0]["status"], "ok");
     assert_eq!(lines[1]["status"], "truncated");
+    // What `extract` says of others that can be read.
+    let float = |name: &str, samples: &[f32]| {
+        let path = folder.path().join(name);
+        let spec = hound::WavSpec {
+            channels: 1,
+            sample_rate: 8000,
+            bits_per_sample: 32,
+            sample_format: hound::SampleFormat::Float,
+        };
+        let mut writer = hound::WavWriter::create(&path, spec).unwrap();
+        samples.iter().for_each(|sample| writer.write_sample(*sample).unwrap());
+        writer.finalize().unwrap();
+        path
+    };
+    for (status, samples) in
+        [("empty", &[][..]), ("non_finite", &[0.1, f32::NAN]), ("unsupported", &[0.1, 1e13])]
+    {
+        let path = float(status, samples);
+        let report = text(&inspect(&[&path, "--json".as_ref()]).stdout);
+        assert!(report.contains(&format!("\"status\": \"{status}\"")), "{report}");
+    }
     let shown = text(&inspect(&[&wav, &cut]).stdout);
-    assert!(shown.lines().any(|line| line.ends_with("; 1 repaired; truncated")), "{shown}");
+    assert!(shown.lines().any(|line| line.ends_with("; truncated; 1 repaired")), "{shown}");
 }
 
 #[test]

@@ -53,5 +53,5 @@ fn what_a_form_has_no_place_for_is_refused() {
     let csv = folder.path().join("p.csv");
     std::fs::write(&csv, "id,true,predicted\na,1.5,1\nb,2,2.5\n").unwrap();
     let said = refused(&["score", csv.to_str().unwrap(), "--reject", "0.6"]);
-    assert!(said.contains("no probabilities for --reject"), "{said}");
+    assert!(said.contains("--reject is for classes"), "{said}");
 }

@@ -126,7 +126,9 @@ fn windows_of_a_recording_are_drawn_together() {
     let lines: String = (0..12).map(|row| format!("{row},{row},x,x\n")).collect();
     let alone = put("4.csv", &format!("id,recording,true,predicted\n{lines}"));
     assert!(done(&["compare-predictions", text(&alone), text(&alone)]).contains("over recordings"));
-    assert!(done(&[&compare[..], &["--groups", "place"]].concat()).contains("12 values of place"));
+    assert!(
+        done(&[&compare[..], &["--groups", "place"]].concat()).contains("12 groups (column place)")
+    );
     // They were left out without a word.
     let output = run(&[&compare[..], &["--groups", "true"]].concat());
     let told = String::from_utf8_lossy(&output.stderr);

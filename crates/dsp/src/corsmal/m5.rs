@@ -68,7 +68,7 @@ impl M5A34f136 {
     /// # Errors
     /// As [`M5A34f136::new`].
     pub fn with_peak(sr: f64, peak: Peak) -> Result<Self> {
-        // Frames of 50 ms are as long as it asks for.
+        // Memory grows with it: a frame has 50 ms.
         if sr > MAX_SR {
             return Err(DspError::parameter("sr", sr, "at most 768,000 Hz"));
         }

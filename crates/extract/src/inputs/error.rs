@@ -3,6 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use corsmal_files::quote::printable_line;
 use thiserror::Error;
 
 /// What can be wrong with the inputs of a run.
@@ -10,13 +11,13 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum InputError {
     /// Nothing has this name.
-    #[error("{path}: no such file or folder")]
+    #[error("{}: no such file or folder", line(path))]
     Missing {
         /// The name given.
         path: PathBuf,
     },
     /// The operating system refused.
-    #[error("{path}: {source}")]
+    #[error("{}: {source}", line(path))]
     Io {
         /// The file or folder.
         path: PathBuf,
@@ -32,7 +33,7 @@ pub enum InputError {
         reason: String,
     },
     /// A folder or glob without recordings.
-    #[error("{path}: no file with an audio extension ({extensions}){skipped}")]
+    #[error("{}: no file with an audio extension ({extensions}){skipped}", line(path))]
     NoAudio {
         /// The folder or glob.
         path: PathBuf,
@@ -50,7 +51,7 @@ pub enum InputError {
         reason: String,
     },
     /// A row of a manifest that cannot be used.
-    #[error("{path}, line {line}: {reason}")]
+    #[error("{}, line {line}: {reason}", self::line(path))]
     Manifest {
         /// The manifest.
         path: PathBuf,
@@ -60,7 +61,7 @@ pub enum InputError {
         reason: String,
     },
     /// An archive that cannot be used.
-    #[error("{path}: {reason}")]
+    #[error("{}: {reason}", line(path))]
     Archive {
         /// The archive.
         path: PathBuf,
@@ -102,4 +103,9 @@ impl InputError {
     pub(crate) fn io(path: &Path, source: io::Error) -> Self {
         Self::Io { path: path.into(), source }
     }
+}
+
+/// A path on one line.
+fn line(path: &Path) -> String {
+    printable_line(&path.display().to_string())
 }

@@ -124,7 +124,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         }
         if how.numeric || numbers {
             if how.reject > 0.0 {
-                let reason = "numbers are scored, which have no probabilities for --reject";
+                let reason = "numbers are scored; --reject is for classes";
                 return Err(self.content(reason));
             }
             let numbers = self.score_numbers(&truth, (&drawn, groups.as_deref()), how)?;

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use corsmal_audio::{
     AudioError, AudioSpec, BlockSource, Health, HealthMeter, ReadReport, Repair, open,
 };
+use corsmal_files::quote::printable_line;
 use corsmal_report::Overview;
 use serde::Serialize;
 
@@ -17,6 +18,8 @@ use crate::plural::plural;
 
 /// Frames read at once.
 const BLOCK: usize = 8192;
+/// Samples beyond 1e12 are not extracted from.
+const HUGE_DBFS: f64 = 240.0;
 
 /// Everything that is printed; its JSON form is the output of `--json`.
 #[derive(Serialize)]
@@ -69,10 +72,14 @@ pub fn inspect(path: &Path, picture: Option<&Picture>, json: bool) -> Result<Exi
 
 /// What `extract` says of a recording that can be read.
 pub(super) fn status(loss: Option<&Repair>, health: &Health) -> &'static str {
-    match (health.channels.iter().any(|channel| channel.non_finite > 0), loss) {
-        (true, _) => "non_finite",
-        (false, Some(_)) => "truncated",
-        (false, None) => "ok",
+    let channels = || health.channels.iter();
+    let is_huge = |dbfs: f64| dbfs > HUGE_DBFS;
+    match loss {
+        _ if health.frames == 0 => "empty",
+        _ if channels().any(|channel| channel.non_finite > 0) => "non_finite",
+        _ if channels().any(|channel| channel.peak_dbfs.is_some_and(is_huge)) => "unsupported",
+        Some(_) => "truncated",
+        None => "ok",
     }
 }
 
@@ -154,7 +161,7 @@ impl Inspection<'_> {
     }
 
     fn text(&self) -> String {
-        let mut out = format!("{}\n  {}\n", self.path, self.facts());
+        let mut out = format!("{}\n  {}\n", printable_line(&self.path), self.facts());
         for repair in &self.reading.repairs {
             line(&mut out, format_args!("  {}: {repair}", repair.name()));
         }

@@ -77,7 +77,11 @@ impl Line {
         match look(path, Vec::new()) {
             Ok(look) => {
                 let status = status(look.loss.as_ref(), &look.health);
-                Self { path: name, status, reason: None, sound: Some(Sound::of(look)) }
+                let mut sound = Sound::of(look);
+                if status == "truncated" {
+                    sound.notes.push(status.into());
+                }
+                Self { path: name, status, reason: None, sound: Some(sound) }
             }
             Err(error) => {
                 let status = match &error {
@@ -108,7 +112,12 @@ impl Sound {
 }
 
 fn text(lines: &[Line]) -> String {
-    let width = lines.iter().map(|l| l.path.chars().count()).max().unwrap_or(4).clamp(4, 60);
+    let width = lines
+        .iter()
+        .map(|l| printable_line(&l.path).chars().count())
+        .max()
+        .unwrap_or(4)
+        .clamp(4, 60);
     let lengths = lines.iter().filter_map(|l| l.sound.as_ref()).map(|s| length(s.seconds).len());
     let long = lengths.max().unwrap_or(0).max(9);
     let mut out = format!(
@@ -118,13 +127,8 @@ fn text(lines: &[Line]) -> String {
     for line in lines {
         let row = match (&line.sound, &line.reason) {
             (Some(sound), _) => {
-                let mut notes = sound.notes.clone();
-                if sound.repairs > 0 {
-                    notes.push(format!("{} repaired", sound.repairs));
-                }
-                if line.status == "truncated" {
-                    notes.push(line.status.into());
-                }
+                let repaired = (sound.repairs > 0).then(|| format!("{} repaired", sound.repairs));
+                let notes: Vec<_> = sound.notes.iter().cloned().chain(repaired).collect();
                 format!(
                     "{:width$}  {:>long$}  {:>6}  {:>2}  {:>9}  {:>7}  {}",
                     printable_line(&line.path),

@@ -109,6 +109,8 @@ pub(super) fn squared_lengths(x: ArrayView2<'_, f64>) -> Vec<f64> {
 
 /// What kernel values are kept in.
 pub(super) trait Precision: Copy + Default + Into<f64> + Send {
+    const IS_ROUNDED: bool;
+
     fn of(value: f64) -> Self;
 
     /// All values of a table, where they are kept so.
@@ -116,6 +118,8 @@ pub(super) trait Precision: Copy + Default + Into<f64> + Send {
 }
 
 impl Precision for f32 {
+    const IS_ROUNDED: bool = true;
+
     fn of(value: f64) -> Self {
         value as f32
     }
@@ -126,6 +130,8 @@ impl Precision for f32 {
 }
 
 impl Precision for f64 {
+    const IS_ROUNDED: bool = false;
+
     fn of(value: f64) -> Self {
         value
     }

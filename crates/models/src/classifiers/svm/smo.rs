@@ -16,6 +16,12 @@ const TAU: f64 = 1e-12;
 /// Steps after which no optimum is near; scikit-learn goes on for ever.
 pub(super) const MOST_STEPS: usize = 100_000_000;
 
+/// Steps after which single precision is given up.
+const MOST_ROUNDED: usize = 10_000_000;
+/// Tolerances that rounding may have led the slopes astray before single precision is given up: from further away,
+/// double precision would begin anew.
+const ASTRAY: f64 = 10.0;
+
 /// A two-class problem: y is 1 or -1, and no α goes beyond its bound.
 pub(super) struct Problem<'a> {
     pub y: &'a [f64],
@@ -40,14 +46,24 @@ impl Problem<'_> {
             slope: self.y.iter().map(|y| -y).collect(),
             steps: 0,
         };
-        search.go_on(&mut gram.rows::<f32>(rows, cache_bytes))?;
-        if search.rounding() > self.tol {
+        let mut is_optimum = search.go_on(&mut gram.rows::<f32>(rows, cache_bytes));
+        if !is_optimum || search.rounding() > self.tol {
             let mut exact = gram.rows::<f64>(rows, cache_bytes);
             search.correct(&mut exact);
-            search.go_on(&mut exact)?;
+            is_optimum = search.go_on(&mut exact);
         }
         let rho = search.state().rho(&search.slope);
-        Ok(Solution { alpha: search.alpha, rho })
+        let reason = match is_optimum {
+            _ if !rho.is_finite() => {
+                "the optimisation overflowed: standardise the features first".into()
+            }
+            true => return Ok(Solution { alpha: search.alpha, rho }),
+            false => format!(
+                "no optimum found after {} steps: standardise the features, lower C, or raise tol",
+                search.steps
+            ),
+        };
+        Err(ModelError::Numerical { owner: "svm", reason })
     }
 }
 
@@ -83,21 +99,27 @@ impl Search<'_> {
         }
     }
 
-    fn go_on<T: Precision>(&mut self, kernel: &mut Rows<'_, '_, T>) -> Result<()> {
+    /// Steps until the conditions hold, which it says; in single precision no longer than that is of use.
+    fn go_on<T: Precision>(&mut self, kernel: &mut Rows<'_, '_, T>) -> bool {
+        /// Steps between two looks at the rounding.
+        const LOOKS: usize = 1 << 12;
         let Problem { y, bound, tol, most_steps } = *self.problem;
-        let Self { diagonal, alpha, slope, steps, .. } = self;
-        let mut is_optimum = false;
-        while *steps < most_steps {
+        self.steps = 0;
+        while self.steps < most_steps {
+            if T::IS_ROUNDED && self.steps % LOOKS == LOOKS - 1 {
+                let is_late = self.steps > MOST_ROUNDED;
+                if is_late || self.rounding() > ASTRAY * tol {
+                    return false;
+                }
+            }
+            let Self { diagonal, alpha, slope, steps, .. } = self;
             *steps += 1;
             let state = State { alpha, y, bound };
             let partner = state.up(slope).and_then(|(i, steepest)| {
                 let row = kernel.one(i);
                 Some((i, state.down(slope, i, steepest, row, diagonal, tol)?))
             });
-            let Some((i, j)) = partner else {
-                is_optimum = true;
-                break;
-            };
+            let Some((i, j)) = partner else { return true };
             let (row_i, row_j) = kernel.two(i, j);
             let curvature = (diagonal[i] + diagonal[j] - 2.0 * row_i[j].into()).max(TAU);
             let (old_i, old_j) = (alpha[i], alpha[j]);
@@ -114,23 +136,13 @@ impl Search<'_> {
             let (change_i, change_j) = (y[i] * (alpha[i] - old_i), y[j] * (alpha[j] - old_j));
             if change_i == 0.0 && change_j == 0.0 {
                 // Rounding hides the step, and every further one.
-                break;
+                return false;
             }
             for ((s, &ki), &kj) in slope.iter_mut().zip(row_i).zip(row_j) {
                 *s += change_i * ki.into() + change_j * kj.into();
             }
         }
-        let reason = match is_optimum {
-            _ if !self.state().rho(&self.slope).is_finite() => {
-                "the optimisation overflowed: standardise the features first".into()
-            }
-            true => return Ok(()),
-            false => format!(
-                "no optimum found after {} steps: standardise the features, lower C, or raise tol",
-                self.steps
-            ),
-        };
-        Err(ModelError::Numerical { owner: "svm", reason })
+        false
     }
 }
 
