@@ -237,3 +237,28 @@ def test_class_weights_of_forests_are_chances(name):
         assert weighted == pytest.approx(rare(theirs, rows, **parameters), abs=0.015)
     # The same chances, the same forest.
     assert rare(ours, class_weight={0: 1.0, 1: 9.0}) == rare(ours, rows)
+
+
+def test_probabilities_of_a_machine_in_double_precision() -> None:
+    """They were fitted to decisions in single precision: noise where `C` is large."""
+    rng = np.random.default_rng(0)
+    x = rng.standard_normal((400, 2))
+    y = (x[:, 0] + 0.8 * rng.standard_normal(400) > 0).astype(int)
+    found = []
+    for c in (1e2, 1e8):
+        machine = SVC(kernel="rbf", gamma=1 / c, C=c, probability=True, random_state=0).fit(
+            x[:100], y[:100]
+        )
+        found.append(machine.predict_proba(x[100:])[:, 1])
+        assert ((found[-1] > 0.5) == y[100:]).mean() > 0.7
+    # The nearly linear machines are the same, but for the second order of the kernel.
+    assert np.abs(found[0] - found[1]).max() < 0.1
+
+
+def test_huge_weights_of_rows_are_weights() -> None:
+    rng = np.random.default_rng(0)
+    x, y = rng.standard_normal((300, 3)), np.arange(300) % 3 // 2
+    forest = RandomForest(30, class_weight={0: 1.0, 1: 1.9}, random_state=0)
+    plain = forest.fit(x, y).predict_proba(x)
+    huge = forest.fit(x, y, sample_weight=np.full(300, 1.7e308)).predict_proba(x)
+    np.testing.assert_array_equal(huge, plain)

@@ -230,6 +230,8 @@ impl Trees {
             });
         }
         let columns = FeatureColumns::new(x)?;
+        let scaled_weights = weights.map(scaled);
+        let weights = scaled_weights.as_deref();
         let counted = weights.filter(|_| plan.balances_weights);
         let mut per_class = scaled(&plan.class_weight.per_class_of(y, n_classes, counted)?);
         let labels: Vec<u32> = y.iter().map(|&c| c as u32).collect();

@@ -8,6 +8,8 @@ use crate::error::{ModelError, Result};
 pub(super) struct Solution {
     pub alpha: Vec<f64>,
     pub rho: f64,
+    /// whether single precision was not enough
+    pub needs_double: bool,
 }
 
 /// Smallest curvature used, where the kernel matrix is not positive definite.
@@ -47,7 +49,8 @@ impl Problem<'_> {
             steps: 0,
         };
         let mut is_optimum = search.go_on(&mut gram.rows::<f32>(rows, cache_bytes));
-        if !is_optimum || search.rounding() > self.tol {
+        let needs_double = !is_optimum || search.rounding() > self.tol;
+        if needs_double {
             let mut exact = gram.rows::<f64>(rows, cache_bytes);
             search.correct(&mut exact);
             is_optimum = search.go_on(&mut exact);
@@ -57,7 +60,7 @@ impl Problem<'_> {
             _ if !rho.is_finite() => {
                 "the optimisation overflowed: standardise the features first".into()
             }
-            true => return Ok(Solution { alpha: search.alpha, rho }),
+            true => return Ok(Solution { alpha: search.alpha, rho, needs_double }),
             false => format!(
                 "no optimum found after {} steps: standardise the features, lower C, or raise tol",
                 search.steps

@@ -4,7 +4,7 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::kernel::Gram;
+use super::kernel::{Gram, Precision};
 use super::smo;
 use crate::error::Result;
 
@@ -47,6 +47,14 @@ impl TwoClass<'_, '_> {
         }
     }
 
+    /// What the machine of some rows sums for a row.
+    fn sum<T: Precision>(&self, row: usize, inner: &Self, solution: &smo::Solution) -> f64 {
+        let mut values = vec![T::default(); inner.rows.len()];
+        self.gram.fill(self.rows[row], &inner.rows, &mut values);
+        let terms = values.into_iter().zip(&solution.alpha).zip(&inner.signs);
+        terms.map(|((k, a), s)| k.into() * a * s).sum()
+    }
+
     /// Decision values of all rows, each from a machine that has not seen it (five folds).
     pub(super) fn held_out_decisions(&self, seed: u64) -> Result<Vec<f64>> {
         const FOLDS: usize = 5;
@@ -67,15 +75,11 @@ impl TwoClass<'_, '_> {
                 continue;
             }
             let solution = inner.solve()?;
-            let mut values = vec![0.0f32; kept.len()];
             for &i in held {
-                self.gram.fill(self.rows[i], &inner.rows, &mut values);
-                let sum: f64 = values
-                    .iter()
-                    .zip(&solution.alpha)
-                    .zip(&inner.signs)
-                    .map(|((&k, a), s)| f64::from(k) * a * s)
-                    .sum();
+                let sum = match solution.needs_double {
+                    true => self.sum::<f64>(i, &inner, &solution),
+                    false => self.sum::<f32>(i, &inner, &solution),
+                };
                 decisions[i] = sum - solution.rho;
             }
         }
