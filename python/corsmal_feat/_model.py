@@ -220,7 +220,7 @@ class TrainedModel:
             reason = self.refusal(row.get("sample_rate"), row.get("channels"))
             if reason is not None:
                 advice = (
-                    "average the channels before, or extract and train with"
+                    "average the channels of the file first, or extract and train with"
                     ' set={"signal.channels": "mean"}'
                     if "channel" in reason
                     else "any_rate=True accepts it as it is"

@@ -150,8 +150,8 @@ pub enum ModelError {
     },
     /// Fewer groups than folds.
     #[error(
-        "{groups} groups are too few for {folds} folds: ask for at most {groups}, or for none, which holds out each group \
-         once"
+        "{groups} groups are too few for {folds} folds: ask for at most {groups}, or name no number to hold out each \
+         group once"
     )]
     TooFewGroups {
         /// different groups

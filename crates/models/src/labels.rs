@@ -118,8 +118,8 @@ pub fn measured(labels: &Labels, rows: usize) -> Option<String> {
     let is_measured = is_many && labels.names().iter().all(|name| name.parse::<i128>().is_ok());
     is_measured.then(|| {
         format!(
-            "{classes} whole numbers are classes of {rows} rows: if they measure something, no classifier learns that; \
-             fit a regression on corsmal_feat.load_features(FILE).summary in Python"
+            "{classes} whole numbers are classes of {rows} rows: if they are measurements, no classifier here can \
+             learn them; fit a regression on corsmal_feat.load_features(FILE).summary in Python"
         )
     })
 }

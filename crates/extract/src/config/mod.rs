@@ -212,8 +212,8 @@ impl Config {
         let cropped =
             [("signal.start", start), ("signal.end", end)].into_iter().find(|(_, s)| *s != 0.0);
         cropped.map_or(Ok(()), |(key, _)| {
-            let why = "must be 0 with windows, each of which it would crop: columns start and end of a manifest crop \
-                       recordings before they are cut";
+            let why = "must be 0 with windows, because it would crop each of them; to crop recordings first, use the columns \
+                       start and end of a manifest";
             Err(ConfigError::key(key, why))
         })
     }

@@ -15,13 +15,13 @@ pub(super) struct Solution {
 /// Smallest curvature used, where the kernel matrix is not positive definite.
 const TAU: f64 = 1e-12;
 
-/// Steps after which no optimum is near; scikit-learn goes on for ever.
+/// Steps after which the search is given up; scikit-learn has no such limit.
 pub(super) const MOST_STEPS: usize = 100_000_000;
 
 /// Steps after which single precision is given up.
 const MOST_ROUNDED: usize = 10_000_000;
-/// Tolerances that rounding may have led the slopes astray before single precision is given up: from further away,
-/// double precision would begin anew.
+/// Single precision is given up once rounding may have moved the slopes by this many tolerances: double precision
+/// would gain nothing from where it is then.
 const ASTRAY: f64 = 10.0;
 
 /// A two-class problem: y is 1 or -1, and no α goes beyond its bound.
@@ -84,7 +84,7 @@ impl Search<'_> {
         State { alpha: &self.alpha, y: self.problem.y, bound: self.problem.bound }
     }
 
-    /// How far rounded kernel values may have led the slopes astray: some standard deviations.
+    /// How far rounded kernel values may have moved the slopes: a few standard deviations.
     fn rounding(&self) -> f64 {
         let terms = self.alpha.iter().zip(&self.diagonal);
         let spread = terms.map(|(alpha, k)| alpha * alpha * k).sum::<f64>();
@@ -92,7 +92,7 @@ impl Search<'_> {
         2.0 * f64::from(f32::EPSILON) * (spread * most).sqrt()
     }
 
-    /// The slopes anew.
+    /// Computes the slopes again.
     fn correct(&mut self, kernel: &mut Rows<'_, '_, f64>) {
         let y = self.problem.y;
         self.slope = y.iter().map(|y| -y).collect();
@@ -102,9 +102,10 @@ impl Search<'_> {
         }
     }
 
-    /// Steps until the conditions hold, which it says; in single precision no longer than that is of use.
+    /// Takes steps until the optimality conditions hold; false if it gives up, in single precision as soon as
+    /// rounding outweighs `tol`.
     fn go_on<T: Precision>(&mut self, kernel: &mut Rows<'_, '_, T>) -> bool {
-        /// Steps between two looks at the rounding.
+        /// Steps between two checks of the rounding.
         const LOOKS: usize = 1 << 12;
         let Problem { y, bound, tol, most_steps } = *self.problem;
         self.steps = 0;

@@ -47,7 +47,7 @@ impl TwoClass<'_, '_> {
         }
     }
 
-    /// What the machine of some rows sums for a row.
+    /// The decision value of a row by the machine of other rows, before its offset.
     fn sum<T: Precision>(&self, row: usize, inner: &Self, solution: &smo::Solution) -> f64 {
         let mut values = vec![T::default(); inner.rows.len()];
         self.gram.fill(self.rows[row], &inner.rows, &mut values);
