@@ -94,22 +94,41 @@ mod tests {
     use super::super::kernel::Function;
     use super::*;
 
+    /// Numbers from -1 to 1.
+    fn noise(seed: u32) -> impl FnMut() -> f64 {
+        let mut state = seed;
+        move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 23) - 1.0
+        }
+    }
+
+    /// All rows of a table, whose errors cost alike.
+    fn problem<'a, 'x>(
+        gram: &'a Gram<'x>,
+        signs: Vec<f64>,
+        cost: f64,
+        most_steps: usize,
+    ) -> TwoClass<'a, 'x> {
+        TwoClass {
+            gram,
+            rows: (0..signs.len() as u32).collect(),
+            bounds: vec![cost; signs.len()],
+            signs,
+            tol: 1e-3,
+            most_steps,
+            cache_bytes: 1 << 20,
+        }
+    }
+
     /// Machines that were no optimum yet were taken for it.
     #[test]
     fn too_few_steps_are_an_error() {
         let x = Array2::from_shape_fn((20, 3), |(i, j)| ((i * 7 + j * 5) % 11) as f64);
         let gram = Gram::new(x.view(), Function::Linear, 1 << 20).unwrap();
         let solved = |most_steps| {
-            let problem = TwoClass {
-                gram: &gram,
-                rows: (0..20).collect(),
-                signs: (0..20).map(|i| if i % 3 == 0 { 1.0 } else { -1.0 }).collect(),
-                bounds: vec![1.0; 20],
-                tol: 1e-3,
-                most_steps,
-                cache_bytes: 1 << 20,
-            };
-            problem.solve().map(|_| ())
+            let signs = (0..20).map(|i| if i % 3 == 0 { 1.0 } else { -1.0 }).collect();
+            problem(&gram, signs, 1.0, most_steps).solve().map(|_| ())
         };
         assert!(solved(smo::MOST_STEPS).is_ok());
         let refused = solved(5).unwrap_err().to_string();
@@ -120,50 +139,26 @@ mod tests {
     /// hundred steps.
     #[test]
     fn rows_that_single_precision_confuses_are_told_apart() {
-        let mut state = 7u32;
-        let mut noise = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            f64::from(state >> 8) / f64::from(1 << 23) - 1.0
-        };
+        let mut noise = noise(7);
         let half = Array2::from_shape_simple_fn((20, 6), || 1e4 * noise());
         let beside = half.mapv(|v| v + 0.1 * noise());
         let x = ndarray::concatenate![ndarray::Axis(0), half, beside];
         let gram = Gram::new(x.view(), Function::Linear, 1 << 20).unwrap();
-        let problem = TwoClass {
-            gram: &gram,
-            rows: (0..40).collect(),
-            signs: (0..40).map(|i| if i < 20 { 1.0 } else { -1.0 }).collect(),
-            bounds: vec![1.0; 40],
-            tol: 1e-3,
-            most_steps: 100_000,
-            cache_bytes: 1 << 20,
-        };
-        assert!(problem.solve().is_ok());
+        let signs = (0..40).map(|i| if i < 20 { 1.0 } else { -1.0 }).collect();
+        assert!(problem(&gram, signs, 1.0, 100_000).solve().is_ok());
     }
 
     /// With kernel values in single precision, as scikit-learn has them, the primal objective ended a tenth above
     /// the dual one.
     #[test]
     fn costly_errors_are_weighed_exactly() {
-        let mut state = 1u32;
-        let mut noise = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            f64::from(state >> 8) / f64::from(1 << 23) - 1.0
-        };
+        let mut noise = noise(1);
         let (n, cost) = (40, 1e2);
         let x = Array2::from_shape_simple_fn((n, 4), || 100.0 + 30.0 * noise());
         let gram = Gram::new(x.view(), Function::Linear, 1 << 20).unwrap();
-        let problem = TwoClass {
-            gram: &gram,
-            rows: (0..n as u32).collect(),
-            signs: (0..n)
-                .map(|i| if x[[i, 0]] + 20.0 * noise() > 100.0 { 1.0 } else { -1.0 })
-                .collect(),
-            bounds: vec![cost; n],
-            tol: 1e-3,
-            most_steps: smo::MOST_STEPS,
-            cache_bytes: 1 << 20,
-        };
+        let sign = |i| if x[[i, 0]] + 20.0 * noise() > 100.0 { 1.0 } else { -1.0 };
+        let signs: Vec<f64> = (0..n).map(sign).collect();
+        let problem = problem(&gram, signs, cost, smo::MOST_STEPS);
         let solution = problem.solve().unwrap();
         let terms: Vec<f64> =
             solution.alpha.iter().zip(&problem.signs).map(|(a, s)| a * s).collect();
