@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import inspect
+import itertools
 import os
 import reprlib
 import types
 from collections.abc import Callable, Iterable, Mapping
-from functools import wraps
+from functools import cache, wraps
 from numbers import Integral
 from pathlib import Path
 from typing import (
@@ -31,6 +32,7 @@ from .errors import CorsmalFeatError, FileError, MissingFileError, ParameterErro
 P = ParamSpec("P")
 R = TypeVar("R")
 
+_FLOATS = (float, np.floating)
 #: What an argument of a wrong type or value raises, here or in numpy.
 _CAUSED = (TypeError, ValueError, OverflowError, AttributeError, IndexError, ZeroDivisionError)
 #: Where errors are raised that an argument causes.
@@ -41,13 +43,15 @@ _LIBRARY = ("<frozen", f"{Path(os.__file__).parent}{os.sep}")
 def refuses(function: Callable[P, R]) -> Callable[P, R]:
     """Makes a public function raise only errors of this package.
 
-    Nothing is checked before the call. After an error, the arguments are compared with the
-    annotations, and the first one that does not fit is named. Errors of a function that the caller
-    passes in are not changed.
+    Before the call, floats such as 2048.0 become whole numbers where those are expected. Nothing is
+    checked: after an error, the arguments are compared with the annotations, and the first one that
+    does not fit is named. Errors of a function that the caller passes in are not changed.
     """
 
     @wraps(function)
     def refusing(*args: P.args, **kwargs: P.kwargs) -> R:
+        if any(isinstance(value, _FLOATS) for value in (*args, *kwargs.values())):
+            args, kwargs = _whole(function, args, kwargs)
         try:
             return function(*args, **kwargs)
         except (Warning, ImportError):
@@ -57,10 +61,6 @@ def refuses(function: Callable[P, R]) -> Callable[P, R]:
                 bound = inspect.signature(function).bind(*args, **kwargs)
             except TypeError:
                 raise error from None  # a missing or unknown argument, as Python says it
-            tried = isinstance(error, (TypeError, ParameterError))
-            if tried and (whole := _whole(function, bound.arguments)):
-                bound.arguments |= whole
-                return refusing(*bound.args, **bound.kwargs)
             told = _told(error, function, bound.arguments)
             if told is None:
                 raise
@@ -69,16 +69,30 @@ def refuses(function: Callable[P, R]) -> Callable[P, R]:
     return refusing
 
 
-def _whole(function: Callable[..., Any], arguments: Mapping[str, Any]) -> dict[str, int]:
-    """Floats without a fraction, such as 2048.0, in place of whole numbers."""
+def _whole(function: Callable[..., Any], args: Any, kwargs: Any) -> tuple[Any, Any]:
+    """The arguments, with floats without a fraction as whole numbers where those are expected."""
+    names, whole = _parameters(function)
+
+    def converted(name: str | None, value: Any) -> Any:
+        is_whole = isinstance(value, _FLOATS) and name in whole and float(value).is_integer()
+        return int(value) if is_whole else value
+
+    named = itertools.zip_longest(names[: len(args)], args)
+    return (
+        tuple(converted(name, value) for name, value in named),
+        {name: converted(name, value) for name, value in kwargs.items()},
+    )
+
+
+@cache
+def _parameters(function: Callable[..., Any]) -> tuple[list[str], frozenset[str]]:
+    """Names of the positional parameters in order, and of those that take whole numbers only."""
     hints = get_type_hints(function)
-    return {
-        name: int(value)
-        for name, value in arguments.items()
-        if isinstance(value, (float, np.floating))
-        and {int, float}.intersection(_parts(hints.get(name))) == {int}
-        and float(value).is_integer()
-    }
+    positional = inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
+    parameters = inspect.signature(function).parameters.values()
+    numbers = {name: {int, float}.intersection(_parts(hint)) for name, hint in hints.items()}
+    whole = frozenset(name for name, kinds in numbers.items() if kinds == {int})
+    return [p.name for p in parameters if p.kind in positional], whole
 
 
 def _told(

@@ -8,6 +8,7 @@ from typing import Any
 import corsmal_feat as cf
 import numpy as np
 import pytest
+from corsmal_feat._refusals import refuses
 
 Y = 0.1 * np.random.default_rng(0).standard_normal(8192).astype(np.float32)
 ROWS = np.arange(120.0).reshape(3, 40)
@@ -52,3 +53,16 @@ def test_a_signal_of_whole_channels() -> None:
     for channels in (0, 65, 1.5):
         with pytest.raises(cf.ParameterError, match="channels"):
             cf.SignalExtractor(44100, channels=channels, preset="esc26")  # type: ignore[arg-type]
+
+
+def test_a_function_that_fails_late_runs_once() -> None:
+    calls = []
+
+    @refuses
+    def late(jobs: int) -> None:
+        calls.append(jobs)
+        raise cf.ParameterError("found at the end of a long run")
+
+    with pytest.raises(cf.ParameterError, match="long run"):
+        late(2.0)  # type: ignore[arg-type]
+    assert calls == [2]

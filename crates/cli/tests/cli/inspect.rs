@@ -102,6 +102,9 @@ fn a_recording_that_lacks_samples_is_truncated() {
         let path = float(status, samples);
         let report = text(&inspect(&[&path, "--json".as_ref()]).stdout);
         assert!(report.contains(&format!("\"status\": \"{status}\"")), "{report}");
+        let told = if status == "non_finite" { "1 sample not finite" } else { status };
+        let listed = text(&inspect(&[&wav, &path]).stdout);
+        assert!(listed.lines().any(|line| line.ends_with(told)), "{listed}");
     }
     let shown = text(&inspect(&[&wav, &cut]).stdout);
     assert!(shown.lines().any(|line| line.ends_with("; truncated; 1 repaired")), "{shown}");
@@ -206,24 +209,6 @@ fn folders_and_several_files_are_listed() {
     let picture = folder.path().join("p.svg");
     let refused = inspect(&[folder.path(), "--picture".as_ref(), &picture]);
     assert!(text(&refused.stderr).contains("name one file") && !picture.exists());
-}
-
-#[test]
-fn models_and_predictions_are_explained() {
-    let folder = tempfile::tempdir().unwrap();
-    let predictions = folder.path().join("p.csv");
-    std::fs::write(&predictions, "id,true,predicted\na,dog,dog\nb,cat,dog\n").unwrap();
-    let shown = text(&inspect(&[&predictions]).stdout);
-    assert!(shown.contains("2 rows · 3 columns") && shown.contains("predicted  dog 2"), "{shown}");
-    assert!(shown.contains("accuracy   50.00 %"), "{shown}");
-    let json = inspect(&[&predictions, "--json".as_ref()]);
-    let found: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
-    assert_eq!((&found["accuracy"], &found["counts"]["true"]["cat"]), (&0.5.into(), &1.into()));
-    let torn = folder.path().join("torn.model");
-    std::fs::write(&torn, b"CORSMDL\0 and no more").unwrap();
-    let refused = inspect(&[&torn]);
-    assert_eq!(refused.status.code(), Some(1));
-    assert!(text(&refused.stderr).contains("torn.model: "));
 }
 
 #[test]

@@ -15,6 +15,25 @@ fn inspect(args: &[&Path]) -> Output {
 fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
 }
+
+#[test]
+fn models_and_predictions_are_explained() {
+    let folder = tempfile::tempdir().unwrap();
+    let predictions = folder.path().join("p.csv");
+    std::fs::write(&predictions, "id,true,predicted\na,dog,dog\nb,cat,dog\n").unwrap();
+    let shown = text(&inspect(&[&predictions]).stdout);
+    assert!(shown.contains("2 rows · 3 columns") && shown.contains("predicted  dog 2"), "{shown}");
+    assert!(shown.contains("accuracy   50.00 %"), "{shown}");
+    let json = inspect(&[&predictions, "--json".as_ref()]);
+    let found: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
+    assert_eq!((&found["accuracy"], &found["counts"]["true"]["cat"]), (&0.5.into(), &1.into()));
+    let torn = folder.path().join("torn.model");
+    std::fs::write(&torn, b"CORSMDL\0 and no more").unwrap();
+    let refused = inspect(&[&torn]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(text(&refused.stderr).contains("torn.model: "));
+}
+
 /// Everything else that the tool writes or reads is known by its content.
 #[test]
 fn every_kind_of_file_is_known() {

@@ -31,6 +31,7 @@ pub use extractor::{Extractor, Refused, Span};
 pub use failed::{Failed, FinishError};
 pub use plan::{Plan, PlannedFeature};
 pub use plans::{Planned, Plans};
+pub use reading::LARGEST_SAMPLE;
 pub use recording::{FeatureArray, Features, Recording};
 pub use signal::{Signal, SignalError, Signals};
 pub use signal_chain::{SignalChain, channels_out};

@@ -153,8 +153,9 @@ pub(super) fn unread(
     }
 }
 
-/// Largest sample: the power of the longest window of them still has a place in single precision.
-const LARGEST: f32 = 1e12;
+/// Largest sample that features are computed of: the power of the longest window of such samples
+/// still has a place in single precision.
+pub const LARGEST_SAMPLE: f32 = 1e12;
 
 /// Refuses samples that features cannot be computed of; `position` is that of the first frame, and
 /// `byte_of` knows where in the file a frame begins.
@@ -165,7 +166,7 @@ pub fn check_samples(
     byte_of: impl Fn(u64) -> Option<u64>,
 ) -> Result<(), Failed> {
     // False for NaN.
-    let is_usable = |x: &f32| x.abs() <= LARGEST;
+    let is_usable = |x: &f32| x.abs() <= LARGEST_SAMPLE;
     if samples.iter().fold(true, |all, x| all & is_usable(x)) {
         return Ok(());
     }

@@ -158,6 +158,8 @@ impl LabelFile {
             // A file name may stand for several recordings in different folders; an id and a path
             // (of several stretches of one recording) may not.
             let (id, path) = recording;
+            let path = if path == id { recording_of(id).unwrap_or(id) } else { path };
+            let recording = (id, path);
             let other = of_name.insert(key, recording).filter(|(_, other)| *other != path);
             if let Some((other, _)) = other {
                 return Err(DatasetError::content(
@@ -207,12 +209,13 @@ impl LabelFile {
         Ok((columns, unmatched))
     }
 
-    /// By id; by path as extracted or, failing that, the path without extension as id; by any of
+    /// By id, that of the recording for windows; by path as extracted or, failing that, the path without extension as id; by any of
     /// these or the file name where the column has another name.
     fn find(&self, (id, path): (&str, &str)) -> Option<(&String, &Line)> {
         let get = |key: &str| self.rows.get_key_value(key);
+        let of_window = || recording_of(id).and_then(get);
         if self.key == Key::Id {
-            return get(id);
+            return get(id).or_else(of_window);
         }
         let file = Path::new(path);
         let with_extension = || {
@@ -235,8 +238,14 @@ impl LabelFile {
             let stem = self.stems.get(last.filter(|_| path.is_empty() || path == id)?)?;
             get(stem)
         };
-        by_path.or_else(|| get(id)).or_else(name).or_else(stem).or_else(named)
+        by_path.or_else(|| get(id)).or_else(of_window).or_else(name).or_else(stem).or_else(named)
     }
+}
+
+/// Of a window's id that of its recording: windows have `@` and where they begin after it.
+fn recording_of(id: &str) -> Option<&str> {
+    let (recording, start) = id.rsplit_once('@')?;
+    start.parse::<f64>().ok().filter(|start| start.is_finite()).map(|_| recording)
 }
 
 fn file_name(path: &str) -> Option<&str> {
@@ -294,6 +303,32 @@ mod tests {
             missing.contains("\"b/y\"") && missing.contains("1 recording without"),
             "{missing}"
         );
+    }
+
+    /// They had labels by path only.
+    #[test]
+    fn windows_have_the_labels_of_their_recording() {
+        let windows = [("x@0", "d/x.wav"), ("x@0.5", "d/x.wav"), ("y@2", "d/y@2.wav")];
+        let classes = |text: &str, key| {
+            let columns = file(text, key)?.for_recordings(&windows, &[], Path::new("f.npz"))?;
+            Ok::<_, DatasetError>(columns.0[0].1.clone())
+        };
+        for key in [None, Some("id")] {
+            let found = classes("id,class\nx,cat\ny@2,dog\n", key).unwrap();
+            assert_eq!(found, ["cat", "cat", "dog"]);
+        }
+        let bare = [("x@0", "x@0"), ("x@0.5", "x@0.5")];
+        let found = file("id,class\nx,cat\n", None).unwrap();
+        let found = found.for_recordings(&bare, &[], Path::new("f.npz")).unwrap();
+        assert_eq!(found.0[0].1, ["cat", "cat"]);
+        // A window of its own label; and a name that is no window.
+        let text = "id,class\nx,cat\nx@0.5,bird\ny@2,dog\n";
+        assert_eq!(classes(text, None).unwrap(), ["cat", "bird", "dog"]);
+        let other = file("id,class\nx,cat\n", None).unwrap();
+        assert!(other.for_recordings(&[("x@home", "d/x@home.wav")], &[], Path::new("f")).is_err());
+        // The recording of another path.
+        let two = [("x", "d/x.wav"), ("x@2", "d/x@2.wav")];
+        assert!(other.for_recordings(&two, &[], Path::new("f")).is_err());
     }
 
     #[test]

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use corsmal_audio::{
     AudioError, AudioSpec, BlockSource, Health, HealthMeter, ReadReport, Repair, open,
 };
+use corsmal_extract::engine::LARGEST_SAMPLE;
 use corsmal_files::quote::printable_line;
 use corsmal_report::Overview;
 use serde::Serialize;
@@ -18,8 +19,6 @@ use crate::plural::plural;
 
 /// Frames read at once.
 const BLOCK: usize = 8192;
-/// Samples beyond 1e12 are not extracted from.
-const HUGE_DBFS: f64 = 240.0;
 
 /// Everything that is printed; its JSON form is the output of `--json`.
 #[derive(Serialize)]
@@ -73,7 +72,7 @@ pub fn inspect(path: &Path, picture: Option<&Picture>, json: bool) -> Result<Exi
 /// What `extract` says of a recording that can be read.
 pub(super) fn status(loss: Option<&Repair>, health: &Health) -> &'static str {
     let channels = || health.channels.iter();
-    let is_huge = |dbfs: f64| dbfs > HUGE_DBFS;
+    let is_huge = |dbfs: f64| dbfs > 20.0 * f64::from(LARGEST_SAMPLE).log10();
     match loss {
         _ if health.frames == 0 => "empty",
         _ if channels().any(|channel| channel.non_finite > 0) => "non_finite",

@@ -78,7 +78,8 @@ impl Line {
             Ok(look) => {
                 let status = status(look.loss.as_ref(), &look.health);
                 let mut sound = Sound::of(look);
-                if status == "truncated" {
+                // Notes of channels say where samples are not finite.
+                if !matches!(status, "ok" | "non_finite") {
                     sound.notes.push(status.into());
                 }
                 Self { path: name, status, reason: None, sound: Some(sound) }

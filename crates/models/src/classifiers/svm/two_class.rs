@@ -47,12 +47,20 @@ impl TwoClass<'_, '_> {
         }
     }
 
-    /// The decision value of a row by the machine of other rows, before its offset.
-    fn sum<T: Precision>(&self, row: usize, inner: &Self, solution: &smo::Solution) -> f64 {
+    /// The decision values of rows by the machine of other rows, before its offset.
+    fn sums<T: Precision>(
+        &self,
+        rows: &[usize],
+        inner: &Self,
+        solution: &smo::Solution,
+    ) -> Vec<f64> {
         let mut values = vec![T::default(); inner.rows.len()];
-        self.gram.fill(self.rows[row], &inner.rows, &mut values);
-        let terms = values.into_iter().zip(&solution.alpha).zip(&inner.signs);
-        terms.map(|((k, a), s)| k.into() * a * s).sum()
+        let sum = |&row: &usize| {
+            self.gram.fill(self.rows[row], &inner.rows, &mut values);
+            let terms = values.iter().zip(&solution.alpha).zip(&inner.signs);
+            terms.map(|((&k, a), s)| k.into() * a * s).sum()
+        };
+        rows.iter().map(sum).collect()
     }
 
     /// Decision values of all rows, each from a machine that has not seen it (five folds).
@@ -75,13 +83,11 @@ impl TwoClass<'_, '_> {
                 continue;
             }
             let solution = inner.solve()?;
-            for &i in held {
-                let sum = match solution.needs_double {
-                    true => self.sum::<f64>(i, &inner, &solution),
-                    false => self.sum::<f32>(i, &inner, &solution),
-                };
-                decisions[i] = sum - solution.rho;
-            }
+            let sums = match solution.needs_double {
+                true => self.sums::<f64>(held, &inner, &solution),
+                false => self.sums::<f32>(held, &inner, &solution),
+            };
+            held.iter().zip(sums).for_each(|(&i, sum)| decisions[i] = sum - solution.rho);
         }
         Ok(decisions)
     }

@@ -1,15 +1,19 @@
 //! One or many trees whose leaf fractions are averaged.
 
+mod plan;
+
 use ndarray::{Array2, ArrayView2, Axis};
-use rand::{Rng, RngCore, SeedableRng};
+use rand::{RngCore, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::Classify;
-use super::cart::{FeatureColumns, Growth, Sample, Tree};
+use super::cart::{FeatureColumns, Sample, Tree};
 use crate::error::{ModelError, Result};
-use crate::params::ClassWeight;
+
+pub(super) use plan::Plan;
+use plan::Weighing;
 
 /// Trees with the shape of what they were grown on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -168,41 +172,6 @@ macro_rules! forest {
 }
 pub(super) use forest;
 
-/// How an ensemble is grown.
-pub(super) struct Plan<'a> {
-    pub growth: Growth,
-    pub n_trees: usize,
-    pub bootstrap: bool,
-    /// whether trees are asked about the rows that they have not seen
-    pub out_of_bag: bool,
-    pub class_weight: &'a ClassWeight,
-    /// whether balanced classes have equal weights of rows, or equal numbers
-    pub balances_weights: bool,
-    pub seed: u64,
-}
-
-impl Plan<'_> {
-    /// How often each row is in the sample of the tree of this seed, and the tree's further draws.
-    /// `upto`: rows are drawn in proportion to their weights, which are added up there.
-    fn draw(&self, seed: u64, rows: usize, upto: Option<&[f64]>) -> (Vec<u32>, Xoshiro256PlusPlus) {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut times = vec![u32::from(!self.bootstrap); rows];
-        if self.bootstrap {
-            for _ in 0..rows {
-                let row = match upto {
-                    None => rng.gen_range(0..rows),
-                    Some(upto) => {
-                        let at = rng.r#gen::<f64>() * upto[rows - 1];
-                        upto.partition_point(|&sum| sum <= at).min(rows - 1)
-                    }
-                };
-                times[row] += 1;
-            }
-        }
-        (times, rng)
-    }
-}
-
 /// Most rows predicted together: each tree comes into the cache once per block.
 const ROW_BLOCK: usize = 256;
 /// Rows that walk through a tree at once.
@@ -230,38 +199,20 @@ impl Trees {
             });
         }
         let columns = FeatureColumns::new(x)?;
-        let scaled_weights = weights.map(scaled);
-        let weights = scaled_weights.as_deref();
-        let counted = weights.filter(|_| plan.balances_weights);
-        let mut per_class = scaled(&plan.class_weight.per_class_of(y, n_classes, counted)?);
+        let weighing = Weighing::new(plan, y, n_classes, weights)?;
         let labels: Vec<u32> = y.iter().map(|&c| c as u32).collect();
         let mut seeds = Xoshiro256PlusPlus::seed_from_u64(plan.seed);
         let seeds: Vec<u64> = (0..plan.n_trees).map(|_| seeds.next_u64()).collect();
-        // Where rows are drawn, the weight of a row's class is a part of its chance, as in scikit-learn 1.9.
-        let chances: Vec<f64> = match plan.bootstrap {
-            true => {
-                let of_class = y.iter().map(|&class| per_class[class]);
-                let of_row = |(row, of_class)| weights.map_or(1.0, |all| all[row]) * of_class;
-                of_class.enumerate().map(of_row).collect()
-            }
-            false => Vec::new(),
-        };
-        let weights = if plan.bootstrap { Some(&chances[..]) } else { weights };
-        if plan.bootstrap {
-            per_class.fill(1.0);
-        }
-        // Equal weights are none, to the bit.
-        let weights = weights.filter(|all| all.iter().any(|weight| *weight != all[0]));
-        let upto = weights.filter(|_| plan.bootstrap).map(added_up);
-        let upto = upto.as_deref();
-        let row_weights = weights.filter(|_| !plan.bootstrap).map(scaled);
-        let row_weights = row_weights.as_deref();
         let (trees, shares): (Vec<Tree>, Vec<Vec<(u32, f64)>>) = seeds
             .par_iter()
             .map(|&seed| {
-                let (times, mut rng) = plan.draw(seed, y.len(), upto);
-                let sample =
-                    Sample { y: &labels, times: &times, class_weights: &per_class, row_weights };
+                let (times, mut rng) = plan.draw(seed, y.len(), weighing.upto.as_deref());
+                let sample = Sample {
+                    y: &labels,
+                    times: &times,
+                    class_weights: &weighing.of_class,
+                    row_weights: weighing.of_row.as_deref(),
+                };
                 Tree::grow(&columns, &sample, &plan.growth, rng.next_u64())
             })
             .unzip();
@@ -269,7 +220,7 @@ impl Trees {
         let mut grown =
             Self { n_features: x.ncols(), n_classes, trees, importances, out_of_bag: None };
         if plan.out_of_bag {
-            grown.out_of_bag = Some(grown.left_out(x, &seeds, plan, upto));
+            grown.out_of_bag = Some(grown.left_out(x, &seeds, plan, weighing.upto.as_deref()));
         }
         Ok(grown)
     }
@@ -308,24 +259,6 @@ impl Trees {
         }
         fractions
     }
-}
-
-/// Weights divided by a power of two, the largest being near one: that changes no bits of a tree, but lets no sum
-/// or square overflow.
-fn scaled(weights: &[f64]) -> Vec<f64> {
-    let largest = weights.iter().copied().fold(0.0, f64::max);
-    let factor = 2f64.powi((largest.log2() as i32).clamp(-1022, 1023));
-    weights.iter().map(|weight| weight / factor).collect()
-}
-
-/// Sums of the weights up to each row, the largest weight being one.
-fn added_up(weights: &[f64]) -> Vec<f64> {
-    let largest = weights.iter().copied().fold(0.0, f64::max);
-    let add = |sum: &mut f64, weight: &f64| {
-        *sum += weight / largest;
-        Some(*sum)
-    };
-    weights.iter().scan(0.0, add).collect()
 }
 
 /// Mean of the trees' shares, summing to one; zeros if no tree has a split.
