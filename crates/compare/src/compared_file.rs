@@ -9,7 +9,7 @@ use corsmal_files::npz::{NpzError, NpzFile};
 use corsmal_files::parquet::{NumericTable, ParquetFile};
 use corsmal_files::provenance::Provenance;
 use corsmal_files::table::{RESERVED, Table};
-use ndarray::{Array1, ArrayD};
+use ndarray::{Array1, ArrayD, Axis};
 use serde::Serialize;
 
 use super::pairing::Identities;
@@ -246,6 +246,37 @@ impl ComparedFile {
     /// Labels and statuses of an output of ours, texts of another file.
     pub(super) fn texts(&self) -> &[TextColumn] {
         &self.texts
+    }
+
+    /// Makes columns of whole numbers texts where they are texts in the other file, as numbers that
+    /// doubles would round.
+    pub(super) fn spell_out(&mut self, other: &Self) {
+        let Some(table) = &mut self.table else { return };
+        let is_text = |name: &String, kind: &str| {
+            kind.contains("int") && other.texts.iter().any(|t| t.name == *name)
+        };
+        let (texts, kept): (Vec<usize>, Vec<usize>) =
+            (0..table.names.len()).partition(|&i| is_text(&table.names[i], table.types[i]));
+        for &at in &texts {
+            let spelled = |x: &f64| if x.is_nan() { String::new() } else { format!("{x:.0}") };
+            let values: Vec<String> = table.values.column(at).iter().map(spelled).collect();
+            self.texts.push(TextColumn {
+                name: table.names[at].clone(),
+                ids: table.ids.clone(),
+                shape: vec![values.len() as u64],
+                values,
+            });
+        }
+        table.values = table.values.select(Axis(1), &kept);
+        table.names = kept.iter().map(|&i| table.names[i].clone()).collect();
+        table.types = kept.iter().map(|&i| table.types[i]).collect();
+    }
+
+    /// Whether it is a table of texts only, of which the other has some.
+    pub(super) fn shares_texts_only(&self, other: &Self) -> bool {
+        let is_bare = |file: &Self| file.table.as_ref().is_some_and(|table| table.names.is_empty());
+        let shares = |text: &TextColumn| other.texts.iter().any(|theirs| theirs.name == text.name);
+        is_bare(self) && is_bare(other) && self.texts.iter().any(shares)
     }
 
     /// Ids of the rows of arrays, in an archive of another program.

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::causes::{self, Cause};
 use super::compared_file::{ArrayEntry, ComparedFile, Refused};
-use super::difference::{Difference, Tolerance};
+use super::difference::{Difference, Limit, Tolerance};
 use super::matching::{ArrayMatch, Matching, TableMatch};
 use super::pair::{Axes, Pair, index_of};
 use super::pairing::PairedBy;
@@ -159,7 +159,7 @@ impl ComparisonBuilder {
         let limit = tolerance.limit(pair.largest());
         let before = feature.difference.values - feature.difference.within;
         let equal = feature.difference.values - feature.difference.equal;
-        feature.difference.add(pair.values(), limit, locate);
+        feature.difference.add(pair.values(), |_| limit, locate);
         let apart = feature.difference.values - feature.difference.within;
         feature.differing += usize::from(apart > before);
         if feature.difference.values - feature.difference.equal > equal {
@@ -207,13 +207,15 @@ impl ComparisonBuilder {
             }),
             axes: Axes::Table,
         };
-        let limit = self.tolerance.limit(pair.largest());
+        let scales = pair.scales(&found.vectors);
+        let limits: Vec<Limit> = scales.iter().map(|most| self.tolerance.limit(*most)).collect();
         let rows = found.row_names(a);
         let feature = self.feature(&found.feature, ["table", "table"]);
         feature.arrays += rows.len();
         let differs = |row: usize| {
             let column = |side: &Array3<f64>| side.slice(ndarray::s![0, .., row]).to_owned();
-            column(&pair.a).iter().zip(&column(&pair.b)).any(|(x, y)| !limit.holds(*x, *y))
+            let [x, y] = [column(&pair.a), column(&pair.b)];
+            x.iter().zip(&y).zip(&limits).any(|((x, y), limit)| !limit.holds(*x, *y))
         };
         let apart: Vec<String> =
             (0..rows.len()).filter(|&row| differs(row)).map(|row| rows[row].clone()).collect();
@@ -223,8 +225,11 @@ impl ComparisonBuilder {
             let column = &a.names[found.columns[index[0]].0];
             (rows[index[1]].clone(), column.clone(), vec![index[1], index[0]])
         };
-        feature.difference.add(pair.values(), limit, locate);
+        feature.difference.add(pair.values(), |ordinal| limits[ordinal / shape.2], locate);
         if feature.difference.equal < feature.difference.values {
+            // Beside a large column, differences of a small one would pass for rounding.
+            let is_hidden = !apart.is_empty() && pair.is_noise();
+            let pair = if is_hidden { pair.relative_to(&scales) } else { pair };
             feature.causes(causes::of_values(&pair, ["table", "table"]), "the table");
         }
         self.differs(&found.feature, apart);

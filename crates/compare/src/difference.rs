@@ -5,9 +5,10 @@ use serde::Serialize;
 /// What counts as equal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Tolerance {
-    /// A share of the largest magnitude of the two arrays.
+    /// A share of the largest magnitude of the two arrays, or of the two columns of tables; the
+    /// coefficients of a vector count as one column.
     OfLargest(f64),
-    /// For each value `atol + rtol * |b|`, as `numpy.allclose`.
+    /// For each value `atol + rtol * |b|`, as `numpy.allclose(equal_nan=True)`.
     Each {
         /// Absolute part.
         atol: f64,
@@ -25,7 +26,7 @@ impl Default for Tolerance {
 }
 
 impl Tolerance {
-    /// The limit for arrays with this largest magnitude.
+    /// The limit for values with this largest magnitude.
     pub(super) fn limit(self, largest: f64) -> Limit {
         match self {
             Self::OfLargest(share) => Limit { atol: share * largest, rtol: 0.0 },
@@ -44,7 +45,7 @@ pub(super) struct Limit {
 impl Limit {
     /// Whether two values are equal under the limit; NaN equals NaN.
     pub(super) fn holds(self, a: f64, b: f64) -> bool {
-        same(a, b) || (a - b).abs() <= self.atol + self.rtol * b.abs()
+        same(a, b) || (b.is_finite() && (a - b).abs() <= self.atol + self.rtol * b.abs())
     }
 }
 
@@ -104,12 +105,12 @@ struct Moments {
 }
 
 impl Difference {
-    /// Adds the values of one pair of arrays. `locate` gives array, position and index of the value
-    /// with this ordinal.
+    /// Adds the values of one pair of arrays. `limit` is that of the value with this ordinal; `locate`
+    /// gives its array, position and index.
     pub(super) fn add(
         &mut self,
         values: impl Iterator<Item = (f64, f64)>,
-        limit: Limit,
+        limit: impl Fn(usize) -> Limit,
         locate: impl FnOnce(usize) -> (String, String, Vec<usize>),
     ) {
         let mut largest = self.largest.as_ref().map_or(0.0, |extreme| extreme.value);
@@ -118,7 +119,7 @@ impl Difference {
         for (ordinal, (a, b)) in values.enumerate() {
             self.values += 1;
             self.equal += u64::from(same(a, b));
-            self.within += u64::from(limit.holds(a, b));
+            self.within += u64::from(limit(ordinal).holds(a, b));
             if !(a.is_finite() && b.is_finite()) {
                 self.one_sided += u64::from(!same(a, b));
                 continue;

@@ -69,6 +69,8 @@ pub struct Criteria {
 /// [`CompareError`]: a file cannot be read, or they have nothing in common.
 pub fn compare(a: &Path, b: &Path, criteria: &Criteria) -> Result<Comparison, CompareError> {
     let (mut a, mut b) = (ComparedFile::open(a)?, ComparedFile::open(b)?);
+    a.spell_out(&b);
+    b.spell_out(&a);
     let mut matching = Matching::new(&a, &b, &criteria.map)?;
     let mut builder = ComparisonBuilder::new(criteria.tolerance);
     if matching.rows.is_some() {

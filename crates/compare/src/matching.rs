@@ -31,6 +31,8 @@ pub(super) struct TableMatch {
     pub feature: String,
     /// Positions in the first and in the second file.
     pub columns: Vec<(usize, usize)>,
+    /// Which vector each column is a coefficient of, in any channel; others are vectors of their own.
+    pub vectors: Vec<usize>,
     /// Positions in the first and in the second file.
     pub rows: Vec<(usize, usize)>,
 }
@@ -107,7 +109,7 @@ impl Matching {
             pairs.push((*only_a, *only_b));
             (rest_a, rest_b) = (Vec::new(), Vec::new());
         }
-        if pairs.is_empty() && matching.tables.is_empty() {
+        if pairs.is_empty() && matching.tables.is_empty() && !a.shares_texts_only(b) {
             if let (Some(in_a), Some(in_b)) = (a.rows_or_recordings(), b.rows_or_recordings()) {
                 let (of_a, of_b) = (a.path().into(), b.path().into());
                 if in_a.iter().any(|id| in_b.contains(id)) {
@@ -180,7 +182,13 @@ impl Matching {
         }
         for feature in features {
             let columns = groups.remove(&feature).unwrap_or_default();
-            self.tables.push(TableMatch { feature, columns, rows: rows.clone() });
+            let mut known: HashMap<String, usize> = HashMap::new();
+            let mut vector = |name: &str| {
+                let next = known.len();
+                *known.entry(vector_of(name)).or_insert(next)
+            };
+            let vectors = columns.iter().map(|(i, _)| vector(&x.names[*i])).collect();
+            self.tables.push(TableMatch { feature, columns, vectors, rows: rows.clone() });
         }
         Ok(())
     }
@@ -307,11 +315,28 @@ fn common(
 
 /// The feature that a summary column is of: `mfcc` for `ch0/mfcc[3].mean`.
 fn feature_of(column: &str) -> &str {
-    let rest = match column.split_once('/') {
+    let rest = without_channel(column);
+    rest.split(['[', '.']).next().unwrap_or(rest)
+}
+
+/// The vector that a summary column is a coefficient of: `mfcc[].mean` for `ch0/mfcc[3].mean`,
+/// `af193[chroma_]` for `af193[chroma_2]`.
+fn vector_of(column: &str) -> String {
+    let rest = without_channel(column);
+    match rest.split_once('[').and_then(|(name, rest)| Some((name, rest.split_once(']')?))) {
+        Some((name, (index, statistic))) => {
+            let part = index.trim_end_matches(|c: char| c.is_ascii_digit() || c == ',');
+            format!("{name}[{part}]{statistic}")
+        }
+        None => rest.into(),
+    }
+}
+
+fn without_channel(column: &str) -> &str {
+    match column.split_once('/') {
         Some((place, rest)) if place.starts_with("ch") => rest,
         _ => column,
-    };
-    rest.split(['[', '.']).next().unwrap_or(rest)
+    }
 }
 
 impl TableMatch {

@@ -1,6 +1,6 @@
 //! Two arrays whose values stand in the same places.
 
-use ndarray::{Array3, ArrayD};
+use ndarray::{Array3, ArrayD, Axis, s};
 
 /// What the three axes of a pair mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,6 +57,38 @@ impl Pair {
     /// Differences up to here are noise, relative to the second file's values.
     pub(super) fn noise(&self) -> f64 {
         NOISE * largest(self.b.iter())
+    }
+
+    /// The largest finite magnitude of both for each column; columns of the same vector have one.
+    pub(super) fn scales(&self, vectors: &[usize]) -> Vec<f64> {
+        let column = |side: &Array3<f64>, column| largest(side.slice(s![0, column, ..]).iter());
+        let mut of_vector =
+            vec![0.0f64; vectors.iter().map(|vector| vector + 1).max().unwrap_or(0)];
+        for (at, &vector) in vectors.iter().enumerate() {
+            let most = column(&self.a, at).max(column(&self.b, at));
+            of_vector[vector] = of_vector[vector].max(most);
+        }
+        vectors.iter().map(|&vector| of_vector[vector]).collect()
+    }
+
+    /// Whether no difference is more than noise.
+    pub(super) fn is_noise(&self) -> bool {
+        let noise = self.noise();
+        self.values().all(|(a, b)| a == b || (a.is_nan() && b.is_nan()) || (a - b).abs() <= noise)
+    }
+
+    /// Every column divided by its scale.
+    pub(super) fn relative_to(&self, scales: &[f64]) -> Self {
+        let divided = |side: &Array3<f64>| {
+            let mut side = side.clone();
+            for (mut column, &scale) in side.axis_iter_mut(Axis(1)).zip(scales) {
+                if scale > 0.0 {
+                    column /= scale;
+                }
+            }
+            side
+        };
+        Self { a: divided(&self.a), b: divided(&self.b), axes: self.axes }
     }
 
     /// Values in the order of their indices.

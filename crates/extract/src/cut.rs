@@ -72,7 +72,8 @@ pub fn name_recordings(mut inputs: Vec<Input>) -> Result<Vec<Input>, InputError>
 }
 
 /// The windows of every recording, in the order of time: `x@0.5` begins half a second into `x`.
-/// Labels are copied; the column `recording` holds the id of the recording.
+/// Labels are copied; the column `recording` holds the id of the recording, or its path where inputs are
+/// stretches of one file.
 ///
 /// Windows begin at multiples of the hop and are whole: what remains at the end is left out, but a
 /// recording shorter than a window is one window. Both are whole numbers of frames, rounded once.
@@ -81,7 +82,8 @@ pub fn name_recordings(mut inputs: Vec<Input>) -> Result<Vec<Input>, InputError>
 ///
 /// # Errors
 /// Standard input, which cannot be read twice; too many windows; a window with the id of another
-/// input; a label called `recording`, by whose values folds would split recordings; a stop.
+/// input; a label called `recording`, by whose values folds would split recordings; stretches of web
+/// addresses that only their queries tell apart; a stop.
 pub fn into_windows(
     inputs: Vec<Input>,
     span: WindowSpan,
@@ -94,6 +96,7 @@ pub fn into_windows(
         );
         return Err(InputError::Window { id: input.id.clone(), reason });
     }
+    let inputs = name_recordings(inputs)?;
     let headers = headers(&inputs, stop);
     let lengths = lengths(&inputs, &headers, stop);
     if stop.load(Ordering::Relaxed) {
@@ -175,7 +178,9 @@ fn frame_at(seconds: f64, rate: f64) -> u64 {
 
 fn labelled(input: &Input, id: String, start: Option<f64>, end: Option<f64>) -> Input {
     let mut labels = input.labels.clone();
-    labels.push((RECORDING.into(), input.id.clone()));
+    if labels.iter().all(|(name, _)| name != RECORDING) {
+        labels.push((RECORDING.into(), input.id.clone()));
+    }
     Input { id, source: input.source.clone(), start, end, labels }
 }
 

@@ -18,6 +18,8 @@ pub struct FeaturePanel {
     /// `[coefficients, frames]`, the lowest coefficient first; what is not finite is drawn as the
     /// lowest value.
     pub values: Array2<f32>,
+    /// Where its frames begin and end on the time axis; the whole axis where that is not known.
+    pub span: Option<(f64, f64)>,
     /// Labels of rows with their place, 0 at the bottom to 1 at the top, the most wanted first;
     /// empty for the numbers of the rows.
     pub rows: Vec<(f64, f64)>,
@@ -69,6 +71,13 @@ impl FeaturePicture {
         }
     }
 
+    /// The part of a plot that a panel's frames take up.
+    fn place(&self, panel: &FeaturePanel, plot: Rect) -> Rect {
+        let (from, to) = panel.span.unwrap_or(self.time);
+        let [left, right] = [from, to].map(|time| plot.x + share(time, self.time) * plot.w);
+        if right > left { Rect::new(left, plot.y, right - left, plot.h) } else { plot }
+    }
+
     fn bottom(&self) -> f64 {
         let heights = self.panels.iter().map(|p| HEAD + self.height(p) + SPACE);
         TOP + heights.sum::<f64>()
@@ -87,7 +96,7 @@ impl FeaturePanel {
         }
     }
 
-    fn draw_curve(&self, on: &mut Drawing, plot: Rect) {
+    fn draw_curve(&self, on: &mut Drawing, plot: Rect, frames: Rect) {
         let values: Vec<f64> = self.values.iter().map(|v| f64::from(*v)).collect();
         let range = range_of(values.iter().copied());
         let marks = ticks(range.0, range.1, 2);
@@ -96,9 +105,9 @@ impl FeaturePanel {
             on.rect(Rect::new(plot.x, y - 0.5, plot.w, 1.0), Paint::Grid);
             on.text(plot.x - 7.0, y + 3.5, &text, TextStyle::tick(Anchor::End));
         }
-        let step = plot.w / values.len().max(1) as f64;
+        let step = frames.w / values.len().max(1) as f64;
         let place = |(i, v): (usize, &f64)| {
-            (plot.x + step * (i as f64 + 0.5), plot.bottom() - share(*v, range) * plot.h)
+            (frames.x + step * (i as f64 + 0.5), plot.bottom() - share(*v, range) * plot.h)
         };
         // A gap where a value is not finite.
         for run in values.iter().enumerate().collect::<Vec<_>>().split(|(_, v)| !v.is_finite()) {
@@ -107,14 +116,14 @@ impl FeaturePanel {
         }
     }
 
-    fn draw_colors(&self, on: &mut Drawing, plot: Rect) -> Result<(), PlotError> {
-        let (rows, frames) = self.values.dim();
+    fn draw_colors(&self, on: &mut Drawing, plot: Rect, frames: Rect) -> Result<(), PlotError> {
+        let (rows, columns) = self.values.dim();
         let range = self.range();
-        if rows > 0 && frames > 0 {
+        if rows > 0 && columns > 0 {
             let color = |v: f32| sequential(share(f64::from(v), range) as f32);
             let colors = (0..rows).rev().flat_map(|r| self.values.row(r).to_vec());
             let colors = colors.map(color).collect();
-            on.image(plot, &Pixels { width: frames, height: rows, colors })?;
+            on.image(frames, &Pixels { width: columns, height: rows, colors })?;
         }
         let numbers: Vec<(f64, f64)> = ticks(0.0, rows.saturating_sub(1) as f64, 4)
             .into_iter()
@@ -156,9 +165,10 @@ impl Figure for FeaturePicture {
             let name = TextStyle { bold: true, ..TextStyle::new(11.5, Paint::Ink, Anchor::Start) };
             on.text(LEFT, y + 13.0, &font::fitted(&panel.label, 11.5, true, WIDTH), name);
             let plot = Rect::new(LEFT, y + HEAD, WIDTH, self.height(panel));
+            let frames = self.place(panel, plot);
             match panel.values.nrows() {
-                0..=1 => panel.draw_curve(on, plot),
-                _ => panel.draw_colors(on, plot)?,
+                0..=1 => panel.draw_curve(on, plot, frames),
+                _ => panel.draw_colors(on, plot, frames)?,
             }
             y = plot.bottom() + SPACE;
         }

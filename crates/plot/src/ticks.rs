@@ -17,14 +17,24 @@ pub(crate) fn ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
     (0..=(last - first).max(-1.0) as usize).map(|i| (first + i as f64) * step + 0.0).collect()
 }
 
+/// Most decimals of a label; smaller steps have exponents.
+const DECIMALS: f64 = 6.0;
+
 /// Labels of `values` with as few decimals as tell them apart, and a true minus sign.
 pub(crate) fn labels(values: &[f64]) -> Vec<String> {
     let step = values.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
-    let decimals = if step.is_finite() && step > 0.0 {
-        (-(step * 1.0001).log10().floor()).clamp(0.0, 9.0) as usize
-    } else {
-        1
+    let wanted = match step.is_finite() && step > 0.0 {
+        true => (-(step * 1.0001).log10().floor()).max(0.0),
+        false => 1.0,
     };
+    if wanted > DECIMALS {
+        let most = values.iter().fold(step, |most, v| most.max(v.abs()));
+        let digits = ((most * 1.0001).log10().floor() + wanted) as usize;
+        let label =
+            |v: &f64| if *v == 0.0 { "0".into() } else { signed(&format!("{v:.digits$e}")) };
+        return values.iter().map(label).collect();
+    }
+    let decimals = wanted as usize;
     values.iter().map(|v| signed(&format!("{v:.decimals$}"))).collect()
 }
 
@@ -63,6 +73,8 @@ mod tests {
         assert_eq!(ticks(0.0, 100.0, 5), [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]);
         assert_eq!(labels(&ticks(0.0, 0.3, 3)), ["0.0", "0.1", "0.2", "0.3"]);
         assert_eq!(labels(&ticks(-40.0, 0.0, 2)), ["\u{2212}40", "\u{2212}20", "0"]);
+        assert_eq!(labels(&ticks(0.0, 1e-9, 2)), ["0", "5.0e\u{2212}10", "1.0e\u{2212}9"]);
+        assert_eq!(labels(&[2e-8, 4e-8]), ["2e\u{2212}8", "4e\u{2212}8"]);
         assert!(ticks(1.0, 1.0, 5).is_empty() && ticks(0.0, f64::NAN, 5).is_empty());
         assert_eq!([50.0, 1000.0, 2500.0].map(frequency), ["50", "1k", "2.5k"]);
     }

@@ -62,6 +62,7 @@ fn features() -> FeaturePicture {
     let panel = |rows: usize| FeaturePanel {
         label: format!("{rows} rows, channel 0"),
         values: Array2::from_shape_fn((rows, 90), |(r, t)| (r as f32 - 2.0) * (t as f32).sin()),
+        span: (rows == 12).then_some((0.5, 1.5)),
         rows: Vec::new(),
         unit: "value".into(),
     };

@@ -43,10 +43,11 @@ pub struct Args {
     a: PathBuf,
     /// The second file.
     b: PathBuf,
-    /// Values are equal when they differ by at most this share of the largest magnitude of their arrays.
+    /// Values are equal when they differ by at most this share of the largest magnitude of their arrays;
+    /// in tables, of their columns, the coefficients of a vector together.
     #[arg(long, value_name = "SHARE", default_value = "1e-5", value_parser = number)]
     tolerance: f64,
-    /// Values are equal when they differ by at most ATOL + RTOL * |b|, as numpy.allclose.
+    /// Values are equal when they differ by at most ATOL + RTOL * |b|, as numpy.allclose with equal_nan.
     #[arg(long, value_name = "ATOL", conflicts_with = "tolerance", value_parser = number)]
     atol: Option<f64>,
     /// The relative part of --atol.

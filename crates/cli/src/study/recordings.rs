@@ -1,8 +1,9 @@
 //! What the recordings behind a report are like.
 
 use std::collections::{HashMap, HashSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use corsmal_extract::inputs::is_stored;
 use corsmal_files::identity;
 use corsmal_plot::RecordingPicture;
 use corsmal_report::study::{Recording, Study};
@@ -13,6 +14,8 @@ use crate::progress::bar;
 
 /// Classes of which a recording is drawn.
 const PICTURES: usize = 50;
+/// Stretches of a recording without features that are named.
+const STRETCHES: usize = 5;
 
 /// A row of a study: a recording, or a stretch of it, that may still be at its path.
 pub(super) struct Source {
@@ -30,6 +33,11 @@ pub(super) struct Source {
 /// A recording, and what is drawn of it.
 struct Heard {
     source: Source,
+    /// the classes of its rows
+    classes: HashSet<usize>,
+    /// ids of its rows without features, and why
+    unused: Vec<(String, String)>,
+    rows: usize,
     present: Present,
     examples: Vec<(usize, Excerpt)>,
 }
@@ -39,6 +47,8 @@ struct Heard {
 enum Present {
     Yes,
     Gone,
+    /// a member of a tar, or an object in a store
+    Elsewhere,
     /// another file
     Changed,
 }
@@ -46,7 +56,9 @@ enum Present {
 impl Present {
     fn of(source: &Source) -> Self {
         let known = !source.identity.is_empty() && source.identity != identity::STREAM;
+        let is_member = || source.path.ancestors().skip(1).any(Path::is_file);
         match source.path.is_file() {
+            false if is_member() || source.path.to_str().is_some_and(is_stored) => Self::Elsewhere,
             false => Self::Gone,
             true if known
                 && identity::of_file(&source.path).ok().as_ref() != Some(&source.identity) =>
@@ -62,6 +74,7 @@ impl Present {
 /// none is at its path any more, the report does without.
 pub(super) fn add(study: &mut Study, sources: Vec<Source>, quiet: bool) {
     let recordings = heard(sources);
+    warn(&recordings, Present::Elsewhere, "lie in a tar or a store");
     warn(&recordings, Present::Gone, "are no longer at their paths");
     warn(&recordings, Present::Changed, "are no longer those that the features were made from");
     if recordings.iter().all(|heard| heard.present != Present::Yes) {
@@ -84,19 +97,28 @@ pub(super) fn add(study: &mut Study, sources: Vec<Source>, quiet: bool) {
     study.examples.sort_by_key(|(class, _)| *class);
 }
 
-/// The recordings of the rows, with the first row of each class as an example. A recording with stretches of
-/// several classes has none.
+/// The recordings of the rows, with the first row of each class as an example.
 fn heard(sources: Vec<Source>) -> Vec<Heard> {
     let mut recordings: Vec<Heard> = Vec::new();
     let (mut known, mut pictured, mut rows) = (HashMap::new(), HashSet::new(), Vec::new());
     for source in sources {
         let index = *known.entry(source.path.clone()).or_insert(recordings.len());
         let (class, stretch) = (source.class, source.stretch);
+        let unused = source.unused.clone().map(|reason| (source.id.clone(), reason));
         if index == recordings.len() {
-            recordings.push(Heard { source, present: Present::Gone, examples: Vec::new() });
+            recordings.push(Heard {
+                source,
+                classes: HashSet::new(),
+                unused: Vec::new(),
+                rows: 0,
+                present: Present::Gone,
+                examples: Vec::new(),
+            });
         }
         let heard = &mut recordings[index];
-        heard.source.class = heard.source.class.filter(|_| heard.source.class == class);
+        heard.classes.extend(class);
+        heard.unused.extend(unused);
+        heard.rows += 1;
         rows.push((index, class, stretch));
     }
     recordings.par_iter_mut().for_each(|heard| heard.present = Present::of(&heard.source));
@@ -124,8 +146,11 @@ fn warn(recordings: &[Heard], present: Present, what: &str) {
 }
 
 fn described(heard: Heard) -> (Recording, Vec<(usize, RecordingPicture)>) {
-    let Heard { source, present, examples } = heard;
-    let recording = Recording { id: source.id, class: source.class, ..Recording::default() };
+    let Heard { source, classes, unused, rows, present, examples } = heard;
+    // Of several stretches, the file is the recording. With stretches of several classes it has none.
+    let id = if rows > 1 { source.path.display().to_string() } else { source.id };
+    let class = classes.iter().next().copied().filter(|_| classes.len() == 1);
+    let recording = Recording { id, class, ..Recording::default() };
     let (classes, excerpts): (Vec<usize>, _) = examples.into_iter().unzip();
     let found = match present {
         Present::Changed => {
@@ -137,7 +162,14 @@ fn described(heard: Heard) -> (Recording, Vec<(usize, RecordingPicture)>) {
         Ok(found) => (of_look(recording, &found), found.pictures),
         Err(failure) => (Recording { failure: Some(failure), ..recording }, Vec::new()),
     };
-    recording.notes.extend(source.unused);
+    let more = unused.len().saturating_sub(STRETCHES);
+    recording.notes.extend(unused.into_iter().take(STRETCHES).map(|(id, reason)| match rows {
+        1 => reason,
+        _ => format!("{id}: {reason}"),
+    }));
+    if more > 0 {
+        recording.notes.push(format!("{more} more without features"));
+    }
     (recording, classes.into_iter().zip(pictures).collect())
 }
 

@@ -212,30 +212,6 @@ fn folders_and_several_files_are_listed() {
 }
 
 #[test]
-fn features_are_drawn() {
-    let folder = tempfile::tempdir().unwrap();
-    let audio = folder.path().join("audio");
-    std::fs::create_dir_all(&audio).unwrap();
-    recording(&audio);
-    let out = folder.path().join("frames.npz");
-    let mut extract = tool();
-    extract.arg("extract").arg("--in").arg(&audio).arg("--out").arg(&out);
-    assert!(extract.args(["--preset", "logmel"]).output().unwrap().status.success());
-    let svg = drawn(&out, &["--recording", "four", "--channels", "0,2"]);
-    assert!(
-        svg.contains(">four</text>") && svg.contains("channel 2") && !svg.contains("channel 1")
-    );
-    let refused = tool()
-        .arg("inspect")
-        .arg(&out)
-        .args(["--picture", "x.svg", "--recording", "five"])
-        .current_dir(folder.path())
-        .output()
-        .unwrap();
-    assert!(text(&refused.stderr).contains("no recording 'five'; it has 1 (four)"));
-}
-
-#[test]
 fn what_is_no_recording_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let bad = folder.path().join("bad.wav");

@@ -160,15 +160,20 @@ fn stretches_of_one_recording_are_examples_of_their_classes() {
         }
         writer.finalize().unwrap();
     }
+    // Those without features had no note, as rows of a recording that has some.
+    list += "long1.wav,90,91,hum\n";
     std::fs::write(j.path("list.csv"), list).unwrap();
     let (table, report) = (j.path("t.npz"), j.path("report"));
     let at = ["--preset", "esc26", "--set", "signal.start=0.25", "-q"];
-    done(&[&["extract", text(&j.path("list.csv")), "-o", text(&table)], &at[..]].concat());
+    let listed = j.path("list.csv");
+    let extract = [&["extract", text(&listed), "-o", text(&table)], &at[..]].concat();
+    assert_eq!(run(&extract).status.code(), Some(1));
     let validate = ["cross-validate", text(&table), "--target", "class", "--cv", "group=recording"];
     let write = ["--set", "trees=25", "--report", text(&report), "--overwrite", "-q"];
     let validate = [&validate[..], &write[..]].concat();
     done(&validate);
     holds(&report.join("report.html"), &["hum: long0.wav", "rain: long0.wav"]);
+    holds(&report.join("tables/notes.csv"), &["long1.wav", "long1@90.0-91.0: ", "after the end"]);
 
     std::fs::copy(j.path("audio/ticks/ticks0.wav"), j.path("long0.wav")).unwrap();
     let again = run(&validate);

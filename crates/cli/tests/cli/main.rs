@@ -10,6 +10,7 @@ mod compare;
 mod compat;
 #[cfg(target_os = "linux")]
 mod devices;
+mod drawn_features;
 mod extract;
 mod formats;
 mod fusion;

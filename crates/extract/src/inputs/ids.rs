@@ -159,16 +159,17 @@ fn id_of(path: &Path) -> String {
     if id.starts_with(RESERVED) { format!("./{id}") } else { id }
 }
 
-/// Of the bytes of a path, of which an id may lose some.
+/// Of the bytes of a path, of which an id loses some, such as where it begins.
 fn fingerprint(path: &Path) -> String {
     let mut hash = blake3::Hasher::new();
-    let parts = path.components().filter_map(|part| match part {
-        Component::Normal(name) => Some(name),
-        _ => None,
-    });
-    parts.for_each(|name| {
-        hash.update(name.as_encoded_bytes()).update(b"/");
-    });
+    for part in path.components() {
+        match part {
+            Component::Normal(name) => hash.update(name.as_encoded_bytes()).update(b"/"),
+            Component::ParentDir => hash.update(b"../"),
+            Component::RootDir => hash.update(b"/"),
+            Component::CurDir | Component::Prefix(_) => continue,
+        };
+    }
     hash.finalize().to_hex()[..8].into()
 }
 
@@ -186,6 +187,17 @@ fn readable(name: &OsStr) -> String {
 mod tests {
     use super::*;
 
+    fn found((relative, path): (&str, &str)) -> Found {
+        Found {
+            source: InputSource::File(path.into()),
+            naming: Naming::Derived(relative.into()),
+            start: None,
+            end: None,
+            labels: Vec::new(),
+            line: None,
+        }
+    }
+
     #[test]
     fn plain_names_get_no_hash() {
         let files = [
@@ -194,14 +206,18 @@ mod tests {
             ("x.wav", "2/x.wav"),
             ("1/x.wav", "R/1/x.wav"),
         ];
-        let found = files.map(|(relative, path)| Found {
-            source: InputSource::File(path.into()),
-            naming: Naming::Derived(relative.into()),
-            start: None,
-            end: None,
-            labels: Vec::new(),
-            line: None,
-        });
-        assert_eq!(assign(&found).unwrap(), ["x.flac", "1/x.wav", "2/x", "R/1/x"]);
+        assert_eq!(assign(&files.map(found)).unwrap(), ["x.flac", "1/x.wav", "2/x", "R/1/x"]);
+    }
+
+    /// They were refused as one file that is named twice.
+    #[test]
+    fn paths_that_begin_elsewhere_are_other_files() {
+        let paths = ["aud/x.wav", "../aud/x.wav", "/aud/x.wav", "aud/../aud/x.wav"];
+        let mut ids = assign(&paths.map(|path| found(("x.wav", path)))).unwrap();
+        ids.sort();
+        ids.dedup();
+        assert_eq!(ids.len(), 4, "{ids:?}");
+        let same = ["aud/x.wav", "./aud/x.wav"].map(|path| found(("x.wav", path)));
+        assert!(matches!(assign(&same), Err(InputError::Duplicate { .. })));
     }
 }

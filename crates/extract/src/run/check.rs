@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use corsmal_files::feature_file::{FeatureFileError, FeatureTable};
 use corsmal_files::format::{OutputFormat, require_npz};
 use corsmal_files::layout::TIMES;
+use corsmal_files::outcome::Outcome;
 use corsmal_files::provenance::Provenance;
 use corsmal_files::{draft, identity, partition};
 
@@ -258,13 +259,20 @@ impl Finished<'_> {
             return Err(refuse(why));
         }
         let now = Identities::of(self.inputs, stop);
-        let same = outcomes.len() == self.inputs.len()
-            && outcomes.iter().enumerate().all(|(i, outcome)| outcome.identity == now.get(i));
+        let changed = |(i, outcome): &(usize, &Outcome)| outcome.identity != now.get(*i);
+        let changed: Vec<&Outcome> =
+            outcomes.iter().enumerate().filter(changed).map(|(_, outcome)| outcome).collect();
         if stop.load(Ordering::Relaxed) {
             return Err(RunError::Interrupted);
         }
-        if !same {
-            return Err(refuse("holds features of files that have changed since"));
+        if outcomes.len() != self.inputs.len() || !changed.is_empty() {
+            // Nothing was known of files that could not be read.
+            let were_read =
+                changed.is_empty() || changed.iter().any(|outcome| !outcome.identity.is_empty());
+            return Err(refuse(match were_read {
+                true => "holds features of files that have changed since",
+                false => "has failures of files that can be read now",
+            }));
         }
         Ok(RunReport { resumed: outcomes.len(), outcomes, up_to_date: true })
     }

@@ -72,6 +72,30 @@ fn stretches_are_named_after_their_file_however_it_is_written() {
     assert_eq!(named(vec![own.clone(), own]), [recording("mine"), recording("mine")]);
 }
 
+/// They were groups of their own, so that folds had windows of one recording on both sides.
+#[test]
+fn windows_of_stretches_belong_to_their_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x");
+    std::fs::write(&path, MP3).unwrap();
+    let stretch = |id: &str, start: f64, end: f64| Input {
+        id: id.into(),
+        start: Some(start),
+        end: Some(end),
+        ..input(&path)
+    };
+    let cut = |inputs: Vec<Input>| {
+        into_windows(inputs, WindowSpan { window: 0.1, hop: 0.1 }, &Arc::default()).unwrap()
+    };
+    let windows = cut(vec![stretch("a", 0.0, 0.2), stretch("b", 0.3, 0.5)]);
+    let recording = vec![("recording".to_string(), path.to_str().unwrap().to_string())];
+    assert_eq!(windows.len(), 4);
+    assert!(windows.iter().all(|window| window.labels == recording), "{windows:?}");
+    // A stretch alone has the name that it was given.
+    let windows = cut(vec![stretch("a", 0.0, 0.2)]);
+    assert!(windows.iter().all(|window| window.labels[0].1 == "a"), "{windows:?}");
+}
+
 /// Seconds of a recording, up to what cannot be read.
 fn length(path: &Path) -> f64 {
     let Ok(mut source) = corsmal_audio::open(path) else { return 1.0 };

@@ -2,44 +2,58 @@
 
 use std::path::Path;
 
-use corsmal_files::layout::{TIMES, is_frame_level};
+use corsmal_files::layout::{self, TIMES, is_frame_level};
 use corsmal_files::npz::NpzFile;
 use corsmal_files::parquet::ParquetFile;
 use corsmal_plot::{FeaturePanel, FeaturePicture};
-use ndarray::{Array2, ArrayD, ArrayView2, Axis, Ix3, s};
+use ndarray::{ArrayD, ArrayView2, Axis, Ix3, s};
 
 use super::picture::Picture;
 use crate::failure::Failure;
 
 /// Panels in one picture.
 const MAX_PANELS: usize = 24;
+/// Frames of a panel; of more, every k-th is drawn.
+const MOST_FRAMES: usize = 4000;
+
+/// The frames of a feature.
+struct Frames {
+    /// Empty where there is one feature only.
+    feature: String,
+    /// `[channels, coefficients, frames]`, or fewer axes.
+    values: ArrayD<f32>,
+    /// Their middles in seconds, where they are known.
+    times: Vec<f64>,
+}
 
 /// Draws the frame-level arrays of one recording of an `.npz`.
 pub fn draw_npz(file: &mut NpzFile, picture: &Picture) -> Result<(), Failure> {
     let path = file.path().display().to_string();
     let names: Vec<String> = file.names().iter().filter(|n| is_frame_level(n)).cloned().collect();
-    let arrays: Vec<&String> = names.iter().filter(|n| !n.starts_with(TIMES)).collect();
-    let ids = if file.contains("__ids__") { file.strings("__ids__")? } else { Vec::new() };
-    let known: Vec<String> = match ids.is_empty() {
-        true => arrays.iter().map(|n| (*n).clone()).collect(),
-        false => ids,
+    let (known, features) = match layout::is_ours(file) {
+        true => (file.strings("__ids__")?, layout::read_table(file)?.1.features()),
+        false => (names.into_iter().filter(|n| !n.starts_with(TIMES)).collect(), Vec::new()),
     };
     let id = chosen(&path, &known, picture)?;
-    let of = |name: &str| name == id || name.strip_prefix(&id).is_some_and(|r| r.starts_with('/'));
-    let arrays: Vec<String> = arrays.into_iter().filter(|n| of(n)).cloned().collect();
-    let mut panels = Vec::new();
-    let mut time = None;
-    for name in &arrays {
-        let values = file.f32(name)?;
-        let times_name = format!("{TIMES}{name}");
-        if time.is_none() && file.contains(&times_name) {
-            let times = file.f64(&times_name)?;
-            time = times.first().copied().zip(times.last().copied());
+    // One feature, or an array of another program, has the name of its recording.
+    let features: Vec<Option<String>> = match features.len() {
+        0 | 1 => vec![None],
+        _ => features.into_iter().map(Some).collect(),
+    };
+    let mut frames = Vec::new();
+    for feature in features {
+        let name = layout::frames_name(&id, feature.as_deref());
+        let times = layout::times_name(&id, feature.as_deref());
+        if file.contains(&name) {
+            let times = match file.contains(&times) {
+                true => file.f64(&times)?.into_iter().collect(),
+                false => Vec::new(),
+            };
+            let feature = feature.unwrap_or_default();
+            frames.push(Frames { feature, values: file.f32(&name)?, times });
         }
-        let feature = name.strip_prefix(&id).unwrap_or_default().trim_start_matches('/');
-        panels.extend(panels_of(feature, values, picture)?);
     }
-    draw_frames(path, id, panels, time, picture)
+    draw_frames(path, id, frames, picture)
 }
 
 /// Draws the frames of one recording of a Parquet file.
@@ -49,18 +63,16 @@ pub fn draw_parquet(file: &mut ParquetFile, picture: &Picture) -> Result<(), Fai
     let id = chosen(&path, &ids, picture)?;
     let row = ids.iter().position(|known| *known == id).unwrap_or_default();
     let features = file.frame_features();
-    let mut panels = Vec::new();
-    let mut time = None;
+    let mut frames = Vec::new();
     for feature in &features {
-        let frames = file.frames(row, feature)?;
-        if frames.values.is_empty() {
+        let found = file.frames(row, feature)?;
+        if found.values.is_empty() {
             continue;
         }
-        time = time.or(frames.times.first().copied().zip(frames.times.last().copied()));
-        let named = if features.len() > 1 { feature } else { "" };
-        panels.extend(panels_of(named, frames.values, picture)?);
+        let feature = if features.len() > 1 { feature.clone() } else { String::new() };
+        frames.push(Frames { feature, values: found.values, times: found.times.to_vec() });
     }
-    draw_frames(path, id, panels, time, picture)
+    draw_frames(path, id, frames, picture)
 }
 
 /// The recording to draw, of those that there are.
@@ -79,28 +91,32 @@ fn chosen(path: &str, known: &[String], picture: &Picture) -> Result<String, Fai
     }
 }
 
-/// Draws the panels of one recording, from the first to the last `time` in seconds.
+/// Draws the frames of one recording over one time axis.
 fn draw_frames(
     path: String,
     id: String,
-    panels: Vec<FeaturePanel>,
-    time: Option<(f64, f64)>,
+    frames: Vec<Frames>,
     picture: &Picture,
 ) -> Result<(), Failure> {
+    picture.takes("frames", &["--channels", "--start", "--end", "--recording"])?;
+    let mut panels = Vec::new();
+    for found in frames {
+        panels.extend(found.within(picture, &path)?.panels(picture)?);
+    }
     if panels.is_empty() {
         return Err(nothing(&path));
     }
-    let frames = panels.iter().map(|p| p.values.ncols()).max().unwrap_or(0);
-    let (time, time_label) = match time.filter(|(from, to)| to > from) {
-        Some(ends) => (ends, "time, seconds"),
-        None => ((0.0, frames as f64), "frame"),
-    };
     if panels.len() > MAX_PANELS {
         return Err(Failure::new(format!(
             "{path}: {} panels; choose some with --channels, at most {MAX_PANELS} are drawn",
             panels.len()
         )));
     }
+    let union = |a: (f64, f64), b: (f64, f64)| (a.0.min(b.0), a.1.max(b.1));
+    let (time, time_label) = match panels.iter().filter_map(|panel| panel.span).reduce(union) {
+        Some(ends) => (ends, "time, seconds"),
+        None => (whole(&panels), "frame"),
+    };
     let title = picture.title.clone().unwrap_or(id);
     let time_label = time_label.to_owned();
     picture.save(&FeaturePicture { title, subtitle: path, time, time_label, panels })
@@ -108,60 +124,90 @@ fn draw_frames(
 
 /// Draws the one array of an `.npy`.
 pub fn draw_array(path: &Path, values: ArrayD<f32>, picture: &Picture) -> Result<(), Failure> {
-    let panels = panels_of("", values, picture)?;
-    let frames = panels.iter().map(|p| p.values.ncols()).max().unwrap_or(0);
+    picture.takes("an array", &["--channels"])?;
+    let frames = Frames { feature: String::new(), values, times: Vec::new() };
+    let panels = frames.panels(picture)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     picture.save(&FeaturePicture {
         title: picture.title.clone().unwrap_or(name),
         subtitle: path.display().to_string(),
-        time: (0.0, frames as f64),
+        time: whole(&panels),
         time_label: "frame".into(),
         panels,
     })
+}
+
+/// An axis of frame numbers.
+fn whole(panels: &[FeaturePanel]) -> (f64, f64) {
+    (0.0, panels.iter().map(|panel| panel.values.ncols()).max().unwrap_or(0) as f64)
 }
 
 fn nothing(path: &str) -> Failure {
     Failure::new(format!("{path}: has no array of features to draw"))
 }
 
-/// A panel for each channel of an array `[channels, coefficients, frames]`.
-fn panels_of(
-    feature: &str,
-    values: ArrayD<f32>,
-    picture: &Picture,
-) -> Result<Vec<FeaturePanel>, Failure> {
-    let shape = values.shape().to_vec();
-    let cube = match shape.len() {
-        3 => values.into_dimensionality::<Ix3>()?,
-        2 => values.insert_axis(Axis(0)).into_dimensionality::<Ix3>()?,
-        1 => values.insert_axis(Axis(0)).insert_axis(Axis(0)).into_dimensionality::<Ix3>()?,
-        _ => {
-            let message = format!("an array of shape {shape:?} cannot be drawn: at most 3 axes");
-            return Err(Failure::new(message));
+impl Frames {
+    /// The frames of the stretch that is to be drawn.
+    fn within(mut self, picture: &Picture, path: &str) -> Result<Self, Failure> {
+        let (start, end) = (picture.view.start, picture.end);
+        if start == 0.0 && end.is_none() {
+            return Ok(self);
         }
-    };
-    picture.check_channels(cube.len_of(Axis(0)))?;
-    let channels: Vec<usize> = match picture.view.channels.is_empty() {
-        true => (0..cube.len_of(Axis(0))).collect(),
-        false => picture.view.channels.clone(),
-    };
-    let panel = |channel: usize| FeaturePanel {
-        label: match feature {
-            "" => format!("channel {channel}"),
-            feature => format!("{feature}, channel {channel}"),
-        },
-        values: thinned(cube.slice(s![channel, .., ..])),
-        rows: Vec::new(),
-        unit: String::new(),
-    };
-    Ok(channels.into_iter().map(panel).collect())
-}
+        let last = Axis(self.values.ndim().saturating_sub(1));
+        if self.times.is_empty() || self.times.len() != self.values.len_of(last) {
+            return Err(Failure::new(format!("--start and --end: {path} has no times of frames")));
+        }
+        let from = self.times.partition_point(|time| *time < start);
+        let to = self.times.partition_point(|time| end.is_none_or(|end| *time < end)).max(from);
+        if from == to {
+            return Err(Failure::new(format!("--start {start}: {path} has no frame there")));
+        }
+        self.values = self.values.slice_axis(last, (from..to).into()).to_owned();
+        self.times = self.times[from..to].to_vec();
+        Ok(self)
+    }
 
-/// Every k-th frame, so that a picture of a long recording stays small.
-fn thinned(values: ArrayView2<f32>) -> Array2<f32> {
-    const MOST: usize = 4000;
-    let step = values.ncols().div_ceil(MOST).max(1);
-    values.slice(s![.., ..;step as isize]).to_owned()
+    /// A panel for each channel.
+    fn panels(self, picture: &Picture) -> Result<Vec<FeaturePanel>, Failure> {
+        let Self { feature, values, times } = self;
+        let shape = values.shape().to_vec();
+        let cube = match shape.len() {
+            3 => values.into_dimensionality::<Ix3>()?,
+            2 => values.insert_axis(Axis(0)).into_dimensionality::<Ix3>()?,
+            1 => values.insert_axis(Axis(0)).insert_axis(Axis(0)).into_dimensionality::<Ix3>()?,
+            _ => {
+                let message =
+                    format!("an array of shape {shape:?} cannot be drawn: at most 3 axes");
+                return Err(Failure::new(message));
+            }
+        };
+        picture.check_channels(cube.len_of(Axis(0)))?;
+        let channels: Vec<usize> = match picture.view.channels.is_empty() {
+            true => (0..cube.len_of(Axis(0))).collect(),
+            false => picture.view.channels.clone(),
+        };
+        let step = cube.len_of(Axis(2)).div_ceil(MOST_FRAMES).max(1);
+        let span = match times[..] {
+            [first, .., last] if last > first => {
+                // Each frame reaches half way to its neighbours.
+                let hop = (last - first) / (times.len() - 1) as f64;
+                let drawn = times.len().div_ceil(step) * step;
+                Some((first - hop / 2.0, first + hop * (drawn as f64 - 0.5)))
+            }
+            _ => None,
+        };
+        let panel = |channel: usize| FeaturePanel {
+            label: match &*feature {
+                "" => format!("channel {channel}"),
+                feature => format!("{feature}, channel {channel}"),
+            },
+            values: cube.slice(s![channel, .., ..;step as isize]).to_owned(),
+            span,
+            rows: Vec::new(),
+            unit: String::new(),
+        };
+        Ok(channels.into_iter().map(panel).collect())
+    }
 }
 
 /// Draws a table: each row a recording, each column a feature in units of its standard deviation.
@@ -171,6 +217,7 @@ pub fn draw_table(
     values: ArrayView2<f32>,
     picture: &Picture,
 ) -> Result<(), Failure> {
+    picture.takes("a table", &[])?;
     if values.is_empty() {
         return Err(nothing(&path.display().to_string()));
     }
@@ -195,6 +242,7 @@ pub fn draw_table(
         label: "rows: recordings, columns: features, each in units of its standard deviation"
             .into(),
         values: standard,
+        span: None,
         rows: places.map(label).collect(),
         unit: "standard deviations".into(),
     };

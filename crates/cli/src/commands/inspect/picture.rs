@@ -30,14 +30,16 @@ pub struct PictureArgs {
     #[arg(long, value_name = "SECONDS", requires = "picture", value_parser = seconds)]
     end: Option<f64>,
     /// Frequency axis of a spectrogram.
-    #[arg(long, value_enum, default_value = "mel", requires = "picture")]
-    frequency_axis: Axis,
+    /// [default: mel]
+    #[arg(long, value_enum, requires = "picture")]
+    frequency_axis: Option<Axis>,
     /// Highest frequency of a spectrogram, in Hz; half the sample rate by default.
     #[arg(long, value_name = "HZ", requires = "picture", value_parser = hertz)]
     fmax: Option<f64>,
     /// Draw all waveforms on one scale, or each channel on its own.
-    #[arg(long, value_enum, default_value = "shared", requires = "picture")]
-    wave_scale: Scale,
+    /// [default: shared]
+    #[arg(long, value_enum, requires = "picture")]
+    wave_scale: Option<Scale>,
     /// Pixels per inch of a PNG; the picture is about 11 inches wide.
     #[arg(long, value_name = "N", default_value_t = DEFAULT_DPI, requires = "picture",
           value_parser = clap::value_parser!(u16).range(20..=1200))]
@@ -119,6 +121,8 @@ pub struct Picture {
     pub view: View,
     /// End of the stretch in seconds; the end of the recording where there is none.
     pub end: Option<f64>,
+    /// Options that choose what is drawn.
+    given: Vec<&'static str>,
 }
 
 impl PictureArgs {
@@ -143,26 +147,51 @@ impl PictureArgs {
             let message = format!("--end {end} is not after --start {start}: nothing to draw");
             return Err(Failure::new(message));
         }
+        let given = [
+            ("--channels", self.channels.is_some()),
+            ("--start", self.start.is_some()),
+            ("--end", self.end.is_some()),
+            ("--frequency-axis", self.frequency_axis.is_some()),
+            ("--fmax", self.fmax.is_some()),
+            ("--wave-scale", self.wave_scale.is_some()),
+            ("--recording", self.recording.is_some()),
+        ];
+        let given = given.into_iter().filter(|(_, given)| *given).map(|(option, _)| option);
         let view = View {
             channels: self.channels.map(|c| c.0).unwrap_or_default(),
-            axis: match self.frequency_axis {
+            axis: match self.frequency_axis.unwrap_or(Axis::Mel) {
                 Axis::Mel => FrequencyAxis::Mel,
                 Axis::Log => FrequencyAxis::Log,
                 Axis::Linear => FrequencyAxis::Linear,
             },
             fmax: self.fmax,
-            wave_scale: match self.wave_scale {
+            wave_scale: match self.wave_scale.unwrap_or(Scale::Shared) {
                 Scale::Shared => WaveScale::Shared,
                 Scale::Channel => WaveScale::Channel,
             },
             start,
         };
         let (title, recording) = (self.title, self.recording);
-        Ok(Some(Picture { path, format, dpi: self.dpi, title, recording, view, end: self.end }))
+        let (dpi, end, given) = (self.dpi, self.end, given.collect());
+        Ok(Some(Picture { path, format, dpi, title, recording, view, end, given }))
     }
 }
 
 impl Picture {
+    /// Options for pictures of recordings.
+    pub const OF_RECORDINGS: [&'static str; 6] =
+        ["--channels", "--start", "--end", "--frequency-axis", "--fmax", "--wave-scale"];
+
+    /// Refuses options that a picture of such a thing does not have.
+    pub fn takes(&self, what: &str, options: &[&str]) -> Result<(), Failure> {
+        match self.given.iter().find(|option| !options.contains(option)) {
+            None => Ok(()),
+            Some(option) => {
+                Err(Failure::new(format!("{option} has no effect on a picture of {what}")))
+            }
+        }
+    }
+
     /// Refuses channels that a recording of so many does not have.
     pub fn check_channels(&self, channels: usize) -> Result<(), Failure> {
         match self.view.channels.iter().find(|channel| **channel >= channels) {

@@ -35,6 +35,9 @@ struct Inspection<'a> {
 
 /// Reads the recording once and prints its report.
 pub fn inspect(path: &Path, picture: Option<&Picture>, json: bool) -> Result<ExitCode, Failure> {
+    if let Some(picture) = picture {
+        picture.takes("a recording", &Picture::OF_RECORDINGS)?;
+    }
     let name = path.display().to_string();
     let mut source = match open(path) {
         Ok(source) => source,
