@@ -253,7 +253,8 @@ def get_duration(
     S : [shape=(..., d, t)], optional
         Spectrogram, made with `n_fft`, `hop_length` and `center`.
     path : path, or binary file, optional
-        Recording; takes precedence over `y` and `S`.
+        Recording; takes precedence over `y` and `S`. It is decoded where the end of the file does
+        not bear out the length in its header.
 
     Returns
     -------
@@ -266,8 +267,11 @@ def get_duration(
     """
     if path is not None:
         recording = _open(path)
-        frames = recording.declared_frames
-        return (recording.count() if frames is None else frames) / recording.sample_rate
+        frames = recording.confirmed_frames()
+        if frames is None:
+            frames = recording.count()
+            _tell(recording, path)
+        return frames / recording.sample_rate
     if not sr > 0:
         raise ParameterError(f"sr must be a positive sample rate in Hz, not {sr}")
     if y is None and S is None:

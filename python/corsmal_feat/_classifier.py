@@ -214,9 +214,15 @@ class Classifier(ClassifierMixin, BaseEstimator):
             raise ModelError(f"{path} holds {steps}, not {cls._name}: use load_model")
         back = {new: old for old, new in cls._renamed.items()}
         params = {back.get(k, k): v for k, v in spec["parameters"].items()}
+        classes = class_labels(header)
+        if isinstance(params.get("class_weight"), list):
+            # By name, for a later `fit` with other labels.
+            params["class_weight"] = dict(
+                zip(classes.tolist(), params["class_weight"], strict=True)
+            )
         estimator = cls(**{k: v for k, v in params.items() if k in cls._get_param_names()})
         estimator._model = model
-        estimator.classes_ = class_labels(header)
+        estimator.classes_ = classes
         estimator.n_features_in_ = model.n_features()
         if header["feature_names"]:
             estimator.feature_names_in_ = np.asarray(header["feature_names"], dtype=object)

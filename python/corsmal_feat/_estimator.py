@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from array import array
@@ -110,7 +111,7 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
         for position, recording in enumerate(recordings):
             if not _is_path(recording):
                 _signal(recording, position)
-        self._names = self._compute(recordings[:1]).names
+        self._names = self._first(recordings).names
         self._formats = self._formats_of(recordings)
         self._given = array("Q")
         return self
@@ -212,6 +213,16 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
                 'set={"summary.stats": ["mean", "std"]} adds one'
             )
         return config, overrides
+
+    def _first(self, recordings: list[Any]) -> _Computed:
+        """The features of the first recording, or of the first that has some."""
+        if self.errors == "nan":
+            readable = [recording for recording in recordings if self._format(recording)]
+            for recording in readable:
+                with contextlib.suppress(DecodeError):
+                    return self._compute([recording])
+            return self._compute(recordings)
+        return self._compute(recordings[:1])
 
     def _compute(self, recordings: list[Any]) -> _Computed:
         config, overrides = self._configuration()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
@@ -35,7 +35,7 @@ def lengths(outcomes: list[dict[str, Any]]) -> list[tuple[str, float]]:
     return [(row["path"], row["decoded_frames"] / row["sample_rate"]) for row in good]
 
 
-@dataclass(repr=False)
+@dataclass(repr=False, eq=False)
 class Features:
     """The output of a run (see `load_features`).
 
@@ -137,7 +137,7 @@ class Features:
         return iter(self.ids)
 
     def __contains__(self, recording: object) -> bool:
-        return recording in self._rows
+        return isinstance(recording, Hashable) and recording in self._rows
 
     @cached_property
     def _rows(self) -> dict[object, int]:
@@ -145,15 +145,15 @@ class Features:
         return {recording: row for row, recording in enumerate(self.ids)}
 
     def __getitem__(self, recording: str) -> Any:
-        if self.summary is None and recording in self.arrays:
-            return self.arrays[recording]
-        if recording not in self._rows:
+        if recording not in self:
             near = isinstance(recording, str)
             close = [i for i in self.ids if near and (recording in i or i in recording)][:3]
             hint = f"; did you mean {', '.join(map(repr, close))}?" if close else ""
             raise UnknownIdError(
                 f"none of the {len(self.ids)} recordings has the id {recording!r}{hint}"
             )
+        if self.summary is None and recording in self.arrays:
+            return self.arrays[recording]
         if self.summary is None:
             # A recording may be too short for any frame.
             return {} if len(self.config["features"]) > 1 else np.empty((0, 0, 0), np.float32)

@@ -41,6 +41,8 @@ class Members(MutableMapping[str, Any]):
 
     def __init__(self, archive: Any, name: str, members: dict[str, Names]) -> None:
         self._archive, self._name = archive, name
+        # The folder may be left before it is opened again.
+        self._path = os.path.abspath(getattr(archive.zip.fp, "name", name))
         self._process = os.getpid()
         self._members = members
         self._read: dict[str, Any] = {}
@@ -62,10 +64,10 @@ class Members(MutableMapping[str, Any]):
         file = self._archive.zip.fp
         if hasattr(file, "name"):
             try:
-                ours, there = os.fstat(file.fileno()), os.stat(file.name)
+                ours, there = os.fstat(file.fileno()), os.stat(self._path)
                 if (ours.st_dev, ours.st_ino) != (there.st_dev, there.st_ino):
                     raise FileNotFoundError
-                self._archive = np.load(file.name)
+                self._archive = np.load(self._path)
             except OSError as error:
                 raise ParameterError(
                     f"{self._name} was moved or replaced after it was loaded: load it again"

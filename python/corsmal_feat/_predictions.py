@@ -16,7 +16,7 @@ from ._refusals import destination, refuses
 StrPath = str | os.PathLike[str]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Predictions:
     """Predictions of recordings, as in the files that the command writes.
 

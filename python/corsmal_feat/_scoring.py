@@ -29,7 +29,7 @@ __all__ = [
 FOLDERS = "folders"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CrossValidation:
     """Scores on held-out rows.
 

@@ -189,3 +189,17 @@ def test_weights_of_classes_that_do_not_exist_are_refused(kind: str) -> None:
     # One of all classes may be missing in a fold.
     for weights in ({"Rain": 5}, {"Rain": 5, "Dog": 1, "x": 3}, {}):
         getattr(classifiers, kind)(class_weight=weights).fit(x, y)
+
+
+def test_weights_of_classes_keep_their_names(tmp_path: Path) -> None:
+    """After loading, they stood for the labels of any other training."""
+    x = np.random.default_rng(0).standard_normal((60, 2))
+    classes = np.digitize(x[:, 0], [-0.4, 0.4])
+    weights = {"a": 5.0, "b": 1.0, "c": 0.1}
+    classifiers.SVC(class_weight=weights).fit(x, np.array(list("abc"))[classes]).save(
+        tmp_path / "c.model"
+    )
+    loaded = classifiers.SVC.load(tmp_path / "c.model")
+    assert loaded.class_weight == weights
+    with pytest.raises(ParameterError, match=r"class_weight has .* no label in y"):
+        loaded.fit(x, np.array(list("xyz"))[classes])

@@ -202,6 +202,12 @@ def test_rows_of_nan(folder: Path) -> None:
     assert np.isnan(around[0]).all() and np.array_equal(around[1:], rows[[0, 2]])
     with pytest.raises(cf.DecodeError, match="no such file"):
         cf.FeatureExtractor("esc26", errors="nan").fit_transform([str(folder / "gone.wav")])
+    # Names of columns come from the first recording that has features.
+    for first in ("bad.wav", "gone.wav"):
+        extractor = cf.FeatureExtractor("esc26", errors="nan")
+        assert len(extractor.fit([str(folder / first), *paths]).get_feature_names_out()) == 26
+    with pytest.raises(cf.DecodeError, match=r"bad\.wav: not_audio"):
+        cf.FeatureExtractor("esc26", errors="nan").fit([str(folder / "bad.wav")])
     with pytest.raises(cf.ParameterError, match="'raise' or 'nan'"):
         cf.FeatureExtractor("esc26", errors="skip").fit_transform(paths)
 
@@ -395,3 +401,12 @@ def test_whole_numbers_are_features_where_they_are_named_so(tmp_path: Path) -> N
         pq.write_table(pa.table(columns), path, compression=codec)
         with pytest.raises(cf.ParameterError, match=f"snappy or zstd .*a column with {codec}"):
             cf.cross_validate(path, "y", cv=2)
+
+
+def test_features_are_compared_as_objects_and_found_by_id(folder: Path) -> None:
+    features = cf.extract([folder / "a.wav"], preset="mfcc-zcr")
+    assert features == features and features != cf.extract([folder / "a.wav"], preset="mfcc-zcr")
+    for no_id in (slice(0, 1), [1], {}):
+        assert no_id not in features
+        with pytest.raises(cf.UnknownIdError):
+            features[no_id]  # type: ignore[index]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -185,3 +186,32 @@ def test_what_was_odd_is_told(tmp_path: Path, recordings: dict[str, Path]) -> No
     with pytest.warns(UserWarning, match="ends after"):
         y, _ = cf.load(cut, sr=None)
     assert 0 < len(y) < 30000
+
+
+@pytest.mark.parametrize("frames", [50000, 200000])
+def test_durations_are_those_of_the_samples(tmp_path: Path, frames: int) -> None:
+    """Lengths in the headers of cut and joined files were taken for theirs."""
+    # Long enough for FLAC to be looked at in several places.
+    noise = 0.1 * np.random.default_rng(5).standard_normal((frames, 2))
+    for name in ("a.flac", "a.mp3", "a.ogg"):
+        path = tmp_path / name
+        soundfile.write(path, noise, RATE)
+        whole = path.read_bytes()
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            assert cf.get_duration(path=path) == pytest.approx(frames / RATE, abs=1e-9)
+        other = tmp_path / f"other-{name}"
+        kinds = {"half": whole[: len(whole) // 2], "noise": whole + bytes(999)}
+        if not name.endswith("ogg"):
+            kinds |= {"two": 2 * whole, "five": 5 * whole}
+        for kind, content in kinds.items():
+            other.write_bytes(content)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                samples, rate = cf.load(other, sr=None, mono=False)
+                found = cf.get_duration(path=other)
+            assert found == samples.shape[-1] / rate, (name, kind)
+        if name.endswith("flac"):
+            other.write_bytes(kinds["half"])
+            with pytest.warns(UserWarning, match="the file ends after"):
+                cf.get_duration(path=other)

@@ -145,3 +145,21 @@ def test_forked_processes_read_one_file(tmp_path: Path) -> None:
     assert [faults.get(timeout=60) for _ in processes] == [""] * 4
     for process in processes:
         process.join()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_fork_in_another_folder_reads_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(tmp_path / "x.wav", 1)
+    monkeypatch.chdir(tmp_path)
+    corsmal_feat.extract(["x.wav"], config="[features.rms]\n", out="f.npz")
+    features = corsmal_feat.load_features("f.npz")
+    (tmp_path / "sub").mkdir()
+    monkeypatch.chdir("sub")
+    child = os.fork()
+    if child == 0:
+        try:
+            os._exit(0 if features["x"].size else 1)
+        except BaseException:
+            os._exit(2)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0

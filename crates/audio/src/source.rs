@@ -112,6 +112,15 @@ pub trait BlockSource: Send {
         self.spec().declared_frames
     }
 
+    /// Frames of the recording, where the end of the file bears out what its header says; `None` where
+    /// only decoding tells. Nothing is decoded, and the place stays.
+    ///
+    /// # Errors
+    /// Reading or seeking failed.
+    fn confirmed_frames(&mut self) -> Result<Option<u64>, AudioError> {
+        Ok(self.most_frames().filter(|_| self.seekable()))
+    }
+
     /// The byte of the file at which `frame` begins, where frames lie side by side in it.
     fn byte_of(&self, _frame: u64) -> Option<u64> {
         None

@@ -25,6 +25,11 @@ pub(crate) trait Stream: Send {
     /// comes instead. Notes in `report` what it worked around.
     fn next(&mut self, samples: &mut Vec<f32>, report: &mut ReadReport)
     -> Result<Next, AudioError>;
+
+    /// Whether the input ends where its header says, without decoding. It stays where it is.
+    fn ends_as_declared(&mut self) -> Result<bool, AudioError> {
+        Ok(false)
+    }
 }
 
 /// Hands out the samples of a stream.
@@ -132,6 +137,12 @@ impl<S: Stream> BlockSource for StreamSource<S> {
 
     fn seek(&mut self, _: u64) -> Result<(), AudioError> {
         Err(AudioError::NotSeekable)
+    }
+
+    fn confirmed_frames(&mut self) -> Result<Option<u64>, AudioError> {
+        let Some(stream) = self.stream.as_mut() else { return Ok(None) };
+        let is_so = stream.ends_as_declared()?;
+        Ok(self.spec.declared_frames.filter(|_| is_so))
     }
 
     fn health(&self) -> &ReadReport {

@@ -72,10 +72,10 @@ pub(crate) fn run(
         if goes_on { Ok(()) } else { Err(NetError::Stopped { epochs: epochs.len() }) }
     };
     tell(&epochs, None)?;
-    let is_short = is_short(course, recipe);
+    let is_short = is_short(course, trainer.network, recipe);
     for epoch in resumed..recipe.epochs {
         let mut sum = 0.0;
-        let steps = steps_of(course.train, recipe, epoch);
+        let steps = steps_of(course.train, trainer.network, recipe, epoch);
         let all = (recipe.epochs * steps.len()) as u64;
         for (step, rows) in steps.iter().enumerate() {
             tell(&epochs, Some(step))?;
@@ -114,8 +114,8 @@ pub(crate) fn run(
 }
 
 /// Whether a training ends before running statistics have settled.
-fn is_short(course: &Course<'_>, recipe: &Recipe) -> bool {
-    recipe.epochs * steps_of(course.train, recipe, 0).len() < SETTLED
+fn is_short(course: &Course<'_>, network: &Network, recipe: &Recipe) -> bool {
+    recipe.epochs * steps_of(course.train, network, recipe, 0).len() < SETTLED
 }
 
 /// Steps after which running statistics have forgotten what they began with.
@@ -133,7 +133,7 @@ fn settle(course: &Course<'_>, network: &mut Network, recipe: &Recipe) -> Result
         network.parameters_mut().get_mut(name).values_mut().fill(0.0);
     }
     let (mut sums, mut items) = (HashMap::<String, Vec<f64>>::new(), 0.0);
-    for rows in steps_of(course.train, recipe, recipe.epochs) {
+    for rows in steps_of(course.train, network, recipe, recipe.epochs) {
         let chance = Stream::new(recipe.seed, "offset").part(recipe.epochs as u64);
         let inputs = course.items.laid(network, &rows, recipe, chance);
         let targets = course.targets.pick(&rows, network.outputs());
@@ -190,7 +190,7 @@ fn trial(
     recipe: &Recipe,
     settings: &StepSettings,
 ) -> Result<Duration> {
-    let rows = &steps_of(course.train, recipe, 0)[0];
+    let rows = &steps_of(course.train, network, recipe, 0)[0];
     let inputs = course.items.laid(network, rows, recipe, Stream::new(recipe.seed, "offset"));
     let targets = course.targets.pick(rows, network.outputs());
     let step =
@@ -203,28 +203,66 @@ fn trial(
     step()?;
     let work = |rows: &[usize]| rows.iter().map(|&r| course.items.work(r)).sum::<usize>() as f64;
     // Evaluation takes about a third of a step.
-    let is_settled =
-        is_short(course, recipe) && !course.watched.is_empty() && !running(network).is_empty();
+    let is_settled = is_short(course, network, recipe)
+        && !course.watched.is_empty()
+        && !running(network).is_empty();
     let settling = if is_settled { work(course.train) } else { 0.0 };
     let all = (work(course.train) + work(course.watched) / 3.0 + settling) / work(rows).max(1.0);
     Ok(began.elapsed().mul_f64(all * recipe.epochs as f64))
 }
 
-/// The rows of each step of an epoch.
-fn steps_of(train: &[usize], recipe: &Recipe, epoch: usize) -> Vec<Vec<usize>> {
+/// The rows of each step of an epoch. A last batch that is too small for the network joins the one before.
+fn steps_of(train: &[usize], network: &Network, recipe: &Recipe, epoch: usize) -> Vec<Vec<usize>> {
     let order = Stream::new(recipe.seed, "order").part(epoch as u64).permutation(train.len());
     let rows: Vec<usize> = order.into_iter().map(|i| train[i]).collect();
     let whole = rows.len() / recipe.batch * recipe.batch;
     let used = if recipe.drop_last { whole } else { rows.len() };
-    rows[..used].chunks(recipe.batch).map(<[usize]>::to_vec).collect()
+    let mut steps: Vec<Vec<usize>> =
+        rows[..used].chunks(recipe.batch).map(<[usize]>::to_vec).collect();
+    if let [.., before, last] = &mut steps[..]
+        && last.len() < network.fewest_items()
+    {
+        before.append(last);
+        steps.pop();
+    }
+    steps
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::batch::Batch;
     use crate::fit::{self, Task};
     use crate::items::{Column, Items};
     use crate::networks;
+
+    /// The last batch of one item set the variance of each number to nine tenths, and the network stored that.
+    #[test]
+    fn a_single_item_joins_the_batch_before_it() {
+        let rows: Vec<usize> = (0..9).collect();
+        let lengths = |name: &str, batch: usize| -> Vec<usize> {
+            let definition = networks::named(name).unwrap();
+            let network = definition.build(None, 0).unwrap();
+            let recipe = Recipe { batch, ..definition.recipe };
+            steps_of(&rows, &network, &recipe, 0).iter().map(Vec::len).collect()
+        };
+        assert_eq!(lengths("m2_capacity", 8), [9]);
+        assert_eq!(lengths("m2_capacity", 4), [4, 5]);
+        assert_eq!(lengths("m2_capacity", 7), [7, 2]);
+        // An image has a variance of its own.
+        assert_eq!(lengths("m4_type", 8), [8, 1]);
+
+        let network = networks::named("m2_capacity").unwrap().build(None, 0).unwrap();
+        let one: Vec<Batch> = network
+            .inputs()
+            .iter()
+            .map(|input| Batch::new(vec![0.5; input.shape.len()], input.shape))
+            .collect();
+        let targets = crate::loss::Targets::Numbers(vec![1.0]);
+        let loss = crate::loss::Loss::Mse;
+        let refused = network.gradients(&one, &targets, &loss, &[], None).unwrap_err().to_string();
+        assert!(refused.contains("at least 2 items") && refused.contains("has 1"), "{refused}");
+    }
 
     /// Trained to a loss near 0, the network gave every recording the same class: what it had learned by the statistics
     /// of its batches was nothing by the running ones.

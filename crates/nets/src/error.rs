@@ -94,6 +94,18 @@ pub enum NetError {
         /// frames of a window
         needed: usize,
     },
+    /// A training step on too few items.
+    #[error(
+        "{network} trains on batches of at least {needed} items, whose variance it needs; this one has {items}"
+    )]
+    FewItems {
+        /// the network
+        network: String,
+        /// items of the batch
+        items: usize,
+        /// items that it needs
+        needed: usize,
+    },
     /// A training that needs more memory than is free.
     #[error(
         "the training needs about {:.1} GiB of memory, but {:.1} GiB are free: a smaller batch or \

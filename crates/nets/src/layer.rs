@@ -32,6 +32,16 @@ pub trait Layer: Debug + Send + Sync {
     /// [`crate::NetError::LayerInput`] for a shape that it cannot take.
     fn output(&self, input: Shape) -> Result<Shape>;
 
+    /// Whether it drops numbers in training.
+    fn drops(&self) -> bool {
+        false
+    }
+
+    /// Items that a training step needs at least.
+    fn fewest_items(&self, _: Shape) -> usize {
+        1
+    }
+
     /// Numbers that a training step holds for each item on account of this layer, roughly: what comes
     /// after it, and the gradient by that.
     fn kept(&self, input: Shape) -> usize {
@@ -57,6 +67,16 @@ pub trait Layer: Debug + Send + Sync {
 
 /// Layers one after another.
 pub type Chain = Vec<Box<dyn Layer>>;
+
+/// Items that a training step needs at least on account of these layers.
+pub(crate) fn fewest_for(layers: &[Box<dyn Layer>], input: Shape) -> usize {
+    let (mut shape, mut most) = (input, 1);
+    for layer in layers {
+        most = most.max(layer.fewest_items(shape));
+        shape = layer.output(shape).unwrap_or(shape);
+    }
+    most
+}
 
 /// Numbers that a training step holds for each item on account of these layers; see [`Layer::kept`].
 pub(crate) fn kept_by(layers: &[Box<dyn Layer>], input: Shape) -> usize {

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use crate::batch::{Batch, Shape};
 use crate::device::Device;
 use crate::error::{NetError, Result};
-use crate::layer::{Backward, Chain, Layer, Pass, Training, kept_by, passing_by};
+use crate::layer::{Backward, Chain, Layer, Pass, Training, fewest_for, kept_by, passing_by};
 use crate::loss::{Loss, Targets};
 use crate::matrix::Matrix;
 use crate::parameters::{Declared, Initial, Parameters};
@@ -159,6 +159,12 @@ impl Network {
         lines
     }
 
+    /// Items that a training step needs at least: two where a batch is normalised number by number.
+    pub(crate) fn fewest_items(&self) -> usize {
+        let chains = self.architecture.body.chains().iter().zip(self.inputs());
+        chains.map(|(chain, input)| fewest_for(chain, input.shape)).max().unwrap_or(1)
+    }
+
     /// Numbers that a training step holds for an item of these input shapes, roughly.
     pub(crate) fn kept(&self, shapes: &[Shape]) -> usize {
         let chains = self.architecture.body.chains().iter().zip(shapes);
@@ -288,6 +294,10 @@ impl Network {
         dropout: Option<Stream>,
     ) -> Result<Gradients> {
         self.check(inputs)?;
+        let (items, needed) = (inputs[0].items(), self.fewest_items());
+        if items < needed {
+            return Err(NetError::FewItems { network: self.name.clone(), items, needed });
+        }
         let chains = self.chains(self.through_activation);
         match &self.device {
             Device::Cpu => {}

@@ -118,10 +118,9 @@ impl PyRecording {
         py.detach(work).map_err(decode_error)
     }
 
-    /// Frames according to the header, where it says so.
-    #[getter]
-    fn declared_frames(&self) -> Option<u64> {
-        self.source().most_frames()
+    /// Frames by the header, where the end of the file bears it out.
+    fn confirmed_frames(&self, py: Python<'_>) -> PyResult<Option<u64>> {
+        py.detach(|| self.source().confirmed_frames()).map_err(decode_error)
     }
 
     /// What was odd so far, in words.

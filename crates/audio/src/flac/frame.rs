@@ -1,6 +1,6 @@
 //! Frame headers of FLAC (RFC 9639, section 9.1).
 
-use symphonia::core::checksum::Crc8Ccitt;
+use symphonia::core::checksum::{Crc8Ccitt, Crc16Ansi};
 use symphonia::core::io::Monitor;
 
 /// Longest frame header.
@@ -33,6 +33,22 @@ pub(super) enum Number {
 /// Whether the mark of a frame is here, which may be chance.
 pub(super) fn may_start(bytes: &[u8]) -> bool {
     matches!(bytes, [0xff, 0xf8 | 0xf9, ..])
+}
+
+/// The first header of a frame, of those that are admitted.
+pub(super) fn first(bytes: &[u8], admits: impl Fn(&Header) -> bool) -> Option<Header> {
+    let starts = (0..bytes.len()).filter(|&at| may_start(&bytes[at..]));
+    starts.filter_map(|at| Header::parse(&bytes[at..])).find(admits)
+}
+
+/// The header of the frame that ends with these bytes, by its checksums.
+pub(super) fn last(bytes: &[u8]) -> Option<Header> {
+    let starts = (0..bytes.len()).rev().filter(|&at| may_start(&bytes[at..]));
+    starts.filter_map(|at| Some((at, Header::parse(&bytes[at..])?))).find_map(|(at, header)| {
+        let mut crc = Crc16Ansi::new(0);
+        crc.process_buf_bytes(&bytes[at..]);
+        (crc.crc() == 0).then_some(header)
+    })
 }
 
 impl Header {

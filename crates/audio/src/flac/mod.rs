@@ -25,6 +25,8 @@ const EXPECTED: &str = "FLAC frames with right checksums";
 const MAX_ENDS: usize = 16;
 /// Bytes that may be searched in vain for each byte of the file.
 const PATIENCE: u64 = 64;
+/// Parts of a file between which its frames are looked at.
+const PROBES: u64 = 5;
 /// Shortest frame: header of 6 bytes, a constant of 2, checksum of 2.
 const MIN_FRAME: usize = 10;
 /// Bytes of a frame that are looked at first; most frames fit.
@@ -287,6 +289,35 @@ impl FlacStream {
         Ok(())
     }
 
+    /// Samples per channel up to the end of the last frame, if it ends the file and frames in between have
+    /// growing numbers: those of joined recordings begin again. `None` for short files, too.
+    fn end_by_probes(&mut self, len: u64) -> Result<Option<u64>, AudioError> {
+        let (begin, info) = (self.input.position(), self.info);
+        let most = info.max_frame(info.block);
+        let length = len.saturating_sub(begin);
+        if length / PROBES < 2 * most as u64 {
+            return Ok(None);
+        }
+        let start = |header: &Header| match header.number {
+            Number::Sample(n) => n,
+            Number::Frame(n) => n * u64::from(info.block),
+        };
+        let mut before = None;
+        for probe in 1..PROBES {
+            self.input.seek(begin + length / PROBES * probe)?;
+            let found = frame::first(self.input.peek(2 * most)?, |header| info.admits(header));
+            let Some(found) = found.map(|header| start(&header)) else { return Ok(None) };
+            if before.is_some_and(|before| found <= before) {
+                return Ok(None);
+            }
+            before = Some(found);
+        }
+        self.input.seek(len - most as u64)?;
+        let last = frame::last(self.input.peek(most)?).filter(|header| info.admits(header));
+        let last = last.filter(|header| before.is_none_or(|before| before <= start(header)));
+        Ok(last.map(|header| start(&header) + u64::from(header.block)))
+    }
+
     /// Notes where a part has not the length declared.
     fn finish(&self, report: &mut ReadReport) -> Result<(), AudioError> {
         let begin = self.part.begin;
@@ -340,5 +371,15 @@ impl Stream for FlacStream {
             }
         }
         Ok(Next::Samples)
+    }
+
+    fn ends_as_declared(&mut self) -> Result<bool, AudioError> {
+        let Some((len, declared)) = self.input.len().zip(self.info.declared) else {
+            return Ok(false);
+        };
+        let back = self.input.position();
+        let end = self.end_by_probes(len)?;
+        self.input.seek(back)?;
+        Ok(end == Some(declared))
     }
 }

@@ -25,6 +25,8 @@ pub(crate) use sync::{WINDOW, find, find_free};
 
 const EXPECTED: &str = "MPEG audio of layers 1 to 3";
 
+/// Bytes of a tag of ID3 version 1, at the end of a file.
+const ID3V1: u64 = 128;
 /// So many frames of free format may be damaged before their rate is held to be too high.
 const MOST_TOO_LARGE: usize = 8;
 
@@ -87,6 +89,9 @@ struct MpegStream {
     /// Whether any frame could be decoded.
     sounds: bool,
     ended: bool,
+    /// Where its first frame is, and the bytes of the frame that holds the tag.
+    begin: u64,
+    tagged: u64,
 }
 
 /// Opens MPEG audio at the position of `input`, where a frame begins.
@@ -112,6 +117,7 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn BlockSource>, AudioError>
     };
     let mut first = frames.next(&mut report)?.ok_or_else(no_frame)?;
     let tag = Tag::parse(&frames.input.peek(first.size)?[..first.size], &first);
+    let tagged = if tag.is_some() { first.size as u64 } else { 0 };
     if tag.is_some() {
         frames.input.consume(first.size);
         first = frames.next(&mut report)?.ok_or_else(no_frame)?;
@@ -141,6 +147,8 @@ pub(crate) fn open(mut input: Input) -> Result<Box<dyn BlockSource>, AudioError>
         silence: 0,
         sounds: false,
         ended: false,
+        begin: at,
+        tagged,
     };
     Ok(Box::new(StreamSource::new(stream, spec, report)))
 }
@@ -252,6 +260,15 @@ impl MpegStream {
 }
 
 impl Stream for MpegStream {
+    fn ends_as_declared(&mut self) -> Result<bool, AudioError> {
+        let said = self.part.tag.and_then(|tag| tag.bytes).map(u64::from);
+        let Some((bytes, len)) = said.zip(self.frames.input.len()) else { return Ok(false) };
+        // Counted with the frame of the tag or without it, before an ID3 tag or without one.
+        let end = self.begin + bytes;
+        let ends = [end, end + self.tagged];
+        Ok(ends.contains(&len) || ends.contains(&len.saturating_sub(ID3V1)))
+    }
+
     fn next(
         &mut self,
         samples: &mut Vec<f32>,

@@ -10,6 +10,8 @@ const DECODER_DELAY: u32 = 529;
 pub(crate) struct Tag {
     /// Frames that follow, where it says so.
     pub(crate) frames: Option<u32>,
+    /// Bytes from the frame of the tag to the end, where it says so; some writers do not count that frame.
+    pub(crate) bytes: Option<u32>,
     /// Samples per channel to drop at the start and at the end.
     pub(crate) trim: (u32, u32),
 }
@@ -40,6 +42,8 @@ impl Tag {
         let u32_at = |at: usize| Some(u32::from_be_bytes(*body.get(at..)?.first_chunk()?));
         let flags = u32_at(4)?;
         let frames = (flags & 1 != 0).then(|| u32_at(8)).flatten();
+        let at = if flags & 1 != 0 { 12 } else { 8 };
+        let bytes = (flags & 2 != 0).then(|| u32_at(at)).flatten();
         let fields = [(1, 4), (2, 4), (4, 100), (8, 4)];
         let at =
             8 + fields.iter().filter(|(bit, _)| flags & bit != 0).map(|(_, n)| n).sum::<usize>();
@@ -53,12 +57,13 @@ impl Tag {
             }
             _ => (0, 0),
         };
-        Some(Self { frames, trim })
+        Some(Self { frames, bytes, trim })
     }
 
     /// Fraunhofer's: "VBRI", u16 version, delay, quality, u32 bytes, frames.
     fn vbri(body: &[u8]) -> Option<Self> {
-        let frames = body.strip_prefix(b"VBRI")?.get(10..14)?.first_chunk()?;
-        Some(Self { frames: Some(u32::from_be_bytes(*frames)), trim: (0, 0) })
+        let fields = body.strip_prefix(b"VBRI")?;
+        let u32_at = |at: usize| Some(u32::from_be_bytes(*fields.get(at..)?.first_chunk()?));
+        Some(Self { frames: Some(u32_at(10)?), bytes: u32_at(6), trim: (0, 0) })
     }
 }

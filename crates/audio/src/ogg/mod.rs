@@ -275,6 +275,11 @@ fn queued(steps: &VecDeque<Step>) -> u64 {
 }
 
 impl Stream for OggStream {
+    fn ends_as_declared(&mut self) -> Result<bool, AudioError> {
+        // The length is that of its last page.
+        Ok(true)
+    }
+
     fn next(
         &mut self,
         samples: &mut Vec<f32>,

@@ -1,6 +1,6 @@
 //! AIFF and AIFF-C (Apple, 1989 and 1991).
 
-use super::extent::{Extent, beyond_end, is_placeholder, is_really_empty, to_end};
+use super::extent::{Extent, Sizes, beyond_end, is_placeholder, is_really_empty, to_end};
 use super::format::{Encoding, Endian, Format};
 use super::header::Header;
 use crate::error::AudioError;
@@ -77,7 +77,9 @@ pub(super) fn read(input: &mut Input) -> Result<Header, AudioError> {
             to_end(Repair::DataSizeUnknown, &mut repairs)
         }
         // The count of frames in COMM is filled in as late as this size.
-        0 if !is_really_empty(input, Endian::Big)? => to_end(Repair::DataSizeZero, &mut repairs),
+        0 if !is_really_empty(input, Sizes::Short(Endian::Big))? => {
+            to_end(Repair::DataSizeZero, &mut repairs)
+        }
         declared => Some(declared),
     };
     let extent = Extent::new(input, &format, declared, &mut repairs);

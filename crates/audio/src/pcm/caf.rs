@@ -1,6 +1,6 @@
 //! Apple's Core Audio Format, version 1.
 
-use super::extent::{Extent, beyond_end, to_end};
+use super::extent::{Extent, Sizes, beyond_end, is_really_empty, to_end};
 use super::format::{Encoding, Endian, Format};
 use super::header::Header;
 use crate::error::AudioError;
@@ -31,15 +31,20 @@ pub(super) fn read(input: &mut Input) -> Result<Header, AudioError> {
                 let Some((format, endian)) = description else {
                     return Err(AudioError::corrupt(at, "data before desc", "a desc chunk first"));
                 };
+                if !input.skip(12)? {
+                    break;
+                }
+                let is_bare = size == 0 && is_really_empty(input, Sizes::Long)?;
                 // Four bytes count the edits.
-                if !input.skip(16)? {
+                if !is_bare && !input.skip(4)? {
                     break;
                 }
                 let mut repairs = Vec::new();
                 let declared = match u64::try_from(size) {
+                    Ok(0) if is_bare => Some(0),
                     // Minus one says "until the end" by the format itself.
                     Err(_) => None,
-                    Ok(0..=4) if !input.peek(1)?.is_empty() => {
+                    Ok(0..=4) if !is_really_empty(input, Sizes::Long)? => {
                         to_end(Repair::DataSizeZero, &mut repairs)
                     }
                     Ok(size) => Some(size.saturating_sub(4)),

@@ -50,9 +50,29 @@ pub(super) fn to_end(repair: Repair, repairs: &mut Vec<Repair>) -> Option<u64> {
     None
 }
 
+/// How chunks say their size.
+#[derive(Clone, Copy)]
+pub(super) enum Sizes {
+    /// In 32 bits; chunks fill whole pairs of bytes.
+    Short(Endian),
+    /// In 64 bits, as CAF.
+    Long,
+}
+
+impl Sizes {
+    /// The name, the size, and the bytes of both, if a chunk begins here.
+    fn read(self, shown: &[u8]) -> Option<(&[u8; 4], u64, u64)> {
+        let (name, rest) = shown.split_first_chunk::<4>()?;
+        Some(match self {
+            Self::Short(endian) => (name, u64::from(endian.u32(*rest.first_chunk()?)), 8),
+            Self::Long => (name, u64::from_be_bytes(*rest.first_chunk()?), 12),
+        })
+    }
+}
+
 /// A data size of 0 is meant if nothing follows, or (where the input can be looked through) if
 /// chunks follow that end exactly with the file. Otherwise it was never filled in.
-pub(super) fn is_really_empty(input: &mut Input, endian: Endian) -> Result<bool, AudioError> {
+pub(super) fn is_really_empty(input: &mut Input, sizes: Sizes) -> Result<bool, AudioError> {
     if input.peek(1)?.is_empty() {
         return Ok(true);
     }
@@ -62,12 +82,13 @@ pub(super) fn is_really_empty(input: &mut Input, endian: Endian) -> Result<bool,
     let mut chunks = 0;
     let end = loop {
         let at = input.position();
-        let Some(&[i0, i1, i2, i3, s0, s1, s2, s3]) = input.peek(8)?.first_chunk::<8>() else {
-            break at;
+        let shown = input.peek(12)?;
+        let Some((name, size, head)) = sizes.read(shown) else { break at };
+        let named = name.iter().all(|b| (0x20..0x7f).contains(b));
+        let next = match sizes {
+            Sizes::Short(_) => (at + head).saturating_add(size + size % 2),
+            Sizes::Long => (at + head).saturating_add(size),
         };
-        let size = u64::from(endian.u32([s0, s1, s2, s3]));
-        let named = [i0, i1, i2, i3].iter().all(|b| (0x20..0x7f).contains(b));
-        let next = at + 8 + size + size % 2;
         chunks += 1;
         if !named || next > len + 1 || chunks > MAX_CHUNKS {
             break 0;

@@ -1,6 +1,6 @@
 //! WAV (RIFF, RIFX, RF64, BW64): finds `fmt ` and `data`, repairs what the policy allows.
 
-use super::extent::{Extent, beyond_end, is_placeholder, is_really_empty, to_end};
+use super::extent::{Extent, Sizes, beyond_end, is_placeholder, is_really_empty, to_end};
 use super::format::{Endian, Format};
 use super::header::Header;
 use crate::error::AudioError;
@@ -103,7 +103,7 @@ fn finish(
         repairs.push(Repair::DataSizeWrapped { declared, used });
         declared = used;
     }
-    let empty = declared == 0 && is_really_empty(input, endian)?;
+    let empty = declared == 0 && is_really_empty(input, Sizes::Short(endian))?;
     let declared = match declared {
         _ if unknown => to_end(Repair::DataSizeUnknown, &mut repairs),
         0 if !empty => to_end(Repair::DataSizeZero, &mut repairs),

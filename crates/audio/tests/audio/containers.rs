@@ -132,6 +132,23 @@ fn core_audio_format() {
     check(&caf(2, &little(), 200), "caf pcm_s16le", &["truncated"]);
 }
 
+/// Metadata behind no samples were samples.
+#[test]
+fn core_audio_without_samples() {
+    let info = b"info\0\0\0\0\0\0\0\x10\0\0\0\x01title\0hello\0";
+    for size in [0i64, 4] {
+        let mut bytes = caf(0, info, size);
+        if size == 0 {
+            // Not even the count of edits.
+            let at = bytes.len() - info.len() - 4;
+            bytes.drain(at..at + 4);
+        }
+        let found = read_file(bytes).unwrap();
+        assert!(found.samples.is_empty() && found.repairs().is_empty(), "{size} bytes of data");
+    }
+    check(&caf(2, &little(), 4), "caf pcm_s16le", &["data_size_zero"]);
+}
+
 /// Wave64; `size` is that of its data and of their header of 24 bytes.
 fn w64(size: u64) -> Vec<u8> {
     let rest = *b"\xf3\xac\xd3\x11\x8c\xd1\x00\xc0\x4f\x8e\xdb\x8a";

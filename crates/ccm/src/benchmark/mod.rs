@@ -97,6 +97,15 @@ pub struct BenchmarkOptions {
     pub made: Made,
 }
 
+/// What a benchmark came to.
+#[derive(Debug)]
+pub struct Finished {
+    /// The report.
+    pub report: Report,
+    /// Why systems are not in it.
+    pub failed: Vec<String>,
+}
+
 /// Runs the benchmark and writes `report.html`, `report.json`, `tables/`, `figures/`,
 /// `submissions/`, `models/` and `features/` below the output folder.
 ///
@@ -113,7 +122,7 @@ pub fn run(
     options: &BenchmarkOptions,
     progress: &(dyn Fn(&str) + Sync),
     stop: &Arc<AtomicBool>,
-) -> Result<Report> {
+) -> Result<Finished> {
     require_names(options)?;
     let mut slugs = HashSet::new();
     if let Some(twice) = options.baselines.iter().find(|b| !slugs.insert(b.slug())) {
@@ -141,7 +150,7 @@ pub fn run(
     for nowhere in given.filter(|a| !a.is_any()) {
         progress(&format!("{}: has no recording of this data set", nowhere.name));
     }
-    let cautions: Vec<String> =
+    let mut cautions: Vec<String> =
         options.capacities.iter().filter_map(CapacityTable::caution).collect();
     cautions.iter().for_each(|caution| progress(caution));
     let earlier = files::prepare(&options.out)?;
@@ -149,18 +158,31 @@ pub fn run(
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build();
     let pool = pool.map_err(|e| CcmError::Request(format!("{jobs} threads: {e}")))?;
     let outcomes = baselines(options, (&set, &rows), &pool, progress, stop)?;
-    let mut runs = Vec::new();
+    let (mut runs, mut failed) = (Vec::new(), Vec::new());
     if !options.systems.is_empty() {
         let (folder, how) = (options.out.join("features"), (options.jobs, options.seed));
         let tables = options.detections.as_deref();
         let work = Work::new(&set, &rows, &folder, tables, how, progress, stop)?;
         for system in &options.systems {
-            for run in system::run(system.as_ref(), &work, &rows)? {
-                files::write_run(&options.out, &run, &rows)?;
-                runs.push(run);
+            match system::run(system.as_ref(), &work, &rows) {
+                Ok(found) => {
+                    for run in found {
+                        files::write_run(&options.out, &run, &rows)?;
+                        runs.push(run);
+                    }
+                }
+                Err(CcmError::Request(reason)) => {
+                    progress(&format!("warning: {reason}; it is left out"));
+                    failed.push(reason);
+                }
+                Err(error) => return Err(error),
             }
         }
     }
+    if let (Some(first), true) = (failed.first(), outcomes.is_empty() && runs.is_empty()) {
+        return Err(CcmError::Request(first.clone()));
+    }
+    cautions.extend(failed.iter().map(|reason| format!("Left out: {reason}.")));
     files::write_random(&options.out, &rows, options.seed)?;
     let made = &options.made;
     let predicted = Predicted {
@@ -180,7 +202,7 @@ pub fn run(
     if let Some(caution) = earlier.caution(&options.out) {
         progress(&format!("warning: {}: {caution}", options.out.display()));
     }
-    Ok(report)
+    Ok(Finished { report, failed })
 }
 
 /// Refuses names of what is added whose files would replace each other.

@@ -175,7 +175,16 @@ pub(super) fn run(system: &dyn System, work: &Work<'_>, rows: &Rows) -> Result<V
     for (number, fold) in folds.iter().enumerate() {
         work.go_on()?;
         (work.progress)(&format!("{name}: fold {} of {}", number + 1, folds.len()));
-        let found = prepared.predict(&fold.train, &fold.test)?;
+        let found = prepared.predict(&fold.train, &fold.test);
+        let found = found.map_err(|error| match error {
+            CcmError::Request(reason) => CcmError::Request(format!(
+                "{reason} (fold {} of {}, trained on {} recordings)",
+                number + 1,
+                folds.len(),
+                fold.train.len()
+            )),
+            other => other,
+        })?;
         for (run, found) in runs.iter_mut().zip(found) {
             run.held_out.extend(fold.test.iter().copied().zip(found));
         }

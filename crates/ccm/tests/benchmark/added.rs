@@ -110,6 +110,7 @@ impl Adding {
         let said = std::sync::Mutex::new(Vec::new());
         let progress = |step: &str| said.lock().unwrap().push(step.to_string());
         let result = corsmal_ccm::benchmark::run(&options, &progress, &Arc::default());
+        let result = result.map(|finished| finished.report);
         (result, said.into_inner().unwrap())
     }
 

@@ -79,7 +79,10 @@ fn options(data: &Path, out: &Path, baselines: Vec<Baseline>) -> BenchmarkOption
 }
 
 fn run(options: &BenchmarkOptions) -> corsmal_ccm::Result<Report> {
-    corsmal_ccm::benchmark::run(options, &|_| {}, &Arc::new(AtomicBool::new(false)))
+    let finished =
+        corsmal_ccm::benchmark::run(options, &|_| {}, &Arc::new(AtomicBool::new(false)))?;
+    assert!(finished.failed.is_empty(), "{:?}", finished.failed);
+    Ok(finished.report)
 }
 
 #[test]

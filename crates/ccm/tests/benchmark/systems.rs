@@ -1,5 +1,8 @@
 //! A system that a caller brings along.
 
+use std::sync::{Arc, Mutex};
+
+use corsmal_ccm::CcmError;
 use corsmal_ccm::benchmark::{BenchmarkOptions, Estimate, Prepared, System, Work};
 use corsmal_ccm::synth::{self, Size};
 use corsmal_report::Cell;
@@ -48,6 +51,29 @@ impl Prepared for Ready<'_> {
     }
 }
 
+/// Cannot be trained.
+struct Failing;
+
+impl System for Failing {
+    fn name(&self) -> &'static str {
+        "M6"
+    }
+
+    fn prepare<'a>(&'a self, _: &'a Work<'a>) -> corsmal_ccm::Result<Box<dyn Prepared + 'a>> {
+        Ok(Box::new(Failing))
+    }
+}
+
+impl Prepared for Failing {
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    fn predict(&self, _: &[usize], _: &[usize]) -> corsmal_ccm::Result<Vec<Vec<Estimate>>> {
+        Err(CcmError::Request("M6: too few classes".into()))
+    }
+}
+
 #[test]
 fn a_system_is_run_on_containers_that_it_never_heard() {
     let dir = tempfile::tempdir().unwrap();
@@ -70,6 +96,22 @@ fn a_system_is_run_on_containers_that_it_never_heard() {
     }
     assert!(out.join("figures/m4-type-confusion.svg").exists());
     assert!(!out.join("figures/m4-level-confusion.svg").exists());
+
+    // One that fails does not take the others with it.
+    let systems: Vec<Box<dyn System>> = vec![Box::new(Failing), Box::new(Constant)];
+    let two = BenchmarkOptions { systems, ..options(&data, &out, Vec::new()) };
+    let said = Mutex::new(Vec::new());
+    let progress = |step: &str| said.lock().unwrap().push(step.to_owned());
+    let finished = corsmal_ccm::benchmark::run(&two, &progress, &Arc::default()).unwrap();
+    let reason = "M6: too few classes (fold 1 of 3, trained on 76 recordings)";
+    assert_eq!(finished.failed, [reason]);
+    assert!(said.lock().unwrap().contains(&format!("warning: {reason}; it is left out")));
+    let texts: Vec<_> = finished.report.sections.iter().flat_map(|s| &s.text).collect();
+    assert!(texts.contains(&&format!("Left out: {reason}.")), "{texts:?}");
+    assert!(texts.iter().any(|t| *t == "M4 of this run: it always says rice."));
+    let systems: Vec<Box<dyn System>> = vec![Box::new(Failing)];
+    let alone = BenchmarkOptions { systems, ..options(&data, &out, Vec::new()) };
+    assert_eq!(run(&alone).unwrap_err().to_string(), reason);
 
     let systems: Vec<Box<dyn System>> = vec![Box::new(Constant), Box::new(Constant)];
     let twice = BenchmarkOptions { systems, ..options(&data, &out, Vec::new()) };

@@ -6,14 +6,16 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use corsmal_ccm::CcmError;
-use corsmal_ccm::benchmark::{self, Baseline, BenchmarkOptions, CapacityTable, Made, System};
+use corsmal_ccm::benchmark::{
+    self, Baseline, BenchmarkOptions, CapacityTable, Finished, Made, System,
+};
 use corsmal_ccm::capacity::{self, CapacityOptions, Method};
 use corsmal_report::{Cell, Report, Row, Source};
 use corsmal_vision::cuboid::Outliers;
 use corsmal_vision::lode::Variant;
 
 use crate::args::Jobs;
-use crate::failure::{Failure, INTERRUPTED};
+use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
 use crate::made;
 use crate::paragraphs::wrapped;
 
@@ -26,7 +28,8 @@ use crate::paragraphs::wrapped;
                         --capacity m5 --capacity fused=fused.capacity --capacity M2=m2.csv\n\nSystems are trained on whole containers \
                         held out in three folds, with their published recipes; `corsmal-feat nets` \
                         lists them.\n\nThe report is report/report.html; the same tables \
-                        are in report/tables and report/report.json.")]
+                        are in report/tables and report/report.json. Exit code 1: a system could not be trained on these data \
+                        and was left out.")]
 pub struct Args {
     /// Folder of the data set.
     #[arg(long, value_name = "DIR")]
@@ -71,7 +74,7 @@ pub struct Args {
     /// and --capacity; by default `detections/` next to each recording's audio folder.
     #[arg(long, value_name = "DIR")]
     detections: Option<PathBuf>,
-    /// Seed of the forests and of the pseudo-random estimates.
+    /// Seed of the forests, of the networks and votes of systems, and of the pseudo-random estimates.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
@@ -269,9 +272,9 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
             eprintln!("{step}");
         }
     };
-    let report = match benchmark::run(&options, &progress, stop) {
+    let Finished { report, failed } = match benchmark::run(&options, &progress, stop) {
         Err(error @ CcmError::Interrupted) => return interrupted(error),
-        report => report?,
+        finished => finished?,
     };
     if args.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
@@ -282,7 +285,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         }
         println!("{}", options.out.join("report.html").display());
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(if failed.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(FAILED_FILES) })
 }
 
 /// The scores of capacity and filling mass, and the error of the weight, of the methods that

@@ -78,6 +78,11 @@ impl Layer for BatchNorm {
         (input.numbers() == self.channels).then_some(input).ok_or_else(refusal)
     }
 
+    fn fewest_items(&self, input: Shape) -> usize {
+        // One number of a channel has no variance.
+        if input.len() == self.channels { 2 } else { 1 }
+    }
+
     fn forward(&self, mut input: Batch, pass: &mut Pass<'_>) -> Batch {
         let parameters = pass.parameters;
         let numbers = |what| parameters.get(&self.key(what)).values();

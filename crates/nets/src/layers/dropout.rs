@@ -22,6 +22,10 @@ impl Layer for Dropout {
         Ok(input)
     }
 
+    fn drops(&self) -> bool {
+        true
+    }
+
     fn forward(&self, mut input: Batch, pass: &mut Pass<'_>) -> Batch {
         let Some(training) = &mut pass.training else { return input };
         let stream = training.next_dropout();

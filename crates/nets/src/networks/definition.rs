@@ -74,6 +74,7 @@ impl Definition {
         let layers = (self.architecture)(self.outputs);
         let is_sequence = |input: &Input| matches!(input.shape, Shape::Sequence { .. });
         let takes_sequences = layers.inputs.iter().any(is_sequence);
+        let drops = layers.body.layers().any(|layer| layer.drops());
         let unused = [
             (
                 recipe.optimizer == OptimizerKind::Adam && recipe.momentum != 0.0,
@@ -86,6 +87,18 @@ impl Definition {
             (
                 recipe.padding == Padding::Published && !takes_sequences,
                 ("padding", "published".into(), "masked: the network takes no sequences"),
+            ),
+            (
+                recipe.padding == Padding::Published && recipe.offset == Offset::Random,
+                (
+                    "padding",
+                    "published".into(),
+                    "masked with offset=random, which fills with zeros",
+                ),
+            ),
+            (
+                !recipe.dropout && !drops,
+                ("dropout", "false".into(), "true: the network has no dropout"),
             ),
             (
                 recipe.offset == Offset::Random && !takes_sequences,

@@ -341,3 +341,24 @@ fn numbers_that_are_not_finite_end_the_training_or_the_prediction() {
     let after: Vec<f32> = network.parameters().iter().flat_map(|(_, v)| v.to_vec()).collect();
     assert!(after == before, "as it was");
 }
+
+/// They were taken, and recorded in the model.
+#[test]
+fn settings_without_effect_are_refused() {
+    let refused = |name: &str, changes: Value| {
+        let definition = networks::named(name).unwrap();
+        definition.recipe_with(changes.as_object().unwrap()).map_err(|e| e.to_string())
+    };
+    let both = json!({"padding": "published", "offset": "random"});
+    let reason = refused("attention_gru", both).unwrap_err();
+    assert!(reason.contains("padding"), "{reason}");
+    assert!(refused("attention_gru", json!({"padding": "published"})).is_ok());
+    assert!(refused("attention_gru", json!({"offset": "random"})).is_ok());
+    for name in ["m5_vggish_level", "m3_mlp", "m6_action"] {
+        let reason = refused(name, json!({"dropout": false})).unwrap_err();
+        assert!(reason.contains("the network has no dropout"), "{reason}");
+    }
+    for name in ["m1", "m4_level"] {
+        assert!(refused(name, json!({"dropout": false})).is_ok(), "{name}");
+    }
+}

@@ -142,6 +142,10 @@ impl Recurrent {
 }
 
 impl Layer for Recurrent {
+    fn drops(&self) -> bool {
+        self.layers > 1 && self.dropout > 0.0
+    }
+
     fn describe(&self) -> String {
         let Self { name, inputs, hidden, layers, .. } = self;
         let mut text = format!(
